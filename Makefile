@@ -15,6 +15,7 @@ export PIP_BUILD_CONSTRAINT := constraints.txt
 BIN := .venv/bin
 USE := .venv/.stamp-use# hsp_control and what it needs are installed
 STAMP := .venv/.stamp# what tests and development need, too
+ENGINE := .venv/.engine# what is compiled is as new as its sources
 WORKERS ?= 2# processes that `make test` uses
 CONFIGS ?=# whose machine code `make wheel` compiles; by default that of all
 ARGS ?=# further arguments of pytest, as in `make test ARGS="-k spline"`
@@ -30,7 +31,7 @@ demo test test-system thorough docs wheel-test: export PYTHONDONTWRITEBYTECODE :
 # Without the field its terms weigh nothing: both runs log the same distance.
 LOOK := --set 'title=The same hand path. Only one elbow avoids the ball.' \
   --set 'view.background="\#10171E"'
-demo: $(USE) ## the paper's run, and a Panda under a ball, with and without its field
+demo: $(USE) $(ENGINE) ## the paper's run, and a Panda under a ball, with and without its field
 	@echo "Running paper/4_moving_obstacle; the first run compiles its kernels, once ..."
 	@$(BIN)/hsp run paper/4_moving_obstacle --out out/demo
 	@$(BIN)/hsp plot out/demo/4_moving_obstacle.npz --out out/demo
@@ -48,31 +49,31 @@ demo: $(USE) ## the paper's run, and a Panda under a ball, with and without its 
 	@echo "The paper's log and figures are in out/demo, too."
 
 ##@ Check
-quick: $(STAMP) ## what to run after every edit: a minute of CPU
+quick: $(STAMP) $(ENGINE) ## what to run after every edit: a minute of CPU
 	@$(BIN)/python -m pytest tests/unit -m "not slow and not process and not browser" \
 	  $(ARGS)
 
 # A file's tests stay in one process, which makes what they share once.
 SPREAD := -n $(WORKERS) --dist loadfile --no-loadscope-reorder
-test: $(STAMP) ## run the tests
+test: $(STAMP) $(ENGINE) ## run the tests
 	@$(BIN)/python -m pytest $(SPREAD) -m "not system" $(ARGS)
 
-test-system: $(STAMP) ## run those of browsers, notebooks, processes and whole walks
+test-system: $(STAMP) $(ENGINE) ## run those of browsers, notebooks, processes and whole walks
 	@$(BIN)/python -m pytest $(SPREAD) -m system $(ARGS)
 
-thorough: $(STAMP) ## run the tests with more seeds, and every configuration's page
+thorough: $(STAMP) $(ENGINE) ## run the tests with more seeds, and every configuration's page
 	@HSP_THOROUGH=1 $(BIN)/python -m pytest $(SPREAD) $(ARGS)
 
-lint: $(STAMP) ## ruff, mypy --strict, the layers of the architecture
+lint: $(STAMP) $(ENGINE) ## ruff, mypy --strict, the layers of the architecture
 	@$(BIN)/ruff check
 	@$(BIN)/ruff format --check
 	@$(BIN)/mypy --strict
 	@$(BIN)/lint-imports
 
-coverage: $(STAMP) ## run the tests with the kernels uncompiled, report the lines not run
+coverage: $(STAMP) $(ENGINE) ## run the tests with the kernels uncompiled, report the lines not run
 	@NUMBA_DISABLE_JIT=1 $(BIN)/python -m pytest -n $(WORKERS) --cov --cov-report=term $(ARGS)
 
-bench: $(STAMP) ## compare with other controllers, in .venv-peers (TSID builds: 20 minutes)
+bench: $(STAMP) $(ENGINE) ## compare with other controllers, in .venv-peers (TSID builds: 20 minutes)
 	@if ! .venv-peers/bin/python -m pip --version > /dev/null 2>&1; then \
 	  echo "Creating .venv-peers ..."; $(call new-venv,$(BIN)/python,.venv-peers); \
 	fi
@@ -84,26 +85,27 @@ bench: $(STAMP) ## compare with other controllers, in .venv-peers (TSID builds: 
 	@.venv-peers/bin/python -W "ignore:to-Python converter" benchmarks/limit_side_by_side.py
 	@.venv-peers/bin/python -W "ignore:to-Python converter" benchmarks/scaling.py
 
-fuzz: $(STAMP) ## random states, mutated files, faults, soak: hours
+fuzz: $(STAMP) $(ENGINE) ## random states, mutated files, faults, soak: hours
 	@PYTHONPATH=tests nice $(BIN)/python -m campaigns $(ARGS)
 
-mutants: $(STAMP) ## break the code on purpose, report what no test notices
+mutants: $(STAMP) $(ENGINE) ## break the code on purpose, report what no test notices
 	@$(BIN)/python tools/mutants.py $(ARGS)
 
 # What is in the wheel goes: a checkout compiles for its own processor.
-wheel: $(STAMP) ## build the wheel into dist/, with machine code for every configuration
+wheel: $(STAMP) $(ENGINE) ## build the wheel into dist/, with machine code for every configuration
 	@echo "Compiling what the bundled configurations use (a minute) ..."
 	@$(BIN)/python tools/machine_code.py $(CONFIGS)
-	@rm -rf dist; $(BIN)/python -m pip wheel --quiet --no-deps --wheel-dir dist .
+	@rm -rf dist; $(BIN)/python -m pip wheel --quiet --no-deps --no-build-isolation \
+	  --wheel-dir dist .
 	@rm -rf machine_code
 	@ls dist
 
-sims: $(STAMP) ## robosuite's own arms and our law in them, in .venv-sims
+sims: $(STAMP) $(ENGINE) ## robosuite's own arms and our law in them, in .venv-sims
 	@if ! .venv-sims/bin/python -m pip --version > /dev/null 2>&1; then \
 	  $(call new-venv,$(BIN)/python,.venv-sims); fi
 	@.venv-sims/bin/python tools/simulators.py $(ARGS)
 
-lerobot: $(STAMP) ## LeRobot's own commands on our arm, in .venv-lerobot (8 GB)
+lerobot: $(STAMP) $(ENGINE) ## LeRobot's own commands on our arm, in .venv-lerobot (8 GB)
 	@if ! .venv-lerobot/bin/python -m pip --version > /dev/null 2>&1; then \
 	  $(call new-venv,$(BIN)/python,.venv-lerobot); fi
 	@.venv-lerobot/bin/python tools/lerobot.py $(ARGS)
@@ -130,27 +132,27 @@ wheel-test: wheel ## build the wheel, install it elsewhere, use it from there
 	echo "The wheel works."
 
 ##@ Documents
-docs: $(STAMP) ## build the site into docs/_build/html, with its replays; warnings are errors
+docs: $(STAMP) $(ENGINE) ## build the site into docs/_build/html, with its replays; warnings are errors
 	@echo "Running what the site's frames play (a minute, once) ..."
 	@$(BIN)/python tools/replays.py
 	@$(BIN)/sphinx-build -q -W --keep-going -b html docs docs/_build/html
 	@echo "The site is docs/_build/html/index.html"
 
-links: $(STAMP) ## ask every other site that the documents link to (needs a network)
+links: $(STAMP) $(ENGINE) ## ask every other site that the documents link to (needs a network)
 	@$(BIN)/python tools/links.py
 
 ##@ Keep
-figures: $(STAMP) ## draw the documents' figures anew, into docs/figures
+figures: $(STAMP) $(ENGINE) ## draw the documents' figures anew, into docs/figures
 	@$(BIN)/python docs/make_figures.py
 
-animations: $(STAMP) ## film the README's animations anew, into docs/figures (needs Chromium)
+animations: $(STAMP) $(ENGINE) ## film the README's animations anew, into docs/figures (needs Chromium)
 	@$(BIN)/python docs/make_animations.py
 	@$(BIN)/python docs/make_play_picture.py
 
-notebooks: $(STAMP) ## run the notebooks and keep what they print and draw
+notebooks: $(STAMP) $(ENGINE) ## run the notebooks and keep what they print and draw
 	@$(BIN)/python tools/notebooks.py
 
-format: $(STAMP) ## let ruff format the code and fix what it can
+format: $(STAMP) $(ENGINE) ## let ruff format the code and fix what it can
 	@$(BIN)/ruff check --fix --quiet || true
 	@$(BIN)/ruff format
 
@@ -176,16 +178,28 @@ clean: ## remove caches, builds and the demo's output; .venv stays
 
 # One environment for everything, with two stamps: the demo needs the package alone. Made
 # anew where it is missing or broken, brought up to date where pyproject.toml or
-# constraints.txt is newer than the stamp.
+# constraints.txt is newer than the stamp. What the engine is built with is installed
+# first: so it is built there, and again only where a source of it has changed.
 $(USE): pyproject.toml constraints.txt
 	@echo "Installing hsp_control and robots' meshes into .venv (1.3 GB, once) ..."
-	@$(find-python); "$$python" tools/install.py .venv --editable '.[export,robots]'
-	@touch $@
+	@$(call install,.[export$(,)robots])
+	@touch $@ $(ENGINE)
 
 $(STAMP): pyproject.toml constraints.txt
 	@echo "Installing hsp_control, test and development tools into .venv (2.6 GB, once) ..."
-	@$(find-python); "$$python" tools/install.py .venv --editable '.[test,dev]'
-	@touch $(USE) $@
+	@$(call install,.[test$(,)dev])
+	@touch $(USE) $@ $(ENGINE)
+
+, := ,
+# $(call install,.[extra,...]): this checkout with its extras.
+define install
+$(find-python); "$$python" tools/install.py .venv $$("$$python" hatch_build.py needs); \
+"$$python" tools/install.py .venv --no-build-isolation --editable '$(1)'
+endef
+
+$(ENGINE): $(USE) hatch_build.py engine/CMakeLists.txt $(shell find engine -name '*.?pp')
+	@$(BIN)/python hatch_build.py
+	@touch $@
 
 # Sets the shell variable `python`: PYTHON if given, else the newest one that will do. A
 # candidate is asked, not trusted: some are shims of versions that are not installed.

@@ -38,7 +38,7 @@ ROLLOUTS, WAYS, POINTS = 24, 6, 1000  # of a robot; of a way
 
 _LIMITS = "constraints/limits/acceleration_bounds.py"
 _COST = "control/actuation/deviation_cost.py"
-_EDGE = "law/threshold.py"
+_EDGE = "edge/threshold.py"
 _SENT = "control/actuation/sent_effort.py"
 _MODEL = "robot/model.py"
 
@@ -57,7 +57,7 @@ INGREDIENTS: dict[str, tuple[Edit, ...]] = {
     "threshold of the field": ((_EDGE, "QUICKEST = 50.0,", "QUICKEST = 1e12,"),),
     "threshold below a held level": ((_EDGE, "BELOW = 40.0", "BELOW = 0.0"),),
     "what those above it draw": (
-        ("law/hierarchy.py", "opposed[k] -= J[start", "opposed[k] -= 0.0 * J[start"),
+        ("edge/damped_levels.py", "opposed[k] -= J[", "opposed[k] -= 0.0 * J["),
     ),
     "how a null space turns": (
         (_EDGE, "following.size / above))", "0.0 / above))"),

@@ -20,6 +20,7 @@ from hsp_control.common.version import __version__ as __version__
 
 if TYPE_CHECKING:  # what a type checker reads; the names are looked up below
     from . import config as config
+    from . import engine as engine
     from . import live as live
     from . import robot as robot
     from . import simulation as simulation
@@ -60,7 +61,7 @@ if TYPE_CHECKING:  # what a type checker reads; the names are looked up below
     from .robot import integrators as integrators
     from .simulation import Rollout as Rollout
     from .simulation import plants as plants
-    from .simulation import simulate as simulate
+    from .simulation.simulate import simulate as simulate
     from .tasks import CenterOfMass as CenterOfMass
     from .tasks import FrameOrientation as FrameOrientation
     from .tasks import FramePose as FramePose
@@ -103,6 +104,7 @@ _NAMESPACES = {
     "compensation": "control.compensation",
     "config": "config",
     "contacts": "constraints.contacts",
+    "engine": "engine",
     "errors": "common.exceptions",
     "estimation": "control.estimator",
     "fields": "null_space.fields",
@@ -143,8 +145,8 @@ def __getattr__(name: str) -> Any:
 
 def _hint(name: str) -> str:
     """Return where a name is that a namespace has, for the message."""
-    if name.startswith("_"):
-        return ""
+    if name.startswith("_") or (Path(__file__).parent / name).is_dir():
+        return ""  # a room: who imports it from here is asked about it first
     for namespace, room in _NAMESPACES.items():
         value = getattr(import_module(f"{__name__}.{room}"), name, None)
         if getattr(value, "__module__", "").startswith(f"{__name__}.{room}"):

@@ -66,7 +66,6 @@ struct Directions {
   double size;            // robot's size [m]
   std::int64_t first;     // first level that may deviate: 1 below contacts, else 0
   double least;           // least cost of a level relative to the one above it
-  In<1> held;             // how much tasks are held, from 0 to 1
   In<'l'> thresholds;     // singular value below which a direction belongs to a level in part
   LawFactors factors;
   LawProjectors projectors;
@@ -122,7 +121,7 @@ struct Directions {
       const double of_error = k < last - 1 ? below_level : below_last;
       const double length = error.segment(start, rows).norm();
       // Whoever stands keeps the balance at any cost.
-      const double below = standing ? 0.0 : held[0] * of_error * length / size;
+      const double below = standing ? 0.0 : of_error * length / size;
       const bool is_spring = springs.segment(start, rows).all();
       if (k >= first && (standing || !is_spring))
         log_cost += std::log(std::min(std::max(below, least), most));

@@ -1,11 +1,16 @@
-// The Python module: kinds and calls, once for all kinds, by the tables of their fields.
+// The Python module: kinds, calls and plans, once for all kinds.
 #include <nanobind/nanobind.h>
-#include <nanobind/ndarray.h>
+#include <nanobind/stl/pair.h>
 #include <nanobind/stl/string.h>
 #include <nanobind/stl/vector.h>
 
-#include "call.hpp"
+#include "functions.hpp"
+#include "python_objects.hpp"
 #include "rooms.hpp"
+
+#define NPY_NO_DEPRECATED_API NPY_2_0_API_VERSION
+#define PY_ARRAY_UNIQUE_SYMBOL hsp_engine_numpy
+#include <numpy/arrayobject.h>
 
 namespace nb = nanobind;
 using namespace nb::literals;
@@ -13,139 +18,19 @@ using namespace hsp;
 
 namespace {
 
-std::string text_of(nb::handle x) { return nb::cast<std::string>(nb::str(x)); }
-
-const char* entries(char entry) {
-  return entry == 'd' ? "float64" : entry == 'i' ? "int64" : "bool";
-}
-
-bool is_packed(const nb::ndarray<nb::ro>& x, Order order) {
-  if (x.size() == 0) return true;  // whatever NumPy says of its strides
-  std::int64_t stride = 1;
-  for (std::size_t i = 0; i < x.ndim(); ++i) {
-    const std::size_t axis = order == Order::Rows ? x.ndim() - 1 - i : i;
-    if (x.shape(axis) > 1 && x.stride(axis) != stride) return false;
-    stride *= static_cast<std::int64_t>(x.shape(axis));
-  }
-  return true;
-}
-
-std::string use_text(const Field& field) {
-  const char* use[] = {"reads", "writes", "changes"};
-  std::string text = use[static_cast<int>(field.access)];
-  return text + " " + entries(field.entry) + " " + shape_text(field) +
-         (field.order == Order::Columns ? ", column by column" : "");
-}
-
-// The memory of an array, not a copy: a call reads what is there when it is made.
-Argument array(const Kind& kind, const Field& field, nb::handle given) {
-  const std::string who = std::string(kind.name) + ": " + field.name;
-  if (!nb::isinstance<nb::ndarray<nb::ro>>(given))
-    throw nb::type_error(
-        (who + " " + use_text(field) + "; got " + text_of(nb::repr(given))).c_str());
-  const auto x = nb::cast<nb::ndarray<nb::ro>>(given);
-  const bool is_entry = field.entry == 'd'   ? x.dtype() == nb::dtype<double>()
-                        : field.entry == 'i' ? x.dtype() == nb::dtype<std::int64_t>()
-                                             : x.dtype() == nb::dtype<bool>();
-  const bool writeable =
-      field.access == Access::In || nb::cast<bool>(given.attr("flags").attr("writeable"));
-  if (!is_entry || static_cast<std::int32_t>(x.ndim()) != field.rank ||
-      !is_packed(x, field.order) || !writeable)
-    throw nb::type_error((who + " " + use_text(field) + "; got an array of " +
-                          text_of(given.attr("dtype")) + " with the shape " +
-                          text_of(given.attr("shape")) + " and the strides " +
-                          text_of(given.attr("strides")) + (writeable ? "" : ", read-only"))
-                             .c_str());
-  Argument found;
-  found.data = const_cast<void*>(x.data());
-  for (std::size_t i = 0; i < x.ndim(); ++i) found.shape[i] = static_cast<std::int64_t>(x.shape(i));
-  return found;
-}
-
-Argument number(const Kind& kind, const Field& field, nb::handle given) {
-  Argument found;
-  if (!nb::try_cast(given, found.number))
-    throw nb::type_error((std::string(kind.name) + ": " + field.name + " is a number; got " +
-                          text_of(nb::repr(given)))
-                             .c_str());
-  return found;
-}
-
-std::string signature(const Kind& kind) {
+std::string described(const CallObject& object) {
+  const Leaves leaves(object.arguments);
+  const Kind& kind = object.call.kind;
   std::string text = std::string(kind.name) + "(";
   for (std::int64_t k = 0; k < kind.count; ++k) {
     const Field& field = kind.fields[k];
-    text += std::string(k ? ", " : "") + field.name;
-    if (field.access != Access::Number) text += ": " + use_text(field);
+    text += std::string(k ? ", " : "") + field.name + "=";
+    text += field.access == Access::Number   ? text_of(nb::repr(leaves.values[k]))
+            : field.access == Access::Object ? field.object
+                                             : "array" + text_of(leaves.values[k].attr("shape"));
   }
   return text + ")";
 }
-
-// The leaves of nested tuples, in order. A record names its own: they are the fields' names.
-void flatten(nb::tuple given, const std::string& prefix, std::vector<nb::object>& leaves,
-             std::vector<std::string>& names) {
-  const nb::object fields = nb::getattr(given, "_fields", nb::none());
-  std::size_t i = 0;
-  for (nb::handle each : given) {
-    std::string name = prefix;
-    if (!fields.is_none()) name += "." + nb::cast<std::string>(fields[i]);
-    ++i;
-    if (nb::isinstance<nb::tuple>(each)) {
-      flatten(nb::borrow<nb::tuple>(each), name, leaves, names);
-    } else {
-      leaves.push_back(nb::borrow(each));
-      names.push_back(name);
-    }
-  }
-}
-
-bool ends_with(std::string_view text, std::string_view end) {
-  return end.size() <= text.size() && text.substr(text.size() - end.size()) == end;
-}
-
-struct PythonCall {
-  PythonCall(const Kind& kind, nb::tuple given)
-      : arguments(given), call(kind, checked(kind, given)) {}
-
-  static std::vector<Argument> checked(const Kind& kind, nb::tuple given) {
-    std::vector<nb::object> leaves;
-    std::vector<std::string> names;
-    flatten(given, "", leaves, names);
-    if (static_cast<std::int64_t>(leaves.size()) != kind.count)
-      throw nb::type_error((std::string(kind.name) + " has " + std::to_string(kind.count) +
-                            " arguments; got " + std::to_string(leaves.size()) + ": " +
-                            signature(kind))
-                               .c_str());
-    std::vector<Argument> found;
-    for (std::int64_t k = 0; k < kind.count; ++k) {
-      const Field& field = kind.fields[k];
-      if (!ends_with(std::string(".") + field.name, names[k]))
-        throw nb::type_error((std::string(kind.name) + ": in the place of " + field.name +
-                              " stands a record's " + names[k].substr(1))
-                                 .c_str());
-      found.push_back(field.access == Access::Number ? number(kind, field, leaves[k])
-                                                     : array(kind, field, leaves[k]));
-    }
-    return found;
-  }
-
-  std::string repr() const {
-    std::vector<nb::object> leaves;
-    std::vector<std::string> names;
-    flatten(arguments, "", leaves, names);
-    std::string text = std::string(call.kind.name) + "(";
-    for (std::int64_t k = 0; k < call.kind.count; ++k) {
-      const Field& field = call.kind.fields[k];
-      text += std::string(k ? ", " : "") + field.name + "=";
-      text += field.access == Access::Number ? text_of(nb::repr(leaves[k]))
-                                             : "array" + text_of(leaves[k].attr("shape"));
-    }
-    return text + ")";
-  }
-
-  nb::tuple arguments;  // they own the memory
-  Call call;
-};
 
 nb::list names(const Kind& kind, Access one) {
   nb::list found;
@@ -155,14 +40,40 @@ nb::list names(const Kind& kind, Access one) {
   return found;
 }
 
+nb::object engine(const char* name) {
+  return nb::module_::import_("hsp_control.engine").attr(name);
+}
+
+// Python's collector sees what an object owns: a function may lead back to its own plan.
+
+template <class T, auto member> int traverse(PyObject* self, visitproc visit, void* arg) {
+#if PY_VERSION_HEX >= 0x03090000
+  Py_VISIT(Py_TYPE(self));
+#endif
+  if (nb::inst_ready(self)) Py_VISIT((nb::inst_ptr<T>(self)->*member).ptr());
+  return 0;
+}
+template <class T, auto member> int clear(PyObject* self) {
+  if (nb::inst_ready(self)) (nb::inst_ptr<T>(self)->*member).reset();
+  return 0;
+}
+template <class T, auto member>
+PyType_Slot slots[] = {{Py_tp_traverse, reinterpret_cast<void*>(&traverse<T, member>)},
+                       {Py_tp_clear, reinterpret_cast<void*>(&clear<T, member>)},
+                       {0, nullptr}};
+
+bool has_numpy() { return _import_array() >= 0; }
+
 }  // namespace
 
 NB_MODULE(_engine, m) {
+  if (!has_numpy()) throw nb::python_error();
   nb::set_leak_warnings(false);
+
   nb::class_<Kind>(m, "Kind", "A kind of call: what its arguments are, and its mathematics.")
       .def("__repr__", &signature)
       .def(
-          "__call__", [](const Kind& kind, nb::args given) { return new PythonCall(kind, given); },
+          "__call__", [](const Kind& kind, nb::args given) { return new CallObject(kind, given); },
           "Return a call with these arguments; those of a group may be a record.")
       .def_prop_ro("doc", [](const Kind& kind) { return kind.doc; })
       .def_prop_ro("name", [](const Kind& kind) { return kind.name; })
@@ -170,32 +81,105 @@ NB_MODULE(_engine, m) {
       .def_prop_ro("reads", [](const Kind& kind) { return names(kind, Access::In); })
       .def_prop_ro("writes", [](const Kind& kind) { return names(kind, Access::Out); })
       .def("__reduce__", [](const Kind& kind) {
-        return nb::make_tuple(nb::module_::import_("hsp_control.engine").attr("kind"),
-                              nb::make_tuple(kind.name));
+        return nb::make_tuple(engine("kind"), nb::make_tuple(kind.name));
       });
-  nb::class_<PythonCall>(m, "Call",
-                         "A kind with its arguments: their memory is read when it is made.")
-      .def("__repr__", &PythonCall::repr)
+
+  nb::class_<Runnable>(m, "Runnable", "What a plan can make: f(t) ↦ a number.")
       .def(
-          "__call__", [](const PythonCall& c, double t) { return c.call(t); }, "t"_a = 0.0)
-      .def_prop_ro(
-          "kind", [](const PythonCall& c) -> const Kind& { return c.call.kind; },
-          nb::rv_policy::reference)
-      .def_ro("arguments", &PythonCall::arguments)
+          "__call__", [](const Runnable& call, double t) { return call(t); }, "t"_a = 0.0)
       .def_prop_ro(
           "row",
-          [](const PythonCall& c) {
-            return nb::make_tuple(reinterpret_cast<std::int64_t>(c.call.kind.run),
-                                  reinterpret_cast<std::int64_t>(c.call.self()));
+          [](const Runnable& call) {
+            return std::pair(reinterpret_cast<std::intptr_t>(call.row.run),
+                             reinterpret_cast<std::intptr_t>(call.row.self));
           },
           "The addresses of its function f(self, t) and of self.")
-      .def("__reduce__", [](const PythonCall& c) {
+      .def_ro("python", &Runnable::python, "Whether a function of Python is among what it runs.");
+
+  nb::class_<CallObject, Runnable>(
+      m, "Call", "A kind with its arguments, whose memory it reads each time that it is made.",
+      nb::type_slots(slots<CallObject, &CallObject::arguments>))
+      .def("__repr__", &described)
+      .def_prop_ro(
+          "kind", [](const CallObject& c) -> const Kind& { return c.call.kind; },
+          nb::rv_policy::reference)
+      .def_ro("arguments", &CallObject::arguments)
+      .def_prop_ro(
+          "values",
+          [](const CallObject& c) {
+            const Leaves leaves(c.arguments);
+            nb::dict found;
+            for (std::size_t k = 0; k < leaves.values.size(); ++k)
+              found[c.call.kind.fields[k].name] = leaves.values[k];
+            return found;
+          },
+          "The arguments by name.")
+      .def("__reduce__", [](const CallObject& c) {
         return nb::make_tuple(
-            nb::module_::import_("hsp_control.engine").attr("call"),
+            engine("call"),
             nb::make_tuple(nb::cast(c.call.kind, nb::rv_policy::reference), c.arguments));
       });
+
+  nb::class_<PlanObject, Runnable>(m, "Plan", "Calls that are made one after the other.",
+                                   nb::type_slots(slots<PlanObject, &PlanObject::calls>))
+      .def(
+          "__init__",
+          [](PlanObject* self, nb::iterable calls) { new (self) PlanObject(nb::tuple(calls)); },
+          "calls"_a = nb::tuple())
+      .def_ro("calls", &PlanObject::calls)
+      .def("__repr__",
+           [](const PlanObject& plan) {
+             std::string text = "Plan:";
+             for (nb::handle each : plan.calls) text += "\n  " + text_of(nb::repr(each));
+             return text;
+           })
+      .def("__reduce__", [](const PlanObject& plan) {
+        return nb::make_tuple(engine("Plan"), nb::make_tuple(plan.calls));
+      });
+
+  nb::class_<PythonCall, Runnable>(m, "PythonCall",
+                                   "A function of Python as a call, of the time or of nothing.",
+                                   nb::type_slots(slots<PythonCall, &PythonCall::function>))
+      .def(nb::init<nb::object, bool>(), "function"_a, "timed"_a = false)
+      .def_ro("function", &PythonCall::function)
+      .def_ro("timed", &PythonCall::timed)
+      .def("__repr__",
+           [](const PythonCall& call) {
+             return "PythonCall(" + text_of(nb::repr(call.function)) + ")";
+           })
+      .def("__reduce__", [](const PythonCall& call) {
+        return nb::make_tuple(engine("PythonCall"), nb::make_tuple(call.function, call.timed));
+      });
+
+  nb::class_<ForeignCall, Runnable>(
+      m, "ForeignCall", "A C function with words as arguments, and what these point to.",
+      nb::type_slots(slots<ForeignCall, &ForeignCall::kept>))
+      .def(nb::init<Foreign::Word, const std::vector<Foreign::Word>&, nb::object>(), "address"_a,
+           "words"_a, "kept"_a);
+
+  nb::class_<MoveObject>(m, "Move", "Copies t, q and v where they are valid, and makes a plan.",
+                         nb::type_slots(slots<MoveObject, &MoveObject::arguments>))
+      .def("__init__", [](MoveObject* self, nb::args given) { new (self) MoveObject(given); })
+      .def("__call__", &MoveObject::operator(), "t"_a, "q"_a, "v"_a)
+      .def_ro("arguments", &MoveObject::arguments)
+      .def_ro("python", &MoveObject::python)
+      .def("__reduce__",
+           [](const MoveObject& move) { return nb::make_tuple(engine("Move"), move.arguments); });
+  m.attr("REFUSED") = refused;
+
+  m.def(
+      "load_library",
+      [](const std::string& path) {
+        nb::list found;
+        for (const auto* kinds = library_kinds(path); *kinds; ++kinds)
+          found.append(nb::cast(*kinds, nb::rv_policy::reference));
+        return found;
+      },
+      "path"_a);
+
   nb::list all;
   for (const auto* kinds : rooms())
     for (; *kinds; ++kinds) all.append(nb::cast(*kinds, nb::rv_policy::reference));
   m.attr("kinds") = all;
+  bind_functions(m);
 }

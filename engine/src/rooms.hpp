@@ -5,10 +5,41 @@
 
 namespace hsp {
 
+const Kind* const* contact_kinds();
+const Kind* const* edge_kinds();
+const Kind* const* field_kinds();
+const Kind* const* geometry_kinds();
+const Kind* const* integrator_kinds();
+const Kind* const* law_kinds();
 const Kind* const* limit_kinds();
+const Kind* const* metric_kinds();
+const Kind* const* plan_kinds();
 const Kind* const* qp_kinds();
+const Kind* const* robot_kinds();
+const Kind* const* simulation_kinds();
+const Kind* const* task_kinds();
 const Kind* const* trajectory_kinds();
 
-inline std::vector<const Kind* const*> rooms() { return {limit_kinds(), qp_kinds(), trajectory_kinds()}; }
+// The kinds of a library of a user's own, which stays loaded. Throws std::runtime_error.
+const Kind* const* library_kinds(const std::string& path);
+
+inline std::vector<const Kind* const*> rooms() {
+  return {
+          plan_kinds(),
+          contact_kinds(),
+          edge_kinds(),
+          field_kinds(),
+          geometry_kinds(),
+          integrator_kinds(),
+          law_kinds(),
+          limit_kinds(),
+          metric_kinds(),
+          qp_kinds(),
+          robot_kinds(),
+          simulation_kinds(),
+          task_kinds(),
+          trajectory_kinds(),
+  };
+}
 
 }  // namespace hsp

@@ -1,6 +1,14 @@
 #include "../src/rooms.hpp"
+#include "blends.hpp"
+#include "charts.hpp"
 #include "curves.hpp"
+#include "extrapolations.hpp"
+#include "poses.hpp"
 
 namespace hsp {
-const Kind* const* trajectory_kinds() { return kinds<Circle, Lissajous, UniformLine>(); }
+const Kind* const* trajectory_kinds() {
+  return kinds<Circle, Lissajous, UniformLine, Polynomial, PiecewisePolynomial, Blend, Crossfade,
+               OrientationPath, Spin, BlendOrientation, Screw, OrientationOfChart, RotationVectors,
+               Extrapolation, ExtrapolatedOrientation>();
+}
 }  // namespace hsp

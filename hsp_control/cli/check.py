@@ -16,7 +16,7 @@ from hsp_control.common.suggestions import listing
 from hsp_control.config import Experiment
 from hsp_control.control import Controller, ControlOutput, Diagnostics
 from hsp_control.control.first_state import warn_of_jump, warn_of_slow_efforts
-from hsp_control.law.edge import FAR, NEAR
+from hsp_control.edge.shares import FAR, NEAR
 from hsp_control.robot import Robot
 from hsp_control.robot.description.inertias import impossible_inertias
 from hsp_control.robot.description.urdf import read_urdf
@@ -104,7 +104,7 @@ def _checked(
 
 
 def _exact(controller: Controller) -> dict[str, Any] | None:
-    """Return where the law is exact, see `law/edge.py`; None with a floating base."""
+    """Return where the law is exact, see `edge/shares.py`; None if the base floats."""
     robot, stack = controller.robot, controller.active_stack
     rows = stack.rows.jacobian[stack.first_task_row :]
     if robot.unactuated or not robot.size or not len(rows):

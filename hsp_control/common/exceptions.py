@@ -182,5 +182,9 @@ class LiveError(HspControlError, ValueError):
     """Settings of a live loop are invalid, or it does not support this robot."""
 
 
+class EngineError(HspControlError, RuntimeError):
+    """A compiled part of one's own does not compile, or brings nothing."""
+
+
 class HardwareError(HspControlError, RuntimeError):
     """The robot cannot be reached, is not ready, or stopped sending its state."""

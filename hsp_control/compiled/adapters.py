@@ -7,7 +7,6 @@ import hashlib
 import struct
 import warnings
 from collections.abc import Callable
-from functools import cache
 from types import FunctionType
 from typing import Any, cast
 
@@ -19,8 +18,8 @@ from numba.core.datamodel.registry import default_manager
 from numba.extending import intrinsic
 from numpy.typing import NDArray
 
-from hsp_control.common.arrays import Array, Indices
-from hsp_control.compiled.kernels import callback, kernel
+from hsp_control.common.arrays import Indices
+from hsp_control.compiled.kernels import callback
 
 _ARRAY = ("meminfo", "parent", "nitems", "itemsize", "data", "shape", "strides")
 """The words of an array in Numba's compiled code, in order."""
@@ -160,97 +159,6 @@ def _unpacked(typing: Any, words: Any, kind: Any) -> Any:
         return builder.load(builder.inttoptr(arguments[0], pointer))
 
     return values(types.int64, kind), code
-
-
-@cache
-def foreign_adapter(count: int) -> int:
-    """Return the address of what calls a C function with ``count`` words."""
-    place = {
-        "__name__": __name__,
-        "words_of_call": cast("Any", types).UniTuple(types.int64, count + 1),
-        "_called": _called,
-    }
-    call = FunctionType(cast("FunctionType", _call_c).__code__, place)
-    call.__qualname__ = f"c_function_{count}"
-    code = callback(types.float64(types.int64, types.float64), call)
-    _codes.append(code)
-    return int(code.address)
-
-
-def _call_c(words: int, t: float) -> float:
-    return _called(words, words_of_call)  # type: ignore # noqa
-
-
-@intrinsic
-def _called(typing: Any, words: Any, kind: Any) -> Any:
-    """Call the C function that comes first at an address, with what follows there."""
-    count = kind.instance_type.count
-
-    def code(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
-        word = ir.IntType(64)
-        table = builder.inttoptr(arguments[0], ir.ArrayType(word, count).as_pointer())
-        function, *given = (
-            builder.extract_value(builder.load(table), k) for k in range(count)
-        )
-        kind = ir.FunctionType(ir.VoidType(), [word] * (count - 1))
-        builder.call(builder.inttoptr(function, kind.as_pointer()), given)
-        return context.get_constant(types.float64, 0.0)
-
-    return types.float64(types.int64, kind), code
-
-
-@intrinsic
-def _invoke(typing: Any, address: Any, words: Any, t: Any) -> Any:
-    """Call what `adapter` made."""
-
-    def code(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
-        kind = ir.FunctionType(ir.DoubleType(), [ir.IntType(64), ir.DoubleType()])
-        function = builder.inttoptr(arguments[0], kind.as_pointer())
-        return builder.call(function, arguments[1:])
-
-    return types.float64(types.int64, types.int64, types.float64), code
-
-
-@kernel
-def run(calls: Indices, t: float) -> float:
-    """Make calls, rows (code, arguments), at a time; return the last result."""
-    value = 0.0
-    for k in range(calls.shape[0]):
-        value = _invoke(calls[k, 0], calls[k, 1], t)  # type: ignore[call-arg]
-    return value
-
-
-@kernel
-def run_once(calls: Indices, stamp: Indices, made: Indices) -> None:
-    """Make calls that do not depend on the time, unless ``made`` equals ``stamp``."""
-    if made[0] != stamp[0]:
-        made[0] = stamp[0]
-        run(calls, 0.0)
-
-
-@kernel
-def run_if(calls: Indices, found: Array) -> float:
-    """If ``found[1]``, make the calls; return ``found[0]`` plus the last result."""
-    value = float(found[0])
-    if found[1] != 0.0:
-        value += run(calls, 0.0)
-    return value
-
-
-def entry_point(function: Callable[..., Any], kinds: tuple[Any, ...]) -> Any:
-    """Return a kernel for these types, as Python calls it without asking for them."""
-    compiled = cast("Any", function)
-    compiled.compile(kinds)
-    return compiled.overloads[kinds].entry_point
-
-
-@cache
-def entry() -> Callable[..., float]:
-    """Return `run` as Python calls it."""
-    return cast(
-        "Callable[..., float]",
-        entry_point(run, (types.int64[:, ::1], types.float64)),
-    )
 
 
 def _available() -> bool:

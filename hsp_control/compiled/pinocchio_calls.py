@@ -6,8 +6,8 @@ call are found in Pinocchio's library by their C++ names, and the model and the 
 its Python objects by Boost.Python's own registry. So there is one dynamics, and its
 results are the same to the last bit.
 
-What this relies on is looked at before the first call (`unknown_layout`). Where it is
-not as known, and without Numba, the bindings are called.
+What this relies on is looked at before the first call (`unknown`). Where it is not as
+known, the bindings are called.
 """
 
 import ctypes
@@ -19,9 +19,9 @@ import numpy as np
 import pinocchio as pin
 from pinocchio import pinocchio_pywrap_default
 
+from hsp_control import engine
 from hsp_control.common.arrays import Array, Indices, matrix_view
-from hsp_control.compiled.kernels import PLAIN, kernel
-from hsp_control.compiled.native import NativeCall, sequence
+from hsp_control.engine import ForeignCall, Plan, PythonCall, Runnable
 
 _MODEL = b"N9pinocchio8ModelTplIdLi0ENS_25JointCollectionDefaultTplEEE"
 _DATA = b"N9pinocchio7DataTplIdLi0ENS_25JointCollectionDefaultTplEEE"
@@ -115,20 +115,9 @@ def _reference(vector: Array) -> Indices:
     return words
 
 
+@cache
 def unknown() -> str:
     """Return what keeps Pinocchio from being called natively, or nothing."""
-    if PLAIN:
-        return "kernels run as plain Python"
-    from hsp_control.compiled import adapters
-
-    if not adapters.AVAILABLE:
-        return "kernels are called one by one"
-    return _missing()
-
-
-@cache
-def _missing() -> str:
-    """Return which function the library has not, or nothing."""
     for name in (*_NAMES.values(), _QUERY, _EXTRACT):
         if not _address(name):
             return f"Pinocchio {pin.__version__} has no function {name}"
@@ -142,7 +131,7 @@ def is_pinocchio(function: Callable[..., object]) -> bool:
 
 def bind_pinocchio(
     what: str, model: pin.Model, data: pin.Data, *vectors: Array
-) -> Callable[[], object]:
+) -> "PinocchioCall | PythonCall":
     """Return a call that computes from what these arrays then hold, into the data.
 
     Args:
@@ -161,7 +150,7 @@ def bind_pinocchio(
         addresses = _object_address(model, _MODEL), _object_address(data, _DATA)
         if all(addresses):
             return _native(what, addresses, (model, data, *vectors))
-    return partial(getattr(pin, what), model, data, *vectors)
+    return PythonCall(partial(getattr(pin, what), model, data, *vectors))
 
 
 def _fits(vector: Array, size: int) -> bool:
@@ -170,28 +159,41 @@ def _fits(vector: Array, size: int) -> bool:
     return packed and vector.dtype == np.float64 and vector.flags.aligned
 
 
+class PinocchioCall:
+    """A function of Pinocchio with its arguments; copies compute with their own."""
+
+    __slots__ = ("_arguments", "_call")
+    python = False
+
+    def __init__(self, call: Runnable, *arguments: Any) -> None:
+        self._call, self._arguments = call, arguments
+
+    @property
+    def row(self) -> tuple[int, int]:
+        """The addresses of the function and of its arguments; see `engine.Plan`."""
+        return self._call.row
+
+    def __call__(self, t: float = 0.0) -> float:
+        """Make the call."""
+        return self._call(t)
+
+    def __repr__(self) -> str:
+        return f"PinocchioCall({self._arguments[0]})"
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return bind_pinocchio, self._arguments
+
+
 def _native(
     what: str, addresses: tuple[int, int], arguments: tuple[Any, ...]
-) -> NativeCall:
+) -> PinocchioCall:
     _, data, *vectors = arguments
     references = [_reference(vector) for vector in vectors]
     words = [*addresses, *(words.ctypes.data for words in references)]
     if what in ("crba", "aba"):
         words.append(_LOCAL)
-    recipe = bind_pinocchio, (what, *arguments)
-    call = NativeCall.of_function(_address(_NAMES[what]), words, recipe)
-    call.kept = references
+    kept = arguments, references
+    call: Runnable = ForeignCall(_address(_NAMES[what]), words, kept)
     if what == "crba":  # writes one triangle
-        both = call, NativeCall.of(_mirror, (matrix_view(data.M),), timed=False)
-        mirrored = sequence(both, 0.0)
-        mirrored.recipe, mirrored.kept = recipe, both
-        return mirrored
-    return call
-
-
-@kernel
-def _mirror(M: Array) -> None:
-    """Copy the upper triangle of a matrix to the lower one."""
-    for i in range(M.shape[0]):
-        for j in range(i):
-            M[i, j] = M[j, i]
+        call = Plan([call, engine.Mirror(matrix_view(data.M))])
+    return PinocchioCall(call, what, *arguments)

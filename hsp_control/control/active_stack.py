@@ -6,6 +6,7 @@ from typing import Any, NoReturn
 
 import numpy as np
 
+from hsp_control import engine
 from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import NonFiniteError
 from hsp_control.compiled.kernels import AnyCall
@@ -13,17 +14,19 @@ from hsp_control.constraints.contacts import Contact
 from hsp_control.constraints.contacts.contact import UnactuatedRows, unactuated_count
 from hsp_control.control.actuation.support import Support
 from hsp_control.control.setup import PlannedTask
-from hsp_control.law import CONSTANT, FieldSample, Outcome, Resolution, TaskSample
-from hsp_control.law.resolution import outcome_of
-from hsp_control.law.threshold import Following
+from hsp_control.edge import Resolution
+from hsp_control.edge.threshold import Following
+from hsp_control.law import CONSTANT, FieldSample, Outcome, TaskSample
+from hsp_control.law.outcome import outcome_of
 from hsp_control.null_space.fields import FieldSum, NullSpaceField
 from hsp_control.null_space.metrics import Metric
 from hsp_control.robot import Robot, RobotState
 from hsp_control.robot.state import as_given
 from hsp_control.tasks import Task
 from hsp_control.tasks.compliant_task import impedance_of
-from hsp_control.tasks.feedback import InForce, beyond_largest, write_asked
-from hsp_control.tasks.slipping import slipped, write_pulls
+from hsp_control.tasks.feedback import InForce, beyond_largest
+from hsp_control.tasks.impedance import parts_of
+from hsp_control.tasks.slipping import slipped
 from hsp_control.trajectories.streams.stream import Streamed
 
 
@@ -107,8 +110,8 @@ class ActiveStack:
                 ends = each.task.part_ends()
                 away = partial(slipped, in_force.numbers, ends)
                 pulls = self.resolution.problem.pulls[here]
-                given = in_force.numbers, ends, sample.error, pulls
-                self._calls.append((write_pulls, given))
+                given = parts_of(in_force.numbers), ends, sample.error, pulls
+                self._calls.append((engine.SpringPulls, given))
                 self.bounds.append((each.task.name, here, away))
             elif len(in_force.feedback.largest):
                 away = partial(beyond_largest, largest=in_force.feedback.largest)
@@ -121,10 +124,10 @@ class ActiveStack:
             follows = each.key in below or len(in_force.feedback.largest)
             draws = spring and below  # from those below it
             if (follows or draws) and not balances:
-                still = np.zeros_like(asked)  # what damps is not lost, at any speed
+                # at rest: what damps is not lost, at any speed
                 stretched = self.resolution.problem.stretched[here]
-                rest = in_force.feedback, sample.error, still, asked, stretched
-                self._calls.append((write_asked, rest))
+                rest = in_force.feedback, sample.error, asked, stretched
+                self._calls.append((engine.AskedAtRest, rest))
             row += each.task.rows
         # names of each level's tasks; ``contacts`` for those at the top
         self.level_names = [

@@ -1,18 +1,19 @@
 """A step while nothing changes: state, references, law and limits in one call."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from functools import cached_property
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 from numpy.typing import ArrayLike
 
 from hsp_control.common.arrays import Array
-from hsp_control.compiled.kernels import kernel
+from hsp_control.compiled.step_plan import Step
 from hsp_control.control.active_stack import ActiveStack
 from hsp_control.control.actuation import Actuation, Delivered
 from hsp_control.control.actuation.actuation import LOOK
 from hsp_control.control.actuation.limits_in_force import LimitsInForce
-from hsp_control.law.resolution import BEYOND_ANY_LEVEL
+from hsp_control.engine import Move
+from hsp_control.law.outcome import BEYOND_ANY_LEVEL
 from hsp_control.robot import RobotState
 
 
@@ -61,16 +62,10 @@ class BoundStep:
 class FreeStep(NamedTuple):
     """What `compute` and `applied` of a controller do where no limit is violated."""
 
-    # (t, q, v) ↦ a number that `is_free` understands; the effort and the acceleration
-    # are written
-    move: Callable[[float, Array, Array], float]
+    # (t, q, v) ↦ a number, from 0 to `LOOK` where the step is free; the effort and the
+    # acceleration are written
+    move: Move
     effort: Array  # M a + N, shape (nv,) [N·m or N]
     # calls of the time that record that this effort is held from now on, for the period
     # of the last `Controller.applied`
-    sending: Sequence[Callable[[float], Any]]
-
-
-@kernel
-def is_free(value: float) -> bool:
-    """Return whether what a move returned means: valid, finite, no limit violated."""
-    return 0.0 <= value < LOOK
+    sending: Sequence[Step]

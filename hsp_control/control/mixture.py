@@ -14,7 +14,7 @@ from hsp_control.control.bound_step import BoundStep
 from hsp_control.control.evolution import PlannedContact
 from hsp_control.control.gains_in_force import GainsInForce
 from hsp_control.control.setup import PlannedTask, Setup, levels_of
-from hsp_control.law.resolution import DAMPED, NOT_FINITE
+from hsp_control.law.outcome import DAMPED, NOT_FINITE
 from hsp_control.robot import RobotState
 
 AccelerationModifier = Callable[

@@ -1,15 +1,22 @@
 """The engine: kinds of calls in C++, by name, and calls of them.
 
-A kind is a struct of the folder ``engine`` in the sources: its members are its arguments,
-its ``operator()`` is its mathematics. ``repr(engine.Circle)`` shows them.
+A kind is a struct of the folder ``engine`` in the sources: its members are its
+arguments, its ``operator()`` is its mathematics. ``repr(engine.Circle)`` shows them.
 """
 
 from typing import Any
 
 try:
+    from ._engine import REFUSED as REFUSED
     from ._engine import Call as Call
+    from ._engine import ForeignCall as ForeignCall
     from ._engine import Kind as Kind
+    from ._engine import Move as Move
+    from ._engine import Plan as Plan
+    from ._engine import PythonCall as PythonCall
+    from ._engine import Runnable as Runnable
     from ._engine import kinds as _kinds
+    from ._engine import smooth_step as smooth_step
 except ImportError as error:
     raise ImportError(
         f"the compiled part of hsp_control is missing or was built for another Python "
@@ -29,7 +36,7 @@ def kind(name: str) -> Kind:
 
 
 def call(kind: Kind, arguments: tuple[Any, ...]) -> Call:
-    """Return a call of a kind with these arguments: what copies and pickles are made of."""
+    """Return a call of a kind with these arguments; copies and pickles use it."""
     return kind(*arguments)
 
 
@@ -41,4 +48,4 @@ def __getattr__(name: str) -> Kind:
 
 
 def __dir__() -> list[str]:
-    return sorted([*_BY_NAME, "Call", "Kind", "call", "kind"])
+    return sorted([*_BY_NAME, *(name for name in globals() if name[0] != "_")])

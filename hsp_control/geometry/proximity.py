@@ -6,9 +6,9 @@ from typing import Any
 import numpy as np
 import pinocchio as pin
 
+from hsp_control import engine
 from hsp_control.common.arrays import Array, Indices
 from hsp_control.common.exceptions import FieldError
-from hsp_control.compiled.kernels import kernel
 from hsp_control.geometry.closed_form import ClosedFormDistances, has_closed_form
 from hsp_control.geometry.links import LinkShape
 from hsp_control.geometry.scene import Obstacle
@@ -89,38 +89,13 @@ class CoalDistances:
             columns, dofs, columns2, dofs2 = self._supports[k]
             first, second, normal = self.witness(k)
             force = -own[k] * normal
-            _add_force(J, columns, dofs, first, force, gradient)
+            engine.AddForce(J, columns, dofs, first, force, gradient)()
             if len(columns2):
-                _add_force(J, columns2, dofs2, second, -force, gradient)
+                engine.AddForce(J, columns2, dofs2, second, -force, gradient)()
 
     def _add(self, name: str, joint: int, placement: pin.SE3, geometry: Any) -> None:
         self._geometry.addGeometryObject(
             pin.GeometryObject(name, joint, placement, geometry)
-        )
-
-
-@kernel
-def _add_force(
-    J_world: Array,
-    columns: Indices,
-    dofs: Indices,
-    point: Array,
-    force: Array,
-    out: Array,
-) -> None:
-    """Add J(point)ᵀ force to ``out``; J is the linear Jacobian of a point on a link."""
-    mx = point[1] * force[2] - point[2] * force[1]
-    my = point[2] * force[0] - point[0] * force[2]
-    mz = point[0] * force[1] - point[1] * force[0]
-    for k in range(columns.shape[0]):
-        c = columns[k]
-        out[dofs[k]] += (
-            J_world[0, c] * force[0]
-            + J_world[1, c] * force[1]
-            + J_world[2, c] * force[2]
-            + J_world[3, c] * mx
-            + J_world[4, c] * my
-            + J_world[5, c] * mz
         )
 
 

@@ -4,7 +4,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from hsp_control.common.arrays import Array
+from hsp_control.common.arrays import Array, Flags
 from hsp_control.law.samples import FieldSample, MetricSample, TaskSample
 
 
@@ -80,3 +80,8 @@ class Problem:
         self.pulls = np.zeros(rows)
         self.stretched = np.zeros(rows)
         self.springs = np.zeros(rows, dtype=np.bool_)
+
+    @property
+    def rows(self) -> tuple[Array, Array, Array, Flags, Array]:
+        """What is asked of each row: asked, yields, pulls, springs and stretched."""
+        return self.asked, self.yields, self.pulls, self.springs, self.stretched

@@ -5,8 +5,6 @@ from typing import NamedTuple
 import numpy as np
 
 from hsp_control.common.arrays import Array
-from hsp_control.compiled.kernels import kernel
-from hsp_control.compiled.linalg import solve_lower, solve_lower_transposed
 
 IDENTITY, CONSTANT, VARYING = 0, 1, 2
 """Form of a metric: W = I (no solves); W' = 0 (solves); any W (solves, terms in W')."""
@@ -84,11 +82,3 @@ class MetricSample(NamedTuple):
     def allocate(cls, nv: int) -> "MetricSample":
         """Return the identity metric of nv degrees of freedom, with W' = 0."""
         return cls(np.eye(nv), np.eye(nv), np.zeros((nv, nv)))
-
-
-@kernel
-def raise_covector(covector: Array, L: Array, form: int) -> None:
-    """Overwrite a covector, shape (nv,), by W⁻¹ covector, with W = L Lᵀ."""
-    if form != IDENTITY:
-        solve_lower(L, covector)
-        solve_lower_transposed(L, covector)

@@ -3,11 +3,11 @@
 from collections.abc import Sequence
 from copy import copy
 from functools import cached_property
-from typing import NamedTuple
 
 import numpy as np
 import pinocchio as pin
 
+from hsp_control import engine
 from hsp_control.common.arrays import (
     Array,
     Indices,
@@ -17,8 +17,8 @@ from hsp_control.common.arrays import (
 )
 from hsp_control.common.exceptions import ModelError
 from hsp_control.common.suggestions import listing
-from hsp_control.compiled.kernels import KernelCall, KernelCalls, Once, kernel
-from hsp_control.robot.kinematics import Term
+from hsp_control.compiled.kernels import KernelCall, KernelCalls, Once
+from hsp_control.robot.kinematics import PointMotion, Term
 
 
 def inertia_terms(
@@ -32,7 +32,7 @@ def inertia_terms(
         given = model, model.createData(), q, v, M_dot
         return M, Term(M_dot, [Once.at(stamp, (_write_difference, given))])
     coriolis = pin.computeCoriolisMatrix, (model, data, q, v)
-    add = _write_sum, (matrix_view(data.C), M_dot)
+    add = engine.InertiaRate, (matrix_view(data.C), M_dot)
     return M, Term(M_dot, [Once.at(stamp, coriolis, add)])
 
 
@@ -44,7 +44,7 @@ def mass_matrix(model: pin.Model, data: pin.Data, q: Array) -> Array:
     So nobody else calls ``pin.crba`` with data that are used again.
     """
     for matrix in _remembered(model, data):
-        _clear(matrix)
+        matrix[:] = 0.0
     return np.asarray(pin.crba(model, data, q))
 
 
@@ -53,7 +53,7 @@ def _mass_matrix_calls(
 ) -> Sequence[KernelCall]:
     """Return the calls of `mass_matrix`."""
     clearing: list[KernelCall] = [
-        (_clear, (matrix,)) for matrix in _remembered(model, data)
+        (engine.Clear, (matrix,)) for matrix in _remembered(model, data)
     ]
     return [*clearing, (pin.crba, (model, data, q))]
 
@@ -63,22 +63,6 @@ def _remembered(model: pin.Model, data: pin.Data) -> list[Array]:
     if not model.mimicking_joints:
         return []
     return [kept_view(matrix_view(each), data) for each in (*data.Fcrb, data.M)]
-
-
-@kernel
-def _clear(matrix: Array) -> None:
-    """Write zeros."""
-    for i in range(matrix.shape[0]):
-        for j in range(matrix.shape[1]):
-            matrix[i, j] = 0.0
-
-
-@kernel
-def _write_sum(C: Array, M_dot: Array) -> None:
-    """Write C + Cᵀ."""
-    for i in range(C.shape[0]):
-        for j in range(C.shape[0]):
-            M_dot[i, j] = C[i, j] + C[j, i]
 
 
 def _write_difference(
@@ -91,15 +75,6 @@ def _write_difference(
         return mass_matrix(model, data, pin.integrate(model, q, s * v)).copy()
 
     M_dot[:] = (8.0 * (M(h) - M(-h)) - (M(2.0 * h) - M(-2.0 * h))) / (12.0 * h)
-
-
-class PointMotion(NamedTuple):
-    """The part of a `FrameMotion` that a point without axes has."""
-
-    jacobian: Array
-    jacobian_dot: Array
-    position: Array
-    velocity: Array
 
 
 class CentroidalMotion:
@@ -140,10 +115,10 @@ class CentroidalMotion:
         found = self.velocity, self.jacobian, self.jacobian_dot
         angular = self.momentum_matrix, self.momentum_matrix_dot
         sums = matrix_view(data.Ag), matrix_view(data.dAg), self.mass, v
-        extract = _extract, (*sums, *found, *angular)
+        extract = engine.CentroidalRows, (*sums, *found, *angular)
         # It reads the velocity of the centre, which it does not write: of others' calls
         # nothing is to be in A'.
-        rest = _clear, (kept_view(data.vcom[0].reshape(1, 3), data),)
+        rest = engine.Clear, (kept_view(data.vcom[0].reshape(1, 3), data),)
         self.calls: KernelCalls = [Once.at(stamp, rest, momentum, extract)]
 
     @cached_property
@@ -159,37 +134,3 @@ class CentroidalMotion:
         """Return the centre's motion as an argument of a kernel; see `planned`."""
         J, J_dot = self.jacobian, self.jacobian_dot
         return PointMotion(J, J_dot, self.position, self.velocity), self.calls
-
-
-@kernel
-def _extract(
-    A: Array,
-    A_dot: Array,
-    mass: float,
-    v: Array,
-    velocity: Array,
-    J: Array,
-    J_dot: Array,
-    angular: Array,
-    angular_dot: Array,
-) -> None:
-    """Write the linear rows divided by the mass, and the angular rows with their rate.
-
-    Pinocchio's A' is the rate about a point at rest, but the centre of mass moves. The
-    rate of the angular rows about c is A' - m c' × J (checked against finite
-    differences; Pinocchio's product A'v is right as it is, since c' × c' = 0).
-    """
-    for i in range(3):
-        velocity[i] = 0.0
-    for j in range(v.shape[0]):
-        for i in range(3):
-            J[i, j] = A[i, j] / mass
-            J_dot[i, j] = A_dot[i, j] / mass
-            angular[i, j] = A[3 + i, j]
-            velocity[i] += J[i, j] * v[j]
-    x, y, z = velocity[0], velocity[1], velocity[2]
-    for j in range(v.shape[0]):
-        px, py, pz = A[0, j], A[1, j], A[2, j]
-        angular_dot[0, j] = A_dot[3, j] - (y * pz - z * py)
-        angular_dot[1, j] = A_dot[4, j] - (z * px - x * pz)
-        angular_dot[2, j] = A_dot[5, j] - (x * py - y * px)

@@ -7,18 +7,20 @@ with δ' = v for single-dof joints and δ' = J_r(δ)⁻¹ v for a root.
 from abc import ABC, abstractmethod
 from collections.abc import Callable
 from functools import partial
+from math import ceil
 
 import numpy as np
 import pinocchio as pin
 
+from hsp_control import engine
 from hsp_control.common.arrays import Array
 from hsp_control.common.entry_points import own_names
 from hsp_control.common.exceptions import HspControlError, SimulationError
-from hsp_control.compiled.kernels import TIME, AnyCall, KernelCalls, kernel
-from hsp_control.compiled.native import NativeCall
-from hsp_control.compiled.step_plan import in_equal_steps, planned
+from hsp_control.compiled.kernels import TIME, AnyCall, KernelCalls
+from hsp_control.compiled.step_plan import planned
 from hsp_control.declaration import Part
 from hsp_control.declaration.quantities import Positive
+from hsp_control.engine import Plan
 from hsp_control.robot.kinematics import Term
 from hsp_control.robot.robot import Robot
 
@@ -165,6 +167,11 @@ class SemiImplicitEuler(FixedStep, type="semi_implicit_euler"):
         return _EulerStep(robot, bind_dynamics, self.step)
 
 
+def number_of_steps(duration: float, step: float) -> int:
+    """Return the smallest number of equal steps that are not longer than ``step``."""
+    return max(1, ceil(duration / step - 1e-9))
+
+
 class Steps(ABC):
     """Takes steps of equal length: the memory of a `FixedStep`, called as `Advance`.
 
@@ -176,8 +183,8 @@ class Steps(ABC):
         now: Beginning of the present step [s], shape (1,).
         h: The step [s], shape (1,).
         take: Integrates q and v over the interval.
-        native: Whether `take` is one native call; not if a part of a step, for example
-            v', is none.
+        native: Whether `take` runs no function of Python; a part of a step, for example
+            v', may be one.
     """
 
     def __init__(self, robot: Robot, bind_dynamics: Bind, longest: float) -> None:
@@ -186,9 +193,9 @@ class Steps(ABC):
         self.q, self.v = robot.neutral(), np.zeros(robot.nv)
         self.acceleration = bind_dynamics(self.q, self.v)
         self.interval, self.now, self.h = np.zeros(2), np.zeros(1), np.zeros(1)
-        calls = planned(self._calls()).steps()
-        self.take = in_equal_steps(calls, self.interval, longest, self.now, self.h)
-        self.native = isinstance(self.take, NativeCall)
+        step = Plan(planned(self._calls()).steps())
+        self.take = engine.EqualSteps(step, self.interval, longest, self.now, self.h)
+        self.native = not self.take.python
 
     @abstractmethod
     def _calls(self) -> KernelCalls:
@@ -215,7 +222,7 @@ class _EulerStep(Steps):
         robot = self.robot
         self._moved = np.zeros(robot.nv)
         q, a = self.q if robot.linear else np.zeros(0), self.acceleration.value
-        step = _euler, (self.h, a, q, self.v, self._moved)
+        step = engine.EulerStep, (self.h, a, q, self.v, self._moved)
         place = [] if robot.linear else [(self._place, ())]
         return [*self.compute_at(0.0), step, *place]
 
@@ -233,18 +240,18 @@ class _Rk4Stages(Steps):
         self._chart = TangentChart(robot, self.q)
         self._base = self._chart.base
         base, q = self._base, self.q
-        begin = _begin, (q, self.v, base, v0, self._D)
+        begin = engine.Rk4Begin, (q, self.v, base, v0, self._D)
         if not robot.linear:
             base = q = np.zeros(0)
         slopes = self.h, self._D, A, self.acceleration.value
         point = base, v0, self._delta, q, self.v
         parts: list[AnyCall] = [begin, *self.compute_at(0.0)]
         for i, fraction in enumerate((0.5, 0.5, 1.0)):
-            parts.append((_next_stage, (i, fraction, *slopes, *point)))
+            parts.append((engine.Rk4Stage, (i, fraction, *slopes, *point)))
             if not robot.linear:
                 parts.append((self._place, (i + 1,)))
             parts += self.compute_at(fraction)
-        parts.append((_weighted_step, (*slopes, *point)))
+        parts.append((engine.Rk4End, (*slopes, *point)))
         if not robot.linear:
             parts.append((self._place, (None,)))
         return parts
@@ -254,71 +261,6 @@ class _Rk4Stages(Steps):
         self.q[:] = self.robot.integrate(self._base, self._delta)
         if stage is not None and not self.robot.flat:
             self._D[stage] = self._chart.velocity(self._delta, self.v)
-
-
-@kernel
-def _begin(q: Array, v: Array, base: Array, v0: Array, D: Array) -> None:
-    """Begin a step: keep q and v, and write the first slope of δ."""
-    for i in range(q.shape[0]):
-        base[i] = q[i]
-    for i in range(v.shape[0]):
-        v0[i] = D[0, i] = v[i]
-
-
-@kernel
-def _euler(h: Array, a: Array, q: Array, v: Array, moved: Array) -> None:
-    """Write v + h a and h times that, and add the latter to q, unless it is empty."""
-    for i in range(v.shape[0]):
-        v[i] += h[0] * a[i]
-        moved[i] = h[0] * v[i]
-    for i in range(q.shape[0]):
-        q[i] += moved[i]
-
-
-@kernel
-def _next_stage(
-    stage: int,
-    fraction: float,
-    h: Array,
-    D: Array,
-    A: Array,
-    a: Array,
-    base: Array,
-    v0: Array,
-    delta: Array,
-    q: Array,
-    v: Array,
-) -> None:
-    """Write the point (δ, q, v) where a stage's slopes lead, and its slope of δ."""
-    for i in range(v.shape[0]):
-        A[stage, i] = a[i]
-        delta[i] = fraction * h[0] * D[stage, i]
-        v[i] = v0[i] + fraction * h[0] * A[stage, i]
-        D[stage + 1, i] = v[i]
-    for i in range(q.shape[0]):
-        q[i] = base[i] + delta[i]
-
-
-@kernel
-def _weighted_step(
-    h: Array,
-    D: Array,
-    A: Array,
-    a: Array,
-    base: Array,
-    v0: Array,
-    delta: Array,
-    q: Array,
-    v: Array,
-) -> None:
-    """Write the end of a step, by all slopes; the arguments are `_next_stage`'s."""
-    for i in range(v.shape[0]):
-        A[3, i] = a[i]
-        delta[i] = h[0] / 6.0 * (D[0, i] + 2.0 * D[1, i] + 2.0 * D[2, i] + D[3, i])
-        slopes = A[0, i] + 2.0 * A[1, i] + 2.0 * A[2, i] + A[3, i]
-        v[i] = v0[i] + h[0] / 6.0 * slopes
-    for i in range(q.shape[0]):
-        q[i] = base[i] + delta[i]
 
 
 class Dop853(Integrator, type="dop853"):

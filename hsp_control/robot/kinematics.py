@@ -6,6 +6,7 @@ from typing import NamedTuple
 import numpy as np
 import pinocchio as pin
 
+from hsp_control import engine
 from hsp_control.common.arrays import Array, Indices, matrix_view, read_only_view
 from hsp_control.common.exceptions import ImmutableError, ModelError
 from hsp_control.compiled.kernels import KernelCalls, kernel
@@ -42,6 +43,15 @@ class WorldKinematics(NamedTuple):
     jacobian: Array
     jacobian_dot: Array  # its time derivative, shape (6, nvExtended)
     v: Array  # the velocity, shape (nv,)
+
+
+class PointMotion(NamedTuple):
+    """The part of a `FrameMotion` that a point without axes has."""
+
+    jacobian: Array  # shape (3, nv)
+    jacobian_dot: Array  # shape (3, nv)
+    position: Array  # shape (3,) [m]
+    velocity: Array  # J v, shape (3,) [m/s]
 
 
 class _ParentJoint(NamedTuple):
@@ -105,7 +115,7 @@ class FrameKinematics:
             *joint_support(model, frame.parentJoint),
         )
         given = stamp, np.array([-1]), carrier, v, motion, self.drift
-        self.calls: KernelCalls = [(frame_kinematics, given)]
+        self.calls: KernelCalls = [(engine.FrameKinematics, given)]
 
     def __setattr__(self, name: str, value: object) -> None:
         if hasattr(self, name):
@@ -118,6 +128,23 @@ class FrameKinematics:
     def supplied(self) -> tuple[FrameMotion, KernelCalls]:
         """Return the motion as an argument of a kernel; see `planned`."""
         return self.motion, self.calls
+
+    @property
+    def point(self) -> "FramePoint":
+        """The frame's origin, as an argument of a kernel."""
+        return FramePoint(self)
+
+
+class FramePoint:
+    """The origin of a frame, without its axes."""
+
+    def __init__(self, frame: FrameKinematics) -> None:
+        self._frame = frame
+
+    def supplied(self) -> tuple[PointMotion, KernelCalls]:
+        """Return the origin's motion as an argument of a kernel; see `planned`."""
+        (J, J_dot, _, p, velocity), calls = self._frame.supplied()
+        return PointMotion(J[:3], J_dot[:3], p, velocity[:3]), calls
 
 
 class ShownFrame(FrameKinematics):
@@ -135,85 +162,6 @@ class ShownFrame(FrameKinematics):
     def supplied(self) -> tuple[FrameMotion, KernelCalls]:
         """Return the motion as an argument of a kernel; see `planned`."""
         return self._own.supplied()
-
-
-@kernel
-def frame_kinematics(
-    stamp: Indices,
-    computed: Indices,
-    carrier: _ParentJoint,
-    v: Array,
-    motion: FrameMotion,
-    drift: Array,
-) -> None:
-    """Write the placement of a frame that is fixed to a joint, and its motion.
-
-    Pinocchio gives the joints' Jacobian and its rate at the world's origin. A column
-    (l, w) there is (l + w × p, w) at a point p, and its rate is
-    (l' + w' × p + w × p', w'). Only joints that carry the frame have columns; those of
-    mimic joints are added to their leader's. Nothing is done if ``computed`` equals
-    ``stamp``.
-    """
-    if computed[0] == stamp[0]:
-        return
-    computed[0] = stamp[0]
-    J_world, J_world_dot, R_joint, p_joint, R_local, p_local, columns, dofs = carrier
-    J, J_dot, R, p, velocity = motion
-    # Placement
-    for i in range(3):
-        p[i] = p_joint[i]
-        for j in range(3):
-            p[i] += R_joint[i, j] * p_local[j]
-            R[i, j] = 0.0
-            for k in range(3):
-                R[i, j] += R_joint[i, k] * R_local[k, j]
-    for k in range(columns.shape[0]):
-        j = dofs[k]
-        for i in range(6):
-            J[i, j] = 0.0
-            J_dot[i, j] = 0.0
-    # J and the velocity J v
-    for i in range(6):
-        velocity[i] = 0.0
-        drift[i] = 0.0
-    for k in range(columns.shape[0]):
-        c, j = columns[k], dofs[k]
-        wx, wy, wz = J_world[3, c], J_world[4, c], J_world[5, c]
-        J[0, j] += J_world[0, c] + wy * p[2] - wz * p[1]
-        J[1, j] += J_world[1, c] + wz * p[0] - wx * p[2]
-        J[2, j] += J_world[2, c] + wx * p[1] - wy * p[0]
-        J[3, j] += wx
-        J[4, j] += wy
-        J[5, j] += wz
-    for j in range(v.shape[0]):
-        for i in range(6):
-            velocity[i] += J[i, j] * v[j]
-    # J' and the drift J' v; the frame's origin moves with u = p'
-    ux, uy, uz = velocity[0], velocity[1], velocity[2]
-    for k in range(columns.shape[0]):
-        c, j = columns[k], dofs[k]
-        wx, wy, wz = J_world[3, c], J_world[4, c], J_world[5, c]
-        ax, ay, az = J_world_dot[3, c], J_world_dot[4, c], J_world_dot[5, c]
-        J_dot[0, j] += J_world_dot[0, c] + ay * p[2] - az * p[1] + wy * uz - wz * uy
-        J_dot[1, j] += J_world_dot[1, c] + az * p[0] - ax * p[2] + wz * ux - wx * uz
-        J_dot[2, j] += J_world_dot[2, c] + ax * p[1] - ay * p[0] + wx * uy - wy * ux
-        J_dot[3, j] += ax
-        J_dot[4, j] += ay
-        J_dot[5, j] += az
-    for j in range(v.shape[0]):
-        for i in range(6):
-            drift[i] += J_dot[i, j] * v[j]
-
-
-@kernel
-def copy_rows(
-    J_frame: Array, J_frame_dot: Array, first: int, J: Array, J_dot: Array
-) -> None:
-    """Write J and J': rows ``first``, ``first`` + 1, ... of the frame's."""
-    for i in range(J.shape[0]):
-        for j in range(J.shape[1]):
-            J[i, j] = J_frame[first + i, j]
-            J_dot[i, j] = J_frame_dot[first + i, j]
 
 
 class Term(NamedTuple):

@@ -22,9 +22,9 @@ from hsp_control.common.arrays import (
 )
 from hsp_control.common.exceptions import ImmutableError, NonFiniteError, ShapeError
 from hsp_control.compiled.kernels import AnyCall, KernelCall, KernelCalls, Once, says
-from hsp_control.compiled.moves import REFUSED, Memory, Move
-from hsp_control.compiled.step_plan import StepPlan, moving, planned
+from hsp_control.compiled.step_plan import Step, StepPlan, planned
 from hsp_control.declaration.quantities import Vector
+from hsp_control.engine import REFUSED, Move, Plan
 from hsp_control.robot.inertia import CentroidalMotion, inertia_terms
 from hsp_control.robot.kinematics import (
     FrameKinematics,
@@ -71,7 +71,7 @@ class RobotState:
         self.stamp_array: Indices = np.zeros(1, dtype=np.int64)
         blocks = np.array(robot.unit_blocks, dtype=np.int64).reshape(-1, 2)
         # writable, also where `seen` binds calls
-        self._memory: Memory = self.time, self.q, self.v, blocks, self.stamp_array
+        self._memory = self.time, self.q, self.v, blocks, self.stamp_array
         self._seen: RobotState | None = None
         self._read_only: RobotState | None = None
         self._data: pin.Data = robot.model.createData()
@@ -162,10 +162,10 @@ class RobotState:
             self._refuse(t, q, v)
         return value
 
-    def bind_move(self, calls: Sequence[Callable[[float], Any]] = ()) -> Move:
+    def bind_move(self, calls: Sequence[Step] = ()) -> Move:
         """Return how `advance` moves this state, with calls of the time that follow."""
         jacobians = pin.computeJointJacobiansTimeVariation, self._at
-        return moving(self._memory, [*self.plan([jacobians]).steps(), *calls])
+        return Move(Plan([*self.plan([jacobians]).steps(), *calls]), *self._memory)
 
     def _refuse(self, t: float, q: ArrayLike, v: ArrayLike) -> None:
         """Raise the error that says what is wrong with t, q and v."""

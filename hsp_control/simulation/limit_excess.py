@@ -4,8 +4,9 @@ from typing import Any
 
 import numpy as np
 
-from hsp_control.common.arrays import Array, Indices
-from hsp_control.compiled.kernels import KernelCall, kernel
+from hsp_control import engine
+from hsp_control.common.arrays import Array
+from hsp_control.compiled.kernels import KernelCall
 from hsp_control.constraints.limits import RobotLimits
 from hsp_control.control.measurement import LogChannel
 from hsp_control.robot import Robot
@@ -32,11 +33,19 @@ class LimitExcess:
         self._units = unit, f"{unit}/s"
         # beyond the limits, shape (nv,) [rad or m, rad/s or m/s]
         self.position, self.velocity = np.zeros(robot.nv), np.zeros(robot.nv)
+        self._q, self._v = robot.neutral(), np.zeros(robot.nv)  # for `record`
+        self._limits: RobotLimits | None = None
 
     def record(self, limits: RobotLimits | None, q: Array, v: Array) -> None:
         """Record a true state."""
-        if limits is not None:
-            _record(*self._arguments(limits, q, v))
+        if limits is None:
+            return
+        if limits is not self._limits:
+            self._limits = limits
+            given = self._arguments(limits, self._q, self._v)
+            self._record = engine.LimitExcess(*given)
+        self._q[:], self._v[:] = q, v
+        self._record()
 
     def recording(
         self, limits: RobotLimits | None, q: Array, v: Array
@@ -44,7 +53,7 @@ class LimitExcess:
         """Return `record` of what these arrays then hold, as calls."""
         if limits is None:
             return []
-        return [(_record, self._arguments(limits, q, v))]
+        return [(engine.LimitExcess, self._arguments(limits, q, v))]
 
     def _arguments(self, limits: RobotLimits, q: Array, v: Array) -> tuple[Any, ...]:
         bounds = limits.lower, limits.upper, limits.velocity
@@ -62,24 +71,3 @@ class LimitExcess:
         self.position.fill(0.0)
         self.velocity.fill(0.0)
         return found
-
-
-@kernel
-def _record(
-    coordinates: Indices,
-    dofs: Indices,
-    q: Array,
-    v: Array,
-    lower: Array,
-    upper: Array,
-    speed: Array,
-    position: Array,
-    velocity: Array,
-) -> None:
-    """Write the largest excesses."""
-    for k in range(coordinates.shape[0]):
-        i = dofs[k]
-        x = q[coordinates[k]]
-        position[i] = max(position[i], x - upper[i], lower[i] - x)
-    for i in range(v.shape[0]):
-        velocity[i] = max(velocity[i], abs(v[i]) - speed[i])

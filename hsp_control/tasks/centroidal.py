@@ -5,6 +5,7 @@ from typing import ClassVar, Literal, Self
 
 import numpy as np
 
+from hsp_control import engine
 from hsp_control.common.arrays import Array
 from hsp_control.compiled.kernels import KernelCall
 from hsp_control.declaration.quantities import Axes, Positive
@@ -12,7 +13,7 @@ from hsp_control.geometry.scene import Start
 from hsp_control.law import TaskSample
 from hsp_control.robot import Robot, RobotState
 from hsp_control.tasks.feedback import ErrorPart, Feedback
-from hsp_control.tasks.frame_position import axis_indices, track_axes
+from hsp_control.tasks.frame_position import axis_indices
 from hsp_control.tasks.frame_task import TrackingTask, place_point
 from hsp_control.tasks.task import Task
 from hsp_control.trajectories import Hold, Trajectory
@@ -48,7 +49,8 @@ class CenterOfMass(TrackingTask, type="center_of_mass"):
 
     def kernel(self, state: RobotState) -> KernelCall:
         """Return the kernel; see `Task.kernel`."""
-        return track_axes, (axis_indices(self.axes), state.centroidal, self.trajectory)
+        axes = axis_indices(self.axes)
+        return engine.TrackAxes, (axes, state.centroidal, self.trajectory)
 
     def reference_rate(self, state: RobotState) -> Array:
         """Return c_d', shape (m,) [m/s]."""

@@ -1,10 +1,11 @@
 """The base class of tasks that may have an impedance instead of gains."""
 
 from dataclasses import KW_ONLY, replace
-from typing import ClassVar, Self
+from typing import ClassVar, NamedTuple, Self
 
 import numpy as np
 
+from hsp_control import engine
 from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import GainError
 from hsp_control.compiled.kernels import KernelCalls
@@ -14,14 +15,18 @@ from hsp_control.robot import Robot, RobotState
 from hsp_control.tasks.feedback import Feedback, InForce
 from hsp_control.tasks.gains import Gains
 from hsp_control.tasks.impedance import Impedance, parts_of
-from hsp_control.tasks.impedance_gains import (
-    ImpedanceScratch,
-    Rotating,
-    impedance_gains,
-)
 from hsp_control.tasks.task import SecondOrderTask, Task
 
 _NO_GAINS = Gains(natural_frequency=10.0)
+_THRESHOLD = 0.03  # default threshold of the law's singularities: see `Controller`
+
+
+class Rotating(NamedTuple):
+    """Which rows of an error are a rotation vector, and what rotates."""
+
+    first: int  # the first of the three rows; the number of rows if there are none
+    rotation: Array  # world ← frame, (3, 3)
+    angular_velocity: Array  # of the frame, in world axes, (3,) [rad/s]
 
 
 class CompliantTask(SecondOrderTask):
@@ -96,11 +101,10 @@ class CompliantTask(SecondOrderTask):
         if self.impedance is None:
             return task
         inertia = state.inertia, state.inertia_rate
-        numbers = in_force.numbers, self.part_ends()
-        scratch = ImpedanceScratch.allocate(self.rows, state.robot.nv)
-        gains = *inertia, self._rotating(state), *numbers, out, scratch
-        own = in_force.mobility, in_force.feedback
-        return [*task, (impedance_gains, (*gains, *own)), *task]
+        impedance = parts_of(in_force.numbers), self.part_ends()
+        given = *inertia, self._rotating(state), *impedance, out, _THRESHOLD
+        own = in_force.mobility, in_force.feedback.Kp, in_force.feedback.Kv
+        return [*task, (engine.ImpedanceGains, (*given, *own)), *task]
 
     def feedback_at(self, state: RobotState) -> Feedback:
         """Return new arrays of feedback at a state; see `Task.feedback_at`."""

@@ -6,12 +6,11 @@ from typing import Annotated, Any, Literal, NamedTuple
 import numpy as np
 from pydantic import AfterValidator, BeforeValidator
 
+from hsp_control import engine
 from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import HspControlError, TaskError
-from hsp_control.compiled.kernels import kernel
-from hsp_control.compiled.linalg import squared_norm
 from hsp_control.declaration.quantities import Positive, plain
-from hsp_control.law.threshold import WHOLE
+from hsp_control.edge.threshold import WHOLE
 from hsp_control.robot import Robot
 
 UNBOUNDED = np.zeros((0, 3))
@@ -39,8 +38,9 @@ class Feedback(NamedTuple):
 
     def acceleration(self, e: Array, e_dot: Array) -> Array:
         """Return Kv e' + Kp s(e) + offset, shape (m,), for a task in plain Python."""
+        given = [np.ascontiguousarray(x, dtype=float) for x in (*self, e, e_dot)]
         out = np.zeros(len(self.offset))
-        add_feedback(out, self, e, e_dot, out)
+        engine.FeedbackAcceleration(*given, out)()
         return out
 
 
@@ -54,49 +54,6 @@ class InForce(NamedTuple):
     # Λ⁻¹ in the coordinates of the error, (m, m), of the last step; only of a task with
     # an impedance.
     mobility: Array
-
-
-@kernel
-def add_feedback(
-    feed_forward: Array, feedback: Feedback, e: Array, e_dot: Array, out: Array
-) -> None:
-    """Write feed_forward + offset + Kv e' + Kp s(e), perhaps in place."""
-    Kp, Kv, offset, largest = feedback
-    for i in range(e.shape[0]):
-        total = feed_forward[i] + offset[i]
-        for j in range(e.shape[0]):
-            total += Kv[i, j] * e_dot[j] + Kp[i, j] * e[j]
-        out[i] = total
-    for part in range(largest.shape[0]):
-        first, end = int(largest[part, 0]), int(largest[part, 1])
-        square = 0.0
-        for j in range(first, end):
-            square += e[j] * e[j]
-        if square > largest[part, 2] * largest[part, 2]:
-            beyond = 1.0 - largest[part, 2] / np.sqrt(square)
-            for i in range(e.shape[0]):
-                for j in range(first, end):
-                    out[i] -= Kp[i, j] * beyond * e[j]
-
-
-@kernel
-def write_asked(
-    feedback: Feedback, e: Array, rest: Array, out: Array, stretched: Array
-) -> None:
-    """Write Kp s(e), what the feedback asks for at rest, shape (m,); ``rest`` is 0.
-
-    And of each row of a bounded part how long that part is, relative to its largest
-    length.
-    """
-    largest = feedback.largest
-    for part in range(largest.shape[0]):
-        first, end = int(largest[part, 0]), int(largest[part, 1])
-        length = np.sqrt(squared_norm(e[first:end])) / largest[part, 2]
-        for i in range(first, end):
-            stretched[i] = length
-    for i in range(e.shape[0]):
-        out[i] = -feedback.offset[i]
-    add_feedback(out, feedback, e, rest, out)
 
 
 class ErrorPart(NamedTuple):
@@ -116,7 +73,7 @@ class ErrorPart(NamedTuple):
 
     @property
     def yields(self) -> float:
-        """By how much L is less for it; see `hsp_control.law.threshold`."""
+        """By how much L is less for it; see `hsp_control.edge.threshold`."""
         return 1.0 if self.unit == "rad" else max(WHOLE + 1.0 - self.size, 1.0)
 
 

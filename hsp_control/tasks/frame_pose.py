@@ -6,45 +6,29 @@ from typing import Annotated, Any, ClassVar
 import numpy as np
 import pinocchio as pin
 
+from hsp_control import engine
 from hsp_control.common.arrays import Array
-from hsp_control.compiled.kernels import KernelCall, kernel
-from hsp_control.compiled.linalg import multiply
-from hsp_control.compiled.rotations import (
-    compose_back,
-    cross,
-    jexp3,
-    jexp3_dot,
-    jlog3,
-    log3,
-    quaternion_from_rotation,
-    rotate,
-    rotate_back,
-)
+from hsp_control.compiled.kernels import KernelCall
 from hsp_control.declaration import AnyOf
-from hsp_control.law import TaskSample
+from hsp_control.engine.rotations import quaternion_from_rotation
 from hsp_control.robot import RobotState
-from hsp_control.robot.kinematics import FrameKinematics, FrameMotion, copy_rows
-from hsp_control.tasks.compliant_task import CompliantTask
-from hsp_control.tasks.feedback import ErrorPart, Feedback, add_feedback
+from hsp_control.robot.kinematics import FrameKinematics
+from hsp_control.tasks.compliant_task import CompliantTask, Rotating
+from hsp_control.tasks.feedback import ErrorPart
 from hsp_control.tasks.frame_task import (
     FrameTask,
     TrackingTask,
     place_orientation,
     place_pose,
 )
-from hsp_control.tasks.impedance_gains import Rotating
 from hsp_control.tasks.task import Drawn
 from hsp_control.trajectories import (
     ComposedPose,
     HoldOrientation,
-    OrientationSample,
     OrientationTrajectory,
     PoseTrajectory,
     Trajectory,
 )
-
-ORIENTATION_SCRATCH = 12
-"""Rows of the scratch array of `orientation_error` and `orientation_acceleration`."""
 
 
 class FrameOrientation(
@@ -78,9 +62,8 @@ class FrameOrientation(
 
     def kernel(self, state: RobotState) -> KernelCall:
         """Return the kernel; see `Task.kernel`."""
-        scratch = np.zeros((ORIENTATION_SCRATCH, 3))
         frame = state.frame(self.frame_name)
-        return _track_orientation, (frame, self.trajectory, scratch)
+        return engine.TrackOrientation, (frame, self.trajectory)
 
     def _rotating(self, state: RobotState) -> Rotating:
         motion = state.frame(self.frame_name).motion
@@ -99,89 +82,8 @@ class FrameOrientation(
 
 def _quaternions(desired: Array, actual: Array) -> tuple[Array, Array]:
     """Return two rotations as quaternions; q and -q are one: of the nearer sign."""
-    q_d, q = np.zeros((2, 4))
-    quaternion_from_rotation(desired, q_d)
-    quaternion_from_rotation(actual, q)
+    q_d, q = quaternion_from_rotation(desired), quaternion_from_rotation(actual)
     return q_d, q if q_d @ q >= 0.0 else -q
-
-
-@kernel
-def orientation_error(
-    R: Array, w: Array, R_d: Array, w_d: Array, scratch: Array, e: Array, e_dot: Array
-) -> None:
-    """Write e = -y and e' = -y' with y = log(R_dᵀ R) and y' = Jlog(y) w̃.
-
-    w̃ = Rᵀ(w - w_d) is the relative angular velocity in the axes of the frame.
-
-    Shapes: w (3,) [rad/s], w_d (3,) [rad/s], scratch (ORIENTATION_SCRATCH, 3), e (3,)
-    [rad], e_dot (3,) [rad/s].
-    """
-    w_tilde, y, E = scratch[0], scratch[1], scratch[6:9]
-    compose_back(R_d, R, E)
-    log3(E, y)
-    for i in range(3):
-        e[i] = w[i] - w_d[i]
-    rotate_back(R, e, w_tilde)
-    jlog3(y, E)
-    multiply(E, w_tilde, e_dot)
-    for i in range(3):
-        e[i] = -y[i]
-        e_dot[i] = -e_dot[i]
-
-
-@kernel
-def orientation_acceleration(
-    R: Array,
-    w: Array,
-    w_d: Array,
-    w_d_dot: Array,
-    e: Array,
-    e_dot: Array,
-    scratch: Array,
-    out: Array,
-) -> None:
-    """Overwrite y'' = -e'' by the angular acceleration w' that produces it.
-
-    w̃ = Jexp(y) y' gives w̃' = Jexp y'' + Jexp' y'. The motion of the desired frame adds
-    the transport term: w' = R w̃' - w × w_d + w_d'.
-
-    Shapes: w (3,) [rad/s], w_d (3,) [rad/s], w_d_dot (3,) [rad/s²], e (3,) [rad], e_dot
-    (3,) [rad/s], scratch (ORIENTATION_SCRATCH, 3), out (3,) [rad/s²].
-    """
-    y, y_dot, w_tilde_dot, term = scratch[0], scratch[1], scratch[2], scratch[3]
-    for i in range(3):
-        y[i], y_dot[i] = -e[i], -e_dot[i]
-    J_exp, J_exp_dot = scratch[6:9], scratch[9:12]
-    jexp3(y, J_exp)
-    jexp3_dot(y, y_dot, J_exp_dot)
-    multiply(J_exp, out, w_tilde_dot)
-    multiply(J_exp_dot, y_dot, term)
-    for i in range(3):
-        w_tilde_dot[i] += term[i]
-    rotate(R, w_tilde_dot, out)
-    cross(w, w_d, term)
-    for i in range(3):
-        out[i] += w_d_dot[i] - term[i]
-
-
-@kernel
-def _track_orientation(
-    frame: FrameMotion,
-    desired: OrientationSample,
-    scratch: Array,
-    feedback: Feedback,
-    out: TaskSample,
-) -> None:
-    """Write the sample: the angular acceleration for which e'' = -Kv e' - Kp e."""
-    R, w = frame.rotation, frame.velocity[3:]
-    R_d, w_d, w_d_dot = desired
-    J, J_dot, e, e_dot, a_x = out
-    copy_rows(frame.jacobian, frame.jacobian_dot, 3, J, J_dot)
-    orientation_error(R, w, R_d, w_d, scratch, e, e_dot)
-    for i in range(3):
-        a_x[i] = 0.0
-    add_feedback(a_x, feedback, e, e_dot, a_x)
-    orientation_acceleration(R, w, w_d, w_d_dot, e, e_dot, scratch, a_x)
 
 
 PoseOrPoint = Annotated[PoseTrajectory | Trajectory, AnyOf(PoseTrajectory, Trajectory)]
@@ -252,8 +154,7 @@ class FramePose(FrameTask, PoseTask, CompliantTask, type="frame_pose"):
 
     def kernel(self, state: RobotState) -> KernelCall:
         """Return the kernel; see `Task.kernel`."""
-        scratch = np.zeros((ORIENTATION_SCRATCH, 3))
-        return track_pose, (state.frame(self.frame_name), self.followed, scratch)
+        return engine.TrackPose, (state.frame(self.frame_name), self.followed)
 
     def _rotating(self, state: RobotState) -> Rotating:
         motion = state.frame(self.frame_name).motion
@@ -263,31 +164,3 @@ class FramePose(FrameTask, PoseTask, CompliantTask, type="frame_pose"):
         """Return position and rotation of the frame in the world."""
         frame = state.frame(self.frame_name)
         return frame.position, frame.rotation
-
-
-@kernel
-def track_pose(
-    frame: FrameMotion,
-    desired: Array,
-    scratch: Array,
-    feedback: Feedback,
-    out: TaskSample,
-) -> None:
-    """Write the sample of a pose task; gains may couple position and orientation.
-
-    ``desired`` has shape (8, 3): x, x', x'', R (three rows), ω, ω', see
-    `PoseSample.over`.
-    """
-    J_frame, J_frame_dot, R, position, velocity = frame
-    J, J_dot, e, e_dot, a_x = out
-    copy_rows(J_frame, J_frame_dot, 0, J, J_dot)
-    for i in range(3):
-        e[i] = desired[0, i] - position[i]
-        e_dot[i] = desired[1, i] - velocity[i]
-        a_x[i] = desired[2, i]
-        a_x[3 + i] = 0.0
-    R_d, w_d, w_d_dot = desired[3:6], desired[6], desired[7]
-    w, angle, angle_dot, turning = velocity[3:], e[3:], e_dot[3:], a_x[3:]
-    orientation_error(R, w, R_d, w_d, scratch, angle, angle_dot)
-    add_feedback(a_x, feedback, e, e_dot, a_x)
-    orientation_acceleration(R, w, w_d, w_d_dot, angle, angle_dot, scratch, turning)

@@ -5,18 +5,17 @@ from typing import Any, ClassVar
 
 import numpy as np
 
+from hsp_control import engine
 from hsp_control.common.arrays import Array, Indices
-from hsp_control.compiled.kernels import KernelCall, kernel
+from hsp_control.compiled.kernels import KernelCall
 from hsp_control.declaration.quantities import Axes
-from hsp_control.law import TaskSample
 from hsp_control.robot import RobotState
-from hsp_control.robot.inertia import PointMotion
-from hsp_control.robot.kinematics import FrameKinematics, FrameMotion
+from hsp_control.robot.kinematics import FrameKinematics
 from hsp_control.tasks.compliant_task import CompliantTask
-from hsp_control.tasks.feedback import ErrorPart, Feedback, add_feedback
+from hsp_control.tasks.feedback import ErrorPart
 from hsp_control.tasks.frame_task import FrameTask, TrackingTask, place_point
 from hsp_control.tasks.task import Drawn
-from hsp_control.trajectories import Hold, Trajectory, TrajectorySample
+from hsp_control.trajectories import Hold, Trajectory
 
 
 class FramePosition(FrameTask, TrackingTask, CompliantTask, type="frame_position"):
@@ -48,7 +47,7 @@ class FramePosition(FrameTask, TrackingTask, CompliantTask, type="frame_position
     def kernel(self, state: RobotState) -> KernelCall:
         """Return the kernel; see `Task.kernel`."""
         frame = state.frame(self.frame_name)
-        return track_axes, (axis_indices(self.axes), frame, self.trajectory)
+        return engine.TrackAxes, (axis_indices(self.axes), frame.point, self.trajectory)
 
     def reference_rate(self, state: RobotState) -> Array:
         """Return x_d', shape (m,) [m/s]."""
@@ -64,26 +63,3 @@ class FramePosition(FrameTask, TrackingTask, CompliantTask, type="frame_position
 def axis_indices(axes: str) -> Indices:
     """Return the indices of axes: [0, 2] for ``"xz"``."""
     return np.array(["xyz".index(letter) for letter in axes], dtype=np.int64)
-
-
-@kernel
-def track_axes(
-    axes: Indices,
-    point: FrameMotion | PointMotion,
-    desired: TrajectorySample,
-    feedback: Feedback,
-    out: TaskSample,
-) -> None:
-    """Write the sample of a point, whose motion is in world axes."""
-    J_point, J_point_dot = point.jacobian, point.jacobian_dot
-    position, velocity = point.position, point.velocity
-    x_d, x_d_dot, x_d_ddot = desired
-    J, J_dot, e, e_dot, a_x = out
-    for k in range(axes.shape[0]):
-        i = axes[k]
-        for j in range(J.shape[1]):
-            J[k, j] = J_point[i, j]
-            J_dot[k, j] = J_point_dot[i, j]
-        e[k] = x_d[k] - position[i]
-        e_dot[k] = x_d_dot[k] - velocity[i]
-    add_feedback(x_d_ddot, feedback, e, e_dot, a_x)

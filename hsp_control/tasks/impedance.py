@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import KW_ONLY, replace
-from typing import Any, Self
+from typing import Any, NamedTuple, Self
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -86,11 +86,21 @@ class Impedance(Part, error=GainError):
         return out
 
 
-def parts_of(numbers: Array) -> tuple[Array, Array, Array, Array]:
-    """Return views: K, D (m, m), and ζ, 1/largest force (m,)."""
+class ImpedanceParts(NamedTuple):
+    """The numbers of an impedance, as one argument of a kernel."""
+
+    K: Array  # stiffness, symmetric, shape (m, m) [N/m or N·m/rad]
+    D: Array  # damping, symmetric, shape (m, m) [N·s/m or N·m·s/rad]
+    ratio: Array  # ζ, the same for all rows, shape (m,) [-]
+    # 1/largest force of each row, shape (m,) [1/N or 1/(N·m)]; 0 for no bound
+    inverse_force: Array
+
+
+def parts_of(numbers: Array) -> ImpedanceParts:
+    """Return views of the numbers of `Impedance.numbers`."""
     m = numbers.shape[1]
     K, D, rest = numbers[:m], numbers[m : 2 * m], numbers[2 * m :]
-    return K, D, rest[0], rest[1]
+    return ImpedanceParts(K, D, rest[0], rest[1])
 
 
 def _definite(value: ArrayLike, name: str) -> Array:

@@ -1,24 +1,22 @@
 """The task of joint positions, which track a posture that may move."""
 
 from dataclasses import KW_ONLY, replace
-from math import atan2, cos, sin
 from typing import Any, Self
 
 import numpy as np
 
-from hsp_control.common.arrays import Array, Indices
+from hsp_control import engine
+from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import TaskError
-from hsp_control.compiled.kernels import KernelCall, kernel
+from hsp_control.compiled.kernels import KernelCall
 from hsp_control.declaration import within
 from hsp_control.declaration.quantities import Names
 from hsp_control.geometry.scene import Start
-from hsp_control.law import TaskSample
 from hsp_control.robot import Robot, RobotState
-from hsp_control.robot.kinematics import joint_displacements
 from hsp_control.robot.state import Posture, configuration
 from hsp_control.tasks.compliant_task import CompliantTask
-from hsp_control.tasks.feedback import ErrorPart, Feedback, add_feedback
-from hsp_control.trajectories import Hold, Stream, Trajectory, TrajectorySample
+from hsp_control.tasks.feedback import ErrorPart
+from hsp_control.trajectories import Hold, Stream, Trajectory
 from hsp_control.trajectories.crossfade import AnyReference
 
 
@@ -95,7 +93,7 @@ class JointPosture(CompliantTask, type="joint_posture"):
         place = {int(row[0]): row for row in robot.single_dof_joints}
         joints = np.array([place[i] for i in self._indices(robot)], dtype=np.int64)
         where = state.q, state.v, self._configuration(robot), joints
-        return _track_posture, (*where, np.zeros(robot.nv), self.followed)
+        return engine.TrackPosture, (*where, self.followed)
 
     def reference_rate(self, state: RobotState) -> Array:
         """Return the desired velocities of the joints, shape (m,) [rad/s or m/s]."""
@@ -146,30 +144,3 @@ class JointPosture(CompliantTask, type="joint_posture"):
         if np.shape(self.reference) != (robot.nq,):
             raise self._not_placed("reference")
         return np.asarray(self.reference)
-
-
-@kernel
-def _track_posture(
-    q: Array,
-    v: Array,
-    reference: Array,
-    joints: Indices,
-    away: Array,
-    desired: TrajectorySample,
-    feedback: Feedback,
-    out: TaskSample,
-) -> None:
-    """Write the sample: e = displacement - (q ⊖ reference), within ±π if continuous."""
-    displacement, displacement_dot, displacement_ddot = desired
-    J, J_dot, e, e_dot, a_x = out
-    joint_displacements(q, reference, joints, away)
-    for k in range(joints.shape[0]):
-        for j in range(J.shape[1]):
-            J[k, j] = J_dot[k, j] = 0.0
-        i = joints[k, 0]
-        J[k, i] = 1.0
-        e[k] = displacement[k] - away[i]
-        if joints[k, 2] == 2:
-            e[k] = atan2(sin(e[k]), cos(e[k]))
-        e_dot[k] = displacement_dot[k] - v[i]
-    add_feedback(displacement_ddot, feedback, e, e_dot, a_x)

@@ -7,33 +7,16 @@ from typing import Self
 import numpy as np
 from numpy.typing import ArrayLike
 
+from hsp_control import engine
 from hsp_control.common.arrays import Array
-from hsp_control.compiled.kernels import KernelCall, kernel
-from hsp_control.compiled.linalg import multiply
-from hsp_control.compiled.rotations import (
-    compose_back,
-    cross,
-    jexp3,
-    jexp3_dot,
-    jlog3,
-    log3,
-    rotate,
-    turn,
-)
-from hsp_control.compiled.step_plan import planned
+from hsp_control.compiled.kernels import KernelCall
 from hsp_control.declaration.quantities import Number, Positive, Vector, Vector3
 from hsp_control.declaration.rotation import Rotation, matrix_of
+from hsp_control.engine.rotations import jexp3_dot, jlog3, log3
 from hsp_control.trajectories import checks
-from hsp_control.trajectories.orientation import (
-    OrientationSample,
-    OrientationTrajectory,
-)
-from hsp_control.trajectories.piecewise_polynomial import QUINTIC, horner
-from hsp_control.trajectories.schedule import smooth_step
-from hsp_control.trajectories.trajectory import (
-    Trajectory,
-    TrajectorySample,
-)
+from hsp_control.trajectories.orientation import OrientationTrajectory
+from hsp_control.trajectories.piecewise_polynomial import QUINTIC
+from hsp_control.trajectories.trajectory import Trajectory
 
 
 class Blend(Trajectory, type="blend"):
@@ -88,34 +71,7 @@ class Blend(Trajectory, type="blend"):
         x = np.asarray(self.start)
         v = np.zeros_like(x) if self.start_velocity is None else self.start_velocity
         start = np.stack([x, np.asarray(v)])
-        return _blend, (self.start_time, self.duration, start, self.trajectory)
-
-
-@kernel
-def _blend(
-    start_time: float,
-    duration: float,
-    start_state: Array,
-    desired: TrajectorySample,
-    out: TrajectorySample,
-    t: float,
-) -> None:
-    """Blend x_d with the line x0 + (t - t0) v0; ``start_state`` is x0 and v0."""
-    position, velocity, acceleration = out
-    x_d, v_d, a_d = desired
-    elapsed = t - start_time
-    s, s_dot, s_ddot = smooth_step(elapsed, 0.0, duration)
-    for i in range(position.size):
-        if elapsed < 0.0:
-            position[i], velocity[i], acceleration[i] = start_state[0, i], 0.0, 0.0
-        elif elapsed >= duration:
-            position[i], velocity[i], acceleration[i] = x_d[i], v_d[i], a_d[i]
-        else:
-            x, v = start_state[0, i] + elapsed * start_state[1, i], start_state[1, i]
-            gap, gap_dot = x_d[i] - x, v_d[i] - v
-            position[i] = x + s * gap
-            velocity[i] = v + s_dot * gap + s * gap_dot
-            acceleration[i] = s_ddot * gap + 2.0 * s_dot * gap_dot + s * a_d[i]
+        return engine.Blend, (self.start_time, self.duration, start, self.trajectory)
 
 
 class BlendOrientation(OrientationTrajectory, type="blend"):
@@ -175,86 +131,14 @@ class BlendOrientation(OrientationTrajectory, type="blend"):
         w = R.T @ (omega - omega_d)
         omega_dot = np.asarray(self.start_angular_acceleration)
         w_dot = R.T @ (omega_dot - omega_d_dot - np.cross(omega, R @ w))
-        y, y_dot, y_ddot = np.empty((3, 3))
-        given = R_d, R, w, w_dot, np.empty((3, 3)), y, y_dot, y_ddot
-        planned([(_offset, given)]).run(0.0)
-        return y, y_dot, y_ddot
+        y = log3(R_d.T @ R)
+        y_dot = jlog3(y) @ w
+        return y, y_dot, jlog3(y) @ (w_dot - jexp3_dot(y, y_dot) @ y_dot)
 
     def kernel(self) -> KernelCall:
         """Return the kernel; see `Trajectory.kernel`."""
-        motion = self._start, self._coefficients, np.empty((11, 3))
-        when = self.start_time, self.duration
-        return _blend_orientation, (*when, *motion, self.trajectory)
-
-
-@kernel
-def _offset(
-    R_d: Array,
-    R: Array,
-    w: Array,
-    w_dot: Array,
-    work: Array,
-    y: Array,
-    y_dot: Array,
-    y_ddot: Array,
-) -> None:
-    """Write y = log(R_dᵀ R) and its derivatives, with w = Jexp(y) y' and w'."""
-    compose_back(R_d, R, work)
-    log3(work, y)
-    jlog3(y, work)
-    multiply(work, w, y_dot)
-    jexp3_dot(y, y_dot, work)
-    multiply(work, y_dot, y_ddot)
-    for i in range(3):
-        w_dot[i] -= y_ddot[i]
-    jlog3(y, work)
-    multiply(work, w_dot, y_ddot)
-
-
-@kernel
-def _blend_orientation(
-    start_time: float,
-    duration: float,
-    start: Array,
-    coefficients: Array,
-    work: Array,
-    desired: OrientationSample,
-    out: OrientationSample,
-    t: float,
-) -> None:
-    """Write R_d exp(y).
-
-    ω = ω_d + R w and ω' = ω_d' + ω × R w + R w', where w = Jexp y' in the body frame.
-    """
-    rotation, velocity, acceleration = out
-    R_d, omega_d, omega_d_dot = desired
-    elapsed = t - start_time
-    for i in range(3):
-        velocity[i], acceleration[i] = omega_d[i], omega_d_dot[i]
-        if elapsed < 0.0:
-            velocity[i] = acceleration[i] = 0.0
-        for j in range(3):
-            rotation[i, j] = start[i, j] if elapsed < 0.0 else R_d[i, j]
-    if not 0.0 <= elapsed < duration:
-        return
-    y, y_dot, y_ddot = work[0], work[1], work[2]
-    w, w_dot = work[3], work[4]
-    J, J_dot = work[5:8], work[8:11]
-    horner(elapsed / duration, duration, coefficients, y, y_dot, y_ddot)
-    jexp3(y, J)
-    jexp3_dot(y, y_dot, J_dot)
-    rotate(J, y_dot, w)
-    rotate(J_dot, y_dot, w_dot)
-    rotate(J, y_ddot, y_ddot)
-    for i in range(3):
-        w_dot[i] += y_ddot[i]
-    rotate(rotation, y, y)  # R_d exp(y) = exp(R_d y) R_d
-    turn(rotation, y, 1.0, rotation)
-    rotate(rotation, w, w)
-    rotate(rotation, w_dot, w_dot)
-    for i in range(3):
-        velocity[i] += w[i]
-        acceleration[i] += w_dot[i]
-    cross(velocity, w, w)
-    for i in range(3):
-        acceleration[i] += w[i]
+        when, motion = (
+            (self.start_time, self.duration),
+            (self._start, self._coefficients),
+        )
+        return engine.BlendOrientation, (*when, *motion, self.trajectory)

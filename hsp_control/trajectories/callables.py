@@ -13,8 +13,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from hsp_control.common.arrays import Array
-from hsp_control.compiled.rotations import compose_back, log3
 from hsp_control.declaration.quantities import Positive, PositiveCount
+from hsp_control.engine.rotations import log3
 from hsp_control.trajectories import checks
 from hsp_control.trajectories.orientation import (
     OrientationSample,
@@ -116,10 +116,7 @@ class CallableOrientation(OrientationTrajectory):
         R = self._call(t)
 
         def relative_rotation(time: float) -> Array:
-            between, y = np.empty((3, 3)), np.empty(3)
-            compose_back(R, self._call(time), between)
-            log3(between, y)
-            return y
+            return log3(R.T @ self._call(time))
 
         velocity, acceleration = both_derivatives(relative_rotation, t, self.step)
         out.rotation[:] = R

@@ -5,9 +5,8 @@ from functools import cached_property
 
 from numpy.typing import ArrayLike
 
-from hsp_control.common.arrays import Array
+from hsp_control import engine
 from hsp_control.common.exceptions import TrajectoryError
-from hsp_control.compiled.kernels import kernel
 from hsp_control.declaration.quantities import NonNegative, Number
 from hsp_control.trajectories.blend import BlendOrientation
 from hsp_control.trajectories.orientation import (
@@ -15,7 +14,6 @@ from hsp_control.trajectories.orientation import (
     OrientationTrajectory,
 )
 from hsp_control.trajectories.pose import ComposedPose, PoseTrajectory
-from hsp_control.trajectories.schedule import smooth_step
 from hsp_control.trajectories.trajectory import Trajectory, TrajectorySample
 
 AnyReference = Trajectory | OrientationTrajectory | PoseTrajectory
@@ -71,7 +69,7 @@ class Crossfade(Trajectory, type="crossfade"):
         self.after.sample(t, out)
         if t < self.start_time + self.duration:
             old = self.before.sample(t)
-            _mix(float(t), self.start_time, self.duration, *old, *out)
+            engine.Crossfade(self.start_time, self.duration, old, out)(float(t))
         return out
 
 
@@ -193,25 +191,3 @@ def _parts(pose: PoseTrajectory) -> ComposedPose:
     if isinstance(pose, ComposedPose):
         return pose
     return ComposedPose(PositionOf(pose), OrientationOf(pose))
-
-
-@kernel
-def _mix(
-    t: float,
-    start_time: float,
-    duration: float,
-    old: Array,
-    old_dot: Array,
-    old_ddot: Array,
-    x: Array,
-    x_dot: Array,
-    x_ddot: Array,
-) -> None:
-    """Overwrite x_1 and its rates by those of (1 - s) x_0 + s x_1."""
-    s, s_dot, s_ddot = smooth_step(t, start_time, duration)
-    for i in range(x.size):
-        gap, gap_dot = x[i] - old[i], x_dot[i] - old_dot[i]
-        gap_ddot = x_ddot[i] - old_ddot[i]
-        x[i] = old[i] + s * gap
-        x_dot[i] = old_dot[i] + s_dot * gap + s * gap_dot
-        x_ddot[i] = old_ddot[i] + s_ddot * gap + 2.0 * s_dot * gap_dot + s * gap_ddot

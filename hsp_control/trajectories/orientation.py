@@ -8,15 +8,15 @@ from typing import Any, ClassVar, NamedTuple, Self
 import numpy as np
 from numpy.typing import ArrayLike
 
+from hsp_control import engine
 from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import TrajectoryError
-from hsp_control.compiled.kernels import KernelCall, KernelCalls, kernel
-from hsp_control.compiled.rotations import compose_back, log3, rotate, turn
+from hsp_control.compiled.kernels import KernelCall, KernelCalls
 from hsp_control.declaration import Part
 from hsp_control.declaration.quantities import Number, Vector, Vector3
 from hsp_control.declaration.rotation import Rotation, Rotations, matrix_of
+from hsp_control.engine.rotations import log3
 from hsp_control.trajectories import checks
-from hsp_control.trajectories.schedule import smooth_step
 from hsp_control.trajectories.trajectory import calls_of_sample, sampled
 
 
@@ -135,31 +135,10 @@ class OrientationPath(OrientationTrajectory, type="path"):
     def kernel(self) -> KernelCall:
         """Return the kernel; see `Trajectory.kernel`."""
         R = self._matrices
-        turns, between = np.zeros((len(R) - 1, 3)), np.zeros((3, 3))
-        for i, a in enumerate(turns):
-            compose_back(R[i], R[i + 1], between)
-            log3(between, a)
-            rotate(R[i], a, a)
-        return _path, (np.asarray(self.times), R, turns)
-
-
-@kernel
-def _path(
-    times: Array, rotations: Array, turns: Array, out: OrientationSample, t: float
-) -> None:
-    rotation, velocity, acceleration = out
-    last = times.size - 1
-    i = 0
-    while i < last - 1 and t >= times[i + 1]:
-        i += 1
-    s, s_dot, s_ddot = smooth_step(t, times[i], times[i + 1] - times[i])
-    if s < 1.0:
-        turn(rotations[i], turns[i], s, rotation)
-    else:
-        turn(rotations[i + 1], turns[i], 0.0, rotation)  # exactly the waypoint
-    for k in range(3):
-        velocity[k] = s_dot * turns[i, k]
-        acceleration[k] = s_ddot * turns[i, k]
+        turns = np.zeros((len(R), 3))
+        for i in range(len(R) - 1):
+            turns[i] = R[i] @ log3(R[i].T @ R[i + 1])
+        return engine.OrientationPath, (np.asarray(self.times), R, turns)
 
 
 class Spin(OrientationTrajectory, type="spin"):
@@ -186,13 +165,4 @@ class Spin(OrientationTrajectory, type="spin"):
     def _call(self) -> KernelCall:
         assert self.rotation is not None
         omega = self.rate * checks.direction(self.axis, "axis")
-        return _spin, (np.asarray(omega), matrix_of(self.rotation))
-
-
-@kernel
-def _spin(omega: Array, start: Array, out: OrientationSample, t: float) -> None:
-    rotation, velocity, acceleration = out
-    turn(start, omega, t, rotation)
-    for i in range(3):
-        velocity[i] = omega[i]
-        acceleration[i] = 0.0
+        return engine.Spin, (np.asarray(omega), matrix_of(self.rotation))

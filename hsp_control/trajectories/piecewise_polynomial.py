@@ -9,11 +9,12 @@ from typing import Any, ClassVar, Literal, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
+from hsp_control import engine
 from hsp_control.common.arrays import Array
-from hsp_control.compiled.kernels import KernelCall, kernel
+from hsp_control.compiled.kernels import KernelCall
 from hsp_control.declaration.quantities import Matrix, Number, Positive, Tensor, Vector
 from hsp_control.trajectories import checks
-from hsp_control.trajectories.trajectory import Trajectory, TrajectorySample
+from hsp_control.trajectories.trajectory import Trajectory
 
 # Row k maps (x, x', x'') at u = 0 and (x, x', x'') at u = 1 to the coefficient of u^k.
 QUINTIC: Array = np.array(
@@ -27,31 +28,6 @@ QUINTIC: Array = np.array(
     ]
 )
 QUINTIC.setflags(write=False)
-
-
-@kernel
-def horner(
-    u: float,
-    width: float,
-    coefficients: Array,
-    position: Array,
-    velocity: Array,
-    acceleration: Array,
-) -> None:
-    """Write Σ_k c_k u^k and its two time derivatives, where u' = 1 / width.
-
-    Shapes: coefficients (degree + 1, n), position (n,), velocity (n,) [1/s],
-    acceleration (n,) [1/s²].
-    """
-    for j in range(position.size):
-        x, x_dot, half_x_ddot = 0.0, 0.0, 0.0  # Horner's scheme and its derivatives
-        for k in range(coefficients.shape[0] - 1, -1, -1):
-            half_x_ddot = half_x_ddot * u + x_dot
-            x_dot = x_dot * u + x
-            x = x * u + coefficients[k, j]
-        position[j] = x
-        velocity[j] = x_dot / width
-        acceleration[j] = 2.0 * half_x_ddot / (width * width)
 
 
 class Pieces(NamedTuple):
@@ -102,7 +78,7 @@ class PolynomialTrajectory(Trajectory):
 
     def kernel(self) -> KernelCall:
         """Return the kernel; see `Trajectory.kernel`."""
-        return _evaluate, tuple(self.pieces)
+        return engine.PiecewisePolynomial, tuple(self.pieces)
 
 
 class PiecewisePolynomial(PolynomialTrajectory):
@@ -119,31 +95,6 @@ class PiecewisePolynomial(PolynomialTrajectory):
 
     def _pieces(self) -> Pieces:
         return join(self.times, self.coefficients, self.end)
-
-
-@kernel
-def _evaluate(
-    times: Array, waypoints: Array, coefficients: Array, out: TrajectorySample, t: float
-) -> None:
-    position, velocity, acceleration = out
-    last = times.size - 1
-    if t <= times[0] or t >= times[last]:
-        end = 0 if t <= times[0] else last
-        for j in range(position.size):
-            position[j] = waypoints[end, j]
-            velocity[j] = 0.0
-            acceleration[j] = 0.0
-        return
-    i, after = 0, last  # bisection for times[i] <= t < times[i + 1]
-    while after - i > 1:
-        middle = (i + after) // 2
-        if t < times[middle]:
-            after = middle
-        else:
-            i = middle
-    width = times[i + 1] - times[i]
-    u = (t - times[i]) / width
-    horner(u, width, coefficients[i], position, velocity, acceleration)
 
 
 class Line(PolynomialTrajectory, type="line"):

@@ -3,24 +3,24 @@
 from abc import ABC, abstractmethod
 from dataclasses import KW_ONLY, replace
 from functools import cached_property
-from typing import NamedTuple, Self
+from typing import Any, NamedTuple, Self
 
 import numpy as np
 import pinocchio as pin
 
+from hsp_control import engine
 from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import TrajectoryError
-from hsp_control.compiled.kernels import TIME, KernelCalls, kernel
-from hsp_control.compiled.rotations import compose_back, jlog3, log3, stumpff, turn
+from hsp_control.compiled.kernels import TIME, KernelCalls, says
 from hsp_control.declaration import Part
 from hsp_control.declaration.quantities import Number, Positive, Vector3, numbers
 from hsp_control.declaration.rotation import Rotation, matrix_of
+from hsp_control.engine.rotations import jlog3, log3
 from hsp_control.trajectories.hold import Hold, HoldOrientation
 from hsp_control.trajectories.orientation import (
     OrientationSample,
     OrientationTrajectory,
 )
-from hsp_control.trajectories.schedule import smooth_step
 from hsp_control.trajectories.trajectory import (
     Trajectory,
     TrajectorySample,
@@ -87,13 +87,10 @@ class PoseTrajectory(Part, ABC, family="poses", error=TrajectoryError):
         """Return the calls that write ``out`` at a time; see `Trajectory.calls`."""
         return [(write_sample, (self.sample, out, TIME))]
 
-    def supplied(self) -> tuple[Array, KernelCalls]:
-        """Return its sample as an argument of a kernel, in one array; see `planned`.
-
-        The rows are x, x', x'', R (three), ω and ω', shape (8, 3).
-        """
-        desired = np.zeros((8, 3))
-        return desired, self.calls(PoseSample.over(desired))
+    def supplied(self) -> tuple[PoseSample, KernelCalls]:
+        """Return its sample as an argument of a kernel; see `planned`."""
+        desired = PoseSample.over(np.zeros((8, 3)))
+        return desired, self.calls(desired)
 
 
 class ComposedPose(PoseTrajectory, type="composed"):
@@ -236,73 +233,31 @@ class ScrewInterpolation(PoseTrajectory, type="screw"):
         )
 
     @cached_property
-    def _screw(self) -> Array:
-        return _screw(*self._ends)
+    def _arguments(self) -> tuple[Any, ...]:
+        positions, rotations = self._ends
+        when, screw = (self.start_time, self.duration), _screw(positions, rotations)
+        return *when, positions, rotations, *screw
 
     def sample(self, t: float, out: PoseSample | None = None) -> PoseSample:
         """Return the pose at time t; see `PoseTrajectory.sample`."""
         if out is None:
             out = PoseSample.allocate()
-        positions, rotations = self._ends
-        s, s_dot, s_ddot = smooth_step(float(t), self.start_time, self.duration)
-        if 0.0 < s < 1.0:
-            p, R = positions[0], rotations[0]
-            _advance(s, s_dot, s_ddot, p, R, self._screw, *out.position, *out[1])
-        else:
-            end = int(s)
-            out.position.position[:] = positions[end]
-            out.orientation.rotation[:] = rotations[end]
-            for rate in (*out.position[1:], *out.orientation[1:]):
-                rate.fill(0.0)
+        engine.Screw(*self._arguments, out)(float(t))
         return out
 
+    def calls(self, out: PoseSample) -> KernelCalls:
+        """Return the calls that write ``out``; see `Trajectory.calls`."""
+        if says(self, "calls", "sample") == "sample":  # of a class that derives from it
+            return super().calls(out)
+        return [(engine.Screw, (*self._arguments, out, TIME))]
 
-def _screw(positions: Array, rotations: Array) -> Array:
-    """Return a, b, a × b and a (a·b), shape (4, 3), in the world frame.
+
+def _screw(positions: Array, rotations: Array) -> tuple[Array, Array]:
+    """Return a and b, shape (3,) each, in the world frame.
 
     (a, b) is the constant twist that moves the body from start to end in one second: a
     is the rotation vector [rad], b the velocity of the origin at the start [m];
     V(a) b = p1 - p0, with the left Jacobian V(y) = Jexp(-y).
     """
-    body, R, V_inverse = np.empty(3), np.empty((3, 3)), np.empty((3, 3))
-    compose_back(rotations[0], rotations[1], R)
-    log3(R, body)
-    a = rotations[0] @ body
-    jlog3(-a, V_inverse)
-    b = V_inverse @ (positions[1] - positions[0])
-    return np.stack([a, b, np.cross(a, b), a * (a @ b)])
-
-
-@kernel
-def _advance(
-    s: float,
-    s_dot: float,
-    s_ddot: float,
-    start_position: Array,
-    start_rotation: Array,
-    screw: Array,
-    position: Array,
-    velocity: Array,
-    acceleration: Array,
-    rotation: Array,
-    angular_velocity: Array,
-    angular_acceleration: Array,
-) -> None:
-    """Write the pose exp(s a) R0, p0 + V(s a) s b, and its rates.
-
-    p' = s' f and p'' = s'' f + s'² a × f with f = exp(s a) b. The rows of ``screw`` are
-    those of `_screw`.
-    """
-    a, b, a_cross_b, along = screw[0], screw[1], screw[2], screw[3]
-    a_squared = a[0] * a[0] + a[1] * a[1] + a[2] * a[2]
-    c0, c1, c2, c3, _, _ = stumpff(s * s * a_squared)
-    turn(start_rotation, a, s, rotation)
-    for i in range(3):
-        offset = s * (c1 * b[i] + s * c2 * a_cross_b[i] + s * s * c3 * along[i])
-        f = c0 * b[i] + s * c1 * a_cross_b[i] + s * s * c2 * along[i]
-        a_cross_f = c0 * a_cross_b[i] + s * c1 * (along[i] - a_squared * b[i])
-        position[i] = start_position[i] + offset
-        velocity[i] = s_dot * f
-        acceleration[i] = s_ddot * f + s_dot * s_dot * a_cross_f
-        angular_velocity[i] = s_dot * a[i]
-        angular_acceleration[i] = s_ddot * a[i]
+    a = rotations[0] @ log3(rotations[0].T @ rotations[1])
+    return a, jlog3(-a) @ (positions[1] - positions[0])

@@ -8,8 +8,8 @@ from typing import Annotated
 import numpy as np
 from pydantic import AfterValidator, BeforeValidator, Field
 
+from hsp_control import engine
 from hsp_control.common.exceptions import ScheduleError
-from hsp_control.compiled.kernels import kernel
 from hsp_control.declaration import Part
 from hsp_control.declaration.quantities import NonNegative, Number, plain
 
@@ -128,7 +128,6 @@ def _smooth(s: float) -> float:
     return s**3 * (10.0 - 15.0 * s + 6.0 * s * s) if s > 0.0 else 0.0
 
 
-@kernel
 def smooth_step(
     t: float, start_time: float, duration: float
 ) -> tuple[float, float, float]:
@@ -138,13 +137,4 @@ def smooth_step(
     motions it has the minimum jerk. It is exactly 0 before and exactly 1 after, hence
     C². The peaks of s' and s'' are 1.875 / T and 5.77 / T².
     """
-    u = (t - start_time) / duration
-    if u <= 0.0:
-        return 0.0, 0.0, 0.0
-    if u >= 1.0:
-        return 1.0, 0.0, 0.0
-    rest = 1.0 - u
-    s = u * u * u * (10.0 + u * (6.0 * u - 15.0))
-    s_dot = 30.0 * u * u * rest * rest / duration
-    s_ddot = 60.0 * u * rest * (rest - u) / (duration * duration)
-    return s, s_dot, s_ddot
+    return engine.smooth_step(t, start_time, duration)

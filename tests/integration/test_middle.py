@@ -15,7 +15,7 @@ import pytest
 
 import hsp_control as hsp
 from hsp_control.common.arrays import Array
-from hsp_control.law.edge import NEAR
+from hsp_control.edge.shares import NEAR
 from hsp_control.robot.integrators import Rk4
 from hsp_control.simulation.plants import Push, RigidBodyPlant
 

@@ -30,7 +30,7 @@ from hsp_control import (
     simulate,
 )
 from hsp_control.common.arrays import Array
-from hsp_control.law.edge import FAR, NEAR
+from hsp_control.edge.shares import FAR, NEAR
 from hsp_control.robot.integrators import Rk4
 from hsp_control.trajectories import (
     CallableOrientation,

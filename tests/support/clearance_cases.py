@@ -9,11 +9,10 @@ import pinocchio as pin
 import pytest
 from oracles import slope
 
-from hsp_control import Cost, Robot
+from hsp_control import Cost, Robot, engine
 from hsp_control.common.arrays import Array
 from hsp_control.common.resources import bundled_robots
 from hsp_control.geometry import LinkShape
-from hsp_control.null_space.fields.cost import barrier
 from hsp_control.trajectories import Lissajous
 
 
@@ -38,7 +37,7 @@ def turned(*rpy: float) -> Array:
 def barrier_at(d: float, influence: float) -> tuple[float, float, float]:
     """Return b, b' and b'' at one distance."""
     slopes, curvatures = np.full(1, np.nan), np.full(1, np.nan)
-    value = barrier(np.array([d]), influence, slopes, curvatures)
+    value = engine.Barrier(np.array([d]), influence, slopes, curvatures)()
     return float(value), float(slopes[0]), float(curvatures[0])
 
 

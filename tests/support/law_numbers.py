@@ -7,8 +7,9 @@ import numpy as np
 
 from hsp_control.common.arrays import Array
 from hsp_control.compiled.step_plan import planned
-from hsp_control.law import IDENTITY, VARYING, Outcome, Problem, Resolution
-from hsp_control.law.resolution import outcome_of
+from hsp_control.edge import Resolution
+from hsp_control.law import IDENTITY, VARYING, Outcome, Problem
+from hsp_control.law.outcome import outcome_of
 
 
 def orthogonal(seed: int, n: int, m: int) -> Array:

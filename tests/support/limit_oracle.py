@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from hsp_control.common.arrays import Array
 from hsp_control.control.actuation.support import Support
-from hsp_control.law import Resolution
+from hsp_control.edge import Resolution
 
 _EQUALITY, _INEQUALITY = 5, 0
 _FORCE_COST = 1e-6
@@ -45,10 +45,10 @@ def stacked(*rows: Rows) -> Rows:
 def level_costs(resolution: Resolution, supported: bool, size: float) -> Array:
     """Return ρ of each level, then of the null space, shape (levels + 1,).
 
-    What is below a level costs a part of the level's error over the robot's size, as
-    far as the tasks are held, but no more than a tenth and no less than priorities
-    need; on contacts the least, whatever the error. Contacts cost as much as the level
-    below them, and so do springs where there are none.
+    What is below a level costs a part of the level's error over the robot's size, but
+    no more than a tenth and no less than priorities need; on contacts the least,
+    whatever the error. Contacts cost as much as the level below them, and so do springs
+    where there are none.
     """
     count = len(resolution.ends) - supported
     least = 1e-6 ** (1.0 / max(count, 1))
@@ -56,8 +56,7 @@ def level_costs(resolution: Resolution, supported: bool, size: float) -> Array:
     for k, end in enumerate(resolution.ends):
         error = np.linalg.norm(resolution.problem.task.error[start:end])
         of_error = 0.2 if k == len(resolution.ends) - 1 else 1.0
-        held = float(resolution.edge.held[0])
-        below = 0.0 if supported else held * of_error * error / size
+        below = 0.0 if supported else of_error * error / size
         below = np.clip(below, least, 0.1)
         springs = resolution.problem.springs[start:end].all() and not supported
         equal = springs or (supported and k == 0)

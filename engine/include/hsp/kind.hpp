@@ -27,7 +27,8 @@
 namespace hsp {
 
 struct Field {
-  const char* name;  // "task.error" for a member of a group
+  const char* name;    // "task.error" for a member of a group
+  const char* object;  // the type of a shared object
   Access access;
   Order order;
   char entry;         // 'd': double, 'i': int64, 'b': bool
@@ -57,6 +58,8 @@ concept IsView = requires {
   T::shape;
 };
 template <class T>
+concept IsShared = requires { T::Type::type_name; };
+template <class T>
 concept IsMemory = requires(T x, const Sizes& size) { x.prepare(size); };
 
 template <class T> constexpr char entry_of() {
@@ -75,6 +78,7 @@ void collect(const char* start, const std::string& prefix, T& x, std::vector<Fie
     const std::int64_t offset = reinterpret_cast<const char*>(&member) - start;
     if constexpr (IsView<M>) {
       found.push_back({kept(full),
+                       nullptr,
                        M::access,
                        M::order,
                        entry_of<typename M::Scalar>(),
@@ -87,7 +91,13 @@ void collect(const char* start, const std::string& prefix, T& x, std::vector<Fie
         *static_cast<M*>(self) = static_cast<M>(*static_cast<double*>(number));
       };
       found.push_back(
-          {kept(full), Access::Number, Order::Rows, entry_of<M>(), 0, {}, offset, bind});
+          {kept(full), nullptr, Access::Number, Order::Rows, entry_of<M>(), 0, {}, offset, bind});
+    } else if constexpr (IsShared<M>) {
+      const auto bind = [](void* self, void* object, const std::int64_t*) {
+        static_cast<M*>(self)->object = static_cast<typename M::Type*>(object);
+      };
+      found.push_back(
+          {kept(full), M::Type::type_name, Access::Object, Order::Rows, 'o', 0, {}, offset, bind});
     } else if constexpr (!IsMemory<M>) {
       collect(start, full + ".", member, found);
     }
@@ -98,6 +108,7 @@ template <class T> void prepare(T& x, const Sizes& size) {
   boost::pfr::for_each_field(x, [&](auto& member) {
     using M = std::remove_cvref_t<decltype(member)>;
     if constexpr (IsMemory<M>) member.prepare(size);
+    else if constexpr (!IsView<M> && !std::is_arithmetic_v<M>) prepare(member, size);
   });
 }
 

@@ -34,6 +34,12 @@ template <template <int...> class As> struct OrientationSample {
   As<3> angular_velocity, angular_acceleration;
 };
 
+// A body's origin and its rotation.
+template <template <int...> class As> struct PoseSample {
+  TrajectorySample<As, 3> position;
+  OrientationSample<As> orientation;
+};
+
 // A frame in the axes of the frame that it is relative to, linear rows before angular rows.
 template <template <int...> class As> struct FrameMotion {
   As<6, 'n'> jacobian, jacobian_dot;

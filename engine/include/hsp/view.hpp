@@ -20,7 +20,7 @@ using Matrix3 = Eigen::Matrix3d;
 using Vector = Eigen::VectorXd;
 using Matrix = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
 
-enum class Access : std::int32_t { In, Out, InOut, Number };
+enum class Access : std::int32_t { In, Out, InOut, Number, Object };
 enum class Order : std::int32_t { Rows, Columns };
 
 // Letters begin at 'A'; what is below is the size itself.
@@ -110,6 +110,13 @@ template <int... sizes> using InOutInts = View<std::int64_t, Access::InOut, Orde
 template <int... sizes> using Flags = View<bool, Access::In, Order::Rows, sizes...>;
 template <int... sizes> using Columns = View<double, Access::In, Order::Columns, sizes...>;
 template <int... sizes> using InOutColumns = View<double, Access::InOut, Order::Columns, sizes...>;
+
+// An object that calls share, such as a plan.
+template <class T> struct Shared {
+  using Type = T;
+  T* object = nullptr;
+  T* operator->() const { return object; }
+};
 
 // What the letters of a call stand for.
 class Sizes {

@@ -13,8 +13,8 @@ from hsp_control.common.exceptions import HardwareError
 from hsp_control.common.suggestions import did_you_mean
 from hsp_control.companions.datagrams.targets import address_of
 from hsp_control.companions.shared import Rate, name_and_options, rate_of
-from hsp_control.compiled.rotations import quaternion_from_rotation
 from hsp_control.declaration.nested import parts_within
+from hsp_control.engine.rotations import quaternion_from_rotation
 from hsp_control.robot import RobotState
 from hsp_control.simulation.control_chain import EffortSource
 from hsp_control.tasks import JointPosture
@@ -136,10 +136,10 @@ class Teller:
 
     def _poses(self, state: RobotState) -> dict[str, list[float | None]]:
         """Return the poses of the tasks' frames, or of the hand."""
-        found, quaternion = {}, np.zeros(4)
+        found = {}
         for name in self._frames:
             frame = state.frame(name)
-            quaternion_from_rotation(frame.rotation, quaternion)
+            quaternion = quaternion_from_rotation(frame.rotation)
             found[name] = _numbers([*frame.position, *quaternion])
         return found
 

@@ -8,7 +8,8 @@ from typing import Any, Literal
 import numpy as np
 import pinocchio as pin
 
-from hsp_control.common.arrays import Array, Indices
+from hsp_control import engine
+from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import ModelError, SimulationError
 from hsp_control.companions.mujoco import scene
 from hsp_control.companions.mujoco.coordinates import MujocoCoordinates, joints_of
@@ -19,13 +20,11 @@ from hsp_control.companions.mujoco.mjcf import (
     geoms_of,
     write_mjcf,
 )
-from hsp_control.compiled.kernels import kernel
-from hsp_control.compiled.moves import number_of_steps
 from hsp_control.control.measurement import LogChannel
 from hsp_control.declaration import within
 from hsp_control.declaration.quantities import Flag, Positive
 from hsp_control.robot import Robot
-from hsp_control.robot.integrators import Integrator
+from hsp_control.robot.integrators import Integrator, number_of_steps
 from hsp_control.simulation.plants.plant import (
     FloatingRoots,
     SampledPlant,
@@ -142,41 +141,10 @@ class MujocoEngine(SampledPlant):
             for k in np.flatnonzero((touched >= 0).any(axis=1)).tolist():
                 self._mujoco.mj_contactForce(self.model, data, k, local[k])
             points = np.array([origins[name] for name in names])
-            places, world = (contact.pos, contact.frame), np.zeros(6)
-            _add_wrenches(touched, *places, local, points, world, sums)
+            where = np.ascontiguousarray(contact.pos)  # both are members of structs
+            axes = np.ascontiguousarray(contact.frame).reshape(count, 3, 3)
+            engine.AddContactWrenches(touched, where, axes, local, points, sums)()
         return dict(zip(names, sums, strict=True))
-
-
-@kernel
-def _add_wrenches(
-    touched: Indices,
-    positions: Array,
-    frames: Array,
-    local: Array,
-    origins: Array,
-    world: Array,
-    sums: Array,
-) -> None:
-    """Add the wrench of each contact to those that it touches, about their origins."""
-    for k in range(touched.shape[0]):
-        for i in range(3):
-            world[i] = world[3 + i] = 0.0
-            for j in range(3):
-                world[i] += frames[k, 3 * j + i] * local[k, j]
-                world[3 + i] += frames[k, 3 * j + i] * local[k, 3 + j]
-        for side in range(2):
-            owner = touched[k, side]
-            if owner < 0:
-                continue
-            sign = 1.0 if side == 1 else -1.0
-            x = positions[k, 0] - origins[owner, 0]
-            y = positions[k, 1] - origins[owner, 1]
-            z = positions[k, 2] - origins[owner, 2]
-            for i in range(6):
-                sums[owner, i] += sign * world[i]
-            sums[owner, 3] += sign * (y * world[2] - z * world[1])
-            sums[owner, 4] += sign * (z * world[0] - x * world[2])
-            sums[owner, 5] += sign * (x * world[1] - y * world[0])
 
 
 class Mujoco(FrictionalPart, type="mujoco"):

@@ -5,17 +5,14 @@ from typing import ClassVar, Self
 import numpy as np
 from numpy.typing import ArrayLike
 
+from hsp_control import engine
 from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import TrajectoryError
 from hsp_control.companions.walking.written_part import Written
-from hsp_control.compiled.kernels import KernelCall, kernel
-from hsp_control.compiled.rotations import turn
+from hsp_control.compiled.kernels import KernelCall
 from hsp_control.declaration.quantities import PositiveCount
-from hsp_control.trajectories.orientation import (
-    OrientationSample,
-    OrientationTrajectory,
-)
-from hsp_control.trajectories.trajectory import Trajectory, TrajectorySample
+from hsp_control.trajectories.orientation import OrientationTrajectory
+from hsp_control.trajectories.trajectory import Trajectory
 
 
 class Fed(Written, Trajectory):
@@ -72,7 +69,8 @@ class Fed(Written, Trajectory):
 
     def kernel(self) -> KernelCall:
         """Return the kernel; see `Trajectory.kernel`."""
-        return _go_on, (self.memory,)
+        motion = self.memory[1:].reshape(3, self.size)
+        return engine.Extrapolation, (self.memory[:1], motion)
 
 
 class FedOrientation(Written, OrientationTrajectory):
@@ -108,26 +106,5 @@ class FedOrientation(Written, OrientationTrajectory):
 
     def kernel(self) -> KernelCall:
         """Return the kernel; see `Trajectory.kernel`."""
-        return _turn_on, (self.memory[:1], self.memory[1:].reshape(5, 3))
-
-
-@kernel
-def _go_on(memory: Array, out: TrajectorySample, t: float) -> None:
-    x, x_dot, x_ddot = out
-    n, dt = x.shape[0], max(t - memory[0], 0.0)
-    for i in range(n):
-        x_ddot[i] = memory[1 + 2 * n + i]
-        x_dot[i] = memory[1 + n + i] + dt * x_ddot[i]
-        x[i] = memory[1 + i] + dt * (x_dot[i] - 0.5 * dt * x_ddot[i])
-
-
-@kernel
-def _turn_on(time: Array, rows: Array, out: OrientationSample, t: float) -> None:
-    R, omega, omega_dot = out
-    dt = max(t - time[0], 0.0)
-    for i in range(3):
-        omega_dot[i] = rows[4, i]
-        omega[i] = rows[3, i] + 0.5 * dt * rows[4, i]
-    turn(rows[:3], omega, dt, R)
-    for i in range(3):
-        omega[i] = rows[3, i] + dt * rows[4, i]
+        motion = self.memory[1:].reshape(5, 3)
+        return engine.ExtrapolatedOrientation, (self.memory[:1], motion)

@@ -5,7 +5,7 @@ import numpy as np
 from hsp_control.common.arrays import Array
 from hsp_control.companions.walking.footsteps import Footstep
 from hsp_control.companions.walking.quintic import FootMotion, Quintic, at_rest, to_rest
-from hsp_control.compiled.rotations import log3, turn
+from hsp_control.engine.rotations import exp3, log3
 from hsp_control.trajectories.schedule import smooth_step
 
 APPROACH = 0.92
@@ -44,8 +44,8 @@ class Swing:
     ) -> None:
         """Plan the motion, above ground of a slope, shape (2,) [-]."""
         self.start, self.end, self.target = t, t + duration, target
-        self._rotation, self._axis = rotation.copy(), np.zeros(3)
-        log3(goal @ rotation.T, self._axis)  # in world axes
+        self._rotation = rotation.copy()
+        self._axis = log3(goal @ rotation.T)  # in world axes
         self._slope, self._level = slope, height - float(slope @ target.point)
         self._top = max(float(position[2]), height) + lift
         self._descent, self._settling = DESCENT * lift / duration, _SETTLING * duration
@@ -105,8 +105,7 @@ class Swing:
     def orientation(self, t: float) -> FootMotion:
         """Return R, ω and ω', shapes (3, 3), (3,) and (3,)."""
         s, s_dot, s_ddot = (float(each[2]) for each in self._along.sample(t))
-        rotation = np.zeros((3, 3))
-        turn(self._rotation, self._axis, s, rotation)
+        rotation = exp3(s * self._axis) @ self._rotation
         return FootMotion(rotation, s_dot * self._axis, s_ddot * self._axis)
 
     def _vertical(self, t: float) -> FootMotion:
@@ -130,6 +129,4 @@ class Swing:
 
 def turned(yaw: float, rotation: Array) -> Array:
     """Return an orientation that is turned about the vertical by an angle [rad]."""
-    out = np.zeros((3, 3))
-    turn(rotation, np.array([0.0, 0.0, 1.0]), yaw, out)
-    return out
+    return exp3(np.array([0.0, 0.0, yaw])) @ rotation

@@ -11,7 +11,7 @@ from pydantic import AfterValidator
 
 from hsp_control.common.arrays import Array, Indices
 from hsp_control.common.exceptions import ContactError, TrajectoryError
-from hsp_control.compiled.kernels import KernelCall, KernelCalls, kernel, with_outputs
+from hsp_control.compiled.kernels import KernelCall, KernelCalls, with_outputs
 from hsp_control.declaration import Part, within
 from hsp_control.declaration.nested import parts_within, with_memories_copied
 from hsp_control.declaration.quantities import (
@@ -264,8 +264,8 @@ class Contact(Part, ABC, family="contacts", error=ContactError):
     def kernel(self, state: RobotState) -> KernelCall:
         """Return a kernel and its first arguments; ``v``, ``damping``, ``out`` follow.
 
-        It writes J and J', shape (rows, nv) each, e' = -J v, and the acceleration that
-        damps it, see `damp_velocity`; see `Task.kernel` for its arguments.
+        It writes J and J', shape (rows, nv) each, e' = -J v, and the acceleration Kd e'
+        that damps it; see `Task.kernel` for its arguments.
         """
 
     def calls(self, state: RobotState, out: TaskSample) -> KernelCalls:
@@ -285,18 +285,6 @@ class Contact(Part, ABC, family="contacts", error=ContactError):
     def arms(self, frame: FrameKinematics) -> Array:
         """Return where forces act, from the frame's origin, world axes, (k, 3) [m]."""
         return np.asarray(self.points @ frame.rotation.T + self.shift)
-
-
-@kernel
-def damp_velocity(v: Array, damping: float, out: TaskSample) -> None:
-    """Write e' = -J v and the acceleration Kd e', which damps the contact's motion."""
-    J, e_dot, a = out.jacobian, out.error_rate, out.acceleration
-    for k in range(J.shape[0]):
-        total = 0.0
-        for i in range(J.shape[1]):
-            total += J[k, i] * v[i]
-        e_dot[k] = -total
-        a[k] = -damping * total
 
 
 def plane_axes(normal: ArrayLike) -> Array:

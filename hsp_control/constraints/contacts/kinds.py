@@ -7,21 +7,14 @@ from typing import Annotated, Any, ClassVar
 import numpy as np
 from pydantic import AfterValidator
 
+from hsp_control import engine
 from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import ContactError
-from hsp_control.compiled.kernels import KernelCall, kernel
-from hsp_control.compiled.linalg import multiply_transposed
-from hsp_control.constraints.contacts.contact import (
-    NORMAL,
-    WRENCH,
-    Contact,
-    damp_velocity,
-)
+from hsp_control.compiled.kernels import KernelCall
+from hsp_control.constraints.contacts.contact import NORMAL, WRENCH, Contact
 from hsp_control.declaration import within
 from hsp_control.declaration.quantities import Points, Positive, Vector3, read_only
-from hsp_control.law import TaskSample
 from hsp_control.robot import RobotState
-from hsp_control.robot.kinematics import FrameMotion, copy_rows
 
 
 class PointContact(Contact, type="point"):
@@ -40,55 +33,13 @@ class PointContact(Contact, type="point"):
 
     def kernel(self, state: RobotState) -> KernelCall:
         """Return the kernel of the velocity rows of the point."""
-        return _hold_point, _point_of(self, state)
+        return engine.HoldPoint, _point_of(self, state)
 
 
 def _point_of(contact: Contact, state: RobotState) -> tuple[Any, Array, Array]:
-    """Return the first arguments of `_point_velocity_rows`."""
+    """Return a frame, and the point and the shift of its arm from the origin."""
     point, shift = np.array(contact.points[0]), np.array(contact.shift)
     return state.frame(contact.frame), point, shift
-
-
-@kernel
-def _hold_point(
-    frame: FrameMotion,
-    point: Array,
-    shift: Array,
-    v: Array,
-    damping: float,
-    out: TaskSample,
-) -> None:
-    _point_velocity_rows(frame, point, shift, out.jacobian, out.jacobian_dot)
-    damp_velocity(v, damping, out)
-
-
-@kernel
-def _point_velocity_rows(
-    frame: FrameMotion, point: Array, shift: Array, out: Array, out_dot: Array
-) -> None:
-    """Write a point's velocity rows (3, nv), and their rate, from those of a frame.
-
-    With l and w the frame's linear and angular rows and the arm r = R p + s, whose
-    shift s does not turn: l + w × r, and its rate l' + w' × r + w × r', where
-    r' = ω × R p. p is in the frame, s in world axes [m].
-    """
-    J, J_dot, R, _, velocity = frame
-    x = R[0, 0] * point[0] + R[0, 1] * point[1] + R[0, 2] * point[2]
-    y = R[1, 0] * point[0] + R[1, 1] * point[1] + R[1, 2] * point[2]
-    z = R[2, 0] * point[0] + R[2, 1] * point[1] + R[2, 2] * point[2]
-    u = velocity[4] * z - velocity[5] * y
-    v = velocity[5] * x - velocity[3] * z
-    w = velocity[3] * y - velocity[4] * x
-    x, y, z = x + shift[0], y + shift[1], z + shift[2]
-    for j in range(J.shape[1]):
-        a, b, c = J[3, j], J[4, j], J[5, j]
-        d, e, f = J_dot[3, j], J_dot[4, j], J_dot[5, j]
-        out[0, j] = J[0, j] + b * z - c * y
-        out[1, j] = J[1, j] + c * x - a * z
-        out[2, j] = J[2, j] + a * y - b * x
-        out_dot[0, j] = J_dot[0, j] + e * z - f * y + b * w - c * v
-        out_dot[1, j] = J_dot[1, j] + f * x - d * z + c * u - a * w
-        out_dot[2, j] = J_dot[2, j] + d * y - e * x + a * v - b * u
 
 
 class BallContact(Contact, type="ball"):
@@ -117,7 +68,7 @@ class BallContact(Contact, type="ball"):
 
     def kernel(self, state: RobotState) -> KernelCall:
         """Return the kernel of the velocity rows of the material point in contact."""
-        return _hold_point, _point_of(self, state)
+        return engine.HoldPoint, _point_of(self, state)
 
 
 class SlidingContact(Contact, type="sliding"):
@@ -184,25 +135,7 @@ class SlidingContact(Contact, type="sliding"):
     def kernel(self, state: RobotState) -> KernelCall:
         """Return the kernel of the normal's row, nᵀ times the point's velocity rows."""
         normal = np.ascontiguousarray(self.axes[:, 2])
-        rows = np.zeros((2, 3, state.robot.nv))
-        return _hold_normal, (*_point_of(self, state), normal, rows)
-
-
-@kernel
-def _hold_normal(
-    frame: FrameMotion,
-    point: Array,
-    shift: Array,
-    normal: Array,
-    rows: Array,
-    v: Array,
-    damping: float,
-    out: TaskSample,
-) -> None:
-    _point_velocity_rows(frame, point, shift, rows[0], rows[1])
-    multiply_transposed(rows[0], normal, out.jacobian[0])
-    multiply_transposed(rows[1], normal, out.jacobian_dot[0])
-    damp_velocity(v, damping, out)
+        return engine.HoldNormal, (*_point_of(self, state), normal)
 
 
 def _surface(corners: Array) -> Array:
@@ -265,12 +198,4 @@ class SurfaceContact(Contact, type="surface"):
 
     def kernel(self, state: RobotState) -> KernelCall:
         """Return the kernel of the frame's six rows: it neither moves nor turns."""
-        return _hold_surface, (state.frame(self.frame),)
-
-
-@kernel
-def _hold_surface(
-    frame: FrameMotion, v: Array, damping: float, out: TaskSample
-) -> None:
-    copy_rows(frame.jacobian, frame.jacobian_dot, 0, out.jacobian, out.jacobian_dot)
-    damp_velocity(v, damping, out)
+        return engine.HoldSurface, (state.frame(self.frame),)

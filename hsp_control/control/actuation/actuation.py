@@ -32,10 +32,10 @@ from hsp_control.control.actuation.limited_step import (
     Status,
     Wanted,
 )
-from hsp_control.control.actuation.limited_target import Permitted
 from hsp_control.control.actuation.limits_in_force import LimitSet
 from hsp_control.control.actuation.support import Support
-from hsp_control.law import Resolution
+from hsp_control.edge import Resolution
+from hsp_control.edge.limited_target import Permitted
 from hsp_control.robot import RobotState
 
 _BEYOND = 4
@@ -210,7 +210,14 @@ class Actuation:
         capacity = 1 << (count - 1).bit_length() if count else 0
         permitted = None
         if limits is not None and not self._support.base.size:
-            permitted = Permitted.by(limits.effort, self._limits.motion)
+            motion = self._limits.motion
+            permitted = Permitted.by(
+                limits.effort,
+                motion.upper - motion.lower,
+                motion.velocity,
+                motion.acceleration,
+                motion.bandwidth[0],
+            )
         law = self._state, self._law, self._support, self._limits.bounds, self._wanted
         status = self.found[1:]
         return LimitedStep(*law, motors[some[motors]], status, capacity, permitted)

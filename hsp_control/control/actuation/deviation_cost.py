@@ -12,8 +12,8 @@ import numpy as np
 from hsp_control import engine
 from hsp_control.common.arrays import Array, Flags, Indices
 from hsp_control.compiled.kernels import KernelCall
-from hsp_control.law import Resolution
-from hsp_control.law.resolution import Factors, Projectors
+from hsp_control.edge import Resolution
+from hsp_control.edge.step import Factors, Projectors
 
 _LEAST = 1e-6
 """Least cost of null-space deviation relative to the first level. The smaller it is,
@@ -33,20 +33,19 @@ class Levels(NamedTuple):
     size: float  # robot's size [m]
     first: int  # first level that may deviate: 1 below contacts, else 0
     least: float  # least cost of a level relative to the one above it
-    held: Array  # how much tasks are held, from 0 to 1, shape (1,)
     # singular value of each level below which a direction belongs to it in part, shape
     # (levels,)
     thresholds: Array
     factors: Factors  # law's pseudo-inverse of the stack
     projectors: Projectors  # what its levels left, where it went level by level
-    code: Indices  # outcome of the damped law, see `Resolution.edge`
+    code: Indices  # outcome of the damped law, see `Resolution.damped_code`
     alone: bool  # see `Resolution`
 
     @classmethod
     def of(cls, resolution: Resolution, supported: bool, size: float) -> Self:
         """Return those of a law; ``supported``: its first level is that of contacts."""
         levels = len(resolution.ends) - supported
-        problem, edge = resolution.problem, resolution.edge
+        problem = resolution.problem
         return cls(
             problem.task.jacobian,
             problem.metric.L,
@@ -57,11 +56,10 @@ class Levels(NamedTuple):
             size,
             int(supported),
             _LEAST ** (1.0 / max(levels, 1)),
-            edge.held,
             resolution.thresholds,
             resolution.factors,
             resolution.projectors,
-            edge.code,
+            resolution.damped_code,
             resolution.alone,
         )
 

@@ -31,14 +31,15 @@ from hsp_control.control.actuation.deviation_cost import (
     write_inverse_root,
 )
 from hsp_control.control.actuation.dual_active_set import QP, Workspace
-from hsp_control.control.actuation.limited_target import (
+from hsp_control.control.actuation.support import Support
+from hsp_control.edge import Resolution
+from hsp_control.edge.limited_target import (
     Barred,
     Parts,
     Permitted,
-    write_limited_target,
+    Within,
+    limited_target,
 )
-from hsp_control.control.actuation.support import Support
-from hsp_control.law import Resolution
 from hsp_control.robot import RobotState
 
 
@@ -208,12 +209,11 @@ class LimitedStep:
         if permitted is not None:
             kept, edge = slice(barriers, contacts), resolution.edge
             law = resolution.acceleration, edge.damped
-            parts = Parts(*law, *edge.self_motions, *edge.brakings)
+            own, (self_motions, brakings) = resolution.self_motions(state.v)
+            parts = Parts(*law, *self_motions, *brakings)
             barred = Barred(A[kept], lower[kept])
-            target = *wanted, parts, bounds, permitted, barred, zeros((4, n))
-            shares = edge.share, edge.held
-            rows.append(resolution.self_motions(state.v))
-            rows.append((write_limited_target, (*target, *shares)))
+            target = *wanted, parts, Within(*bounds[:2]), permitted, barred
+            rows += own, limited_target(*target, edge.share)
         rows.append((engine.LimitedRows, (*around, A, lower, upper)))
         write = write_directions(levels, directions)
         closest = write, *nearest(standing=p > 0, warm=True)

@@ -12,7 +12,7 @@ from hsp_control.common.arrays import Array, Indices
 from hsp_control.constraints.contacts import Contact, SlidingContact
 from hsp_control.constraints.contacts.contact import NORMAL, WRENCH, shares
 from hsp_control.control.evolution import PlannedContact
-from hsp_control.law import Resolution
+from hsp_control.edge import Resolution
 from hsp_control.robot import Robot, RobotState
 from hsp_control.trajectories import TrajectorySample
 

@@ -5,16 +5,15 @@ from typing import Any, Literal, Self
 
 import numpy as np
 
+from hsp_control import engine
 from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import CompensationError, SimulationError
-from hsp_control.compiled.linalg import bounded_inverse
 from hsp_control.control.active_stack import ActiveStack
 from hsp_control.control.compensation.stage import Run, Stage
 from hsp_control.control.measurement import LogChannel
 from hsp_control.declaration import Part, within
 from hsp_control.declaration.quantities import Positive, Weights
 from hsp_control.law import VARYING
-from hsp_control.law.pseudo_inverse import apply_pseudo_inverse, whiten
 from hsp_control.robot import Robot, RobotState
 from hsp_control.robot.friction import JointFriction
 
@@ -104,9 +103,8 @@ def desired_velocity(state: RobotState, active: ActiveStack) -> Array:
         minimal = np.linalg.pinv(B.T, rcond=resolution.threshold) @ rate_error
         raised = np.linalg.solve(metric.L.T, minimal)
         return np.asarray(v + resolution.null_space_error + raised)
-    B, Q, X = np.zeros((m, n)), np.zeros((m, n)), np.zeros((m, m))
-    whiten(task.jacobian, metric.L, VARYING, B)
-    bounded_inverse(B, resolution.threshold, Q, X)
-    motion = np.zeros(n)
-    apply_pseudo_inverse(Q, X, metric.L, VARYING, rate_error, np.zeros(m), motion)
+    motion, threshold = np.zeros(n), resolution.threshold
+    engine.SmallestMotion(
+        task.jacobian, metric.L, VARYING, threshold, rate_error, motion
+    )()
     return np.asarray(v + resolution.null_space_error + motion)

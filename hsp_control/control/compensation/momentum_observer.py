@@ -23,9 +23,9 @@ from typing import Literal
 
 import numpy as np
 
+from hsp_control import engine
 from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import CompensationError
-from hsp_control.compiled.linalg import bounded_inverse, cholesky
 from hsp_control.constraints.limits.joint_numbers import Positives, by_dof
 from hsp_control.control.active_stack import ActiveStack
 from hsp_control.control.compensation.stage import Run, Stage
@@ -33,10 +33,6 @@ from hsp_control.control.measurement import LogChannel
 from hsp_control.declaration import Part, within
 from hsp_control.declaration.quantities import Flag, Positive
 from hsp_control.law import VARYING
-from hsp_control.law.pseudo_inverse import (
-    apply_pseudo_inverse_transpose,
-    whiten,
-)
 from hsp_control.robot import Robot, RobotState
 from hsp_control.robot.state import as_given
 from hsp_control.tasks import Task
@@ -189,12 +185,10 @@ def task_wrench(
     """
     given = as_given(task, state)
     J = task.evaluate(given, feedback=task.feedback()).jacobian
-    m, nv = J.shape
-    L, B, Q = np.zeros((nv, nv)), np.zeros((m, nv)), np.zeros((m, nv))
-    X, part, force = np.zeros((m, m)), np.zeros(m), np.zeros(m)
-    if not cholesky(state.mass_matrix, L):
-        return np.full(m, np.nan)
-    whiten(J, L, VARYING, B)
-    bounded_inverse(B, threshold, Q, X)
-    apply_pseudo_inverse_transpose(Q, X, L, VARYING, disturbance.copy(), part, force)
+    force = np.zeros(len(J))
+    try:
+        L = np.linalg.cholesky(state.mass_matrix)
+    except np.linalg.LinAlgError:
+        return np.full(len(J), np.nan)
+    engine.TaskForce(J, L, VARYING, threshold, np.array(disturbance), force)()
     return force

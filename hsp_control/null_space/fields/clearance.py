@@ -9,6 +9,7 @@ from weakref import WeakKeyDictionary
 import numpy as np
 from pydantic import AfterValidator
 
+from hsp_control import engine
 from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import FieldError, SceneError
 from hsp_control.common.suggestions import did_you_mean, listing
@@ -19,19 +20,20 @@ from hsp_control.geometry import LinkShape, Proximity, Proxy, link_shapes, self_
 from hsp_control.geometry.scene import Obstacle, Start
 from hsp_control.law import FieldSample, MetricSample
 from hsp_control.null_space.differences import rate_along_flow
-from hsp_control.null_space.fields.cost import Cost, barrier, descend
+from hsp_control.null_space.fields.cost import Cost, descent
 from hsp_control.robot import Robot, RobotState
 
 
 class Clearance(Cost):
-    """f = Σ b(d_k / influence) over pairs of shapes, b the function `barrier_at`.
+    """f = Σ b(d_k / influence) over pairs of shapes: a barrier around obstacles.
 
-    f is zero where all distances d_k are at least ``influence``. The gradient comes
-    from the witness points, its rate from their motion, which includes the velocity of
-    the obstacles and the sliding of the points on the shapes; with points fixed to the
-    shapes the rate would be wrong by up to half. The rate is exact for spheres,
-    capsules, boxes, cylinders and planes; for meshes, hulls and clouds it is a central
-    difference of the gradient along the flow.
+    b(s) is -(1 - s)² ln s, zero for s ≥ 1, and a parabola below 0.02, finite where
+    shapes overlap. So f is zero where all distances d_k are at least ``influence``. The
+    gradient comes from the witness points, its rate from their motion, which includes
+    the velocity of the obstacles and the sliding of the points on the shapes; with
+    points fixed to the shapes the rate would be wrong by up to half. The rate is exact
+    for spheres, capsules, boxes, cylinders and planes; for meshes, hulls and clouds it
+    is a central difference of the gradient along the flow.
 
     Where the nearest features are flat or parallel and slide over each other, the
     gradient of a distance jumps. Between links and obstacles it does not jump: capsules
@@ -92,7 +94,7 @@ class Clearance(Cost):
             *closed_form.calls(state),
             work.barrier,
             *closed_form.derivatives(state, work.slopes, work.curvatures, *out),
-            (descend, (metric.L, metric.W_dot, form, *out)),
+            descent(metric, form, out),
         ]
 
     def value(self, state: RobotState) -> float:
@@ -134,7 +136,7 @@ class Clearance(Cost):
         distances = np.full(len(self.proximity(state).pairs), np.inf)
         slopes, curvatures = np.zeros((2, len(distances)))
         coal.measure(state, distances)
-        barrier(distances, self.influence, slopes, curvatures)
+        engine.Barrier(distances, self.influence, slopes, curvatures)()
         gradient = np.zeros(state.robot.nv)
         coal.add_gradient(state, slopes, gradient)
         return gradient
@@ -146,7 +148,7 @@ class Clearance(Cost):
             proximity = self._pairs(state.robot)
             slopes, curvatures = np.zeros((2, len(proximity.pairs)))
             arguments = proximity.distances, self.influence, slopes, curvatures
-            call = barrier, arguments
+            call = engine.Barrier, arguments
             add_barriers = state.plan([call]).call()
             return _Work(proximity, slopes, curvatures, call, add_barriers)
 

@@ -1,4 +1,4 @@
-"""Costs f(q, t): the field is their steepest descent, g = -W⁻¹∇f; and a barrier."""
+"""Costs f(q, t): the field is their steepest descent, g = -W⁻¹∇f."""
 
 from collections.abc import Callable
 from dataclasses import KW_ONLY
@@ -6,58 +6,15 @@ from typing import Annotated, Any, NoReturn
 
 import numpy as np
 
+from hsp_control import engine
 from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import FieldError
-from hsp_control.compiled.kernels import (
-    KernelCall,
-    KernelCalls,
-    kernel,
-    says,
-    with_outputs,
-)
+from hsp_control.compiled.kernels import KernelCall, KernelCalls, says, with_outputs
 from hsp_control.declaration.imported import AS_TEXT, NAMED
-from hsp_control.law import VARYING, FieldSample, MetricSample, raise_covector
+from hsp_control.law import FieldSample, MetricSample
 from hsp_control.null_space.differences import gradient, rate_along_flow
 from hsp_control.null_space.fields.field import NullSpaceField
 from hsp_control.robot import RobotState
-
-CORE = 0.02
-"""Value of s below which the barrier continues as a parabola, finite for all s."""
-
-
-@kernel
-def barrier_at(s: float) -> tuple[float, float, float]:
-    """Return b(s), b' and b'': b = -(1 - s)² ln s, s the distance over the influence.
-
-    C², zero for s ≥ 1. For s < CORE its second-order Taylor polynomial at CORE replaces
-    it, so that it stays finite (Li et al. 2020, incremental potential contact).
-    """
-    if s >= 1.0:
-        return 0.0, 0.0, 0.0
-    at = max(s, CORE)
-    away, log = 1.0 - at, np.log(at)
-    value = -away * away * log
-    slope = 2.0 * away * log - away * away / at
-    curvature = -2.0 * log + 4.0 * away / at + away * away / (at * at)
-    if s < CORE:
-        value += (slope + 0.5 * curvature * (s - at)) * (s - at)
-        slope += curvature * (s - at)
-    return value, slope, curvature
-
-
-@kernel
-def barrier(
-    distances: Array, influence: float, slopes: Array, curvatures: Array
-) -> float:
-    """Return Σ b(d_k/influence), write its slopes and curvatures by d_k."""
-    total = 0.0
-    for k in range(distances.shape[0]):
-        value, slope, curvature = barrier_at(distances[k] / influence)
-        total += value
-        slopes[k] = slope / influence
-        curvatures[k] = curvature / (influence * influence)
-    return total
-
 
 _BY_KERNEL = "kernel", "derivatives"
 
@@ -149,10 +106,10 @@ class Cost(NullSpaceField):
         self, state: RobotState, metric: MetricSample, form: int, out: FieldSample
     ) -> KernelCalls:
         """Return the calls: g = -W⁻¹∇f and g' = -W⁻¹((∇f)' + W'g)."""
-        descent = metric.L, metric.W_dot, form, *out
+        descend = descent(metric, form, out)
         if self._has_kernel("gradient", "gradient_rate", "differentiate"):
-            return [*self.derivatives(state, *out), (descend, descent)]
-        return [(self._differentiated, (state.read_only, *out)), (descend, descent)]
+            return [*self.derivatives(state, *out), descend]
+        return [(self._differentiated, (state.read_only, *out)), descend]
 
     def evaluate(
         self, state: RobotState, metric: MetricSample, form: int, out: FieldSample
@@ -261,15 +218,6 @@ class FunctionCost(Cost, type="function_cost"):
         return self.rate_function(state.read_only)
 
 
-@kernel
-def descend(L: Array, W_dot: Array, form: int, g: Array, g_dot: Array) -> None:
-    """Overwrite (∇f, (∇f)') by g = -W⁻¹∇f and g'."""
-    raise_covector(g, L, form)
-    for i in range(g.shape[0]):
-        g[i] = -g[i]
-    for i in range(g.shape[0]):
-        if form == VARYING:
-            for j in range(g.shape[0]):
-                g_dot[i] += W_dot[i, j] * g[j]
-        g_dot[i] = -g_dot[i]
-    raise_covector(g_dot, L, form)
+def descent(metric: MetricSample, form: int, out: FieldSample) -> KernelCall:
+    """Return the call that overwrites ∇f and (∇f)' by g = -W⁻¹∇f and g'."""
+    return engine.GradientDescent, (metric.L, metric.W_dot, form, out)

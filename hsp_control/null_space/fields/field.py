@@ -10,9 +10,10 @@ from typing import Annotated, Any, ClassVar, Self
 import numpy as np
 from pydantic import AfterValidator, InstanceOf
 
+from hsp_control import engine
 from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import FieldError
-from hsp_control.compiled.kernels import AnyCall, KernelCalls, kernel, says
+from hsp_control.compiled.kernels import AnyCall, KernelCalls, says
 from hsp_control.declaration import Part, within
 from hsp_control.declaration.quantities import NonNegative, OrInstance
 from hsp_control.geometry.scene import Start
@@ -223,7 +224,7 @@ class FieldSum(NullSpaceField):
                 calls.append((_update, (term.weight, state.read_only, weights)))
             else:
                 weights[:] = sample_weight(term.weight, state)
-            calls.append((_add, (k == 0, weights, *sample, *out)))
+            calls.append((engine.AddWeighted, (k == 0, weights, sample, out)))
         return calls
 
     def value(self, state: RobotState) -> float:
@@ -241,16 +242,3 @@ def terms_of(field: NullSpaceField) -> tuple[NullSpaceField, ...]:
 
 def _update(weight: Weight, state: RobotState, weights: Array) -> None:
     weights[:] = weight.sample(state)
-
-
-@kernel
-def _add(
-    first: bool, weights: Array, g: Array, g_dot: Array, sum_g: Array, sum_g_dot: Array
-) -> None:
-    """Scale a sample by w and w', and add it to the sum; ``first`` starts the sum."""
-    w, w_dot = weights[0], weights[1]
-    for i in range(g.shape[0]):
-        g_dot[i] = w * g_dot[i] + w_dot * g[i]
-        g[i] *= w
-        sum_g[i] = g[i] if first else sum_g[i] + g[i]
-        sum_g_dot[i] = g_dot[i] if first else sum_g_dot[i] + g_dot[i]

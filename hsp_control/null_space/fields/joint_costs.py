@@ -1,24 +1,23 @@
 """Costs of joint positions: centring, a posture, equal angles, a barrier at limits."""
 
 from dataclasses import KW_ONLY, replace
-from math import cos, pi, sin
 from typing import Annotated, Self
 
 import numpy as np
 from numpy.typing import ArrayLike
 from pydantic import Field
 
+from hsp_control import engine
 from hsp_control.common.arrays import Array, Indices
 from hsp_control.common.exceptions import FieldError
-from hsp_control.compiled.kernels import KernelCall, kernel
+from hsp_control.compiled.kernels import KernelCall
 from hsp_control.declaration import within
 from hsp_control.declaration.quantities import Fraction, Names, Weights
 from hsp_control.geometry.scene import Start
-from hsp_control.null_space.fields.cost import Cost, barrier_at
+from hsp_control.null_space.fields.cost import Cost
 from hsp_control.robot import Robot, RobotState
-from hsp_control.robot.kinematics import joint_displacements
 from hsp_control.robot.state import Posture, configuration
-from hsp_control.trajectories import Hold, Trajectory, TrajectorySample
+from hsp_control.trajectories import Hold, Trajectory
 
 
 class LimitedJointsCost(Cost):
@@ -57,7 +56,8 @@ class JointCentering(LimitedJointsCost, type="joint_centering"):
         low, high = lower[dofs], upper[dofs]
         half = np.maximum(0.5 * (high - low), 1.0)
         stiffness = per_dof(self.weights, robot.nv)[dofs] / half**2
-        return _centering, (state.q, state.v, limited, 0.5 * (low + high), stiffness)
+        middle = 0.5 * (low + high)
+        return engine.JointCentering, (state.q, state.v, limited, middle, stiffness)
 
 
 def limited_joints(robot: Robot) -> Indices:
@@ -65,29 +65,6 @@ def limited_joints(robot: Robot) -> Indices:
     lower, upper = robot.position_limits()
     limited = np.isfinite(lower) & np.isfinite(upper) & (upper > lower)
     return robot.single_dof_joints[limited[robot.single_dof_joints[:, 0]], :2].copy()
-
-
-@kernel
-def _centering(
-    q: Array,
-    v: Array,
-    limited: Indices,
-    middle: Array,
-    stiffness: Array,
-    gradient: Array,
-    rate: Array,
-) -> float:
-    """Write ∇f = k_i (q_i - m_i) and (∇f)' = k_i v_i, and return f; k_i = w_i/r_i²."""
-    for i in range(v.shape[0]):
-        gradient[i] = rate[i] = 0.0
-    f = 0.0
-    for k in range(limited.shape[0]):
-        i, at = limited[k, 0], limited[k, 1]
-        away = q[at] - middle[k]
-        gradient[i] = stiffness[k] * away
-        rate[i] = stiffness[k] * v[i]
-        f += 0.5 * stiffness[k] * away * away
-    return f
 
 
 def per_dof(weights: ArrayLike, nv: int) -> Array:
@@ -146,37 +123,8 @@ class TargetPosture(Cost, type="target_posture"):
         target = np.asarray(self.target, dtype=float)
         moved = self.displacement or Hold(np.zeros(robot.nv))
         joints, weights = robot.single_dof_joints, per_dof(self.weights, robot.nv)
-        return _posture, (state.q, state.v, target, moved, joints, weights)
-
-
-@kernel
-def _posture(
-    q: Array,
-    v: Array,
-    target: Array,
-    moved: TrajectorySample,
-    single_dof_joints: Indices,
-    weights: Array,
-    gradient: Array,
-    rate: Array,
-) -> float:
-    """Write ∇f = w d (continuous joints: w sin d) and its rate, and return f."""
-    for i in range(v.shape[0]):
-        gradient[i] = rate[i] = 0.0
-    joint_displacements(q, target, single_dof_joints, gradient)
-    f = 0.0
-    for k in range(single_dof_joints.shape[0]):
-        i = single_dof_joints[k, 0]
-        d, d_dot = gradient[i] - moved.position[i], v[i] - moved.velocity[i]
-        if single_dof_joints[k, 2] == 1:
-            f += 0.5 * weights[i] * d * d
-            gradient[i] = weights[i] * d
-            rate[i] = weights[i] * d_dot
-        else:
-            f += weights[i] * (1.0 - cos(d))
-            gradient[i] = weights[i] * sin(d)
-            rate[i] = weights[i] * cos(d) * d_dot
-    return f
+        where = state.q, state.v, target
+        return engine.TargetPosture, (*where, moved, joints, weights)
 
 
 class EqualJointAngles(Cost, type="equal_joint_angles"):
@@ -206,47 +154,16 @@ class EqualJointAngles(Cost, type="equal_joint_angles"):
         """Return the kernel; see `Cost.kernel`."""
         robot = state.robot
         chain = [robot.velocity_index(joint).start for joint in self.joints]
-        joints, angles = robot.single_dof_joints, np.zeros(robot.nv)
-        chained = np.array(chain, dtype=np.int64)
-        return _equal_angles, (
-            state.q, state.v, robot.neutral(), joints, chained, angles,
-        )  # fmt: skip
-
-
-@kernel
-def _equal_angles(
-    q: Array,
-    v: Array,
-    neutral: Array,
-    single_dof_joints: Indices,
-    chain: Indices,
-    angles: Array,
-    gradient: Array,
-    rate: Array,
-) -> float:
-    """Write ∇f and (∇f)' with d_k = q_{k+1} - q_k in [-π, π), and return f."""
-    joint_displacements(q, neutral, single_dof_joints, angles)
-    for i in range(v.shape[0]):
-        gradient[i] = rate[i] = 0.0
-    f = 0.0
-    for k in range(chain.shape[0] - 1):
-        i, j = chain[k], chain[k + 1]
-        d = (angles[j] - angles[i] + pi) % (2.0 * pi) - pi
-        slope, slope_dot = 2.0 * d, 2.0 * (v[j] - v[i])
-        gradient[i] -= slope
-        gradient[j] += slope
-        rate[i] -= slope_dot
-        rate[j] += slope_dot
-        f += d * d
-    return f
+        where = state.q, state.v, robot.neutral(), robot.single_dof_joints
+        return engine.EqualJointAngles, (*where, np.array(chain, dtype=np.int64))
 
 
 class LimitBarrier(LimitedJointsCost, type="limit_barrier"):
     """f = Σ w_i (b((q_i - lower_i)/u_i) + b((upper_i - q_i)/u_i)).
 
-    u_i is ``zone`` times half the range, and b the function `barrier_at`: a joint adds
-    to f only within the distance u_i of a limit. Joints without limits, continuous
-    joints and a floating root do not count.
+    u_i is ``zone`` times half the range, and b(s) = -(1 - s)² ln s below 1, 0 beyond: a
+    joint adds to f only within the distance u_i of a limit. Joints without limits,
+    continuous joints and a floating root do not count.
     """
 
     zone: Fraction = 0.3
@@ -261,33 +178,5 @@ class LimitBarrier(LimitedJointsCost, type="limit_barrier"):
         lower, upper = low[dofs], high[dofs]
         unit = 0.5 * self.zone * (upper - lower)  # u_i
         weights = per_dof(self.weights, robot.nv)[dofs]
-        return _limit_barrier, (
-            state.q, state.v, limited, lower, upper, unit, weights,
-        )  # fmt: skip
-
-
-@kernel
-def _limit_barrier(
-    q: Array,
-    v: Array,
-    limited: Indices,
-    lower: Array,
-    upper: Array,
-    unit: Array,
-    weights: Array,
-    gradient: Array,
-    rate: Array,
-) -> float:
-    """Write ∇f and (∇f)' = ∇²f v, and return f."""
-    for i in range(v.shape[0]):
-        gradient[i] = rate[i] = 0.0
-    f = 0.0
-    for k in range(limited.shape[0]):
-        i, at = limited[k, 0], limited[k, 1]
-        b_lower, slope_lower, curvature_lower = barrier_at((q[at] - lower[k]) / unit[k])
-        b_upper, slope_upper, curvature_upper = barrier_at((upper[k] - q[at]) / unit[k])
-        f += weights[k] * (b_lower + b_upper)
-        gradient[i] = weights[k] * (slope_lower - slope_upper) / unit[k]
-        curvature = (curvature_lower + curvature_upper) / (unit[k] * unit[k])
-        rate[i] = weights[k] * curvature * v[i]
-    return f
+        where = state.q, state.v, limited
+        return engine.LimitBarrier, (*where, lower, upper, unit, weights)

@@ -1,20 +1,13 @@
 """Measures of the Jacobian: manipulability and condition."""
 
 from dataclasses import KW_ONLY
-from math import exp, log
 from typing import Literal, Self
 
 import numpy as np
 
-from hsp_control.common.arrays import Array
+from hsp_control import engine
 from hsp_control.common.exceptions import FieldError
-from hsp_control.compiled.kernels import KernelCall, kernel
-from hsp_control.compiled.linalg import (
-    cholesky,
-    gram,
-    multiply_transposed,
-    solve_columns,
-)
+from hsp_control.compiled.kernels import KernelCall
 from hsp_control.declaration import within
 from hsp_control.declaration.quantities import Matrix, Positive
 from hsp_control.geometry.scene import Start
@@ -69,54 +62,8 @@ class Manipulability(JacobianCost, type="manipulability"):
         # Larger if the entries of W are small: it must exceed the rounding error of G.
         floor = FLOOR**2 * max(1.0, 0.1 * float(np.trace(W_inv)) / nv)
         power = {"log": 0, "root": 1, "determinant": 2}[self.form]
-        return _manipulability, (np.asarray(W_inv), weighted, floor, power)
-
-
-@kernel
-def _manipulability(
-    W_inv: Array,
-    weighted: bool,
-    floor: float,
-    power: int,
-    J: Array,
-    J_dot: Array,
-    slope: Array,
-    slope_rate: Array,
-    scratch: Array,
-) -> float:
-    """Write ∂f/∂J and its rate, and return f; for φ = ½ log det G ∂φ/∂J is G⁻¹JW⁻¹."""
-    k, n = J.shape
-    JW, JW_dot, G, G_dot = J, J_dot, scratch[2, :, :k], scratch[3, :, :k]
-    if weighted:
-        JW, JW_dot = scratch[0], scratch[1]
-        for i in range(k):
-            multiply_transposed(W_inv, J[i], JW[i])
-            multiply_transposed(W_inv, J_dot[i], JW_dot[i])
-    gram(JW, J, False, G)
-    gram(JW_dot, J, True, G_dot)
-    for i in range(k):
-        G[i, i] += floor
-    L = scratch[4, :, :k]
-    cholesky(G, L)
-    half_log = 0.0
-    for i in range(k):
-        half_log += log(L[i, i])
-    _solve_with_rate(L, G_dot, JW, JW_dot, slope, slope_rate)
-    # f = -φ, or f = -exp(power φ) with ∂f = power f ∂φ and f' = power f φ'
-    value, outer, outer_rate = -half_log, -1.0, 0.0
-    if power > 0:
-        value = -exp(power * half_log)
-        rate = 0.0
-        for i in range(k):
-            for j in range(n):
-                rate += slope[i, j] * J_dot[i, j]
-        outer = power * value
-        outer_rate = power * outer * rate
-    for i in range(k):
-        for j in range(n):
-            slope_rate[i, j] = outer * slope_rate[i, j] + outer_rate * slope[i, j]
-            slope[i, j] *= outer
-    return value
+        inverse = np.ascontiguousarray(W_inv)
+        return engine.Manipulability, (inverse, weighted, floor, power)
 
 
 class InverseCondition(JacobianCost, type="inverse_condition"):
@@ -135,77 +82,4 @@ class InverseCondition(JacobianCost, type="inverse_condition"):
 
     def terms_kernel(self, nv: int) -> KernelCall:
         """Return the kernel; see `JacobianCost.terms_kernel`."""
-        return _inverse_condition, (FLOOR**2,)
-
-
-@kernel
-def _inverse_condition(
-    floor: float,
-    J: Array,
-    J_dot: Array,
-    slope: Array,
-    slope_rate: Array,
-    scratch: Array,
-) -> float:
-    """Write ∂f/∂J = 2φ(J/tr G - G⁻²J/tr G⁻¹) with φ = -f, and its rate; return f.
-
-    Y = G⁻¹J and Z = G⁻¹Y = G⁻²J, hence Y' = G⁻¹(J' - G'Y) and Z' = G⁻¹(Y' - G'Z).
-    """
-    k, n = J.shape
-    Y, Y_dot, Z, Z_dot = scratch[0], scratch[1], scratch[2], scratch[3]
-    G, G_dot, L, G_inv = (
-        scratch[4, :, :k],
-        scratch[5, :, :k],
-        scratch[6, :, :k],
-        scratch[7, :, :k],
-    )
-    gram(J, J, False, G)
-    gram(J_dot, J, True, G_dot)
-    for i in range(k):
-        G[i, i] += floor
-        for j in range(k):
-            G_inv[i, j] = 1.0 if i == j else 0.0
-    cholesky(G, L)
-    solve_columns(L, G_inv)
-    size = size_dot = stretch = stretch_dot = 0.0
-    for i in range(k):
-        size += G[i, i]
-        size_dot += G_dot[i, i]
-        stretch += G_inv[i, i]
-        for j in range(k):
-            for p in range(k):  # -tr(G⁻¹G'G⁻¹)
-                stretch_dot -= G_inv[p, i] * G_dot[i, j] * G_inv[j, p]
-    _solve_with_rate(L, G_dot, J, J_dot, Y, Y_dot)
-    _solve_with_rate(L, G_dot, Y, Y_dot, Z, Z_dot)
-    phi = k * k / (size * stretch)
-    phi_dot = -phi * (size_dot / size + stretch_dot / stretch)
-    for i in range(k):
-        for j in range(n):
-            inner = J[i, j] / size - Z[i, j] / stretch
-            inner_dot = (
-                J_dot[i, j] / size
-                - J[i, j] * size_dot / (size * size)
-                - Z_dot[i, j] / stretch
-                + Z[i, j] * stretch_dot / (stretch * stretch)
-            )
-            slope[i, j] = 2.0 * phi * inner
-            slope_rate[i, j] = 2.0 * (phi_dot * inner + phi * inner_dot)
-    return float(-phi)
-
-
-@kernel
-def _solve_with_rate(
-    L: Array, G_dot: Array, X: Array, X_dot: Array, Y: Array, Y_dot: Array
-) -> None:
-    """Write Y = G⁻¹X and Y' = G⁻¹(X' - G'Y) with G = L Lᵀ."""
-    k, n = X.shape
-    for i in range(k):
-        for j in range(n):
-            Y[i, j] = X[i, j]
-    solve_columns(L, Y)
-    for i in range(k):
-        for j in range(n):
-            Y_dot[i, j] = X_dot[i, j]
-            for p in range(k):
-                Y_dot[i, j] -= G_dot[i, p] * Y[p, j]
-    solve_columns(L, Y_dot)
+        return engine.InverseCondition, (FLOOR**2,)

@@ -6,16 +6,15 @@ from typing import Annotated, Self
 import numpy as np
 from pydantic import Field
 
+from hsp_control import engine
 from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import FieldError
-from hsp_control.compiled.kernels import KernelCall, kernel
+from hsp_control.compiled.kernels import KernelCalls
 from hsp_control.declaration import within
 from hsp_control.declaration.quantities import Name, Names, OrInstance
 from hsp_control.geometry.scene import Obstacle, Start
 from hsp_control.null_space.fields.cost import Cost
 from hsp_control.robot import RobotState
-from hsp_control.robot.kinematics import FrameMotion
-from hsp_control.trajectories import TrajectorySample
 
 
 class PointDistance(Cost, type="point_distance"):
@@ -54,10 +53,17 @@ class PointDistance(Cost, type="point_distance"):
             float(np.linalg.norm(state.position(frame) - c)) for frame in self.frames
         )
 
-    def kernel(self, state: RobotState) -> KernelCall:
-        """Return the kernel; see `Cost.kernel`."""
-        frames = tuple(map(state.frame, self.frames))
-        return _point_distance, (frames, self._placed_obstacle.center)
+    def derivatives(
+        self, state: RobotState, gradient: Array, rate: Array
+    ) -> KernelCalls:
+        """Return the calls that add a frame each to f, ∇f and (∇f)'."""
+        center, moving = self._placed_obstacle.center.supplied()
+        sums = np.zeros(1), gradient, rate
+        frames = enumerate(map(state.frame, self.frames))
+        return [
+            *moving,
+            *((engine.PointDistance, (k == 0, x, center, *sums)) for k, x in frames),
+        ]
 
     def value(self, state: RobotState) -> float:
         """Return f; see `Cost.value`.
@@ -80,45 +86,3 @@ class PointDistance(Cost, type="point_distance"):
 
 NEAREST = 1e-12
 """Below this distance a frame is at the centre [m]."""
-
-
-@kernel
-def _point_distance(
-    frames: tuple[FrameMotion, ...],
-    center: TrajectorySample,
-    gradient: Array,
-    rate: Array,
-) -> float:
-    """Write ∇f and (∇f)', and return f: the sum over the frames.
-
-    With r from the centre to a frame and r' = J v - c' its terms are
-    -2 Jᵀr/d⁴ and -2 (J'ᵀr + Jᵀr' - 4 (r·r'/d²) Jᵀr)/d⁴.
-    """
-    c, c_dot = center.position, center.velocity
-    for i in range(gradient.shape[0]):
-        gradient[i] = rate[i] = 0.0
-    total = 0.0
-    for frame in frames:
-        J, J_dot, x, x_dot = (
-            frame.jacobian,
-            frame.jacobian_dot,
-            frame.position,
-            frame.velocity,
-        )
-        square = nearing = 0.0
-        for a in range(3):
-            r, r_dot = x[a] - c[a], x_dot[a] - c_dot[a]
-            square += r * r
-            nearing += r * r_dot
-        if square < NEAREST * NEAREST:
-            gradient[0] = np.inf  # the law reports that the field is not finite
-            return np.inf
-        scale = -2.0 / (square * square)
-        for i in range(gradient.shape[0]):
-            for a in range(3):
-                r, r_dot = x[a] - c[a], x_dot[a] - c_dot[a]
-                inner = r_dot - 4.0 * nearing / square * r
-                gradient[i] += scale * J[a, i] * r
-                rate[i] += scale * (J_dot[a, i] * r + J[a, i] * inner)
-        total += 1.0 / square
-    return total

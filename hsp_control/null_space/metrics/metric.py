@@ -9,16 +9,10 @@ import numpy as np
 from numpy.typing import ArrayLike
 from pydantic import Field
 
+from hsp_control import engine
 from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import MetricError
-from hsp_control.compiled.kernels import (
-    KernelCall,
-    KernelCalls,
-    kernel,
-    says,
-    with_outputs,
-)
-from hsp_control.compiled.linalg import cholesky
+from hsp_control.compiled.kernels import KernelCall, KernelCalls, says, with_outputs
 from hsp_control.declaration import Part, within
 from hsp_control.declaration.quantities import (
     ArrayField,
@@ -119,7 +113,7 @@ class MassMatrixMetric(Metric, type="mass_matrix"):
         """Return the kernel; see `Metric.kernel`."""
         known = self.inertia != "robot"
         unit = self.inertia if known else state.robot.typical_inertia
-        return _write, (state.inertia, state.inertia_rate, unit)
+        return engine.MassMatrixMetric, (state.inertia, state.inertia_rate, unit)
 
     def evaluate(self, state: RobotState, out: MetricSample) -> MetricSample:
         """Write W = M/m, L and W' = M'/m; see `Metric.evaluate`."""
@@ -127,20 +121,6 @@ class MassMatrixMetric(Metric, type="mass_matrix"):
         if np.isnan(out.L[0, 0]):
             raise MetricError(f"the mass matrix is singular at q = {state.q.tolist()}")
         return out
-
-
-@kernel
-def _write(
-    M: Array, M_dot: Array, unit: float, W: Array, L: Array, W_dot: Array
-) -> None:
-    """Write W = M/m, its factor L and W' = M'/m; L is NaN if M is singular."""
-    n = M.shape[0]
-    for i in range(n):
-        for j in range(n):
-            W[i, j] = M[i, j] / unit
-            W_dot[i, j] = M_dot[i, j] / unit
-    if not cholesky(W, L):
-        L[0, 0] = np.nan  # the law reports that the step is not finite
 
 
 class FixedMetric(Metric):

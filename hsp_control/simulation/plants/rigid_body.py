@@ -6,14 +6,13 @@ from typing import Any
 import numpy as np
 import pinocchio as pin
 
+from hsp_control import engine
 from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import SimulationError
-from hsp_control.compiled.kernels import kernel
-from hsp_control.compiled.moves import number_of_steps
 from hsp_control.robot import Robot
 from hsp_control.robot.friction import JointFriction
 from hsp_control.robot.inertia import mass_matrix
-from hsp_control.robot.integrators import Integrator
+from hsp_control.robot.integrators import Integrator, number_of_steps
 from hsp_control.robot.kinematics import Term
 from hsp_control.simulation.plants.plant import (
     ContinuousPlant,
@@ -136,38 +135,13 @@ class StickingPlant(SampledPlant):
         N = pin.nonLinearEffects(model, data, q, v)
         damping = np.diag(0.5 * h * self.friction.viscous)
         after = start.copy()
-        _minimize(
-            M + damping,
+        engine.DryFriction(
+            np.ascontiguousarray(M + damping),
             (M - damping) @ start + h * (tau - N),
             h * self.friction.coulomb,
             after,
-        )
+        )()
         return after
-
-
-@kernel
-def _minimize(A: Array, b: Array, c: Array, x: Array) -> None:
-    """Move x to the minimum of ½ xᵀA x - bᵀx + Σ c_i |x_i|, A positive definite."""
-    n = x.shape[0]
-    for _ in range(10_000):
-        largest = 0.0
-        size = 1e-9
-        for i in range(n):
-            rest = b[i]
-            for k in range(n):
-                if k != i:
-                    rest -= A[i, k] * x[k]
-            if rest > c[i]:
-                new = (rest - c[i]) / A[i, i]
-            elif rest < -c[i]:
-                new = (rest + c[i]) / A[i, i]
-            else:
-                new = 0.0
-            largest = max(largest, abs(new - x[i]))
-            size = max(size, abs(new))
-            x[i] = new
-        if largest <= 1e-13 * size:
-            return
 
 
 _STEP = 1e-3

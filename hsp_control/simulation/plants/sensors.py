@@ -12,11 +12,11 @@ from pydantic import AfterValidator
 
 from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import SimulationError
-from hsp_control.compiled.rotations import log3
 from hsp_control.control.measurement import Inertial
 from hsp_control.declaration import within
 from hsp_control.declaration.by_type import ByType
 from hsp_control.declaration.quantities import NonNegative, Periods, Weights
+from hsp_control.engine.rotations import log3
 from hsp_control.robot import Robot
 from hsp_control.simulation.plants.plant import Imperfection, in_order
 
@@ -243,8 +243,7 @@ class RunningImu:
         if self._last is not None and t > self._last[0]:
             before, R_before, v_before = self._last
             h = t - before
-            log3(R_before.T @ R, omega)
-            omega = omega / h
+            omega = log3(R_before.T @ R) / h
             force = R_before.T @ ((velocity - v_before) / h - gravity)
             omega = omega + self._noise(self._imu.gyroscope_noise, h)
             force = force + self._noise(self._imu.accelerometer_noise, h)

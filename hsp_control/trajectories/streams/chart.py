@@ -9,25 +9,11 @@ that continues in another chart is C². Wherever |y| < 3π/2, measured in world 
 (`tests/unit/trajectories/test_streams.py` compares with 10⁵ random motions).
 """
 
-from math import pi
-
 import numpy as np
 
+from hsp_control import engine
 from hsp_control.common.arrays import Array
-from hsp_control.compiled.kernels import kernel
-from hsp_control.compiled.linalg import multiply
-from hsp_control.compiled.rotations import (
-    compose,
-    compose_back,
-    exp3,
-    jexp3,
-    jexp3_dot,
-    jlog3,
-    log3,
-    rotate,
-    rotate_back,
-    rotation_from_quaternion,
-)
+from hsp_control.engine.rotations import exp3, jlog3
 from hsp_control.trajectories.orientation import OrientationSample
 
 
@@ -47,7 +33,9 @@ class Chart:
         """Set the number of linear coordinates, and whether a rotation follows."""
         self.linear, self.rotational = linear, rotational
         self.size = linear + 3 * rotational
-        self._work = np.zeros((9, 3))
+        self._base, self._y = np.eye(3), np.zeros((3, 3))  # y, y' and y''
+        self._found = OrientationSample.allocate()
+        self._turn = engine.OrientationOfChart(self._base, *self._y, self._found)
 
     def begin(self, linear: Array, rotation: Array) -> State:
         """Return the state at rest at a point and an orientation."""
@@ -65,17 +53,18 @@ class Chart:
         x, rate = state.x.copy(), state.rate.copy()
         acceleration = state.acceleration.copy()
         x[n:] = 0.0
-        rotate_back(sample.rotation, sample.angular_velocity, rate[n:])
-        rotate_back(sample.rotation, sample.angular_acceleration, acceleration[n:])
-        return State(x, rate, acceleration, sample.rotation)
+        R, omega, omega_dot = sample
+        rate[n:], acceleration[n:] = R.T @ omega, R.T @ omega_dot
+        return State(x, rate, acceleration, R)
 
     def write_orientation(self, state: State, out: OrientationSample) -> None:
         """Write R, ω and ω' of a state, in world axes."""
-        n = self.linear
-        _orientation(
-            *(state.base, state.x[n:], state.rate[n:], state.acceleration[n:]),
-            *(self._work, *out),
-        )
+        n, y = self.linear, self._y
+        self._base[:] = state.base
+        y[0], y[1], y[2] = state.x[n:], state.rate[n:], state.acceleration[n:]
+        self._turn()
+        for own, found in zip(out, self._found, strict=True):
+            own[:] = found
 
     def local(self, values: Array, base: Array) -> Array:
         """Return values, (k, width), in local coordinates about a base, (k, n).
@@ -86,73 +75,18 @@ class Chart:
         n = self.linear
         x[:, :n] = values[:, :n]
         if self.rotational:
-            _rotation_vectors(values[:, n:], base, self._work, x[:, n:])
+            y = np.empty((len(values), 3))
+            engine.RotationVectors(np.ascontiguousarray(values[:, n:]), base, y)()
+            x[:, n:] = y
         return x
 
     def local_rate(self, x: Array, velocity: Array, base: Array) -> Array:
-        """Return x' at x for a velocity in world axes, each of shape (n,)."""
+        """Return x' at x for a velocity in world axes, each of shape (n,).
+
+        A rotation vector's rate is y' = Jlog(y) Rᵀ ω.
+        """
         rate = velocity.copy()
         if self.rotational:
-            n = self.linear
-            _rotation_rate(x[n:], velocity[n:], base, self._work, rate[n:])
+            y, omega = x[self.linear :], velocity[self.linear :]
+            rate[self.linear :] = jlog3(y) @ (base @ exp3(y)).T @ omega
         return rate
-
-
-@kernel
-def _orientation(
-    base: Array,
-    y: Array,
-    y_dot: Array,
-    y_ddot: Array,
-    work: Array,
-    rotation: Array,
-    velocity: Array,
-    acceleration: Array,
-) -> None:
-    """Write R = R_b exp(y), ω = R Jexp y' and ω' = R (Jexp y'' + Jexp' y')."""
-    turned, J, moved = work[0:3], work[3:6], work[6]
-    exp3(y, turned)
-    compose(base, turned, rotation)
-    jexp3(y, J)
-    multiply(J, y_dot, velocity)
-    multiply(J, y_ddot, acceleration)
-    jexp3_dot(y, y_dot, J)
-    multiply(J, y_dot, moved)
-    for i in range(3):
-        acceleration[i] += moved[i]
-    rotate(rotation, velocity, velocity)
-    rotate(rotation, acceleration, acceleration)
-
-
-@kernel
-def _rotation_vectors(quaternions: Array, base: Array, work: Array, y: Array) -> None:
-    """Write log(R_bᵀ R) of each row, on the branch nearest to the row before."""
-    R, away = work[0:3], work[3:6]
-    for k in range(quaternions.shape[0]):
-        rotation_from_quaternion(quaternions[k], R)
-        compose_back(base, R, away)
-        log3(away, y[k])
-        if k == 0:
-            continue
-        angle, along = 0.0, 0.0
-        for i in range(3):
-            angle += y[k, i] * y[k, i]
-            along += y[k, i] * y[k - 1, i]
-        angle = np.sqrt(angle)
-        if angle > 0.0:  # y and y (1 - 2π/|y|) are the same rotation
-            turns = np.round((angle - along / angle) / (2.0 * pi))
-            for i in range(3):
-                y[k, i] *= 1.0 - 2.0 * pi * turns / angle
-
-
-@kernel
-def _rotation_rate(
-    y: Array, omega: Array, base: Array, work: Array, rate: Array
-) -> None:
-    """Write y' = Jlog(y) Rᵀ ω."""
-    R, turned, J, body = work[0:3], work[3:6], work[3:6], work[6]
-    exp3(y, turned)
-    compose(base, turned, R)
-    rotate_back(R, omega, body)
-    jlog3(y, J)
-    multiply(J, body, rate)

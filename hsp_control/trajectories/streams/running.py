@@ -24,7 +24,6 @@ from hsp_control.trajectories.streams.segments import (
     Goal,
     Joiner,
     MotionBounds,
-    QuinticSegment,
     Segment,
 )
 
@@ -241,18 +240,6 @@ class RunningStream:
         self._starts = [-inf]
         self.taken = self.refused = 0
         self.waypoints = Waypoints()
-        self._compile(start)
-
-    def _compile(self, start: State) -> None:
-        """Compile what a message needs now, and not in a period of a live loop."""
-        chart, zeros = self.chart, np.zeros_like(start.x)
-        values = np.zeros((2, chart.linear + 4 * chart.rotational))
-        values[:, -1] = 1.0
-        chart.local(values, start.base)
-        chart.local(values[:1], start.base)  # to Numba a single row has another layout
-        chart.local_rate(start.x, zeros, start.base)
-        chart.rebased(start)
-        QuinticSegment(0.0, 1.0, start.base, np.zeros((6, chart.size))).state(0.5)
 
     @property
     def age(self) -> float:

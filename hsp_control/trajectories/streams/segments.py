@@ -13,10 +13,12 @@ import numpy as np
 import ruckig
 from numpy.typing import ArrayLike
 
+from hsp_control import engine
 from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import StreamError, TrajectoryError
-from hsp_control.trajectories.piecewise_polynomial import QUINTIC, horner
+from hsp_control.trajectories.piecewise_polynomial import QUINTIC
 from hsp_control.trajectories.streams.chart import State
+from hsp_control.trajectories.trajectory import TrajectorySample
 
 _PIECES = 4
 """A quintic is cut into this many pieces: the bounds of a Bézier curve by its control
@@ -182,14 +184,14 @@ class QuinticSegment(Segment):
     def __init__(self, start: float, end: float, base: Array, ends: Array) -> None:
         """Set x, T x', T² x'' at the start, then at the end, shape (6, n)."""
         super().__init__(start, end, base)
-        self._coefficients = QUINTIC @ ends
+        self._found = TrajectorySample.allocate(ends.shape[1])
+        given = self.start, self.end, QUINTIC @ ends, self._found
+        self._motion = engine.Polynomial(*given)
 
     def state(self, t: float) -> State:
         """Return the state at time t [s]."""
-        x, rate, acceleration = np.empty((3, self._coefficients.shape[1]))
-        width = self.end - self.start
-        u = (t - self.start) / width
-        horner(u, width, self._coefficients, x, rate, acceleration)
+        self._motion(t)
+        x, rate, acceleration = (each.copy() for each in self._found)
         return State(x, rate, acceleration, self.base)
 
 

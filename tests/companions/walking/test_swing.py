@@ -20,15 +20,14 @@ from hsp_control.companions.walking.step_adjustment import (
 )
 from hsp_control.companions.walking.step_planner import StepPlanner
 from hsp_control.companions.walking.swing import APPROACH, DESCENT, Swing
-from hsp_control.compiled.rotations import log3, turn
+from hsp_control.engine.rotations import exp3, log3
 
 H = 1e-5
 STANCE = Stance(width=0.17, narrowest=0.12, widest=0.4, longest=0.6)
 
 
 def a_swing(height: float = 0.1) -> Swing:
-    tilted = np.zeros((3, 3))
-    turn(np.eye(3), np.array([0.1, 0.2, 0.3]), 1.0, tilted)
+    tilted = exp3(np.array([0.1, 0.2, 0.3]))
     place = Footstep(0.3, 0.1, 0.0)
     start = np.array([0.0, 0.05, height + 0.01])
     return Swing(1.0, 0.6, start, tilted, place, np.eye(3), height, 0.05)
@@ -74,8 +73,7 @@ def assert_smooth(swing: Swing, first: float, last: float) -> None:
             b.acceleration, abs=2e-2
         )
         R, S, T = (swing.orientation(t + d * H) for d in (-1, 0, 1))
-        y = np.zeros(3)
-        log3(T.position @ R.position.T, y)
+        y = log3(T.position @ R.position.T)
         assert y / (2 * H) == pytest.approx(S.velocity, abs=1e-5)
 
 

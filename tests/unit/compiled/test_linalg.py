@@ -10,7 +10,7 @@ from hypothesis import assume, given
 from hypothesis import strategies as st
 
 from hsp_control.common.arrays import Array
-from hsp_control.compiled import linalg, moves
+from hsp_control.compiled import linalg
 from hsp_control.compiled.linalg import (
     cholesky,
     multiply,
@@ -23,7 +23,6 @@ from hsp_control.compiled.linalg import (
     triangularise_rows,
 )
 from hsp_control.law import CONSTANT, law
-from hsp_control.robot import kinematics
 from hsp_control.tasks import TaskSample
 
 EPS = float(np.finfo(float).eps)
@@ -241,13 +240,9 @@ def arguments(name: str) -> tuple[Any, ...]:
     deficient[3] = 0.0
     independent = normal(7, 5, 7)
     independent[2] = independent[1] + 0.01 * independent[2]  # cleaned twice
-    turned = np.linalg.qr(normal(23, 3, 3))[0]
     n, m = 7, 4
     sample = [normal(k, n) for k in range(9, 12)]
     J, J_dot = normal(12, m, n), normal(13, m, n)
-    world = [normal(k, 6, n) for k in (15, 16)]
-    index = np.arange(n)
-    shared = np.array([0, 1, 2, 3, 4, 5, 5])  # the last joint mimics its neighbour
     return {
         "add_rows": (normal(24, 6), normal(25, 6, n), normal(26, n)),
         "copy": (sample[0], np.zeros(n)),
@@ -275,19 +270,6 @@ def arguments(name: str) -> tuple[Any, ...]:
             *(normal(14, m, n), triangular(4), sample[0], sample[2]),
             *(np.zeros((6, n)), np.zeros(n)),
         ),
-        "frame_kinematics": (
-            *(np.array([2]), np.array([1])),
-            kinematics._ParentJoint(
-                *(*world, np.eye(3), normal(18, 3), turned, normal(22, 3)),
-                *(index, shared),
-            ),
-            *(normal(19, n - 1), kinematics.FrameMotion.allocate(n - 1), np.zeros(6)),
-        ),
-        "copy_valid": (
-            *(0.5, np.array([0.6, 0.8, 3.0]), sample[0]),
-            *(np.zeros(1), np.zeros(3), np.zeros(n)),
-            *(np.array([[0, 2]]), np.array([4])),
-        ),
     }[name]
 
 
@@ -298,8 +280,6 @@ KERNELS: dict[str, Callable[..., Any]] = {
         if callable(function) and uncompiled(function).__module__ == linalg.__name__
     },
     "acceleration": law.acceleration,
-    "frame_kinematics": kinematics.frame_kinematics,
-    "copy_valid": moves.copy_valid,
 }
 
 

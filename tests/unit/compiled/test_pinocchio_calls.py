@@ -11,11 +11,8 @@ from robot_cases import ROBOTS, assert_equal_terms, draw, everything
 
 from hsp_control.common.arrays import Array
 from hsp_control.compiled import pinocchio_calls
-from hsp_control.compiled.kernels import PLAIN
-from hsp_control.compiled.native import NativeCall
+from hsp_control.compiled.pinocchio_calls import PinocchioCall
 from hsp_control.compiled.step_plan import bind
-
-compiled = pytest.mark.skipif(PLAIN, reason="plain Python has no native calls")
 
 
 def both(
@@ -29,7 +26,6 @@ def both(
     return native, bound, call
 
 
-@compiled
 @pytest.mark.parametrize("case", ROBOTS)
 def test_native_calls_equal_the_bindings(case: str) -> None:
     """And they read the arrays anew each time: the second state is another one."""
@@ -46,7 +42,7 @@ def test_native_calls_equal_the_bindings(case: str) -> None:
         calls["aba"] = ((q, v, a), ("ddq",))
     for what, (vectors, results) in calls.items():
         native, bound, call = both(what, model, *vectors)
-        assert isinstance(call, NativeCall), pinocchio_calls.unknown()
+        assert isinstance(call, PinocchioCall), pinocchio_calls.unknown()
         for name in results:
             np.testing.assert_array_equal(
                 np.array(getattr(native, name)), np.array(getattr(bound, name))
@@ -61,7 +57,6 @@ def test_native_calls_equal_the_bindings(case: str) -> None:
             np.testing.assert_array_equal(np.array(found), np.array(expected))
 
 
-@compiled
 def test_a_copied_call_computes_into_its_own_data() -> None:
     """A copy has its own model, data and arrays; the first call's stay as they are."""
     robot, q, v, rng = draw("panda", seed=22)
@@ -70,7 +65,7 @@ def test_a_copied_call_computes_into_its_own_data() -> None:
     q[:] = robot.random_configuration(rng)
     copied()
     np.testing.assert_array_equal(native.tau, bound.tau)
-    what, _, own, *_ = copied.recipe[1]
+    what, _, own, *_ = copied._arguments
     assert what == "rnea"
     np.testing.assert_array_equal(own.tau, bound.tau)
 
@@ -83,7 +78,7 @@ def test_what_is_not_packed_is_left_to_the_bindings() -> None:
     native, bound, call = both(
         "computeJointJacobiansTimeVariation", robot.model, q, spread[:, 0]
     )
-    assert not isinstance(call, NativeCall)
+    assert not isinstance(call, PinocchioCall)
     np.testing.assert_array_equal(native.dJ, bound.dJ)
     call = bind(pin.crba, robot.model, native, q[:-1])
     with pytest.raises(ValueError, match="size"):
@@ -94,9 +89,9 @@ def test_what_is_not_packed_is_left_to_the_bindings() -> None:
 def no_library(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
     """Let Pinocchio's library have none of the functions."""
     monkeypatch.setattr(pinocchio_calls, "_address", lambda name: 0)
-    pinocchio_calls._missing.cache_clear()
+    pinocchio_calls.unknown.cache_clear()
     yield
-    pinocchio_calls._missing.cache_clear()
+    pinocchio_calls.unknown.cache_clear()
 
 
 @pytest.mark.parametrize("case", ["panda", "solo12"])
@@ -109,7 +104,6 @@ def test_without_the_functions_the_bindings_are_called(
     expected = everything(robot.state(0.0, q, v), frame)
     request.getfixturevalue("no_library")
     state = robot.state(0.0, q, v)
-    assert not isinstance(state._inverse_dynamics, NativeCall)
-    if not PLAIN:
-        assert "computeJointJacobiansTimeVariation" in pinocchio_calls.unknown()
+    assert not isinstance(state._inverse_dynamics, PinocchioCall)
+    assert "computeJointJacobiansTimeVariation" in pinocchio_calls.unknown()
     assert_equal_terms(everything(state, frame), expected)

@@ -22,7 +22,7 @@ from hsp_control.control.actuation.deviation_cost import (
     write_directions,
     write_inverse_root,
 )
-from hsp_control.law import Resolution
+from hsp_control.edge import Resolution
 
 seeds = st.integers(0, 2**32 - 1)
 NOWHERE = np.zeros(0, dtype=np.int64)
@@ -99,8 +99,8 @@ def test_levels_share_directions_as_the_law_does(
     np.testing.assert_allclose(inverse_cost(resolution) @ H, np.eye(7), atol=1e-5)
 
 
-FIELD = 0.01 * hsp.JointCentering()
-"""It asks for less than the limits permit far from them."""
+FIELD = 1e-3 * hsp.JointCentering()
+"""It asks for less than a tenth of what the limits permit far from them."""
 
 
 def on_springs(limits: hsp.Limits | None, *below: hsp.FramePosition) -> hsp.Controller:

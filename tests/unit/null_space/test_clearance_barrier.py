@@ -14,11 +14,12 @@ from hsp_control import Cost, Obstacle, load_experiment
 from hsp_control.geometry.closed_form import ClosedFormDistances
 from hsp_control.geometry.shapes import Sphere
 from hsp_control.null_space.fields import FieldSample, ObstacleClearance
-from hsp_control.null_space.fields.cost import CORE
 from hsp_control.null_space.metrics import IdentityMetric, MetricSample
 from hsp_control.trajectories import Hold, UniformLine
 
 # --- the barrier ---------------------------------------------------------------------
+
+CORE = 0.02  # s below which it is a parabola
 
 
 @given(s=st.floats(-2.0, 1.5), influence=st.floats(0.01, 10.0))

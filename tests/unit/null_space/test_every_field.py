@@ -61,7 +61,10 @@ def test_field_and_its_rate(name: str, which: str, metric_name: str) -> None:
 
     rate = derivative(along, 0.005)
     scale = scale + np.abs(rate).max()
-    np.testing.assert_allclose(g_dot, rate, rtol=0, atol=member.rate_accuracy * scale)
+    # What W⁻¹ is known to, of a g that may be larger than its rate by far, over the step.
+    rounding = 0.25 * np.finfo(float).eps * np.linalg.cond(W(q)) * np.abs(g).max()
+    atol = member.rate_accuracy * scale + rounding / 0.005
+    np.testing.assert_allclose(g_dot, rate, rtol=0, atol=atol)
     if member.parts(name) and metric_name != "identity":
         assert np.abs(g_dot).max() > 1e-3  # else nothing was tested
 

@@ -15,7 +15,6 @@ from hsp_control import Robot
 from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import LogError, SimulationError
 from hsp_control.compiled.kernels import PLAIN
-from hsp_control.compiled.moves import make_steps
 from hsp_control.compiled.step_plan import planned
 from hsp_control.robot import integrators
 from hsp_control.robot.integrators import Dop853, Rk4, SemiImplicitEuler
@@ -27,6 +26,19 @@ def falling(robot: Robot) -> Callable[[float, Array, Array], Array]:
     """Return the dynamics without a controller, tau = 0."""
     nothing = np.zeros(robot.nv)
     return lambda t, q, v: robot.forward_dynamics(q, v, nothing)
+
+
+def one_by_one(
+    calls: list[Any], interval: Array, longest: float, now: Array, h: Array
+) -> None:
+    """Divide an interval into equal steps, and make the calls of each, in Python."""
+    start, end = interval
+    steps = integrators.number_of_steps(end - start, longest)
+    h[0] = (end - start) / steps
+    for k in range(steps):
+        now[0] = start + k * h[0]
+        for call in calls:
+            call(now[0])
 
 
 @pytest.mark.parametrize(
@@ -173,7 +185,7 @@ def test_native_steps_are_those_that_are_made_one_by_one(method: Any) -> None:
     native, single = begin(), begin()
     assert native.native
     given = single.interval, 0.003, single.now, single.h
-    single.take = partial(make_steps, planned(single._calls()).steps(), *given)
+    single.take = partial(one_by_one, planned(single._calls()).steps(), *given)
     ours = theirs = start(robot, 8)
     for k in range(10):
         t, end = 0.01 * k, 0.01 * (k + 1)

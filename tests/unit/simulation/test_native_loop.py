@@ -13,19 +13,20 @@ from hsp_control import (
     Limits,
     Rollout,
     TargetPosture,
+    engine,
     load_experiment,
     simulate,
 )
 from hsp_control.common.exceptions import SimulationError
 from hsp_control.compiled.kernels import PLAIN
-from hsp_control.compiled.moves import REFUSED
 from hsp_control.config import Experiment
 from hsp_control.constraints.limits import RobotLimits
 from hsp_control.control.actuation import Status
 from hsp_control.control.actuation.actuation import LOOK
-from hsp_control.control.bound_step import BoundStep, FreeStep, is_free
+from hsp_control.control.bound_step import BoundStep, FreeStep
 from hsp_control.control.changes import Changes
 from hsp_control.control.controller import Controller
+from hsp_control.engine import REFUSED, Move, Plan, PythonCall
 from hsp_control.robot.integrators import SemiImplicitEuler
 from hsp_control.simulation import loops
 from hsp_control.simulation.limit_excess import LimitExcess
@@ -121,11 +122,25 @@ def test_the_same_to_the_last_bit(case: tuple[str, ...], counted: Counted) -> No
     assert max(counted.many) <= MOST
 
 
-def test_a_step_is_free_whose_law_is_finite_within_limits() -> None:
+@pytest.mark.parametrize(
+    ("value", "free"),
+    [
+        *[(0.0, True), (1.0, True), (REFUSED, False), (LOOK, False)],
+        *[(LOOK + Status.LIMITED, False), (np.nan, False), (np.inf, False)],
+    ],
+)
+def test_a_step_is_free_whose_law_is_finite_within_limits(
+    value: float, free: bool
+) -> None:
     """Also with a bounded inverse, 1; `LOOK`: a limit is violated."""
-    assert all(map(is_free, (0.0, 1.0)))
-    for value in (REFUSED, LOOK, LOOK + Status.LIMITED, np.nan, np.inf):
-        assert not is_free(value)
+    stamp, unit_blocks = np.zeros(1, dtype=np.int64), np.zeros((0, 2), dtype=np.int64)
+    law = Plan([PythonCall(lambda: value)])
+    move = Move(law, np.zeros(1), np.zeros(2), np.zeros(2), unit_blocks, stamp)
+    which = np.array([0.0, 1.0, 10.0, 3.0, 7.0])
+    numbers = np.zeros(2), np.zeros(2), np.zeros(2), np.ones(2), np.zeros(2)
+    assert engine.Periods(Plan(), move, Plan(), *numbers, LOOK, which)() == (
+        7.0 if free else 4.0
+    )
 
 
 @pytest.mark.parametrize("part", ["move", "sending"])
@@ -135,13 +150,15 @@ def test_calls_in_python_are_not_left_out(
     """Where one is within a move, or records what was sent, periods are made alone."""
     ours = short("panda_obstacle").run()
     before, made = sum(counted.many), BoundStep.free.func
+    nothing = PythonCall(float)
 
     def with_python(bound: BoundStep) -> FreeStep:
         step = made(bound)
         assert step is not None
         if part == "move":
-            return step._replace(move=lambda *at: step.move(*at))
-        return step._replace(sending=[*step.sending, float])
+            plan, *memory = step.move.arguments
+            return step._replace(move=Move(Plan([plan, nothing]), *memory))
+        return step._replace(sending=[*step.sending, nothing])
 
     monkeypatch.setattr(BoundStep, "free", property(with_python))
     assert_same(short("panda_obstacle").run(), ours)

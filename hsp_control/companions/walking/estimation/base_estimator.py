@@ -24,16 +24,16 @@ from hsp_control.companions.walking.estimation.leg_kinematics import (
     Seen,
     rolled,
 )
-from hsp_control.compiled.rotations import (
-    log3,
-    quaternion_from_rotation,
-    rotation_from_quaternion,
-)
 from hsp_control.constraints.contacts import Contact
 from hsp_control.control.controller import Controller
 from hsp_control.control.estimator import Estimator, RunningEstimator
 from hsp_control.control.measurement import Inertial, LogChannel, Measurement
 from hsp_control.declaration.quantities import Names, NonNegative, Positive
+from hsp_control.engine.rotations import (
+    log3,
+    quaternion_from_rotation,
+    rotation_from_quaternion,
+)
 
 
 class BaseEstimator(Estimator, type="base"):
@@ -176,9 +176,8 @@ class RunningBaseEstimator(RunningEstimator):
         """Return the last estimate and its errors; see `RunningEstimator`."""
         assert self.filter is not None
         P = self.filter.covariance
-        turn = np.zeros(3)
         R, R_true = _rotation(self._q), _rotation(q)
-        log3(R @ R_true.T, turn)
+        turn = log3(R @ R_true.T)
         return {
             "estimate.base": LogChannel(self._q[:7], "m and -", "position, quaternion"),
             "estimate.twist": LogChannel(
@@ -305,8 +304,7 @@ class RunningBaseEstimator(RunningEstimator):
         omega = R_unit @ (inertial.angular_velocity - bias) - twist[3:]
         q, v = measured.q.copy(), measured.v.copy()
         q[:3] = estimate.position - R @ p_unit
-        quaternion = np.zeros(4)
-        quaternion_from_rotation(R, quaternion)
+        quaternion = quaternion_from_rotation(R)
         q[3:7] = quaternion / np.linalg.norm(quaternion)
         v[:3] = R.T @ estimate.velocity - np.cross(omega, p_unit) - twist[:3]
         v[3:6] = omega
@@ -315,6 +313,4 @@ class RunningBaseEstimator(RunningEstimator):
 
 def _rotation(q: Array) -> Array:
     """Return the rotation of the base, shape (3, 3)."""
-    R = np.zeros((3, 3))
-    rotation_from_quaternion(np.ascontiguousarray(q[3:7]), R)
-    return R
+    return rotation_from_quaternion(q[3:7])

@@ -38,7 +38,7 @@ from typing import TypeAlias
 import numpy as np
 
 from hsp_control.common.arrays import Array
-from hsp_control.compiled.rotations import exp3, jexp3
+from hsp_control.engine.rotations import exp3, jexp3
 
 PointName: TypeAlias = tuple[str, int]
 """A contact, and which of its points."""
@@ -109,15 +109,13 @@ class InvariantFilter:
         """Go on by a period, driven by what the unit reports of it."""
         turn, R = h * (angular_velocity - self.gyroscope_bias), self.rotation
         force = R @ (specific_force - self.accelerometer_bias)
-        left, step = np.zeros((3, 3)), np.zeros((3, 3))
-        jexp3(-turn, left)  # the left Jacobian is the right one of the opposite
-        exp3(turn, step)
-        B = -h * R @ left
+        # The left Jacobian is the right one of the opposite.
+        B = -h * R @ jexp3(-turn)
         acceleration = force + self._gravity
         self.position = self.position + h * self.velocity + 0.5 * h * h * acceleration
         self.velocity = self.velocity + h * acceleration
         transition = self._transition(R, B, h)
-        self.rotation = orthonormal(R @ step)
+        self.rotation = orthonormal(R @ exp3(turn))
         self.covariance = transition @ self.covariance @ transition.T + self._noise(
             transition, h
         )
@@ -208,10 +206,7 @@ class InvariantFilter:
 
     def retract(self, error: Array) -> None:
         """Replace X̂ by exp(ξ) X̂, and b̂ by b̂ + ζ."""
-        turn, left = np.zeros((3, 3)), np.zeros((3, 3))
-        axis = np.ascontiguousarray(error[ROTATION])
-        exp3(axis, turn)
-        jexp3(-axis, left)
+        turn, left = exp3(error[ROTATION]), jexp3(-error[ROTATION])
         self.rotation = orthonormal(turn @ self.rotation)
         self.velocity = turn @ self.velocity + left @ error[VELOCITY]
         self.position = turn @ self.position + left @ error[POSITION]

@@ -1,0 +1,41 @@
+// The parts of the thresholds as calls of their own, so that each can be tried alone.
+#pragma once
+#include "threshold.hpp"
+
+namespace hsp {
+
+struct WriteThresholds {
+  static constexpr const char* doc =
+      "Write the threshold of each level; return a singular value of the stack from which on none "
+      "is bounded.";
+  In<'m', 'n'> J, B;  // B = J L⁻ᵀ
+  Asked rows;
+  double least, turning;
+  Following following;
+  Thresholds thresholds;
+
+  double operator()() {
+    return write_thresholds(J, B, rows, least, turning, following, thresholds);
+  }
+};
+
+struct ThresholdBelow {
+  static constexpr const char* doc = "The ε that a level below others has at least.";
+  In<'m'> asked;
+  double held, above;
+  int level;
+  Following following;
+  Thresholds thresholds;
+
+  double operator()() { return threshold_below(asked, held, above, level, following, thresholds); }
+};
+
+struct HowHeld {
+  static constexpr const char* doc = "How much a level is held at the edge, from 0 to nearly 1.";
+  double lacking, wanted, least;
+  Following following;
+
+  double operator()() { return how_held(lacking, wanted, least, following); }
+};
+
+}  // namespace hsp

@@ -1,0 +1,124 @@
+// The two laws of the edge, one with bounded inverses and the exact one, and their blend.
+#pragma once
+#include "damped_levels.hpp"
+#include "shares.hpp"
+
+namespace hsp {
+
+// The two factors of a pseudo-inverse.
+template <template <int...> class As> struct Factors {
+  As<'m', 'n'> Q;
+  As<'m', 'm'> X;
+};
+
+// What the two laws leave.
+template <template <int...> class As> struct EdgeMemory {
+  As<'m', 'n'> Q;  // factors of the exact inverse
+  As<'m', 'm'> X;
+  As<'n'> exact;     // a_exact, where μ < 1 and the laws differ
+  As<'n'> damped;    // a_damped, where they differ or a limit is violated
+  As<'n'> by_tasks;  // a_damped without φ_N, where it went level by level
+  As<'n'> exact_e_N;
+  As<1> share;  // μ, without the share of the limits
+};
+
+struct Resolve {
+  static constexpr const char* doc =
+      "Write e_N and a; return and write a code: 0: exact; from 1 on, the first level with a "
+      "bounded inverse; beyond any level: not finite.";
+  LawInput law;
+  Asked rows;
+  double least;  // ε_0
+  Following following;
+  bool exact_beside;  // whether there is an exact law beside the damped one
+  bool alone;         // whether the tasks are one level, which is resolved at once
+  double beyond;      // the code of what is not finite
+  Thresholds thresholds;
+  Factors<InOut> factors;
+  Projectors projectors;
+  EdgeMemory<InOut> edge;
+  OutInts<1> damped_code;
+  Out<'n'> e_N, a;
+  OutInts<1> code;
+
+  struct Memory {
+    LawMemory law;
+    DampedMemory damped;
+    LevelMemory levels;
+    Scratch<'m', 'n'> B, turned;
+    void prepare(const Sizes& size) {
+      law.prepare(size);
+      damped.prepare(size);
+      levels.prepare(size);
+      B.prepare(size);
+      turned.prepare(size);
+    }
+  } memory;
+
+  double operator()() {
+    code[0] = damped_code[0] = alone ? at_once() : by_levels();
+    blend();
+    return static_cast<double>(code[0]);
+  }
+
+  template <class Q, class X> auto inverse(const Q& q, const X& factor) const {
+    return PseudoInverse(q, factor, law.metric.L, law.form);
+  }
+
+  // All tasks at once. If the tasks of several levels are exact together, they are exact one after
+  // the other: this is the same then.
+  std::int64_t at_once() {
+    auto& [Q, X] = factors;
+    const bool damped = bounded_inverse(memory.B, whitened(), Q, X);
+    write_law(law, inverse(Q, X), memory.law, e_N, a);
+    return std::isfinite(a.sum()) ? damped : static_cast<std::int64_t>(beyond);
+  }
+
+  // All levels at once, or level by level if they conflict.
+  std::int64_t by_levels() {
+    if (law.task.jacobian.rows() <= law.task.jacobian.cols()) {
+      const std::int64_t found = at_once();
+      if (found == 0) return found;
+    } else {
+      whitened();
+    }
+    const int damped = write_damped_levels(law, rows, least, following, thresholds, projectors,
+                                           memory.damped, memory.levels, edge.by_tasks, e_N, a);
+    return std::isfinite(a.sum()) ? damped : static_cast<std::int64_t>(beyond);
+  }
+
+  // a = a_exact + μ (a_damped - a_exact); the first two shares count here.
+  void blend() {
+    auto& [Q, X, exact, damped, by_tasks, exact_e_N, share] = edge;
+    if (damped_code[0] == 0) {
+      share[0] = 0.0;
+      return;
+    }
+    damped = a;
+    share[0] = 1.0;
+    if (damped_code[0] >= beyond || !exact_beside) return;
+    double mu = far_share(rows.stretched, following.far);
+    if (mu < 1.0) {
+      const auto& J = law.task.jacobian;
+      mu = std::max(mu, near_share(J, following.near, least, memory.turned));
+    }
+    if (mu == 1.0) return;
+    share[0] = mu;
+    bounded_inverse(memory.B, 0.0, Q, X);
+    write_law(law, inverse(Q, X), memory.law, exact_e_N, a);
+    exact = a;
+    a += mu * (damped - exact);
+    e_N = exact_e_N + mu * (e_N - exact_e_N);
+    if (mu == 0.0) code[0] = 0;
+  }
+
+  // Write J L⁻ᵀ and the thresholds; return a singular value from which on no level is bounded.
+  double whitened() {
+    const auto& J = law.task.jacobian;
+    whiten(J, law.metric.L, law.form, memory.B);
+    const double turning = turning_threshold(law.field.g, following);
+    return write_thresholds(J, memory.B, rows, least, turning, following, thresholds);
+  }
+};
+
+}  // namespace hsp

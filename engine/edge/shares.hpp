@@ -1,0 +1,47 @@
+// The edge: the law is exact where tasks can be met, and damped where they cannot.
+//
+//   a = a_exact + μ (a_damped - a_exact),      0 ≤ μ ≤ 1
+//
+// Out of reach an error persists, and with it what the feedback asks for. Near a singular posture
+// the exact inverse of that changes faster than a sampled loop bears, so the inverse of a_damped is
+// bounded by thresholds that follow what is asked for (`threshold.hpp`). But a threshold cannot
+// tell an error that persists from a step within reach. What can is where the arm is held, and how:
+// singular, or far away, or at a limit. So μ is the largest of three shares, each of them 0 in the
+// middle:
+//
+//   near    σ ≥ σ_x: 0;  σ ≤ σ_x/2: 1.    σ_x is a tenth of the robot's size
+//   far     |e| ≤ 0.85 ℓ: 0;  |e| ≥ ℓ: 1.      ℓ is the largest error that is fed back
+//   limits  a_exact is within all limits: 0;  a tenth beyond one: 1
+//
+// with σ the smallest singular value of the stack J, whatever the metric. The first two are here,
+// the last is where limits are known, in `limited_target.hpp`. All are continuous, so a is.
+#pragma once
+#include <hsp/linalg.hpp>
+
+namespace hsp {
+
+// 0 for x ≤ 0 and 1 for x ≥ 1, and between them 3x² - 2x³.
+inline double smooth_share(double x) {
+  x = std::clamp(x, 0.0, 1.0);
+  return x * x * (3.0 - 2.0 * x);
+}
+
+// How near a singular posture is, from 0 to 1. `edge` is σ_x [m]; no exact law is asked for below
+// twice ε_0.
+template <class J, class B>
+double near_share(const J& jacobian, double edge, double least, B& rows) {
+  rows = jacobian;
+  Matrix none;
+  orthogonalise_rows(rows, none);
+  const double smallest =
+      rows.rows() ? rows.rowwise().norm().minCoeff() : std::numeric_limits<double>::infinity();
+  return smooth_share(2.0 - 2.0 * smallest / std::max(edge, 2.0 * least));
+}
+
+// How far an error is, from 0 to 1; `stretched` is |e|/ℓ of each row.
+template <class S> double far_share(const S& stretched, double far) {
+  const double most = stretched.size() ? std::max(stretched.maxCoeff(), 0.0) : 0.0;
+  return smooth_share((most - far) / (1.0 - far));
+}
+
+}  // namespace hsp

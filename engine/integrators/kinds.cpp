@@ -1,0 +1,6 @@
+#include "../src/rooms.hpp"
+#include "steps.hpp"
+
+namespace hsp {
+const Kind* const* integrator_kinds() { return kinds<EulerStep, Rk4Begin, Rk4Stage, Rk4End>(); }
+}  // namespace hsp

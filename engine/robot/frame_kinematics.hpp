@@ -1,0 +1,71 @@
+// Placement, Jacobian and motion of a frame that is fixed to a joint.
+#pragma once
+#include <hsp/records.hpp>
+
+namespace hsp {
+
+// The joint that carries a frame, as Pinocchio has it.
+struct ParentJoint {
+  Columns<6, 'x'> J_world, J_world_dot;  // of all joints, at the world's origin
+  Columns<3, 3> R_joint;                 // world ← joint
+  In<3> p_joint;
+  In<3, 3> R_local;  // joint ← frame
+  In<3> p_local;
+  Ints<'c'> columns, dofs;  // what moves the joint: columns of J_world, and their indices in v
+};
+
+// In world axes. A column (l, w) of the Jacobian at the world's origin is
+//
+//   (l + w × p, w)              at the frame's origin p, and its rate is
+//   (l' + w' × p + w × p', w').
+//
+// Only joints that carry the frame have columns. Those of mimic joints are added to their
+// leader's.
+struct FrameKinematics {
+  static constexpr const char* doc =
+      "J, J', R, p and J v of a frame that is fixed to a joint, and J'v; nothing if it is known.";
+  Ints<1> stamp;
+  InOutInts<1> computed;  // the stamp at which it was computed last
+  ParentJoint carrier;
+  In<'n'> v;
+  FrameMotion<Out> motion;
+  Out<6> drift;  // J'v
+
+  void operator()() {
+    if (computed[0] == stamp[0]) return;
+    computed[0] = stamp[0];
+    const auto& [J_world, J_world_dot, R_joint, p_joint, R_local, p_local, columns, dofs] = carrier;
+    const Vector3 p = p_joint + R_joint * p_local;
+    motion.position = p;
+    motion.rotation.noalias() = R_joint * R_local;
+
+    motion.jacobian.setZero();
+    Vector3 p_dot = Vector3::Zero(), omega = Vector3::Zero();
+    for (Index k = 0; k < columns.size(); ++k) {
+      const Index c = columns[k], j = dofs[k];
+      const Vector3 l = J_world.col(c).head<3>(), w = J_world.col(c).tail<3>();
+      const Vector3 linear = l + w.cross(p);
+      motion.jacobian.col(j).head<3>() += linear;
+      motion.jacobian.col(j).tail<3>() += w;
+      p_dot += v[j] * linear;
+      omega += v[j] * w;
+    }
+    motion.velocity << p_dot, omega;
+
+    motion.jacobian_dot.setZero();
+    Vector3 p_ddot = Vector3::Zero(), omega_dot = Vector3::Zero();  // for v' = 0
+    for (Index k = 0; k < columns.size(); ++k) {
+      const Index c = columns[k], j = dofs[k];
+      const Vector3 l_dot = J_world_dot.col(c).head<3>(), w_dot = J_world_dot.col(c).tail<3>();
+      const Vector3 w = J_world.col(c).tail<3>();
+      const Vector3 linear = l_dot + w_dot.cross(p) + w.cross(p_dot);
+      motion.jacobian_dot.col(j).head<3>() += linear;
+      motion.jacobian_dot.col(j).tail<3>() += w_dot;
+      p_ddot += v[j] * linear;
+      omega_dot += v[j] * w_dot;
+    }
+    drift << p_ddot, omega_dot;
+  }
+};
+
+}  // namespace hsp

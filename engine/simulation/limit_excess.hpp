@@ -1,0 +1,25 @@
+// How far a robot is beyond its limits.
+#pragma once
+#include <hsp/view.hpp>
+
+namespace hsp {
+
+struct LimitExcess {
+  static constexpr const char* doc =
+      "The largest of what it was, q - upper and lower - q, and of |v| - speed, for each dof.";
+  Ints<'k'> coordinates, dofs;  // where the joints that have a range stand in q and v
+  In<'q'> q;
+  In<'n'> v, lower, upper, speed;
+  InOut<'n'> position, velocity;
+
+  void operator()() {
+    for (Index k = 0; k < dofs.size(); ++k) {
+      const Index i = dofs[k];
+      const double x = q[coordinates[k]];
+      position[i] = std::max({position[i], x - upper[i], lower[i] - x});
+    }
+    velocity = velocity.cwiseMax(v.cwiseAbs() - speed);
+  }
+};
+
+}  // namespace hsp

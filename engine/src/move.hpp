@@ -1,0 +1,41 @@
+// A state's move: valid t, q and v are copied, then the calls of a plan are made.
+#pragma once
+#include "plan.hpp"
+
+namespace hsp {
+
+constexpr double refused = -1.0;  // what a move returns if it was refused
+
+struct Move {
+  static constexpr const char* type_name = "Move";
+  static constexpr const char* doc = "Make calls at a state, which `to` has moved.";
+  Shared<Plan> calls;
+  Out<1> time;
+  Out<'q'> q;
+  Out<'n'> v;
+  Ints<'u', 2> unit_blocks;  // start and size of what in q has norm 1
+  InOutInts<1> stamp;        // the number of moves
+
+  double operator()(double t) { return calls->run(t); }
+
+  // Copy t, q and v if all are finite and the norms are right, and make the calls.
+  template <class Q, class V> double to(double t, const Q& q_in, const V& v_in) {
+    if (!is_valid(t, q_in, v_in)) return refused;
+    time[0] = t;
+    q = q_in;
+    v = v_in;
+    ++stamp[0];
+    return calls->run(t);
+  }
+
+  template <class Q, class V> bool is_valid(double t, const Q& q_in, const V& v_in) const {
+    bool valid = std::isfinite(t + q_in.sum() + v_in.sum());
+    for (Index k = 0; k < unit_blocks.rows(); ++k) {
+      const double square = q_in.segment(unit_blocks(k, 0), unit_blocks(k, 1)).squaredNorm();
+      valid = valid && std::abs(square - 1.0) < 2e-6;
+    }
+    return valid;
+  }
+};
+
+}  // namespace hsp

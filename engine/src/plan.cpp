@@ -1,0 +1,7 @@
+#include "plan.hpp"
+#include "foreign.hpp"
+#include "rooms.hpp"
+
+namespace hsp {
+const Kind* const* plan_kinds() { return kinds<Once, OnlyIf, EqualSteps, Mirror>(); }
+}  // namespace hsp

@@ -1,0 +1,73 @@
+// A plan: calls that are made one after the other, and what makes a plan under a condition.
+#pragma once
+#include <algorithm>
+#include <cmath>
+#include <hsp/kind.hpp>
+#include <vector>
+
+namespace hsp {
+
+class Plan {
+ public:
+  static constexpr const char* type_name = "Plan";
+  struct Row {
+    double (*run)(void* self, double t);
+    void* self;
+  };
+
+  explicit Plan(std::vector<Row> rows) : rows_(std::move(rows)) {}
+
+  // Make the calls at a time [s]; return what the last one returns.
+  double run(double t) const {
+    double value = 0.0;
+    for (const Row& row : rows_) value = row.run(row.self, t);
+    return value;
+  }
+
+ private:
+  std::vector<Row> rows_;
+};
+
+struct Once {
+  static constexpr const char* doc = "Make calls unless they were made at this stamp.";
+  Shared<Plan> calls;
+  Ints<1> stamp;
+  InOutInts<1> made;
+
+  void operator()(double t) {
+    if (made[0] == stamp[0]) return;
+    made[0] = stamp[0];
+    calls->run(t);
+  }
+};
+
+struct OnlyIf {
+  static constexpr const char* doc =
+      "Return found[0]; and make calls if found[1] is not 0, and add what the last returns.";
+  Shared<Plan> calls;
+  In<2> found;
+
+  double operator()(double t) { return found[0] + (found[1] != 0.0 ? calls->run(t) : 0.0); }
+};
+
+struct EqualSteps {
+  static constexpr const char* doc =
+      "Divide an interval into the fewest equal steps that are not longer than one, and make the "
+      "calls of each at its beginning.";
+  Shared<Plan> calls;
+  In<2> interval;
+  double longest;
+  Out<1> now, h;
+
+  void operator()() {
+    const double start = interval[0], duration = interval[1] - start;
+    const double steps = std::max(1.0, std::ceil(duration / longest - 1e-9));
+    h[0] = duration / steps;
+    for (double k = 0.0; k < steps; ++k) {
+      now[0] = start + k * h[0];
+      calls->run(now[0]);
+    }
+  }
+};
+
+}  // namespace hsp

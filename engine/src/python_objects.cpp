@@ -1,0 +1,72 @@
+#include "python_objects.hpp"
+
+#include <nanobind/stl/pair.h>
+
+#include "numpy.hpp"
+
+namespace nb = nanobind;
+
+namespace hsp {
+
+bool CallObject::runs_python(nb::tuple given) {
+  for (nb::handle each : given)
+    if (PlanObject::is_python(each)) return true;
+  return false;
+}
+
+bool PlanObject::is_python(nb::handle call) {
+  if (nb::isinstance<MoveObject>(call)) return nb::cast<MoveObject&>(call).python;
+  return nb::isinstance<Runnable>(call) && nb::cast<Runnable&>(call).python;
+}
+
+std::vector<Plan::Row> PlanObject::rows(nb::tuple given) {
+  std::vector<Plan::Row> found;
+  for (nb::handle each : given) {
+    if (nb::isinstance<Runnable>(each)) {
+      found.push_back(nb::cast<Runnable&>(each).row);
+    } else {  // what was compiled elsewhere says the same addresses
+      const auto row = nb::cast<std::pair<std::intptr_t, std::intptr_t>>(each.attr("row"));
+      found.push_back({reinterpret_cast<double (*)(void*, double)>(row.first),
+                       reinterpret_cast<void*>(row.second)});
+    }
+  }
+  return found;
+}
+
+double PythonCall::made(double t) const {
+  const nb::object value = timed ? function(t) : function();
+  PyObject* x = value.ptr();
+  const bool number = PyFloat_Check(x) || PyLong_Check(x) || PyArray_CheckScalar(x);
+  return number ? PyFloat_AsDouble(x) : 0.0;
+}
+
+namespace {
+
+using Strided = Eigen::Map<const Vector, Eigen::Unaligned, Eigen::InnerStride<>>;
+
+// A vector of doubles, whatever its stride; an empty one with a null pointer if it is none.
+Strided vector_of(nb::handle given) {
+  const auto none = Strided(nullptr, 0, Eigen::InnerStride<>(1));
+  if (!PyArray_Check(given.ptr())) return none;
+  auto* x = reinterpret_cast<PyArrayObject*>(given.ptr());
+  if (PyArray_NDIM(x) != 1 || PyArray_TYPE(x) != NPY_DOUBLE || !PyArray_ISBEHAVED_RO(x))
+    return none;
+  return Strided(static_cast<const double*>(PyArray_DATA(x)), PyArray_DIM(x, 0),
+                 Eigen::InnerStride<>(PyArray_STRIDE(x, 0) / static_cast<Index>(sizeof(double))));
+}
+
+}  // namespace
+
+MoveObject::MoveObject(nb::tuple given)
+    : arguments(given),
+      call(kind_of<Move>(), arguments_of(kind_of<Move>(), given)),
+      python(CallObject::runs_python(given)) {}
+
+double MoveObject::operator()(double t, nb::handle q, nb::handle v) {
+  Move& move = *static_cast<Move*>(call.self());
+  const Strided q_in = vector_of(q), v_in = vector_of(v);
+  const bool fits = q_in.size() == move.q.size() && v_in.size() == move.v.size();
+  return fits ? move.to(t, q_in, v_in) : refused;
+}
+
+}  // namespace hsp

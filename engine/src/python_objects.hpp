@@ -1,0 +1,87 @@
+// What Python holds: calls, plans, and functions of Python as calls. Each has a row: the
+// addresses of a function f(self, t) and of self, which is all that a plan knows of it.
+#pragma once
+#include <nanobind/nanobind.h>
+
+#include <vector>
+
+#include "arguments.hpp"
+#include "foreign.hpp"
+#include "move.hpp"
+#include "plan.hpp"
+
+namespace hsp {
+
+struct Runnable {
+  Plan::Row row;
+  bool python;  // whether a function of Python is among what it runs
+
+  double operator()(double t) const { return row.run(row.self, t); }
+};
+
+// A kind with its arguments, which own the memory.
+struct CallObject : Runnable {
+  CallObject(const Kind& kind, nanobind::tuple given)
+      : arguments(given), call(kind, arguments_of(kind, given)) {
+    row = {kind.run, call.self()};
+    python = runs_python(given);
+  }
+  static bool runs_python(nanobind::tuple given);
+
+  nanobind::tuple arguments;
+  Call call;
+};
+
+// Calls that are made one after the other.
+struct PlanObject : Runnable {
+  explicit PlanObject(nanobind::tuple given) : calls(given), plan(rows(given)) {
+    row = {[](void* self, double t) { return static_cast<Plan*>(self)->run(t); }, &plan};
+    python = false;
+    for (nanobind::handle each : given) python |= is_python(each);
+  }
+  PlanObject(const PlanObject&) = delete;
+  static std::vector<Plan::Row> rows(nanobind::tuple given);
+  static bool is_python(nanobind::handle call);
+
+  nanobind::tuple calls;
+  Plan plan;
+};
+
+// A function of Python, of the time or of nothing. What it returns counts if it is a number.
+struct PythonCall : Runnable {
+  PythonCall(nanobind::object f, bool t) : function(std::move(f)), timed(t) {
+    row = {[](void* self, double t) { return static_cast<PythonCall*>(self)->made(t); }, this};
+    python = true;
+  }
+  PythonCall(const PythonCall&) = delete;
+  double made(double t) const;
+
+  nanobind::object function;
+  bool timed;
+};
+
+// A function of another library, with what its arguments point to.
+struct ForeignCall : Runnable {
+  ForeignCall(Foreign::Word address, const std::vector<Foreign::Word>& words,
+              nanobind::object owner)
+      : kept(std::move(owner)), function(address, words) {
+    row = {[](void* self, double) { return (*static_cast<Foreign*>(self))(); }, &function};
+    python = false;
+  }
+  ForeignCall(const ForeignCall&) = delete;
+
+  nanobind::object kept;
+  Foreign function;
+};
+
+// A state's move, as Python makes it.
+struct MoveObject {
+  MoveObject(nanobind::tuple given);
+  double operator()(double t, nanobind::handle q, nanobind::handle v);
+
+  nanobind::tuple arguments;
+  Call call;
+  bool python;
+};
+
+}  // namespace hsp

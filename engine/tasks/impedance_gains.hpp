@@ -1,0 +1,122 @@
+// From an impedance to the gains that give it at a state.
+//
+// With J_e the Jacobian of the error's coordinates, e' = -J_e v plus what the reference does,
+// G = Λ⁻¹ = J_e M⁻¹ J_eᵀ and an external force f, τ = J_eᵀ f:
+//
+//   e'' = e''_commanded - G f
+//
+// so that e''_commanded = -Kv e' - Kp e with
+//
+//   Kp = G S,    Kv = -½ G' Λ + G D + 2 ζ √(G K)
+//
+// gives Λ e'' + (½ Λ' + D + D_ζ) e' + S e = -f, because Λ' = -Λ G' Λ. S = K up to the spring's
+// largest force (slipping.hpp). D_ζ = 2 ζ Λ √(G K) is symmetric, and damps each mode of (Λ, K)
+// with the ratio ζ. With K = C Cᵀ,
+//
+//   √(G K) = C⁻ᵀ √(Cᵀ G C) Cᵀ,
+//
+// which needs no inverse of G. Only the first term does. There Λ = J̄ᵀ M J̄, with the
+// pseudo-inverse J̄ = M⁻¹J_eᵀΛ, bounded where the law bounds its own.
+#pragma once
+#include <cmath>
+#include <hsp/linalg.hpp>
+#include <hsp/rotations.hpp>
+#include <limits>
+
+#include "feedback.hpp"
+#include "slipping.hpp"
+
+namespace hsp {
+
+// Which rows of an error are a rotation vector, and what rotates.
+struct Rotating {
+  int first;               // of the three rows; the number of rows if there are none
+  In<3, 3> rotation;       // world ← frame
+  In<3> angular_velocity;  // of the frame, in world axes
+};
+
+struct ImpedanceGains {
+  static constexpr const char* doc =
+      "Λ⁻¹, Kp and Kv of an impedance; NaN where M is singular, so that the step is not finite.";
+  Columns<'n', 'n'> M;
+  In<'n', 'n'> M_dot;
+  Rotating rotating;
+  Impedance impedance;
+  Ints<'g'> ends;         // where each part of the error ends
+  TaskSample<In> sample;  // of the task, whatever its gains are
+  double threshold;       // of the law's singularities
+  Out<'m', 'm'> G, Kp, Kv;
+
+  Scratch<'n', 'n'> L;
+  Scratch<'m', 'n'> J_e, J_e_dot, B, X, Z, Q;
+  Scratch<'m', 'm'> G_dot, Lambda, C, U, root, factor, S;
+  Scratch<'m'> frequency;
+  BoundedStiffness bounded;
+
+  void operator()() {
+    if (!cholesky(M, L)) {
+      Kp(0, 0) = Kv(0, 0) = std::numeric_limits<double>::quiet_NaN();
+      return;
+    }
+    const auto& [K, D, ratio, inverse_force] = impedance;
+    write_error_jacobian();
+    B = J_e;
+    solve_rows(L, B);  // B = J_e L⁻ᵀ
+    X = B;
+    solve_rows_transposed(L, X);  // X = J_e M⁻¹
+    G.noalias() = B * B.transpose();
+    // G' = A Xᵀ + X Aᵀ with A = J_e' - ½ X M'.
+    J_e_dot.noalias() -= 0.5 * X * M_dot;
+    G_dot.noalias() = J_e_dot * X.transpose();
+    G_dot.noalias() += X * J_e_dot.transpose();
+
+    Kv.noalias() = G * D;
+    if (ratio[0] > 0.0) {
+      write_natural_root();
+      Kv += 2.0 * ratio[0] * root;
+    }
+    write_bounded_inertia();
+    Kv.noalias() -= 0.5 * G_dot * Lambda;
+    if (bounded.write(impedance, ends, sample.error, S)) Kp.noalias() = G * S;
+    else Kp.noalias() = G * K;
+  }
+
+ private:
+  // J_e and J_e': J and J', but T J and its rate for a rotation vector. e = -y with y' = T ω,
+  // T = Jlog(y) Rᵀ, plus what the reference does; hence T' = -Jlog Jexp' T - T [ω]×.
+  void write_error_jacobian() {
+    J_e = sample.jacobian;
+    J_e_dot = sample.jacobian_dot;
+    const auto& [first, R, w] = rotating;
+    if (first + 3 > J_e.rows()) return;
+    const Vector3 y = -sample.error.segment<3>(first), y_dot = -sample.error_rate.segment<3>(first);
+    const Matrix3 J_log = jlog3(y), T = J_log * R.transpose();
+    const Matrix3 T_dot = -J_log * jexp3_dot(y, y_dot) * T - T * skew(w);
+    const auto J = sample.jacobian.middleRows<3>(first);
+    const auto J_dot = sample.jacobian_dot.middleRows<3>(first);
+    J_e.middleRows<3>(first) = T.lazyProduct(J);
+    J_e_dot.middleRows<3>(first) = T.lazyProduct(J_dot) + T_dot.lazyProduct(J);
+  }
+
+  // √(G K) = C⁻ᵀ √(Cᵀ G C) Cᵀ, with G = B Bᵀ and K = C Cᵀ. The singular values of Cᵀ B are the
+  // natural frequencies of the modes [rad/s].
+  void write_natural_root() {
+    cholesky(impedance.K, C);
+    Z.noalias() = C.transpose() * B;
+    orthogonalise_rows(Z, U);  // Cᵀ G C = Uᵀ diag(ω²) U
+    frequency = Z.rowwise().norm();
+    S.noalias() = U.transpose() * frequency.asDiagonal() * U;
+    solve_lower_transposed(C, S);
+    root.noalias() = S * C.transpose();
+  }
+
+  // Λ = (B#)ᵀ B# = Xᵀ Q Qᵀ X with B# = Qᵀ X, the inverse of B Bᵀ; it fades to zero where B loses
+  // rank. The rows of Q are orthogonal. The law whitens with its own metric: W = I at worst, where
+  // the singular values of J L⁻ᵀ may be less than those of J by √(largest eigenvalue of M).
+  void write_bounded_inertia() {
+    bounded_inverse(B, threshold / std::sqrt(1.0 + M.trace()), Q, factor);
+    Lambda.noalias() = factor.transpose() * Q.rowwise().squaredNorm().asDiagonal() * factor;
+  }
+};
+
+}  // namespace hsp

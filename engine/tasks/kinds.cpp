@@ -1,0 +1,14 @@
+#include "../src/rooms.hpp"
+#include "impedance_gains.hpp"
+#include "relative_kinematics.hpp"
+#include "track_direction.hpp"
+#include "track_orientation.hpp"
+#include "track_position.hpp"
+
+namespace hsp {
+const Kind* const* task_kinds() {
+  return kinds<FeedbackAcceleration, AskedAtRest, TrackAxes, TrackPosture, TrackOrientation,
+               TrackPose, TrackDirection, RelativeKinematics, SpringStiffness, SpringPulls,
+               ImpedanceGains>();
+}
+}  // namespace hsp

@@ -1,0 +1,141 @@
+// A spring whose force is bounded, as if it slipped where it pulls with the most.
+//
+// Let each group of rows g, such as the position, carry no more than F_g. The spring slips by x,
+// as it does at a friction that is F_g in every direction, and K (e - x) pulls:
+//
+//   U(e) = min_x ½ (e - x)ᵀ K (e - x) + Σ F_g |x_g|
+//   s(e) = ∂U/∂e = S e,    S = (K⁻¹ + diag(c))⁻¹,    c ≥ 0
+//
+// with one number c in each group, 0 unless |s_g| = F_g. U is convex, ½ eᵀK e where no force is
+// at its bound, and grows linearly far away, so that the bounded force is conservative for every
+// stiffness. Each c is where a Newton iteration on 1/|s_g| ends, as for the radius of a trust
+// region: one step if the group's stiffness is one number.
+#pragma once
+#include <cmath>
+#include <hsp/kind.hpp>
+#include <hsp/linalg.hpp>
+#include <limits>
+
+namespace hsp {
+
+// The numbers of an impedance.
+struct Impedance {
+  In<'m', 'm'> K, D;             // stiffness, damping; symmetric
+  In<'m'> ratio, inverse_force;  // ζ, the same for all rows; 1/F of each row, 0 for no bound
+};
+
+// A group's rows, and F_g, inf for no bound.
+struct Group {
+  Index first, size;
+  double most;
+
+  Group(Index g, const Ints<'g'>& ends, const Impedance& impedance)
+      : first(g == 0 ? 0 : ends[g - 1]), size(ends[g] - first) {
+    const double inverse = impedance.inverse_force[first];
+    most = inverse > 0.0 ? 1.0 / inverse : std::numeric_limits<double>::infinity();
+  }
+
+  template <class X> auto of(X& x) const { return x.segment(first, size); }
+};
+
+// S of an error, in memory of its own.
+struct BoundedStiffness {
+  Scratch<'m', 'm'> inverse, L;
+  Scratch<'m'> s, change;
+  Scratch<'g'> c;
+
+  // Write S where a bound acts; return whether one does, else S is K, and is not written.
+  template <class E, class Out_>
+  bool write(const Impedance& impedance, const Ints<'g'>& ends, const E& e, Out_& S) {
+    s = impedance.K.lazyProduct(e);
+    bool acts = false;
+    for (Index g = 0; g < ends.size(); ++g) {
+      const Group group(g, ends, impedance);
+      acts = acts || group.of(s).norm() > group.most;
+    }
+    if (!acts || !cholesky(impedance.K, L)) return false;
+    write_inverse(inverse);
+    c.setZero();
+    bool settled = false;
+    for (int sweep = 0; sweep < steps && !settled; ++sweep) {  // where K couples the groups
+      settled = true;
+      for (Index g = 0; g < ends.size(); ++g)
+        settled = bound(Group(g, ends, impedance), g, ends, e) && settled;
+    }
+    factorise(ends);
+    write_inverse(S);
+    return true;
+  }
+
+ private:
+  static constexpr double tolerance = 1e-11;  // of |s_g|, relative to F_g
+  static constexpr int steps = 40;
+
+  // Newton's iteration on 1/|s_g|, which is nearly linear in c_g; whether nothing had to change.
+  template <class E> bool bound(const Group& group, Index g, const Ints<'g'>& ends, const E& e) {
+    if (std::isinf(group.most)) return true;
+    for (int step = 0; step < steps; ++step) {
+      factorise(ends);
+      s = e;
+      solve(s);
+      const double n = group.of(s).norm(), relative = n / group.most;
+      if (relative <= 1.0 + tolerance && (c[g] == 0.0 || relative >= 1.0 - tolerance))
+        return step == 0;
+      change.setZero();
+      group.of(change) = group.of(s);
+      solve(change);  // -∂s/∂c_g
+      const double slope = group.of(s).dot(group.of(change));
+      c[g] = std::max(c[g] + (relative - 1.0) * n * n / slope, 0.0);
+    }
+    return false;
+  }
+
+  // L Lᵀ = K⁻¹ + diag(c)
+  void factorise(const Ints<'g'>& ends) {
+    L = inverse;
+    for (Index g = 0, i = 0; g < ends.size(); ++g)
+      for (; i < ends[g]; ++i) L(i, i) += c[g];
+    cholesky(L, L);
+  }
+
+  template <class X> void solve(X& x) const {
+    solve_lower(L, x);
+    solve_lower_transposed(L, x);
+  }
+
+  template <class X> void write_inverse(X& out) const {
+    out.setIdentity();
+    solve(out);
+  }
+};
+
+struct SpringStiffness {
+  static constexpr const char* doc = "S, the stiffness of a spring whose force is bounded.";
+  Impedance impedance;
+  Ints<'g'> ends;  // where each group of rows ends
+  In<'m'> e;
+  Out<'m', 'm'> S;
+  BoundedStiffness bounded;
+
+  void operator()() {
+    if (!bounded.write(impedance, ends, e, S)) S = impedance.K;
+  }
+};
+
+struct SpringPulls {
+  static constexpr const char* doc = "(K e)_i/F_g; 0 where there is no bound.";
+  Impedance impedance;
+  Ints<'g'> ends;
+  In<'m'> e;
+  Out<'m'> pulls;
+
+  void operator()() {
+    pulls = impedance.K.lazyProduct(e);
+    for (Index g = 0; g < ends.size(); ++g) {
+      const Group group(g, ends, impedance);
+      group.of(pulls) /= group.most;
+    }
+  }
+};
+
+}  // namespace hsp

@@ -1,0 +1,120 @@
+"""Builds the engine, the compiled part of the package, into ``hsp_control/engine``.
+
+pip runs it (the hook of the wheel, also of an editable one), and ``make`` where a
+source is newer than the library: ``python hatch_build.py``. A C++ compiler is taken
+from the variable CXX or from the path; where there is none, the package ziglang is one.
+"""
+
+import os
+import platform
+import shutil
+import subprocess
+import sys
+import sysconfig
+import tomllib
+from pathlib import Path
+from typing import Any
+
+try:
+    from hatchling.builders.hooks.plugin.interface import BuildHookInterface
+except ImportError:  # `make` needs no hook
+    BuildHookInterface = object
+
+ROOT = Path(__file__).parent
+
+ZIG_TARGETS = {"x86_64": "x86_64-linux-gnu.2.17", "aarch64": "aarch64-linux-gnu.2.17"}
+"""What zig compiles for, by machine: any processor and any Linux of the last ten years.
+Without a target it would compile for the very processor that it runs on."""
+
+
+def compiler() -> str | None:
+    """Return the machine's own C++ compiler, None if it has none."""
+    given = os.environ.get("CXX")
+    return given or next(filter(shutil.which, ("c++", "g++", "clang++")), None)
+
+
+def tools() -> list[str]:
+    """Return the packages that stand for tools which this machine lacks."""
+    found = [name for name in ("cmake", "ninja") if not shutil.which(name)]
+    return found if compiler() else [*found, "ziglang"]
+
+
+def needs() -> list[str]:
+    """Return all packages that a build takes."""
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
+    return [*project["build-system"]["requires"], "editables", *tools()]
+
+
+def zig(folder: Path) -> list[str]:
+    """Return CMake's options for zig as compiler and archiver."""
+    machine = platform.machine()
+    if machine not in ZIG_TARGETS:
+        raise SystemExit(
+            f"hsp_control needs a C++ compiler, and this machine ({machine}) has none: "
+            "install one (Debian: apt install g++), or name it in CXX"
+        )
+    options = []
+    for name, tool in (("CXX_COMPILER", "c++"), ("AR", "ar"), ("RANLIB", "ranlib")):
+        target = f"-target {ZIG_TARGETS[machine]}" if tool == "c++" else ""
+        script = folder / f"zig-{tool}"
+        script.write_text(
+            f'#!/bin/sh\nexec "{sys.executable}" -m ziglang {tool} {target} "$@"\n'
+        )
+        script.chmod(0o755)
+        options.append(f"-DCMAKE_{name}={script}")
+    return options
+
+
+def build(kind: str = "Release", folder: Path = ROOT / "build") -> Path:
+    """Build the library, and return where it is: beside the Python of the engine.
+
+    Args:
+        kind: ``Release``, or ``Debug`` with Eigen's assertions.
+        folder: Where what is compiled stays, for each Python and each kind of build.
+    """
+    place = folder / f"{kind}-{sysconfig.get_config_var('SOABI')}".lower()
+    place.mkdir(parents=True, exist_ok=True)
+    # What was found last time may have been a build environment that is gone.
+    (place / "CMakeCache.txt").unlink(missing_ok=True)
+    options = [f"-DCMAKE_BUILD_TYPE={kind}", f"-DPython_EXECUTABLE={sys.executable}"]
+    if compiler() is None:
+        options += zig(place)
+    configure = ["cmake", "-G", "Ninja", "-S", str(ROOT / "engine"), "-B", str(place)]
+    # Tools that pip brought are beside Python.
+    path = f"{Path(sys.executable).parent}{os.pathsep}{os.environ.get('PATH', '')}"
+    environment = os.environ | {"PATH": path}
+    for command in ([*configure, *options], ["cmake", "--build", str(place)]):
+        done = subprocess.run(
+            command, capture_output=True, text=True, check=False, env=environment
+        )
+        if done.returncode:
+            sys.stderr.write(done.stdout + done.stderr)
+            raise SystemExit(f"the engine was not built: {' '.join(command)} failed")
+    (library,) = place.glob("_engine*.so")
+    target = ROOT / "hsp_control" / "engine" / library.name
+    # A new file: a process that has loaded the old one goes on with it.
+    fresh = target.with_suffix(".new")
+    shutil.copy2(library, fresh)
+    return fresh.replace(target)
+
+
+class EngineHook(BuildHookInterface):  # type: ignore[misc]
+    """Builds the engine where a wheel is built, also an editable one."""
+
+    def dependencies(self) -> list[str]:
+        """Return what is needed besides what pyproject.toml says."""
+        return tools()
+
+    def initialize(self, version: str, build_data: dict[str, Any]) -> None:
+        """Build; the wheel is then one of this Python and this machine."""
+        library = build()
+        build_data["pure_python"] = False
+        build_data["infer_tag"] = True
+        build_data["artifacts"].append(str(library.relative_to(ROOT)))
+
+
+if __name__ == "__main__":
+    if sys.argv[1:] == ["needs"]:
+        print(" ".join(needs()))
+    else:
+        build()

@@ -1,0 +1,111 @@
+"""What a step comes near to where a limit binds.
+
+The law promises nothing where a limit binds. Then it is taken apart,
+
+    a = a_t + φ_N,
+
+into what the tasks make of it and the self-motion (`self_motion.py`). Two things
+change, as far as a is beyond a limit, so that the step is a continuous function of the
+state:
+
+*The tasks are damped.* An arm that is held at its edge, or rushes to it, asks for more
+than its motors give, from one side and then from the other: the nearest step within the
+limits would swing with it. So as far as a_t alone is beyond the limits, the step comes
+near to the damped law instead (`shares.py`).
+
+*What a field asks for is bounded.* That is φ_N + P K_N P v, the self-motion without
+what brakes it. A field may ask for anything; at most what the limits permit far from
+them is asked of the QP, and a tenth of that where the tasks are held, by their edge or
+by a limit. What brakes stays whole: else it would swing at the limits.
+
+An excess is relative to what the limit permits: of an effort, the maximum; of an
+acceleration, what the barriers of `Limits` permit far from them. It counts wholly from
+a tenth on. The limit on the effort's rate does not count: it depends on the last
+effort, and a step that waits for it would wait for ever.
+"""
+
+from typing import NamedTuple, Self
+
+import numpy as np
+
+from hsp_control import engine
+from hsp_control.common.arrays import Array
+from hsp_control.compiled.kernels import KernelCall
+
+LARGE = 0.1
+"""Excess from which on it counts wholly, and the part of what the limits permit that a
+field gets where the tasks are held."""
+
+
+class Permitted(NamedTuple):
+    """What limits permit far from them, shape (nv,) each; inf where there is none."""
+
+    effort: Array  # [N·m or N]
+    acceleration: Array  # [rad/s² or m/s²]
+
+    @classmethod
+    def by(
+        cls, effort: Array, span: Array, speed: Array, most: Array, bandwidth: float
+    ) -> Self:
+        """Return it.
+
+        Args:
+            effort: Maximum efforts, shape (nv,) as all of these.
+            span: Upper minus lower position limits.
+            speed: Maximum speeds.
+            most: Maximum accelerations.
+            bandwidth: α of the barriers that keep positions and speeds [1/s].
+        """
+        acceleration = np.minimum(bandwidth * speed, bandwidth**2 * (0.5 * span))
+        return cls(np.array(effort), np.minimum(acceleration, most))
+
+
+class Parts(NamedTuple):
+    """The law's acceleration and the damped law's, and what they are made of."""
+
+    law: Array  # shape (nv,) each
+    damped: Array
+    law_self_motion: Array  # φ_N
+    damped_self_motion: Array
+    law_braking: Array  # P K_N P v
+    damped_braking: Array
+
+
+class Within(NamedTuple):
+    """Bounds on the acceleration, shape (nv,) each."""
+
+    lower: Array
+    upper: Array
+
+
+class Barred(NamedTuple):
+    """Rows of barriers: A δ ≥ lower for a deviation δ from what is wanted."""
+
+    A: Array  # shape (k, at least nv)
+    lower: Array  # shape (k,)
+
+
+def limited_target(
+    M: Array,
+    a: Array,
+    effort: Array,
+    parts: Parts,
+    bounds: Within,
+    permitted: Permitted,
+    barred: Barred,
+    share: Array,
+) -> KernelCall:
+    """Return the call that overwrites what is wanted by what the step comes near to.
+
+    Args:
+        M: Mass matrix, shape (nv, nv).
+        a: The law's acceleration, and what compensators add, shape (nv,).
+        effort: M a + N, and what compensators add, shape (nv,).
+        parts: The law's acceleration, and what it is made of.
+        bounds: Bounds on the acceleration.
+        permitted: What excesses are relative to.
+        barred: Rows of barriers; ``lower`` then is for deviations from the new a.
+        share: How much the law is damped already, shape (1,); see `shares.py`.
+    """
+    given = M, a, effort, parts, bounds, permitted, barred, share, LARGE
+    return engine.LimitedTarget, given

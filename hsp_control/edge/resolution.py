@@ -1,0 +1,124 @@
+"""The law with its edge and its memory: from tasks and a field to an acceleration.
+
+The mathematics is in the engine: ``engine/law`` is the theorem, ``engine/edge`` what is
+done where tasks cannot be met.
+"""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from hsp_control import engine
+from hsp_control.common.arrays import Array, Indices
+from hsp_control.compiled.kernels import KernelCall
+from hsp_control.edge.step import EdgeMemory, Factors, Projectors
+from hsp_control.edge.threshold import NOT, Following, Thresholds
+from hsp_control.law.outcome import BEYOND_ANY_LEVEL
+from hsp_control.law.problem import Problem
+
+
+class Resolution:
+    """The law for levels of tasks: its calls and their memory.
+
+    It has scratch memory but no state: the same input gives the same output.
+
+    Attributes:
+        problem: The input, to be written before `call` is made.
+        ends: End of each level's rows in the stack.
+        form: The metric's form.
+        threshold: ε_0, the singular value below which the inverse is always bounded.
+        thresholds: ε of each level, as `call` wrote it last, shape (levels,).
+        acceleration: a, as `call` wrote it last, shape (nv,).
+        null_space_error: e_N, as `call` wrote it last, shape (nv,).
+        code: What `call` returned last, see `outcome_of`, shape (1,).
+        edge: What the two laws of the edge left then.
+        damped_code: The code of the damped law, shape (1,).
+        factors: The stack's pseudo-inverse then.
+        alone: Whether the tasks of one level are resolved at once, whatever happens.
+        projectors: The levels' projectors then, if the code is not 0 and the level is
+            not alone.
+    """
+
+    def __init__(
+        self,
+        levels: Sequence[int],
+        nv: int,
+        form: int,
+        gain: Array,
+        threshold: float,
+        following: Following = NOT,
+    ) -> None:
+        """Allocate."""
+        m = sum(levels)
+        self.problem = Problem(m, nv, gain)
+        self.ends: Indices = np.cumsum([*levels] or [0], dtype=np.int64)
+        self.form = form
+        self.threshold, self._following = threshold, following
+        self._thresholds = Thresholds.allocate(len(self.ends))
+        self.thresholds = self._thresholds.own
+        self.thresholds[:] = threshold
+        self.factors = Factors(np.zeros((m, nv)), np.zeros((m, m)))
+        self.projectors = Projectors.allocate(m, nv)
+        self.edge = EdgeMemory.allocate(m, nv)
+        self.damped_code: Indices = np.zeros(1, dtype=np.int64)
+        self._self_motions, self._brakings = np.zeros((2, 2, nv))
+        # Only a fixed base has a law beside the damped one. Who stands keeps the
+        # balance by tasks that nothing damps.
+        legs = following.modest > 0.0
+        self._exact_beside = following.size > 0.0 and m <= nv and not legs
+        # A conflict takes two levels, or more rows than degrees of freedom.
+        self.alone = len(self.ends) == 1 and m <= nv
+        self.acceleration = self.problem.record.acceleration
+        self.null_space_error = self.problem.record.null_space_error
+        self.code: Indices = np.zeros(1, dtype=np.int64)
+
+    def call(self, v: Array, *, controls: bool = True) -> KernelCall:
+        """Return the call that writes a and e_N; it returns what `outcome_of` takes."""
+        problem = self.problem
+        law = (
+            *(problem.task, problem.field, problem.metric, self.form),
+            *(v, problem.gain, controls),
+        )
+        rows = self.ends, *problem.rows
+        found = self.null_space_error, self.acceleration, self.code
+        return engine.Resolve, (
+            *(law, rows, self.threshold, self._following, self._exact_beside),
+            *(self.alone, BEYOND_ANY_LEVEL, self._thresholds, self.factors),
+            *(self.projectors, self.edge, self.damped_code, *found),
+        )
+
+    def self_motions(self, v: Array) -> tuple[KernelCall, tuple[Array, Array]]:
+        """Return the call that writes what the null space contributes, after `call`.
+
+        Args:
+            v: Velocity, shape (nv,).
+
+        Returns:
+            The call, and what it writes: φ_N of a and of a_damped, shape (2, nv), and
+            P K_N P v, what brakes them, shape (2, nv).
+        """
+        (J, J_dot, *_, a_x), metric = self.problem.task, self.problem.metric
+        written = self._self_motions, self._brakings
+        given = (
+            *(J, J_dot, a_x, metric.W, metric.L, self.form, v, self.problem.gain),
+            *(self.alone, self.factors, self.projectors.Q, self.edge),
+            *(self.damped_code, self.acceleration, *written),
+        )
+        return (engine.SelfMotions, given), written
+
+    def diagnosis(self, first: int) -> tuple[KernelCall, Array, Array]:
+        """Return a call that finds how near the law is to singular and to rest.
+
+        Args:
+            first: The first row of the tasks: those before it belong to contacts.
+
+        Returns:
+            The call, which returns det(J W⁻¹ Jᵀ) without the rows before ``first``, the
+            paper's manipulability; and what it writes: what `singular_values` takes,
+            and ‖e_N‖_W, the square root of 2 V, shape (1,).
+        """
+        J, metric = self.problem.task.jacobian[first:], self.problem.metric
+        smaller = min(J.shape)
+        T, length = np.zeros((smaller, smaller)), np.zeros(1)
+        given = J, metric.W, metric.L, self.form, self.null_space_error, T, length
+        return (engine.Diagnose, given), T, length

@@ -1,0 +1,28 @@
+"""The edge: the law is exact where tasks can be met, and damped where they cannot.
+
+    a = a_exact + μ (a_damped - a_exact),      0 ≤ μ ≤ 1
+
+Out of reach an error persists, and with it what the feedback asks for. Near a singular
+posture the exact inverse of that changes faster than a sampled loop bears, so the
+inverse of a_damped is bounded by thresholds that follow what is asked for
+(`threshold.py`). But a threshold cannot tell an error that persists from a step within
+reach. What can is where the arm is held, and how: singular, or far away, or at a limit.
+So μ is the largest of three shares, each of them 0 in the middle:
+
+    near    σ ≥ σ_x: 0;  σ ≤ σ_x/2: 1.    σ_x is a tenth of the robot's size
+    far     |e| ≤ 0.85 ℓ: 0;  |e| ≥ ℓ: 1.      ℓ is the largest error that is fed back
+    limits  a_exact is within all limits: 0;  a tenth beyond one: 1
+
+with σ the smallest singular value of the stack J, whatever the metric. The first two
+are here, the last is where limits are known, in `limited_target.py`.
+All are continuous, so a is.
+
+``docs/edge.md`` has what follows from it.
+"""
+
+NEAR = 0.1
+"""σ_x over the robot's size: the law is exact in every posture that is farther from a
+singular one, whatever a step asks for."""
+
+FAR = 0.85
+"""Part of ℓ up to which errors are far from being those of a hand that is held."""

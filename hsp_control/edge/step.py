@@ -1,0 +1,55 @@
+"""What the law and its edge leave in each step."""
+
+from typing import NamedTuple, Self
+
+import numpy as np
+
+from hsp_control.common.arrays import Array
+
+
+class Factors(NamedTuple):
+    """The two factors of the stack's pseudo-inverse, B# = Qᵀ X."""
+
+    Q: Array  # (m, nv)
+    X: Array  # (m, m)
+
+
+class Projectors(NamedTuple):
+    """What the damped law of several levels leaves of its projectors.
+
+    Level k takes Q_{k-1} J_kᵀ q(G_k) J_k Q_{k-1} of W⁻¹, and leaves Q_k.
+    """
+
+    Q: Array  # what the last level leaves, Q_K = P W⁻¹, shape (nv, nv)
+    QJ: Array  # Q_{k-1} J_kᵀ of all levels side by side, shape (nv, m)
+    G_inverse: Array  # q(G_k) of all levels along the diagonal, shape (m, m)
+
+    @classmethod
+    def allocate(cls, m: int, nv: int) -> Self:
+        """Return memory for m rows."""
+        return cls(np.zeros((nv, nv)), np.zeros((nv, m)), np.zeros((m, m)))
+
+
+class EdgeMemory(NamedTuple):
+    """What the two laws leave, between the steps of the law."""
+
+    Q: Array  # factors of the exact inverse, (m, nv)
+    X: Array  # (m, m)
+    exact: Array  # a_exact, shape (nv,), where μ < 1 and the laws differ
+    damped: Array  # a_damped, shape (nv,), where they differ or a limit is violated
+    by_tasks: Array  # a_damped without φ_N, where it went level by level, shape (nv,)
+    exact_e_N: Array  # shape (nv,)
+    share: Array  # μ, without the share of the limits, shape (1,)
+
+    @classmethod
+    def allocate(cls, m: int, nv: int) -> Self:
+        """Return memory for m rows."""
+        return cls(
+            Q=np.zeros((m, nv)),
+            X=np.zeros((m, m)),
+            exact=np.zeros(nv),
+            damped=np.zeros(nv),
+            by_tasks=np.zeros(nv),
+            exact_e_N=np.zeros(nv),
+            share=np.zeros(1),
+        )

@@ -1,0 +1,127 @@
+"""Kinds of one's own: a file in C++, compiled once, and what it brings.
+
+Its last line says which kinds it has:
+
+    extern "C" auto hsp_kinds_1() { return hsp::kinds<ElbowHeight>(); }
+"""
+
+import hashlib
+import os
+import shlex
+import shutil
+import subprocess
+import sys
+import sysconfig
+from pathlib import Path
+from types import SimpleNamespace
+
+from hsp_control.common.exceptions import EngineError
+from hsp_control.engine._engine import load_library
+
+_LOADED: dict[Path, SimpleNamespace] = {}
+
+
+def include_folders() -> list[Path]:
+    """Return where the headers are: the engine's, Eigen's and Boost's.
+
+    Raises:
+        EngineError: If Eigen's or Boost's are not there.
+    """
+    package = Path(__file__).parent / "include"
+    own = package if package.is_dir() else Path(__file__).parents[2] / "engine/include"
+    prefix = Path(sysconfig.get_path("purelib")) / "cmeel.prefix/include"
+    folders = [own, prefix / "eigen3", prefix]
+    for header in ("Eigen/Dense", "boost/pfr/core.hpp"):
+        if not any((folder / header).is_file() for folder in folders):
+            raise EngineError(
+                f"the header {header} is missing: pip install 'hsp_control[engine]'"
+            )
+    return folders
+
+
+def command(source: Path, library: Path) -> list[str]:
+    """Return the command that compiles a file into a library.
+
+    The compiler is that of the variable CXX, or the first on the path of c++, g++ and
+    clang++, or the package ziglang.
+
+    Raises:
+        EngineError: If there is none.
+    """
+    given = os.environ.get("CXX")
+    found = next(filter(shutil.which, ("c++", "g++", "clang++")), None)
+    if given or found:
+        compiler = shlex.split(given or str(found))
+    else:
+        try:
+            import ziglang  # noqa: F401
+        except ImportError:
+            raise EngineError(
+                f"no C++ compiler is there to compile {source.name}: install one "
+                "(Debian: apt install g++), name it in CXX, or pip install ziglang"
+            ) from None
+        compiler = [sys.executable, "-m", "ziglang", "c++"]
+    # The engine's own flags: alignment is part of Eigen's layout.
+    flags = ["-std=c++20", "-O2", "-DNDEBUG", "-shared", "-fPIC"]
+    headers = [f"-I{folder}" for folder in include_folders()]
+    return [*compiler, *flags, *headers, str(source), "-o", str(library)]
+
+
+def build(source: str | os.PathLike[str], library: Path | None = None) -> Path:
+    """Compile a file with kinds, and return the library.
+
+    Args:
+        source: The file in C++.
+        library: Where the library is written; beside the file by default, where `load`
+            finds it: a computer without a compiler needs no more.
+
+    Raises:
+        EngineError: If it does not compile, with what the compiler says.
+    """
+    path = Path(source)
+    library = library or path.with_suffix(".so")
+    library.parent.mkdir(parents=True, exist_ok=True)
+    fresh = library.with_suffix(f".{os.getpid()}")
+    made = subprocess.run(
+        command(path, fresh), capture_output=True, text=True, check=False
+    )
+    if made.returncode:
+        raise EngineError(f"{path} does not compile:\n{made.stderr.strip()}")
+    return fresh.replace(library)
+
+
+def load(file: str | os.PathLike[str]) -> SimpleNamespace:
+    """Return the kinds of a library, or of a file in C++, by name.
+
+    A file is compiled where no library beside it is newer; what is compiled then is
+    kept in the user's cache folder, and is new where the file or the engine is.
+
+    Raises:
+        EngineError: If there is no such file, or it brings no kinds.
+    """
+    path = Path(file).resolve()
+    if not path.is_file():
+        raise EngineError(f"there is no file {path}")
+    if path.suffix != ".so":
+        path = _library(path)
+    if path not in _LOADED:
+        try:
+            kinds = load_library(str(path))
+        except RuntimeError as error:
+            raise EngineError(f"{path.name} brings no kinds: {error}") from None
+        _LOADED[path] = SimpleNamespace(**{kind.name: kind for kind in kinds})
+    return _LOADED[path]
+
+
+def _library(source: Path) -> Path:
+    """Return the library of a file, compiled if need be."""
+    beside = source.with_suffix(".so")
+    if beside.is_file() and beside.stat().st_mtime >= source.stat().st_mtime:
+        return beside
+    told = hashlib.sha256(source.read_bytes())
+    for header in sorted(include_folders()[0].rglob("*.hpp")):
+        told.update(header.read_bytes())
+    caches = os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache"
+    name = f"{source.stem}-{told.hexdigest()[:16]}.so"
+    library = Path(caches) / "hsp_control" / name
+    return library if library.is_file() else build(source, library)

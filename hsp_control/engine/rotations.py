@@ -1,0 +1,25 @@
+"""Rotations for plain Python: exp, log and their Jacobians on SO(3), each a new array.
+
+A rotation vector y is a rotation by the angle √(y·y) about y, shape (3,) [rad]; a
+quaternion is x, y, z, w. The equations stand in the engine's ``rotations.hpp``.
+
+- ``exp3(y)``: the rotation exp([y]×), shape (3, 3).
+- ``log3(R)``: the rotation vector of R, |y| ≤ π; at π either sign is right.
+- ``jexp3(y)``: the right Jacobian of exp, ω = Jexp(y) y' in the body's axes.
+- ``jexp3_dot(y, y_dot)``: its rate, so that ω' = Jexp(y) y'' + Jexp' y'.
+- ``jlog3(y)``: its inverse, y' = Jlog(y) ω, for |y| < 2π.
+- ``quaternion_from_rotation(R)``: of length 1, with a scalar part that is not negative.
+- ``rotation_from_quaternion(q)``: of a quaternion of any length but zero.
+- ``stumpff(s)``: the functions C0 to C5 of which all of them are made, at s = |y|².
+
+They take what NumPy takes for an array, and raise TypeError for another shape.
+"""
+
+from ._engine import exp3 as exp3
+from ._engine import jexp3 as jexp3
+from ._engine import jexp3_dot as jexp3_dot
+from ._engine import jlog3 as jlog3
+from ._engine import log3 as log3
+from ._engine import quaternion_from_rotation as quaternion_from_rotation
+from ._engine import rotation_from_quaternion as rotation_from_quaternion
+from ._engine import stumpff as stumpff

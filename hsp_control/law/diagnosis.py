@@ -1,0 +1,20 @@
+"""How near the law is to a singular posture."""
+
+from math import isqrt
+
+import numpy as np
+
+from hsp_control import engine
+from hsp_control.common.arrays import Array
+
+
+def singular_values(triangle: bytes) -> Array:
+    """Return the singular values of J L⁻ᵀ, the largest first, shape (min(m, nv),).
+
+    Args:
+        triangle: What the call of `Resolution.diagnosis` wrote, as bytes.
+    """
+    T = np.frombuffer(triangle).copy()
+    values = np.zeros(isqrt(len(T)))
+    engine.SingularValues(T.reshape(len(values), len(values)), values)()
+    return values

@@ -1,0 +1,293 @@
+"""Kinds, calls and plans of the engine: what is checked, what is kept, what is made."""
+
+import copy
+import gc
+import pickle
+import weakref
+from collections.abc import Callable
+from typing import Any, NamedTuple
+
+import numpy as np
+import pytest
+
+from hsp_control import engine
+from hsp_control.common.arrays import Array
+from hsp_control.engine import Move, Plan, PythonCall
+from hsp_control.engine.inspection import calls, first_not_finite, listing
+from hsp_control.trajectories import TrajectorySample
+
+
+def line(out: TrajectorySample | None = None, **changed: Any) -> Any:
+    """Return a call of a line in the plane, with arguments changed."""
+    given: dict[str, Any] = {
+        "start": np.array([1.0, 2.0]),
+        "speed": np.array([0.5, -1.0]),
+        "position": np.zeros(2),
+        "velocity": np.zeros(2),
+        "acceleration": np.ones(2),
+    } | changed
+    start, speed, *sample = given.values()
+    return engine.UniformLine(start, speed, out or TrajectorySample(*sample))
+
+
+def test_a_call_reads_its_arrays_anew_each_time() -> None:
+    start, out = np.array([1.0, 2.0]), TrajectorySample.allocate(2)
+    call = line(out, start=start)
+    call(2.0)
+    np.testing.assert_array_equal(out.position, [2.0, 0.0])
+    np.testing.assert_array_equal(out.velocity, [0.5, -1.0])
+    start[:] = 0.0
+    call(2.0)
+    np.testing.assert_array_equal(out.position, [1.0, -2.0])
+
+
+def test_a_kind_tells_its_arguments() -> None:
+    kind = engine.UniformLine
+    assert repr(kind).startswith("UniformLine(start: reads float64 (d,), speed: ")
+    assert kind.timed
+    assert kind.reads == ["start", "speed"]
+    assert kind.writes == ["out.position", "out.velocity", "out.acceleration"]
+    assert "x0 + t v" in kind.doc
+    assert repr(line()) == (
+        "UniformLine(start=array(2,), speed=array(2,), out.position=array(2,), "
+        "out.velocity=array(2,), out.acceleration=array(2,))"
+    )
+
+
+class Other(NamedTuple):
+    """A record whose names are not those of a sample."""
+
+    position: Array
+    speed: Array
+    acceleration: Array
+
+
+WRONG: dict[str, tuple[Callable[[], Any], str]] = {
+    "another size": (
+        lambda: line(speed=np.zeros(3)),
+        r"UniformLine: speed has the shape \(3,\); needs \(d,\), where d = 2 as in st",
+    ),
+    "no array": (
+        lambda: line(start=[0.0, 1.0]),
+        r"UniformLine: start reads float64 \(d,\); got \[0.0, 1.0\]",
+    ),
+    "integers": (
+        lambda: line(start=np.zeros(2, dtype=int)),
+        r"start reads float64 \(d,\); got an array of int64 with the shape \(2,\)",
+    ),
+    "single precision": (
+        lambda: line(position=np.zeros(2, dtype=np.float32)),
+        r"out.position writes float64 \(d,\); got an array of float32",
+    ),
+    "another number of axes": (
+        lambda: line(start=np.zeros((2, 1))),
+        r"start reads float64 \(d,\); .* the shape \(2, 1\)",
+    ),
+    "not packed": (
+        lambda: line(start=np.zeros(4)[::2]),
+        r"start reads float64 \(d,\); .* the strides \(16,\)",
+    ),
+    "reversed": (lambda: line(start=np.zeros(2)[::-1]), r"the strides \(-8,\)"),
+    "another byte order": (
+        lambda: line(start=np.zeros(2, dtype=">f8")),
+        r"start reads float64",
+    ),
+    "written, but read-only": (
+        lambda: line(position=np.broadcast_to(0.0, 2)),
+        r"out.position writes float64 \(d,\); .*read-only",
+    ),
+    "too few": (
+        lambda: engine.UniformLine(np.zeros(2)),
+        r"UniformLine has 5 arguments; got 1: UniformLine\(start: reads",
+    ),
+    "too many": (lambda: engine.UniformLine(*6 * [np.zeros(2)]), "got 6"),
+    "another record": (
+        lambda: engine.UniformLine(*np.zeros((2, 2)), Other(*np.zeros((3, 2)))),
+        "in the place of out.velocity stands a record's speed",
+    ),
+    "no number": (
+        lambda: engine.Circle("fast", 0.0, np.zeros(2), np.eye(2), *np.zeros((3, 2))),
+        "Circle: rate is a number; got 'fast'",
+    ),
+    "no plan": (
+        lambda: engine.Once(line(), np.zeros(1, dtype=int), np.zeros(1, dtype=int)),
+        "Once: calls a Plan; got UniformLine",
+    ),
+    "no call": (lambda: Plan([3]), "row"),
+}
+
+
+@pytest.mark.parametrize("case", WRONG)
+def test_what_does_not_fit_is_named(case: str) -> None:
+    make, message = WRONG[case]
+    with pytest.raises((TypeError, ValueError, AttributeError), match=message):
+        make()
+
+
+def test_an_unknown_kind_is_an_error() -> None:
+    with pytest.raises(AttributeError, match="the engine has no kind 'Sirkle'"):
+        _ = engine.Sirkle
+    assert {"Circle", "Once", "Plan"} <= set(dir(engine))
+
+
+def test_a_plan_makes_its_calls_in_turn() -> None:
+    told: list[float] = []
+    first = PythonCall(lambda: told.append(0.0))
+    second = PythonCall(told.append, timed=True)
+    last = PythonCall(lambda: np.float64(7.0))
+    plan = Plan([first, Plan([second, first]), last])
+    assert plan(1.5) == 7.0
+    assert told == [0.0, 1.5, 0.0]
+    assert Plan()(1.0) == 0.0
+    assert PythonCall(lambda: 3)() == 3.0
+    assert PythonCall(lambda: np.zeros(3))() == 0.0
+    assert plan.python
+    assert not Plan([line()]).python
+
+
+def test_what_python_raises_goes_through_a_plan() -> None:
+    told: list[int] = []
+
+    def fail() -> None:
+        raise KeyboardInterrupt("enough")
+
+    after = PythonCall(lambda: told.append(1))
+    stamp = np.ones(1, dtype=int)
+    once = engine.Once(Plan([PythonCall(fail), after]), stamp, 0 * stamp)
+    with pytest.raises(KeyboardInterrupt, match="enough"):
+        Plan([once, after])(0.0)
+    assert told == []
+
+
+def test_calls_are_made_once_at_a_stamp_and_only_if_found() -> None:
+    told: list[int] = []
+    calls = Plan([PythonCall(lambda: told.append(1) or 4.0)])  # type: ignore[func-returns-value]
+    stamp, made = np.zeros((2, 1), dtype=int)
+    stamp[0], found = 3, np.array([16.0, 0.0])
+    once, only_if = engine.Once(calls, stamp, made), engine.OnlyIf(calls, found)
+    once()
+    once()
+    assert (len(told), made[0]) == (1, 3)
+    assert only_if() == 16.0
+    assert len(told) == 1
+    found[1] = 1.0
+    assert only_if() == 20.0
+    assert len(told) == 2
+
+
+@pytest.mark.parametrize(
+    "how", [copy.deepcopy, lambda x: pickle.loads(pickle.dumps(x))]
+)
+def test_copies_have_memory_of_their_own(how: Callable[[Any], Any]) -> None:
+    out = TrajectorySample.allocate(2)
+    plan, copied = how((Plan([line(out)]), out))
+    plan(2.0)
+    np.testing.assert_array_equal(copied.position, [2.0, 0.0])
+    assert not out.position.any()
+
+
+def test_a_call_keeps_its_arrays_and_lets_them_go() -> None:
+    position = np.zeros(2)
+    watched = weakref.ref(position)
+    plan = Plan([line(position=position)])
+    del position
+    gc.collect()
+    plan(1.0)
+    assert watched() is not None
+    del plan
+    gc.collect()
+    assert watched() is None
+
+
+def test_a_function_that_leads_back_to_its_plan_is_collected() -> None:
+    class Owner:
+        def __init__(self) -> None:
+            self.plan = Plan([PythonCall(self.told)])
+
+        def told(self) -> None:
+            pass
+
+    owner = Owner()
+    watched = weakref.ref(owner)
+    owner.plan()
+    del owner
+    gc.collect()
+    assert watched() is None
+
+
+def moving(told: list[float], blocks: Any = ()) -> tuple[Move, list[Array]]:
+    """Return a move of 3 coordinates and 2 velocities, and its memory."""
+    memory = [np.zeros(1), np.zeros(3), np.zeros(2)]
+    unit = np.array(blocks, dtype=int).reshape(-1, 2)
+    plan = Plan([PythonCall(told.append, timed=True), PythonCall(lambda: 5.0)])
+    return Move(plan, *memory, unit, np.zeros(1, dtype=int)), memory
+
+
+def test_a_move_copies_what_is_valid_and_makes_its_calls() -> None:
+    told: list[float] = []
+    move, (t, q, v) = moving(told)
+    assert move(0.5, np.arange(6.0)[::2], np.ones(2)) == 5.0
+    np.testing.assert_array_equal(np.concatenate([t, q, v]), [0.5, 0, 2, 4, 1, 1])
+    assert told == [0.5]
+
+
+@pytest.mark.parametrize(
+    ("t", "q", "v"),
+    [
+        (np.nan, np.zeros(3), np.zeros(2)),
+        (0.0, np.array([0.0, np.inf, 0.0]), np.zeros(2)),
+        (0.0, np.zeros(3), np.array([np.nan, 0.0])),
+        (0.0, np.zeros(2), np.zeros(2)),
+        (0.0, np.zeros(3), np.zeros((2, 1))),
+        (0.0, np.zeros(3, dtype=int), np.zeros(2)),
+        (0.0, [0.0, 0.0, 0.0], np.zeros(2)),
+        (0.0, np.zeros(3, dtype=">f8"), np.zeros(2)),
+    ],
+)
+def test_a_move_refuses_what_is_not(t: float, q: Any, v: Any) -> None:
+    told: list[float] = []
+    move, memory = moving(told)
+    assert move(t, q, v) == engine.REFUSED
+    assert told == []
+    assert not np.concatenate(memory).any()
+
+
+def test_a_move_refuses_directions_that_are_not_of_norm_1() -> None:
+    move, _ = moving([], blocks=[[0, 2]])
+    assert move(0.0, np.array([0.6, 0.8, 9.0]), np.zeros(2)) == 5.0
+    assert move(0.0, np.array([0.6, 0.9, 9.0]), np.zeros(2)) == engine.REFUSED
+
+
+def test_equal_steps_divide_an_interval() -> None:
+    told: list[float] = []
+    now, h = np.zeros((2, 1))
+    steps = engine.EqualSteps(
+        Plan([PythonCall(told.append, timed=True)]), np.array([1.0, 1.3]), 0.11, now, h
+    )
+    steps()
+    np.testing.assert_allclose(told, [1.0, 1.1, 1.2], rtol=1e-15)
+    assert h[0] == pytest.approx(0.1)
+
+
+def test_a_plan_says_what_it_does_and_what_writes_it() -> None:
+    out = TrajectorySample.allocate(2)
+    second = line(start=out.position)
+    plan = Plan([line(out), PythonCall(print), Plan([second])])
+    assert [*calls(plan)][-1] is second
+    text = listing(plan)
+    assert "  0 UniformLine\n      <- start [2]\n" in text
+    assert "      -> out.position [2]" in text
+    assert "  2 UniformLine\n      <- start [2], from 0\n" in text
+    assert repr(plan).count("\n") > 2
+
+
+def test_the_first_call_that_writes_nan_is_found() -> None:
+    out = TrajectorySample.allocate(2)
+    wrong = line(out, speed=np.array([0.0, np.nan]))
+    stamp = np.zeros(1, dtype=int)
+    once = engine.Once(Plan([line(), wrong]), stamp, stamp - 1)
+    assert first_not_finite(Plan([line(), once, line(start=out.position)])) == (
+        wrong,
+        ["out.position", "out.velocity"],
+    )
+    assert first_not_finite(Plan([line()])) is None

@@ -1,0 +1,83 @@
+"""Kinds of a user's own: compiled, loaded, used, and refused where they are wrong."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from hsp_control.common.exceptions import EngineError
+from hsp_control.engine import own_kinds
+from hsp_control.engine.inspection import listing
+
+pytestmark = pytest.mark.slow
+
+SOURCE = """
+#include <hsp/kind.hpp>
+
+struct Doubled {
+  static constexpr const char* doc = "y = 2 x.";
+  hsp::In<'n'> x;
+  hsp::Out<'n'> y;
+  void operator()() { y = 2.0 * x; }
+};
+
+extern "C" auto hsp_kinds_1() { return hsp::kinds<Doubled>(); }
+"""
+
+
+@pytest.fixture
+def source(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
+    file = tmp_path / "doubled.cpp"
+    file.write_text(SOURCE)
+    return file
+
+
+def test_a_file_is_compiled_once_and_used(
+    source: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    kinds = own_kinds.load(source)
+    x, y = np.arange(3.0), np.zeros(3)
+    call = kinds.Doubled(x, y)
+    call()
+    np.testing.assert_array_equal(y, 2.0 * x)
+    assert "-> y [3]" in listing(call)
+    with pytest.raises(ValueError, match=r"Doubled: y has the shape \(2,\)"):
+        kinds.Doubled(x, np.zeros(2))
+    monkeypatch.setenv("CXX", "false")  # what is compiled is kept
+    assert own_kinds.load(source) is kinds
+    source.write_text(SOURCE.replace("2.0 * x", "3.0 * x"))
+    with pytest.raises(EngineError, match=r"doubled\.cpp does not compile"):
+        own_kinds.load(source)
+
+
+def test_a_library_beside_its_file_needs_no_compiler(
+    source: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    library = own_kinds.build(source)
+    monkeypatch.setenv("CXX", "false")
+    assert own_kinds.load(source) is own_kinds.load(library)
+
+
+def test_what_does_not_compile_says_what_the_compiler_says(source: Path) -> None:
+    source.write_text(SOURCE.replace("2.0 * x;", "2.0 * z;"))
+    with pytest.raises(
+        EngineError, match=r"does not compile:[\s\S]*z.* was not declared|undeclared"
+    ):
+        own_kinds.load(source)
+
+
+def test_a_library_without_kinds_is_named(source: Path) -> None:
+    source.write_text(SOURCE.replace("hsp_kinds_1", "hsp_kinds_0"))
+    with pytest.raises(EngineError, match="brings no kinds: it has no function hsp_k"):
+        own_kinds.load(source)
+
+
+def test_no_file_and_no_compiler(source: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    with pytest.raises(EngineError, match="there is no file"):
+        own_kinds.load(source.with_name("nowhere.cpp"))
+    monkeypatch.delenv("CXX", raising=False)
+    monkeypatch.setenv("PATH", "")
+    monkeypatch.setitem(__import__("sys").modules, "ziglang", None)
+    with pytest.raises(EngineError, match="no C\\+\\+ compiler is there to compile"):
+        own_kinds.load(source)
