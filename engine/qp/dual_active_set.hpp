@@ -349,14 +349,16 @@ class DualActiveSet {
     } else if (i >= k) {
       first = JT().col(i - k).transpose();
     } else {
-      const Index from = qp.begin[i], to = qp.end[i];
-      const Index middle = std::clamp(n, from, to), rest = to - middle;
       const auto row = qp.A.row(i);
-      first = row.segment(from, middle - from)
-                  .lazyProduct(JT().middleCols(from, middle - from).transpose());
-      if (rest > 0)
-        own.segment(middle - n, rest) =
-            row.segment(middle, rest).cwiseProduct(qp.own.segment(middle - n, rest).transpose());
+      const Index from = qp.begin[i], to = qp.end[i], middle = std::min(n, to);
+      if (from < n)
+        first = row.segment(from, middle - from)
+                    .lazyProduct(JT().middleCols(from, middle - from).transpose());
+      const Index alone = std::max(n, from);
+      if (alone < to)
+        own.segment(alone - n, to - alone) =
+            row.segment(alone, to - alone)
+                .cwiseProduct(qp.own.segment(alone - n, to - alone).transpose());
     }
     if (qp.softness.size() > 0) b[moving + p + i] = qp.softness[i];
   }
