@@ -52,7 +52,6 @@ def execute(notebook: Any, folder: Path) -> None:
         "MPLBACKEND": "module://matplotlib_inline.backend_inline",
         "IPYTHONDIR": str(folder / "ipython"),
     }
-    environment.pop("NUMBA_DISABLE_JIT", None)  # no coverage comes from a kernel
     with tempfile.TemporaryDirectory() as sockets:  # whose names may not be long
         config = Config()
         config.KernelManager.transport = "ipc"

@@ -360,7 +360,7 @@ def continuous_dofs(robot: Robot) -> list[int]:
 
 def versions() -> dict[str, str]:
     """Return the versions of the packages that a run depends on."""
-    packages = ("pin", "numpy", "scipy", "numba")
+    packages = ("pin", "numpy", "scipy")
     return {
         "hsp_control": __version__,
         "python": platform.python_version(),

@@ -1,7 +1,7 @@
 """A field: a frame, such as the elbow, keeps a height."""
 
-from hsp_control.compiled.kernels import KernelCall, kernel
 from hsp_control.declaration.quantities import Number
+from hsp_control.engine.plans import KernelCall, kernel
 from hsp_control.null_space.fields import Cost
 
 

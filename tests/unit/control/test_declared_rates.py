@@ -11,9 +11,9 @@ import pytest
 import hsp_control as hsp
 from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import RateError
-from hsp_control.compiled.kernels import kernel
 from hsp_control.declaration import imported
 from hsp_control.declaration.language import in_yaml
+from hsp_control.engine.plans import kernel
 from hsp_control.law import VARYING
 from hsp_control.null_space.fields import FunctionField, StateWeight, VectorField
 

@@ -4,9 +4,6 @@ All ready tasks, fields and metrics are run, compiled and as plain Python.
 """
 
 import gc
-import json
-import os
-import subprocess
 import sys
 import tracemalloc
 from collections.abc import Callable
@@ -17,7 +14,6 @@ import numpy as np
 import pinocchio as pin
 import pytest
 from oracles import slope
-from places import ROOT
 
 from hsp_control import (
     Circle,
@@ -33,7 +29,6 @@ from hsp_control import (
     Robot,
     RobotState,
 )
-from hsp_control.compiled import kernels
 from hsp_control.control.actuation import Status
 from hsp_control.geometry import Proximity, Scene, link_shapes
 from hsp_control.geometry.proximity import CoalDistances
@@ -180,33 +175,6 @@ def everything() -> dict[str, list[float]]:
                 parts = [*out.g, *out.g_dot, field.value(state)]
                 results[f"{name} {form} {k}"] = np.array(parts)
     return {name: values.tolist() for name, values in results.items()}
-
-
-@pytest.mark.process
-def test_all_tasks_and_fields_are_the_same_without_the_compiler() -> None:
-    """The very same functions, as plain Python: there is no second implementation."""
-    if not hasattr(kernels.kernel(lambda: None), "py_func"):
-        pytest.skip("NUMBA_DISABLE_JIT is set: there is one form only")
-    environment = os.environ | {
-        "NUMBA_DISABLE_JIT": "1",
-        "PYTHONPATH": os.pathsep.join(map(str, (HERE, ROOT / "tests/support", ROOT))),
-    }
-    code = "import json, test_kernels as t; print(json.dumps(t.everything()))"
-    run = subprocess.run(
-        [sys.executable, "-W", "error", "-c", code],
-        env=environment,
-        capture_output=True,
-        text=True,
-        check=True,
-    )
-    plain, compiled = json.loads(run.stdout), everything()
-    assert plain.keys() == compiled.keys()
-    for name, values in compiled.items():
-        # Sums are the same to the last bit but for functions of the C library.
-        scale = max(1.0, float(np.abs(values).max()))
-        np.testing.assert_allclose(
-            plain[name], values, rtol=1e-12, atol=1e-12 * scale, err_msg=name
-        )
 
 
 def test_what_is_bound_to_one_state_or_sample_is_not_given_to_another() -> None:

@@ -6,10 +6,6 @@ from typing import Any
 
 import numpy as np
 import pytest
-from hypothesis import assume, given
-from hypothesis import strategies as st
-
-from hsp_control.common.arrays import Array
 from hsp_control.compiled import linalg
 from hsp_control.compiled.linalg import (
     cholesky,
@@ -22,6 +18,10 @@ from hsp_control.compiled.linalg import (
     solve_lower_transposed,
     triangularise_rows,
 )
+from hypothesis import assume, given
+from hypothesis import strategies as st
+
+from hsp_control.common.arrays import Array
 from hsp_control.law import CONSTANT, law
 from hsp_control.tasks import TaskSample
 
