@@ -191,7 +191,7 @@ $(find-python); "$$python" tools/install.py .venv $$("$$python" hatch_build.py n
 endef
 
 $(ENGINE): $(USE) hatch_build.py engine/CMakeLists.txt $(shell find engine -name '*.?pp')
-	@$(BIN)/python hatch_build.py
+	@$(BIN)/python hatch_build.py > /dev/null
 	@touch $@
 
 # Sets the shell variable `python`: PYTHON if given, else the newest one that will do. A
