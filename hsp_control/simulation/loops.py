@@ -148,4 +148,4 @@ def _bounded(q: Array, v: Array) -> bool:
 
 def _same(q: Array, v: Array, q_other: Array, v_other: Array) -> bool:
     """Return whether two states are equal."""
-    return q.tolist() == q_other.tolist() and v.tolist() == v_other.tolist()
+    return bool(q.tolist() == q_other.tolist() and v.tolist() == v_other.tolist())
