@@ -23,7 +23,7 @@ from traitlets.config import Config
 ROOT = Path(__file__).resolve().parents[1]
 FOLDER = ROOT / "notebooks"
 
-CELL_TIME = 240  # [s]: kernels may have to be compiled
+CELL_TIME = 240  # [s]: the first one imports
 COLORS = 64
 """How many colours a picture keeps: enough for lines and their smooth edges."""
 

@@ -17,7 +17,8 @@ def _load(file: str) -> None:
     """Load a library in the place of the installed one."""
     name = f"{__name__}._engine"
     spec = spec_from_file_location(name, file)
-    assert spec is not None and spec.loader is not None
+    assert spec is not None
+    assert spec.loader is not None
     sys.modules[name] = module = module_from_spec(spec)
     spec.loader.exec_module(module)
 

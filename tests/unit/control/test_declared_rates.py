@@ -13,7 +13,6 @@ from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import RateError
 from hsp_control.declaration import imported
 from hsp_control.declaration.language import in_yaml
-from hsp_control.engine.plans import kernel
 from hsp_control.law import VARYING
 from hsp_control.null_space.fields import FunctionField, StateWeight, VectorField
 
@@ -118,7 +117,6 @@ class Both(hsp.Cost):
         gradient[:], rate[:] = slope(state), self.by(state)
 
 
-@kernel
 def _square(q: Array, v: Array, factor: float, gradient: Array, rate: Array) -> float:
     total = 0.0
     for i in range(gradient.shape[0]):

@@ -1,7 +1,4 @@
-"""What a step costs beside time: no memory; and what kernels give without a compiler.
-
-All ready tasks, fields and metrics are run, compiled and as plain Python.
-"""
+"""What a step costs beside time: no memory; and all ready tasks, fields and metrics."""
 
 import gc
 import sys
@@ -151,30 +148,7 @@ METRICS = {
 }
 
 
-# -- with and without the compiler -----------------------------------------------------
-
-
-def everything() -> dict[str, list[float]]:
-    """Return what all tasks and fields give at random states."""
-    robot, rng = Robot.load("panda"), np.random.default_rng(31)
-    frame, results = "panda_tcp", {}
-    samples = {name: MetricSample.allocate(7) for name in METRICS}
-    all_fields = fields(robot, frame) | clearances(robot)
-    all_tasks, out = tasks(robot, frame), FieldSample.allocate(7)
-    state = RobotState(robot)
-    for k in range(3):
-        q = robot.integrate(robot.home(), 0.3 * rng.standard_normal(7))
-        state.update(0.9 * k - 0.3, q, rng.standard_normal(7))
-        for name, task in all_tasks.items():
-            sample = task.evaluate(state)
-            results[f"{name} {k}"] = np.concatenate([np.ravel(a) for a in sample])
-        for form, metric in METRICS.items():
-            at = metric.evaluate(state, samples[form])
-            for name, field in all_fields.items():
-                field.evaluate(state, at, metric.form, out)
-                parts = [*out.g, *out.g_dot, field.value(state)]
-                results[f"{name} {form} {k}"] = np.array(parts)
-    return {name: values.tolist() for name, values in results.items()}
+# -- states and samples ---------------------------------------------------------------
 
 
 def test_what_is_bound_to_one_state_or_sample_is_not_given_to_another() -> None:
