@@ -45,7 +45,7 @@ MotorInertias = Annotated[
         _stored,
     ),
 ]
-"""A number, one for each joint in a list or by name, or ``bundled``."""
+"""A number, one for each joint in a list or by name, or ``bundled``; 0: bare links."""
 
 
 def write_motor_inertia(
@@ -54,9 +54,11 @@ def write_motor_inertia(
     source: RobotSource,
     of_file: Mapping[str, float],
 ) -> None:
-    """Set a model's armature: as given, else as its file says, by joint.
+    """Set a model's armature: as given, else as its source says, by joint.
 
-    Joints of several degrees of freedom, such as a root, have no motor.
+    A bundled robot comes with the rotors of its README; what the transmissions of a
+    URDF say goes before. Joints of several degrees of freedom, such as a root, have no
+    motor.
     """
     joints = {
         name: joint
@@ -64,13 +66,14 @@ def write_motor_inertia(
         if joint.nv == 1
     }
     if given == "bundled":
-        given = source.motor_inertia
-        if given is None:
+        if not source.motor_inertia:
             raise ModelError(
                 f"{source.name} comes without motor inertias; give them: one number "
                 "[kg m²], or one for each joint"
             )
-    inertias = {name: of_file[name] for name in joints if name in of_file}
+        given = None
+    own = {**source.motor_inertia, **of_file}
+    inertias = {name: own[name] for name in joints if name in own}
     if isinstance(given, Mapping):
         for name in given:
             if name not in joints:
