@@ -43,6 +43,9 @@ _LONGEST = 0.05
 """Longest delay and lag that are tried [s]."""
 _LARGEST_ROTOR = 10.0
 """Largest inertia of a rotor that is tried [kg·m²]."""
+USUAL_ROTOR = 0.05
+"""What the joint of a light wrist feels of its motor: a rotor of 5e-6 kg·m² behind a
+gear of 100 [kg·m²]."""
 _STEP_RESPONSE = 0.5
 """How long the response to an effort is followed [s]."""
 
@@ -154,9 +157,14 @@ def lines(found: ModelErrors) -> dict[str, str]:
     )
     if found.rotor < np.inf:
         texts["bears"] += (
-            f"; rotors of up to {found.rotor:.2g} kg m² that the model lacks, see "
-            "robot: motor_inertia"
+            f"; rotors of up to {found.rotor:.2g} kg m² that the model lacks"
         )
+        if found.rotor < USUAL_ROTOR:
+            texts["rotors"] = (
+                f"a light wrist's has some {USUAL_ROTOR:g} kg m²: then a mode grows; "
+                "give them, if only a guess: robot: {motor_inertia: "
+                f"{USUAL_ROTOR:g}}}"
+            )
     return texts
 
 

@@ -4,6 +4,7 @@ import json
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 import yaml
 
@@ -61,4 +62,10 @@ def test_a_run_says_how_much_nobody_explained() -> None:
     _, told = unexplained_rows(load_experiment(CONFIG | {"plant": beside}).run())
     assert told.startswith("the robot does not do what the model says: that is ")
     assert "of the effort limit of panda_joint" in told
+    bare = {**CONFIG, "robot": {"name": "panda", "motor_inertia": 0}, "plant": beside}
+    log = load_experiment(bare).run()
+    *_, remedy = unexplained_rows(log)
+    assert remedy == "the model has no rotors: robot: motor_inertia adds them"
+    size = np.abs(log["observer.disturbance"]) / log.meta["limits"]["effort"]
+    np.testing.assert_allclose(log["observer.share"], size.max(axis=1), rtol=1e-12)
     assert not [*unexplained_rows(load_experiment(CONFIG).run())]

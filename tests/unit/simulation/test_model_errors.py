@@ -109,6 +109,8 @@ def test_no_mode_grows_by_default_and_it_takes_no_time(name: str) -> None:
         assert alone.growing == 0
         bare, *_ = borne(name, ALONE, motor_inertia=0.0)
         assert bare.growing > 0
+    light = "rotors" in lines(found)
+    assert light is (found.rotor < 0.05) is (name == "xarm7")
     assert (alone.moved[0].resting == pytest.approx(found.moved[0].resting)) is True
     assert (found.moved[0].peak < 0.5 * found.moved[0].resting + 1e-6).all()
     assert posture(made.robot, name) == pytest.approx(q)
