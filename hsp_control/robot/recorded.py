@@ -214,7 +214,6 @@ def _source(record: Mapping[str, Any], told: OneRobot, access: Access) -> RobotS
         package_dirs=() if there is None else there.package_dirs,
         origin="file" if there is None else there.origin,
         locked=_by_joint(record["locked"]),
-        # Logs of versions whose bundled arms had none do not say it.
         motor_inertia=_by_joint(record.get("motor_inertia", {})),
         end_effector=record["end_effector"],
         joint_coordinates=record["joint_coordinates"],

@@ -54,11 +54,9 @@ def write_motor_inertia(
     source: RobotSource,
     of_file: Mapping[str, float],
 ) -> None:
-    """Set a model's armature: as given, else as its source says, by joint.
+    """Set a model's armature: as given, else as its file says, by joint.
 
-    A bundled robot comes with the rotors of its README; what the transmissions of a
-    URDF say goes before. Joints of several degrees of freedom, such as a root, have no
-    motor.
+    Joints of several degrees of freedom, such as a root, have no motor.
     """
     joints = {
         name: joint
@@ -71,9 +69,9 @@ def write_motor_inertia(
                 f"{source.name} comes without motor inertias; give them: one number "
                 "[kg m²], or one for each joint"
             )
-        given = None
-    own = {**source.motor_inertia, **of_file}
-    inertias = {name: own[name] for name in joints if name in own}
+        # of the joints that are not locked
+        given = {k: each for k, each in source.motor_inertia.items() if k in joints}
+    inertias = {name: of_file[name] for name in joints if name in of_file}
     if isinstance(given, Mapping):
         for name in given:
             if name not in joints:

@@ -164,7 +164,7 @@ def test_known_friction_costs_nothing_and_the_observer_leaves_it_alone() -> None
     flow = {"v0": made.flow(0.0, Q0)}  # no transient
     bare, alone = run(made, **flow), run(made, plant=oil, **flow)
     off = np.abs(alone["task.hand.error"] - bare["task.hand.error"]).max()
-    assert off > 5e-4  # [m]
+    assert off > 8e-4  # [m]
     late = slice(1, None)
     for compensation in (
         only(friction_feed_forward=known),

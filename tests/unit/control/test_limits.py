@@ -124,7 +124,7 @@ def test_the_drift_is_made_up_for_where_it_leads_beyond_a_limit(
 
 def test_what_lasts_is_made_up_for_by_what_a_light_joint_can_do() -> None:
     """Of what has been, a tenth of the range is made up for; of what is, more."""
-    robot = hsp.Robot.load("panda", motor_inertia=0.0)
+    robot = panda()
     limits = of(robot, velocity=None)
     motion = limits.motion
     q, v = robot.home(), np.zeros(7)

@@ -25,8 +25,7 @@ from hsp_control.robot.integrators import Rk4
 from hsp_control.simulation.plants.model_changes import Payload, changed
 from hsp_control.simulation.plants.sensors import SensorDelay
 
-# bare links, of which a load is the larger part
-ARM = hsp.Robot.load("panda", gravity=[0.0, 0.0, 0.0], motor_inertia=0.0)
+ARM = hsp.Robot.load("panda", gravity=[0.0, 0.0, 0.0])
 Q0 = np.array([0.0, -0.5, 0.1, -2.0, 0.2, 1.6, 0.7])
 H, MASS = 1e-3, 3.0
 
@@ -157,11 +156,7 @@ def test_configurations_with_a_payload_are_warned_of_it() -> None:
     Without weight; with it, self-motion that nothing holds runs away with any load.
     """
     document: dict[str, Any] = {
-        "robot": {
-            "name": "panda",
-            "gravity": [0.0, 0.0, 0.0],
-            "motor_inertia": 0,
-        },
+        "robot": {"name": "panda", "gravity": [0.0, 0.0, 0.0]},
         "tasks": {
             "hand": {
                 "type": "frame_position",
@@ -185,7 +180,7 @@ def test_configurations_with_a_payload_are_warned_of_it() -> None:
 
 def test_weight_that_nothing_holds_is_told_and_an_observer_holds_it() -> None:
     """The arm does what is told: its posture runs away, or stays where it is."""
-    arm = hsp.Robot.load("panda", motor_inertia=0.0)
+    arm = hsp.Robot.load("panda")
     hand = hsp.FramePosition("panda_tcp", gains=hsp.Gains(natural_frequency=20.0))
     true = changed(arm, [Payload(frame="panda_hand", mass=1.0)])
     made = hsp.Controller(arm, [hand], limits=None, start=Q0)

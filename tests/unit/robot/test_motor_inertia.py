@@ -16,6 +16,7 @@ from hsp_control.common.exceptions import (
 )
 from hsp_control.robot.description.robot_description import RobotDescription
 from hsp_control.robot.integrators import Rk4
+from hsp_control.robot.recorded import recorded_robot, robot_record
 from hsp_control.simulation.plants import RigidBody
 
 ARM = """<robot name="arm">
@@ -75,7 +76,7 @@ def test_a_urdf_says_it_in_its_transmissions(
 @pytest.mark.parametrize("name", ["panda", "iiwa14", "planar3r"])
 def test_it_is_the_diagonal_of_m_in_every_algorithm(name: str) -> None:
     rng = np.random.default_rng(0)
-    bare = hsp.Robot.load(name, motor_inertia=0.0)
+    bare = hsp.Robot.load(name)
     own = rng.uniform(0.1, 1.0, bare.nv)
     robot = hsp.Robot.load(name, motor_inertia=own)
     q, v, a = robot.random_configuration(rng), *rng.normal(size=(2, robot.nv))
@@ -94,25 +95,22 @@ def test_it_is_the_diagonal_of_m_in_every_algorithm(name: str) -> None:
 
 
 @pytest.mark.parametrize("name", ["panda", "iiwa14"])
-def test_bundled_arms_have_rotors_unless_0_is_asked_for(name: str) -> None:
-    bare, whole = hsp.Robot.load(name, motor_inertia=0.0), hsp.Robot.load(name)
+def test_bundled_arms_have_rotors_where_they_are_asked_for(name: str) -> None:
+    bare, whole = hsp.Robot.load(name), hsp.Robot.load(name, motor_inertia="bundled")
     assert not bare.model.armature.any()
     assert (whole.model.armature >= 0.1).all()
-    named = hsp.Robot.load(name, motor_inertia="bundled")
-    assert armature(named) == armature(whole)
+    first = next(iter(whole.dof_names))
+    locked = {**whole.source.locked, first: 0.0}
+    fewer = hsp.Robot.load(name, motor_inertia="bundled", locked=locked)
+    assert armature(fewer) == armature(whole)[1:]
+    again = recorded_robot(robot_record(whole))
+    assert armature(again) == armature(whole)
 
     def condition(robot: hsp.Robot) -> float:
         rest = np.zeros(robot.nv)
         return float(np.linalg.cond(robot.state(0.0, robot.home(), rest).mass_matrix))
 
     assert condition(whole) < 0.1 * condition(bare)
-
-
-def test_joints_that_are_named_have_their_own_and_the_others_what_is_bundled() -> None:
-    robot = hsp.Robot.load("panda", motor_inertia={"panda_joint7": 0.7})
-    assert armature(robot) == [0.1] * 6 + [0.7]
-    fingers = hsp.Robot.load("panda", locked={})  # they have no rotor
-    assert armature(fingers) == [0.1] * 7 + [0.0]
 
 
 def test_locking_combining_and_copying_keep_it() -> None:
@@ -125,7 +123,7 @@ def test_locking_combining_and_copying_keep_it() -> None:
         locked=dict.fromkeys(locks, 0.0),
         motor_inertia=own,
     )
-    assert armature(locked) == [0.1, 0.3, 0.1, 0.1, 0.1, 0.7]
+    assert armature(locked) == [0.0, 0.3, 0.0, 0.0, 0.0, 0.7]
     assert armature(deepcopy(locked)) == armature(locked)
     first = hsp.Robot.load("panda", motor_inertia=0.1)
     second = hsp.Robot.load("iiwa14", motor_inertia=[*range(1, 8)])
