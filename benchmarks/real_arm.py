@@ -3,10 +3,10 @@
     .venv/bin/python benchmarks/real_arm.py [--seeds N] [--arms panda,ur5] [--out FILE]
 
 The same wrong arms for all: masses and inertias ±20 %, centres of mass ±10 mm; and "as
-real", with a load of 0.5 kg, 0.05 kg m² of rotor more than the model has, friction that
-no model contains, 2 ms of delay, a lag of 3 ms and velocities with noise. Each law has
-the gains of its own project. Writes benchmarks/results/real_arm.md. A peer that is not
-installed is left out, and named.
+real", with a load of 0.5 kg, rotors of 0.05 kg m² and friction that no model contains,
+2 ms of delay, a lag of 3 ms and velocities with noise. Each law has the gains of its
+own project. Writes benchmarks/results/real_arm.md. A peer that is not installed is left
+out, and named.
 """
 
 import argparse
@@ -46,7 +46,8 @@ PEERS = {
     "tsid_pose": "TSID",
 }
 GUESSED = 0.1
-"""Rotors in the model of one row, where an arm comes without any [kg m²]."""
+"""Rotors in the model of one row, twice those of the arms as real [kg m²]."""
+ROTORS = f"this law, motor_inertia: {GUESSED:g}"
 WITHOUT, OURS = "this law, no observer", "this law, as it comes"
 IMPEDANCE = "this law, crisp's impedance"
 
@@ -174,11 +175,8 @@ def laws(
         WITHOUT: lambda: chain(Compensation(momentum_observer=None)),
         IMPEDANCE: lambda: chain(Compensation(), impedance=True),
     }
-    if kind == "real":
-        # Bundled arms come with rotors: without them; others with a guess.
-        other = 0.0 if case.robot.model.armature.any() else GUESSED
-        name = f"this law, motor_inertia: {other:g}"
-        found[name] = lambda: chain(Compensation(), rotors=other)
+    if kind == "real":  # else the arms have no rotors
+        found[ROTORS] = lambda: chain(Compensation(), rotors=GUESSED)
     if case.robot.nq != case.robot.nv:  # peers subtract postures
         return found
     for module, name in PEERS.items():
@@ -213,31 +211,45 @@ def main() -> None:
     parser.add_argument("--out", type=Path, default=PAGE)
     options = parser.parse_args()
     missing: dict[str, str] = {}
-    lines = [INTRODUCTION.format(seeds=options.seeds)]
-    for kind, words in KINDS.items():
-        lines += ["", f"## {words[0].upper()}{words[1:]}", "", HEADER]
-        for arm in options.arms.split(","):
-            still, moving = Case(arm, moves=False), Case(arm, moves=True)
-            runs: dict[str, list[list[Run]]] = {}
-            for case in (still, moving):
-                for name, make in track(
-                    laws(case, kind, missing).items(), f"{arm}, {kind}", transient=True
-                ):
-                    own = [
-                        measured(case, wrong_arm(case, kind, seed), make())
-                        for seed in range(options.seeds)
-                    ]
-                    runs.setdefault(name, []).append(own)
-            for name, (held, circled) in runs.items():
-                lines.append(row(arm, name, held, circled))
+    introduction = INTRODUCTION.format(seeds=options.seeds)
+    tables: dict[str, list[str]] = {kind: [] for kind in KINDS}
+    ending: list[str] = []
+
+    def write() -> None:
+        lines = [introduction]
+        for kind, words in KINDS.items():
+            title = f"{words[0].upper()}{words[1:]}"
+            lines += ["", f"## {title}", "", HEADER, *tables[kind]]
+        why = [f"\nNot installed: {name} ({why})." for name, why in missing.items()]
+        text = "\n".join([*lines, *ending, *why]) + "\n"
+        options.out.write_text(text, encoding="utf-8")
+
+    for arm in options.arms.split(","):
+        for kind in KINDS:
+            tables[kind] += rows(arm, kind, options.seeds, missing)
+        write()  # what there is
     case = Case("panda", moves=False)
-    lines += ["", "## The delay that is borne", "", BORNE, ""]
-    lines += ["| law | Panda [ms] |", "|---|--:|"]
+    ending += ["", "## The delay that is borne", "", BORNE, ""]
+    ending += ["| law | Panda [ms] |", "|---|--:|"]
     for name, make in laws(case, "exact", missing).items():
-        lines.append(f"| {name} | {borne_delay(case, make)} |")
-    lines += [f"\nNot installed: {name} ({why})." for name, why in missing.items()]
-    options.out.write_text("\n".join(lines) + "\n", encoding="utf-8")
+        ending.append(f"| {name} | {borne_delay(case, make)} |")
+    write()
     print(f"Wrote {options.out}")
+
+
+def rows(arm: str, kind: str, seeds: int, missing: dict[str, str]) -> list[str]:
+    """Return the lines of an arm."""
+    runs: dict[str, list[list[Run]]] = {}
+    for case in (Case(arm, moves=False), Case(arm, moves=True)):
+        for name, make in track(
+            laws(case, kind, missing).items(), f"{arm}, {kind}", transient=True
+        ):
+            own = [
+                measured(case, wrong_arm(case, kind, seed), make())
+                for seed in range(seeds)
+            ]
+            runs.setdefault(name, []).append(own)
+    return [row(arm, name, held, circled) for name, (held, circled) in runs.items()]
 
 
 def row(arm: str, name: str, held: list[Run], circled: list[Run]) -> str:
@@ -262,7 +274,8 @@ def _number(value: float) -> str:
 
 
 BORNE = """\
-With which a pose settles on the model itself, with its rotors."""
+With which a pose settles on the model itself, whose wrist has no rotors: a damping of
+10 N·m·s/rad on 0.007 kg m² bears less than a period."""
 HEADER = (
     "| arm | law | held: hand [mm] | angle [°] | circle: hand [mm] | angle [°] "
     "| effort's change [N·m] | rests |\n|---|---|--:|--:|--:|--:|--:|--:|"
@@ -281,13 +294,11 @@ Gains are those of each project: crisp_py's for a Franka, Isaac-Reach-Franka-OSC
 robosuite's `osc_pose.json`, pink's example with Kp = 100 and Kv = 20 in joint space.
 TSID has the gains and weights of its UR5 exercise (Kp = 5).
 This law has its defaults (Kp = 100, Kv = 20, K_N = 10): without an observer, as it
-comes, and with crisp's stiffness as its impedance, where the observer is off because a
-spring must yield. Panda and iiwa14 come with rotors, for every law; the arms as real
-have 0.05 kg m² more. One row has the bare links in this law's model
-(`motor_inertia: 0`). Other arms come without rotors; there one row has 0.1 kg m² for
-each joint, a guess. Targets of peers have no velocity, so that they follow a circle
-late. Jaco (kinova) has joints that turn on and on, whose angles peers subtract: it has
-no rows of theirs."""
+comes, with crisp's stiffness as its impedance, where the observer is off because a
+spring must yield, and with rotors in its model: 0.1 kg m² for each joint, a guess,
+where the arms as real have 0.05. Targets of peers have no velocity, so that they follow
+a circle late. Jaco (kinova) has joints that turn on and on, whose angles peers
+subtract: it has no rows of theirs."""
 
 
 if __name__ == "__main__":
