@@ -177,7 +177,8 @@ def lines(found: ModelErrors) -> dict[str, str]:
     )
     if found.rotor < np.inf:
         texts["bears"] += (
-            f"; rotors of up to {found.rotor:.2g} kg m² that the model lacks"
+            f"; rotors of up to {found.rotor:.2g} kg m² that the model lacks, see "
+            "robot: motor_inertia"
         )
         if found.rotor < USUAL_ROTOR:
             texts["rotors"] = (
