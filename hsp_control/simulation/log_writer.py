@@ -279,6 +279,7 @@ class LogWriter:
                 "nv": robot.nv,
                 "dofs": list(robot.dof_names),
                 "units": list(robot.units),
+                "rotors": bool(robot.model.armature.any()),
                 "continuous": continuous_dofs(robot),
                 "skeleton_parents": self._parents,
                 "joint_coordinates": robot.source.joint_coordinates,
