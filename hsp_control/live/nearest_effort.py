@@ -1,0 +1,62 @@
+"""The effort that a robot's rates permit, and that accelerates nearly as another."""
+
+import numpy as np
+
+from hsp_control.common.arrays import Array
+from hsp_control.compiled.kernels import kernel
+
+_SWEEPS = 30
+"""How often each joint's effort is adapted to those of the others, at most."""
+_NEAR = 1e-10
+"""Change of a sweep that does not count, relative to the first one."""
+
+
+def nearest_effort(
+    wanted: Array, least: Array, most: Array, inertia: Array
+) -> Array | None:
+    """Return the effort within bounds whose acceleration is nearest to that of another.
+
+    It minimizes aᵀ M a, where a = M⁻¹ (tau - wanted) is the acceleration that is wrong.
+    Where a heavy joint's effort lags behind, a light one's, which can follow, keeps the
+    acceleration that it was to have; clipped joint by joint it would be thrown.
+
+    Args:
+        wanted: The effort that is wanted, shape (nv,) [N·m or N].
+        least: The least effort of each joint, shape (nv,).
+        most: The greatest, shape (nv,).
+        inertia: The mass matrix M, shape (nv, nv).
+
+    Returns:
+        The effort, shape (nv,); None if M has no inverse.
+    """
+    try:
+        inverse = np.linalg.inv(inertia)
+    except np.linalg.LinAlgError:
+        return None
+    nearest = np.empty(wanted.size)
+    _write_nearest(inverse, wanted, least, most, nearest)
+    return nearest if np.isfinite(nearest).all() else None
+
+
+@kernel
+def _write_nearest(
+    inverse: Array, wanted: Array, least: Array, most: Array, nearest: Array
+) -> None:
+    """Minimize (x - wanted)ᵀ M⁻¹ (x - wanted) joint by joint, again and again."""
+    n, first = wanted.size, 0.0
+    for i in range(n):
+        nearest[i] = min(max(wanted[i], least[i]), most[i])
+    for sweep in range(_SWEEPS):
+        largest = 0.0
+        for i in range(n):
+            wrong = 0.0
+            for j in range(n):
+                wrong += inverse[i, j] * (nearest[j] - wanted[j])
+            value = nearest[i] - wrong / inverse[i, i]
+            value = min(max(value, least[i]), most[i])
+            largest = max(largest, abs(value - nearest[i]))
+            nearest[i] = value
+        if sweep == 0:
+            first = largest
+        if largest <= _NEAR * first:
+            break
