@@ -30,7 +30,7 @@ def nearest_effort(
         The effort, shape (nv,); None if M has no inverse.
     """
     try:
-        inverse = np.linalg.inv(inertia)
+        inverse: Array = np.linalg.inv(inertia).astype(float)
     except np.linalg.LinAlgError:
         return None
     nearest = np.empty(wanted.size)

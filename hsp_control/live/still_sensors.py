@@ -4,7 +4,7 @@ from math import ceil, exp
 
 import numpy as np
 
-from hsp_control.common.arrays import Array, Flags
+from hsp_control.common.arrays import Array, Flags, Indices
 from hsp_control.live.settings import LiveSettings
 from hsp_control.robot import Robot
 
@@ -107,7 +107,7 @@ class StillSensors:
             "beyond what holds it; its sensor is dead, or it is blocked"
         )
 
-    def _holding(self, standing: Array, q: Array, v: Array, tau: Array) -> Array:
+    def _holding(self, standing: Indices, q: Array, v: Array, tau: Array) -> Array:
         """Return what must hold some joints, so that they stand under an effort."""
         # By Gauss's principle: M⁻¹ of these joints times the force is what they lack.
         state = self._robot.state(0.0, q, v)

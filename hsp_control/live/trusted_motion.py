@@ -262,8 +262,9 @@ class TrustedMotion:
         least, most = np.minimum(expected, 0.0), np.maximum(expected, 0.0)
         beyond = np.maximum(used - most, least - used)
         allowed = self._error + _SPREAD * np.abs(self._expected.v[2])
-        left: Flags = beyond > allowed
-        return left & (self._positions | self._velocities) & self._judged
+        left: Flags = (beyond > allowed) & self._judged
+        left &= self._positions | self._velocities
+        return left
 
     def _described(self, i: int, v: Array, *, runs: bool) -> str:
         name, unit = self._robot.dof_names[i], self._robot.units[i]
