@@ -83,11 +83,14 @@ class Kept:
         return found
 
     def save_overload(self, sig: Any, data: Any) -> None:
-        """Keep code that was compiled."""
+        """Keep code that was compiled; a full disk only costs the time of the next."""
         if self._own is None:
             _warn_of_no_cache()
-        else:
+            return
+        try:
             self._own.save_overload(sig, data)
+        except OSError:
+            _warn_of_no_cache()
 
 
 class Stamp:

@@ -171,6 +171,16 @@ def test_the_machine_code_of_a_wheel(installed: Path, tmp_path: Path) -> None:
     assert sorted(shipped.iterdir()) == before
 
 
+def test_where_the_disk_is_full_it_still_runs_and_says_so(
+    installed: Path, tmp_path: Path
+) -> None:
+    full = "import resource as r; r.setrlimit(r.RLIMIT_FSIZE, (100, 100))\n"
+    ran = run(installed, full + KERNELS, NUMBA_CACHE_DIR=str(tmp_path / "full"))
+    assert ran.returncode == 0, ran.stderr
+    assert ran.stdout.strip() == COMPILED
+    assert "compiled code cannot be kept" in ran.stderr
+
+
 def test_where_nothing_can_be_written_it_still_runs_and_says_so(
     read_only: Path,
 ) -> None:
