@@ -210,7 +210,6 @@ class TrustedMotion:
         self.doubtful = self.fault is None and bool((check.doubtful & both).any())
         v = np.where(self._positions, check.slope, expected.v[2])
         v = np.where(self._velocities, new.v, v)
-        v = np.where(self._contrary, -new.v, v)
         way = self._robot.difference(self._q, new.q)
         way = np.where(self._positions, way, passed * v)
         self._q = self._robot.integrate(self._q, way)

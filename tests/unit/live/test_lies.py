@@ -453,3 +453,45 @@ def test_wrong_masses_are_no_lie(share: float) -> None:
     settings = replace(SETTINGS, velocity_margin=1.0)
     report = run_loop(moving(), robot, duration=1.5, settings=settings)
     assert report.ended == "completed", report.reason
+
+
+def test_motion_as_small_as_its_noise_has_no_sign() -> None:
+    check = ResponseCheck(0.3, np.ones(1, dtype=bool))
+    for k in range(1000):
+        t = k * PERIOD
+        v = np.array([-0.01 * np.sin(8.0 * t)])
+        check.update(np.array([0.08 * np.cos(8.0 * t)]), v, PERIOD)
+        assert not check.contrary.any()
+
+
+@pytest.mark.parametrize(("share", "dead"), [(0.15, False), (0.25, True)])
+def test_a_joint_may_be_held_by_friction_where_the_masses_are_wrong(
+    share: float, dead: bool
+) -> None:
+    """Beside its friction a fifth of its gravity may be an error of the model."""
+    robot, zero = panda(), np.zeros(7)
+    limits = SETTINGS.effort_limits(robot)
+    sensors = StillSensors(robot, SETTINGS, limits, PERIOD)
+    gravity = robot.inverse_dynamics(start(), zero, zero)
+    friction = SETTINGS.friction * limits[3]
+    pushed = (friction + share * abs(gravity[3])) * np.eye(7)[3]
+    for _ in range(60):
+        sensors.update(zero, zero, zero, PERIOD)
+        sensors.judge(start(), zero, gravity + pushed)
+    assert bool(sensors.dead[3]) == dead
+    assert sensors.dead.sum() == dead
+
+
+def test_a_robot_that_stops_by_itself_does_not_throw_its_wrist() -> None:
+    """Its shoulder pushes with 40 N·m, which end by its rate."""
+    robot = watched(SETTINGS)
+    at_start = panda().inverse_dynamics(start(), np.zeros(7), np.zeros(7))
+    for k in range(40):
+        robot.advance([at_start + (k + 1) * np.eye(7)[1]])
+    speed = np.abs(robot.v)
+    robot.halt("enough")
+    fastest = np.zeros(7)
+    for _ in range(60):
+        robot.advance([])
+        fastest = np.maximum(fastest, np.abs(robot.v))
+    assert (fastest[4:] <= np.maximum(FASTER * speed[4:], 0.3)).all()
