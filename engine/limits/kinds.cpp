@@ -3,12 +3,13 @@
 #include "../src/rooms.hpp"
 #include "acceleration_bounds.hpp"
 #include "check.hpp"
+#include "nearest_effort.hpp"
 #include "sent_effort.hpp"
 #include "support.hpp"
 
 namespace hsp {
 const Kind* const* limit_kinds() {
-  return kinds<Copy, AccelerationBounds, Within, EffortWindow, ExpectedVelocity, Observe, CheckLaw,
-               CheckLimits, ForceMap, MinimumNormForces, WithinCones>();
+  return kinds<NearestEffort, Copy, AccelerationBounds, Within, EffortWindow, ExpectedVelocity,
+               Observe, CheckLaw, CheckLimits, ForceMap, MinimumNormForces, WithinCones>();
 }
 }  // namespace hsp

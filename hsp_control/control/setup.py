@@ -31,6 +31,7 @@ from hsp_control.control.evolution import (
 from hsp_control.declaration import Part, within
 from hsp_control.declaration.language import check_kind, shortened
 from hsp_control.declaration.nested import parts_within, with_parts_replaced
+from hsp_control.declaration.quantities import LARGEST
 from hsp_control.geometry.scene import Obstacle, Scene, Start
 from hsp_control.law import VARYING, MetricSample
 from hsp_control.null_space.fields import FieldSum, NullSpaceField, Rest
@@ -105,6 +106,11 @@ def checked_gain(gain: ArrayLike, robot: Robot, metric: Metric) -> Array:
     configurations.
     """
     K_N = as_matrix(np.asarray(gain, dtype=float), robot.nv, "null_space_gain")
+    if np.abs(K_N).max() > LARGEST:
+        raise GainError(
+            f"null_space_gain contains {np.abs(K_N).max():g}, which is absurdly large; "
+            f"its size must be {LARGEST:g} at most"
+        )
     if metric.form == VARYING:
         if not np.array_equal(K_N, K_N[0, 0] * np.eye(robot.nv)):
             raise GainError(

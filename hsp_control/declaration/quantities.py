@@ -35,10 +35,37 @@ def plain(value: Any) -> Any:
     return value
 
 
+LARGEST = 1e30
+"""No length, time, mass or gain is larger, in whatever units: products of some such
+numbers are still doubles, and so are those of the inverses of positive ones."""
+
+
+def _not_huge(value: float) -> float:
+    if abs(value) > LARGEST:
+        raise ValueError(
+            f"{value:g} is absurdly large; its size must be {LARGEST:g} at most"
+        )
+    return value
+
+
+def _not_tiny(value: float) -> float:
+    if value < 1.0 / LARGEST:
+        raise ValueError(
+            f"{value:g} is absurdly small; must be {1.0 / LARGEST:g} at least"
+        )
+    return value
+
+
 _PLAIN = BeforeValidator(plain)
-Number = Annotated[float, Strict(), Field(allow_inf_nan=False), _PLAIN]
-Positive = Annotated[float, Strict(), Field(gt=0.0, allow_inf_nan=False), _PLAIN]
-NonNegative = Annotated[float, Strict(), Field(ge=0.0, allow_inf_nan=False), _PLAIN]
+_SIZE = AfterValidator(_not_huge)
+_LEAST = AfterValidator(_not_tiny)
+Number = Annotated[float, Strict(), Field(allow_inf_nan=False), _PLAIN, _SIZE]
+Positive = Annotated[
+    float, Strict(), Field(gt=0.0, allow_inf_nan=False), _PLAIN, _SIZE, _LEAST
+]
+NonNegative = Annotated[
+    float, Strict(), Field(ge=0.0, allow_inf_nan=False), _PLAIN, _SIZE
+]
 Share = Annotated[float, Strict(), Field(ge=0.0, lt=1.0, allow_inf_nan=False), _PLAIN]
 """0 ≤ x < 1."""
 Fraction = Annotated[

@@ -4,6 +4,7 @@ import numpy as np
 
 from hsp_control.common.arrays import Array
 from hsp_control.constraints.limits import RobotLimits
+from hsp_control.live.nearest_effort import nearest_effort
 from hsp_control.live.sent_efforts import SentEfforts
 from hsp_control.live.settings import LiveSettings
 from hsp_control.robot import Robot
@@ -46,6 +47,7 @@ class EffortLimiter:
         self._most: Array = np.zeros(robot.nv)
         self._before = self._least, self._most
         self._unanswered, self._says = 0, False
+        nearest_effort(self.sent, self.sent, self.sent, np.eye(robot.nv))  # compiles
 
     @property
     def effort_limits(self) -> Array:
@@ -121,12 +123,17 @@ class EffortLimiter:
             self._least = np.minimum(least, self.sent)
             self._most = np.maximum(most, self.sent)
 
-    def apply(self, tau: Array, q: Array) -> bool:
+    def apply(self, tau: Array, q: Array, inertia: Array | None = None) -> bool:
         """Compute ``sent`` from an effort; return whether tau is finite, else it stays.
 
         The effort is clipped to its limits first, then the sent value to its rate. If
         some value satisfies both limits, the result does. The rate counts from all
         efforts that the robot may have.
+
+        With the mass matrix ``inertia``, shape (nv, nv), a joint whose effort can
+        follow at once holds its own acceleration where a heavier one's lags behind
+        (`nearest_effort`). Clipped joint by joint, an arm that must stop while it
+        accelerates would throw its wrist.
         """
         if not np.isfinite(tau).all():
             return False
@@ -134,7 +141,14 @@ class EffortLimiter:
             self.gravity = self._robot.inverse_dynamics(q, self._rest, self._rest)
         wanted = np.clip(tau, -self._upper, self._upper) - self._added_by_robot
         lower, upper = self._most - self._step, self._least + self._step
-        np.clip(wanted, lower, upper, out=self.sent)
+        within = np.clip(wanted, lower, upper)
+        if inertia is not None and not np.array_equal(within, wanted):
+            borne = self._added_by_robot
+            lower = np.clip(-self._upper - borne, lower, upper)
+            upper = np.clip(self._upper - borne, lower, upper)
+            nearest = nearest_effort(wanted, lower, upper, inertia)
+            within = within if nearest is None else nearest
+        self.sent = within
         self.applied = self.sent + self._added_by_robot
         self._before = self._least, self._most
         self._least = self._most = self.sent.copy()

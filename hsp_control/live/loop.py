@@ -311,7 +311,10 @@ class LiveRun:
             tau = self.stop_effort()
         limiter.follow(self.chain.command.controller.limits)
         before = limiter.sent.copy()
-        if tau is not None and not limiter.apply(tau, reader.state.q):
+        # The stop must brake all joints at once, and the law's effort is sent as it is.
+        stops = self.phase != Phase.RUNNING
+        inertia = reader.state.mass_matrix if stops else None
+        if tau is not None and not limiter.apply(tau, reader.state.q, inertia):
             self.stop("fault", f"the effort is not finite: {tau.tolist()}")
         self.send(before)
         response = reader.effort_sent(limiter.applied)
@@ -399,6 +402,7 @@ class LiveRun:
         self.phase = Phase.DAMPING
         self.ended, self.reason, self.error = ended, reason, error
         self.safe_stop.begin()
+        self.reader.stop()
 
     def fail(self, error: BaseException) -> None:
         """Stop because of what a user's code or the law raised."""

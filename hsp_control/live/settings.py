@@ -93,6 +93,9 @@ class LiveSettings(Part, error=LiveError):
     velocity_error: Positive = 0.3
     """How far a measured joint velocity may be from the slopes of its positions in the
     last 50 ms [rad/s or m/s]: six times its noise."""
+    friction: NonNegative = 0.1
+    """Largest friction that may hold a joint at rest, relative to its effort limit. A
+    joint that stands to the last bit under more than that has a dead sensor [-]."""
     start_timeout: Positive = 10.0
     """Maximum time to wait for the first state [s]."""
     watchdog: PositiveCount = 20

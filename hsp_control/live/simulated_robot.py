@@ -219,7 +219,8 @@ class SimulatedRobot:
             state = self._state.update(self.t, self.q, self.v)
             if self.plant.robot.unactuated:
                 self._feet.update(self._pressed())
-            self._limiter.apply(self._stop.effort(state), self.q)
+            effort = self._stop.effort(state)
+            self._limiter.apply(effort, self.q, state.mass_matrix)
             self.phase = self._stop.phase
         self.tau = self._limiter.applied
         end = (self.periods + 1) * self.period

@@ -501,6 +501,10 @@ class StateReader:
         self._last_arrival = self._clock()
         self._due = self._last_arrival + (1.0 + _READ_MARGIN) * self._period
 
+    def stop(self) -> None:
+        """From now on the joints are braked."""
+        self._motion.stop()
+
     def read(self, applied: Array, limits: RobotLimits | None) -> None:
         """Read the period's measurement; predict the state if there is none."""
         self._monitor.follow(limits)

@@ -1,13 +1,15 @@
 """What can be trusted of a joint's measured motion: velocity, positions, or neither."""
 
-from math import exp
+from math import exp, inf
 
 import numpy as np
 
 from hsp_control.common.arrays import Array, Flags, Indices
 from hsp_control.common.exceptions import HspControlError
 from hsp_control.control.measurement import Measurement
+from hsp_control.live.response_check import ResponseCheck
 from hsp_control.live.settings import LiveSettings
+from hsp_control.live.still_sensors import StillSensors
 from hsp_control.live.velocity_check import VelocityCheck
 from hsp_control.robot import Robot
 
@@ -21,6 +23,8 @@ _CLEARLY = 0.5
 """One source is right, and the other wrong, if it surprised by so much less."""
 _SPREAD = 0.25
 """A joint's velocity may be further from what is expected by this part of that."""
+_LAST = 20
+"""Periods of the safe stop that follow the death of a sensor of a joint at rest."""
 _SMALL = 2.0
 """A contradiction up to this, relative to the error of velocities, may be the lag."""
 
@@ -36,6 +40,7 @@ class ExpectedMotion:
     Attributes:
         v: The velocities that are expected, shape (3, nv) [rad/s or m/s].
         surprise: The largest differences of late, shape (3, nv).
+        acceleration: What the efforts applied cause by the model, shape (nv,).
     """
 
     def __init__(self, robot: Robot, error: float, period: float) -> None:
@@ -50,7 +55,7 @@ class ExpectedMotion:
         self.v: Array = np.tile(v, (3, 1))
         self.surprise: Array = np.zeros((3, v.size))
         self._missed = np.zeros((3, v.size))
-        self._acceleration = np.zeros(v.size)
+        self.acceleration: Array = np.zeros(v.size)
 
     def apply(self, q: Array, v: Array, tau: Array) -> None:
         """Record the effort that acts from now on, shape (nv,), at a state."""
@@ -61,11 +66,11 @@ class ExpectedMotion:
         except HspControlError:
             return
         if np.isfinite(acceleration).all():
-            self._acceleration = acceleration
+            self.acceleration = acceleration
 
     def advance(self, passed: float) -> None:
         """Go on for some time [s]."""
-        self.v = self.v + passed * (self._acceleration + self._missed)
+        self.v = self.v + passed * (self.acceleration + self._missed)
 
     def follow(
         self, velocity: Array, slope: Array, known: Indices, passed: float
@@ -96,6 +101,11 @@ class TrustedMotion:
     velocity. Where both are wrong, or the sensor is dead, the expectation is used. What
     was wrong once is not used again.
 
+    Where both agree and are wrong, the efforts tell: a joint that says nothing though
+    it is pushed (`StillSensors`), one that goes the other way (`ResponseCheck`), and in
+    the safe stop one that is braked and speeds up. Then no effort of ours is of use,
+    and the loop leaves it to the robot.
+
     Attributes:
         fault: What contradicts what, or None.
         doubtful: Whether the last measurement should not be used, though it is no fault
@@ -109,14 +119,25 @@ class TrustedMotion:
         self._robot, self._error = robot, settings.velocity_error
         self._check = VelocityCheck(robot, settings, period)
         self._expected = ExpectedMotion(robot, settings.velocity_error, period)
+        limits = settings.effort_limits(robot)
+        self._sensors = StillSensors(robot, settings, limits, period)
+        # Nobody knows what the feet of a robot with a floating base push.
+        self._judged = np.full(robot.nv, not robot.unactuated)
+        self._response = ResponseCheck(settings.velocity_error, self._judged)
+        self._soon = max(settings.prediction_time - _LAST * period, 0.0)
         self.restart()
 
     def restart(self) -> None:
         """Trust everything."""
         self._check.restart()
+        self._sensors.restart()
+        self._response.restart()
+        self._contrary = np.zeros(self._robot.nv, dtype=bool)
         self.last: Measurement | None = None
         self._q: Array = np.zeros(0)  # the last trusted configuration
         self.complete = True
+        self._useless = False  # whether efforts do not what they should
+        self._stopping = False  # whether the joints are braked
         self._moving = False  # whether the robot's clock has begun
         self._positions = np.ones(self._robot.nv, dtype=bool)
         self._velocities = np.ones(self._robot.nv, dtype=bool)
@@ -134,9 +155,15 @@ class TrustedMotion:
         """Joints whose positions are trusted, shape (nv,)."""
         return self._positions
 
+    def stop(self) -> None:
+        """From now on the joints are braked: what speeds up is wrong, or its motor."""
+        self._stopping = True
+
     def applied(self, q: Array, v: Array, tau: Array) -> None:
         """Record the effort that acts from now on, shape (nv,), at a state."""
         self._expected.apply(q, v, tau)
+        if self.complete and self._moving:
+            self._sensors.judge(q, v, tau)
 
     def update(self, new: Measurement, passed: float, jumps: Flags) -> Measurement:
         """Return a measurement of what can be trusted; set the fault.
@@ -161,7 +188,12 @@ class TrustedMotion:
             expected.begin(np.where(np.abs(slope) < np.abs(new.v), slope, new.v))
         expected.advance(passed)
         check.update(way, new.v, passed)
+        self._sensors.update(way, new.v, check.mean, passed)
+        if self.complete:
+            self._response.update(expected.acceleration, check.mean, passed)
         known = self._velocities.astype(np.int64) + self._positions
+        if self._stopping:  # what is braked must obey
+            known = np.minimum(known, 1)
         expected.follow(check.mean, check.slope, known, passed)
         self._judge(new.v, jumps)
         if self.complete:
@@ -170,6 +202,10 @@ class TrustedMotion:
             return new
         all_known = (self._velocities | self._positions).all()
         self.unknown_for = 0.0 if all_known else self.unknown_for + passed
+        if self._sensors.dead.any():  # nobody knows how fast it is
+            self.unknown_for = max(self.unknown_for, self._soon)
+        if self._useless:
+            self.unknown_for = inf
         both = self._positions & self._velocities
         self.doubtful = self.fault is None and bool((check.doubtful & both).any())
         v = np.where(self._positions, check.slope, expected.v[2])
@@ -182,8 +218,11 @@ class TrustedMotion:
     def _judge(self, v: Array, jumps: Flags) -> None:
         """Find what is wrong now, and what is not trusted from now on."""
         check = self._check
-        wrong = check.contradicted | check.dead | jumps
-        if self.complete and not wrong.any():
+        dead = check.dead | self._sensors.dead
+        contrary = self._response.contrary
+        wrong = check.contradicted | jumps
+        runs = self._left(v) if self._stopping else np.zeros(v.size, dtype=bool)
+        if self.complete and not (wrong | dead | contrary | runs).any():
             return
         both = self._positions & self._velocities
         wrong &= both
@@ -196,29 +235,55 @@ class TrustedMotion:
         self._positions &= ~wrong | good_q
         smooth = np.abs(v - self._expected.v[0]) < 0.5 * self._error
         self._velocities &= ~wrong | (good_v & ~jumps) | (jumps & smooth)
-        lost = check.dead & (self._positions | self._velocities)
-        lost |= self._left(v)
+        lost = dead & (self._positions | self._velocities)
+        if self.complete:
+            self._contrary |= contrary & both
+            lost |= contrary & both
+        lost |= runs | self._left(v) & (self._positions ^ self._velocities)
+        # Efforts do harm where a joint goes against them: only the robot can brake.
+        self._useless |= bool(runs.any() or self._contrary.any())
         self._positions &= ~lost
         self._velocities &= ~lost
         self.complete = bool(self._positions.all() and self._velocities.all())
         if (wrong | lost).any():
             i = int(np.flatnonzero(wrong | lost)[0])
-            self.fault = self._described(i, v, bool(check.dead[i]))
+            self.fault = self._described(i, v, runs=bool(runs[i]))
 
     def _left(self, v: Array) -> Flags:
-        """Return the joints whose only source left what the model expects."""
-        expected, slope = self._expected.v, self._check.slope
-        used = np.where(self._velocities, v - expected[0], slope - expected[1])
-        allowed = self._error + _SPREAD * np.abs(expected[2])
-        left: Flags = np.abs(used) > allowed
-        return left & (self._positions ^ self._velocities)
+        """Return the joints that a trusted source says have left what is expected.
 
-    def _described(self, i: int, v: Array, dead: bool) -> str:
+        A joint that is slower than expected is braked by its friction, too; what is
+        wrong drives it, and then it is faster, or goes the other way.
+        """
+        slope, by_v, by_q = self._check.slope, self._expected.v[0], self._expected.v[1]
+        used = np.where(self._velocities, v, slope)
+        expected = np.where(self._velocities, by_v, by_q)
+        least, most = np.minimum(expected, 0.0), np.maximum(expected, 0.0)
+        beyond = np.maximum(used - most, least - used)
+        allowed = self._error + _SPREAD * np.abs(self._expected.v[2])
+        left: Flags = (beyond > allowed) & self._judged
+        left &= self._positions | self._velocities
+        return left
+
+    def _described(self, i: int, v: Array, *, runs: bool) -> str:
         name, unit = self._robot.dof_names[i], self._robot.units[i]
-        if dead:
+        if self._check.dead[i]:
             return (
                 f"{name} stands from one state to the next, where the model expects "
                 f"{self._expected.v[2, i]:.3g} {unit}/s: its sensor is dead"
+            )
+        if self._sensors.dead[i]:
+            return f"the state of {name} stands to the last bit: {self._sensors.why(i)}"
+        if self._contrary[i]:
+            return (
+                f"{name} goes the other way than its effort drives it: its sensor or "
+                "its motor has the wrong sign"
+            )
+        if runs:
+            return (
+                f"{name} is braked, and moves at {v[i]:.3g} {unit}/s where "
+                f"{self._expected.v[2, i]:.3g} {unit}/s are expected: its efforts do "
+                "not what they should"
             )
         return (
             f"the velocity of {name} contradicts its positions: {v[i]:.3g} {unit}/s "

@@ -47,7 +47,8 @@ class Structure:
             ``root_joint.x`` if the joint has several, ``neck.roll`` if it is a ball.
         units: The unit of each degree of freedom, ``rad`` or ``m``.
         single_dof_joints: (index in v, start in q, size in q) of every joint with one
-            degree of freedom, shape (k, 3); the size is 2 for continuous joints.
+            degree of freedom, and of each slide of a joint of several, shape (k, 3);
+            the size is 2 for continuous joints.
         unit_blocks: (start, size) of every quaternion and (cos, sin) pair in q.
         flat: Whether every joint has one degree of freedom, so that δ' = v holds
             globally for q = base ⊕ δ.
@@ -86,7 +87,7 @@ class Structure:
             for joint, _, label in dofs
         )
         self.single_dof_joints: Indices = np.array(
-            [(j.idx_v, j.idx_q, j.nq) for j in joints if j.nv == 1], dtype=np.int64
+            [row for joint in joints for row in _coordinates(joint)], dtype=np.int64
         ).reshape(-1, 3)
         self.unit_blocks: tuple[tuple[int, int], ...] = tuple(
             _unit_block(joint) for joint in joints if joint.nq == joint.nv + 1
@@ -98,9 +99,9 @@ class Structure:
             joint.idx_v + k for joint in joints if _floats(joint) for k in range(6)
         )
         self.dof_indices: Indices = np.full(self.nv, -1, dtype=np.int64)
-        for joint in joints:
-            if joint.nq == joint.nv == 1:
-                self.dof_indices[joint.idx_v] = joint.idx_q
+        for i, at, size in self.single_dof_joints:
+            if size == 1:
+                self.dof_indices[i] = at
         self._home: Array | None = None
         if home is not None and len(home) == self.nv:
             # some SRDFs give postures beyond the limits
@@ -348,6 +349,15 @@ def _dof_labels(joint: Any) -> tuple[str, ...]:
         return "x", "y", "z"
     roots = {3: ("x", "y", "yaw"), 6: ("x", "y", "z", "roll", "pitch", "yaw")}
     return roots.get(joint.nv, tuple(map(str, range(joint.nv))))
+
+
+def _coordinates(joint: Any) -> list[tuple[int, int, int]]:
+    """Return (index in v, start in q, size in q) of each coordinate of its own."""
+    if joint.nv == 1:
+        return [(joint.idx_v, joint.idx_q, joint.nq)]
+    if joint.nq != joint.nv:  # a ball, a plane, a root
+        return []
+    return [(joint.idx_v + k, joint.idx_q + k, 1) for k in range(joint.nv)]
 
 
 def _unit_block(joint: Any) -> tuple[int, int]:

@@ -190,3 +190,6 @@ LIES: dict[str, Lie] = {
     )
     for name, lie in lies.items()
 }
+
+THE_SIGN: Lie = _both(lambda s: (2.0 * _begun(s).q - s.q[-1], -s.v[-1]))
+"""Position and velocity agree with each other, and nothing with the efforts."""

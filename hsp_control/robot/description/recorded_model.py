@@ -24,6 +24,7 @@ _JOINTS: dict[str, Any] = {
         "JointModelTranslation",
     )
 }  # fmt: skip
+_TURNING = "JointModelRevoluteUnboundedUnaligned"
 _PER_POSITION = ("lowerPositionLimit", "upperPositionLimit")
 _PER_VELOCITY = (
     "velocityLimit", "effortLimit", "friction", "damping", "armature", "rotorInertia",
@@ -62,17 +63,11 @@ def model_data(model: pin.Model) -> dict[str, Any]:
     """
     joints = []
     for k in range(1, model.njoints):
-        joint = model.joints[k]
-        kind, name = joint.shortname(), model.names[k]
-        if kind not in _JOINTS:
-            raise ModelError(f"joint {name!r} is a {kind}, which no log contains")
-        own = joint.extract()
+        name = model.names[k]
         joints.append(
             {
                 "name": name,
-                "type": kind,
-                "axis": np.ravel(getattr(own, "axis", ())).tolist(),
-                "pitch": float(getattr(own, "pitch", 0.0)),
+                **_joint_data(model, k),
                 "parent": int(model.parents[k]),
                 "pose": _pose(model.jointPlacements[k]),
                 "inertia": _inertia(model.inertias[k]),
@@ -102,6 +97,92 @@ def model_data(model: pin.Model) -> dict[str, Any]:
     }
 
 
+def _joint_data(model: pin.Model, k: int) -> dict[str, Any]:
+    """Return what a joint's own model is made of."""
+    joint = model.joints[k]
+    if joint.shortname() == "JointModelMimic":
+        return _follower_data(model, k)
+    if (
+        joint.shortname() == _TURNING
+    ):  # Pinocchio does not tell its axis (seen with 4.1)
+        axis = _motion(model, k, k, 0.5)[3:] / 0.5
+        return {"type": _TURNING, "axis": _unit(axis), "pitch": 0.0}
+    return _kind_data(joint, model.names[k])
+
+
+def _kind_data(joint: Any, name: str) -> dict[str, Any]:
+    kind, own = joint.shortname(), joint.extract()
+    if kind == "JointModelComposite":
+        parts = zip(own.joints, own.jointPlacements, strict=True)
+        within = [{**_kind_data(j, name), "pose": _pose(pose)} for j, pose in parts]
+        return {"type": kind, "joints": within}
+    if kind not in _JOINTS or kind == _TURNING:
+        raise ModelError(f"joint {name!r} is a {kind}, which no log contains")
+    axis = np.ravel(getattr(own, "axis", ())).tolist()
+    return {"type": kind, "axis": axis, "pitch": float(getattr(own, "pitch", 0.0))}
+
+
+def _follower_data(model: pin.Model, k: int) -> dict[str, Any]:
+    """Return what a joint that mimics another one is made of.
+
+    Pinocchio does not tell which joint it was: its motion does.
+    """
+    own = model.joints[k].extract()
+    # `model.mimicked_joints` is not in the order of the followers (seen with 4.1).
+    leader = next(
+        j
+        for j in range(1, model.njoints)
+        if model.joints[j].nq and model.idx_qs[j] == model.joints[k].idx_q
+    )
+    # Of a follower that does not move, any joint is right.
+    way = _motion(model, leader, k, 0.5 / own.scaling) if own.scaling else _ABOUT_X
+    linear, angular = way[:3], way[3:]
+    turn, turns = float(np.linalg.norm(angular)), model.joints[leader].nq == 2
+    if turn < _LEAST:
+        kind, axis, pitch = "Prismatic", linear, 0.0
+    else:
+        pitch, axis = float(linear @ angular) / turn**2, angular
+        kind = "Revolute" if abs(pitch) < _LEAST else "Helical"
+    unit = _unit(axis)
+    letter = "XYZ"[int(np.argmax(unit))] if max(unit) == 1.0 else ""
+    if kind == "Helical" and not letter:  # Pinocchio crashes on it (seen with 4.1)
+        raise ModelError(
+            f"joint {model.names[k]!r} follows another one along a screw about "
+            f"{unit}, which no log contains"
+        )
+    short = kind[0] + ("UB" if turns and kind == "Revolute" else "")
+    long = f"{kind}{'Unbounded' if turns and kind == 'Revolute' else ''}Unaligned"
+    return {
+        "type": f"JointModel{short}{letter}" if letter else f"JointModel{long}",
+        "axis": [] if letter else unit,
+        "pitch": pitch if kind == "Helical" else 0.0,
+        "follows": [leader, float(own.scaling), float(own.offset)],
+    }
+
+
+def _motion(model: pin.Model, moved: int, k: int, by: float) -> Array:
+    """Return by which twist joint k moves if another one does [m and rad]."""
+    data, neutral = model.createData(), pin.neutral(model)
+    step = np.zeros(model.nv)
+    step[model.joints[moved].idx_v] = by
+    poses = []
+    for q in (neutral, pin.integrate(model, neutral, step)):
+        pin.forwardKinematics(model, data, q)
+        poses.append(data.liMi[k].copy())
+    twist: Array = pin.log6(poses[0].actInv(poses[1])).vector
+    return twist
+
+
+def _unit(axis: Array) -> list[float]:
+    rounded = np.round(axis / np.linalg.norm(axis), _DIGITS)
+    return [float(each) for each in rounded / np.linalg.norm(rounded)]
+
+
+_ABOUT_X = np.array([0.0, 0.0, 0.0, 1.0, 0.0, 0.0])
+_LEAST, _DIGITS = 1e-9, 14
+"""What is a rounding of nothing, and the digits of an axis."""
+
+
 def model_of(data: Mapping[str, Any]) -> pin.Model:
     """Return the model of JSON data.
 
@@ -116,17 +197,22 @@ def model_of(data: Mapping[str, Any]) -> pin.Model:
 
 def _model_of(data: Mapping[str, Any]) -> pin.Model:
     model = pin.Model()
-    model.name = str(data["name"])
-    model.gravity = pin.Motion(np.array(data["gravity"], dtype=float))
     for each in data["joints"]:
-        kind = _JOINTS[each["type"]]
-        arguments: list[Any] = [np.array(each["axis"])] if each["axis"] else []
-        if "JointModelH" in each["type"]:
-            arguments.append(float(each["pitch"]))
         parent = int(each["parent"])
         if not 0 <= parent < model.njoints:
             raise ValueError(f"joint {each['name']!r} has no parent {parent}")
-        model.addJoint(parent, kind(*arguments), _placement(each["pose"]), each["name"])
+        pose = _placement(each["pose"])
+        model.addJoint(parent, _joint_of(each), pose, each["name"])
+    for k, each in enumerate(data["joints"], start=1):
+        if "follows" in each:
+            leader, scaling, offset = each["follows"]
+            if not 0 < leader < model.njoints:
+                raise ValueError(f"joint {each['name']!r} has no leader {leader}")
+            model = pin.transformJointIntoMimic(
+                model, int(leader), k, float(scaling), float(offset)
+            )
+    model.name = str(data["name"])
+    model.gravity = pin.Motion(np.array(data["gravity"], dtype=float))
     for k, each in enumerate(data["joints"], start=1):
         model.inertias[k] = _inertia_of(each["inertia"])
     model.inertias[0] = _inertia_of(data["base_inertia"])
@@ -144,6 +230,32 @@ def _model_of(data: Mapping[str, Any]) -> pin.Model:
                 raise ValueError(f"{name} has shape {numbers.shape}; needs ({size},)")
             setattr(model, name, numbers)
     return model
+
+
+def _joint_of(data: Mapping[str, Any]) -> Any:
+    if data["type"] == "JointModelComposite":
+        whole = pin.JointModelComposite()
+        for each in data["joints"]:
+            whole.addJoint(_joint_of(each), _placement(each["pose"]))
+        return whole
+    if data["type"] == _TURNING:
+        return _turning(data["axis"])
+    arguments: list[Any] = [np.array(data["axis"])] if data["axis"] else []
+    if "JointModelH" in data["type"]:
+        arguments.append(float(data["pitch"]))
+    return _JOINTS[data["type"]](*arguments)
+
+
+def _turning(axis: Sequence[float]) -> Any:
+    """Return a joint that turns often about an axis, which only a URDF can say."""
+    xyz = " ".join(repr(float(each)) for each in axis)
+    text = (
+        '<robot name="one"><link name="a"/><link name="b"/>'
+        '<joint name="j" type="continuous"><parent link="a"/><child link="b"/>'
+        f'<axis xyz="{xyz}"/></joint></robot>'
+    )
+    model = pin.buildModelFromXML(text)
+    return model.joints[1].extract()  # a copy: the model goes
 
 
 def shapes_data(shapes: Sequence[BodyShape]) -> list[dict[str, Any]]:

@@ -499,7 +499,7 @@ def test_equality_looks_at_class_and_fields() -> None:
 
 
 @pytest.mark.parametrize(("kind", "allowed", "refused"), [
-    (Positive, [1e-300, 9.0], [0.0, -1.0, math.inf]),
+    (Positive, [1e-30, 9.0], [0.0, -1.0, math.inf]),
     (NonNegative, [0.0, 9.0], [-1e-300, math.inf]),
     (Share, [0.0, 0.99], [-1e-300, 1.0]),
     (Fraction, [1e-300, 1.0], [0.0, 1.01]),

@@ -251,12 +251,18 @@ def test_a_jump_is_farther_than_the_greatest_speed_over_the_gap(states: int) -> 
         assert (why is None) == fits
 
 
-def test_a_robot_at_rest_is_not_frozen() -> None:
-    """Its brakes hold it: the same state to the last bit, and a velocity of 0."""
+@pytest.mark.parametrize("friction", [1.0, 0.1])
+def test_a_robot_that_its_friction_can_hold_is_not_frozen(friction: float) -> None:
+    """The same state to the last bit, and a velocity of 0: brakes can hold all, and a
+    gear's friction not what the law wants by then."""
     still = always(replaced(q=start(), v=np.zeros(7)), 1)
-    patient = LiveSettings(stop=QUICK, velocity_margin=99.0)  # it is not held here
+    patient = LiveSettings(stop=QUICK, velocity_margin=99.0, friction=friction)
     report = run(Rig(watched(patient), still), duration=0.1, settings=patient)
-    assert report.ended == "completed", report.reason
+    if friction == 1.0:
+        assert report.ended == "completed", report.reason
+    else:
+        assert "stands to the last bit: its effort is" in report.reason
+        assert "its sensor is dead, or it is blocked" in report.reason
 
 
 def test_buffers_that_the_driver_reuses_are_copied() -> None:

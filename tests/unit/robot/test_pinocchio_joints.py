@@ -7,10 +7,12 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
+import hsp_control as hsp
 from hsp_control import Robot
 from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import ModelError
 
+ZERO = np.zeros(3)
 TILTED = np.array([0.6, 0.8, 0.0])
 
 
@@ -90,3 +92,38 @@ def test_a_translation_has_three_lengths() -> None:
     robot = Robot.from_pinocchio(model_with(pin.JointModelTranslation()))
     assert robot.dof_names[1:4] == ("joint1.x", "joint1.y", "joint1.z")
     assert robot.units == ("rad", "m", "m", "m", "rad")
+
+
+def sliding() -> Robot:
+    """A joint of three slides within their limits, and one that turns on it."""
+    model = pin.Model()
+    slide = model.addJoint(
+        0, pin.JointModelTranslation(), pin.SE3.Identity(), "slide",
+        np.full(3, 100.0), np.full(3, 1.0), np.full(3, -0.2), np.array([0.2, 0.2, 0.3]),
+    )  # fmt: skip
+    model.appendBodyToJoint(
+        slide, pin.Inertia(2.0, ZERO, np.eye(3)), pin.SE3.Identity()
+    )
+    turn = model.addJoint(
+        slide, pin.JointModelRY(), pin.SE3.Identity(), "turn",
+        np.full(1, 10.0), np.full(1, 2.0), np.full(1, -2.0), np.full(1, 2.0),
+    )  # fmt: skip
+    arm = pin.SE3(np.eye(3), np.array([0.3, 0.0, 0.0]))
+    model.appendBodyToJoint(turn, pin.Inertia(1.0, ZERO, 0.01 * np.eye(3)), arm)
+    model.addFrame(pin.Frame("tip", turn, 0, arm, pin.FrameType.BODY))
+    return Robot.from_pinocchio(model, end_effector="tip")
+
+
+def test_the_slides_of_a_translation_keep_their_limits() -> None:
+    """The hand is asked for 0.9 m: the slide ends at 0.2 m."""
+    robot = sliding()
+    lower, upper = robot.position_limits()
+    np.testing.assert_array_equal(lower, [-0.2, -0.2, -0.2, -2.0])
+    np.testing.assert_array_equal(upper, [0.2, 0.2, 0.3, 2.0])
+    assert robot.dof_indices.tolist() == [0, 1, 2, 3]
+    gains = hsp.Gains(natural_frequency=8.0)
+    task = hsp.FramePosition("tip", [0.9, 0.0, 0.1], gains=gains)
+    law = hsp.Controller(robot, [task], limits=hsp.Limits())
+    run = hsp.simulate(law, robot.neutral(), duration=2.0)
+    assert (np.abs(run.q[:, 0]) < 0.2).all()
+    assert run.q[-1, 0] > 0.18

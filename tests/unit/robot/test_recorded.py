@@ -51,7 +51,68 @@ def all_joints() -> hsp.Robot:
     return hsp.Robot.from_pinocchio(model)
 
 
+def followers() -> hsp.Robot:
+    """Followers of each kind of joint, of a leader that turns often, and a whole."""
+    rng = np.random.default_rng(2)
+    kinds = [
+        (pin.JointModelRX(), None),
+        (pin.JointModelRUBY(), None),
+        (pin.JointModelPZ(), None),
+        (pin.JointModelRevoluteUnaligned(np.array([0.0, 0.6, 0.8])), (1, -0.5, 0.1)),
+        (pin.JointModelRUBZ(), (2, 1.0, 0.3)),
+        (pin.JointModelPrismaticUnaligned(np.array([0.6, 0.0, 0.8])), (1, 0.2, 0.0)),
+        (pin.JointModelRZ(), (3, 4.0, 0.0)),
+        (pin.JointModelHX(0.1), (3, 2.0, -0.2)),
+        (pin.JointModelPY(), None),
+    ]  # fmt: skip
+    model, last = pin.Model(), 0
+    for k, (kind, _) in enumerate(kinds):
+        pose = pin.exp6(pin.Motion(rng.normal(size=6)))
+        last = model.addJoint(last, kind, pose, f"j{k}")
+        model.appendBodyToJoint(last, pin.Inertia.Random(), pose)
+        model.addFrame(pin.Frame(f"b{k}", last, 0, pose, pin.FrameType.BODY), False)
+    for k, (_, follows) in enumerate(kinds, start=1):
+        if follows is not None:
+            leader, scaling, offset = follows
+            model = pin.transformJointIntoMimic(model, leader, k, scaling, offset)
+    model.effortLimit[:] = 5.0
+    return hsp.Robot.from_pinocchio(model)
+
+
+def one_of_many() -> hsp.Robot:
+    """A joint of three slides, one after the other, beside one that turns."""
+    table = pin.JointModelComposite()
+    pose = pin.exp6(pin.Motion(0.2 * np.arange(6.0)))
+    for kind in (pin.JointModelPX(), pin.JointModelPY(), pin.JointModelPZ()):
+        table.addJoint(kind, pin.SE3(np.eye(3), np.array([0.1, 0.2, 0.3])))
+    model = pin.Model()
+    for k, kind in enumerate((table, pin.JointModelRY())):
+        model.addJoint(k, kind, pose, f"j{k}")
+        model.appendBodyToJoint(k + 1, pin.Inertia.Random(), pose)
+        frame = pin.Frame(f"b{k}", k + 1, 0, pose, pin.FrameType.BODY)
+        model.addFrame(frame, False)
+    return hsp.Robot.from_pinocchio(model)
+
+
+def tilted() -> hsp.Robot:
+    """A joint that turns often about an axis of its own, and one that it leads."""
+    joints = "".join(
+        f'<joint name="j{k}" type="continuous"><parent link="l{k}"/>'
+        f'<child link="l{k + 1}"/><axis xyz="{axis}"/>'
+        f'<origin xyz="0.1 0.2 0.3" rpy="0.3 0.2 0.1"/></joint>'
+        for k, axis in enumerate(("0 0.6 0.8", "0.6 0 -0.8"))
+    )
+    inertia = '<inertia ixx="1" iyy="1" izz="1.5" ixy="0.1" ixz="0" iyz="0.2"/>'
+    inertial = f'<inertial><mass value="2"/><origin xyz="1 2 3"/>{inertia}</inertial>'
+    links = "".join(f'<link name="l{k}">{inertial}</link>' for k in range(3))
+    model = pin.buildModelFromXML(f'<robot name="tilted">{links}{joints}</robot>')
+    return hsp.Robot.from_pinocchio(pin.transformJointIntoMimic(model, 1, 2, 1.0, 0.2))
+
+
 ROBOTS = {
+    "tilted": tilted,
+    "followers": followers,
+    "slides of one joint": one_of_many,
     "panda": lambda: hsp.Robot.load("panda"),
     "a tool, a lock, gravity": lambda: hsp.Robot.load(TOOL),
     "two": lambda: hsp.Robot.load(TWO),

@@ -1,0 +1,39 @@
+"""The effort that a robot's rates permit, and that accelerates nearly as another."""
+
+import numpy as np
+
+from hsp_control import engine
+from hsp_control.common.arrays import Array
+
+_SWEEPS = 30
+"""How often each joint's effort is adapted to those of the others, at most."""
+_NEAR = 1e-10
+"""Change of a sweep that does not count, relative to the first one."""
+
+
+def nearest_effort(
+    wanted: Array, least: Array, most: Array, inertia: Array
+) -> Array | None:
+    """Return the effort within bounds whose acceleration is nearest to that of another.
+
+    It minimizes aᵀ M a, where a = M⁻¹ (tau - wanted) is the acceleration that is wrong.
+    Where a heavy joint's effort lags behind, a light one's, which can follow, keeps the
+    acceleration that it was to have; clipped joint by joint it would be thrown.
+
+    Args:
+        wanted: The effort that is wanted, shape (nv,) [N·m or N].
+        least: The least effort of each joint, shape (nv,).
+        most: The greatest, shape (nv,).
+        inertia: The mass matrix M, shape (nv, nv).
+
+    Returns:
+        The effort, shape (nv,); None if M has no inverse.
+    """
+    try:
+        inverse: Array = np.linalg.inv(inertia).astype(float)
+    except np.linalg.LinAlgError:
+        return None
+    nearest = np.empty(wanted.size)
+    given = inverse, np.asarray(wanted), np.asarray(least), np.asarray(most)
+    engine.NearestEffort(*given, nearest, _SWEEPS, _NEAR)()
+    return nearest if np.isfinite(nearest).all() else None

@@ -1,0 +1,118 @@
+"""Finds a joint's sensor that died while the joint was at rest."""
+
+from math import ceil, exp
+
+import numpy as np
+
+from hsp_control.common.arrays import Array, Flags, Indices
+from hsp_control.live.settings import LiveSettings
+from hsp_control.robot import Robot
+
+_QUIET, _FEWEST = 0.05, 5
+"""How long a sensor says the same to the last bit before it is judged [s], and the
+fewest states."""
+_REST = 0.05
+"""Speed below which what changes is noise [rad/s or m/s]."""
+_NOISE = 1e-9
+"""Smallest change that is noise: those of a simulated robot at rest are rounding."""
+_MEMORY, _ALIVE = 1.0, 0.3
+"""Time over which noise is counted [s], and in which part of the states it is seen."""
+_GRAVITY = 0.2
+"""Part of a joint's gravity that the model may have wrong."""
+
+_EFFORT = {"rad": "N·m", "m": "N"}
+
+
+class StillSensors:
+    """Judges joints whose position and velocity stay the same to the last bit.
+
+    A joint at rest may well say the same for ever. Its sensor is dead if it had noise
+    before: changes to and fro, of different sizes, so that a coarse encoder on the edge
+    of a step is none. Or if the effort is beyond what holds the joint by more than
+    friction (`LiveSettings.friction`) and the model's errors: a live joint would move.
+
+    Attributes:
+        dead: Joints whose sensor says nothing any more, shape (nv,).
+        beyond: What each joint's effort is beyond what holds it, shape (nv,) [N·m].
+    """
+
+    def __init__(
+        self, robot: Robot, settings: LiveSettings, effort: Array, period: float
+    ) -> None:
+        """``effort`` limits the efforts, shape (nv,), inf where unlimited."""
+        self._robot, self._period = robot, period
+        self._quiet = max(_FEWEST, ceil(_QUIET / period))
+        limited = np.isfinite(effort)
+        self._friction = np.where(limited, effort, 0.0) * settings.friction
+        self._friction[~limited] = np.inf
+        self._judged = np.ones(robot.nv, dtype=bool)
+        self._judged[list(robot.unactuated)] = False
+        self._none = np.zeros(robot.nv, dtype=bool)
+        self.restart()
+
+    def restart(self) -> None:
+        """Forget all states."""
+        nv = self._judged.size
+        self._way, self._v, self._alive = np.zeros((3, nv))
+        self._changes = np.zeros((2, nv))
+        self._count = np.zeros(nv, dtype=np.int64)
+        self.dead: Flags = self._none
+        self.beyond: Array = np.zeros(nv)
+
+    def update(self, way: Array, v: Array, mean: Array, passed: float) -> None:
+        """Take a new measurement.
+
+        Args:
+            way: Displacement since the last one, shape (nv,) [rad or m].
+            v: Measured velocity, shape (nv,).
+            mean: Mean velocity of some milliseconds, shape (nv,).
+            passed: Time since the last one [s].
+        """
+        changes = np.stack([way - self._way, v - self._v])
+        last, self._changes = self._changes, changes
+        self._way, self._v = way, v
+        sizes = np.abs(np.abs(changes) - np.abs(last)) > _NOISE
+        noise = (sizes & (changes * last < -(_NOISE**2))).any(axis=0)
+        noise &= np.abs(mean) < _REST
+        still = (np.abs(way) < 1e-12) & (changes[1] == 0.0)
+        self._count = np.where(still, self._count + 1, 0)
+        # A joint that says nothing any more keeps what is known of its noise.
+        part = 1.0 - exp(-passed / _MEMORY)
+        self._alive = np.where(
+            still, self._alive, self._alive + part * (noise - self._alive)
+        )
+
+    def judge(self, q: Array, v: Array, tau: Array) -> None:
+        """Find the dead ones, at a state under the effort that acts, shape (nv,)."""
+        quiet = (self._count >= self._quiet) & self._judged
+        if not quiet.any():
+            self.dead = self._none
+            return
+        dead = quiet & (self._alive > _ALIVE)
+        standing = np.flatnonzero(quiet & (v == 0.0))
+        self.beyond = np.zeros(v.size)
+        if standing.size and not self._robot.unactuated:
+            self.beyond[standing] = self._holding(standing, q, v, tau)
+            gravity = self._robot.inverse_dynamics(q, 0.0 * v, 0.0 * v)
+            allowed = self._friction + _GRAVITY * np.abs(gravity)
+            dead |= np.abs(self.beyond) > allowed
+        self.dead = dead
+
+    def why(self, i: int) -> str:
+        """Return why the sensor of a dead joint is dead."""
+        if self._alive[i] > _ALIVE:
+            return "its sensor had noise, and has none any more; it is dead"
+        return (
+            f"its effort is {self.beyond[i]:.3g} {_EFFORT[self._robot.units[i]]} "
+            "beyond what holds it; its sensor is dead, or it is blocked"
+        )
+
+    def _holding(self, standing: Indices, q: Array, v: Array, tau: Array) -> Array:
+        """Return what must hold some joints, so that they stand under an effort."""
+        # By Gauss's principle: M⁻¹ of these joints times the force is what they lack.
+        state = self._robot.state(0.0, q, v)
+        inverse = np.linalg.inv(state.mass_matrix)
+        acceleration = self._robot.forward_dynamics(q, v, tau)
+        among = inverse[np.ix_(standing, standing)]
+        held: Array = np.linalg.solve(among, acceleration[standing])
+        return held
