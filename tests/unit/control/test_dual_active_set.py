@@ -4,8 +4,19 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from qp_cases import KINDS, Case, answer, by_daqp, cost, defect, degenerate, dense
+from qp_cases import (
+    KINDS,
+    Case,
+    answer,
+    by_daqp,
+    cost,
+    defect,
+    degenerate,
+    dense,
+    packed,
+)
 
+from hsp_control import engine
 from hsp_control.common.arrays import Array
 from hsp_control.control.actuation.dual_active_set import (
     EXHAUSTED,
@@ -128,3 +139,11 @@ def test_iterations_are_limited() -> None:
     case = degenerate(np.random.default_rng(5))
     assert answer(case).code == SOLVED
     assert answer(case, iterations=0).code == EXHAUSTED
+
+
+def test_sizes_that_do_not_fit_are_refused() -> None:
+    case = two(np.eye(2), np.zeros(2))
+    x, work = case.x0.copy(), Workspace.of(2, 2)
+    problem = packed(case)._replace(own=np.ones(1))
+    with pytest.raises(ValueError, match="a QP: the sizes do not fit together"):
+        engine.Minimise(problem, 10, False, x, work)
