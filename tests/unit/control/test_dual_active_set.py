@@ -108,6 +108,21 @@ def test_a_contradiction_is_shared_by_the_costs(seed: int) -> None:
     np.testing.assert_allclose(violations, expected, rtol=1e-6)
 
 
+@given(seeds)
+def test_a_soft_answer_does_not_depend_on_its_start(seed: int) -> None:
+    """Slacks begin anew, too: the same to the last bit, with the same active set."""
+    rng = np.random.default_rng(seed)
+    case = dense(rng)
+    softness = 10.0 ** rng.uniform(-2.0, 0.0, len(case.rows))
+    cold = answer(case, softness)
+    work = Workspace.of(len(case.x0), len(case.A), soft=True)
+    work.held[:] = rng.integers(-1, 2, len(work.held))
+    warm = answer(case, softness, work)
+    assert cold.code == warm.code == SOLVED
+    if set(warm.active) == set(cold.active):
+        np.testing.assert_array_equal(warm.x, cold.x)
+
+
 # --- codes ---------------------------------------------------------------------------
 
 
