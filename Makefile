@@ -17,7 +17,6 @@ USE := .venv/.stamp-use# hsp_control and what it needs are installed
 STAMP := .venv/.stamp# what tests and development need, too
 ENGINE := .venv/.engine# what is compiled is as new as its sources
 WORKERS ?= 2# processes that `make test` uses
-CONFIGS ?=# whose machine code `make wheel` compiles; by default that of all
 ARGS ?=# further arguments of pytest, as in `make test ARGS="-k spline"`
 
 ##@ Use
@@ -32,7 +31,7 @@ demo test test-system thorough docs wheel-test: export PYTHONDONTWRITEBYTECODE :
 LOOK := --set 'title=The same hand path. Only one elbow avoids the ball.' \
   --set 'view.background="\#10171E"'
 demo: $(USE) $(ENGINE) ## the paper's run, and a Panda under a ball, with and without its field
-	@echo "Running paper/4_moving_obstacle; the first run compiles its kernels, once ..."
+	@echo "Running paper/4_moving_obstacle ..."
 	@$(BIN)/hsp run paper/4_moving_obstacle --out out/demo
 	@$(BIN)/hsp plot out/demo/4_moving_obstacle.npz --out out/demo
 	@echo "Running panda_obstacle, with its field and without ..."
@@ -70,8 +69,8 @@ lint: $(STAMP) $(ENGINE) ## ruff, mypy --strict, the layers of the architecture
 	@$(BIN)/mypy --strict
 	@$(BIN)/lint-imports
 
-coverage: $(STAMP) $(ENGINE) ## run the tests with the kernels uncompiled, report the lines not run
-	@NUMBA_DISABLE_JIT=1 $(BIN)/python -m pytest -n $(WORKERS) --cov --cov-report=term $(ARGS)
+coverage: $(STAMP) $(ENGINE) ## run the tests, report the lines of Python not run
+	@$(BIN)/python -m pytest -n $(WORKERS) --cov --cov-report=term $(ARGS)
 
 bench: $(STAMP) $(ENGINE) ## compare with other controllers, in .venv-peers (TSID builds: 20 minutes)
 	@if ! .venv-peers/bin/python -m pip --version > /dev/null 2>&1; then \
@@ -91,13 +90,9 @@ fuzz: $(STAMP) $(ENGINE) ## random states, mutated files, faults, soak: hours
 mutants: $(STAMP) $(ENGINE) ## break the code on purpose, report what no test notices
 	@$(BIN)/python tools/mutants.py $(ARGS)
 
-# What is in the wheel goes: a checkout compiles for its own processor.
-wheel: $(STAMP) $(ENGINE) ## build the wheel into dist/, with machine code for every configuration
-	@echo "Compiling what the bundled configurations use (a minute) ..."
-	@$(BIN)/python tools/machine_code.py $(CONFIGS)
+wheel: $(STAMP) $(ENGINE) ## build the wheel into dist/
 	@rm -rf dist; $(BIN)/python -m pip wheel --quiet --no-deps --no-build-isolation \
 	  --wheel-dir dist .
-	@rm -rf machine_code
 	@ls dist
 
 sims: $(STAMP) $(ENGINE) ## robosuite's own arms and our law in them, in .venv-sims
@@ -127,8 +122,6 @@ wheel-test: wheel ## build the wheel, install it elsewhere, use it from there
 	hsp check paper/4_moving_obstacle; \
 	hsp run paper/4_moving_obstacle --set simulation.duration=1 --out out; \
 	hsp export out/4_moving_obstacle,*.npz --html out/page.html; \
-	compiled=$$(find "$$dir/venv" -path '*/hsp_control/*/__pycache__/*.nbc'); \
-	if [ -n "$$compiled" ]; then echo "Compiled, though the wheel has code: $$compiled"; exit 1; fi; \
 	echo "The wheel works."
 
 ##@ Documents
@@ -161,15 +154,15 @@ constraints: ## refresh constraints.txt with the newest version of everything
 	unset PIP_CONSTRAINT PIP_BUILD_CONSTRAINT; \
 	echo "Resolving with $$python, without constraints ..."; \
 	$(call new-venv,"$$python","$$dir"); \
-	"$$dir/bin/python" -m pip install --quiet '.[test,dev]' hatchling \
-	  hatch-fancy-pypi-readme editables uv; \
+	"$$dir/bin/python" -m pip install --quiet '.[test,dev]' uv \
+	  $$(python hatch_build.py needs) cmake ninja ziglang; \
 	sed '/^[^#]/d' constraints.txt > "$$dir/new"; \
 	"$$dir/bin/python" -m pip list --format=freeze --exclude hsp_control --exclude pip \
 	  --exclude setuptools --exclude wheel >> "$$dir/new"; \
 	cp "$$dir/new" constraints.txt; echo "Wrote constraints.txt; now: make lint test"
 
 clean: ## remove caches, builds and the demo's output; .venv stays
-	@rm -rf build dist machine_code docs/_build docs/_static/replays docs/reference/generated out/demo .coverage .*_cache .hypothesis
+	@rm -rf build dist docs/_build docs/_static/replays docs/reference/generated out/demo .coverage .*_cache .hypothesis
 	@find hsp_control tests -name __pycache__ -prune -exec rm -rf {} +
 
 .PHONY: help docs links figures animations notebooks demo quick sims lerobot test test-system thorough lint coverage fuzz mutants wheel wheel-test release format constraints clean
@@ -198,7 +191,7 @@ $(find-python); "$$python" tools/install.py .venv $$("$$python" hatch_build.py n
 endef
 
 $(ENGINE): $(USE) hatch_build.py engine/CMakeLists.txt $(shell find engine -name '*.?pp')
-	@$(BIN)/python hatch_build.py
+	@$(BIN)/python hatch_build.py > /dev/null
 	@touch $@
 
 # Sets the shell variable `python`: PYTHON if given, else the newest one that will do. A

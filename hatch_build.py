@@ -66,10 +66,11 @@ def zig(folder: Path) -> list[str]:
 
 
 def build(kind: str = "Release", folder: Path = ROOT / "build") -> Path:
-    """Build the library, and return where it is: beside the Python of the engine.
+    """Build the library, and return where it is.
 
     Args:
-        kind: ``Release``, or ``Debug`` with Eigen's assertions.
+        kind: ``Release``: it is put beside the Python of the engine; or ``Debug``, with
+            Eigen's assertions, which stays where it is compiled.
         folder: Where what is compiled stays, for each Python and each kind of build.
     """
     place = folder / f"{kind}-{sysconfig.get_config_var('SOABI')}".lower()
@@ -91,6 +92,8 @@ def build(kind: str = "Release", folder: Path = ROOT / "build") -> Path:
             sys.stderr.write(done.stdout + done.stderr)
             raise SystemExit(f"the engine was not built: {' '.join(command)} failed")
     (library,) = place.glob("_engine*.so")
+    if kind != "Release":
+        return library
     target = ROOT / "hsp_control" / "engine" / library.name
     # A new file: a process that has loaded the old one goes on with it.
     fresh = target.with_suffix(".new")
@@ -117,4 +120,4 @@ if __name__ == "__main__":
     if sys.argv[1:] == ["needs"]:
         print(" ".join(needs()))
     else:
-        build()
+        print(build(*sys.argv[1:]))

@@ -13,7 +13,7 @@ import pinocchio as pin
 
 import hsp_control as hsp
 from hsp_control.common.arrays import Array
-from hsp_control.compiled.step_plan import planned
+from hsp_control.engine.plans import planned
 from hsp_control.geometry import Scene
 from hsp_control.geometry.scene import Start
 from hsp_control.geometry.shapes import Sphere

@@ -98,7 +98,7 @@ def main() -> None:
     count, period = round(options.seconds * options.rate), round(1e9 / options.rate)
     turn = round(TURN * options.rate)
     loop = Loop(hsp.load_experiment(options.config), 1.0 / options.rate)
-    # Compiles all kernels; with ordinary priority, because Linux stops real-time
+    # With ordinary priority, because Linux stops real-time
     # processes that do not sleep.
     back_to_back = []
     for _ in range(count):

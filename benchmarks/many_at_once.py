@@ -15,7 +15,7 @@ import numpy as np
 import pinocchio as pin
 
 from hsp_control import Robot
-from hsp_control.compiled.pinocchio_calls import bind_pinocchio
+from hsp_control.engine.pinocchio_calls import bind_pinocchio
 
 STATES = 1000
 

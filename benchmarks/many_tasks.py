@@ -8,7 +8,7 @@ import pinocchio as pin
 
 import hsp_control as hsp
 from hsp_control.common.arrays import Array
-from hsp_control.compiled.step_plan import planned
+from hsp_control.engine.plans import planned
 from hsp_control.robot.integrators import Rk4
 from hsp_control.simulation.plants import RigidBodyPlant
 from hsp_control.trajectories import Blend, ComposedPose, HoldOrientation, PoseSample

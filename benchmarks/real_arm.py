@@ -11,6 +11,7 @@ out, and named.
 
 import argparse
 import importlib
+import sys
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
@@ -22,37 +23,17 @@ from rich.progress import track
 import hsp_control as hsp
 from hsp_control.common.arrays import Array
 from hsp_control.control.compensation import Command, Compensation
-from hsp_control.robot.friction import JointFriction
-from hsp_control.robot.integrators import Rk4
-from hsp_control.simulation.plants import (
-    ImperfectPlant,
-    IntegratedPlant,
-    RigidBodyPlant,
-    SampledPlant,
-    StickingPlant,
-)
-from hsp_control.simulation.plants.drives import EffortDelay, EffortLag
-from hsp_control.simulation.plants.model_changes import (
-    Inertias,
-    ModelChange,
-    MotorInertia,
-    Payload,
-    changed,
-)
-from hsp_control.simulation.plants.sensors import VelocityNoise
+from hsp_control.simulation.plants import SampledPlant
+
+TESTS = Path(__file__).resolve().parents[1] / "tests" / "support"
+sys.path.insert(0, str(TESTS))
+from wrong_arms import ARMS, MORE_ARMS, WrongArm, posture  # noqa: E402
 
 PAGE = Path(__file__).resolve().parent / "results" / "real_arm.md"
 PERIOD = 1e-3
 RADIUS, RATE = 0.08, 2.0  # of the circle [m, rad/s]
 DURATION, SETTLED = 3.0, 2.0  # [s]
 AT_REST = 0.05  # fastest joint of an arm that rests [rad/s]
-ARMS: dict[str, list[float] | None] = {
-    "panda": None,
-    "iiwa14": None,
-    "xarm7": [0.0, -0.5, 0.0, 0.9, 0.0, 1.2, 0.0],
-    "ur5": [0.0, -1.3, 1.8, -2.0, -1.57, 0.0],
-}
-"""The postures where they begin; None: home."""
 KINDS = {
     "masses": "masses ±20 %, centres ±10 mm",
     "real": "as real: also 0.5 kg, rotors, friction, delay, lag, noise",
@@ -62,6 +43,7 @@ PEERS = {
     "isaac_lab_osc": "operational space (Isaac Lab)",
     "robosuite_osc": "operational space (robosuite)",
     "pink_rnea": "pink + RNEA",
+    "tsid_pose": "TSID",
 }
 GUESSED = 0.1
 """Rotors in the model of one row, twice those of the arms as real [kg m²]."""
@@ -85,8 +67,7 @@ class Case:
     def __init__(self, name: str, moves: bool) -> None:
         self.robot = hsp.Robot.load(name)
         self.moves, self.rows = moves, 6
-        given = ARMS[name]
-        self.q0 = self.robot.home() if given is None else np.array(given)
+        self.q0 = posture(self.robot, name)
         self.frame = self.robot.end_effector
         rest = np.zeros(self.robot.nv)
         pose = self.robot.state(0.0, self.q0, rest).frame(self.frame)
@@ -132,23 +113,17 @@ def ours(
 
 def wrong_arm(case: Case, kind: str, seed: int, delay: int = 0) -> SampledPlant:
     """Return what moves: for ``exact`` the model, after a delay [periods]."""
-    changes: list[ModelChange] = []
-    if kind != "exact":
-        errors = {"random_mass": 0.2, "random_inertia": 0.2, "random_com": 0.01}
-        changes.append(Inertias(**errors))
-    if kind == "real":
-        load = Payload(case.frame, 0.5, center=(0.03, 0.02, 0.02))
-        changes += [MotorInertia(0.05), load]
-    true = changed(case.robot, changes, seed)
-    if kind != "real":
-        engine = IntegratedPlant(RigidBodyPlant(true), Rk4(PERIOD))
-        drives = [EffortDelay(delay)] if delay else []
-        return ImperfectPlant(engine, [], drives, seed) if drives else engine
-    friction = JointFriction.of(true, coulomb=0.2, viscous=0.2)
-    stuck = StickingPlant(true, friction, PERIOD)
-    return ImperfectPlant(
-        stuck, [VelocityNoise(0.01)], [EffortDelay(2), EffortLag(0.003)], seed
-    )
+    name = case.robot.name
+    if kind == "exact":
+        arm = WrongArm(name, seed, mass=0.0, com=0.0, delay=delay)
+    elif kind == "masses":
+        arm = WrongArm(name, seed)
+    else:
+        arm = WrongArm(
+            name, seed, load=0.5, rotor=0.05, coulomb=0.2, viscous=0.2, delay=2,
+            lag=0.003, noise=0.01,
+        )  # fmt: skip
+    return arm.plant(case.robot)
 
 
 @dataclass
@@ -202,6 +177,8 @@ def laws(
     }
     if kind == "real":  # else the arms have no rotors
         found[ROTORS] = lambda: chain(Compensation(), rotors=GUESSED)
+    if case.robot.nq != case.robot.nv:  # peers subtract postures
+        return found
     for module, name in PEERS.items():
         try:
             peer = importlib.import_module(f"controllers.{module}")
@@ -230,35 +207,49 @@ def main() -> None:
     """Run, and write the page."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--seeds", type=int, default=4)
-    parser.add_argument("--arms", default=",".join(ARMS))
+    parser.add_argument("--arms", default=",".join(ARMS | MORE_ARMS))
     parser.add_argument("--out", type=Path, default=PAGE)
     options = parser.parse_args()
     missing: dict[str, str] = {}
-    lines = [INTRODUCTION.format(seeds=options.seeds)]
-    for kind, words in KINDS.items():
-        lines += ["", f"## {words[0].upper()}{words[1:]}", "", HEADER]
-        for arm in options.arms.split(","):
-            still, moving = Case(arm, moves=False), Case(arm, moves=True)
-            runs: dict[str, list[list[Run]]] = {}
-            for case in (still, moving):
-                for name, make in track(
-                    laws(case, kind, missing).items(), f"{arm}, {kind}", transient=True
-                ):
-                    own = [
-                        measured(case, wrong_arm(case, kind, seed), make())
-                        for seed in range(options.seeds)
-                    ]
-                    runs.setdefault(name, []).append(own)
-            for name, (held, circled) in runs.items():
-                lines.append(row(arm, name, held, circled))
+    introduction = INTRODUCTION.format(seeds=options.seeds)
+    tables: dict[str, list[str]] = {kind: [] for kind in KINDS}
+    ending: list[str] = []
+
+    def write() -> None:
+        lines = [introduction]
+        for kind, words in KINDS.items():
+            title = f"{words[0].upper()}{words[1:]}"
+            lines += ["", f"## {title}", "", HEADER, *tables[kind]]
+        why = [f"\nNot installed: {name} ({why})." for name, why in missing.items()]
+        text = "\n".join([*lines, *ending, *why]) + "\n"
+        options.out.write_text(text, encoding="utf-8")
+
+    for arm in options.arms.split(","):
+        for kind in KINDS:
+            tables[kind] += rows(arm, kind, options.seeds, missing)
+        write()  # what there is
     case = Case("panda", moves=False)
-    lines += ["", "## The delay that is borne", "", BORNE, ""]
-    lines += ["| law | Panda [ms] |", "|---|--:|"]
+    ending += ["", "## The delay that is borne", "", BORNE, ""]
+    ending += ["| law | Panda [ms] |", "|---|--:|"]
     for name, make in laws(case, "exact", missing).items():
-        lines.append(f"| {name} | {borne_delay(case, make)} |")
-    lines += [f"\nNot installed: {name} ({why})." for name, why in missing.items()]
-    options.out.write_text("\n".join(lines) + "\n", encoding="utf-8")
+        ending.append(f"| {name} | {borne_delay(case, make)} |")
+    write()
     print(f"Wrote {options.out}")
+
+
+def rows(arm: str, kind: str, seeds: int, missing: dict[str, str]) -> list[str]:
+    """Return the lines of an arm."""
+    runs: dict[str, list[list[Run]]] = {}
+    for case in (Case(arm, moves=False), Case(arm, moves=True)):
+        for name, make in track(
+            laws(case, kind, missing).items(), f"{arm}, {kind}", transient=True
+        ):
+            own = [
+                measured(case, wrong_arm(case, kind, seed), make())
+                for seed in range(seeds)
+            ]
+            runs.setdefault(name, []).append(own)
+    return [row(arm, name, held, circled) for name, (held, circled) in runs.items()]
 
 
 def row(arm: str, name: str, held: list[Run], circled: list[Run]) -> str:
@@ -301,11 +292,13 @@ many rest, with no joint faster than 0.05 rad/s in the last second. – diverges
 
 Gains are those of each project: crisp_py's for a Franka, Isaac-Reach-Franka-OSC,
 robosuite's `osc_pose.json`, pink's example with Kp = 100 and Kv = 20 in joint space.
+TSID has the gains and weights of its UR5 exercise (Kp = 5).
 This law has its defaults (Kp = 100, Kv = 20, K_N = 10): without an observer, as it
 comes, with crisp's stiffness as its impedance, where the observer is off because a
 spring must yield, and with rotors in its model: 0.1 kg m² for each joint, a guess,
 where the arms as real have 0.05. Targets of peers have no velocity, so that they follow
-a circle late."""
+a circle late. Jaco (kinova) has joints that turn on and on, whose angles peers
+subtract: it has no rows of theirs."""
 
 
 if __name__ == "__main__":

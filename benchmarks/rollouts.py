@@ -20,7 +20,7 @@ import numpy as np
 
 from hsp_control import Rollout, load_experiment
 from hsp_control.common.resources import bundled_configs
-from hsp_control.compiled.step_plan import planned
+from hsp_control.engine.plans import planned
 
 PANDA: dict[str, Any] = {
     "robot": {"name": "panda"},

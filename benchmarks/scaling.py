@@ -25,7 +25,7 @@ import hsp_control as hsp
 from hsp_control.common.arrays import Array
 from hsp_control.companions.plots import new_figure, styled
 from hsp_control.companions.plots.palette import SERIES as SERIES_COLORS
-from hsp_control.compiled.step_plan import planned
+from hsp_control.engine.plans import planned
 from hsp_control.geometry.shapes import Sphere
 from hsp_control.null_space.fields import (
     InverseCondition,

@@ -23,7 +23,7 @@ from traitlets.config import Config
 ROOT = Path(__file__).resolve().parents[1]
 FOLDER = ROOT / "notebooks"
 
-CELL_TIME = 240  # [s]: kernels may have to be compiled
+CELL_TIME = 240  # [s]: the first one imports
 COLORS = 64
 """How many colours a picture keeps: enough for lines and their smooth edges."""
 
@@ -52,7 +52,6 @@ def execute(notebook: Any, folder: Path) -> None:
         "MPLBACKEND": "module://matplotlib_inline.backend_inline",
         "IPYTHONDIR": str(folder / "ipython"),
     }
-    environment.pop("NUMBA_DISABLE_JIT", None)  # no coverage comes from a kernel
     with tempfile.TemporaryDirectory() as sockets:  # whose names may not be long
         config = Config()
         config.KernelManager.transport = "ipc"

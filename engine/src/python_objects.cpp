@@ -34,6 +34,7 @@ std::vector<Plan::Row> PlanObject::rows(nb::tuple given) {
 }
 
 double PythonCall::made(double t) const {
+  [[maybe_unused]] const Allocation allocation(true);  // Python may make other calls
   const nb::object value = timed ? function(t) : function();
   PyObject* x = value.ptr();
   const bool number = PyFloat_Check(x) || PyLong_Check(x) || PyArray_CheckScalar(x);

@@ -12,6 +12,7 @@ const Kind* const* geometry_kinds();
 const Kind* const* integrator_kinds();
 const Kind* const* law_kinds();
 const Kind* const* limit_kinds();
+const Kind* const* linalg_kinds();
 const Kind* const* metric_kinds();
 const Kind* const* plan_kinds();
 const Kind* const* qp_kinds();
@@ -25,9 +26,9 @@ const Kind* const* library_kinds(const std::string& path);
 
 inline std::vector<const Kind* const*> rooms() {
   return {
-      plan_kinds(),       contact_kinds(),    edge_kinds(),  field_kinds(),      geometry_kinds(),
-      integrator_kinds(), law_kinds(),        limit_kinds(), metric_kinds(),     qp_kinds(),
-      robot_kinds(),      simulation_kinds(), task_kinds(),  trajectory_kinds(),
+      plan_kinds(),       contact_kinds(), edge_kinds(),       field_kinds(),  geometry_kinds(),
+      integrator_kinds(), law_kinds(),     limit_kinds(),      linalg_kinds(), metric_kinds(),
+      qp_kinds(),         robot_kinds(),   simulation_kinds(), task_kinds(),   trajectory_kinds(),
   };
 }
 

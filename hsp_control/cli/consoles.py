@@ -1,20 +1,15 @@
-"""Where commands print: results to standard output, progress to standard error.
-
-Progress is also what says that kernels are being compiled, which takes a while once.
-"""
+"""Where commands print: results to standard output, progress to standard error."""
 
 import sys
 import warnings
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager, suppress
+from collections.abc import Iterator
+from contextlib import contextmanager
 from typing import TextIO
 
 from rich.console import Console
-from rich.errors import LiveError
 from rich.markup import escape
 from rich.progress import Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
 
-from hsp_control.compiled import kernels
 from hsp_control.control.first_state import StartWarning
 
 _LONGEST = 1500
@@ -70,50 +65,4 @@ def warnings_printed() -> Iterator[None]:
                 print(f"hsp: {message}", file=sys.stderr)
 
         warnings.showwarning = show
-        yield
-
-
-@contextmanager
-def compiling_told(tell: Callable[[str], object]) -> Iterator[None]:
-    """Tell how many kernels are compiled, at the beginning and the end of each."""
-    done = 0
-
-    def tell_it() -> None:
-        tell(f"Compiling kernels (once, 10 to 20 s) ... {done} done")
-
-    @contextmanager
-    def told() -> Iterator[None]:
-        nonlocal done
-        tell_it()
-        try:
-            yield
-        finally:
-            done += 1
-            tell_it()
-
-    with kernels.watched(told):
-        yield
-
-
-@contextmanager
-def compiling_shown(console: Console) -> Iterator[None]:
-    """Show a line with the number of compiled kernels for as long as it takes."""
-    status = console.status("")
-    depth = 0
-
-    @contextmanager
-    def shown() -> Iterator[None]:  # a kernel is compiled within its caller
-        nonlocal depth
-        if not depth:
-            with suppress(LiveError):  # a progress bar is already there
-                status.start()
-        depth += 1
-        try:
-            yield
-        finally:
-            depth -= 1
-            if not depth:
-                status.stop()
-
-    with compiling_told(status.update), kernels.watched(shown):
         yield

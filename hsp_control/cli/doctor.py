@@ -15,10 +15,9 @@ from packaging.requirements import Requirement
 from hsp_control.cli.consoles import out
 from hsp_control.common.entry_points import entry_points
 from hsp_control.common.version import __version__
-from hsp_control.compiled import kernel_cache
 
 _PACKAGE = "hsp_control"
-_SHOWN = ("pin", "numpy", "scipy", "numba", "pydantic", "meshcat")
+_SHOWN = ("pin", "numpy", "scipy", "pydantic", "meshcat")
 _OURS = {"test", "dev", "docs"}
 """Extras for those who develop the package."""
 
@@ -38,7 +37,6 @@ def doctor(options: argparse.Namespace) -> int:
     """Print what was found; return 2 if something does not work."""
     checks = [
         *_versions(),
-        _cache(),
         _dynamics(),
         _threads(),
         *_companions(),
@@ -72,34 +70,9 @@ def _versions() -> Iterator[Check]:
     yield Check("with", "ok", found)
 
 
-def _cache() -> Check:
-    """Look where compiled kernels are kept."""
-    topic = "compiled kernels"
-    if os.environ.get("NUMBA_DISABLE_JIT", "0") not in {"", "0"}:
-        return Check(
-            topic,
-            "note",
-            "not compiled: NUMBA_DISABLE_JIT is set",
-            "a step takes some hundred times as long; unset it to control a robot",
-        )
-    from hsp_control.law.law import acceleration
-
-    folder = kernel_cache.Kept(
-        getattr(acceleration, "py_func", acceleration)
-    ).cache_path
-    if folder is None:
-        return Check(
-            topic,
-            "note",
-            "no folder can be written: each start compiles anew",
-            "name a folder in NUMBA_CACHE_DIR",
-        )
-    return Check(topic, "ok", f"kept, those of the law in {folder}")
-
-
 def _dynamics() -> Check:
     """Look whether Pinocchio is called without its Python bindings."""
-    from hsp_control.compiled.pinocchio_calls import unknown
+    from hsp_control.engine.pinocchio_calls import unknown
 
     if reason := unknown():
         found = "called through its Python bindings: a step takes a fifth longer"

@@ -19,7 +19,7 @@ from hsp_control.cli.live_experiment import (
 )
 from hsp_control.cli.loading import read
 from hsp_control.cli.robot_process import RobotProcess
-from hsp_control.cli.run_summary import excess_rows
+from hsp_control.cli.run_summary import excess_rows, unexplained_rows
 from hsp_control.common.exceptions import LiveError, LogError
 from hsp_control.config import Experiment
 from hsp_control.config.loaded_scenario import load_scenario
@@ -254,7 +254,7 @@ def _convert(journal: Path, **meta: Any) -> bool:
         print(f"hsp: {error}", file=sys.stderr)
         return False
     journal.unlink(missing_ok=True)
-    for row in excess_rows(rollout):
+    for row in [*excess_rows(rollout), *unexplained_rows(rollout)]:
         out.print(f"{log.stem}: {row}", highlight=False)
     out.print(f"Log: {log}")
     return True

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from importlib import import_module
 from typing import Any
 
-from hsp_control.cli.interrupts import INTERRUPTED, end_in_order, is_command
+from hsp_control.cli.interrupts import INTERRUPTED, end_in_order
 from hsp_control.cli.options import AddedCommand, command_line
 from hsp_control.cli.streams import make_usable
 from hsp_control.common.exceptions import HspControlError
@@ -31,14 +31,6 @@ def main(arguments: Sequence[str] | None = None) -> int:
     if options.command is None:
         parser.print_help()
         return 0
-    # For one state it is faster to run kernels as Python than to load machine code.
-    plain = (
-        options.command == "check"
-        and is_command()
-        and "NUMBA_DISABLE_JIT" not in os.environ
-    )
-    if plain:
-        os.environ["NUMBA_DISABLE_JIT"] = "1"
     try:
         # Commands are imported only when needed, so that `hsp --help` answers at once.
         from hsp_control.cli import consoles
@@ -51,8 +43,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         run = _function_of(options.command) if added is None else added.run
         from hsp_control.declaration.language import in_yaml
 
-        shown = consoles.compiling_shown(consoles.errors)
-        with in_yaml(), shown, consoles.warnings_printed():
+        with in_yaml(), consoles.warnings_printed():
             return int(run(options))
     except HspControlError as error:
         print(f"hsp: {consoles.message_of(error)}", file=sys.stderr)
@@ -63,12 +54,6 @@ def main(arguments: Sequence[str] | None = None) -> int:
         advice = _PACKAGES.get(library, "the package of your system that has it")
         missing = f"hsp: {library} is missing on this system: install {advice}"
         print(missing, file=sys.stderr)
-    except ArithmeticError:
-        if not plain:
-            raise
-        # Python divides by zero where compiled kernels go on with inf: once more, so.
-        command = [sys.executable, *sys.orig_argv[1:]]
-        os.execve(command[0], command, {**os.environ, "NUMBA_DISABLE_JIT": "0"})
     except BrokenPipeError:  # `hsp schema | head`
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
     except OSError as error:

@@ -6,6 +6,7 @@ from time import perf_counter
 import numpy as np
 from rich.table import Table
 
+from hsp_control.control.compensation.momentum_observer import LARGE_SHARE
 from hsp_control.simulation import Rollout
 from hsp_control.simulation.limit_excess import POSITION, VELOCITY
 from hsp_control.simulation.measures import (
@@ -108,10 +109,6 @@ def force_rows(rollout: Rollout) -> Iterator[tuple[str, str]]:
             yield "", f"{lost} rows: contact lost"
 
 
-LARGE_SHARE = 0.25
-"""Share of an effort limit from which on unexplained effort is no small error."""
-
-
 def unexplained_rows(rollout: Rollout) -> Iterator[str]:
     """Yield what an observer found that the model does not explain, one sentence."""
     found = rollout.columns.get("observer.disturbance")
@@ -132,6 +129,8 @@ def unexplained_rows(rollout: Rollout) -> Iterator[str]:
                 f"{100.0 * share[dof]:.0f} % of the effort limit of "
                 f"{rollout.meta['robot']['dofs'][dof]}; is there a load, or a contact?"
             )
+            if not rollout.meta["robot"].get("rotors", True):
+                yield "the model has no rotors: robot: motor_inertia adds them"
 
 
 def limit_rows(rollout: Rollout) -> Iterator[str]:

@@ -9,13 +9,13 @@ import numpy as np
 from hsp_control import engine
 from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import NonFiniteError
-from hsp_control.compiled.kernels import AnyCall
 from hsp_control.constraints.contacts import Contact
 from hsp_control.constraints.contacts.contact import UnactuatedRows, unactuated_count
 from hsp_control.control.actuation.support import Support
 from hsp_control.control.setup import PlannedTask
 from hsp_control.edge import Resolution
 from hsp_control.edge.threshold import Following
+from hsp_control.engine.plans import AnyCall
 from hsp_control.law import CONSTANT, FieldSample, Outcome, TaskSample
 from hsp_control.law.outcome import outcome_of
 from hsp_control.null_space.fields import FieldSum, NullSpaceField

@@ -7,12 +7,12 @@ from typing import NamedTuple
 from numpy.typing import ArrayLike
 
 from hsp_control.common.arrays import Array
-from hsp_control.compiled.step_plan import Step
 from hsp_control.control.active_stack import ActiveStack
 from hsp_control.control.actuation import Actuation, Delivered
 from hsp_control.control.actuation.actuation import LOOK
 from hsp_control.control.actuation.limits_in_force import LimitsInForce
 from hsp_control.engine import Move
+from hsp_control.engine.plans import Step
 from hsp_control.law.outcome import BEYOND_ANY_LEVEL
 from hsp_control.robot import RobotState
 

@@ -30,7 +30,7 @@ import numpy as np
 
 from hsp_control import engine
 from hsp_control.common.arrays import Array
-from hsp_control.compiled.kernels import KernelCall
+from hsp_control.engine.plans import KernelCall
 
 LARGE = 0.1
 """Excess from which on it counts wholly, and the part of what the limits permit that a

@@ -10,9 +10,9 @@ import numpy as np
 
 from hsp_control import engine
 from hsp_control.common.arrays import Array, Indices
-from hsp_control.compiled.kernels import KernelCall
 from hsp_control.edge.step import EdgeMemory, Factors, Projectors
 from hsp_control.edge.threshold import NOT, Following, Thresholds
+from hsp_control.engine.plans import KernelCall
 from hsp_control.law.outcome import BEYOND_ANY_LEVEL
 from hsp_control.law.problem import Problem
 

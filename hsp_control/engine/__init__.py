@@ -2,10 +2,29 @@
 
 A kind is a struct of the folder ``engine`` in the sources: its members are its
 arguments, its ``operator()`` is its mathematics. ``repr(engine.Circle)`` shows them.
+
+The variable HSP_ENGINE names another library than the installed one, such as one with
+Eigen's assertions: ``python hatch_build.py Debug`` builds it.
 """
 
+import os
+import sys
+from importlib.util import module_from_spec, spec_from_file_location
 from typing import Any
 
+
+def _load(file: str) -> None:
+    """Load a library in the place of the installed one."""
+    name = f"{__name__}._engine"
+    spec = spec_from_file_location(name, file)
+    assert spec is not None
+    assert spec.loader is not None
+    sys.modules[name] = module = module_from_spec(spec)
+    spec.loader.exec_module(module)
+
+
+if _given := os.environ.get("HSP_ENGINE"):
+    _load(_given)
 try:
     from ._engine import REFUSED as REFUSED
     from ._engine import Call as Call

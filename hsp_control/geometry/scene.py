@@ -11,10 +11,10 @@ from pydantic import AfterValidator, Field
 from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import SceneError, TrajectoryError
 from hsp_control.common.suggestions import did_you_mean, listing
-from hsp_control.compiled.kernels import KernelCalls
 from hsp_control.declaration import Part
 from hsp_control.declaration.nested import BY_NAME, parts_within, stored
 from hsp_control.declaration.quantities import ArrayField, Name
+from hsp_control.engine.plans import KernelCalls
 from hsp_control.geometry.shapes import Shape
 from hsp_control.robot import RobotState
 from hsp_control.trajectories import (

@@ -17,7 +17,7 @@ from hsp_control.common.arrays import (
 )
 from hsp_control.common.exceptions import ModelError
 from hsp_control.common.suggestions import listing
-from hsp_control.compiled.kernels import KernelCall, KernelCalls, Once
+from hsp_control.engine.plans import KernelCall, KernelCalls, Once
 from hsp_control.robot.kinematics import PointMotion, Term
 
 

@@ -16,11 +16,10 @@ from hsp_control import engine
 from hsp_control.common.arrays import Array
 from hsp_control.common.entry_points import own_names
 from hsp_control.common.exceptions import HspControlError, SimulationError
-from hsp_control.compiled.kernels import TIME, AnyCall, KernelCalls
-from hsp_control.compiled.step_plan import planned
 from hsp_control.declaration import Part
 from hsp_control.declaration.quantities import Positive
 from hsp_control.engine import Plan
+from hsp_control.engine.plans import TIME, AnyCall, KernelCalls, planned
 from hsp_control.robot.kinematics import Term
 from hsp_control.robot.robot import Robot
 

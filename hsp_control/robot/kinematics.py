@@ -1,6 +1,5 @@
 """Placements of joints and frames: Jacobians, their exact rates, motion."""
 
-from math import atan2
 from typing import NamedTuple
 
 import numpy as np
@@ -9,7 +8,7 @@ import pinocchio as pin
 from hsp_control import engine
 from hsp_control.common.arrays import Array, Indices, matrix_view, read_only_view
 from hsp_control.common.exceptions import ImmutableError, ModelError
-from hsp_control.compiled.kernels import KernelCalls, kernel
+from hsp_control.engine.plans import KernelCalls
 
 
 class FrameMotion(NamedTuple):
@@ -206,17 +205,3 @@ def joint_placements(data: pin.Data) -> Array:
     return np.lib.stride_tricks.as_strided(
         first.T.reshape(9), (len(turns), 12), (strides.pop() if strides else 96, 8)
     )
-
-
-@kernel
-def joint_displacements(
-    q: Array, reference: Array, single_dof_joints: Indices, out: Array
-) -> None:
-    """Write q ⊖ reference for single-dof joints; continuous joints are within ±π."""
-    for k in range(single_dof_joints.shape[0]):
-        i, at = single_dof_joints[k, 0], single_dof_joints[k, 1]
-        if single_dof_joints[k, 2] == 1:
-            out[i] = q[at] - reference[at]
-        else:  # (cos, sin)
-            c, s, c_ref, s_ref = q[at], q[at + 1], reference[at], reference[at + 1]
-            out[i] = atan2(s * c_ref - c * s_ref, c * c_ref + s * s_ref)

@@ -85,6 +85,7 @@ def _text_record(source: RobotSource) -> dict[str, Any]:
         "urdf": packed(text_of(source)),
         "root": source.root,
         "locked": dict(source.locked),
+        "motor_inertia": dict(source.motor_inertia),
         "end_effector": source.end_effector,
         "joint_coordinates": source.joint_coordinates,
         "excluded": sorted(sorted(pair) for pair in _excluded(source)),
@@ -184,6 +185,10 @@ def _of_texts(record: Mapping[str, Any], access: Access) -> Robot:
     return Robot(whole.model, source, whole.parts, description)
 
 
+def _by_joint(values: Mapping[str, Any]) -> dict[str, float]:
+    return {str(name): float(value) for name, value in values.items()}
+
+
 def _source(record: Mapping[str, Any], told: OneRobot, access: Access) -> RobotSource:
     """Return the source of a text: its files are those of this computer."""
     text = unpacked(record["urdf"]).decode()
@@ -208,7 +213,8 @@ def _source(record: Mapping[str, Any], told: OneRobot, access: Access) -> RobotS
         root=record["root"],
         package_dirs=() if there is None else there.package_dirs,
         origin="file" if there is None else there.origin,
-        locked={str(name): float(at) for name, at in record["locked"].items()},
+        locked=_by_joint(record["locked"]),
+        motor_inertia=_by_joint(record.get("motor_inertia", {})),
         end_effector=record["end_effector"],
         joint_coordinates=record["joint_coordinates"],
         access=access,

@@ -89,8 +89,9 @@ class Robot(RobotModel):
             srdf: An SRDF whose disabled pairs of links never collide. None: the one
                 beside the URDF that is called like it, if there is one.
             motor_inertia: Inertia of the rotors as the joints feel it [kg·m² or kg]:
-                one number, one for each joint, by name, or ``bundled``: what the README
-                of a bundled robot gives. None: what the URDF's transmissions say.
+                one number, 0 for the bare links, one for each joint, by name, or
+                ``bundled``: what the README of a bundled robot gives. None: what the
+                URDF's transmissions say.
             access: Which files may be read: a URDF given by path, and the meshes that
                 it names. Use `access.only_within` for untrusted files.
 

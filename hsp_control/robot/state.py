@@ -21,10 +21,18 @@ from hsp_control.common.arrays import (
     read_only_view,
 )
 from hsp_control.common.exceptions import ImmutableError, NonFiniteError, ShapeError
-from hsp_control.compiled.kernels import AnyCall, KernelCall, KernelCalls, Once, says
-from hsp_control.compiled.step_plan import Step, StepPlan, planned
 from hsp_control.declaration.quantities import Vector
 from hsp_control.engine import REFUSED, Move, Plan
+from hsp_control.engine.plans import (
+    AnyCall,
+    KernelCall,
+    KernelCalls,
+    Once,
+    Step,
+    StepPlan,
+    planned,
+    says,
+)
 from hsp_control.robot.inertia import CentroidalMotion, inertia_terms
 from hsp_control.robot.kinematics import (
     FrameKinematics,

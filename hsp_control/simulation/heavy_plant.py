@@ -95,7 +95,8 @@ def _too_slow(
             f"plant.motor_inertia is {value:g}: {takes}; at most "
             f"{_kg(most[j] - had[j])}"
         )
-    part = float(np.min((most / has)[known]))
+    rotors = after.model.armature  # which no factor of the bodies changes
+    part = float(np.min(((most - rotors) / np.maximum(has - rotors, 1e-300))[known]))
     own = plant.inertias
     name = "mass_factor" if own.mass_factor > own.inertia_factor else "inertia_factor"
     value = getattr(own, name)

@@ -6,9 +6,9 @@ import numpy as np
 
 from hsp_control import engine
 from hsp_control.common.arrays import Array
-from hsp_control.compiled.kernels import KernelCall
 from hsp_control.constraints.limits import RobotLimits
 from hsp_control.control.measurement import LogChannel
+from hsp_control.engine.plans import KernelCall
 from hsp_control.robot import Robot
 
 POSITION, VELOCITY = "position_excess", "velocity_excess"

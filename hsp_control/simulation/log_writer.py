@@ -279,6 +279,7 @@ class LogWriter:
                 "nv": robot.nv,
                 "dofs": list(robot.dof_names),
                 "units": list(robot.units),
+                "rotors": bool(robot.model.armature.any()),
                 "continuous": continuous_dofs(robot),
                 "skeleton_parents": self._parents,
                 "joint_coordinates": robot.source.joint_coordinates,
@@ -360,7 +361,7 @@ def continuous_dofs(robot: Robot) -> list[int]:
 
 def versions() -> dict[str, str]:
     """Return the versions of the packages that a run depends on."""
-    packages = ("pin", "numpy", "scipy", "numba")
+    packages = ("pin", "numpy", "scipy")
     return {
         "hsp_control": __version__,
         "python": platform.python_version(),

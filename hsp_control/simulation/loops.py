@@ -122,7 +122,7 @@ def _native_loop(
     steps = plant.native_steps()
     if steps is None:
         return None
-    from hsp_control.simulation.native_loop import NativeLoop  # here: it imports Numba
+    from hsp_control.simulation.native_loop import NativeLoop
 
     return NativeLoop(command.controller, plant, steps, excess)
 

@@ -9,6 +9,7 @@ from dataclasses import replace
 from typing import Any, NamedTuple
 
 import numpy as np
+import pinocchio as pin
 
 from hsp_control.common.arrays import Array
 from hsp_control.control.compensation import Compensation
@@ -43,8 +44,19 @@ _LONGEST = 0.05
 """Longest delay and lag that are tried [s]."""
 _LARGEST_ROTOR = 10.0
 """Largest inertia of a rotor that is tried [kg·m²]."""
+USUAL_ROTOR = 0.05
+"""What the joint of a light wrist feels of its motor: a rotor of 5e-6 kg·m² behind a
+gear of 100 [kg·m²]."""
 _STEP_RESPONSE = 0.5
 """How long the response to an effort is followed [s]."""
+
+
+class _HiddenRotors(ModelChange):
+    """Drives whose torque control hides the rotors that the model has."""
+
+    def apply(self, model: pin.Model, robot: Robot, seed: int) -> None:
+        """Take the rotors away."""
+        model.armature[:] = 0.0
 
 
 class Moved(NamedTuple):
@@ -70,6 +82,9 @@ class ModelErrors(NamedTuple):
     # largest inertia that each rotor may have beyond the model [kg·m²]; inf: any that
     # was tried
     rotor: float
+    # longest delay without a growing mode if the drives hide the rotors that the model
+    # has, 0 if it is shorter than a period [s]; None: it has none
+    hidden: float | None
 
 
 def model_errors(
@@ -120,6 +135,13 @@ def model_errors(
         change: ModelChange = MotorInertia(inertia)
         return _of(controller, state, changed(robot, [change]), chain)
 
+    bare = changed(robot, [_HiddenRotors()])
+    unlike = _of(controller, state, bare, chain)
+
+    def late_and_bare(seconds: float) -> LinearLoop:
+        return replace(unlike, effort_delay=effort_delay + round(seconds / period))
+
+    has_rotors = bool(robot.model.armature.any())
     most = round(_LONGEST / period)
     delays = [period * periods for periods in range(1, most + 1)]
     return ModelErrors(
@@ -131,6 +153,7 @@ def model_errors(
         len(rates),
         max(growing, default=0.0),
         _last_stable(with_rotors, [*np.geomspace(1e-5, _LARGEST_ROTOR, 61)], np.inf),
+        _last_stable(late_and_bare, delays) if has_rotors else None,
     )
 
 
@@ -156,6 +179,18 @@ def lines(found: ModelErrors) -> dict[str, str]:
         texts["bears"] += (
             f"; rotors of up to {found.rotor:.2g} kg m² that the model lacks, see "
             "robot: motor_inertia"
+        )
+        if found.rotor < USUAL_ROTOR:
+            texts["rotors"] = (
+                f"a light wrist's has some {USUAL_ROTOR:g} kg m²: then a mode grows; "
+                "give them, if only a guess: robot: {motor_inertia: "
+                f"{USUAL_ROTOR:g}}}"
+            )
+    if found.hidden is not None:
+        most = f"at most {1e3 * found.hidden:.3g} ms" if found.hidden else "hardly any"
+        texts["rotors hidden"] = (
+            "where the drives' torque control makes the arm behave as its bare links, "
+            f"{most} of delay is borne: then motor_inertia: 0"
         )
     return texts
 

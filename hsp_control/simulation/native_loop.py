@@ -12,11 +12,11 @@ import numpy as np
 
 from hsp_control import engine
 from hsp_control.common.arrays import Array
-from hsp_control.compiled.step_plan import bind
 from hsp_control.control.actuation.actuation import LOOK
 from hsp_control.control.bound_step import FreeStep
 from hsp_control.control.controller import Controller
 from hsp_control.engine import Call, Plan
+from hsp_control.engine.plans import bind
 from hsp_control.robot.integrators import Steps
 from hsp_control.simulation.limit_excess import LimitExcess
 from hsp_control.simulation.plants import IntegratedPlant

@@ -7,8 +7,8 @@ import numpy as np
 
 from hsp_control import engine
 from hsp_control.common.arrays import Array
-from hsp_control.compiled.kernels import KernelCall
 from hsp_control.declaration.quantities import Axes, Positive
+from hsp_control.engine.plans import KernelCall
 from hsp_control.geometry.scene import Start
 from hsp_control.law import TaskSample
 from hsp_control.robot import Robot, RobotState

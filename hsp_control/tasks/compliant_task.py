@@ -8,8 +8,8 @@ import numpy as np
 from hsp_control import engine
 from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import GainError
-from hsp_control.compiled.kernels import KernelCalls
 from hsp_control.declaration import within
+from hsp_control.engine.plans import KernelCalls
 from hsp_control.law import TaskSample
 from hsp_control.robot import Robot, RobotState
 from hsp_control.tasks.feedback import Feedback, InForce

@@ -8,8 +8,8 @@ import pinocchio as pin
 
 from hsp_control import engine
 from hsp_control.common.arrays import Array
-from hsp_control.compiled.kernels import KernelCall
 from hsp_control.declaration import AnyOf
+from hsp_control.engine.plans import KernelCall
 from hsp_control.engine.rotations import quaternion_from_rotation
 from hsp_control.robot import RobotState
 from hsp_control.robot.kinematics import FrameKinematics

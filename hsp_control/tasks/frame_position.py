@@ -7,8 +7,8 @@ import numpy as np
 
 from hsp_control import engine
 from hsp_control.common.arrays import Array, Indices
-from hsp_control.compiled.kernels import KernelCall
 from hsp_control.declaration.quantities import Axes
+from hsp_control.engine.plans import KernelCall
 from hsp_control.robot import RobotState
 from hsp_control.robot.kinematics import FrameKinematics
 from hsp_control.tasks.compliant_task import CompliantTask

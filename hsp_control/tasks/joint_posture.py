@@ -8,9 +8,9 @@ import numpy as np
 from hsp_control import engine
 from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import TaskError
-from hsp_control.compiled.kernels import KernelCall
 from hsp_control.declaration import within
 from hsp_control.declaration.quantities import Names
+from hsp_control.engine.plans import KernelCall
 from hsp_control.geometry.scene import Start
 from hsp_control.robot import Robot, RobotState
 from hsp_control.robot.state import Posture, configuration

@@ -10,8 +10,8 @@ import pinocchio as pin
 from hsp_control import engine
 from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import TaskError
-from hsp_control.compiled.kernels import KernelCall
 from hsp_control.declaration.quantities import Vector3
+from hsp_control.engine.plans import KernelCall
 from hsp_control.robot import RobotState
 from hsp_control.robot.kinematics import FrameKinematics
 from hsp_control.tasks.feedback import ErrorPart

@@ -8,8 +8,8 @@ import pinocchio as pin
 from hsp_control import engine
 from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import TaskError
-from hsp_control.compiled.kernels import KernelCall, KernelOutput
 from hsp_control.declaration import within
+from hsp_control.engine.plans import KernelCall, KernelOutput
 from hsp_control.geometry.scene import Start
 from hsp_control.robot import Robot, RobotState
 from hsp_control.robot.kinematics import FrameMotion

@@ -9,10 +9,10 @@ import numpy as np
 
 from hsp_control.common.arrays import Array, Indices
 from hsp_control.common.exceptions import TaskError
-from hsp_control.compiled.kernels import KernelCall, KernelCalls, says, with_outputs
 from hsp_control.declaration import Part, within
 from hsp_control.declaration.nested import parts_within, with_memories_copied
 from hsp_control.declaration.quantities import PositiveCount
+from hsp_control.engine.plans import KernelCall, KernelCalls, says, with_outputs
 from hsp_control.geometry.scene import Start
 from hsp_control.law import TaskSample
 from hsp_control.robot import Robot, RobotState

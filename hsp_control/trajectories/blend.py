@@ -9,9 +9,9 @@ from numpy.typing import ArrayLike
 
 from hsp_control import engine
 from hsp_control.common.arrays import Array
-from hsp_control.compiled.kernels import KernelCall
 from hsp_control.declaration.quantities import Number, Positive, Vector, Vector3
 from hsp_control.declaration.rotation import Rotation, matrix_of
+from hsp_control.engine.plans import KernelCall
 from hsp_control.engine.rotations import jexp3_dot, jlog3, log3
 from hsp_control.trajectories import checks
 from hsp_control.trajectories.orientation import OrientationTrajectory

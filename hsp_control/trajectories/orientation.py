@@ -11,10 +11,10 @@ from numpy.typing import ArrayLike
 from hsp_control import engine
 from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import TrajectoryError
-from hsp_control.compiled.kernels import KernelCall, KernelCalls
 from hsp_control.declaration import Part
 from hsp_control.declaration.quantities import Number, Vector, Vector3
 from hsp_control.declaration.rotation import Rotation, Rotations, matrix_of
+from hsp_control.engine.plans import KernelCall, KernelCalls
 from hsp_control.engine.rotations import log3
 from hsp_control.trajectories import checks
 from hsp_control.trajectories.trajectory import calls_of_sample, sampled

@@ -11,8 +11,8 @@ from numpy.typing import ArrayLike
 
 from hsp_control import engine
 from hsp_control.common.arrays import Array
-from hsp_control.compiled.kernels import KernelCall
 from hsp_control.declaration.quantities import Matrix, Number, Positive, Tensor, Vector
+from hsp_control.engine.plans import KernelCall
 from hsp_control.trajectories import checks
 from hsp_control.trajectories.trajectory import Trajectory
 

@@ -11,10 +11,10 @@ import pinocchio as pin
 from hsp_control import engine
 from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import TrajectoryError
-from hsp_control.compiled.kernels import TIME, KernelCalls, says
 from hsp_control.declaration import Part
 from hsp_control.declaration.quantities import Number, Positive, Vector3, numbers
 from hsp_control.declaration.rotation import Rotation, matrix_of
+from hsp_control.engine.plans import TIME, KernelCalls, says
 from hsp_control.engine.rotations import jlog3, log3
 from hsp_control.trajectories.hold import Hold, HoldOrientation
 from hsp_control.trajectories.orientation import (

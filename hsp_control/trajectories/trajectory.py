@@ -10,9 +10,9 @@ from numpy.typing import ArrayLike
 
 from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import ShapeError, TrajectoryError
-from hsp_control.compiled.kernels import TIME, KernelCall, KernelCalls, says
 from hsp_control.declaration import Part
 from hsp_control.engine import Kind
+from hsp_control.engine.plans import TIME, KernelCall, KernelCalls, says
 
 
 def sampled(trajectory: Any, t: float, out: Any) -> Any:

@@ -6,8 +6,8 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from hsp_control.common.arrays import Array
-from hsp_control.compiled.step_plan import planned
 from hsp_control.edge import Resolution
+from hsp_control.engine.plans import planned
 from hsp_control.law import IDENTITY, VARYING, Outcome, Problem
 from hsp_control.law.outcome import outcome_of
 

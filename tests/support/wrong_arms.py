@@ -35,6 +35,11 @@ ARMS: dict[str, list[float] | None] = {
     "ur5": [0.0, -1.3, 1.8, -2.0, -1.57, 0.0],
 }
 """The postures in which hands are held; None: home."""
+MORE_ARMS: dict[str, list[float] | None] = {
+    "ur10": ARMS["ur5"],
+    "kinova": [0.0, 2.9, 1.3, 1.0, 1.4, 0.3],
+}
+"""Others that benchmarks hold; of joints that turn on and on the angles."""
 
 
 @dataclass(frozen=True)
@@ -84,8 +89,10 @@ class WrongArm:
 
 def posture(robot: hsp.Robot, name: str) -> Array:
     """Return the posture in which an arm's hand is held."""
-    given = ARMS[name]
-    return robot.home() if given is None else np.array(given)
+    given = (ARMS | MORE_ARMS)[name]
+    if given is None:
+        return robot.home()
+    return robot.integrate(robot.neutral(), np.array(given))
 
 
 def holding(arm: WrongArm, circle: float = 0.0) -> tuple[hsp.Controller, Array]:

@@ -12,7 +12,7 @@ import pytest
 
 import hsp_control
 
-HEAVY = {"numba", "numpy", "pinocchio", "scipy", "pydantic", "matplotlib"}
+HEAVY = {"numpy", "pinocchio", "scipy", "pydantic", "matplotlib"}
 
 
 def imported(code: str, **environment: str) -> set[str]:
@@ -148,28 +148,3 @@ def test_a_shell_completes_without_the_engine(
     )
     assert answer.read_text().strip("\013") == offered
     assert not found & HEAVY
-
-
-@pytest.mark.process
-def test_what_python_cannot_divide_is_checked_compiled() -> None:
-    """Python raises where a compiled kernel returns inf: then `hsp` tries again."""
-    code = """
-import sys, types
-sys.argv[0] = "hsp"
-import hsp_control.cli
-
-def check(options):
-    from hsp_control.compiled import kernels
-    if kernels.PLAIN:
-        raise ZeroDivisionError
-    print("compiled")
-    return 0
-
-sys.modules["hsp_control.cli.check"] = types.SimpleNamespace(check=check)
-sys.exit(hsp_control.cli.main(["check", "anything"]))
-"""
-    kept = {k: v for k, v in os.environ.items() if k != "NUMBA_DISABLE_JIT"}
-    ran = subprocess.run(
-        [sys.executable, "-c", code], env=kept, capture_output=True, text=True
-    )
-    assert (ran.returncode, ran.stdout) == (0, "compiled\n"), ran.stderr

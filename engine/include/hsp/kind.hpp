@@ -125,6 +125,22 @@ template <class T> consteval std::string_view type_name() {
 
 }  // namespace detail
 
+// In a build with Eigen's assertions an allocation within a call is one of them.
+class Allocation {
+ public:
+#ifdef EIGEN_RUNTIME_NO_MALLOC
+  explicit Allocation(bool allowed) : before_(Eigen::internal::is_malloc_allowed()) {
+    Eigen::internal::set_is_malloc_allowed(allowed);
+  }
+  ~Allocation() { Eigen::internal::set_is_malloc_allowed(before_); }
+
+ private:
+  bool before_;
+#else
+  explicit Allocation(bool) {}
+#endif
+};
+
 // The table of a struct's members, made once.
 template <class T> const Kind& kind_of() {
   static constexpr bool timed = requires(T x) { x(0.0); };
@@ -146,6 +162,7 @@ template <class T> const Kind& kind_of() {
       [](void* self) { static_cast<T*>(self)->~T(); },
       [](void* self, const Sizes& size) { detail::prepare(*static_cast<T*>(self), size); },
       [](void* self, double t) -> double {
+        [[maybe_unused]] const Allocation allocation(false);
         T& x = *static_cast<T*>(self);
         const auto call = [&] {
           if constexpr (timed) return x(t);

@@ -1,12 +1,15 @@
 """A field: a frame, such as the elbow, keeps a height."""
 
-from hsp_control.compiled.kernels import KernelCall, kernel
+from pathlib import Path
+
 from hsp_control.declaration.quantities import Number
+from hsp_control.engine.own_kinds import load
+from hsp_control.engine.plans import KernelCall
 from hsp_control.null_space.fields import Cost
 
 
 class ElbowHeight(Cost, type="elbow_height"):
-    """f = (z - height)², with gradient and rate by a kernel."""
+    """f = (z - height)², with gradient and rate in C++: ``elbow_height.cpp``."""
 
     frame: str
     """Name of the frame [-]."""
@@ -14,16 +17,6 @@ class ElbowHeight(Cost, type="elbow_height"):
     """The height [m]."""
 
     def kernel(self, state) -> KernelCall:
-        """Return the kernel; see `Cost.kernel`."""
-        return _elbow_height, (state.frame(self.frame), self.height)
-
-
-@kernel
-def _elbow_height(frame, height, gradient, rate):
-    """Write ∇f = 2 (z - height) J_z and its rate, and return f."""
-    away = frame.position[2] - height
-    for i in range(gradient.shape[0]):
-        J, J_dot = frame.jacobian[2, i], frame.jacobian_dot[2, i]
-        gradient[i] = 2.0 * away * J
-        rate[i] = 2.0 * (frame.velocity[2] * J + away * J_dot)
-    return away * away
+        """Return the kind of call and its first arguments; see `Cost.kernel`."""
+        kinds = load(Path(__file__).with_name("elbow_height.cpp"))
+        return kinds.ElbowHeight, (state.frame(self.frame), self.height)

@@ -21,7 +21,6 @@ from hsp_control.companions.viewer.pages import (
     OpeningPage,
     draw_before,
     draw_empty,
-    status_line,
 )
 from hsp_control.companions.viewer.transport import PageServer
 from hsp_control.config import Experiment
@@ -95,26 +94,23 @@ def play_command(options: argparse.Namespace) -> int:
             server.url,
             options,
             lambda url: out.print(f"Play: {url}", soft_wrap=True),
-            status_line(server),
         )
-        with page.compiling():
-            run_imports(options)
-            document = playable_document(
-                options.config,
-                *options.overrides,
-                strict=options.strict or bool(options.allow),
-                allow=options.allow,
-            )
-            loaded = load_scenario(document)
-            view = loaded.scenario.view.all_fields()
-            viewer = Viewer(loaded.robot, transport=server, **view)
-            draw_before(viewer, loaded)
-            experiment = Experiment.of(loaded)
-            page.open()
-            session = Session(experiment)
-            session.rehearse()
-            picture = Picture(session, viewer)
-        page.ready()
+        run_imports(options)
+        document = playable_document(
+            options.config,
+            *options.overrides,
+            strict=options.strict or bool(options.allow),
+            allow=options.allow,
+        )
+        loaded = load_scenario(document)
+        view = loaded.scenario.view.all_fields()
+        viewer = Viewer(loaded.robot, transport=server, **view)
+        draw_before(viewer, loaded)
+        experiment = Experiment.of(loaded)
+        page.open()
+        session = Session(experiment)
+        session.rehearse()
+        picture = Picture(session, viewer)
         gc.collect()
         gc.freeze()  # what is there now stays: no collection looks at it in a row
         stack.enter_context(_stop_at_termination())

@@ -15,7 +15,7 @@ from pathlib import Path
 from time import monotonic, sleep
 from typing import Any, NamedTuple, Self
 
-from hsp_control.cli.consoles import compiling_told, out
+from hsp_control.cli.consoles import out
 from hsp_control.cli.live_experiment import live_period
 from hsp_control.cli.robot_process import end_process
 from hsp_control.common.exceptions import HspControlError, ViewerError
@@ -138,7 +138,7 @@ class SteeringPage(NamedTuple):
         controller, period = experiment.controller, live_period(experiment)
         controller.compute(0.0, experiment.q0, experiment.v0)
         _rehearse(controller, period, experiment)
-        self.opening.ready()
+        self.opening.open()
         page = self.process
         page.begin(experiment, journal)
         key = DeadMansKey() if page.held else None
@@ -164,7 +164,7 @@ def steering_page(
     options: argparse.Namespace, scenario: Scenario
 ) -> Iterator[SteeringPage]:
     """Yield the page, which shows the robot and the scene."""
-    # It opens when a kernel has to be compiled, or when `let_steer` is called.
+    # It opens when `let_steer` is called.
     held = options.steer == "hardware"
     with PageProcess(port=options.port, host=options.host, held=held) as process:
         process.prepare(scenario)
@@ -172,14 +172,12 @@ def steering_page(
             process.url,
             options,
             lambda url: out.print(f"Steer: {url}", soft_wrap=True),
-            process.say,
         )
-        with opening.compiling():
-            yield SteeringPage(process, opening)
+        yield SteeringPage(process, opening)
 
 
 def _rehearse(controller: Controller, period: float, experiment: Experiment) -> None:
-    """Do with a copy all that a page can do: nothing is compiled in the loop."""
+    """Do with a copy all that a page can do: nothing is done first in the loop."""
     memo: dict[int, Any] = {id(controller.robot): controller.robot}
     copy = deepcopy(controller, memo)
     handles = Handles(copy, period)
@@ -233,12 +231,11 @@ def _run(settings: dict[str, Any]) -> None:
                     )
                 case {"begin": dict(config), "journal": str(file), "period": period}:
                     assert viewer is not None
-                    with compiling_told(say):
-                        experiment = load_experiment(config)
-                        channel = Channel(socket.socket(fileno=settings["channel"]))
-                        journal, held = Path(file), settings["held"]
-                        mirror = Mirror(experiment, period, journal, channel, held=held)
-                        picture = Picture(mirror, viewer)
+                    experiment = load_experiment(config)
+                    channel = Channel(socket.socket(fileno=settings["channel"]))
+                    journal, held = Path(file), settings["held"]
+                    mirror = Mirror(experiment, period, journal, channel, held=held)
+                    picture = Picture(mirror, viewer)
                     _show(mirror, picture, server)
                     return
     finally:

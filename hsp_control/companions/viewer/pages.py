@@ -1,4 +1,4 @@
-"""The pages of commands: they open at once, say what is compiled, and stay open.
+"""The pages of commands: they open when all is ready, and stay open.
 
 And ``hsp export``, which writes logs as a page for offline use, or one as films.
 """
@@ -14,7 +14,7 @@ from typing import Self
 from rich.markup import escape
 from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
 
-from hsp_control.cli.consoles import compiling_told, errors, out, working
+from hsp_control.cli.consoles import errors, out, working
 from hsp_control.cli.interrupts import end_in_order
 from hsp_control.common.exceptions import ExportError, HspControlError, ViewerError
 from hsp_control.companions.viewer import (
@@ -37,23 +37,18 @@ from hsp_control.simulation.log_writer import LogWriter
 
 
 class OpeningPage:
-    """Opens a page once: at the first kernel that has to be compiled, or when told to.
-
-    A mistake in a configuration is then said before, unless the cache is empty.
-    """
+    """Opens a page once, when all is ready: mistakes are said before."""
 
     def __init__(
         self,
         url: str | None,
         options: argparse.Namespace,
         announce: Callable[[str], object],
-        say: Callable[[str], object],
     ) -> None:
         assert url is not None
         self.opened = False  # whether it was opened in a browser
         self._url, self._browser = url, options.browser
-        self._announce, self._say = announce, say
-        self._done = self._told = self._ready = False
+        self._announce, self._done = announce, False
 
     def open(self) -> None:
         """Print the address, and open the page in a browser."""
@@ -63,36 +58,6 @@ class OpeningPage:
         self._announce(self._url)
         if self._browser:
             self.opened = transport.open_browser(self._url)
-
-    def ready(self) -> None:
-        """Open the page, if it is not open; from now on it says nothing of kernels."""
-        self.open()
-        self._ready = True
-        if self._told:
-            self._say("")
-
-    @contextmanager
-    def compiling(self) -> Iterator[None]:
-        """Say on the page how many kernels are compiled; the first one opens it."""
-        # Where what is done then fails, an open page says why: it stays, and would
-        # count kernels for ever.
-
-        def tell(text: str) -> None:
-            if self._ready:
-                return
-            self._told = True
-            with suppress(ViewerError):  # who uses the page is told in any case
-                self._say(text)
-            self.open()
-
-        try:
-            with compiling_told(tell):
-                yield
-        except HspControlError as error:
-            if self._done and not self._ready:
-                with suppress(ViewerError):
-                    self._say(str(error))
-            raise
 
 
 def status_line(transport: SceneRecorder) -> Callable[[str], object]:
@@ -120,7 +85,7 @@ PAGE_TIMEOUT = 15.0
 
 
 class Screen:
-    """Shows a run: before it, while kernels are compiled, while it runs, and after."""
+    """Shows a run: before it, while it runs, and after."""
 
     def __init__(
         self, viewer: Viewer | None = None, page: OpeningPage | None = None
@@ -134,7 +99,7 @@ class Screen:
         cls, options: argparse.Namespace, loaded: LoadedScenario
     ) -> Iterator[Self]:
         """Yield a screen that shows the robot and the scene."""
-        # The page opens when a kernel has to be compiled, or when `begin` is called.
+        # The page opens when `begin` is called.
         end_in_order()
         said = errors if options.json else out
         view = loaded.scenario.view.all_fields()
@@ -151,9 +116,7 @@ class Screen:
                 viewer.url,
                 options,
                 lambda url: said.print(f"View: {url}"),
-                status_line(viewer.transport),
             )
-            stack.enter_context(page.compiling())
             yield cls(viewer, page)
 
     def begin(self, experiment: Experiment) -> None:
@@ -194,19 +157,17 @@ def show_logs(options: argparse.Namespace) -> None:
             server.url,
             options,
             lambda url: out.print(f"View: {url}"),
-            status_line(server),
         )
-        with page.compiling():
-            viewer = view_logs(
-                options.logs,
-                beside=options.beside,
-                speed=options.speed,
-                loop=options.loop,
-                transport=server,
-                strict=options.strict or bool(options.allow),
-                allow=options.allow,
-            )
-        page.ready()
+        viewer = view_logs(
+            options.logs,
+            beside=options.beside,
+            speed=options.speed,
+            loop=options.loop,
+            transport=server,
+            strict=options.strict or bool(options.allow),
+            allow=options.allow,
+        )
+        page.open()
         attend(viewer, opened=page.opened)
 
 

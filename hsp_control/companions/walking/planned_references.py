@@ -9,8 +9,8 @@ from hsp_control import engine
 from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import TrajectoryError
 from hsp_control.companions.walking.written_part import Written
-from hsp_control.compiled.kernels import KernelCall
 from hsp_control.declaration.quantities import PositiveCount
+from hsp_control.engine.plans import KernelCall
 from hsp_control.trajectories.orientation import OrientationTrajectory
 from hsp_control.trajectories.trajectory import Trajectory
 

@@ -11,7 +11,6 @@ from pydantic import AfterValidator
 
 from hsp_control.common.arrays import Array, Indices
 from hsp_control.common.exceptions import ContactError, TrajectoryError
-from hsp_control.compiled.kernels import KernelCall, KernelCalls, with_outputs
 from hsp_control.declaration import Part, within
 from hsp_control.declaration.nested import parts_within, with_memories_copied
 from hsp_control.declaration.quantities import (
@@ -21,6 +20,7 @@ from hsp_control.declaration.quantities import (
     Vector3,
     read_only,
 )
+from hsp_control.engine.plans import KernelCall, KernelCalls, with_outputs
 from hsp_control.geometry.scene import Start
 from hsp_control.law import TaskSample
 from hsp_control.robot import Robot, RobotState

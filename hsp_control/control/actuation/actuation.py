@@ -20,7 +20,6 @@ import numpy as np
 
 from hsp_control import engine
 from hsp_control.common.arrays import Array, Indices
-from hsp_control.compiled.kernels import KernelCall, KernelCalls
 from hsp_control.constraints.limits.acceleration_bounds import EFFORT, MOTION
 from hsp_control.control.actuation.limited_step import (
     BEYOND,
@@ -36,6 +35,7 @@ from hsp_control.control.actuation.limits_in_force import LimitSet
 from hsp_control.control.actuation.support import Support
 from hsp_control.edge import Resolution
 from hsp_control.edge.limited_target import Permitted
+from hsp_control.engine.plans import KernelCall, KernelCalls
 from hsp_control.law.outcome import BEYOND_ANY_LEVEL
 from hsp_control.robot import RobotState
 

@@ -11,9 +11,9 @@ import numpy as np
 
 from hsp_control import engine
 from hsp_control.common.arrays import Array, Flags, Indices
-from hsp_control.compiled.kernels import KernelCall
 from hsp_control.edge import Resolution
 from hsp_control.edge.step import Factors, Projectors
+from hsp_control.engine.plans import KernelCall
 
 _LEAST = 1e-6
 """Least cost of null-space deviation relative to the first level. The smaller it is,

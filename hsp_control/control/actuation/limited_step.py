@@ -22,7 +22,6 @@ import numpy as np
 
 from hsp_control import engine
 from hsp_control.common.arrays import Array, Indices
-from hsp_control.compiled.kernels import AnyCall, KernelCall, KernelCalls, OnlyIf
 from hsp_control.constraints.limits.acceleration_bounds import Bounds
 from hsp_control.control.actuation.deviation_cost import (
     Directions,
@@ -40,6 +39,7 @@ from hsp_control.edge.limited_target import (
     Within,
     limited_target,
 )
+from hsp_control.engine.plans import AnyCall, KernelCall, KernelCalls, OnlyIf
 from hsp_control.robot import RobotState
 
 

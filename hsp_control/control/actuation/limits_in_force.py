@@ -7,7 +7,6 @@ import numpy as np
 
 from hsp_control import engine
 from hsp_control.common.arrays import Array
-from hsp_control.compiled.kernels import KernelCall
 from hsp_control.constraints.limits import RobotLimits
 from hsp_control.constraints.limits.acceleration_bounds import (
     Bounds,
@@ -16,6 +15,7 @@ from hsp_control.constraints.limits.acceleration_bounds import (
 )
 from hsp_control.control.actuation.sent_effort import SentEffort
 from hsp_control.control.evolution import Evolution, PlannedLimits
+from hsp_control.engine.plans import KernelCall
 from hsp_control.robot import Robot, RobotState
 
 

@@ -6,7 +6,7 @@ import numpy as np
 
 from hsp_control import engine
 from hsp_control.common.arrays import Array
-from hsp_control.compiled.kernels import KernelCall
+from hsp_control.engine.plans import KernelCall
 from hsp_control.robot import RobotState
 
 

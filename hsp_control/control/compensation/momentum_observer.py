@@ -38,6 +38,10 @@ from hsp_control.robot.state import as_given
 from hsp_control.tasks import Task
 from hsp_control.tasks.compliant_task import CompliantTask
 
+LARGE_SHARE = 0.25
+"""Share of an effort limit from which on unexplained effort is no error of masses: the
+robot does not do what the model says [-]."""
+
 
 class MomentumObserver(Part, error=CompensationError):
     """The efforts that the model does not explain are estimated, and cancelled.
@@ -142,6 +146,14 @@ class RunningObserver(Stage):
         """Return r, and the force at each task of a frame that explains it."""
         r, meaning = self.disturbance, "estimated disturbance r"
         found = {"observer.disturbance": LogChannel(r, "N·m or N", meaning)}
+        limit = run.controller.robot.model.effortLimit
+        share = np.abs(r) / np.where(limit > 0.0, limit, np.inf)
+        found["observer.share"] = LogChannel(
+            np.array(share.max()),
+            "-",
+            f"largest |r| of an effort limit; above {LARGE_SHARE:g} the robot does not "
+            "do what the model says",
+        )
         threshold = run.controller.singularity_threshold
         for task in run.controller.tasks:
             if isinstance(task, CompliantTask) and task.wrench_unit is not None:

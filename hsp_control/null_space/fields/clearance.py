@@ -13,9 +13,9 @@ from hsp_control import engine
 from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import FieldError, SceneError
 from hsp_control.common.suggestions import did_you_mean, listing
-from hsp_control.compiled.kernels import KernelCall, KernelCalls, says
 from hsp_control.declaration import within
 from hsp_control.declaration.quantities import Name, Names, OrInstance, Positive
+from hsp_control.engine.plans import KernelCall, KernelCalls, says
 from hsp_control.geometry import LinkShape, Proximity, Proxy, link_shapes, self_pairs
 from hsp_control.geometry.scene import Obstacle, Start
 from hsp_control.law import FieldSample, MetricSample

@@ -9,8 +9,8 @@ import numpy as np
 from hsp_control import engine
 from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import FieldError
-from hsp_control.compiled.kernels import KernelCall, KernelCalls, says, with_outputs
 from hsp_control.declaration.imported import AS_TEXT, NAMED
+from hsp_control.engine.plans import KernelCall, KernelCalls, says, with_outputs
 from hsp_control.law import FieldSample, MetricSample
 from hsp_control.null_space.differences import gradient, rate_along_flow
 from hsp_control.null_space.fields.field import NullSpaceField

@@ -13,9 +13,9 @@ from pydantic import AfterValidator, InstanceOf
 from hsp_control import engine
 from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import FieldError
-from hsp_control.compiled.kernels import AnyCall, KernelCalls, says
 from hsp_control.declaration import Part, within
 from hsp_control.declaration.quantities import NonNegative, OrInstance
+from hsp_control.engine.plans import AnyCall, KernelCalls, says
 from hsp_control.geometry.scene import Start
 from hsp_control.law import FieldSample, MetricSample
 from hsp_control.null_space.fields.weight import Ramp, Weight, product, sample_weight

@@ -12,9 +12,9 @@ import numpy as np
 from hsp_control import engine
 from hsp_control.common.arrays import Array, Indices
 from hsp_control.common.exceptions import FieldError
-from hsp_control.compiled.kernels import KernelCall, KernelCalls
 from hsp_control.declaration import within
 from hsp_control.declaration.quantities import Axes
+from hsp_control.engine.plans import KernelCall, KernelCalls
 from hsp_control.geometry.scene import Start
 from hsp_control.null_space.fields.cost import Cost
 from hsp_control.robot import Robot, RobotState

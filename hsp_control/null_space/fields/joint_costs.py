@@ -10,9 +10,9 @@ from pydantic import Field
 from hsp_control import engine
 from hsp_control.common.arrays import Array, Indices
 from hsp_control.common.exceptions import FieldError
-from hsp_control.compiled.kernels import KernelCall
 from hsp_control.declaration import within
 from hsp_control.declaration.quantities import Fraction, Names, Weights
+from hsp_control.engine.plans import KernelCall
 from hsp_control.geometry.scene import Start
 from hsp_control.null_space.fields.cost import Cost
 from hsp_control.robot import Robot, RobotState

@@ -7,9 +7,9 @@ import numpy as np
 
 from hsp_control import engine
 from hsp_control.common.exceptions import FieldError
-from hsp_control.compiled.kernels import KernelCall
 from hsp_control.declaration import within
 from hsp_control.declaration.quantities import Matrix, Positive
+from hsp_control.engine.plans import KernelCall
 from hsp_control.geometry.scene import Start
 from hsp_control.null_space.fields.jacobian_cost import JacobianCost, Rows
 

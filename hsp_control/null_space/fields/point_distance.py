@@ -9,9 +9,9 @@ from pydantic import Field
 from hsp_control import engine
 from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import FieldError
-from hsp_control.compiled.kernels import KernelCalls
 from hsp_control.declaration import within
 from hsp_control.declaration.quantities import Name, Names, OrInstance
+from hsp_control.engine.plans import KernelCalls
 from hsp_control.geometry.scene import Obstacle, Start
 from hsp_control.null_space.fields.cost import Cost
 from hsp_control.robot import RobotState

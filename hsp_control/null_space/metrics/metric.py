@@ -12,7 +12,6 @@ from pydantic import Field
 from hsp_control import engine
 from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import MetricError
-from hsp_control.compiled.kernels import KernelCall, KernelCalls, says, with_outputs
 from hsp_control.declaration import Part, within
 from hsp_control.declaration.quantities import (
     ArrayField,
@@ -22,6 +21,7 @@ from hsp_control.declaration.quantities import (
     numbers,
     read_only,
 )
+from hsp_control.engine.plans import KernelCall, KernelCalls, says, with_outputs
 from hsp_control.geometry.scene import Start
 from hsp_control.law import CONSTANT, IDENTITY, VARYING, MetricSample
 from hsp_control.robot import RobotState

@@ -45,7 +45,7 @@ MotorInertias = Annotated[
         _stored,
     ),
 ]
-"""A number, one for each joint in a list or by name, or ``bundled``."""
+"""A number, one for each joint in a list or by name, or ``bundled``; 0: bare links."""
 
 
 def write_motor_inertia(
@@ -64,12 +64,13 @@ def write_motor_inertia(
         if joint.nv == 1
     }
     if given == "bundled":
-        given = source.motor_inertia
-        if given is None:
+        if not source.motor_inertia:
             raise ModelError(
                 f"{source.name} comes without motor inertias; give them: one number "
                 "[kg m²], or one for each joint"
             )
+        # of the joints that are not locked
+        given = {k: each for k, each in source.motor_inertia.items() if k in joints}
     inertias = {name: of_file[name] for name in joints if name in of_file}
     if isinstance(given, Mapping):
         for name in given:

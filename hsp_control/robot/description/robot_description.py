@@ -83,9 +83,9 @@ class OneRobot(Part, error=ModelError):
     the URDF that is called like it, if there is one."""
     motor_inertia: MotorInertias | None = None
     """Inertia of the rotors as the joints feel it, times their reductions squared
-    [kg·m² or kg]: one number, or one for each joint in a list or by name. ``bundled``:
-    what the README of a bundled robot gives. By default what the ``<transmission>``
-    elements of the URDF say."""
+    [kg·m² or kg]: one number, or one for each joint in a list or by name; 0: the bare
+    links. ``bundled``: what the README of a bundled robot gives. By default what the
+    ``<transmission>`` elements of the URDF say."""
 
     def find(self, access: Access = ANYWHERE) -> RobotSource:
         """Return where it comes from; see `find_robot` and `find_description`.

@@ -82,9 +82,9 @@ class RobotSource:
     # joints that are locked by default, name to value [rad or m]
     locked: Mapping[str, float] = field(default_factory=dict)
     end_effector: str | None = None  # the frame that tasks use by default, if known
-    # inertias of the rotors of all joints that are not locked [kg·m² or kg], if the
-    # robot's folder has them; used where they are asked for
-    motor_inertia: tuple[float, ...] | None = None
+    # inertias of the rotors by joint [kg·m² or kg], if the robot's folder has them;
+    # used where they are asked for
+    motor_inertia: Mapping[str, float] = field(default_factory=dict)
     # joint values of a good start posture, shape (nv,) [rad or m], if known
     home: tuple[float, ...] | None = None
     posture: str | None = None  # name of the reference posture in the SRDF, if known
@@ -314,7 +314,7 @@ def _from_bundle(name: str, folder: Path) -> RobotSource:
     file = folder / "robot.yaml"
     if file.is_file():
         settings = yaml.safe_load(file.read_text(encoding="utf-8")) or {}
-    home, rotors = settings.get("home"), settings.get("motor_inertia")
+    home = settings.get("home")
     return RobotSource(
         name=name,
         urdf=folder / f"{name}.urdf",
@@ -324,7 +324,7 @@ def _from_bundle(name: str, folder: Path) -> RobotSource:
         locked=dict(settings.get("locked") or {}),
         end_effector=settings.get("end_effector"),
         home=tuple(float(x) for x in home) if home is not None else None,
-        motor_inertia=tuple(map(float, rotors)) if rotors is not None else None,
+        motor_inertia=dict(settings.get("motor_inertia") or {}),
         joint_coordinates=settings.get("joint_coordinates"),
     )
 

@@ -9,9 +9,9 @@ import numpy as np
 
 from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import SimulationError
-from hsp_control.compiled.kernels import TIME
 from hsp_control.control.measurement import NO_WRENCHES, Inertial, LogChannel
 from hsp_control.declaration import Part
+from hsp_control.engine.plans import TIME
 from hsp_control.robot import Robot
 from hsp_control.robot.integrators import Advance, Integrator, Steps
 from hsp_control.robot.kinematics import Term

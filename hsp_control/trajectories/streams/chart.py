@@ -33,9 +33,6 @@ class Chart:
         """Set the number of linear coordinates, and whether a rotation follows."""
         self.linear, self.rotational = linear, rotational
         self.size = linear + 3 * rotational
-        self._base, self._y = np.eye(3), np.zeros((3, 3))  # y, y' and y''
-        self._found = OrientationSample.allocate()
-        self._turn = engine.OrientationOfChart(self._base, *self._y, self._found)
 
     def begin(self, linear: Array, rotation: Array) -> State:
         """Return the state at rest at a point and an orientation."""
@@ -59,12 +56,9 @@ class Chart:
 
     def write_orientation(self, state: State, out: OrientationSample) -> None:
         """Write R, ω and ω' of a state, in world axes."""
-        n, y = self.linear, self._y
-        self._base[:] = state.base
-        y[0], y[1], y[2] = state.x[n:], state.rate[n:], state.acceleration[n:]
-        self._turn()
-        for own, found in zip(out, self._found, strict=True):
-            own[:] = found
+        n = self.linear
+        y = state.x[n:], state.rate[n:], state.acceleration[n:]
+        engine.OrientationOfChart(state.base, *y, out)()
 
     def local(self, values: Array, base: Array) -> Array:
         """Return values, (k, width), in local coordinates about a base, (k, n).

@@ -67,7 +67,8 @@ def test_it_tells_what_a_policy_needs(states: socket.socket) -> None:
         assert each["tau"] == tau.tolist()
         hand = each["tasks"]["hand"]
         assert each["frames"] == {"panda_tcp": hand["actual"]}
-        assert set(each["log"]) == {"observer.disturbance", "observer.wrench.hand"}
+        names = {"observer.disturbance", "observer.share", "observer.wrench.hand"}
+        assert set(each["log"]) == names
         where = panda().state(t, q, np.zeros(7)).position("panda_tcp")
         np.testing.assert_allclose(hand["actual"][:3], where, atol=1e-12)
         away = math.dist(hand["actual"][:3], hand["reference"][:3])

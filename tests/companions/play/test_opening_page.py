@@ -1,8 +1,7 @@
-"""When a page opens, and what it says before all is ready."""
+"""When a page opens, and what it shows before all is ready."""
 
 import sys
 from argparse import Namespace
-from collections.abc import Callable
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -11,7 +10,7 @@ import pytest
 
 import hsp_control as hsp
 from hsp_control.cli import main
-from hsp_control.common.exceptions import SimulationError, ViewerError
+from hsp_control.common.exceptions import ViewerError
 from hsp_control.companions.play import steering
 from hsp_control.companions.play.live_loop import channel_pair
 from hsp_control.companions.play.playable import playable
@@ -19,7 +18,6 @@ from hsp_control.companions.play.steering import PageProcess, SteeringPage
 from hsp_control.companions.viewer import SceneRecorder, Viewer, transport
 from hsp_control.companions.viewer.commands import unpack
 from hsp_control.companions.viewer.pages import OpeningPage, draw_before
-from hsp_control.compiled import adapters, kernels
 from hsp_control.config.document import read_document
 from hsp_control.config.loaded_scenario import load_scenario
 from hsp_control.live import OperatorRequests
@@ -33,9 +31,7 @@ class Said:
     def __init__(self) -> None:
         self.events: list[str] = []
         options = Namespace(browser=True)
-        self.page = OpeningPage(
-            "http://x/", options, self.events.append, self.events.append
-        )
+        self.page = OpeningPage("http://x/", options, self.events.append)
 
 
 @pytest.fixture
@@ -50,51 +46,20 @@ def said(monkeypatch: pytest.MonkeyPatch) -> Said:
     return said
 
 
-def compiled() -> None:
-    kernels._watched(lambda: None)
-
-
 def transforms(recorder: SceneRecorder) -> dict[str, bytes]:
     return {path: packed for path, kind, packed in recorder.scene.items()
             if kind == "transform"}  # fmt: skip
 
 
-def test_it_opens_at_the_first_kernel_and_says_how_many(said: Said) -> None:
-    with said.page.compiling():
-        assert not said.page.opened
-        compiled()
-        compiled()
-    said.page.ready()
-    line = "Compiling kernels (once, 10 to 20 s) ... {} done"
-    assert said.events == [
-        line.format(0), "http://x/", "browser", *map(line.format, (1, 1, 2)), "",
-    ]  # fmt: skip
+def test_it_opens_once(said: Said) -> None:
+    assert not said.page.opened
+    said.page.open()
+    said.page.open()
+    assert said.events == ["http://x/", "browser"]
     assert said.page.opened
 
 
-def fail_at_last(page: OpeningPage, *events: Callable[[], object]) -> None:
-    with page.compiling():
-        for event in events:
-            event()
-        raise SimulationError("why")
-
-
-def test_an_open_page_says_why_the_rest_failed(said: Said) -> None:
-    with pytest.raises(SimulationError):
-        fail_at_last(said.page)
-    assert said.events == []  # no page was opened
-    with pytest.raises(SimulationError):
-        fail_at_last(said.page, compiled)
-    assert said.events[-1] == "why"
-
-
-def test_the_robot_is_drawn_at_its_start_before_any_kernel_is_compiled(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    def compile_none(*_: object) -> int:
-        raise AssertionError("a kernel was asked for")
-
-    monkeypatch.setattr(adapters, "adapter", compile_none)
+def test_the_robot_is_drawn_at_its_start() -> None:
     document = read_document("panda_obstacle")
     document.override("start={joints: {panda_joint4: -1.0}}")
     loaded = load_scenario(document)
@@ -140,7 +105,7 @@ def test_a_page_that_dies_before_its_key_was_held(
         channel=channel, held=True, begin=lambda *_: there.close()
     )
     ready: list[bool] = []
-    opening = SimpleNamespace(ready=lambda: ready.append(True))
+    opening = SimpleNamespace(open=lambda: ready.append(True))
     page = SteeringPage(process, opening)  # type: ignore[arg-type]
     monkeypatch.setattr(steering, "_rehearse", lambda *_: None)
     with pytest.raises(ViewerError, match="before anybody held its key"):

@@ -10,7 +10,6 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-import numba
 import numpy as np
 import psutil
 import pyarrow.parquet as pq
@@ -32,7 +31,7 @@ from hsp_control.simulation.journal import JournalReader, JournalWriter
 pytestmark = [pytest.mark.process, pytest.mark.slow]
 
 # Some tenths of a second each, also where kernels are not compiled.
-SECONDS = 0.3 if numba.config.DISABLE_JIT else 3
+SECONDS = 3
 SLOWER = [QUICK[1], f"simulation.duration={SECONDS}"]
 
 

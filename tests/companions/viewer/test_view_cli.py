@@ -8,13 +8,10 @@ from urllib.parse import urlsplit
 
 import pytest
 from pages import Page
-from played import wait_until
 
-from hsp_control import Experiment, Rollout
+from hsp_control import Rollout
 from hsp_control.cli import main
 from hsp_control.companions.viewer import transport
-from hsp_control.compiled import kernels
-from hsp_control.config.loaded_scenario import LoadedScenario
 
 pytestmark = pytest.mark.process
 
@@ -79,28 +76,16 @@ def test_run_shows_what_it_computes_and_keeps_its_log(
     assert len(Rollout.load(next(tmp_path.glob("*.npz")))) == 21
 
 
-def test_the_page_of_a_run_opens_before_its_kernels_are_compiled(
+def test_the_page_of_a_run_opens_once_and_shows_its_robot(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """It shows the robot and its title, and says what is being done."""
     pages: list[Page] = []
-
-    def of(loaded: LoadedScenario) -> Experiment:
-        def compile_one() -> None:
-            line = "Compiling kernels (once, 10 to 20 s) ... 0 done"
-            wait_until(lambda: line in [c.get("text") for c in pages[0].commands])
-
-        kernels._watched(compile_one)
-        assert pages[0].last("caption", "/caption")["title"] == loaded.scenario.title
-        assert pages[0].last("set_object", "/robot/joint3/link3")
-        return made(loaded)
-
-    made = Experiment.of
-    monkeypatch.setattr(Experiment, "of", of)
     monkeypatch.setattr(
         transport, "open_browser", lambda url: pages.append(Page(url)) or False
     )
     assert main(["run", MOVING, "--view", "--out", str(tmp_path), *SHORT]) == 0
+    assert pages[0].last("caption", "/caption")["title"]
+    assert pages[0].last("set_object", "/robot/joint3/link3")
     assert any(c["type"] == "clip" for c in pages[0].commands)
 
 

@@ -11,7 +11,7 @@ from hsp_control import FramePose
 from hsp_control.common.exceptions import TrajectoryError
 from hsp_control.companions.walking.contact_switch import Switch
 from hsp_control.companions.walking.planned_references import Fed, FedOrientation
-from hsp_control.compiled.step_plan import planned
+from hsp_control.engine.plans import planned
 from hsp_control.trajectories import ComposedPose, OrientationSample, TrajectorySample
 
 H = 1e-6

@@ -4,6 +4,7 @@ import json
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 import yaml
 
@@ -58,7 +59,13 @@ def test_a_run_says_how_much_nobody_explained() -> None:
     assert row.startswith("up to ")
     assert row.endswith(" N·m that the model does not explain, on panda_joint4")
     beside = {**LOAD, "payload": {**LOAD["payload"], "center": [0.15, 0.0, 0.0]}}
-    _, told = unexplained_rows(load_experiment(CONFIG | {"plant": beside}).run())
+    log = load_experiment(CONFIG | {"plant": beside}).run()
+    _, told, remedy = unexplained_rows(log)
     assert told.startswith("the robot does not do what the model says: that is ")
     assert "of the effort limit of panda_joint" in told
+    assert remedy == "the model has no rotors: robot: motor_inertia adds them"
+    size = np.abs(log["observer.disturbance"]) / log.meta["limits"]["effort"]
+    np.testing.assert_allclose(log["observer.share"], size.max(axis=1), rtol=1e-12)
+    whole = {"robot": {"name": "panda", "motor_inertia": 0.05}, "plant": beside}
+    assert len([*unexplained_rows(load_experiment(CONFIG | whole).run())]) == 2
     assert not [*unexplained_rows(load_experiment(CONFIG).run())]

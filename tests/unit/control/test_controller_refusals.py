@@ -344,7 +344,6 @@ FAILURES: list[tuple[Parts, type[Exception], str]] = [
 
 
 @pytest.mark.parametrize(("own", "error", "message"), FAILURES)
-# Without the compiler (NUMBA_DISABLE_JIT=1) NumPy warns of inf - inf on the way.
 @pytest.mark.filterwarnings("ignore:invalid value encountered:RuntimeWarning")
 def test_nan_of_a_user_is_an_error_and_never_an_effort(
     own: Parts, error: type[Exception], message: str

@@ -11,7 +11,6 @@ import pytest
 import hsp_control as hsp
 from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import RateError
-from hsp_control.compiled.kernels import kernel
 from hsp_control.declaration import imported
 from hsp_control.declaration.language import in_yaml
 from hsp_control.law import VARYING
@@ -118,7 +117,6 @@ class Both(hsp.Cost):
         gradient[:], rate[:] = slope(state), self.by(state)
 
 
-@kernel
 def _square(q: Array, v: Array, factor: float, gradient: Array, rate: Array) -> float:
     total = 0.0
     for i in range(gradient.shape[0]):

@@ -13,7 +13,6 @@ from runs import held
 
 import hsp_control as hsp
 from hsp_control.common.arrays import Array
-from hsp_control.compiled.kernels import PLAIN
 from hsp_control.constraints.limits import StaticEffort
 from hsp_control.control.actuation import Status
 from hsp_control.control.actuation.deviation_cost import (
@@ -27,7 +26,6 @@ from hsp_control.edge import Resolution
 seeds = st.integers(0, 2**32 - 1)
 NOWHERE = np.zeros(0, dtype=np.int64)
 FAR = [0.8, 0.6, 0.9]
-compiled = pytest.mark.skipif(PLAIN, reason="many steps")
 
 
 def hand(**circle: Any) -> hsp.FramePosition:
@@ -142,7 +140,6 @@ def straight_elbow(limits: hsp.Limits | None) -> hsp.Controller:
     return hsp.Controller(panda(), tasks, field, limits=limits, start=home)
 
 
-@compiled
 @pytest.mark.parametrize("limits", [None, hsp.Limits()])
 def test_efforts_are_continuous_near_a_straight_elbow(
     limits: hsp.Limits | None,

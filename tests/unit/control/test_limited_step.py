@@ -13,7 +13,6 @@ from hypothesis import strategies as st
 
 import hsp_control as hsp
 from hsp_control.common.arrays import Array
-from hsp_control.compiled.kernels import PLAIN
 from hsp_control.constraints.limits import Scaled
 from hsp_control.control.actuation import Actuation, Delivered, Status
 from hsp_control.control.actuation.limited_step import Barriers
@@ -200,7 +199,6 @@ def test_contacts_are_relaxed_less_than_distances() -> None:
     np.testing.assert_allclose(found, a, atol=1e-7)
 
 
-@pytest.mark.skipif(PLAIN, reason="about what Numba compiles")
 @pytest.mark.parametrize("strength", [0.7, 0.01])
 def test_one_native_call_is_the_same_as_its_parts(strength: float) -> None:
     """A modifier that changes nothing takes the other way: check, and then deliver."""
@@ -220,24 +218,3 @@ def test_one_native_call_is_the_same_as_its_parts(strength: float) -> None:
         np.testing.assert_array_equal(once.tau, parts.tau)
         np.testing.assert_array_equal(once.acceleration, parts.acceleration)
     assert {Status.LIMITED, Status.RELAXED if strength < 0.5 else Status.EXACT} <= seen
-
-
-def test_nothing_is_compiled_where_a_limit_binds() -> None:
-    """Neither in the first limited step, nor in a relaxed one, nor after a change."""
-    from hsp_control.compiled import adapters
-
-    home, rest, near = panda().home(), np.zeros(7), panda().home()
-    near[3] = panda().position_limits()[1][3] - 0.02
-    fast = 2.0 * np.eye(7)[3]
-    tight = hsp.Limits(effort=1.0)
-    made = arm()
-    changed = hsp.Controller(panda(), [hsp.FramePosition("panda_tcp")])
-    changed.compute(0.0, home, rest)
-    tau = made.compute(0.0, home, rest).tau
-    known = len(adapters._codes)
-    made.applied(tau, 0.001)
-    assert made.compute(0.001, near, fast).status >= Status.LIMITED
-    changed.at(0.0).limits(tight)
-    changed.applied(tau, 0.001)
-    assert changed.compute(1.0, near, fast).status == Status.RELAXED
-    assert len(adapters._codes) == known

@@ -9,8 +9,8 @@ from law_cases import pseudo_inverse
 from law_numbers import Numbers, jacobian, numbers, positive, resolve
 
 from hsp_control.common.arrays import Array
-from hsp_control.compiled.step_plan import planned
 from hsp_control.edge import Resolution
+from hsp_control.engine.plans import planned
 from hsp_control.law import CONSTANT, IDENTITY, VARYING, singular_values
 
 seeds = st.integers(0, 2**32 - 1)

@@ -8,10 +8,10 @@ from typing import Any
 
 import numpy as np
 import pytest
+from hsp_control.compiled import adapters, kernels
 
 import hsp_control as hsp
 from hsp_control.common.exceptions import SimulationError
-from hsp_control.compiled import adapters, kernels
 from hsp_control.live import loop
 from hsp_control.live.loop import rehearse
 from hsp_control.live.real_time import no_garbage_collection, real_time_priority

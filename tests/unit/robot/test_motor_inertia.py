@@ -16,6 +16,7 @@ from hsp_control.common.exceptions import (
 )
 from hsp_control.robot.description.robot_description import RobotDescription
 from hsp_control.robot.integrators import Rk4
+from hsp_control.robot.recorded import recorded_robot, robot_record
 from hsp_control.simulation.plants import RigidBody
 
 ARM = """<robot name="arm">
@@ -98,6 +99,12 @@ def test_bundled_arms_have_rotors_where_they_are_asked_for(name: str) -> None:
     bare, whole = hsp.Robot.load(name), hsp.Robot.load(name, motor_inertia="bundled")
     assert not bare.model.armature.any()
     assert (whole.model.armature >= 0.1).all()
+    first = next(iter(whole.dof_names))
+    locked = {**whole.source.locked, first: 0.0}
+    fewer = hsp.Robot.load(name, motor_inertia="bundled", locked=locked)
+    assert armature(fewer) == armature(whole)[1:]
+    again = recorded_robot(robot_record(whole))
+    assert armature(again) == armature(whole)
 
     def condition(robot: hsp.Robot) -> float:
         rest = np.zeros(robot.nv)

@@ -148,7 +148,6 @@ BAD_STATES = {
 }  # fmt: skip
 
 
-# Without the compiler (NUMBA_DISABLE_JIT=1) NumPy warns of inf - inf on the way.
 @pytest.mark.filterwarnings("ignore:invalid value encountered:RuntimeWarning")
 @pytest.mark.parametrize("what", BAD_STATES)
 def test_bad_state_is_refused_and_leaves_the_old_one(what: str) -> None:

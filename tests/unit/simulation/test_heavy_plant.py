@@ -17,8 +17,8 @@ ROBOT = hsp.Robot.load("panda")
 HOME = ROBOT.home()
 
 
-def told(**fields: Any) -> list[str]:
-    return [*heavy_plant(RigidBody(**fields), ROBOT, HOME)]
+def told(robot: hsp.Robot = ROBOT, **fields: Any) -> list[str]:
+    return [*heavy_plant(RigidBody(**fields), robot, HOME)]
 
 
 def payload(mass: float) -> dict[str, Any]:
@@ -46,16 +46,19 @@ HEAVY: dict[str, tuple[Any, Any]] = {
 }
 
 
+@pytest.mark.parametrize("rotors", [0.0, 0.1])
 @pytest.mark.parametrize("words", HEAVY)
 def test_the_number_in_the_message_would_do_and_a_larger_one_would_not(
-    words: str,
+    words: str, rotors: float
 ) -> None:
+    """Also beside rotors of the model, which no factor of the bodies changes."""
+    robot = hsp.Robot.load("panda", motor_inertia=rotors)
     fields, of = HEAVY[words]
-    (message,) = told(**fields)
+    (message,) = told(robot, **fields)
     assert message.startswith(words)
     most = float(re.search(r"at most ([\d.e+]+)", message).group(1))  # type: ignore[union-attr]
-    assert told(**of(most)) == []
-    assert told(**of(1.02 * most)) != []
+    assert told(robot, **of(most)) == []
+    assert told(robot, **of(1.02 * most)) != []
 
 
 def test_what_a_robot_can_move_is_not_told() -> None:

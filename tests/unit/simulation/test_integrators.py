@@ -14,8 +14,7 @@ import hsp_control as hsp
 from hsp_control import Robot
 from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import LogError, SimulationError
-from hsp_control.compiled.kernels import PLAIN
-from hsp_control.compiled.step_plan import planned
+from hsp_control.engine.plans import PLAIN, planned
 from hsp_control.robot import integrators
 from hsp_control.robot.integrators import Dop853, Rk4, SemiImplicitEuler
 from hsp_control.simulation.plants import RigidBody, RigidBodyPlant

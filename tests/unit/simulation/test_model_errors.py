@@ -62,6 +62,25 @@ def test_a_delay_that_is_told_is_borne_and_a_longer_one_is_not(name: str) -> Non
         assert (growth(made, q, plant, 2.0) > 1.0) is grows, late
 
 
+@pytest.mark.parametrize(("name", "rotors"), [("panda", 0.05), ("panda", 0.02)])
+def test_rotors_that_the_drives_hide_cost_delay(name: str, rotors: float) -> None:
+    """Too much of a rotor is too strong a law: of a bare arm it bears less delay."""
+    made, q = holding(WrongArm(name, 0, motor_inertia=rotors))
+    found = model_errors(made, q, H, Compensation())
+    assert found is not None
+    assert found.hidden is not None
+    assert found.hidden < 0.5 * found.delay
+    assert "rotors hidden" in lines(found)
+    bare = hsp.Robot.load(name, motor_inertia=0.0)
+    periods = round(found.hidden / H)
+    for late, grows in ((periods, False), (periods + 2, True)):
+        engine = IntegratedPlant(RigidBodyPlant(bare), Rk4(H))
+        plant = ImperfectPlant(engine, [], [EffortDelay(late)])
+        assert (growth(made, q, plant, 2.0) > 1.0) is grows, late
+    plain, *_ = borne(name, Compensation())
+    assert plain.hidden is None
+
+
 class Pushed(RigidBodyPlant):
     """The model under an effort that nobody commands."""
 
@@ -107,6 +126,8 @@ def test_no_mode_grows_by_default_and_it_takes_no_time(name: str) -> None:
     assert told.startswith(f"{alone.growing} of 8 grow") is (alone.growing > 0)
     if name == "iiwa14":
         assert alone.growing > 0
+    light = "rotors" in lines(found)
+    assert light is (found.rotor < 0.05) is (name in ("iiwa14", "xarm7"))
     assert (alone.moved[0].resting == pytest.approx(found.moved[0].resting)) is True
     assert (found.moved[0].peak < 0.5 * found.moved[0].resting + 1e-6).all()
     assert posture(made.robot, name) == pytest.approx(q)

@@ -18,7 +18,6 @@ from hsp_control import (
     simulate,
 )
 from hsp_control.common.exceptions import SimulationError
-from hsp_control.compiled.kernels import PLAIN
 from hsp_control.config import Experiment
 from hsp_control.constraints.limits import RobotLimits
 from hsp_control.control.actuation import Status
@@ -27,6 +26,7 @@ from hsp_control.control.bound_step import BoundStep, FreeStep
 from hsp_control.control.changes import Changes
 from hsp_control.control.controller import Controller
 from hsp_control.engine import REFUSED, Move, Plan, PythonCall
+from hsp_control.engine.plans import PLAIN
 from hsp_control.robot.integrators import SemiImplicitEuler
 from hsp_control.simulation import loops
 from hsp_control.simulation.limit_excess import LimitExcess

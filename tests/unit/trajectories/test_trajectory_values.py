@@ -27,7 +27,7 @@ from values import assert_is_a_value
 
 import hsp_control.trajectories as family
 from hsp_control.common.exceptions import TrajectoryError
-from hsp_control.compiled.step_plan import planned
+from hsp_control.engine.plans import planned
 from hsp_control.trajectories import (
     Blend,
     BlendOrientation,

@@ -1,12 +1,6 @@
-"""What a step costs beside time: no memory; and what kernels give without a compiler.
-
-All ready tasks, fields and metrics are run, compiled and as plain Python.
-"""
+"""What a step costs beside time: no memory; and all ready tasks, fields and metrics."""
 
 import gc
-import json
-import os
-import subprocess
 import sys
 import tracemalloc
 from collections.abc import Callable
@@ -17,7 +11,6 @@ import numpy as np
 import pinocchio as pin
 import pytest
 from oracles import slope
-from places import ROOT
 
 from hsp_control import (
     Circle,
@@ -33,7 +26,6 @@ from hsp_control import (
     Robot,
     RobotState,
 )
-from hsp_control.compiled import kernels
 from hsp_control.control.actuation import Status
 from hsp_control.geometry import Proximity, Scene, link_shapes
 from hsp_control.geometry.proximity import CoalDistances
@@ -156,57 +148,7 @@ METRICS = {
 }
 
 
-# -- with and without the compiler -----------------------------------------------------
-
-
-def everything() -> dict[str, list[float]]:
-    """Return what all tasks and fields give at random states."""
-    robot, rng = Robot.load("panda"), np.random.default_rng(31)
-    frame, results = "panda_tcp", {}
-    samples = {name: MetricSample.allocate(7) for name in METRICS}
-    all_fields = fields(robot, frame) | clearances(robot)
-    all_tasks, out = tasks(robot, frame), FieldSample.allocate(7)
-    state = RobotState(robot)
-    for k in range(3):
-        q = robot.integrate(robot.home(), 0.3 * rng.standard_normal(7))
-        state.update(0.9 * k - 0.3, q, rng.standard_normal(7))
-        for name, task in all_tasks.items():
-            sample = task.evaluate(state)
-            results[f"{name} {k}"] = np.concatenate([np.ravel(a) for a in sample])
-        for form, metric in METRICS.items():
-            at = metric.evaluate(state, samples[form])
-            for name, field in all_fields.items():
-                field.evaluate(state, at, metric.form, out)
-                parts = [*out.g, *out.g_dot, field.value(state)]
-                results[f"{name} {form} {k}"] = np.array(parts)
-    return {name: values.tolist() for name, values in results.items()}
-
-
-@pytest.mark.process
-def test_all_tasks_and_fields_are_the_same_without_the_compiler() -> None:
-    """The very same functions, as plain Python: there is no second implementation."""
-    if not hasattr(kernels.kernel(lambda: None), "py_func"):
-        pytest.skip("NUMBA_DISABLE_JIT is set: there is one form only")
-    environment = os.environ | {
-        "NUMBA_DISABLE_JIT": "1",
-        "PYTHONPATH": os.pathsep.join(map(str, (HERE, ROOT / "tests/support", ROOT))),
-    }
-    code = "import json, test_kernels as t; print(json.dumps(t.everything()))"
-    run = subprocess.run(
-        [sys.executable, "-W", "error", "-c", code],
-        env=environment,
-        capture_output=True,
-        text=True,
-        check=True,
-    )
-    plain, compiled = json.loads(run.stdout), everything()
-    assert plain.keys() == compiled.keys()
-    for name, values in compiled.items():
-        # Sums are the same to the last bit but for functions of the C library.
-        scale = max(1.0, float(np.abs(values).max()))
-        np.testing.assert_allclose(
-            plain[name], values, rtol=1e-12, atol=1e-12 * scale, err_msg=name
-        )
+# -- states and samples ---------------------------------------------------------------
 
 
 def test_what_is_bound_to_one_state_or_sample_is_not_given_to_another() -> None:

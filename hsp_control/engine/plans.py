@@ -1,4 +1,4 @@
-"""A step's plan: the calls of parts, bound once, and what supplies their arguments.
+"""Plans: the calls of parts, bound once, and what supplies their arguments.
 
 A part says its mathematics as a kind of call with its arguments, a `KernelCall`. An
 argument may be something that has to be brought up to date first: the kinematics of a
@@ -6,24 +6,78 @@ frame, a trajectory, what another call writes. Its method ``supplied`` returns w
 read, and the calls that write it. `planned` makes a plan of it all.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from functools import partial
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, Self
+
+import numpy as np
 
 from hsp_control import engine
-from hsp_control.compiled.kernels import (
-    TIME,
-    AnyCall,
-    KernelCalls,
-    KernelOutput,
-    Once,
-    OnlyIf,
-    is_compiled,
-    with_outputs,
-)
-from hsp_control.compiled.native import NativeCall
-from hsp_control.compiled.pinocchio_calls import bind_pinocchio, is_pinocchio
+from hsp_control.common.arrays import Array, Indices
 from hsp_control.engine import Kind, Plan, PythonCall
+from hsp_control.engine.pinocchio_calls import bind_pinocchio, is_pinocchio
+
+KernelCall = tuple[Callable[..., Any], tuple[Any, ...]]
+"""A kind of the engine, or a function, with its first arguments: what a part's
+mathematics is. Who calls it adds the others; `planned` says what may be among them."""
+
+TIME = object()
+"""The last argument of a call that brings a reference up to a time [s]."""
+
+
+class Once(NamedTuple):
+    """Calls that are made unless they were made at this stamp."""
+
+    calls: "KernelCalls"
+    stamp: Indices  # shape (1,)
+    made: Indices  # the stamp at which they were made last, shape (1,)
+
+    @classmethod
+    def at(cls, stamp: Indices, *calls: KernelCall) -> Self:
+        """Return calls that were not made yet."""
+        return cls(calls, stamp, np.full(1, -1))
+
+
+class OnlyIf(NamedTuple):
+    """Calls that are made if ``found[1]`` is not zero.
+
+    Their result is ``found[0]``, and what the last of them returns if they are made.
+    """
+
+    calls: "KernelCalls"
+    found: Array  # shape (2,)
+
+
+AnyCall = KernelCall | Once | OnlyIf
+KernelCalls = Sequence[AnyCall]
+"""What a part does in each step: its calls with all their arguments, in this order."""
+
+
+class KernelOutput(NamedTuple):
+    """An argument of a call: what another call writes into its last argument."""
+
+    call: KernelCall
+    out: Any
+
+
+def with_outputs(call: KernelCall, *others: Any) -> KernelCall:
+    """Return a call with further arguments after its own."""
+    function, arguments = call
+    return function, (*arguments, *others)
+
+
+def says(part: object, *ways: str) -> str:
+    """Return by which of several methods a part's class says its mathematics.
+
+    It is the one of the most derived class, so that whoever derives from a part of the
+    package may override any of them; the first, if one class has several.
+    """
+    for each in type(part).__mro__:
+        for way in ways:
+            if way in vars(each):
+                return way
+    raise AttributeError(f"{type(part).__name__} has none of {', '.join(ways)}")
+
 
 Step = Callable[..., Any]
 """What stands in a plan: a call of the engine, or one that it makes as its own."""
@@ -96,7 +150,7 @@ def bind(function: Callable[..., Any], *arguments: Any, timed: bool = False) -> 
 
     Args:
         function: A kind of the engine; a function of Pinocchio, see `pinocchio_calls`;
-            a kernel; or another function.
+            or another function.
         arguments: Arrays, numbers, and tuples or records of them. The call reads and
             writes the memory of these arrays each time; numbers are constants.
         timed: Whether it has one more argument, the time, given to the call.
@@ -105,11 +159,6 @@ def bind(function: Callable[..., Any], *arguments: Any, timed: bool = False) -> 
         return function(*arguments)
     if is_pinocchio(function):
         return bind_pinocchio(function.__name__, *arguments)
-    if is_compiled(function):
-        from hsp_control.compiled import adapters  # here: plain runs need no Numba
-
-        if adapters.AVAILABLE:
-            return NativeCall.of(function, arguments, timed)
     if not arguments and not timed and hasattr(function, "row"):
         return function
     return PythonCall(partial(function, *arguments) if arguments else function, timed)

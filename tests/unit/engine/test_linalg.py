@@ -1,29 +1,14 @@
-"""Kernels against NumPy, rank loss included, and compiled against uncompiled."""
+"""Linear algebra against NumPy, rank loss included."""
 
-from collections.abc import Callable
 from fractions import Fraction
-from typing import Any
 
 import numpy as np
 import pytest
 from hypothesis import assume, given
 from hypothesis import strategies as st
 
+from hsp_control import engine
 from hsp_control.common.arrays import Array
-from hsp_control.compiled import linalg
-from hsp_control.compiled.linalg import (
-    cholesky,
-    multiply,
-    multiply_transposed,
-    orthogonalise_rows,
-    orthonormalise_rows,
-    smallest_singular_value_bound,
-    solve_lower,
-    solve_lower_transposed,
-    triangularise_rows,
-)
-from hsp_control.law import CONSTANT, law
-from hsp_control.tasks import TaskSample
 
 EPS = float(np.finfo(float).eps)
 
@@ -53,23 +38,36 @@ def junk(*shape: int) -> Array:
     return np.full(shape, np.nan)
 
 
+def cholesky(A: Array, L: Array) -> bool:
+    return bool(engine.Cholesky(np.ascontiguousarray(A), L)())
+
+
+def solve_lower(L: Array, x: Array) -> None:
+    engine.SolveLower(L, x)()
+
+
+def solve_lower_transposed(L: Array, x: Array) -> None:
+    engine.SolveLowerTransposed(L, x)()
+
+
+def orthonormalise_rows(J: Array, Q: Array, X: Array) -> float:
+    return engine.OrthonormaliseRows(np.ascontiguousarray(J), Q, X)()
+
+
+def orthogonalise_rows(Y: Array, U: Array) -> None:
+    engine.OrthogonaliseRows(Y, U)()
+
+
+def triangularise_rows(Y: Array) -> float:
+    return engine.TriangulariseRows(Y)()
+
+
+def smallest_singular_value_bound(X: Array) -> float:
+    return engine.SmallestSingularValueBound(X)()
+
+
 def close(actual: Array, expected: Array, atol: float) -> None:
     np.testing.assert_allclose(actual, expected, rtol=0, atol=atol)
-
-
-# --- products ------------------------------------------------------------------------
-
-
-@given(seeds, sizes, sizes, scales)
-def test_products(seed: int, n: int, m: int, scale: float) -> None:
-    A, x, y = scale * normal(seed, n, m), normal(seed + 1, m), normal(seed + 2, n)
-    out, transposed = junk(n), junk(m)
-    multiply(A, x, out)
-    multiply_transposed(A, y, transposed)
-    # A sum of k terms errs by k ε of the sum of their magnitudes.
-    assert (np.abs(out - A @ x) <= 2 * m * EPS * np.abs(A) @ np.abs(x)).all()
-    bound = 2 * n * EPS * np.abs(A).T @ np.abs(y)
-    assert (np.abs(transposed - A.T @ y) <= bound).all()
 
 
 # --- triangles -----------------------------------------------------------------------
@@ -149,10 +147,8 @@ def test_orthonormalise(
     assert bound * np.sqrt(m) * allowed >= least
 
 
-def test_no_rows_are_orthonormal_also_in_plain_python() -> None:
-    plain = getattr(orthonormalise_rows, "py_func", orthonormalise_rows)
-    for each in (orthonormalise_rows, plain):
-        assert each(np.zeros((0, 7)), np.zeros((0, 7)), np.zeros((0, 0))) == np.inf
+def test_no_rows_are_orthonormal() -> None:
+    assert orthonormalise_rows(np.zeros((0, 7)), junk(0, 7), junk(0, 0)) == np.inf
 
 
 @given(seeds, sizes, st.data(), scales)
@@ -219,91 +215,6 @@ def test_small_singular_values_to_high_relative_accuracy(
     product = float(determinant) ** 0.5
     np.testing.assert_allclose(small * large, product, rtol=1e-11)
     np.testing.assert_allclose(large, np.linalg.norm(Y, 2), rtol=1e-13)
-
-
-# --- compiled and uncompiled ---------------------------------------------------------
-
-
-def uncompiled(function: Any) -> Any:
-    """Return a kernel's Python source as a function, or itself if JIT is off."""
-    return getattr(function, "py_func", function)
-
-
-def triangular(n: int) -> Array:
-    return np.tril(normal(6, n, n)) + 3 * np.eye(n)
-
-
-def arguments(name: str) -> tuple[Any, ...]:
-    """Return arguments that take a kernel through all of its branches."""
-    spd = triangular(6) @ triangular(6).T
-    deficient = normal(7, 5, 7)
-    deficient[3] = 0.0
-    independent = normal(7, 5, 7)
-    independent[2] = independent[1] + 0.01 * independent[2]  # cleaned twice
-    n, m = 7, 4
-    sample = [normal(k, n) for k in range(9, 12)]
-    J, J_dot = normal(12, m, n), normal(13, m, n)
-    return {
-        "add_rows": (normal(24, 6), normal(25, 6, n), normal(26, n)),
-        "copy": (sample[0], np.zeros(n)),
-        "multiply": (J, sample[0], np.zeros(m)),
-        "multiply_transposed": (J, sample[0][:m], np.zeros(n)),
-        "cholesky": (spd, np.zeros((6, 6))),
-        "solve_lower": (triangular(6), normal(17, 6)),
-        "solve_lower_transposed": (triangular(6), normal(17, 6)),
-        "solve_rows": (triangular(6), normal(17, 4, 6)),
-        "solve_rows_transposed": (triangular(6), normal(17, 4, 6)),
-        "solve_columns": (triangular(6), normal(21, 6, n)),
-        "gram": (J, J_dot, True, np.zeros((m, m))),
-        "norm": (spd, normal(17, 6)),
-        "orthonormalise_rows": (independent, np.zeros((5, 7)), np.zeros((5, 5))),
-        "_project_out_row": (independent.copy(), triangular(5), 2),
-        "triangularise_rows": (independent.copy(),),
-        "squared_norm": (sample[0],),
-        "smallest_singular_value_bound": (triangular(6),),
-        "_rotate_rows": (independent.copy(), np.eye(5), 1, 3),
-        "orthogonalise_rows": (deficient.copy(), np.zeros((5, 5))),
-        "bounded_inverse": (independent, 0.1, np.zeros((5, 7)), np.zeros((5, 5))),
-        "_bounded_factors": (independent, 0.1, np.zeros((5, 7)), np.zeros((5, 5))),
-        "acceleration": (
-            *(rows_of(J, J_dot, sample[1][:m]), triangular(7), CONSTANT),
-            *(normal(14, m, n), triangular(4), sample[0], sample[2]),
-            *(np.zeros((6, n)), np.zeros(n)),
-        ),
-    }[name]
-
-
-KERNELS: dict[str, Callable[..., Any]] = {
-    **{
-        name: function
-        for name, function in vars(linalg).items()
-        if callable(function) and uncompiled(function).__module__ == linalg.__name__
-    },
-    "acceleration": law.acceleration,
-}
-
-
-def rows_of(J: Array, J_dot: Array, a_x: Array) -> TaskSample:
-    return TaskSample(J, J_dot, np.zeros(len(a_x)), np.zeros(len(a_x)), a_x)
-
-
-def flat(values: Any) -> list[Any]:
-    """Return arguments with records taken apart."""
-    return [x for v in values for x in (flat(v) if isinstance(v, tuple) else [v])]
-
-
-@pytest.mark.parametrize("name", KERNELS)
-def test_compiled_equals_uncompiled(name: str) -> None:
-    function = KERNELS[name]
-    if function is uncompiled(function):
-        pytest.skip("NUMBA_DISABLE_JIT is set: there is one form only")
-    compiled, plain = arguments(name), arguments(name)
-    result = function(*compiled)
-    expected = uncompiled(function)(*plain)
-    assert result == (expected if expected is None else pytest.approx(expected, 1e-13))
-    for mine, other in zip(flat(compiled), flat(plain), strict=True):
-        # Rounding: compiled sums are added in another order, and fused.
-        np.testing.assert_allclose(mine, other, rtol=1e-13, atol=1e-13)
 
 
 @given(st.integers(0, 2**32 - 1), st.integers(1, 12))

@@ -10,9 +10,9 @@ import pytest
 from robot_cases import ROBOTS, assert_equal_terms, draw, everything
 
 from hsp_control.common.arrays import Array
-from hsp_control.compiled import pinocchio_calls
-from hsp_control.compiled.pinocchio_calls import PinocchioCall
-from hsp_control.compiled.step_plan import bind
+from hsp_control.engine import pinocchio_calls
+from hsp_control.engine.pinocchio_calls import PinocchioCall
+from hsp_control.engine.plans import bind
 
 
 def both(

@@ -1,1 +1,0 @@
-"""Kernels, what calls them, and Pinocchio's functions as calls."""
