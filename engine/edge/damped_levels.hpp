@@ -21,8 +21,9 @@ struct DampedMemory {
 // what the levels make of a; the rest is φ_N.
 template <class B, class E, class A>
 int write_damped_levels(const LawInput& in, const Asked& rows, double least,
-                        const Following& following, Thresholds& thresholds, Projectors& projectors,
-                        DampedMemory& memory, LevelMemory& levels, B& by_tasks, E& e_N, A& a) {
+                        const Following& following, Thresholds& thresholds,
+                        Projectors<InOut>& projectors, DampedMemory& memory, LevelMemory& levels,
+                        B& by_tasks, E& e_N, A& a) {
   const auto& [J, J_dot, error, error_rate, a_x] = in.task;
   auto& [drawn, all_rest, all_opposed, all_x, all_row, all_G, all_V] = memory;
   invert_metric(in.metric.L, projectors.Q);

@@ -5,12 +5,6 @@
 
 namespace hsp {
 
-// The two factors of a pseudo-inverse.
-template <template <int...> class As> struct Factors {
-  As<'m', 'n'> Q;
-  As<'m', 'm'> X;
-};
-
 // What the two laws leave.
 template <template <int...> class As> struct EdgeMemory {
   As<'m', 'n'> Q;  // factors of the exact inverse
@@ -35,7 +29,7 @@ struct Resolve {
   double beyond;      // the code of what is not finite
   Thresholds thresholds;
   Factors<InOut> factors;
-  Projectors projectors;
+  Projectors<InOut> projectors;
   EdgeMemory<InOut> edge;
   OutInts<1> damped_code;
   Out<'n'> e_N, a;

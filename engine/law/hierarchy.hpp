@@ -24,10 +24,10 @@
 namespace hsp {
 
 // What the levels leave of their projectors.
-struct Projectors {
-  InOut<'n', 'n'> Q;          // what the last level leaves, Q_K = P W⁻¹
-  InOut<'n', 'm'> QJ;         // Q_{k-1} J_kᵀ of all levels side by side
-  InOut<'m', 'm'> G_inverse;  // q(G_k) of all levels along the diagonal
+template <template <int...> class As> struct Projectors {
+  As<'n', 'n'> Q;          // what the last level leaves, Q_K = P W⁻¹
+  As<'n', 'm'> QJ;         // Q_{k-1} J_kᵀ of all levels side by side
+  As<'m', 'm'> G_inverse;  // q(G_k) of all levels along the diagonal
 };
 
 // Q = W⁻¹ = (L Lᵀ)⁻¹
@@ -95,7 +95,7 @@ struct LevelMemory {
 
 // Write e_N, and add φ_N to a; all levels are closed.
 template <class Ends, class E, class A>
-void add_null_space(const LawInput& in, const Ends& ends, const Projectors& projectors,
+void add_null_space(const LawInput& in, const Ends& ends, const Projectors<InOut>& projectors,
                     LevelMemory& memory, E& e_N, A& a) {
   const auto& [J, J_dot, error, error_rate, a_x] = in.task;
   const auto& [g, g_dot] = in.field;

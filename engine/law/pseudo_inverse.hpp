@@ -11,6 +11,12 @@
 
 namespace hsp {
 
+// The two factors of a pseudo-inverse, B# = Qᵀ X.
+template <template <int...> class As> struct Factors {
+  As<'m', 'n'> Q;
+  As<'m', 'm'> X;
+};
+
 // B = J L⁻ᵀ.
 template <class J, class L, class B>
 void whiten(const J& jacobian, const L& factor, int form, B& whitened) {

@@ -120,13 +120,16 @@ struct AccelerationBounds {
   void operator()() { write_acceleration_bounds(q, v, where, limits, held, a_lower, a_upper); }
 };
 
+// Whether lower ≤ x ≤ upper, each component.
+template <class X, class Bound> bool is_within(const X& x, const Bound& lower, const Bound& upper) {
+  return (lower.array() <= x.array()).all() && (x.array() <= upper.array()).all();
+}
+
 struct Within {
   static constexpr const char* doc = "Whether lower ≤ x ≤ upper, each component.";
   In<'n'> x, lower, upper;
 
-  bool operator()() {
-    return (lower.array() <= x.array()).all() && (x.array() <= upper.array()).all();
-  }
+  bool operator()() { return is_within(x, lower, upper); }
 };
 
 }  // namespace hsp

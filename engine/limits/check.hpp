@@ -16,22 +16,21 @@ enum Violated { MOTION = 1, EFFORT = 2, BEYOND = 4 };
 // is the case it returns 0, or 1 if an inverse is bounded.
 constexpr double LOOK = 2.0;
 
-// From this code of the law on its acceleration is not finite.
-constexpr std::int64_t not_finite_from = 1'000'000;
-
-inline double look_at_law(std::int64_t code) {
-  if (code >= not_finite_from) return LOOK;
+// From the code `not_finite` of the law on, its acceleration is not finite.
+inline double look_at_law(std::int64_t code, double not_finite) {
+  if (code >= not_finite) return LOOK;
   return code > 0 ? 1.0 : 0.0;
 }
 
 struct CheckLaw {
   static constexpr const char* doc = "What `CheckLimits` does where nothing is limited.";
   Ints<1> code;
+  double not_finite;
   OutInts<2> found;
 
   double operator()() {
     found.setZero();
-    return look_at_law(code[0]);
+    return look_at_law(code[0], not_finite);
   }
 };
 
@@ -46,9 +45,10 @@ struct CheckLimits {
   Ends<In> ends;
   Held<InOut> held;
   Bounds<Out, In> bounds;
-  Ints<1> code;      // the law's outcome
-  OutInts<2> found;  // which limits the next effort violates; and 0, no QP was solved
-  Out<2> solve_if;   // what is returned, and whether a bound is violated
+  Ints<1> code;       // the law's outcome
+  double not_finite;  // its code from which on a is not finite
+  OutInts<2> found;   // which limits the next effort violates; and 0, no QP was solved
+  Out<2> solve_if;    // what is returned, and whether a bound is violated
 
   double operator()() {
     observe(v, held, time[0]);
@@ -58,15 +58,11 @@ struct CheckLimits {
                       (is_within(tau, bounds.tau_lower, bounds.tau_upper) ? 0 : EFFORT);
     const int all = flags + (is_beyond() ? BEYOND : 0);
     found << all, 0;
-    solve_if << (all ? LOOK : look_at_law(code[0])), flags;
+    solve_if << (all ? LOOK : look_at_law(code[0], not_finite)), flags;
     return solve_if[0];
   }
 
  private:
-  static bool is_within(const auto& x, const auto& lower, const auto& upper) {
-    return (lower.array() <= x.array()).all() && (x.array() <= upper.array()).all();
-  }
-
   // The robot accelerates by a and the disturbance, which something else is known to cause; so
   // the bounds on a are moved by it. It makes a bound narrower by no more than the speed's barrier
   // permits at rest, so that a push that ends does no harm.

@@ -29,20 +29,9 @@
 #include <hsp/linalg.hpp>
 #include <hsp/records.hpp>
 
+#include "../law/hierarchy.hpp"
+
 namespace hsp {
-
-// The two factors of the law's pseudo-inverse of all rows, B# = Qᵀ X.
-struct LawFactors {
-  In<'m', 'n'> Q;
-  In<'m', 'm'> X;
-};
-
-// What the law's levels left, where it went level by level.
-struct LawProjectors {
-  In<'n', 'n'> Q;          // what the last level leaves, Q_K = P W⁻¹
-  In<'n', 'm'> QJ;         // Q_{k-1} J_kᵀ of all levels side by side
-  In<'m', 'm'> G_inverse;  // q(G_k) of all levels along the diagonal
-};
 
 // What level k and then the null space cost: ρ_k = ρ_N^t_k.
 struct LevelCosts {
@@ -67,8 +56,8 @@ struct Directions {
   std::int64_t first;     // first level that may deviate: 1 below contacts, else 0
   double least;           // least cost of a level relative to the one above it
   In<'l'> thresholds;     // singular value below which a direction belongs to a level in part
-  LawFactors factors;
-  LawProjectors projectors;
+  Factors<In> factors;
+  Projectors<In> projectors;
   Ints<1> code;     // outcome of the damped law: 0, or its first damped level from 1 on
   bool alone;       // whether the law resolves its one level at once, whatever happens
   Out<'n', 'n'> N;  // directions n_k as rows
@@ -147,15 +136,10 @@ struct Directions {
     return true;
   }
 
-  void whiten() {
-    B = jacobian;
-    if (form != IDENTITY) solve_rows(L, B);
-  }
-
   // Write the directions that the first levels have for themselves; return how many. The last of
   // them may have singular values below the threshold: these are left out.
   Index write_levels(Index levels) {
-    whiten();
+    whiten(jacobian, L, form, B);
     Index count = 0, start = 0;
     for (Index k = 0; k < levels; ++k) {
       auto rows = B.middleRows(start, ends[k] - start);

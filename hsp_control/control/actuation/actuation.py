@@ -36,6 +36,7 @@ from hsp_control.control.actuation.support import Support
 from hsp_control.edge import Resolution
 from hsp_control.edge.limited_target import Permitted
 from hsp_control.engine.plans import KernelCall, KernelCalls
+from hsp_control.law.outcome import BEYOND_ANY_LEVEL
 from hsp_control.robot import RobotState
 
 _BEYOND = 4
@@ -93,7 +94,8 @@ class Actuation:
 
     def _check(self) -> KernelCall:
         """Return the call that compares a and M a + N with their bounds."""
-        state, limits, found = self._state, self._limits, (self._law.code, self.found)
+        state, limits = self._state, self._limits
+        found = self._law.code, BEYOND_ANY_LEVEL, self.found
         if limits.limits is None:
             return engine.CheckLaw, found
         moving = state.time, state.q, state.v, self._wanted.acceleration, state.effort

@@ -4,8 +4,19 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from qp_cases import KINDS, Case, answer, by_daqp, cost, defect, degenerate, dense
+from qp_cases import (
+    KINDS,
+    Case,
+    answer,
+    by_daqp,
+    cost,
+    defect,
+    degenerate,
+    dense,
+    packed,
+)
 
+from hsp_control import engine
 from hsp_control.common.arrays import Array
 from hsp_control.control.actuation.dual_active_set import (
     EXHAUSTED,
@@ -97,6 +108,21 @@ def test_a_contradiction_is_shared_by_the_costs(seed: int) -> None:
     np.testing.assert_allclose(violations, expected, rtol=1e-6)
 
 
+@given(seeds)
+def test_a_soft_answer_does_not_depend_on_its_start(seed: int) -> None:
+    """Slacks begin anew, too: the same to the last bit, with the same active set."""
+    rng = np.random.default_rng(seed)
+    case = dense(rng)
+    softness = 10.0 ** rng.uniform(-2.0, 0.0, len(case.rows))
+    cold = answer(case, softness)
+    work = Workspace.of(len(case.x0), len(case.A), soft=True)
+    work.held[:] = rng.integers(-1, 2, len(work.held))
+    warm = answer(case, softness, work)
+    assert cold.code == warm.code == SOLVED
+    if set(warm.active) == set(cold.active):
+        np.testing.assert_array_equal(warm.x, cold.x)
+
+
 # --- codes ---------------------------------------------------------------------------
 
 
@@ -128,3 +154,11 @@ def test_iterations_are_limited() -> None:
     case = degenerate(np.random.default_rng(5))
     assert answer(case).code == SOLVED
     assert answer(case, iterations=0).code == EXHAUSTED
+
+
+def test_sizes_that_do_not_fit_are_refused() -> None:
+    case = two(np.eye(2), np.zeros(2))
+    x, work = case.x0.copy(), Workspace.of(2, 2)
+    problem = packed(case)._replace(own=np.ones(1))
+    with pytest.raises(ValueError, match="a QP: the sizes do not fit together"):
+        engine.Minimise(problem, 10, False, x, work)
