@@ -1,14 +1,12 @@
-"""What a loop in real time needs: kernels before it begins, priority, no collector."""
+"""What a loop in real time needs: a rehearsal, priority, no collector."""
 
 import gc
 import os
-from collections.abc import Callable
 from math import inf
 from typing import Any
 
 import numpy as np
 import pytest
-from hsp_control.compiled import adapters, kernels
 
 import hsp_control as hsp
 from hsp_control.common.exceptions import SimulationError
@@ -23,45 +21,6 @@ CONFIG = {
     "changes": [{"type": "null_space_gain", "at": 5.0, "gain": 3.0}],
 }  # fmt: skip
 LATER = 0.1, 1.1, 1.5, 1.9, 3.0, 5.1, 6.0
-
-
-@pytest.fixture
-def asked(monkeypatch: pytest.MonkeyPatch) -> set[Any]:
-    """Which machine code is asked for: by kernel, and the types of its arguments."""
-    asked: set[Any] = set()
-    adapter: Callable[..., int] = adapters.adapter
-
-    def noted(function: Any, kinds: tuple[Any, ...], timed: bool) -> int:
-        asked.add((function.__name__, str(kinds), timed))
-        return adapter(function, kinds, timed)
-
-    monkeypatch.setattr(adapters, "adapter", noted)
-    return asked
-
-
-def needed(
-    asked: set[Any], end: float, prepare: Callable[..., None]
-) -> tuple[set[Any], set[Any]]:
-    """Return what is asked for before the loop, and what only in it."""
-    experiment = hsp.load_experiment(CONFIG)
-    controller, q, v = experiment.controller, experiment.q0, experiment.v0
-    controller.compute(0.0, q, v)
-    prepare(controller, 0.0, end, q, v)
-    before = set(asked)
-    for t in LATER:
-        controller.compute(t, q, v)
-    return before, asked - before
-
-
-@pytest.mark.skipif(
-    not kernels.is_compiled(adapters.run), reason="plain runs compile nothing"
-)
-def test_nothing_new_is_asked_for_in_the_loop(asked: set[Any]) -> None:
-    _, late = needed(asked, inf, lambda *_: None)
-    assert late  # without a rehearsal there is something
-    asked.clear()
-    _, late = needed(asked, inf, rehearse)
-    assert not late
 
 
 def test_it_evaluates_a_copy_within_the_loop_and_no_more_often_than_allowed(
