@@ -28,7 +28,7 @@ def resolve_priorities(step: LawStep) -> int:
 def _blended(step: LawStep, damped: int) -> int:
     """Overwrite a_damped by a, and e_N; write and return the code of `outcome_of`.
 
-    The first two shares of `edge.py` count here.
+    The first two shares of `shares.py` count here.
     """
     edge, a, e_N = step.scratch.edge, step.a, step.e_N
     edge.code[0] = damped
