@@ -112,9 +112,6 @@ INGREDIENTS: dict[str, tuple[Edit, ...]] = {
     ),
     "limits, 0.1: half of it": _HALF_P,
     "limits, 0.1: twice": _TWICE_P,
-    "a field gets less where tasks are held": (
-        (_TARGET, "leave = 1.0 - (1.0 - LARGE) * held", "leave = 1.0"),
-    ),
     "static effort": (
         ("constraints/limits/limits.py", "_HELD = 0.95", "_HELD = 100.0"),
     ),

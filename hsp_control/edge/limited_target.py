@@ -15,8 +15,7 @@ near to the damped law instead (`shares.py`).
 
 *What a field asks for is bounded.* That is φ_N + P K_N P v, the self-motion without
 what brakes it. A field may ask for anything; at most what the limits permit far from
-them is asked of the QP, and a tenth of that where the tasks are held, by their edge or
-by a limit. What brakes stays whole: else it would swing at the limits.
+them is asked of the QP, and what brakes stays whole: else it would swing at the limits.
 
 An excess is relative to what the limit permits: of an effort, the maximum; of an
 acceleration, what the barriers of `Limits` permit far from them. It counts wholly from
@@ -33,8 +32,7 @@ from hsp_control.compiled.kernels import kernel
 from hsp_control.compiled.linalg import multiply, squared_norm
 
 LARGE = 0.1
-"""Excess from which on it counts wholly, and the part of what the limits permit that a
-field gets where the tasks are held."""
+"""Excess from which on it counts wholly."""
 
 
 class Permitted(NamedTuple):
@@ -95,7 +93,6 @@ def write_limited_target(
     permitted: Permitted,
     barred: Barred,
     scratch: Array,
-    share: Array,
 ) -> None:
     """Overwrite what is wanted by what the step is to come near to.
 
@@ -108,7 +105,6 @@ def write_limited_target(
         permitted: What excesses are relative to.
         barred: Rows of barriers; ``lower`` then is for deviations from the new a.
         scratch: Shape (4, nv).
-        share: How much the law is damped already, shape (1,); see `shares.py`.
     """
     n = a.shape[0]
     a_t, tau_t, change, part = scratch[0], scratch[1], scratch[2], scratch[3]
@@ -119,16 +115,14 @@ def write_limited_target(
         tau_t[i] = effort[i] - part[i]
         change[i] = -parts.law_self_motion[i]
     tasks = min(_excess(a_t, tau_t, bounds, permitted, barred, change, 1.0), whole)
-    held = max(share[0], tasks)
     for i in range(n):
         change[i] = tasks * (parts.damped[i] - parts.law[i])
     asked, asked_damped = scratch[0], scratch[1]
     for i in range(n):
         asked[i] = parts.law_self_motion[i] + parts.law_braking[i]
         asked_damped[i] = parts.damped_self_motion[i] + parts.damped_braking[i]
-    leave = 1.0 - (1.0 - LARGE) * held
-    ours = 1.0 - _permitted_part(M, asked, permitted, leave, part)
-    theirs = 1.0 - _permitted_part(M, asked_damped, permitted, leave, part)
+    ours = 1.0 - _permitted_part(M, asked, permitted, part)
+    theirs = 1.0 - _permitted_part(M, asked_damped, permitted, part)
     for i in range(n):
         change[i] -= whole * (1.0 - tasks) * ours * asked[i]
         change[i] -= whole * tasks * theirs * asked_damped[i]
@@ -170,13 +164,11 @@ def _excess(
 
 
 @kernel
-def _permitted_part(
-    M: Array, asked: Array, permitted: Permitted, leave: float, tau: Array
-) -> float:
-    """Return which part of an acceleration is a part of what the limits permit."""
+def _permitted_part(M: Array, asked: Array, permitted: Permitted, tau: Array) -> float:
+    """Return which part of an acceleration the limits permit far from them."""
     multiply(M, asked, tau)
-    most = leave
+    most = 1.0
     for i in range(tau.shape[0]):
         most = max(most, abs(tau[i]) / permitted.effort[i])
         most = max(most, abs(asked[i]) / permitted.acceleration[i])
-    return leave / most
+    return 1.0 / most

@@ -320,7 +320,7 @@ class LimitedStep:
             barred = Barred(A[kept], lower[kept])
             target = *wanted, parts, Within(*bounds[:2]), permitted, barred
             rows.append(resolution.self_motions(state.v))
-            rows.append((write_limited_target, (*target, zeros((4, n)), edge.share)))
+            rows.append((write_limited_target, (*target, zeros((4, n)))))
         rows.append((_write_rows, (*around, self._rows)))
         write = write_directions_at_once if resolution.alone else write_directions
         closest = (write, (directions,)), *nearest(standing=p > 0, warm=True)
