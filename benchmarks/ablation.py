@@ -4,10 +4,12 @@
 
 An ingredient is left out of a copy of the package by replacing lines of it; a line that
 is not found ends the benchmark, so that what is left out is always a part of the code
-as it is. Defaults only, at 1 and 5 ms: targets out of reach as in `edge.py`, hands on
-springs, two levels, pushes, and a steady force. For ingredients of the limits
-also the rollouts of `limit_robots.py`, and efforts bisected on the way to stretched
-postures where a limit binds. Writes the second table of benchmarks/results/edge.md.
+as it is. Constants are halved and doubled, too. Defaults only, at 1 and 5 ms: targets
+out of reach as in `edge.py`, hands on springs, two levels, pushes, a steady force, one
+axis or two, also without limits; of a planar arm, which has none, what it can have. For
+ingredients of the limits also the rollouts of `limit_robots.py`, and efforts bisected
+on the way to stretched postures where a limit binds. Writes the second table of
+benchmarks/results/edge.md.
 """
 
 import argparse
@@ -23,7 +25,7 @@ from typing import Any
 
 import numpy as np
 from edge_cases import Arm, unit
-from edge_rest import OUT, Case, case, measure
+from edge_rest import IN_THE_PLANE, OUT, Case, case, is_planar, measure
 from limit_robots import roll_out
 from marked_sections import RESULTS, replace_section
 
@@ -32,36 +34,84 @@ from hsp_control.common.arrays import Array
 
 ROOT = Path(__file__).resolve().parents[1]
 ROBOTS, PERIODS = ("panda", "ur5", "iiwa14"), (0.001, 0.005)
-KINDS = (*OUT, "push", "steady", "spring above", "just out")
+KINDS = (*OUT, "push", "steady", "spring above", "just out", "axes", "unlimited")
 NEAREST = ("position", "levels", "just out")  # the hand's distance counts
 ROLLOUTS, WAYS, POINTS = 24, 6, 1000  # of a robot; of a way
 
 _LIMITS = "constraints/limits/acceleration_bounds.py"
 _COST = "control/actuation/deviation_cost.py"
 _EDGE = "edge/threshold.py"
+_SHARES = "edge/shares.py"
+_TARGET = "edge/limited_target.py"
+_LEVELS = "edge/damped_levels.py"
 _SENT = "control/actuation/sent_effort.py"
 _MODEL = "robot/model.py"
 
 Edit = tuple[str, str, str]
 """A file, a text in it, and what replaces it."""
 
+
+def constant(file: str, line: str, *values: float) -> tuple[tuple[Edit, ...], ...]:
+    """Return the edits that give a constant other values.
+
+    Args:
+        file: Where it is.
+        line: Its line's begin, with its value last.
+        *values: The others.
+    """
+    begin = line.rsplit(" ", 1)[0]
+    return tuple(((file, line, f"{begin} {value}"),) for value in values)
+
+
+_HALF_L, _TWICE_L, _NO_L = constant(_EDGE, "STIFFNESS = 200.0", 100.0, 400.0, 1e12)
+_HALF_B, _TWICE_B, _NO_B = constant(_EDGE, "BELOW = 40.0", 20.0, 80.0, 0.0)
+_HALF_T, _TWICE_T, _NO_T = constant(
+    _EDGE, "TURNING, QUICKEST = 50.0", 25.0, 100.0, 1e12
+)
+_HALF_N, _TWICE_N = constant(_SHARES, "NEAR = 0.1", 0.05, 0.2)
+_HALF_P, _TWICE_P = constant(_TARGET, "LARGE = 0.1", 0.05, 0.2)
+
 INGREDIENTS: dict[str, tuple[Edit, ...]] = {
     "nothing": (),
-    "bounded error": ((_MODEL, "return 0.35 * self.size, 1.0", "return 1e3, 1e3"),),
+    "bounded error": ((_MODEL, "return 0.35 * self.size, 1.25", "return 1e3, 1e3"),),
     "bounded force of springs": (
         (_MODEL, "return float(turns.max()) / lever, 0.5 * float(turns.max())",
          "return np.inf, np.inf"),
     ),
-    "threshold that follows": ((_EDGE, "STIFFNESS = 200.0", "STIFFNESS = 1e12"),),
-    "f₀": ((_EDGE, "ON_LEGS = 0.5, 10.0", "ON_LEGS = 0.0, 0.0"),),
-    "threshold of the field": ((_EDGE, "QUICKEST = 50.0,", "QUICKEST = 1e12,"),),
-    "threshold below a held level": ((_EDGE, "BELOW = 40.0", "BELOW = 0.0"),),
+    "threshold that follows (L)": _NO_L,
+    "L: half of it": _HALF_L,
+    "L: twice": _TWICE_L,
+    "less of L for one axis or two": (
+        ("tasks/feedback.py", "max(WHOLE + 1.0 - self.size, 1.0)", "1.0"),
+    ),
+    "threshold of the field": _NO_T,
+    "50 1/s: half of it": _HALF_T,
+    "50 1/s: twice": _TWICE_T,
+    "7 rad/s: half of it": ((_EDGE, "QUICKEST = 50.0, 7.0", "QUICKEST = 50.0, 3.5"),),
+    "7 rad/s: twice": ((_EDGE, "QUICKEST = 50.0, 7.0", "QUICKEST = 50.0, 14.0"),),
+    "threshold below a held level": _NO_B,
+    "40: half of it": _HALF_B,
+    "40: twice": _TWICE_B,
     "what those above it draw": (
-        ("edge/damped_levels.py", "opposed[k] -= J[", "opposed[k] -= 0.0 * J["),
+        (_LEVELS, "opposed[k] -= J[", "opposed[k] -= 0.0 * J["),
     ),
     "how a null space turns": (
         (_EDGE, "following.size / above))", "0.0 / above))"),
     ),
+    "share: near": (
+        (_SHARES, "return float(smooth_share(2.0 - 2.0 *", "return float(0.0 * ("),
+    ),
+    "near, 0.1: half of it": _HALF_N,
+    "near, 0.1: twice": _TWICE_N,
+    "share: far": (
+        (_SHARES, "return float(smooth_share((most - FAR)", "return float(0.0 * (most"),
+    ),
+    "far, 0.85: 0.7": ((_SHARES, "FAR = 0.85", "FAR = 0.7"),),
+    "share: limits": (
+        (_TARGET, "change[i] = tasks * (", "change[i] = 0.0 * ("),
+    ),
+    "limits, 0.1: half of it": _HALF_P,
+    "limits, 0.1: twice": _TWICE_P,
     "static effort": (
         ("constraints/limits/limits.py", "_HELD = 0.95", "_HELD = 100.0"),
     ),
@@ -75,8 +125,7 @@ INGREDIENTS: dict[str, tuple[Edit, ...]] = {
     ),
     "position's drift": ((_LIMITS, "_SHIFT = 0.1", "_SHIFT = 0.0"),),
     "steady force": (
-        (_SENT, "steady[i] = max(", "steady[i] = 0.0 * max("),
-        (_SENT, "+ min(max(drift[i], present), 0.0)", ""),
+        (_SENT, "steady[i] = _shared(drift[i], present)", "steady[i] = 0.0"),
     ),
     "null space dearer with the error": (
         (_COST, "_MOST = 1.0, 0.2, 0.1", "_MOST = 0.0, 0.0, 0.1"),
@@ -86,11 +135,11 @@ INGREDIENTS: dict[str, tuple[Edit, ...]] = {
     ),
     "directions that levels share": (
         (_COST, "count = _write_damped_level(directions)",
-         "count = _write_levels(directions, ends.shape[0])"),
+         "count = _write_levels(directions, 1)\n"
+         "        _write_roots(directions, count)"),
         (_COST, "count = _write_levels(directions, first_damped)",
-         "count = _write_levels(directions, ends.shape[0])"),
-        (_COST, "if exact or not directions.alone:", "if True:"),
-        (_COST, "if not exact and not directions.alone:", "if False:"),
+         "count = _write_levels(directions, directions.ends.shape[0])"),
+        (_COST, "        _write_shared(directions, count)", "        pass"),
     ),
 }  # fmt: skip
 
@@ -101,6 +150,8 @@ def cases(robots: list[str], kinds: list[str], count: int) -> list[Case]:
     for robot in robots:
         arm = Arm(robot)
         for kind in kinds:
+            if is_planar(robot) and kind not in IN_THE_PLANE:
+                continue
             for period in PERIODS:
                 key = [KINDS.index(kind), PERIODS.index(period)]
                 for seed in range(count):
@@ -215,7 +266,7 @@ def main() -> None:
     """Measure all copies, print the table and write it."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--cases", type=int, default=3, help="of a kind, robot, period")
-    parser.add_argument("--robots", nargs="+", default=list(ROBOTS))
+    parser.add_argument("--robots", nargs="+", default=[*ROBOTS, "planar3r"])
     parser.add_argument("--kinds", nargs="+", default=list(KINDS))
     parser.add_argument("--keep", type=Path, help="a folder of runs already made")
     parser.add_argument("--measure", nargs=2, type=Path, help=argparse.SUPPRESS)

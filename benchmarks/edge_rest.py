@@ -35,12 +35,13 @@ PERIODS = (0.001, 0.002, 0.005, 0.01)
 OUT = ("position", "pose", "spring", "levels")
 KINDS = (
     *(*OUT, "push", "steady", "stream", "drag", "step", "flip", "axes", "mass"),
-    *("spring above", "just out"),
+    *("spring above", "just out", "unlimited"),
 )
+AXES = ("axes", "unlimited")
 ABOVE = ("levels", "spring above", "just out")  # an orientation
 SPRINGS = ("spring", "steady", "spring above")
 JUST = -0.005, 0.01  # beyond what can be reached [m]
-OF_REST = tuple(kind for kind in KINDS if kind != "steady")
+OF_REST = tuple(kind for kind in KINDS if kind not in ("steady", "unlimited"))
 IN_THE_PLANE = ("position", "spring", "push", "stream", "drag", "step")
 STIFFNESS, HELD, PUSHED = (100.0, 2000.0), (5.0, 40.0), (50.0, 200.0)  # [N/m, N, N]
 BEGIN, PUSH, REST, WATCHED = 0.5, 0.2, 3.0, 1.0  # [s]
@@ -94,13 +95,13 @@ def case(arm: Arm, kind: str, period: float, rng: np.random.Generator) -> Case:
         d = np.array([d[0], d[1], 0.0]) / np.hypot(d[0], d[1])
     here, _ = arm.at(x0)
     goal, least, number, vector = here.translation.copy(), np.nan, 0.0, np.zeros(3)
-    if kind == "axes":
+    if kind in AXES:
         vector[rng.permutation(3)[: rng.integers(1, 3)]] = 1.0
         d = vector * d / np.linalg.norm(vector * d)
     if kind == "mass":
         state = arm.robot.state(0.0, arm.configuration(x0), np.zeros(arm.robot.nv))
         goal = state.centroidal.position + rng.uniform(*BEYOND) * d
-    if kind in (*OUT, "stream", "drag", "axes", *ABOVE):
+    if kind in (*OUT, "stream", "drag", *AXES, *ABOVE):
         reach = arm.extent(d, rng) - d @ goal
         beyond = rng.uniform(*(JUST if kind == "just out" else BEYOND))
         goal += (reach + beyond) * d
@@ -168,7 +169,7 @@ def controller(case: Case, robot: hsp.Robot, metric: Any = None) -> hsp.Controll
     declared: dict[str, Any] = {"trajectory": reference} if streamed else {}
     if planar:
         declared["axes"] = "xy"
-    if case.kind == "axes":
+    if case.kind in AXES:
         counts = np.array(case.vector) > 0.0
         declared["axes"] = "".join(np.array([*"xyz"])[counts])
         reference = hsp.Hold(goal[counts])
@@ -182,7 +183,8 @@ def controller(case: Case, robot: hsp.Robot, metric: Any = None) -> hsp.Controll
     below = [hsp.FrameOrientation(frame, priority=2)] * (case.kind in ABOVE)
     field: Any = hsp.TargetPosture(case.q0) if planar else hsp.JointCentering()
     tasks = [hand, *below]
-    made = hsp.Controller(robot, tasks, field, start=case.q0, metric=metric)
+    own: dict[str, Any] = {"limits": None} if case.kind == "unlimited" else {}
+    made = hsp.Controller(robot, tasks, field, start=case.q0, metric=metric, **own)
     if not streamed and case.kind not in ("push", "steady"):
         made.at(BEGIN).ramp(0.0).reference("hand", reference)
     return made

@@ -45,7 +45,6 @@ struct LimitedTarget {
     In<'k', 'w'> A;    // the first n columns count
     InOut<'k'> lower;  // for a deviation δ from a: A δ ≥ lower
   } barred;
-  In<1> share;   // how much the law is damped already
   double large;  // the excess from which on it counts wholly
   Scratch<'n'> a_t, tau_t, change, part, asked;
 
@@ -57,14 +56,12 @@ struct LimitedTarget {
     tau_t = effort - part;
     change = -parts.law_self_motion;
     const double tasks = std::min(excess(a_t, tau_t, change), whole);
-    const double held = std::max(share[0], tasks);
-    const double leave = 1.0 - (1.0 - large) * held;
 
     change = tasks * (parts.damped - parts.law);
     asked = parts.law_self_motion + parts.law_braking;
-    change -= whole * (1.0 - tasks) * (1.0 - permitted_part(asked, leave)) * asked;
+    change -= whole * (1.0 - tasks) * (1.0 - permitted_part(asked)) * asked;
     asked = parts.damped_self_motion + parts.damped_braking;
-    change -= whole * tasks * (1.0 - permitted_part(asked, leave)) * asked;
+    change -= whole * tasks * (1.0 - permitted_part(asked)) * asked;
 
     a += change;
     part.noalias() = M * change;
@@ -87,12 +84,12 @@ struct LimitedTarget {
     return std::min(most / large, 1.0);
   }
 
-  // Which part of an acceleration is `leave` of what the limits permit far from them.
-  template <class A> double permitted_part(const A& x, double leave) {
+  // Which part of an acceleration the limits permit far from them.
+  template <class A> double permitted_part(const A& x) {
     part.noalias() = M * x;
     const double efforts = (part.array().abs() / permitted.effort.array()).maxCoeff();
     const double motions = (x.array().abs() / permitted.acceleration.array()).maxCoeff();
-    return leave / std::max({leave, efforts, motions});
+    return 1.0 / std::max({1.0, efforts, motions});
   }
 };
 

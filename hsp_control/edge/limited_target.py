@@ -15,8 +15,7 @@ near to the damped law instead (`shares.py`).
 
 *What a field asks for is bounded.* That is φ_N + P K_N P v, the self-motion without
 what brakes it. A field may ask for anything; at most what the limits permit far from
-them is asked of the QP, and a tenth of that where the tasks are held, by their edge or
-by a limit. What brakes stays whole: else it would swing at the limits.
+them is asked of the QP, and what brakes stays whole: else it would swing at the limits.
 
 An excess is relative to what the limit permits: of an effort, the maximum; of an
 acceleration, what the barriers of `Limits` permit far from them. It counts wholly from
@@ -33,8 +32,7 @@ from hsp_control.common.arrays import Array
 from hsp_control.engine.plans import KernelCall
 
 LARGE = 0.1
-"""Excess from which on it counts wholly, and the part of what the limits permit that a
-field gets where the tasks are held."""
+"""Excess from which on it counts wholly."""
 
 
 class Permitted(NamedTuple):
@@ -93,7 +91,6 @@ def limited_target(
     bounds: Within,
     permitted: Permitted,
     barred: Barred,
-    share: Array,
 ) -> KernelCall:
     """Return the call that overwrites what is wanted by what the step comes near to.
 
@@ -105,7 +102,6 @@ def limited_target(
         bounds: Bounds on the acceleration.
         permitted: What excesses are relative to.
         barred: Rows of barriers; ``lower`` then is for deviations from the new a.
-        share: How much the law is damped already, shape (1,); see `shares.py`.
     """
-    given = M, a, effort, parts, bounds, permitted, barred, share, LARGE
+    given = M, a, effort, parts, bounds, permitted, barred, LARGE
     return engine.LimitedTarget, given

@@ -213,7 +213,7 @@ class LimitedStep:
             parts = Parts(*law, *self_motions, *brakings)
             barred = Barred(A[kept], lower[kept])
             target = *wanted, parts, Within(*bounds[:2]), permitted, barred
-            rows += own, limited_target(*target, edge.share)
+            rows += own, limited_target(*target)
         rows.append((engine.LimitedRows, (*around, A, lower, upper)))
         write = write_directions(levels, directions)
         closest = write, *nearest(standing=p > 0, warm=True)

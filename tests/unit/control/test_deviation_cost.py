@@ -97,8 +97,8 @@ def test_levels_share_directions_as_the_law_does(
     np.testing.assert_allclose(inverse_cost(resolution) @ H, np.eye(7), atol=1e-5)
 
 
-FIELD = 1e-3 * hsp.JointCentering()
-"""It asks for less than a tenth of what the limits permit far from them."""
+FIELD = 0.01 * hsp.JointCentering()
+"""It asks for less than the limits permit far from them."""
 
 
 def on_springs(limits: hsp.Limits | None, *below: hsp.FramePosition) -> hsp.Controller:

@@ -1,0 +1,45 @@
+"""What limits take for the null space's is all that a field makes of the law."""
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from task_cases import load
+
+import hsp_control as hsp
+
+FAR = hsp.Hold([2.0, 0.5, 0.5])
+
+
+@pytest.mark.parametrize("levels", [1, 2])
+@pytest.mark.parametrize("metric", ["identity", "mass"])
+@given(st.integers(0, 2**32 - 1))
+@settings(max_examples=10, deadline=None)
+def test_it_is_what_the_law_does_with_a_field_and_not_without(
+    metric: str, levels: int, seed: int
+) -> None:
+    """Of the damped law, whose P is no projector; the law is linear in φ_N."""
+    robot, rng = load("panda"), np.random.default_rng(seed)
+    q = robot.home() + 0.3 * rng.standard_normal(7)
+    v, g = 0.3 * rng.standard_normal(7), 300.0 * rng.standard_normal(7)
+    tasks: list[hsp.Task] = [hsp.FramePosition("panda_tcp", FAR)]
+    if levels == 2:
+        tasks.append(hsp.FrameOrientation("panda_tcp", priority=2))
+    weighted = metric == "mass"
+    made = hsp.Controller(
+        robot,
+        tasks,
+        hsp.fields.FunctionField(lambda state: g),
+        metric=hsp.metrics.MassMatrixMetric() if weighted else None,
+        start=robot.home(),
+    )
+    made.compute(0.0, q, v)
+    law = made.active_stack.resolution
+    assert law.edge.code[0] > 0  # damped, and beyond limits
+    whole, self_motion = law.edge.damped.copy(), law.edge.self_motions[1].copy()
+    kernel, arguments = law.call(v, controls=False)
+    kernel(*arguments)
+    by_tasks = law.edge.damped.copy()
+    scale = np.abs(whole).max()
+    np.testing.assert_allclose(self_motion, whole - by_tasks, atol=1e-9 * scale)
+    assert np.abs(self_motion).max() > 0.1 * scale
