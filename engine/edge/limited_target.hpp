@@ -14,7 +14,7 @@
 //
 // *What a field asks for is bounded.* That is φ_N + P K_N P v, the self-motion without what brakes
 // it. A field may ask for anything; at most what the limits permit far from them is asked of the
-// QP, and where tasks are held a part of that; what brakes stays whole: else it would swing.
+// QP, and what brakes stays whole: else it would swing.
 //
 // An excess is relative to what the limit permits: of an effort, the maximum; of an acceleration,
 // what the barriers of `Limits` permit far from them. The limit on the effort's rate does not
