@@ -67,7 +67,7 @@ def test_the_page_of_compliance_is_true() -> None:
 
 
 PAGES_WITH_PYTHON = [
-    *("companions/play", "companions/sweeps", "development/kernels", "latency"),
+    *("companions/play", "companions/sweeps", "development/engine", "latency"),
     *("robustness", "streams"),
 ]
 
@@ -87,6 +87,9 @@ def test_what_pages_show_can_be_followed(
     family = hsp_control.Cost.family  # what a page declares ends with it
     monkeypatch.setattr(family, "members", dict(family.members))
     text = (ROOT / "docs" / f"{page}.md").read_text(encoding="utf-8")
+    files = re.findall(r"A file `([\w.]+)`:\n\n```\w+\n(.*?)```", text, re.DOTALL)
+    for name, content in files:
+        Path(name).write_text(content)
     space: dict = {}
     for snippet in blocks(text, "python"):
         exec(compile(snippet, f"{page}.md", "exec"), space)
@@ -161,6 +164,9 @@ def test_the_view_s_document_is_true() -> None:
     on, off = (re.findall(r"`(\w+)`", part) for part in layers.split(" are on, "))
     defaults = ShownItems().all_fields()
     assert dict.fromkeys(on, True) | dict.fromkeys(off, False) == defaults
+    files = re.findall(r"A file `([\w.]+)`:\n\n```\w+\n(.*?)```", text, re.DOTALL)
+    for name, content in files:
+        Path(name).write_text(content)
     space: dict = {}
     for snippet in blocks(text, "python"):
         exec(compile(snippet, "view.md", "exec"), space)
