@@ -20,7 +20,6 @@ from hsp_control.common.version import __version__ as __version__
 
 if TYPE_CHECKING:  # what a type checker reads; the names are looked up below
     from . import config as config
-    from . import engine as engine
     from . import live as live
     from . import robot as robot
     from . import simulation as simulation
@@ -92,7 +91,8 @@ _NAMES = {
     ),
     "constraints.limits": "Barrier Limits",
     "control": "ControlOutput Controller",
-    "simulation": "Rollout simulate",
+    "simulation": "Rollout",
+    "simulation.simulate": "simulate",
     "live": "run_loop",
     "config": "Experiment Recorder load_experiment",
     "common.exceptions": "HspControlError",
@@ -104,7 +104,6 @@ _NAMESPACES = {
     "compensation": "control.compensation",
     "config": "config",
     "contacts": "constraints.contacts",
-    "engine": "engine",
     "errors": "common.exceptions",
     "estimation": "control.estimator",
     "fields": "null_space.fields",

@@ -3,6 +3,7 @@
 import json
 import logging
 import math
+import tokenize
 import zipfile
 import zlib
 from collections.abc import Callable, Mapping, Sequence
@@ -250,7 +251,10 @@ def _check_sizes(archive: zipfile.ZipFile) -> None:
                 (1, 0): np.lib.format.read_array_header_1_0,
                 (2, 0): np.lib.format.read_array_header_2_0,
             }[version]
-            shape, _, kind = read(file)
+            try:
+                shape, _, kind = read(file)
+            except (SyntaxError, tokenize.TokenError) as error:  # of its header's text
+                raise ValueError(f"{entry.filename}: {error}") from None
         if math.prod(shape) * kind.itemsize > entry.file_size:
             size = math.prod(shape) * kind.itemsize
             raise ValueError(

@@ -12,6 +12,7 @@ from robot_cases import ROBOTS, assert_equal_terms, draw, everything, load
 from hsp_control import HspControlError, RobotState
 from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import ConfigurationError, NonFiniteError, ShapeError
+from hsp_control.engine import PythonCall
 
 # --- one state, many moves -----------------------------------------------------------
 
@@ -181,7 +182,7 @@ def test_calls_after_a_move_see_its_time_and_state() -> None:
         seen.append((t, state.t, state.q.copy()))
         return 7.0
 
-    move = state.bind_move([call])
+    move = state.bind_move([PythonCall(call, timed=True)])
     assert state.advance(move, 0.25, q + 0.1, v) == 7.0
     ((t, own, where),) = seen
     assert t == own == 0.25
@@ -191,7 +192,7 @@ def test_calls_after_a_move_see_its_time_and_state() -> None:
 def test_a_refused_move_changes_nothing_and_calls_nothing() -> None:
     robot, q, v, _ = draw("panda", seed=32)
     state, seen = robot.state(0.5, q, v), list[float]()
-    move = state.bind_move([lambda t: seen.append(t)])
+    move = state.bind_move([PythonCall(seen.append, timed=True)])
     with pytest.raises(NonFiniteError, match="velocity v"):
         state.advance(move, 1.0, q, np.full(robot.nv, np.nan))
     with pytest.raises(NonFiniteError, match="time t is None"):
@@ -209,7 +210,7 @@ def test_a_type_error_of_a_call_is_its_own() -> None:
         raise TypeError("a field's own mistake")
 
     with pytest.raises(TypeError, match="a field's own mistake"):
-        state.advance(state.bind_move([call]), 1.0, q, v)
+        state.advance(state.bind_move([PythonCall(call, timed=True)]), 1.0, q, v)
 
 
 def test_what_a_state_gave_keeps_its_memory() -> None:

@@ -14,7 +14,7 @@ import hsp_control as hsp
 from hsp_control import Robot
 from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import LogError, SimulationError
-from hsp_control.engine.plans import PLAIN, planned
+from hsp_control.engine.plans import planned
 from hsp_control.robot import integrators
 from hsp_control.robot.integrators import Dop853, Rk4, SemiImplicitEuler
 from hsp_control.simulation.plants import RigidBody, RigidBodyPlant
@@ -169,7 +169,6 @@ def test_whole_turns_need_new_charts(monkeypatch: pytest.MonkeyPatch) -> None:
     assert evaluations[-1] == pytest.approx(2.0 * np.pi / 5.0, abs=1e-2)
 
 
-@pytest.mark.skipif(PLAIN, reason="plain Python has no native calls")
 @pytest.mark.parametrize("method", [Rk4, SemiImplicitEuler])
 def test_native_steps_are_those_that_are_made_one_by_one(method: Any) -> None:
     """To the last bit, over intervals of 10 ms by steps of at most 3 ms."""

@@ -73,7 +73,7 @@ def test_rotors_that_the_drives_hide_cost_delay(name: str, rotors: float) -> Non
     assert "rotors hidden" in lines(found)
     bare = hsp.Robot.load(name, motor_inertia=0.0)
     periods = round(found.hidden / H)
-    for late, grows in ((periods, False), (periods + 2, True)):
+    for late, grows in ((periods, False), (periods + 3, True)):
         engine = IntegratedPlant(RigidBodyPlant(bare), Rk4(H))
         plant = ImperfectPlant(engine, [], [EffortDelay(late)])
         assert (growth(made, q, plant, 2.0) > 1.0) is grows, late

@@ -26,16 +26,11 @@ from hsp_control.control.bound_step import BoundStep, FreeStep
 from hsp_control.control.changes import Changes
 from hsp_control.control.controller import Controller
 from hsp_control.engine import REFUSED, Move, Plan, PythonCall
-from hsp_control.engine.plans import PLAIN
 from hsp_control.robot.integrators import SemiImplicitEuler
 from hsp_control.simulation import loops
 from hsp_control.simulation.limit_excess import LimitExcess
+from hsp_control.simulation.native_loop import MOST
 from hsp_control.trajectories import Hold
-
-if not PLAIN:
-    from hsp_control.simulation.native_loop import MOST
-
-pytestmark = [pytest.mark.skipif(PLAIN, reason="plain Python has no native calls")]
 
 EULER = "simulation.integrator={type: semi_implicit_euler}"
 RK4 = "simulation.integrator={type: rk4}"
