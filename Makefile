@@ -91,7 +91,8 @@ mutants: $(STAMP) $(ENGINE) ## break the code on purpose, report what no test no
 	@$(BIN)/python tools/mutants.py $(ARGS)
 
 wheel: $(STAMP) $(ENGINE) ## build the wheel into dist/
-	@rm -rf dist; $(BIN)/python -m pip wheel --quiet --no-deps --no-build-isolation \
+	@rm -rf dist; env -u PIP_BUILD_CONSTRAINT \
+	  $(BIN)/python -m pip wheel --quiet --no-deps --no-build-isolation \
 	  --wheel-dir dist .
 	@ls dist
 
@@ -187,7 +188,8 @@ $(STAMP): pyproject.toml constraints.txt
 # $(call install,.[extra,...]): this checkout with its extras.
 define install
 $(find-python); "$$python" tools/install.py .venv $$("$$python" hatch_build.py needs); \
-"$$python" tools/install.py .venv --no-build-isolation --editable '$(1)'
+env -u PIP_BUILD_CONSTRAINT \
+  "$$python" tools/install.py .venv --no-build-isolation --editable '$(1)'
 endef
 
 $(ENGINE): $(USE) hatch_build.py engine/CMakeLists.txt $(shell find engine -name '*.?pp')

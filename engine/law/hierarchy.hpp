@@ -61,7 +61,7 @@ void write_bounded_inverse(const V& turned, const X& x, double threshold, Out&& 
   inverse.setZero();
   for (Index r = 0; r < x.size(); ++r) {
     const double q = x[r] >= floor ? 1.0 / x[r] : (2.0 - x[r] / floor) / floor;
-    inverse.noalias() += (q * turned.row(r).transpose()).lazyProduct(turned.row(r));
+    inverse.noalias() += q * turned.row(r).transpose().lazyProduct(turned.row(r));
   }
 }
 
