@@ -16,7 +16,7 @@ WORDS: dict[str, str] = {
     "how_to/add_a_task": "task, priority, priorities",
     "how_to/tune_gains": "gains, tuning, natural frequency, stiffness, damping",
     "how_to/obstacles": "obstacle, obstacle avoidance, collision, clearance, distance",
-    "how_to/own_cost": "cost, own cost, own field, kernel, plugin",
+    "how_to/own_cost": "cost, own cost, own field, C++, plugin",
     "how_to/metric": "metric, weights of joints, mass matrix, dynamically consistent",
     "how_to/figures": "figures, plot, matplotlib, pdf",
     "limits": "limits, torque limits, effort limits, velocity limits, joint limits",

@@ -39,7 +39,7 @@ from hsp_control.live.hardware import AdaptingHardware, LocatedHardware
 from hsp_control.live.operator_requests import stop_signals
 from hsp_control.simulation import Rollout
 
-_DRY_RUN = 0.5  # duration of the run before that compiles the kernels [s]
+_DRY_RUN = 0.5  # duration of the run before, in which all is done once [s]
 _DRY_RUN_OF_A_PLAN = 3.0  # the same with a plan, which has to come to its steps [s]
 
 

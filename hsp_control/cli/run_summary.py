@@ -169,7 +169,7 @@ def excess_rows(rollout: Rollout) -> Iterator[str]:
 
 
 class Stopwatch:
-    """Measures the wall time from the first row on: kernels are compiled before."""
+    """Measures the wall time from the first row on."""
 
     def __init__(self) -> None:
         self._first: float | None = None

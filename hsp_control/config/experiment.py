@@ -512,7 +512,7 @@ def _in_real_time(
             on_row(recorder)
         row = next(rows)
         if row == 0:
-            begin = monotonic()  # kernels are compiled now
+            begin = monotonic()  # calls are bound now
         sleep(max(begin + row * period - monotonic(), 0.0))
 
     return wait

@@ -45,7 +45,7 @@ class LoadedScenario(NamedTuple):
 
 
 def load_scenario(document: Document) -> LoadedScenario:
-    """Check a configuration, and load its robot and scene: no kernel is compiled."""
+    """Check a configuration, and load its robot and scene."""
     if document.says_nothing("limits"):
         raise document.error(
             ("limits",),

@@ -104,7 +104,7 @@ class Controller(Composition):
                 stack, damped = self.active_stack, mixture.damped
                 run.bound = bound or mixture.bound_step()
             run.acceleration, status = delivered[1], delivered[3]
-            # Kernels have looked at all other efforts already.
+            # The engine has looked at all other efforts already.
             unlike = status is RELAXED or status is BEYOND or modifier is not None
             if unlike and not isfinite(delivered[0] @ delivered[0]):
                 stack.raise_not_finite()

@@ -47,12 +47,12 @@ _SAME = 1e-6
 """Values that differ by less than this part are the same [-]."""
 
 _RATE_BY = (
-    "rate", "gradient_rate", "differentiate", "kernel", "terms", "terms_kernel",
-    "derivatives", "kernels", "evaluate",
+    "rate", "gradient_rate", "differentiate", "call", "terms", "terms_call",
+    "derivatives", "own_calls", "evaluate",
 )  # fmt: skip
 _GRADIENT_BY = (
-    "gradient", "differentiate", "kernel", "terms", "terms_kernel", "derivatives",
-    "kernels", "evaluate",
+    "gradient", "differentiate", "call", "terms", "terms_call", "derivatives",
+    "own_calls", "evaluate",
 )  # fmt: skip
 
 
@@ -92,7 +92,7 @@ def check_metric(metric: Metric, state: RobotState) -> None:
     def entry(i: int) -> str:
         return f" in row and column {divmod(i, state.robot.nv)}"
 
-    by = _by(metric, ("kernel", "evaluate"))
+    by = _by(metric, ("call", "evaluate"))
     part = f"metric {type(metric).__name__}"
     _check(_Declared(part, by, "W", "W' = ∂W/∂q·v", entry, at), state)
 

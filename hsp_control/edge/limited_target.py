@@ -29,7 +29,7 @@ import numpy as np
 
 from hsp_control import engine
 from hsp_control.common.arrays import Array
-from hsp_control.engine.plans import KernelCall
+from hsp_control.engine.plans import PartCall
 
 LARGE = 0.1
 """Excess from which on it counts wholly."""
@@ -91,7 +91,7 @@ def limited_target(
     bounds: Within,
     permitted: Permitted,
     barred: Barred,
-) -> KernelCall:
+) -> PartCall:
     """Return the call that overwrites what is wanted by what the step comes near to.
 
     Args:

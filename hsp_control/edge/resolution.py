@@ -12,7 +12,7 @@ from hsp_control import engine
 from hsp_control.common.arrays import Array, Indices
 from hsp_control.edge.step import EdgeMemory, Factors, Projectors
 from hsp_control.edge.threshold import NOT, Following, Thresholds
-from hsp_control.engine.plans import KernelCall
+from hsp_control.engine.plans import PartCall
 from hsp_control.law.outcome import BEYOND_ANY_LEVEL
 from hsp_control.law.problem import Problem
 
@@ -72,7 +72,7 @@ class Resolution:
         self.null_space_error = self.problem.record.null_space_error
         self.code: Indices = np.zeros(1, dtype=np.int64)
 
-    def call(self, v: Array, *, controls: bool = True) -> KernelCall:
+    def call(self, v: Array, *, controls: bool = True) -> PartCall:
         """Return the call that writes a and e_N; it returns what `outcome_of` takes."""
         problem = self.problem
         law = (
@@ -87,7 +87,7 @@ class Resolution:
             *(self.projectors, self.edge, self.damped_code, *found),
         )
 
-    def self_motions(self, v: Array) -> tuple[KernelCall, tuple[Array, Array]]:
+    def self_motions(self, v: Array) -> tuple[PartCall, tuple[Array, Array]]:
         """Return the call that writes what the null space contributes, after `call`.
 
         Args:
@@ -106,7 +106,7 @@ class Resolution:
         )
         return (engine.SelfMotions, given), written
 
-    def diagnosis(self, first: int) -> tuple[KernelCall, Array, Array]:
+    def diagnosis(self, first: int) -> tuple[PartCall, Array, Array]:
         """Return a call that finds how near the law is to singular and to rest.
 
         Args:

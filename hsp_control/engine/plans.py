@@ -1,6 +1,6 @@
 """Plans: the calls of parts, bound once, and what supplies their arguments.
 
-A part says its mathematics as a kind of call with its arguments, a `KernelCall`. An
+A part says its mathematics as a kind of call with its arguments, a `PartCall`. An
 argument may be something that has to be brought up to date first: the kinematics of a
 frame, a trajectory, what another call writes. Its method ``supplied`` returns what is
 read, and the calls that write it. `planned` makes a plan of it all.
@@ -17,7 +17,7 @@ from hsp_control.common.arrays import Array, Indices
 from hsp_control.engine import Kind, Plan, PythonCall
 from hsp_control.engine.pinocchio_calls import bind_pinocchio, is_pinocchio
 
-KernelCall = tuple[Callable[..., Any], tuple[Any, ...]]
+PartCall = tuple[Callable[..., Any], tuple[Any, ...]]
 """A kind of the engine, or a function, with its first arguments: what a part's
 mathematics is. Who calls it adds the others; `planned` says what may be among them."""
 
@@ -28,12 +28,12 @@ TIME = object()
 class Once(NamedTuple):
     """Calls that are made unless they were made at this stamp."""
 
-    calls: "KernelCalls"
+    calls: "PartCalls"
     stamp: Indices  # shape (1,)
     made: Indices  # the stamp at which they were made last, shape (1,)
 
     @classmethod
-    def at(cls, stamp: Indices, *calls: KernelCall) -> Self:
+    def at(cls, stamp: Indices, *calls: PartCall) -> Self:
         """Return calls that were not made yet."""
         return cls(calls, stamp, np.full(1, -1))
 
@@ -44,23 +44,23 @@ class OnlyIf(NamedTuple):
     Their result is ``found[0]``, and what the last of them returns if they are made.
     """
 
-    calls: "KernelCalls"
+    calls: "PartCalls"
     found: Array  # shape (2,)
 
 
-AnyCall = KernelCall | Once | OnlyIf
-KernelCalls = Sequence[AnyCall]
+AnyCall = PartCall | Once | OnlyIf
+PartCalls = Sequence[AnyCall]
 """What a part does in each step: its calls with all their arguments, in this order."""
 
 
-class KernelOutput(NamedTuple):
+class CallOutput(NamedTuple):
     """An argument of a call: what another call writes into its last argument."""
 
-    call: KernelCall
+    call: PartCall
     out: Any
 
 
-def with_outputs(call: KernelCall, *others: Any) -> KernelCall:
+def with_outputs(call: PartCall, *others: Any) -> PartCall:
     """Return a call with further arguments after its own."""
     function, arguments = call
     return function, (*arguments, *others)
@@ -102,7 +102,7 @@ class StepPlan(NamedTuple):
         return Plan(self.write)
 
 
-def planned(calls: KernelCalls) -> StepPlan:
+def planned(calls: PartCalls) -> StepPlan:
     """Return the plan of calls; one that comes twice is bound once."""
     plans: dict[int, StepPlan] = {}
     follow: list[Step] = []
@@ -132,7 +132,7 @@ def _plan(call: AnyCall) -> StepPlan:
 
 def supplied(argument: Any) -> tuple[Any, StepPlan]:
     """Return an argument as a call reads it, and the plan of what writes it."""
-    if type(argument) is KernelOutput:
+    if type(argument) is CallOutput:
         return argument.out, planned([with_outputs(*argument)])
     if hasattr(argument, "supplied"):
         value, calls = argument.supplied()

@@ -14,7 +14,7 @@ import numpy as np
 
 from hsp_control import engine
 from hsp_control.common.arrays import Array, Indices
-from hsp_control.engine.plans import KernelCalls
+from hsp_control.engine.plans import PartCalls
 from hsp_control.geometry.links import LinkShape
 from hsp_control.geometry.scene import Obstacle
 from hsp_control.geometry.shapes import Box, Capsule, Cylinder, HalfSpace, Shape, Sphere
@@ -55,7 +55,7 @@ class ClosedFormDistances:
         """Allocate; `measure` writes ``distances`` of all pairs at ``places``."""
         used = np.unique(pairs)
         self._motion = np.zeros((len(obstacles), MOTION_SIZE))
-        self._moving: KernelCalls = [
+        self._moving: PartCalls = [
             call
             for k, obstacle in enumerate(obstacles)
             if len(links) + k in used
@@ -93,14 +93,14 @@ class ClosedFormDistances:
         calls = state.cached(self, "distances", lambda: state.plan(self.calls(state)))
         calls.run(state.t)
 
-    def calls(self, state: RobotState) -> KernelCalls:
+    def calls(self, state: RobotState) -> PartCalls:
         """Return the calls of `measure` for this state."""
         bodies = self  # see `supplied`
         given = state.world.placements, bodies, self._used, self._pairs
         found = self._segments, self._cores, self._distances
         return [(engine.MeasureDistances, (self.measurements, *given, *found))]
 
-    def supplied(self) -> "tuple[_Bodies, KernelCalls]":
+    def supplied(self) -> "tuple[_Bodies, PartCalls]":
         """Return the bodies as the engine reads them, and the calls that move them."""
         return self._bodies, self._moving
 
@@ -128,7 +128,7 @@ class ClosedFormDistances:
         run()
         return sums.gradient, sums.rate
 
-    def derivatives(self, state: RobotState, *sums: Array) -> KernelCalls:
+    def derivatives(self, state: RobotState, *sums: Array) -> PartCalls:
         """Return the calls of `differentiate` for these arguments."""
         given = state.world, self._bodies, self._pairs, self._segments
         return [(engine.DistanceGradients, (*given, *sums))]

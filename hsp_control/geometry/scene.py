@@ -14,7 +14,7 @@ from hsp_control.common.suggestions import did_you_mean, listing
 from hsp_control.declaration import Part
 from hsp_control.declaration.nested import BY_NAME, parts_within, stored
 from hsp_control.declaration.quantities import ArrayField, Name
-from hsp_control.engine.plans import KernelCalls
+from hsp_control.engine.plans import PartCalls
 from hsp_control.geometry.shapes import Shape
 from hsp_control.robot import RobotState
 from hsp_control.trajectories import (
@@ -79,7 +79,7 @@ class Obstacle(Part, error=SceneError):
         rotation = self.orientation.sample(t).rotation
         return pin.SE3(rotation, self.center.sample(t).position)
 
-    def calls(self, motion: Array) -> KernelCalls:
+    def calls(self, motion: Array) -> PartCalls:
         """Return the calls that write R by rows, c, c' and ω (18,) at a time."""
         center = TrajectorySample(motion[9:12], motion[12:15], np.zeros(3))
         turn = OrientationSample(motion[:9].reshape(3, 3), motion[15:18], np.zeros(3))

@@ -1,4 +1,4 @@
-"""Whether the law's equations hold, and how kernels say it."""
+"""Whether the law's equations hold, and how the engine says it."""
 
 from enum import IntEnum
 
@@ -18,11 +18,11 @@ EXACT, DAMPED, NOT_FINITE = tuple(Outcome)
 """By name, for the step: up to Python 3.11 `Outcome.EXACT` takes 80 ns."""
 
 BEYOND_ANY_LEVEL = 1_000_000
-"""What kernels return if the acceleration is not finite."""
+"""What the law's call returns if the acceleration is not finite."""
 
 
 def outcome_of(code: float) -> Outcome:
-    """Return the outcome that a kernel's number means.
+    """Return the outcome that the call's number means.
 
     Args:
         code: 0: exact; from 1 on, the first level with a bounded inverse; or

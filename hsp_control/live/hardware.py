@@ -19,7 +19,7 @@ from hsp_control.simulation.control_chain import EffortSource
 class Hardware(Protocol):
     """A robot under effort control: implement it once for each kind of robot.
 
-    The loop calls `read` once, and then compiles kernels for some seconds. From the
+    The loop calls `read` once, and then binds its calls for some time. From the
     second `read` on, it calls `read` and `write` once a period, and `close` at the end.
     If it has no valid state any more, it calls `close` without further writes.
 

@@ -31,7 +31,7 @@ class OperatorRequests:
         ``requests.call(lambda: controller.at(t).gains(...))``. If it raises, the
         robot is stopped. The loop waits until it returns: a change of the controller
         takes a few milliseconds. With a type of task or field that was never used it
-        takes longer, because kernels are compiled: compute once with it before.
+        takes longer, because calls are bound: compute once with it before.
         """
         self._changes.append(change)
 

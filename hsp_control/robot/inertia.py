@@ -17,7 +17,7 @@ from hsp_control.common.arrays import (
 )
 from hsp_control.common.exceptions import ModelError
 from hsp_control.common.suggestions import listing
-from hsp_control.engine.plans import KernelCall, KernelCalls, Once
+from hsp_control.engine.plans import Once, PartCall, PartCalls
 from hsp_control.robot.kinematics import PointMotion, Term
 
 
@@ -50,9 +50,9 @@ def mass_matrix(model: pin.Model, data: pin.Data, q: Array) -> Array:
 
 def _mass_matrix_calls(
     model: pin.Model, data: pin.Data, q: Array
-) -> Sequence[KernelCall]:
+) -> Sequence[PartCall]:
     """Return the calls of `mass_matrix`."""
-    clearing: list[KernelCall] = [
+    clearing: list[PartCall] = [
         (engine.Clear, (matrix,)) for matrix in _remembered(model, data)
     ]
     return [*clearing, (pin.crba, (model, data, q))]
@@ -119,7 +119,7 @@ class CentroidalMotion:
         # It reads the velocity of the centre, which it does not write: of others' calls
         # nothing is to be in A'.
         rest = engine.Clear, (kept_view(data.vcom[0].reshape(1, 3), data),)
-        self.calls: KernelCalls = [Once.at(stamp, rest, momentum, extract)]
+        self.calls: PartCalls = [Once.at(stamp, rest, momentum, extract)]
 
     @cached_property
     def shown(self) -> "CentroidalMotion":
@@ -130,7 +130,7 @@ class CentroidalMotion:
                 setattr(shown, name, read_only_view(value))
         return shown
 
-    def supplied(self) -> tuple[PointMotion, KernelCalls]:
-        """Return the centre's motion as an argument of a kernel; see `planned`."""
+    def supplied(self) -> tuple[PointMotion, PartCalls]:
+        """Return the centre's motion as an argument of a call; see `planned`."""
         J, J_dot = self.jacobian, self.jacobian_dot
         return PointMotion(J, J_dot, self.position, self.velocity), self.calls

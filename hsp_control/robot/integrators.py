@@ -19,7 +19,7 @@ from hsp_control.common.exceptions import HspControlError, SimulationError
 from hsp_control.declaration import Part
 from hsp_control.declaration.quantities import Positive
 from hsp_control.engine import Plan
-from hsp_control.engine.plans import TIME, AnyCall, KernelCalls, planned
+from hsp_control.engine.plans import TIME, AnyCall, PartCalls, planned
 from hsp_control.robot.kinematics import Term
 from hsp_control.robot.robot import Robot
 
@@ -197,7 +197,7 @@ class Steps(ABC):
         self.native = not self.take.python
 
     @abstractmethod
-    def _calls(self) -> KernelCalls:
+    def _calls(self) -> PartCalls:
         """Return the calls of a step."""
 
     def __call__(self, t: float, end: float, q: Array, v: Array) -> tuple[Array, Array]:
@@ -207,7 +207,7 @@ class Steps(ABC):
         self.take()
         return self.q.copy(), self.v.copy()
 
-    def compute_at(self, fraction: float) -> KernelCalls:
+    def compute_at(self, fraction: float) -> PartCalls:
         """Return the calls that write v' at this fraction of the step."""
         calls = self.acceleration.calls
         plan = planned(calls)
@@ -217,7 +217,7 @@ class Steps(ABC):
 
 
 class _EulerStep(Steps):
-    def _calls(self) -> KernelCalls:
+    def _calls(self) -> PartCalls:
         robot = self.robot
         self._moved = np.zeros(robot.nv)
         q, a = self.q if robot.linear else np.zeros(0), self.acceleration.value
@@ -232,7 +232,7 @@ class _EulerStep(Steps):
 class _Rk4Stages(Steps):
     """The four stages of a step, in the chart q = base ⊕ δ."""
 
-    def _calls(self) -> KernelCalls:
+    def _calls(self) -> PartCalls:
         robot = self.robot
         self._D, A = np.zeros((2, 4, robot.nv))
         self._delta, v0 = np.zeros((2, robot.nv))

@@ -8,11 +8,11 @@ import pinocchio as pin
 from hsp_control import engine
 from hsp_control.common.arrays import Array, Indices, matrix_view, read_only_view
 from hsp_control.common.exceptions import ImmutableError, ModelError
-from hsp_control.engine.plans import KernelCalls
+from hsp_control.engine.plans import PartCalls
 
 
 class FrameMotion(NamedTuple):
-    """A frame's placement, Jacobian and motion, as one argument of a kernel.
+    """A frame's placement, Jacobian and motion, as one argument of a call.
 
     In the axes of the frame that it is relative to: the world's, unless said otherwise.
     Linear rows come before angular rows.
@@ -114,7 +114,7 @@ class FrameKinematics:
             *joint_support(model, frame.parentJoint),
         )
         given = stamp, np.array([-1]), carrier, v, motion, self.drift
-        self.calls: KernelCalls = [(engine.FrameKinematics, given)]
+        self.calls: PartCalls = [(engine.FrameKinematics, given)]
 
     def __setattr__(self, name: str, value: object) -> None:
         if hasattr(self, name):
@@ -124,13 +124,13 @@ class FrameKinematics:
             )
         super().__setattr__(name, value)
 
-    def supplied(self) -> tuple[FrameMotion, KernelCalls]:
-        """Return the motion as an argument of a kernel; see `planned`."""
+    def supplied(self) -> tuple[FrameMotion, PartCalls]:
+        """Return the motion as an argument of a call; see `planned`."""
         return self.motion, self.calls
 
     @property
     def point(self) -> "FramePoint":
-        """The frame's origin, as an argument of a kernel."""
+        """The frame's origin, as an argument of a call."""
         return FramePoint(self)
 
 
@@ -140,8 +140,8 @@ class FramePoint:
     def __init__(self, frame: FrameKinematics) -> None:
         self._frame = frame
 
-    def supplied(self) -> tuple[PointMotion, KernelCalls]:
-        """Return the origin's motion as an argument of a kernel; see `planned`."""
+    def supplied(self) -> tuple[PointMotion, PartCalls]:
+        """Return the origin's motion as an argument of a call; see `planned`."""
         (J, J_dot, _, p, velocity), calls = self._frame.supplied()
         return PointMotion(J[:3], J_dot[:3], p, velocity[:3]), calls
 
@@ -158,8 +158,8 @@ class ShownFrame(FrameKinematics):
             setattr(self, name, view)
         self.drift = read_only_view(own.drift)
 
-    def supplied(self) -> tuple[FrameMotion, KernelCalls]:
-        """Return the motion as an argument of a kernel; see `planned`."""
+    def supplied(self) -> tuple[FrameMotion, PartCalls]:
+        """Return the motion as an argument of a call; see `planned`."""
         return self._own.supplied()
 
 
@@ -167,10 +167,10 @@ class Term(NamedTuple):
     """An array, and the calls that bring it up to date."""
 
     value: Array
-    calls: KernelCalls
+    calls: PartCalls
 
-    def supplied(self) -> tuple[Array, KernelCalls]:
-        """Return the array as an argument of a kernel; see `planned`."""
+    def supplied(self) -> tuple[Array, PartCalls]:
+        """Return the array as an argument of a call; see `planned`."""
         return self.value, self.calls
 
 

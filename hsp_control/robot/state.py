@@ -25,9 +25,9 @@ from hsp_control.declaration.quantities import Vector
 from hsp_control.engine import REFUSED, Move, Plan
 from hsp_control.engine.plans import (
     AnyCall,
-    KernelCall,
-    KernelCalls,
     Once,
+    PartCall,
+    PartCalls,
     Step,
     StepPlan,
     planned,
@@ -63,10 +63,10 @@ class RobotState:
         robot: The robot.
         q: Configuration, shape (nq,).
         v: Velocity, shape (nv,).
-        time: `t` as an array of shape (1,), for kernels.
-        stamp_array: `stamp` as an array of shape (1,), for kernels.
-        inertia: M(q) as an argument of kernels; see `mass_matrix`.
-        inertia_rate: M' as an argument of kernels; see `mass_matrix_rate`.
+        time: `t` as an array of shape (1,), for calls.
+        stamp_array: `stamp` as an array of shape (1,), for calls.
+        inertia: M(q) as an argument of calls; see `mass_matrix`.
+        inertia_rate: M' as an argument of calls; see `mass_matrix_rate`.
         effort: What `inverse_dynamics` wrote last, shape (nv,) [N·m or N].
     """
 
@@ -250,7 +250,7 @@ class RobotState:
         self._inverse_dynamics()
         return self.effort
 
-    def rnea(self, acceleration: Array) -> KernelCall:
+    def rnea(self, acceleration: Array) -> PartCall:
         """Return a call that writes `effort` for what this array (nv,) then holds."""
         return pin.rnea, (*self._at, acceleration)
 
@@ -289,16 +289,16 @@ class RobotState:
         made: Made = found[1]
         return made
 
-    def run(self, calls: KernelCalls) -> Any:
+    def run(self, calls: PartCalls) -> Any:
         """Make calls now, once; return what the last one returns."""
         return self.plan(calls).run(self.t)
 
-    def plan(self, calls: KernelCalls) -> StepPlan:
+    def plan(self, calls: PartCalls) -> StepPlan:
         """Return calls as they are made at any time: `StepPlan.run`."""
         return planned(calls)
 
     def prepared(
-        self, part: object, what: str, make: Callable[[], tuple[Made, KernelCalls]]
+        self, part: object, what: str, make: Callable[[], tuple[Made, PartCalls]]
     ) -> tuple[Made, Callable[[], Any]]:
         """Return what `cached` does, and a call that makes ``make``'s calls now."""
 
@@ -366,9 +366,9 @@ class SeenState(RobotState):
 def as_given(part: object, state: RobotState) -> RobotState:
     """Return a state as a part's `evaluate` gets it: read-only for plain Python.
 
-    Kernels are bound to the state itself, whose arrays they know as writable.
+    Calls of the engine are bound to the state itself, whose arrays they write.
     """
-    is_plain = says(part, "kernel", "kernels", "evaluate") == "evaluate"
+    is_plain = says(part, "call", "own_calls", "evaluate") == "evaluate"
     return state.read_only if is_plain else state
 
 

@@ -8,7 +8,7 @@ from hsp_control import engine
 from hsp_control.common.arrays import Array
 from hsp_control.constraints.limits import RobotLimits
 from hsp_control.control.measurement import LogChannel
-from hsp_control.engine.plans import KernelCall
+from hsp_control.engine.plans import PartCall
 from hsp_control.robot import Robot
 
 POSITION, VELOCITY = "position_excess", "velocity_excess"
@@ -49,7 +49,7 @@ class LimitExcess:
 
     def recording(
         self, limits: RobotLimits | None, q: Array, v: Array
-    ) -> list[KernelCall]:
+    ) -> list[PartCall]:
         """Return `record` of what these arrays then hold, as calls."""
         if limits is None:
             return []

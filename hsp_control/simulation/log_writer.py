@@ -184,7 +184,7 @@ class LogWriter:
         columns.keep_row()
 
     def warm_up(self, *row: Any) -> None:
-        """Do all for a row but write it: kernels are compiled, and the heading is."""
+        """Do all for a row but write it; the heading is written."""
         self.record(*row, keep=False)
 
     def _fill_law(self, state: RobotState, output: ControlOutput) -> None:

@@ -8,7 +8,7 @@ import numpy as np
 from hsp_control import engine
 from hsp_control.common.arrays import Array
 from hsp_control.declaration.quantities import Axes, Positive
-from hsp_control.engine.plans import KernelCall
+from hsp_control.engine.plans import PartCall
 from hsp_control.geometry.scene import Start
 from hsp_control.law import TaskSample
 from hsp_control.robot import Robot, RobotState
@@ -47,8 +47,8 @@ class CenterOfMass(TrackingTask, type="center_of_mass"):
         placed = replace(self, trajectory=trajectory, blend=None)
         return placed.checked(start.state.robot)
 
-    def kernel(self, state: RobotState) -> KernelCall:
-        """Return the kernel; see `Task.kernel`."""
+    def call(self, state: RobotState) -> PartCall:
+        """Return the call; see `Task.call`."""
         axes = axis_indices(self.axes)
         return engine.TrackAxes, (axes, state.centroidal, self.trajectory)
 

@@ -9,7 +9,7 @@ from hsp_control import engine
 from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import GainError
 from hsp_control.declaration import within
-from hsp_control.engine.plans import KernelCalls
+from hsp_control.engine.plans import PartCalls
 from hsp_control.law import TaskSample
 from hsp_control.robot import Robot, RobotState
 from hsp_control.tasks.feedback import Feedback, InForce
@@ -95,7 +95,7 @@ class CompliantTask(SecondOrderTask):
 
     def calls_in_force(
         self, state: RobotState, in_force: InForce, out: TaskSample
-    ) -> KernelCalls:
+    ) -> PartCalls:
         """Return the calls: the task, its gains, the task with these gains."""
         task = self.calls(state, in_force.feedback, out)
         if self.impedance is None:
@@ -123,7 +123,7 @@ class CompliantTask(SecondOrderTask):
     def _at(self, state: RobotState, numbers: Array) -> Feedback:
         """Return Kp and Kv of the numbers of an impedance at a state."""
 
-        def make() -> tuple[InForce, KernelCalls]:
+        def make() -> tuple[InForce, PartCalls]:
             mobility = np.zeros((self.rows, self.rows))
             in_force = InForce(np.zeros_like(numbers), self.feedback(), mobility)
             sample = TaskSample.allocate(self.rows, state.robot.nv)

@@ -18,7 +18,7 @@ UNBOUNDED = np.zeros((0, 3))
 
 
 class Feedback(NamedTuple):
-    """Kv e' + Kp s(e) + offset: a task's feedback, as one argument of a kernel.
+    """Kv e' + Kp s(e) + offset: a task's feedback, as one argument of a call.
 
     s(e) is e with each part of it, such as its position, shortened to its largest
     length: s(e) = e wherever no part is longer.

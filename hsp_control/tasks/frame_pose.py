@@ -9,7 +9,7 @@ import pinocchio as pin
 from hsp_control import engine
 from hsp_control.common.arrays import Array
 from hsp_control.declaration import AnyOf
-from hsp_control.engine.plans import KernelCall
+from hsp_control.engine.plans import PartCall
 from hsp_control.engine.rotations import quaternion_from_rotation
 from hsp_control.robot import RobotState
 from hsp_control.robot.kinematics import FrameKinematics
@@ -60,8 +60,8 @@ class FrameOrientation(
         trajectory = place_orientation(self.trajectory, here.rotation, self.blend)
         return {"trajectory": trajectory, "blend": None}
 
-    def kernel(self, state: RobotState) -> KernelCall:
-        """Return the kernel; see `Task.kernel`."""
+    def call(self, state: RobotState) -> PartCall:
+        """Return the call; see `Task.call`."""
         frame = state.frame(self.frame_name)
         return engine.TrackOrientation, (frame, self.trajectory)
 
@@ -152,8 +152,8 @@ class FramePose(FrameTask, PoseTask, CompliantTask, type="frame_pose"):
         trajectory = place_pose(self.trajectory, place, self.blend)
         return {"trajectory": trajectory, "blend": None}
 
-    def kernel(self, state: RobotState) -> KernelCall:
-        """Return the kernel; see `Task.kernel`."""
+    def call(self, state: RobotState) -> PartCall:
+        """Return the call; see `Task.call`."""
         return engine.TrackPose, (state.frame(self.frame_name), self.followed)
 
     def _rotating(self, state: RobotState) -> Rotating:

@@ -8,7 +8,7 @@ import numpy as np
 from hsp_control import engine
 from hsp_control.common.arrays import Array, Indices
 from hsp_control.declaration.quantities import Axes
-from hsp_control.engine.plans import KernelCall
+from hsp_control.engine.plans import PartCall
 from hsp_control.robot import RobotState
 from hsp_control.robot.kinematics import FrameKinematics
 from hsp_control.tasks.compliant_task import CompliantTask
@@ -44,8 +44,8 @@ class FramePosition(FrameTask, TrackingTask, CompliantTask, type="frame_position
         trajectory = place_point(self.trajectory, begin, self.blend)
         return {"trajectory": trajectory, "blend": None}
 
-    def kernel(self, state: RobotState) -> KernelCall:
-        """Return the kernel; see `Task.kernel`."""
+    def call(self, state: RobotState) -> PartCall:
+        """Return the call; see `Task.call`."""
         frame = state.frame(self.frame_name)
         return engine.TrackAxes, (axis_indices(self.axes), frame.point, self.trajectory)
 

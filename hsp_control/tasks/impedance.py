@@ -87,7 +87,7 @@ class Impedance(Part, error=GainError):
 
 
 class ImpedanceParts(NamedTuple):
-    """The numbers of an impedance, as one argument of a kernel."""
+    """The numbers of an impedance, as one argument of a call."""
 
     K: Array  # stiffness, symmetric, shape (m, m) [N/m or N·m/rad]
     D: Array  # damping, symmetric, shape (m, m) [N·s/m or N·m·s/rad]

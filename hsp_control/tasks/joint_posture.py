@@ -10,7 +10,7 @@ from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import TaskError
 from hsp_control.declaration import within
 from hsp_control.declaration.quantities import Names
-from hsp_control.engine.plans import KernelCall
+from hsp_control.engine.plans import PartCall
 from hsp_control.geometry.scene import Start
 from hsp_control.robot import Robot, RobotState
 from hsp_control.robot.state import Posture, configuration
@@ -86,8 +86,8 @@ class JointPosture(CompliantTask, type="joint_posture"):
                     )
         return replace(placed, displacement=displacement).checked(robot)
 
-    def kernel(self, state: RobotState) -> KernelCall:
-        """Return the kernel; see `Task.kernel`."""
+    def call(self, state: RobotState) -> PartCall:
+        """Return the call; see `Task.call`."""
         robot = state.robot
         # The rows of `single_dof_joints`, in the order of the joints of the task.
         place = {int(row[0]): row for row in robot.single_dof_joints}

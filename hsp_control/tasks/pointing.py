@@ -11,7 +11,7 @@ from hsp_control import engine
 from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import TaskError
 from hsp_control.declaration.quantities import Vector3
-from hsp_control.engine.plans import KernelCall
+from hsp_control.engine.plans import PartCall
 from hsp_control.robot import RobotState
 from hsp_control.robot.kinematics import FrameKinematics
 from hsp_control.tasks.feedback import ErrorPart
@@ -109,8 +109,8 @@ class Pointing(FrameTask, type="pointing"):
         normals[1] *= np.sign(np.linalg.det(np.vstack([normals, self._axis])))
         return normals.copy()
 
-    def kernel(self, state: RobotState) -> KernelCall:
-        """Return the kernel; see `Task.kernel`."""
+    def call(self, state: RobotState) -> PartCall:
+        """Return the call; see `Task.call`."""
         axes = self._axis, self._normals
         frame = state.frame(self.frame_name)
         return engine.TrackDirection, (*axes, frame, self._desired)

@@ -9,7 +9,7 @@ from hsp_control import engine
 from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import TaskError
 from hsp_control.declaration import within
-from hsp_control.engine.plans import KernelCall, KernelOutput
+from hsp_control.engine.plans import CallOutput, PartCall
 from hsp_control.geometry.scene import Start
 from hsp_control.robot import Robot, RobotState
 from hsp_control.robot.kinematics import FrameMotion
@@ -62,11 +62,11 @@ class RelativePose(PoseTask, type="relative_pose"):
         placed = replace(self, frame=frame, trajectory=trajectory, blend=None)
         return placed.checked(robot)
 
-    def kernel(self, state: RobotState) -> KernelCall:
-        """Return the kernel; see `Task.kernel`."""
+    def call(self, state: RobotState) -> PartCall:
+        """Return the call; see `Task.call`."""
         frames = state.frame(self.frame_name), state.frame(self.reference)
         motion = FrameMotion.allocate(state.robot.nv)
-        relative = KernelOutput((engine.RelativeKinematics, frames), motion)
+        relative = CallOutput((engine.RelativeKinematics, frames), motion)
         return engine.TrackPose, (relative, self.followed)
 
     def actual(self, state: RobotState) -> tuple[Array, Array]:

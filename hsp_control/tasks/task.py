@@ -12,7 +12,7 @@ from hsp_control.common.exceptions import TaskError
 from hsp_control.declaration import Part, within
 from hsp_control.declaration.nested import parts_within, with_memories_copied
 from hsp_control.declaration.quantities import PositiveCount
-from hsp_control.engine.plans import KernelCall, KernelCalls, says, with_outputs
+from hsp_control.engine.plans import PartCall, PartCalls, says, with_outputs
 from hsp_control.geometry.scene import Start
 from hsp_control.law import TaskSample
 from hsp_control.robot import Robot, RobotState
@@ -39,7 +39,7 @@ class Task(Part, ABC, family="tasks", error=TaskError):
     A subclass declares its parameters as fields (see `Part`) and implements:
 
     * `error_parts` names the components of e, and so says how many rows there are.
-    * `kernel` returns what writes J, J', e, e' and a_x; or `evaluate`, in plain Python,
+    * `call` returns what writes J, J', e, e' and a_x; or `evaluate`, in plain Python,
       writes them itself. The error equation must follow *exactly* from
       J a + J'v = a_x, in the coordinates of e.
     * `reference_rate` returns J v on the reference.
@@ -127,7 +127,7 @@ class Task(Part, ABC, family="tasks", error=TaskError):
 
     def calls_in_force(
         self, state: RobotState, in_force: InForce, out: TaskSample
-    ) -> KernelCalls:
+    ) -> PartCalls:
         """Return the calls with a feedback that may change; see `calls`."""
         return self.calls(state, in_force.feedback, out)
 
@@ -204,10 +204,10 @@ class Task(Part, ABC, family="tasks", error=TaskError):
         """Whether a floating base needs the task to stand; see `priority`."""
         return False
 
-    def kernel(self, state: RobotState) -> KernelCall:
-        """Return a kernel and its first arguments; `feedback` and `out` follow.
+    def call(self, state: RobotState) -> PartCall:
+        """Return a kind of call and its first arguments; `feedback` and `out` follow.
 
-        ``kernel(*arguments, feedback: Feedback, out: TaskSample)`` writes what
+        ``kind(*arguments, feedback: Feedback, out: TaskSample)`` writes what
         `evaluate` describes. Arguments are numbers, arrays and records of them, which
         may be memory of the state; and what is brought up to date before each call:
         ``state.frame(name)`` becomes a `FrameMotion`, a trajectory its sample.
@@ -215,14 +215,14 @@ class Task(Part, ABC, family="tasks", error=TaskError):
         Args:
             state: The state that every step reads. Its values change between steps.
         """
-        raise TypeError(f"{type(self).__name__} implements neither kernel nor evaluate")
+        raise TypeError(f"{type(self).__name__} implements neither call nor evaluate")
 
     def calls(
         self, state: RobotState, feedback: Feedback, out: TaskSample
-    ) -> KernelCalls:
+    ) -> PartCalls:
         """Return the calls that write the sample of each step."""
-        if says(self, "kernel", "evaluate") == "kernel":
-            return [with_outputs(self.kernel(state), feedback, out)]
+        if says(self, "call", "evaluate") == "call":
+            return [with_outputs(self.call(state), feedback, out)]
         return [(self.evaluate, (state.read_only, out, feedback))]
 
     def evaluate(
@@ -246,10 +246,10 @@ class Task(Part, ABC, family="tasks", error=TaskError):
         """
         out, feedback = self.given(state, out, feedback)
 
-        def make() -> tuple[tuple[Feedback, TaskSample], KernelCalls]:
+        def make() -> tuple[tuple[Feedback, TaskSample], PartCalls]:
             own = self.feedback()
             sample = TaskSample.allocate(self.rows, state.robot.nv)
-            return (own, sample), [with_outputs(self.kernel(state), own, sample)]
+            return (own, sample), [with_outputs(self.call(state), own, sample)]
 
         (own, sample), run = state.prepared(self, "evaluate", make)
         for array, value in zip(own, feedback, strict=True):

@@ -11,7 +11,7 @@ from hsp_control import engine
 from hsp_control.common.arrays import Array
 from hsp_control.declaration.quantities import Number, Positive, Vector, Vector3
 from hsp_control.declaration.rotation import Rotation, matrix_of
-from hsp_control.engine.plans import KernelCall
+from hsp_control.engine.plans import PartCall
 from hsp_control.engine.rotations import jexp3_dot, jlog3, log3
 from hsp_control.trajectories import checks
 from hsp_control.trajectories.orientation import OrientationTrajectory
@@ -66,8 +66,8 @@ class Blend(Trajectory, type="blend"):
         """The number n of coordinates."""
         return self.trajectory.dimension
 
-    def kernel(self) -> KernelCall:
-        """Return the kernel; see `Trajectory.kernel`."""
+    def call(self) -> PartCall:
+        """Return the call; see `Trajectory.call`."""
         x = np.asarray(self.start)
         v = np.zeros_like(x) if self.start_velocity is None else self.start_velocity
         start = np.stack([x, np.asarray(v)])
@@ -135,8 +135,8 @@ class BlendOrientation(OrientationTrajectory, type="blend"):
         y_dot = jlog3(y) @ w
         return y, y_dot, jlog3(y) @ (w_dot - jexp3_dot(y, y_dot) @ y_dot)
 
-    def kernel(self) -> KernelCall:
-        """Return the kernel; see `Trajectory.kernel`."""
+    def call(self) -> PartCall:
+        """Return the call; see `Trajectory.call`."""
         when, motion = (
             (self.start_time, self.duration),
             (self._start, self._coefficients),

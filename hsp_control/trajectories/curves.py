@@ -11,7 +11,7 @@ from hsp_control import engine
 from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import TrajectoryError
 from hsp_control.declaration.quantities import Matrix, Number, Positive, Vector, Vector3
-from hsp_control.engine.plans import KernelCall
+from hsp_control.engine.plans import PartCall
 from hsp_control.trajectories import checks
 from hsp_control.trajectories.trajectory import Trajectory
 
@@ -75,8 +75,8 @@ class Circle(Trajectory, type="circle"):
         normal = [0.0, 0.0, 1.0] if self.normal is None else self.normal
         return _axes_from_normal(checks.direction(normal, "normal"), self.toward)
 
-    def kernel(self) -> KernelCall:
-        """Return the kernel; see `Trajectory.kernel`."""
+    def call(self) -> PartCall:
+        """Return the call; see `Trajectory.call`."""
         radii = self.radius * self._plane
         center = np.asarray(self.center, dtype=float)
         return engine.Circle, (self.angular_rate, self.phase, center, radii)
@@ -127,8 +127,8 @@ class Lissajous(Trajectory, type="lissajous"):
         """The number n of coordinates."""
         return np.size(self.amplitudes)
 
-    def kernel(self) -> KernelCall:
-        """Return the kernel; see `Trajectory.kernel`."""
+    def call(self) -> PartCall:
+        """Return the call; see `Trajectory.call`."""
         phases = np.zeros(self.dimension) if self.phases is None else self.phases
         parameters = [self.center, self.amplitudes, self.rates, phases]
         return engine.Lissajous, (np.array(parameters, dtype=float),)
@@ -155,7 +155,7 @@ class UniformLine(Trajectory, type="uniform_line"):
         """The number n of coordinates."""
         return np.size(self.velocity)
 
-    def kernel(self) -> KernelCall:
-        """Return the kernel; see `Trajectory.kernel`."""
+    def call(self) -> PartCall:
+        """Return the call; see `Trajectory.call`."""
         start, velocity = np.asarray(self.start), np.asarray(self.velocity)
         return engine.UniformLine, (start, velocity)

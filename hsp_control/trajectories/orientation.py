@@ -14,7 +14,7 @@ from hsp_control.common.exceptions import TrajectoryError
 from hsp_control.declaration import Part
 from hsp_control.declaration.quantities import Number, Vector, Vector3
 from hsp_control.declaration.rotation import Rotation, Rotations, matrix_of
-from hsp_control.engine.plans import KernelCall, KernelCalls
+from hsp_control.engine.plans import PartCall, PartCalls
 from hsp_control.engine.rotations import log3
 from hsp_control.trajectories import checks
 from hsp_control.trajectories.trajectory import calls_of_sample, sampled
@@ -40,7 +40,7 @@ class OrientationTrajectory(Part, ABC, family="orientations", error=TrajectoryEr
     """R(t) in SO(3) with ω(t) and ω'(t); a value, defined at every t.
 
     R is body to world, ω is in world axes. A subclass declares its parameters as fields
-    and implements `sample` or `kernel`, as described in `Trajectory`. A motion of
+    and implements `sample` or `call`, as described in `Trajectory`. A motion of
     finite duration rests at its first orientation before the start and at its last
     orientation after the end.
 
@@ -70,9 +70,9 @@ class OrientationTrajectory(Part, ABC, family="orientations", error=TrajectoryEr
         rotated: dict[str, Any] = {"rotation": start}
         return replace(self, **rotated)
 
-    def kernel(self) -> KernelCall:
-        """Return a kernel and its first arguments; see `Trajectory.kernel`."""
-        raise TypeError(f"{type(self).__name__} implements neither kernel nor sample")
+    def call(self) -> PartCall:
+        """Return a kind of call and its first arguments; see `Trajectory.call`."""
+        raise TypeError(f"{type(self).__name__} implements neither call nor sample")
 
     def sample(
         self, t: float, out: OrientationSample | None = None
@@ -90,12 +90,12 @@ class OrientationTrajectory(Part, ABC, family="orientations", error=TrajectoryEr
         sample: OrientationSample = sampled(self, t, self._output(out))
         return sample
 
-    def calls(self, out: OrientationSample) -> KernelCalls:
+    def calls(self, out: OrientationSample) -> PartCalls:
         """Return the calls that write ``out`` at a time; see `Trajectory.calls`."""
         return calls_of_sample(self, self._output(out))
 
-    def supplied(self) -> tuple[OrientationSample, KernelCalls]:
-        """Return its sample as an argument of a kernel; see `planned`."""
+    def supplied(self) -> tuple[OrientationSample, PartCalls]:
+        """Return its sample as an argument of a call; see `planned`."""
         sample = OrientationSample.allocate()
         return sample, self.calls(sample)
 
@@ -132,8 +132,8 @@ class OrientationPath(OrientationTrajectory, type="path"):
     def _matrices(self) -> Array:
         return np.array([matrix_of(each) for each in np.asarray(self.rotations)])
 
-    def kernel(self) -> KernelCall:
-        """Return the kernel; see `Trajectory.kernel`."""
+    def call(self) -> PartCall:
+        """Return the call; see `Trajectory.call`."""
         R = self._matrices
         turns = np.zeros((len(R), 3))
         for i in range(len(R) - 1):
@@ -157,12 +157,12 @@ class Spin(OrientationTrajectory, type="spin"):
         """Check that the axis is not zero."""
         checks.direction(self.axis, "axis")
 
-    def kernel(self) -> KernelCall:
-        """Return the kernel; see `Trajectory.kernel`."""
+    def call(self) -> PartCall:
+        """Return the call; see `Trajectory.call`."""
         return self._call
 
     @cached_property
-    def _call(self) -> KernelCall:
+    def _call(self) -> PartCall:
         assert self.rotation is not None
         omega = self.rate * checks.direction(self.axis, "axis")
         return engine.Spin, (np.asarray(omega), matrix_of(self.rotation))

@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike
 from hsp_control import engine
 from hsp_control.common.arrays import Array
 from hsp_control.declaration.quantities import Matrix, Number, Positive, Tensor, Vector
-from hsp_control.engine.plans import KernelCall
+from hsp_control.engine.plans import PartCall
 from hsp_control.trajectories import checks
 from hsp_control.trajectories.trajectory import Trajectory
 
@@ -76,8 +76,8 @@ class PolynomialTrajectory(Trajectory):
         """The number n of coordinates."""
         return len(self.pieces.waypoints[0])
 
-    def kernel(self) -> KernelCall:
-        """Return the kernel; see `Trajectory.kernel`."""
+    def call(self) -> PartCall:
+        """Return the call; see `Trajectory.call`."""
         return engine.PiecewisePolynomial, tuple(self.pieces)
 
 

@@ -14,7 +14,7 @@ from hsp_control.common.exceptions import TrajectoryError
 from hsp_control.declaration import Part
 from hsp_control.declaration.quantities import Number, Positive, Vector3, numbers
 from hsp_control.declaration.rotation import Rotation, matrix_of
-from hsp_control.engine.plans import TIME, KernelCalls, says
+from hsp_control.engine.plans import TIME, PartCalls, says
 from hsp_control.engine.rotations import jlog3, log3
 from hsp_control.trajectories.hold import Hold, HoldOrientation
 from hsp_control.trajectories.orientation import (
@@ -83,12 +83,12 @@ class PoseTrajectory(Part, ABC, family="poses", error=TrajectoryError):
             ``out``, or the new sample.
         """
 
-    def calls(self, out: PoseSample) -> KernelCalls:
+    def calls(self, out: PoseSample) -> PartCalls:
         """Return the calls that write ``out`` at a time; see `Trajectory.calls`."""
         return [(write_sample, (self.sample, out, TIME))]
 
-    def supplied(self) -> tuple[PoseSample, KernelCalls]:
-        """Return its sample as an argument of a kernel; see `planned`."""
+    def supplied(self) -> tuple[PoseSample, PartCalls]:
+        """Return its sample as an argument of a call; see `planned`."""
         desired = PoseSample.over(np.zeros((8, 3)))
         return desired, self.calls(desired)
 
@@ -129,7 +129,7 @@ class ComposedPose(PoseTrajectory, type="composed"):
         self.orientation.sample(t, out.orientation)
         return out
 
-    def calls(self, out: PoseSample) -> KernelCalls:
+    def calls(self, out: PoseSample) -> PartCalls:
         """Return those of both; see `Trajectory.calls`."""
         orientation = self.orientation.calls(out.orientation)
         return [*self.position.calls(out.position), *orientation]
@@ -172,7 +172,7 @@ class HoldPose(PoseTrajectory, type="hold_pose"):
         """Return the pose and zero rates; see `PoseTrajectory.sample`."""
         return self._parts.sample(t, out)
 
-    def calls(self, out: PoseSample) -> KernelCalls:
+    def calls(self, out: PoseSample) -> PartCalls:
         """Write ``out`` once, and return no calls."""
         return self._parts.calls(out)
 
@@ -245,7 +245,7 @@ class ScrewInterpolation(PoseTrajectory, type="screw"):
         engine.Screw(*self._arguments, out)(float(t))
         return out
 
-    def calls(self, out: PoseSample) -> KernelCalls:
+    def calls(self, out: PoseSample) -> PartCalls:
         """Return the calls that write ``out``; see `Trajectory.calls`."""
         if says(self, "calls", "sample") == "sample":  # of a class that derives from it
             return super().calls(out)

@@ -12,12 +12,12 @@ from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import ShapeError, TrajectoryError
 from hsp_control.declaration import Part
 from hsp_control.engine import Kind
-from hsp_control.engine.plans import TIME, KernelCall, KernelCalls, says
+from hsp_control.engine.plans import TIME, PartCall, PartCalls, says
 
 
 def sampled(trajectory: Any, t: float, out: Any) -> Any:
-    """Write a trajectory's sample at time t [s] with its kernel, and return it."""
-    function, arguments = trajectory.kernel()
+    """Write a trajectory's sample at time t [s] with its call, and return it."""
+    function, arguments = trajectory.call()
     given = [x.sample(t) if hasattr(x, "sample") else x for x in arguments]
     if isinstance(function, Kind):
         function(*given, out)(float(t))
@@ -26,13 +26,13 @@ def sampled(trajectory: Any, t: float, out: Any) -> Any:
     return out
 
 
-def calls_of_sample(trajectory: Any, out: Any) -> KernelCalls:
-    """Return the calls of a trajectory that says its kernel, or its sample."""
+def calls_of_sample(trajectory: Any, out: Any) -> PartCalls:
+    """Return the calls of a trajectory that says its call, or its sample."""
     if trajectory.constant:
         trajectory.sample(0.0, out)
         return []
-    if says(trajectory, "kernel", "sample") == "kernel":
-        function, arguments = trajectory.kernel()
+    if says(trajectory, "call", "sample") == "call":
+        function, arguments = trajectory.call()
         return [(function, (*arguments, out, TIME))]
     return [(write_sample, (trajectory.sample, out, TIME))]
 
@@ -70,7 +70,7 @@ class Trajectory(Part, ABC, family="trajectories", error=TrajectoryError):
     """x(t) in Rⁿ with x'(t) and x''(t); a value, defined at every t.
 
     A subclass declares its parameters as fields (see `Part`) and implements `dimension`
-    and `sample`, or `kernel`, which makes a step faster. The coordinates may have any
+    and `sample`, or `call`, which makes a step faster. The coordinates may have any
     unit; a task says which frame and units it needs. A motion of finite duration rests
     at its first point before the start and at its last point after the end.
 
@@ -143,12 +143,12 @@ class Trajectory(Part, ABC, family="trajectories", error=TrajectoryError):
     def dimension(self) -> int:
         """The number n of coordinates."""
 
-    def kernel(self) -> KernelCall:
-        """Return a kernel and its first arguments; the sample and t follow.
+    def call(self) -> PartCall:
+        """Return a kind of call and its first arguments; the sample and t follow.
 
-        ``kernel(*arguments, out: TrajectorySample, t)`` writes what `sample` returns.
+        ``kind(*arguments, out: TrajectorySample, t)`` writes what `sample` returns.
         """
-        raise TypeError(f"{type(self).__name__} implements neither kernel nor sample")
+        raise TypeError(f"{type(self).__name__} implements neither call nor sample")
 
     def sample(self, t: float, out: TrajectorySample | None = None) -> TrajectorySample:
         """Return x(t), x'(t) and x''(t), shape (n,) each.
@@ -170,7 +170,7 @@ class Trajectory(Part, ABC, family="trajectories", error=TrajectoryError):
         sample: TrajectorySample = sampled(self, t, self._output(out))
         return sample
 
-    def calls(self, out: TrajectorySample) -> KernelCalls:
+    def calls(self, out: TrajectorySample) -> PartCalls:
         """Return the calls that write the sample into ``out``, at a `TIME`.
 
         From now on nothing else may write into ``out``, because calls may skip entries
@@ -178,8 +178,8 @@ class Trajectory(Part, ABC, family="trajectories", error=TrajectoryError):
         """
         return calls_of_sample(self, self._output(out))
 
-    def supplied(self) -> tuple[TrajectorySample, KernelCalls]:
-        """Return its sample as an argument of a kernel; see `planned`."""
+    def supplied(self) -> tuple[TrajectorySample, PartCalls]:
+        """Return its sample as an argument of a call; see `planned`."""
         sample = TrajectorySample.allocate(self.dimension)
         return sample, self.calls(sample)
 

@@ -4,7 +4,7 @@ from pathlib import Path
 
 from hsp_control.declaration.quantities import Number
 from hsp_control.engine.own_kinds import load
-from hsp_control.engine.plans import KernelCall
+from hsp_control.engine.plans import PartCall
 from hsp_control.null_space.fields import Cost
 
 
@@ -16,7 +16,7 @@ class ElbowHeight(Cost, type="elbow_height"):
     height: Number = 0.6
     """The height [m]."""
 
-    def kernel(self, state) -> KernelCall:
-        """Return the kind of call and its first arguments; see `Cost.kernel`."""
+    def call(self, state) -> PartCall:
+        """Return the kind of call and its first arguments; see `Cost.call`."""
         kinds = load(Path(__file__).with_name("elbow_height.cpp"))
         return kinds.ElbowHeight, (state.frame(self.frame), self.height)

@@ -37,7 +37,7 @@ def franka_box(options: argparse.Namespace) -> int:
     experiment = _experiment(options)
     terminal = _Terminal()
     box = _box(experiment, lambda _: None)
-    for _ in range(_WARM_UP):  # kernels are compiled or loaded now, not in a motion
+    for _ in range(_WARM_UP):  # what is done first is done now, not in a motion
         box.step(None)
     box = _box(experiment, terminal.say)
     terminal.box = box

@@ -94,7 +94,7 @@ class Session:
         gc.collect()  # what has been refers to itself, and would stay
 
     def rehearse(self) -> None:
-        """Do everything once, and begin anew: no kernel is compiled in the play."""
+        """Do everything once, and begin anew: nothing is done first in the play."""
         self.handles.rehearse()
         for _ in range(_REHEARSED):
             self.advance()

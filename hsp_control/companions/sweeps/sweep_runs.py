@@ -119,7 +119,7 @@ def sweep(
 
 
 def _compile(plan: SweepPlan, run: int) -> None:
-    """Simulate one log period of a run: workers then find compiled kernels."""
+    """Simulate one log period of a run: a mistake is found before workers start."""
     period = plan.experiment(run).scenario.simulation.log_period
     short = document(plan.task(run))
     short.assign(["simulation", "duration"], period, "")

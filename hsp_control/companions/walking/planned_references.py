@@ -10,7 +10,7 @@ from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import TrajectoryError
 from hsp_control.companions.walking.written_part import Written
 from hsp_control.declaration.quantities import PositiveCount
-from hsp_control.engine.plans import KernelCall
+from hsp_control.engine.plans import PartCall
 from hsp_control.trajectories.orientation import OrientationTrajectory
 from hsp_control.trajectories.trajectory import Trajectory
 
@@ -67,8 +67,8 @@ class Fed(Written, Trajectory):
         rows[0], rows[1], rows[2] = position, velocity, acceleration
         self.memory[0] = t
 
-    def kernel(self) -> KernelCall:
-        """Return the kernel; see `Trajectory.kernel`."""
+    def call(self) -> PartCall:
+        """Return the call; see `Trajectory.call`."""
         motion = self.memory[1:].reshape(3, self.size)
         return engine.Extrapolation, (self.memory[:1], motion)
 
@@ -104,7 +104,7 @@ class FedOrientation(Written, OrientationTrajectory):
         rows[:3], rows[3], rows[4] = rotation, velocity, acceleration
         self.memory[0] = t
 
-    def kernel(self) -> KernelCall:
-        """Return the kernel; see `Trajectory.kernel`."""
+    def call(self) -> PartCall:
+        """Return the call; see `Trajectory.call`."""
         motion = self.memory[1:].reshape(5, 3)
         return engine.ExtrapolatedOrientation, (self.memory[:1], motion)

@@ -20,7 +20,7 @@ from hsp_control.declaration.quantities import (
     Vector3,
     read_only,
 )
-from hsp_control.engine.plans import KernelCall, KernelCalls, with_outputs
+from hsp_control.engine.plans import PartCall, PartCalls, with_outputs
 from hsp_control.geometry.scene import Start
 from hsp_control.law import TaskSample
 from hsp_control.robot import Robot, RobotState
@@ -155,7 +155,7 @@ class Contact(Part, ABC, family="contacts", error=ContactError):
     it pushes and never pulls.
 
     A subclass declares its parameters as fields (see `Part`), sets `rows`, and
-    implements `points` and `kernel`, and `shift` if its points are not where forces
+    implements `points` and `call`, and `shift` if its points are not where forces
     act.
 
     Attributes:
@@ -261,16 +261,16 @@ class Contact(Part, ABC, family="contacts", error=ContactError):
         """Where forces act, in the frame, shape (k, 3) [m]."""
 
     @abstractmethod
-    def kernel(self, state: RobotState) -> KernelCall:
-        """Return a kernel and its first arguments; ``v``, ``damping``, ``out`` follow.
+    def call(self, state: RobotState) -> PartCall:
+        """Return a kind of call, and what comes before ``v``, ``damping``, ``out``.
 
         It writes J and J', shape (rows, nv) each, e' = -J v, and the acceleration Kd e'
-        that damps it; see `Task.kernel` for its arguments.
+        that damps it; see `Task.call` for its arguments.
         """
 
-    def calls(self, state: RobotState, out: TaskSample) -> KernelCalls:
+    def calls(self, state: RobotState, out: TaskSample) -> PartCalls:
         """Return the calls that write the rows of each step."""
-        return [with_outputs(self.kernel(state), state.v, self.damping, out)]
+        return [with_outputs(self.call(state), state.v, self.damping, out)]
 
     def evaluate(self, state: RobotState, out: TaskSample) -> TaskSample:
         """Write the rows: J, J', and the acceleration that damps the motion."""

@@ -13,7 +13,7 @@ from hsp_control.common.exceptions import ContactError
 from hsp_control.constraints.contacts.contact import NORMAL, WRENCH, Contact
 from hsp_control.declaration import within
 from hsp_control.declaration.quantities import Points, Positive, Vector3, read_only
-from hsp_control.engine.plans import KernelCall
+from hsp_control.engine.plans import PartCall
 from hsp_control.robot import RobotState
 
 
@@ -31,8 +31,8 @@ class PointContact(Contact, type="point"):
         """The point in the frame, shape (1, 3) [m]."""
         return np.asarray(self.point)[None]
 
-    def kernel(self, state: RobotState) -> KernelCall:
-        """Return the kernel of the velocity rows of the point."""
+    def call(self, state: RobotState) -> PartCall:
+        """Return the call of the velocity rows of the point."""
         return engine.HoldPoint, _point_of(self, state)
 
 
@@ -66,8 +66,8 @@ class BallContact(Contact, type="ball"):
         """From the ball's centre to the point in contact: -r n, shape (3,) [m]."""
         return -self.radius * self.axes[:, 2]
 
-    def kernel(self, state: RobotState) -> KernelCall:
-        """Return the kernel of the velocity rows of the material point in contact."""
+    def call(self, state: RobotState) -> PartCall:
+        """Return the call of the velocity rows of the material point in contact."""
         return engine.HoldPoint, _point_of(self, state)
 
 
@@ -132,8 +132,8 @@ class SlidingContact(Contact, type="sliding"):
         """From the point to where the plane is touched, shape (3,) [m]."""
         return np.asarray(self.offset, dtype=float)
 
-    def kernel(self, state: RobotState) -> KernelCall:
-        """Return the kernel of the normal's row, nᵀ times the point's velocity rows."""
+    def call(self, state: RobotState) -> PartCall:
+        """Return the call of the normal's row, nᵀ times the point's velocity rows."""
         normal = np.ascontiguousarray(self.axes[:, 2])
         return engine.HoldNormal, (*_point_of(self, state), normal)
 
@@ -196,6 +196,6 @@ class SurfaceContact(Contact, type="surface"):
         center = np.zeros(3) if self.center is None else np.asarray(self.center)
         return read_only(square + center)
 
-    def kernel(self, state: RobotState) -> KernelCall:
-        """Return the kernel of the frame's six rows: it neither moves nor turns."""
+    def call(self, state: RobotState) -> PartCall:
+        """Return the call of the frame's six rows: it neither moves nor turns."""
         return engine.HoldSurface, (state.frame(self.frame),)

@@ -48,7 +48,7 @@ class RobotLimits:
         lower: Lower joint position limit, shape (nv,) [rad or m].
         upper: Upper joint position limit, shape (nv,) [rad or m].
         motion: What the barriers keep: position and velocity limits less their margins,
-            the maximum acceleration and α, as a record for kernels.
+            the maximum acceleration and α, as a record for calls.
         barriers: Minimum distances, and other barriers.
         static_effort: The limit on the effort against gravity, if any.
     """

@@ -35,7 +35,7 @@ from hsp_control.control.actuation.limits_in_force import LimitSet
 from hsp_control.control.actuation.support import Support
 from hsp_control.edge import Resolution
 from hsp_control.edge.limited_target import Permitted
-from hsp_control.engine.plans import KernelCall, KernelCalls
+from hsp_control.engine.plans import PartCall, PartCalls
 from hsp_control.law.outcome import BEYOND_ANY_LEVEL
 from hsp_control.robot import RobotState
 
@@ -92,7 +92,7 @@ class Actuation:
             # what is delivered where it was solved at once
             self._solved = Delivered(*self._qp.result, LIMITED, 0.0)
 
-    def _check(self) -> KernelCall:
+    def _check(self) -> PartCall:
         """Return the call that compares a and M a + N with their bounds."""
         state, limits = self._state, self._limits
         found = self._law.code, BEYOND_ANY_LEVEL, self.found
@@ -111,7 +111,7 @@ class Actuation:
         that is needed where a bound is violated, it is solved at once.
         """
         law, wanted = self._law.acceleration, self._wanted
-        calls: KernelCalls = [(engine.Copy, (law, wanted.acceleration)), *self._checks]
+        calls: PartCalls = [(engine.Copy, (law, wanted.acceleration)), *self._checks]
         if self._qp is not None and self.direct:
             keep = engine.Copy, (self._state.effort, wanted.effort)
             calls = [*calls, self._qp.nearest_if(keep, self._solve_if)]

@@ -13,7 +13,7 @@ from hsp_control import engine
 from hsp_control.common.arrays import Array, Flags, Indices
 from hsp_control.edge import Resolution
 from hsp_control.edge.step import Factors, Projectors
-from hsp_control.engine.plans import KernelCall
+from hsp_control.engine.plans import PartCall
 
 _LEAST = 1e-6
 """Least cost of null-space deviation relative to the first level. The smaller it is,
@@ -77,14 +77,14 @@ class Directions(NamedTuple):
         return cls(np.zeros((nv, nv)), np.zeros(1, dtype=np.int64), np.zeros(nv))
 
 
-def write_directions(levels: Levels, out: Directions) -> KernelCall:
+def write_directions(levels: Levels, out: Directions) -> PartCall:
     """Return the call that writes the directions of levels and of the null space."""
     return engine.Directions, (levels, out)
 
 
 def write_inverse_root(
     levels: Levels, directions: Directions, standing: bool, JT: Array, moving: Indices
-) -> KernelCall:
+) -> PartCall:
     """Return the call that writes Jᵀ, J Jᵀ = H⁻¹.
 
     Args:

@@ -39,7 +39,7 @@ from hsp_control.edge.limited_target import (
     Within,
     limited_target,
 )
-from hsp_control.engine.plans import AnyCall, KernelCall, KernelCalls, OnlyIf
+from hsp_control.engine.plans import AnyCall, OnlyIf, PartCall, PartCalls
 from hsp_control.robot import RobotState
 
 
@@ -192,12 +192,12 @@ class LimitedStep:
         # The calls that solve them
         def optimum(
             qp: QP, count: Indices, work: Workspace, reached: Status, *, warm: bool
-        ) -> KernelCalls:
+        ) -> PartCalls:
             solve = int(reached), warm, qp, count, x, work, status
             outcome = *around, x, self.result, status, unsolved
             return [(engine.SolveLimitedStep, solve), (engine.LimitedResult, outcome)]
 
-        def nearest(*, standing: bool, warm: bool) -> KernelCalls:
+        def nearest(*, standing: bool, warm: bool) -> PartCalls:
             root = write_inverse_root(
                 levels, directions, standing, self._rows.JT, moving
             )
@@ -231,7 +231,7 @@ class LimitedStep:
         least = optimum(soft, none, soft_memory, RELAXED, warm=False)
         self._least_violation = state.plan(least).call()
 
-    def nearest_if(self, before: KernelCall, found: Array) -> OnlyIf:
+    def nearest_if(self, before: PartCall, found: Array) -> OnlyIf:
         """Return a call that writes the nearest, as `solve`, if ``found[1]`` is not 0.
 
         A call is made before. It returns ``found[0]``, or more if the QP was solved.

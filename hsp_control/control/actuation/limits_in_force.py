@@ -15,12 +15,12 @@ from hsp_control.constraints.limits.acceleration_bounds import (
 )
 from hsp_control.control.actuation.sent_effort import SentEffort
 from hsp_control.control.evolution import Evolution, PlannedLimits
-from hsp_control.engine.plans import KernelCall
+from hsp_control.engine.plans import PartCall
 from hsp_control.robot import Robot, RobotState
 
 
 class LimitSet:
-    """One set of limits, as kernels read it; None: nothing is limited."""
+    """One set of limits, as calls read it; None: nothing is limited."""
 
     def __init__(
         self, limits: RobotLimits | None, state: RobotState, sent: SentEffort
@@ -46,7 +46,7 @@ class LimitSet:
         # writes the bounds on the next effort
         most = np.array(limits.effort), np.array(limits.effort_rate)
         window = self.bounds.tau_lower, self.bounds.tau_upper
-        self.updating: KernelCall = engine.EffortWindow, (sent.last, *most, *window)
+        self.updating: PartCall = engine.EffortWindow, (sent.last, *most, *window)
         self.update: Callable[[], object] = state.plan([self.updating]).call()
         self.update()
 

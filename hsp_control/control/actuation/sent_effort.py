@@ -6,12 +6,12 @@ import numpy as np
 
 from hsp_control import engine
 from hsp_control.common.arrays import Array
-from hsp_control.engine.plans import KernelCall
+from hsp_control.engine.plans import PartCall
 from hsp_control.robot import RobotState
 
 
 class Held(NamedTuple):
-    """What was seen of the efforts that were held, as kernels read it."""
+    """What was seen of the efforts that were held, as calls read it."""
 
     # when the period ends, NaN once that was looked at, and its length [s]
     timing: Array
@@ -65,7 +65,7 @@ class SentEffort:
         self.held.timing[1] = period
         self._expect()
 
-    def expecting(self, acceleration: Array) -> KernelCall:
+    def expecting(self, acceleration: Array) -> PartCall:
         """Return `record_acceleration` of what an array then holds.
 
         The period is that of the last one.
@@ -74,7 +74,7 @@ class SentEffort:
         arrays = acceleration, held.disturbance, held.timing, held.expected
         return engine.ExpectedVelocity, (state.time, state.v, *arrays)
 
-    def recording(self) -> KernelCall:
+    def recording(self) -> PartCall:
         """Return a call that makes `RobotState.effort` the last effort."""
         return engine.Copy, (self._state.effort, self.last[:-1])
 

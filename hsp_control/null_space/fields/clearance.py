@@ -15,7 +15,7 @@ from hsp_control.common.exceptions import FieldError, SceneError
 from hsp_control.common.suggestions import did_you_mean, listing
 from hsp_control.declaration import within
 from hsp_control.declaration.quantities import Name, Names, OrInstance, Positive
-from hsp_control.engine.plans import KernelCall, KernelCalls, says
+from hsp_control.engine.plans import PartCall, PartCalls, says
 from hsp_control.geometry import LinkShape, Proximity, Proxy, link_shapes, self_pairs
 from hsp_control.geometry.scene import Obstacle, Start
 from hsp_control.law import FieldSample, MetricSample
@@ -81,15 +81,15 @@ class Clearance(Cost):
         """Return the minimum distance of all pairs [m]."""
         return self.proximity(state).nearest(state)[0]
 
-    def kernels(
+    def own_calls(
         self, state: RobotState, metric: MetricSample, form: int, out: FieldSample
-    ) -> KernelCalls:
-        """Return the calls: kernels alone if all distances have closed forms."""
+    ) -> PartCalls:
+        """Return the calls: the engine's alone if all distances have closed forms."""
         work = self._work(state)
         closed_form, coal = work.proximity.closed_form, work.proximity.coal
-        ways = "kernels", "differentiate", "gradient_rate", "gradient"
-        if closed_form is None or coal is not None or says(self, *ways) != "kernels":
-            return super().kernels(state, metric, form, out)
+        ways = "own_calls", "differentiate", "gradient_rate", "gradient"
+        if closed_form is None or coal is not None or says(self, *ways) != "own_calls":
+            return super().own_calls(state, metric, form, out)
         return [
             *closed_form.calls(state),
             work.barrier,
@@ -161,7 +161,7 @@ class _Work(NamedTuple):
     proximity: Proximity  # the pairs of shapes and their distances
     slopes: Array  # ∂f/∂d of each pair, written by ``barrier``
     curvatures: Array  # ∂²f/∂d² of each pair, written by ``barrier``
-    barrier: KernelCall  # f of the distances; and the same, bound
+    barrier: PartCall  # f of the distances; and the same, bound
     add_barriers: Callable[[], float]
 
 

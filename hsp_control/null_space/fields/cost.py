@@ -10,13 +10,13 @@ from hsp_control import engine
 from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import FieldError
 from hsp_control.declaration.imported import AS_TEXT, NAMED
-from hsp_control.engine.plans import KernelCall, KernelCalls, says, with_outputs
+from hsp_control.engine.plans import PartCall, PartCalls, says, with_outputs
 from hsp_control.law import FieldSample, MetricSample
 from hsp_control.null_space.differences import gradient, rate_along_flow
 from hsp_control.null_space.fields.field import NullSpaceField
 from hsp_control.robot import RobotState
 
-_BY_KERNEL = "kernel", "derivatives"
+_BY_KERNEL = "call", "derivatives"
 
 
 class Cost(NullSpaceField):
@@ -44,29 +44,27 @@ class Cost(NullSpaceField):
     * `gradient_rate` returns (∇f)' = ∇²f v + ∂∇f/∂t, shape (nv,).
     * `differentiate` writes both, where one computation gives both.
 
-    Or it implements `kernel` alone, which gives f and both derivatives at once.
+    Or it implements `call` alone, which gives f and both derivatives at once.
 
     f and ∇f depend on q and t only, not on v. The unit of f is chosen such that
     -W⁻¹∇f is in rad/s and m/s.
     """
 
-    def kernel(self, state: RobotState) -> KernelCall:
-        """Return a kernel and its first arguments; ``gradient`` and ``rate`` follow.
+    def call(self, state: RobotState) -> PartCall:
+        """Return a kind of call, and what comes before ``gradient`` and ``rate``.
 
-        ``kernel(*arguments, gradient, rate) -> float`` writes ∇f and (∇f)', shape (nv,)
-        each, and returns f; see `Task.kernel` for its arguments.
+        ``kind(*arguments, gradient, rate) -> float`` writes ∇f and (∇f)', shape (nv,)
+        each, and returns f; see `Task.call` for its arguments.
         """
-        raise TypeError(f"{type(self).__name__} implements neither kernel nor value")
+        raise TypeError(f"{type(self).__name__} implements neither call nor value")
 
-    def derivatives(
-        self, state: RobotState, gradient: Array, rate: Array
-    ) -> KernelCalls:
-        """Return the calls that write ∇f and (∇f)' with `kernel`, and give f."""
-        return [with_outputs(self.kernel(state), gradient, rate)]
+    def derivatives(self, state: RobotState, gradient: Array, rate: Array) -> PartCalls:
+        """Return the calls that write ∇f and (∇f)' with `call`, and give f."""
+        return [with_outputs(self.call(state), gradient, rate)]
 
     def _has_kernel(self, *ways: str) -> bool:
         """Return whether no subclass overrides any of these methods in plain Python."""
-        return says(self, "kernel", "derivatives", *ways, "value") in _BY_KERNEL
+        return says(self, "call", "derivatives", *ways, "value") in _BY_KERNEL
 
     def value(self, state: RobotState) -> float:
         """Return f(q, t), which must not depend on v."""
@@ -102,9 +100,9 @@ class Cost(NullSpaceField):
         gradient[:] = self._tangent(self.gradient(state), "gradient", nv)
         rate[:] = self._tangent(self.gradient_rate(state), "gradient rate", nv)
 
-    def kernels(
+    def own_calls(
         self, state: RobotState, metric: MetricSample, form: int, out: FieldSample
-    ) -> KernelCalls:
+    ) -> PartCalls:
         """Return the calls: g = -W⁻¹∇f and g' = -W⁻¹((∇f)' + W'g)."""
         descend = descent(metric, form, out)
         if self._has_kernel("gradient", "gradient_rate", "differentiate"):
@@ -140,7 +138,7 @@ class Cost(NullSpaceField):
         )
 
     def _derivative(self, state: RobotState, which: int) -> Array:
-        """Return ∇f (0) or (∇f)' (1) of the kernel, shape (nv,)."""
+        """Return ∇f (0) or (∇f)' (1) of the call, shape (nv,)."""
         both, run = self._derived(state)
         run()
         return np.array(both[which])
@@ -148,7 +146,7 @@ class Cost(NullSpaceField):
     def _derived(self, state: RobotState) -> tuple[Array, Callable[[], Any]]:
         """Return ∇f and (∇f)', (2, nv), and what writes them and gives f."""
 
-        def make() -> tuple[Array, KernelCalls]:
+        def make() -> tuple[Array, PartCalls]:
             both = np.zeros((2, state.robot.nv))
             return both, self.derivatives(state, *both)
 
@@ -218,6 +216,6 @@ class FunctionCost(Cost, type="function_cost"):
         return self.rate_function(state.read_only)
 
 
-def descent(metric: MetricSample, form: int, out: FieldSample) -> KernelCall:
+def descent(metric: MetricSample, form: int, out: FieldSample) -> PartCall:
     """Return the call that overwrites ∇f and (∇f)' by g = -W⁻¹∇f and g'."""
     return engine.GradientDescent, (metric.L, metric.W_dot, form, out)

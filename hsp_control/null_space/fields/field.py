@@ -15,7 +15,7 @@ from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import FieldError
 from hsp_control.declaration import Part, within
 from hsp_control.declaration.quantities import NonNegative, OrInstance
-from hsp_control.engine.plans import AnyCall, KernelCalls, says
+from hsp_control.engine.plans import AnyCall, PartCalls, says
 from hsp_control.geometry.scene import Start
 from hsp_control.law import FieldSample, MetricSample
 from hsp_control.null_space.fields.weight import Ramp, Weight, product, sample_weight
@@ -91,7 +91,7 @@ class NullSpaceField(Part, ABC, family="fields", error=FieldError):
 
     def calls(
         self, state: RobotState, metric: MetricSample, form: int, out: FieldSample
-    ) -> KernelCalls:
+    ) -> PartCalls:
         """Return the calls that write the sample of each step.
 
         Args:
@@ -100,17 +100,17 @@ class NullSpaceField(Part, ABC, family="fields", error=FieldError):
             form: The metric's form, see `Metric`.
             out: The sample that every step writes.
         """
-        if says(self, "kernels", "evaluate") == "kernels":
-            return self.kernels(state, metric, form, out)
+        if says(self, "own_calls", "evaluate") == "own_calls":
+            return self.own_calls(state, metric, form, out)
         if self.zero:
             self.evaluate(state.read_only, metric, form, out)
             return []
         return [(self.evaluate, (state.read_only, metric, form, out))]
 
-    def kernels(
+    def own_calls(
         self, state: RobotState, metric: MetricSample, form: int, out: FieldSample
-    ) -> KernelCalls:
-        """Return the calls of a kind of field that has kernels; else see `evaluate`."""
+    ) -> PartCalls:
+        """Return the calls of a field that has calls of the engine; else see `evaluate`."""
         raise TypeError(f"{type(self).__name__} implements no evaluate")
 
     def evaluate(
@@ -125,10 +125,10 @@ class NullSpaceField(Part, ABC, family="fields", error=FieldError):
             out: The sample to write into, shape (nv,) each.
         """
 
-        def make() -> tuple[tuple[MetricSample, FieldSample], KernelCalls]:
+        def make() -> tuple[tuple[MetricSample, FieldSample], PartCalls]:
             known = MetricSample.allocate(state.robot.nv)
             sample = FieldSample.allocate(state.robot.nv)
-            return (known, sample), self.kernels(state, known, form, sample)
+            return (known, sample), self.own_calls(state, known, form, sample)
 
         (known, sample), run = state.prepared(self, f"evaluate {form}", make)
         for array, value in zip(known, metric, strict=True):
@@ -195,9 +195,9 @@ class FieldSum(NullSpaceField):
                 placed.append(term.placed(start))
         return replace(self, terms=tuple(placed))
 
-    def kernels(
+    def own_calls(
         self, state: RobotState, metric: MetricSample, form: int, out: FieldSample
-    ) -> KernelCalls:
+    ) -> PartCalls:
         """Return the calls of all terms."""
         return self.calls_of_terms(
             state, metric, form, out, self.allocate_terms(state.robot.nv)
@@ -214,7 +214,7 @@ class FieldSum(NullSpaceField):
         form: int,
         out: FieldSample,
         samples: Sequence[FieldSample],
-    ) -> KernelCalls:
+    ) -> PartCalls:
         """Return the calls, which also write the weighted sample of each term."""
         calls: list[AnyCall] = []
         for k, (term, sample) in enumerate(zip(self.terms, samples, strict=True)):

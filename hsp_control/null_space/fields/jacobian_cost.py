@@ -14,7 +14,7 @@ from hsp_control.common.arrays import Array, Indices
 from hsp_control.common.exceptions import FieldError
 from hsp_control.declaration import within
 from hsp_control.declaration.quantities import Axes
-from hsp_control.engine.plans import KernelCall, KernelCalls
+from hsp_control.engine.plans import PartCall, PartCalls
 from hsp_control.geometry.scene import Start
 from hsp_control.null_space.fields.cost import Cost
 from hsp_control.robot import Robot, RobotState
@@ -40,8 +40,8 @@ class JacobianCost(Cost):
     """f = φ(J) of k rows of a frame's Jacobian, in world axes at the frame's origin.
 
     A subclass implements `terms`, which returns φ, ∂φ/∂J and the rate of ∂φ/∂J. Value,
-    gradient and gradient rate follow exactly. If one kernel computes the terms, it
-    implements `terms_kernel` instead. The rows are those of the position, unless the
+    gradient and gradient rate follow exactly. If one call computes the terms, it
+    implements `terms_call` instead. The rows are those of the position, unless the
     subclass declares fields ``rows`` and ``length``, with defaults.
     """
 
@@ -93,10 +93,10 @@ class JacobianCost(Cost):
             J: The selected rows, orientation rows scaled, shape (k, nv).
             J_dot: Their time derivative, shape (k, nv).
         """
-        raise TypeError(f"{type(self).__name__} has neither terms nor terms_kernel")
+        raise TypeError(f"{type(self).__name__} has neither terms nor terms_call")
 
-    def terms_kernel(self, nv: int) -> KernelCall:
-        """Return a kernel and its first arguments, instead of `terms`.
+    def terms_call(self, nv: int) -> PartCall:
+        """Return a kind of call and its first arguments, instead of `terms`.
 
         The further arguments are J, J', ∂φ/∂J and its rate, shape (k, nv) each. It
         writes ∂φ/∂J and its rate, and returns φ.
@@ -111,14 +111,12 @@ class JacobianCost(Cost):
     def value(self, state: RobotState) -> float:
         """Return f, which the calls before the last one give."""
 
-        def make() -> tuple[None, KernelCalls]:
+        def make() -> tuple[None, PartCalls]:
             return None, self.derivatives(state, *np.zeros((2, state.robot.nv)))[:-1]
 
         return float(state.prepared(self, "value", make)[1]())
 
-    def derivatives(
-        self, state: RobotState, gradient: Array, rate: Array
-    ) -> KernelCalls:
+    def derivatives(self, state: RobotState, gradient: Array, rate: Array) -> PartCalls:
         """Return the calls that write ∇f and (∇f)'; the last but one gives f."""
         frame, nv = state.frame(self._frame(state.robot)), state.robot.nv
         dofs, first = _chain(state.robot, self._frame(state.robot))
@@ -127,7 +125,7 @@ class JacobianCost(Cost):
         rows = selected, np.where(selected < 3, 1.0, length)
         J, J_dot, slope, slope_rate = np.zeros((4, len(selected), nv))
         motion = frame.jacobian, frame.jacobian_dot
-        function, parameters = self.terms_kernel(nv)
+        function, parameters = self.terms_call(nv)
         slopes, chain = (slope, slope_rate), (dofs, first)
         return [
             (engine.SelectRows, (frame, *rows, J, J_dot)),

@@ -12,7 +12,7 @@ from hsp_control.common.arrays import Array, Indices
 from hsp_control.common.exceptions import FieldError
 from hsp_control.declaration import within
 from hsp_control.declaration.quantities import Fraction, Names, Weights
-from hsp_control.engine.plans import KernelCall
+from hsp_control.engine.plans import PartCall
 from hsp_control.geometry.scene import Start
 from hsp_control.null_space.fields.cost import Cost
 from hsp_control.robot import Robot, RobotState
@@ -48,8 +48,8 @@ class JointCentering(LimitedJointsCost, type="joint_centering"):
     4 cm would be drawn back at 2500 1/s, faster than any control period can follow.
     """
 
-    def kernel(self, state: RobotState) -> KernelCall:
-        """Return the kernel; see `Cost.kernel`."""
+    def call(self, state: RobotState) -> PartCall:
+        """Return the call; see `Cost.call`."""
         robot = state.robot
         limited, (lower, upper) = limited_joints(robot), robot.position_limits()
         dofs = limited[:, 0]
@@ -115,8 +115,8 @@ class TargetPosture(Cost, type="target_posture"):
             target = configuration(self.target, start.state)
         return replace(self, target=target, displacement=displacement)
 
-    def kernel(self, state: RobotState) -> KernelCall:
-        """Return the kernel; see `Cost.kernel`."""
+    def call(self, state: RobotState) -> PartCall:
+        """Return the call; see `Cost.call`."""
         robot = state.robot
         if isinstance(self.target, str) or np.shape(self.target) != (robot.nq,):
             raise self._not_placed("posture")
@@ -150,8 +150,8 @@ class EqualJointAngles(Cost, type="equal_joint_angles"):
                     )
         return self
 
-    def kernel(self, state: RobotState) -> KernelCall:
-        """Return the kernel; see `Cost.kernel`."""
+    def call(self, state: RobotState) -> PartCall:
+        """Return the call; see `Cost.call`."""
         robot = state.robot
         chain = [robot.velocity_index(joint).start for joint in self.joints]
         where = state.q, state.v, robot.neutral(), robot.single_dof_joints
@@ -170,8 +170,8 @@ class LimitBarrier(LimitedJointsCost, type="limit_barrier"):
     """Width of the zone before a limit, as a fraction of half the range, at most 1
     [-]."""
 
-    def kernel(self, state: RobotState) -> KernelCall:
-        """Return the kernel; see `Cost.kernel`."""
+    def call(self, state: RobotState) -> PartCall:
+        """Return the call; see `Cost.call`."""
         robot = state.robot
         limited, (low, high) = limited_joints(robot), robot.position_limits()
         dofs = limited[:, 0]

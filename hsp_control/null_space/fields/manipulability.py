@@ -9,7 +9,7 @@ from hsp_control import engine
 from hsp_control.common.exceptions import FieldError
 from hsp_control.declaration import within
 from hsp_control.declaration.quantities import Matrix, Positive
-from hsp_control.engine.plans import KernelCall
+from hsp_control.engine.plans import PartCall
 from hsp_control.geometry.scene import Start
 from hsp_control.null_space.fields.jacobian_cost import JacobianCost, Rows
 
@@ -55,8 +55,8 @@ class Manipulability(JacobianCost, type="manipulability"):
                 raise FieldError(f"metric has shape {shape}; needs ({nv}, {nv})")
         return super().placed(start)
 
-    def terms_kernel(self, nv: int) -> KernelCall:
-        """Return the kernel; see `JacobianCost.terms_kernel`."""
+    def terms_call(self, nv: int) -> PartCall:
+        """Return the call; see `JacobianCost.terms_call`."""
         weighted = self.metric is not None
         W_inv = np.linalg.inv(np.array(self.metric)) if weighted else np.eye(nv)
         # Larger if the entries of W are small: it must exceed the rounding error of G.
@@ -80,6 +80,6 @@ class InverseCondition(JacobianCost, type="inverse_condition"):
     length: Positive = 1.0
     """Length that is equivalent to one radian [m], for rows of metres and radians."""
 
-    def terms_kernel(self, nv: int) -> KernelCall:
-        """Return the kernel; see `JacobianCost.terms_kernel`."""
+    def terms_call(self, nv: int) -> PartCall:
+        """Return the call; see `JacobianCost.terms_call`."""
         return engine.InverseCondition, (FLOOR**2,)

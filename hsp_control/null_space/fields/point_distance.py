@@ -11,7 +11,7 @@ from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import FieldError
 from hsp_control.declaration import within
 from hsp_control.declaration.quantities import Name, Names, OrInstance
-from hsp_control.engine.plans import KernelCalls
+from hsp_control.engine.plans import PartCalls
 from hsp_control.geometry.scene import Obstacle, Start
 from hsp_control.null_space.fields.cost import Cost
 from hsp_control.robot import RobotState
@@ -53,9 +53,7 @@ class PointDistance(Cost, type="point_distance"):
             float(np.linalg.norm(state.position(frame) - c)) for frame in self.frames
         )
 
-    def derivatives(
-        self, state: RobotState, gradient: Array, rate: Array
-    ) -> KernelCalls:
+    def derivatives(self, state: RobotState, gradient: Array, rate: Array) -> PartCalls:
         """Return the calls that add a frame each to f, ∇f and (∇f)'."""
         center, moving = self._placed_obstacle.center.supplied()
         sums = np.zeros(1), gradient, rate

@@ -21,7 +21,7 @@ from hsp_control.declaration.quantities import (
     numbers,
     read_only,
 )
-from hsp_control.engine.plans import KernelCall, KernelCalls, says, with_outputs
+from hsp_control.engine.plans import PartCall, PartCalls, says, with_outputs
 from hsp_control.geometry.scene import Start
 from hsp_control.law import CONSTANT, IDENTITY, VARYING, MetricSample
 from hsp_control.robot import RobotState
@@ -35,7 +35,7 @@ class Metric(Part, ABC, family="metrics", error=MetricError):
     -W⁻¹∇f. W acts on the tangent space: v has shape (nv,) and is in rad/s and m/s.
 
     A subclass declares its parameters as fields (see `Part`), sets `form` to CONSTANT
-    or VARYING and implements `evaluate`, or `kernel`, which makes a step faster; if W
+    or VARYING and implements `evaluate`, or `call`, which makes a step faster; if W
     is constant, derive from `FixedMetric` instead. It may override `placed`. A metric
     has no memory: what a computation needs is kept by the state (see
     `RobotState.cached`).
@@ -57,20 +57,20 @@ class Metric(Part, ABC, family="metrics", error=MetricError):
         """
         return self
 
-    def kernel(self, state: RobotState) -> KernelCall:
-        """Return a kernel and its first arguments; ``W``, ``L`` and ``W_dot`` follow.
+    def call(self, state: RobotState) -> PartCall:
+        """Return a kind of call and its first arguments; ``W``, ``L`` and ``W_dot`` follow.
 
-        It writes what `evaluate` describes; see `Task.kernel` for its arguments.
+        It writes what `evaluate` describes; see `Task.call` for its arguments.
         """
-        raise TypeError(f"{type(self).__name__} implements neither kernel nor evaluate")
+        raise TypeError(f"{type(self).__name__} implements neither call nor evaluate")
 
-    def calls(self, state: RobotState, out: MetricSample) -> KernelCalls:
+    def calls(self, state: RobotState, out: MetricSample) -> PartCalls:
         """Return the calls that write the sample of each step."""
         if self.form != VARYING:
             self.evaluate(state.read_only, out)
             return []
-        if says(self, "kernel", "evaluate") == "kernel":
-            return [with_outputs(self.kernel(state), *out)]
+        if says(self, "call", "evaluate") == "call":
+            return [with_outputs(self.call(state), *out)]
         return [(self.evaluate, (state.read_only, out))]
 
     def evaluate(self, state: RobotState, out: MetricSample) -> MetricSample:
@@ -83,7 +83,7 @@ class Metric(Part, ABC, family="metrics", error=MetricError):
             state: The robot's state: t, q, v and the kinematics.
             out: The sample to write into, shapes (nv, nv).
         """
-        state.run([with_outputs(self.kernel(state), *out)])
+        state.run([with_outputs(self.call(state), *out)])
         return out
 
 
@@ -109,8 +109,8 @@ class MassMatrixMetric(Metric, type="mass_matrix"):
             return self
         return replace(self, inertia=start.state.robot.typical_inertia)
 
-    def kernel(self, state: RobotState) -> KernelCall:
-        """Return the kernel; see `Metric.kernel`."""
+    def call(self, state: RobotState) -> PartCall:
+        """Return the call; see `Metric.call`."""
         known = self.inertia != "robot"
         unit = self.inertia if known else state.robot.typical_inertia
         return engine.MassMatrixMetric, (state.inertia, state.inertia_rate, unit)

@@ -130,7 +130,7 @@ class Kernel(hsp.Cost):
 
     factor: float
 
-    def kernel(self, state: hsp.RobotState) -> Any:
+    def call(self, state: hsp.RobotState) -> Any:
         return _square, (state.q, state.v, self.factor)
 
 
@@ -251,7 +251,7 @@ def test_a_wrong_gradient_is_named() -> None:
 
 def test_a_wrong_kernel_is_named() -> None:
     first_step(Kernel(1.0))
-    with pytest.raises(RateError, match=r"Kernel\.kernel is wrong.* 0.5 times"):
+    with pytest.raises(RateError, match=r"Kernel\.call is wrong.* 0.5 times"):
         first_step(Kernel(0.5))
 
 
