@@ -110,7 +110,7 @@ class NullSpaceField(Part, ABC, family="fields", error=FieldError):
     def own_calls(
         self, state: RobotState, metric: MetricSample, form: int, out: FieldSample
     ) -> PartCalls:
-        """Return the calls of a field that has calls of the engine; else see `evaluate`."""
+        """Return the calls of a field that is the engine's; else see `evaluate`."""
         raise TypeError(f"{type(self).__name__} implements no evaluate")
 
     def evaluate(

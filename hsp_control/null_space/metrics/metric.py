@@ -58,7 +58,7 @@ class Metric(Part, ABC, family="metrics", error=MetricError):
         return self
 
     def call(self, state: RobotState) -> PartCall:
-        """Return a kind of call and its first arguments; ``W``, ``L`` and ``W_dot`` follow.
+        """Return a kind of call, and what comes before ``W``, ``L`` and ``W_dot``.
 
         It writes what `evaluate` describes; see `Task.call` for its arguments.
         """
