@@ -1,21 +1,18 @@
-"""Measure the time of a start with an empty and with a filled kernel cache.
+"""Measure the time of a start beside that of an import of Pinocchio.
 
     .venv/bin/python benchmarks/start_up.py [CONFIG ...] [--rounds N]
 
 A CONFIG may be followed by changes, as in "panda_obstacle limits=none".
 
 Each start is a new interpreter that imports the package, builds a configuration and
-computes its first effort. Cold: the cache of compiled code is an empty folder. Cached:
-it is the folder that the cold start has filled. The two alternate. Times are processor
-times, which equal wall time on an idle machine: everything runs in one thread.
+computes its first effort; in turns with one that imports Pinocchio alone. Times are
+processor times, which equal wall time on an idle machine: all runs in one thread.
 """
 
 import argparse
-import os
 import statistics
 import subprocess
 import sys
-import tempfile
 
 CONFIGS = (
     "paper/4_moving_obstacle",
@@ -33,12 +30,17 @@ experiment.controller.compute(0.0, experiment.q0, experiment.v0)
 print(process_time())
 """
 
+IMPORT = """
+from time import process_time
+import pinocchio
+print(process_time())
+"""
 
-def start(config: str, cache: str) -> float:
-    """Return the time of a start, to the first effort [s]."""
+
+def taken(code: str, *arguments: str) -> float:
+    """Return the processor time of a program [s]."""
     done = subprocess.run(
-        [sys.executable, "-c", START, *config.split()],
-        env={**os.environ, "NUMBA_CACHE_DIR": cache},
+        [sys.executable, "-c", code, *arguments],
         capture_output=True,
         text=True,
         check=True,
@@ -50,21 +52,19 @@ def main() -> None:
     """Print the table."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("configs", nargs="*", metavar="CONFIG")
-    parser.add_argument("--rounds", type=int, default=3)
+    parser.add_argument("--rounds", type=int, default=5)
     options = parser.parse_args()
-    configs = options.configs or [*CONFIGS]
-    print("| configuration | start | to the first effort |")
-    print("|---|---|--:|")
-    for config in configs:
-        times: dict[str, list[float]] = {"cold": [], "cached": []}
-        for _ in range(options.rounds):
-            with tempfile.TemporaryDirectory() as cache:
-                for kind in times:
-                    times[kind].append(start(config, cache))
-        for kind, rounds in times.items():
-            median, least, most = statistics.median(rounds), min(rounds), max(rounds)
-            cell = f"{median:.1f} s ({least:.1f} to {most:.1f})"
-            print(f"| `{config}` | {kind} | {cell} |")
+    print("| configuration | to the first effort | imports of Pinocchio |")
+    print("|---|--:|--:|")
+    for config in options.configs or CONFIGS:
+        pairs = [
+            (taken(START, *config.split()), taken(IMPORT))
+            for _ in range(options.rounds)
+        ]
+        first, imported = (
+            statistics.median(times) for times in zip(*pairs, strict=True)
+        )
+        print(f"| `{config}` | {first:.2f} s | {first / imported:.1f} |")
 
 
 if __name__ == "__main__":
