@@ -63,6 +63,20 @@ test-system: $(STAMP) $(ENGINE) ## run those of browsers, notebooks, processes a
 thorough: $(STAMP) $(ENGINE) ## run the tests with more seeds, and every configuration's page
 	@HSP_THOROUGH=1 $(BIN)/python -m pytest $(SPREAD) $(ARGS)
 
+# What a library of the engine is built with, and the tests whose calls it then makes.
+CALLS := tests/unit/engine tests/unit/law tests/unit/edge tests/unit/tasks tests/unit/null_space \
+  tests/unit/constraints tests/unit/trajectories tests/unit/geometry tests/unit/robot \
+  tests/unit/control -m "not system and not process"
+assertions: $(STAMP) $(ENGINE) ## those of the engine, with Eigen's assertions and no allocation
+	@HSP_ENGINE=$$($(BIN)/python hatch_build.py Debug) \
+	  $(BIN)/python -m pytest $(SPREAD) $(CALLS) $(ARGS)
+
+sanitize: $(STAMP) $(ENGINE) ## those of the engine, under AddressSanitizer and UBSan (needs g++)
+	@HSP_ENGINE=$$($(BIN)/python hatch_build.py Sanitized) \
+	  LD_PRELOAD="$$(g++ -print-file-name=libasan.so) $$(g++ -print-file-name=libstdc++.so.6)" \
+	  ASAN_OPTIONS=detect_leaks=0 PYTHONMALLOC=malloc \
+	  $(BIN)/python -m pytest $(SPREAD) $(CALLS) $(ARGS)
+
 lint: $(STAMP) $(ENGINE) ## ruff, mypy --strict, the layers of the architecture
 	@$(BIN)/ruff check
 	@$(BIN)/ruff format --check
@@ -166,7 +180,7 @@ clean: ## remove caches, builds and the demo's output; .venv stays
 	@rm -rf build dist docs/_build docs/_static/replays docs/reference/generated out/demo .coverage .*_cache .hypothesis
 	@find hsp_control tests -name __pycache__ -prune -exec rm -rf {} +
 
-.PHONY: help docs links figures animations notebooks demo quick sims lerobot test test-system thorough lint coverage fuzz mutants wheel wheel-test release format constraints clean
+.PHONY: help assertions sanitize docs links figures animations notebooks demo quick sims lerobot test test-system thorough lint coverage fuzz mutants wheel wheel-test release format constraints clean
 
 # ------------------------------------------------------------------- the environment
 

@@ -69,8 +69,8 @@ def build(kind: str = "Release", folder: Path = ROOT / "build") -> Path:
     """Build the library, and return where it is.
 
     Args:
-        kind: ``Release``: it is put beside the Python of the engine; or ``Debug``, with
-            Eigen's assertions, which stays where it is compiled.
+        kind: ``Release``: it is put beside the Python of the engine; ``Debug``, with
+            Eigen's assertions, and ``Sanitized`` stay where they are compiled.
         folder: Where what is compiled stays, for each Python and each kind of build.
     """
     place = folder / f"{kind}-{sysconfig.get_config_var('SOABI')}".lower()

@@ -55,7 +55,7 @@ void write_law(const LawInput& in, const Inverse& inverse, LawMemory& memory, E&
     y = x - 0.5 * e_N;
     bent.noalias() -= W_dot * y;
   }
-  raise(L, in.form, bent);
+  raise(in.form, L, bent);
   u = g_dot - bent;
   u.noalias() += in.K_N * e_N;  // (13)
   if (!in.controls) u.setZero();

@@ -6,8 +6,7 @@
 // `bounded_inverse`: it stays in these two factors, which the law multiplies by one after the
 // other. docs/law.md, Near singularities.
 #pragma once
-#include <hsp/linalg.hpp>
-#include <hsp/records.hpp>
+#include "../metrics/raise.hpp"
 
 namespace hsp {
 
@@ -22,13 +21,6 @@ template <class J, class L, class B>
 void whiten(const J& jacobian, const L& factor, int form, B& whitened) {
   whitened = jacobian;
   if (form != IDENTITY) solve_rows(factor, whitened);
-}
-
-// x ← W⁻¹ x: a covector becomes a velocity.
-template <class L, class X> void raise(const L& factor, int form, X& x) {
-  if (form == IDENTITY) return;
-  solve_lower(factor, x);
-  solve_lower_transposed(factor, x);
 }
 
 // What multiplies by J#, given its factors.
