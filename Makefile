@@ -120,7 +120,8 @@ lerobot: $(STAMP) $(ENGINE) ## LeRobot's own commands on our arm, in .venv-lerob
 	  $(call new-venv,$(BIN)/python,.venv-lerobot); fi
 	@.venv-lerobot/bin/python tools/lerobot.py $(ARGS)
 
-release: wheel ## beside the wheel the sources with their tests; check what PyPI shows
+release: export CXX := zig
+release: wheel ## a wheel for any Linux, the sources with their tests; check what PyPI shows
 	@dir=$$(mktemp -d); trap 'rm -rf "$$dir"' EXIT; \
 	$(call new-venv,$(BIN)/python,"$$dir"); \
 	"$$dir/bin/python" -m pip install --quiet build twine; \

@@ -2,7 +2,9 @@
 
 pip runs it (the hook of the wheel, also of an editable one), and ``make`` where a
 source is newer than the library: ``python hatch_build.py``. A C++ compiler is taken
-from the variable CXX or from the path; where there is none, the package ziglang is one.
+from the variable CXX or from the path; where there is none, or CXX is ``zig``, it is the
+package ziglang. What that makes runs on any Linux of the last ten years, and the wheel
+says so.
 """
 
 import os
@@ -23,13 +25,17 @@ except ImportError:  # `make` needs no hook
 ROOT = Path(__file__).parent
 
 ZIG_TARGETS = {"x86_64": "x86_64-linux-gnu.2.17", "aarch64": "aarch64-linux-gnu.2.17"}
-"""What zig compiles for, by machine: any processor and any Linux of the last ten years.
-Without a target it would compile for the very processor that it runs on."""
+"""What zig compiles for, by machine: any processor, and glibc from 2.17 on. Without a
+target it would compile for the very processor that it runs on."""
+OLD_LINUX = "manylinux_2_17"
+"""What a wheel calls that."""
 
 
 def compiler() -> str | None:
-    """Return the machine's own C++ compiler, None if it has none."""
+    """Return the machine's own C++ compiler; None: zig is asked for, or stands in."""
     given = os.environ.get("CXX")
+    if given == "zig":
+        return None
     return given or next(filter(shutil.which, ("c++", "g++", "clang++")), None)
 
 
@@ -73,7 +79,8 @@ def build(kind: str = "Release", folder: Path = ROOT / "build") -> Path:
             Eigen's assertions, and ``Sanitized`` stay where they are compiled.
         folder: Where what is compiled stays, for each Python and each kind of build.
     """
-    place = folder / f"{kind}-{sysconfig.get_config_var('SOABI')}".lower()
+    by = "" if compiler() else "-zig"
+    place = folder / f"{kind}-{sysconfig.get_config_var('SOABI')}{by}".lower()
     place.mkdir(parents=True, exist_ok=True)
     # What was found last time may have been a build environment that is gone.
     (place / "CMakeCache.txt").unlink(missing_ok=True)
@@ -84,6 +91,8 @@ def build(kind: str = "Release", folder: Path = ROOT / "build") -> Path:
     # Tools that pip brought are beside Python.
     path = f"{Path(sys.executable).parent}{os.pathsep}{os.environ.get('PATH', '')}"
     environment = os.environ | {"PATH": path}
+    if compiler() is None:
+        environment.pop("CXX", None)
     for command in ([*configure, *options], ["cmake", "--build", str(place)]):
         done = subprocess.run(
             command, capture_output=True, text=True, check=False, env=environment
@@ -112,7 +121,11 @@ class EngineHook(BuildHookInterface):  # type: ignore[misc]
         """Build; the wheel is then one of this Python and this machine."""
         library = build()
         build_data["pure_python"] = False
-        build_data["infer_tag"] = True
+        if compiler() is None:
+            python = f"cp{sys.version_info.major}{sys.version_info.minor}"
+            build_data["tag"] = f"{python}-{python}-{OLD_LINUX}_{platform.machine()}"
+        else:
+            build_data["infer_tag"] = True
         build_data["artifacts"].append(str(library.relative_to(ROOT)))
 
 
