@@ -2,9 +2,9 @@
 
 pip runs it (the hook of the wheel, also of an editable one), and ``make`` where a
 source is newer than the library: ``python hatch_build.py``. A C++ compiler is taken
-from the variable CXX or from the path; where there is none, or CXX is ``zig``, it is the
-package ziglang. What that makes runs on any Linux of the last ten years, and the wheel
-says so.
+from the variable CXX or from the path; where there is none, or CXX is ``zig``, it is
+the package ziglang. What that makes runs on any Linux of the last ten years, and the
+wheel says so.
 """
 
 import os
