@@ -100,7 +100,7 @@ def live(options: argparse.Namespace) -> int:
                 publisher.ended(report.ended, report.reason)
             return report
 
-        # A dry run compiles everything, before there is a clock
+        # A dry run binds everything, before there is a clock
         dry_run_robot = InProcessRobot(simulated_robot(experiment))
         run_loop(
             command,

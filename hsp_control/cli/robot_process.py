@@ -280,7 +280,7 @@ class _RobotLog:
 
 
 def _warm_up(robot: SimulatedRobot, experiment: Experiment) -> None:
-    """Execute each real-time operation once, so that none is compiled later."""
+    """Execute each real-time operation once, so that none is the first later."""
     experiment.controller.compute(0.0, experiment.q0, experiment.v0)
     trial = SimulatedRobot(
         robot.plant,

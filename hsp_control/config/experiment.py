@@ -178,7 +178,7 @@ class Experiment:
         folder = Path(document.name).resolve().parent
         contacts = tuple(scenario.contacts.values())
         null_space, tasks = scenario.null_space, tuple(scenario.tasks.values())
-        # First: its engine may not be installed, and what follows may compile for long.
+        # First: its engine may not be installed, and what follows may take long.
         scenario = replace(scenario, plant=scenario.plant.located(folder))
         plant = _plant(document, scenario, robot)
         with document.at("start"):

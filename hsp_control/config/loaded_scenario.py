@@ -1,4 +1,4 @@
-"""A checked configuration with its robot and scene: nothing is compiled for it."""
+"""A checked configuration with its robot and scene."""
 
 from dataclasses import replace
 from functools import reduce

@@ -162,7 +162,7 @@ class ActiveStack:
 
     @cached_property
     def calls(self) -> list[Callable[[float], Any]]:
-        """The calls of `resolve`, each of the time [s]; compiled when first asked for.
+        """The calls of `resolve`, each of the time [s]; bound when first asked for.
 
         The last one returns what `outcome_of` takes.
         """

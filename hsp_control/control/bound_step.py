@@ -52,7 +52,7 @@ class BoundStep:
 
     @cached_property
     def free(self) -> "FreeStep | None":
-        """What a compiled loop calls instead; None if more is needed than that."""
+        """What the engine's loop calls instead; None if more is needed than that."""
         if self.active.streamed or not self.direct:
             return None
         sending = self._limits.applying(self.active.acceleration)

@@ -206,7 +206,7 @@ class Composition:
             if self._run.begun:
                 self._check_terms(time_line.setup, self._setup.terms, self._state)
             self._follow(time_line)
-            if self._run.begun:  # compile now, not in a step
+            if self._run.begun:  # bind now, not in a step
                 self._mixture.prepare(self._mixture.stack_at(now))
 
     def check_derivatives(self, state: RobotState) -> None:

@@ -196,7 +196,7 @@ class Controller(Composition):
             self._gains.delay(self.active_stack, self._state.t, period)
 
     def _while_free(self, advance: Callable[[FreeStep], int]) -> int:
-        """Let a compiled loop make steps that are free; return how many it made."""
+        """Let the engine's loop make steps that are free; return how many it made."""
         # Each is a `compute` that finds no limit violated, and an `applied` for the
         # period of the last one. There are none where something changes, is streamed,
         # is no native call, or the last effort was not the law's own.
@@ -248,7 +248,7 @@ class Controller(Composition):
         lifted: Collection[str] = (),
         without: Collection[str] = (),
     ) -> None:
-        """Compile the law for some contacts and tasks now, instead of in a step.
+        """Bind the law for some contacts and tasks now, instead of in a step.
 
         A plan that switches contacts asks for each combination that it will use.
 

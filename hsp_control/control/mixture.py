@@ -70,7 +70,7 @@ class Mixture:
         self.plan(setup, exchanged=False)
 
     def plan(self, setup: Setup, *, exchanged: bool) -> None:
-        """Follow a setup from now on; what stays the same is not compiled again."""
+        """Follow a setup from now on; what stays the same is not bound again."""
         field = setup.field
         if exchanged or field != self.field:
             self._stacks.clear()
@@ -164,8 +164,8 @@ class Mixture:
         return BoundStep(self._state, self.active, actuation, self._limits)
 
     def prepare(self, stack: ActiveStack) -> None:
-        """Compile what a step with a stack calls, now instead of in the step."""
-        stack.calls  # noqa: B018 (compiled, and kept)
+        """Bind what a step with a stack calls, now instead of in the step."""
+        stack.calls  # noqa: B018 (bound, and kept)
         for limits in self._limits.all:
             self.actuation(stack, limits)
 

@@ -1,4 +1,4 @@
-"""A live loop: check, compile and allocate; then read, send, and stop safely."""
+"""A live loop: check, bind and allocate; then read, send, and stop safely."""
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import suppress
@@ -42,7 +42,7 @@ from hsp_control.simulation.plants import is_exact
 from hsp_control.trajectories.schedule import Schedule
 
 _WARM_UP = 20
-"""Steps before real-time operation: they compile kernels and touch all memory."""
+"""Steps before real-time operation: they bind calls and touch all memory."""
 
 
 def run_loop(
@@ -133,7 +133,7 @@ def run_loop(
             )
             reader = StateReader(robot, limits, hardware, settings, clock, start_time)
             first = reader.wait_for_first()
-            # Compile and allocate everything now, not in real-time operation.
+            # Bind and allocate everything now, not in real-time operation.
             chain.begin(first.inertial)
             for _ in range(_WARM_UP):
                 chain.effort(first._replace(t=start_time, applied=None), period)

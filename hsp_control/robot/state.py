@@ -277,7 +277,7 @@ class RobotState:
         ``what`` tells apart what a class and its subclasses keep.
 
         Parts are values and have no memory. What they compute with at a state, such as
-        buffers and compiled calls, is kept here, so that one part may serve many
+        buffers and bound calls, is kept here, so that one part may serve many
         states, in many threads.
         """
         key = id(part), what

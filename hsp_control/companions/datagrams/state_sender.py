@@ -84,7 +84,7 @@ class Teller:
         robot, tasks = source.controller.robot, source.controller.tasks
         frames = [getattr(each, "frame", None) or robot.end_effector for each in tasks]
         self._frames = dict.fromkeys(frames or [robot.end_effector])
-        self._measured(source.controller.state)  # what it needs is compiled now
+        self._measured(source.controller.state)  # what it needs is bound now
         self._poses(source.controller.state)
         source.log_channels()
 

@@ -30,7 +30,7 @@ class FrankaHardware:
     """`Hardware`: seven joints that take tau - g(q) each millisecond.
 
     The second `read` starts the torque control and waits for it: the first states come
-    without, while the loop compiles. A reflex, the stop button and a lost line are
+    without, while the loop prepares. A reflex, the stop button and a lost line are
     raised by `read`; the arm then holds itself.
 
     Attributes:
@@ -106,7 +106,7 @@ class FrankaHardware:
                 raise HardwareError(f"torque control did not start in {_START:g} s")
             return None
         _, t, *numbers = client.STATE.unpack(answer)
-        if not self._running:  # time stands still while the loop compiles
+        if not self._running:  # time stands still while the loop prepares
             self._origin = t
         self._running = self._reads > 0
         self._reads += 1

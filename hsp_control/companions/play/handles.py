@@ -388,7 +388,7 @@ class Handles:
         return {**self.values, **self._wanted}
 
     def rehearse(self) -> None:
-        """Ask for everything once, so that what it needs is compiled."""
+        """Ask for everything once, so that what it needs is bound."""
         targets, obstacles = self.places()
         for name, pose in targets.items():
             self.receive({"do": "move", "target": name, "pose": pose})

@@ -97,7 +97,7 @@ class PageProcess:
         self._say({"status": text})
 
     def begin(self, experiment: Experiment, journal: Path) -> None:
-        """Let it draw the loop: what it needs is compiled."""
+        """Let it draw the loop: what it needs is there."""
         journal.unlink(missing_ok=True)  # of another run
         self._say(
             {
@@ -199,7 +199,7 @@ def main() -> int:
     passes on what the page says. It reads lines of JSON from its standard input. The
     first has its settings; then it writes the page's address. ``prepare`` lets it draw
     the robot and the scene, ``status`` sets the status line, ``begin`` lets it draw the
-    loop: until then the loop's process compiles what both need. When its input is
+    loop: until then the loop's process prepares what both need. When its input is
     closed, the loop has ended, and so does it.
     """
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C stops the loop only

@@ -110,7 +110,7 @@ class Ros2Hardware:
                 return None
         if newest is None:
             return None
-        # A robot's clock runs on while the loop compiles after its first read.
+        # A robot's clock runs on while the loop prepares after its first read.
         if self._reads < 2:
             self._stamps.begin(self._reads * self.period)
             newest = self._last = newest._replace(t=self._stamps.t)

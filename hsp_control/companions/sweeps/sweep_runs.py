@@ -110,7 +110,7 @@ def sweep(
         try:
             with suppress(KeyboardInterrupt):
                 if store.pending:
-                    _compile(plan, first)
+                    _rehearse(plan, first)
                 _run_pending(plan, store, pool, on_progress)
         except BaseException:
             store.close()
@@ -118,7 +118,7 @@ def sweep(
         return store.close()
 
 
-def _compile(plan: SweepPlan, run: int) -> None:
+def _rehearse(plan: SweepPlan, run: int) -> None:
     """Simulate one log period of a run: a mistake is found before workers start."""
     period = plan.experiment(run).scenario.simulation.log_period
     short = document(plan.task(run))

@@ -63,7 +63,7 @@ class Actuation:
     def __init__(
         self, state: RobotState, law: Resolution, support: Support, limits: LimitSet
     ) -> None:
-        """Compile what every step calls, also where a limit binds."""
+        """Bind what every step calls, also where a limit binds."""
         nv = state.robot.nv
         self._state, self._law = state, law
         self._support, self._limits = support, limits
