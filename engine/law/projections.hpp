@@ -4,16 +4,22 @@
 
 namespace hsp {
 
-struct InverseMemory {
+// A bounded pseudo-inverse with memory of its own.
+struct OwnInverse {
   Scratch<'m', 'n'> B, Q;
   Scratch<'m', 'm'> X;
   Scratch<'m'> part;
-  Scratch<'n'> y;
   void prepare(const Sizes& size) {
     for (auto* each : {&B, &Q}) each->prepare(size);
     X.prepare(size);
     part.prepare(size);
-    y.prepare(size);
+  }
+
+  // Find its factors; return whether it is damped.
+  template <class J, class L>
+  bool compute(const J& jacobian, const L& factor, int form, double threshold) {
+    whiten(jacobian, factor, form, B);
+    return bounded_inverse(B, threshold, Q, X);
   }
 };
 
@@ -26,13 +32,11 @@ struct SmallestMotion {
   double threshold;
   In<'m'> x;
   Out<'n'> motion;
-  InverseMemory memory;
+  OwnInverse inverse;
 
   bool operator()() {
-    auto& [B, Q, X, part, y] = memory;
-    whiten(J, L, form, B);
-    const bool damped = bounded_inverse(B, threshold, Q, X);
-    PseudoInverse(Q, X, L, form).apply(x, part, motion);
+    const bool damped = inverse.compute(J, L, form, threshold);
+    PseudoInverse(inverse.Q, inverse.X, L, form).apply(x, inverse.part, motion);
     return damped;
   }
 };
@@ -46,14 +50,13 @@ struct TaskForce {
   double threshold;
   In<'n'> effort;
   Out<'m'> force;
-  InverseMemory memory;
+  Scratch<'n'> y;
+  OwnInverse inverse;
 
   bool operator()() {
-    auto& [B, Q, X, part, y] = memory;
-    whiten(J, L, form, B);
-    const bool damped = bounded_inverse(B, threshold, Q, X);
+    const bool damped = inverse.compute(J, L, form, threshold);
     y = effort;
-    PseudoInverse(Q, X, L, form).apply_transposed(y, part, force);
+    PseudoInverse(inverse.Q, inverse.X, L, form).apply_transposed(y, inverse.part, force);
     return damped;
   }
 };

@@ -1,0 +1,44 @@
+"""Which library the engine is: the installed one, or the one that HSP_ENGINE names."""
+
+import os
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from hsp_control.engine import _engine
+
+pytestmark = pytest.mark.process
+
+WHICH = """
+import sys
+
+import hsp_control.engine as engine
+import numpy as np
+out = np.zeros((3, 1))
+engine.UniformLine(np.ones(1), np.ones(1), *out)(2.0)
+print(sys.modules["hsp_control.engine._engine"].__file__, out[0, 0])
+"""
+
+
+def asked(library: Path) -> subprocess.CompletedProcess[str]:
+    return subprocess.run(
+        [sys.executable, "-c", WHICH],
+        env=os.environ | {"HSP_ENGINE": str(library)},
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+
+
+def test_another_library_is_used_instead(tmp_path: Path) -> None:
+    other = Path(shutil.copy2(_engine.__file__, tmp_path / "_engine.so"))
+    assert asked(other).stdout.split() == [str(other), "3.0"]
+
+
+def test_a_library_that_is_not_there_is_an_error(tmp_path: Path) -> None:
+    ran = asked(tmp_path / "nowhere.so")
+    assert ran.returncode != 0
+    assert "nowhere.so" in ran.stderr
