@@ -14,8 +14,7 @@ from time import perf_counter
 import numpy as np
 import pinocchio as pin
 
-from hsp_control import Robot
-from hsp_control.engine.pinocchio_calls import bind_pinocchio
+from hsp_control import Robot, engine
 
 STATES = 1000
 
@@ -28,7 +27,7 @@ def ways(robot: Robot) -> dict[str, Callable[[], object]]:
     data, columns = model.createData(), [np.asfortranarray(x.T) for x in (q, v, tau)]
     pool, out = pin.ModelPool(model, 2), np.asfortranarray(np.zeros((robot.nv, STATES)))
     here = q[0].copy(), v[0].copy(), tau[0].copy()
-    call = bind_pinocchio("aba", model, data, *here)
+    call = engine.ForwardDynamics(robot.dynamics(), *here, np.zeros(robot.nv))
 
     def bindings() -> None:
         for k in range(STATES):

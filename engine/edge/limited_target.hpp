@@ -27,7 +27,7 @@ namespace hsp {
 struct LimitedTarget {
   static constexpr const char* doc =
       "Overwrite what is wanted by what the step is to come near to.";
-  Columns<'n', 'n'> M;
+  In<'n', 'n'> M;
   InOut<'n'> a;       // the law's acceleration, and what compensators add
   InOut<'n'> effort;  // M a + N, and what compensators add
   struct {

@@ -8,7 +8,7 @@ namespace hsp {
 
 struct MassMatrixMetric {
   static constexpr const char* doc = "W = M/m = L Lᵀ and W' = M'/m; L is NaN if M is singular.";
-  Columns<'n', 'n'> M;
+  In<'n', 'n'> M;
   In<'n', 'n'> M_dot;
   double inertia;  // m [kg·m²]
   MetricSample<Out> out;

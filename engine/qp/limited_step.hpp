@@ -18,7 +18,7 @@ namespace hsp {
 
 // What the law wants; the effort is M a + N and friction, without contact forces.
 struct Wanted {
-  Columns<'n', 'n'> mass_matrix;
+  In<'n', 'n'> mass_matrix;
   In<'n'> acceleration, effort;
 };
 

@@ -4,7 +4,7 @@
 
 namespace hsp {
 
-// The joint that carries a frame, as Pinocchio has it.
+// The joint that carries a frame; see JointJacobians.
 struct ParentJoint {
   Columns<6, 'x'> J_world, J_world_dot;  // of all joints, at the world's origin
   Columns<3, 3> R_joint;                 // world ← joint

@@ -1,9 +1,9 @@
 #include "../src/rooms.hpp"
 #include "frame_kinematics.hpp"
-#include "inertia.hpp"
+#include "gravity.hpp"
 
 namespace hsp {
 const Kind* const* robot_kinds() {
-  return kinds<FrameKinematics, Clear, InertiaRate, CentroidalRows>();
+  return kinds<FrameKinematics, Gravity>();
 }
 }  // namespace hsp

@@ -55,6 +55,8 @@ void* shared_object(std::string_view type, nb::handle given) {
     return &nb::cast<PlanObject&>(given).plan;
   if (type == Move::type_name && nb::isinstance<MoveObject>(given))
     return nb::cast<MoveObject&>(given).call.self();
+  if (type == Dynamics::type_name && nb::isinstance<DynamicsObject>(given))
+    return &nb::cast<DynamicsObject&>(given).dynamics;
   return nullptr;
 }
 

@@ -151,11 +151,12 @@ NB_MODULE(_engine, m) {
         return nb::make_tuple(engine("PythonCall"), nb::make_tuple(call.function, call.timed));
       });
 
-  nb::class_<ForeignCall, Runnable>(
-      m, "ForeignCall", "A C function with words as arguments, and what these point to.",
-      nb::type_slots(slots<ForeignCall, &ForeignCall::kept>))
-      .def(nb::init<Foreign::Word, const std::vector<Foreign::Word>&, nb::object>(), "address"_a,
-           "words"_a, "kept"_a);
+  nb::class_<DynamicsObject>(
+      m, "Dynamics", "A robot's rigid-body dynamics: Pinocchio's algorithms and their memory.")
+      .def(nb::init<nb::tuple, nb::tuple, nb::tuple>(), "joints"_a, "gravity"_a, "armature"_a)
+      .def_prop_ro("columns", [](const DynamicsObject& d) { return d.dynamics.columns(); })
+      .def("__reduce__",
+           [](const DynamicsObject& d) { return nb::make_tuple(engine("Dynamics"), d.given); });
 
   nb::class_<MoveObject>(m, "Move", "Copies t, q and v where they are valid, and makes a plan.",
                          nb::type_slots(slots<MoveObject, &MoveObject::arguments>))
@@ -166,6 +167,7 @@ NB_MODULE(_engine, m) {
       .def("__reduce__",
            [](const MoveObject& move) { return nb::make_tuple(engine("Move"), move.arguments); });
   m.attr("REFUSED") = refused;
+  m.attr("PINOCCHIO") = pinocchio_version();
 
   m.def(
       "load_library",

@@ -1,7 +1,6 @@
 #include "plan.hpp"
-#include "foreign.hpp"
 #include "rooms.hpp"
 
 namespace hsp {
-const Kind* const* plan_kinds() { return kinds<Once, OnlyIf, EqualSteps, Mirror>(); }
+const Kind* const* plan_kinds() { return kinds<Once, OnlyIf, EqualSteps>(); }
 }  // namespace hsp

@@ -1,6 +1,9 @@
 #include "python_objects.hpp"
 
+#include <nanobind/stl/array.h>
 #include <nanobind/stl/pair.h>
+#include <nanobind/stl/string.h>
+#include <nanobind/stl/vector.h>
 
 #include "numpy.hpp"
 
@@ -57,6 +60,53 @@ Strided vector_of(nb::handle given) {
 }
 
 }  // namespace
+
+namespace {
+
+template <class T> T attribute(nb::handle object, const char* name) {
+  return nb::cast<T>(object.attr(name));
+}
+
+Vector3 vector3(nb::handle object) {
+  const auto x = nb::cast<std::array<double, 3>>(object);
+  return {x[0], x[1], x[2]};
+}
+
+Joint joint_of(nb::handle given) {
+  Joint joint;
+  joint.name = attribute<std::string>(given, "name");
+  joint.type = attribute<std::string>(given, "type");
+  joint.parent = attribute<std::int64_t>(given, "parent");
+  joint.placement = attribute<std::array<double, 12>>(given, "placement");
+  joint.axis = vector3(given.attr("axis"));
+  joint.pitch = attribute<double>(given, "pitch");
+  joint.leader = attribute<std::int64_t>(given, "leader");
+  joint.ratio = attribute<double>(given, "ratio");
+  joint.offset = attribute<double>(given, "offset");
+  for (nb::handle part : given.attr("parts")) joint.parts.push_back(joint_of(part));
+  joint.mass = attribute<double>(given, "mass");
+  joint.center = vector3(given.attr("center"));
+  const auto inertia = attribute<std::array<double, 9>>(given, "inertia");
+  joint.inertia = Matrix3(inertia.data());  // symmetric
+  return joint;
+}
+
+std::vector<Joint> joints_of(nb::tuple given) {
+  std::vector<Joint> joints;
+  for (nb::handle each : given) joints.push_back(joint_of(each));
+  return joints;
+}
+
+Vector vector_of(nb::tuple given) {
+  const auto x = nb::cast<std::vector<double>>(given);
+  return Eigen::Map<const Vector>(x.data(), static_cast<Index>(x.size()));
+}
+
+}  // namespace
+
+DynamicsObject::DynamicsObject(nb::tuple joints, nb::tuple gravity, nb::tuple armature)
+    : given(nb::make_tuple(joints, gravity, armature)),
+      dynamics(joints_of(joints), vector3(gravity), vector_of(armature)) {}
 
 MoveObject::MoveObject(nb::tuple given)
     : arguments(given),

@@ -5,8 +5,8 @@
 
 #include <vector>
 
+#include "../dynamics/dynamics.hpp"
 #include "arguments.hpp"
-#include "foreign.hpp"
 #include "move.hpp"
 #include "plan.hpp"
 
@@ -60,18 +60,14 @@ struct PythonCall : Runnable {
   bool timed;
 };
 
-// A function of another library, with what its arguments point to.
-struct ForeignCall : Runnable {
-  ForeignCall(Foreign::Word address, const std::vector<Foreign::Word>& words,
-              nanobind::object owner)
-      : kept(std::move(owner)), function(address, words) {
-    row = {[](void* self, double) { return (*static_cast<Foreign*>(self))(); }, &function};
-    python = false;
-  }
-  ForeignCall(const ForeignCall&) = delete;
+// A robot's dynamics, with the numbers that they were made of.
+struct DynamicsObject {
+  // `joints` are objects with the attributes of `Joint`.
+  DynamicsObject(nanobind::tuple joints, nanobind::tuple gravity, nanobind::tuple armature);
+  DynamicsObject(const DynamicsObject&) = delete;
 
-  nanobind::object kept;
-  Foreign function;
+  nanobind::tuple given;
+  Dynamics dynamics;
 };
 
 // A state's move, as Python makes it.

@@ -38,7 +38,7 @@ struct Rotating {
 struct ImpedanceGains {
   static constexpr const char* doc =
       "Λ⁻¹, Kp and Kv of an impedance; NaN where M is singular, so that the step is not finite.";
-  Columns<'n', 'n'> M;
+  In<'n', 'n'> M;
   In<'n', 'n'> M_dot;
   Rotating rotating;
   Impedance impedance;

@@ -8,19 +8,6 @@ Indices = NDArray[np.int64]
 Flags = NDArray[np.bool_]
 
 
-class _Owned:
-    """Memory and its owner, as NumPy takes them."""
-
-    def __init__(self, view: Array, owner: object) -> None:
-        self.__array_interface__ = view.__array_interface__
-        self.owner = owner
-
-
-def kept_view(view: Array, owner: object) -> Array:
-    """Return a view of somebody's memory that keeps its owner; Pinocchio's do not."""
-    return np.asarray(_Owned(view, owner))
-
-
 def read_only_view(array: Array) -> Array:
     """Return a view that cannot be written."""
     view = array.view()

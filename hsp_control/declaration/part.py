@@ -75,6 +75,24 @@ _CONFIG = ConfigDict(
 )
 
 
+class _Documentation:
+    """The docstring of each field: sources are read when somebody asks."""
+
+    def __get__(self, part: object, cls: type["Part"]) -> dict[str, str]:
+        found: dict[str, str] = {}
+        for base in reversed(cls.__mro__):
+            if issubclass(base, Part):
+                found |= attribute_docstrings(base)
+        return found
+
+
+class _Docstring:
+    """The docstring of a class, with those of its fields."""
+
+    def __get__(self, part: object, cls: type["Part"]) -> str:
+        return with_fields(cls, cls._docstring)
+
+
 @dataclass_transform(frozen_default=True)
 class Part(Declared):
     """A value that declares one part of a controller, a world or a simulation.
@@ -98,6 +116,7 @@ class Part(Declared):
     together. A field may stand for a property that a base class asks for.
     """
 
+    documentation = _Documentation()
     _docstring: ClassVar[str]  # without the fields' own
     __signature__: ClassVar[PlainSignature]
 
@@ -121,16 +140,12 @@ class Part(Declared):
         if family is not None:
             cls.family = Family(family, cls)
         cls.yaml_type = type
-        inherited: dict[str, str] = {}
-        for base in reversed(cls.__mro__[1:]):
-            inherited |= vars(base).get("documentation", {})
-        cls.documentation = inherited | attribute_docstrings(cls)
         if "__post_init__" in vars(cls):
             cls.__post_init__ = _completed(cls.__post_init__)  # type: ignore[assignment,method-assign]
         cls._docstring = cleandoc(vars(cls)["__doc__"] or "")
         hidden = _hide_properties(cls)
         dataclass(cls, frozen=True, eq=False, repr=False, config=_CONFIG)
-        cls.__doc__ = with_fields(cls, cls._docstring)
+        cls.__doc__ = _Docstring()  # type: ignore[assignment]
         cls.__signature__ = PlainSignature()
         for name in hidden:
             setattr(cls, name, _field_property(name))

@@ -26,9 +26,10 @@ def _load(file: str) -> None:
 if _given := os.environ.get("HSP_ENGINE"):
     _load(_given)
 try:
+    from ._engine import PINOCCHIO as PINOCCHIO
     from ._engine import REFUSED as REFUSED
     from ._engine import Call as Call
-    from ._engine import ForeignCall as ForeignCall
+    from ._engine import Dynamics as Dynamics
     from ._engine import Kind as Kind
     from ._engine import Move as Move
     from ._engine import Plan as Plan

@@ -5,6 +5,7 @@ from numpy.typing import ArrayLike
 
 from hsp_control.common.arrays import Array
 
+PINOCCHIO: str
 REFUSED: float
 
 class Kind:
@@ -49,8 +50,15 @@ class PythonCall(Runnable):
     @property
     def timed(self) -> bool: ...
 
-class ForeignCall(Runnable):
-    def __init__(self, address: int, words: list[int], kept: object) -> None: ...
+class Dynamics:
+    def __init__(
+        self,
+        joints: tuple[Any, ...],
+        gravity: tuple[float, ...],
+        armature: tuple[float, ...],
+    ) -> None: ...
+    @property
+    def columns(self) -> int: ...
 
 class Move:
     def __init__(self, *arguments: Any) -> None: ...

@@ -15,7 +15,6 @@ import numpy as np
 from hsp_control import engine
 from hsp_control.common.arrays import Array, Indices
 from hsp_control.engine import Kind, Plan, PythonCall
-from hsp_control.engine.pinocchio_calls import bind_pinocchio, is_pinocchio
 
 PartCall = tuple[Callable[..., Any], tuple[Any, ...]]
 """A kind of the engine, or a function, with its first arguments: what a part's
@@ -149,16 +148,13 @@ def bind(function: Callable[..., Any], *arguments: Any, timed: bool = False) -> 
     """Return a call with these arguments, as a plan makes it.
 
     Args:
-        function: A kind of the engine; a function of Pinocchio, see `pinocchio_calls`;
-            or another function.
+        function: A kind of the engine, or a function.
         arguments: Arrays, numbers, and tuples or records of them. The call reads and
             writes the memory of these arrays each time; numbers are constants.
         timed: Whether it has one more argument, the time, given to the call.
     """
     if isinstance(function, Kind):
         return function(*arguments)
-    if is_pinocchio(function):
-        return bind_pinocchio(function.__name__, *arguments)
     if not arguments and not timed and hasattr(function, "row"):
         return function
     return PythonCall(partial(function, *arguments) if arguments else function, timed)

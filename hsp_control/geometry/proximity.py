@@ -68,7 +68,7 @@ class CoalDistances:
         for index, obstacle in enumerate(self._obstacles, start=self._first_obstacle):
             items[index].placement = obstacle.placement(state.t)
         pin.updateGeometryPlacements(
-            self._robot.model, state.own_data, self._geometry, self._data
+            self._robot.model, state.data, self._geometry, self._data
         )
         pin.computeDistances(self._geometry, self._data)
         distances[self.places] = [result.min_distance for result in self._results]

@@ -1,6 +1,5 @@
 """A robot's mass matrix, its centre of mass and momentum, and their exact rates."""
 
-from collections.abc import Sequence
 from copy import copy
 from functools import cached_property
 
@@ -8,73 +7,22 @@ import numpy as np
 import pinocchio as pin
 
 from hsp_control import engine
-from hsp_control.common.arrays import (
-    Array,
-    Indices,
-    kept_view,
-    matrix_view,
-    read_only_view,
-)
+from hsp_control.common.arrays import Array, Indices, read_only_view
 from hsp_control.common.exceptions import ModelError
 from hsp_control.common.suggestions import listing
-from hsp_control.engine.plans import Once, PartCall, PartCalls
+from hsp_control.engine import Dynamics
+from hsp_control.engine.plans import Once, PartCalls
 from hsp_control.robot.kinematics import PointMotion, Term
 
 
 def inertia_terms(
-    model: pin.Model, data: pin.Data, q: Array, v: Array, stamp: Indices
+    dynamics: Dynamics, q: Array, v: Array, stamp: Indices
 ) -> tuple[Term, Term]:
-    """Return M (CRBA) and M' = C + Cᵀ along v, shape (nv, nv) each."""
-    value = kept_view(matrix_view(data.M), data)
-    M = Term(value, [Once.at(stamp, *_mass_matrix_calls(model, data, q))])
-    M_dot = np.zeros((model.nv, model.nv))
-    if model.mimicking_joints:  # Pinocchio has no C of such a model
-        given = model, model.createData(), q, v, M_dot
-        return M, Term(M_dot, [Once.at(stamp, (_write_difference, given))])
-    coriolis = pin.computeCoriolisMatrix, (model, data, q, v)
-    add = engine.InertiaRate, (matrix_view(data.C), M_dot)
-    return M, Term(M_dot, [Once.at(stamp, coriolis, add)])
-
-
-def mass_matrix(model: pin.Model, data: pin.Data, q: Array) -> Array:
-    """Return M(q), shape (nv, nv), whatever the data were used for before.
-
-    Of models with mimic joints Pinocchio's CRBA (seen with 4.1) adds to `data.Fcrb` and
-    `data.M`, which it does not clear: a second M would contain a part of the first one.
-    So nobody else calls ``pin.crba`` with data that are used again.
-    """
-    for matrix in _remembered(model, data):
-        matrix[:] = 0.0
-    return np.asarray(pin.crba(model, data, q))
-
-
-def _mass_matrix_calls(
-    model: pin.Model, data: pin.Data, q: Array
-) -> Sequence[PartCall]:
-    """Return the calls of `mass_matrix`."""
-    clearing: list[PartCall] = [
-        (engine.Clear, (matrix,)) for matrix in _remembered(model, data)
-    ]
-    return [*clearing, (pin.crba, (model, data, q))]
-
-
-def _remembered(model: pin.Model, data: pin.Data) -> list[Array]:
-    """Return what CRBA does not clear itself, views of the data."""
-    if not model.mimicking_joints:
-        return []
-    return [kept_view(matrix_view(each), data) for each in (*data.Fcrb, data.M)]
-
-
-def _write_difference(
-    model: pin.Model, data: pin.Data, q: Array, v: Array, M_dot: Array
-) -> None:
-    """Write M' along v by differences."""
-    h = 1e-3 / max(1.0, float(np.abs(v).max()))
-
-    def M(s: float) -> Array:
-        return mass_matrix(model, data, pin.integrate(model, q, s * v)).copy()
-
-    M_dot[:] = (8.0 * (M(h) - M(-h)) - (M(2.0 * h) - M(-2.0 * h))) / (12.0 * h)
+    """Return M (CRBA) and M' along v, shape (nv, nv) each."""
+    M, M_dot = np.zeros((v.size, v.size)), np.zeros((v.size, v.size))
+    mass_matrix = engine.MassMatrix, (dynamics, q, M)
+    rate = engine.MassMatrixRate, (dynamics, q, v, M_dot)
+    return Term(M, [Once.at(stamp, mass_matrix)]), Term(M_dot, [Once.at(stamp, rate)])
 
 
 class CentroidalMotion:
@@ -93,7 +41,12 @@ class CentroidalMotion:
     """
 
     def __init__(
-        self, model: pin.Model, data: pin.Data, q: Array, v: Array, stamp: Indices
+        self,
+        model: pin.Model,
+        dynamics: Dynamics,
+        q: Array,
+        v: Array,
+        stamp: Indices,
     ) -> None:
         """Allocate the arrays; `calls` take the values that q and v have then."""
         if mimics := [model.names[index] for index in model.mimicking_joints]:
@@ -102,24 +55,17 @@ class CentroidalMotion:
                 f"mimic joints, and {listing(map(repr, mimics))} are some; load the "
                 "robot with mimic=False"
             )
-        # Pinocchio allocates these results at the first call; take views after it.
-        pin.computeCentroidalMapTimeVariation(model, data, q, v)
         self.mass: float = pin.computeTotalMass(model)
-        self.position: Array = kept_view(data.com[0], data)
+        self.position: Array = np.zeros(3)
         self.velocity: Array = np.zeros(3)
         self.jacobian: Array = np.zeros((3, model.nv))
         self.jacobian_dot: Array = np.zeros((3, model.nv))
         self.momentum_matrix: Array = np.zeros((3, model.nv))
         self.momentum_matrix_dot: Array = np.zeros((3, model.nv))
-        momentum = pin.computeCentroidalMapTimeVariation, (model, data, q, v)
-        found = self.velocity, self.jacobian, self.jacobian_dot
+        found = self.position, self.velocity, self.jacobian, self.jacobian_dot
         angular = self.momentum_matrix, self.momentum_matrix_dot
-        sums = matrix_view(data.Ag), matrix_view(data.dAg), self.mass, v
-        extract = engine.CentroidalRows, (*sums, *found, *angular)
-        # It reads the velocity of the centre, which it does not write: of others' calls
-        # nothing is to be in A'.
-        rest = engine.Clear, (kept_view(data.vcom[0].reshape(1, 3), data),)
-        self.calls: PartCalls = [Once.at(stamp, rest, momentum, extract)]
+        given = dynamics, q, v, self.mass, *found, *angular
+        self.calls: PartCalls = [Once.at(stamp, (engine.CentroidalMotion, given))]
 
     @cached_property
     def shown(self) -> "CentroidalMotion":

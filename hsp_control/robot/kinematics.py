@@ -6,8 +6,8 @@ import numpy as np
 import pinocchio as pin
 
 from hsp_control import engine
-from hsp_control.common.arrays import Array, Indices, matrix_view, read_only_view
-from hsp_control.common.exceptions import ImmutableError, ModelError
+from hsp_control.common.arrays import Array, Indices, read_only_view
+from hsp_control.common.exceptions import ImmutableError
 from hsp_control.engine.plans import PartCalls
 
 
@@ -33,15 +33,27 @@ class FrameMotion(NamedTuple):
 
 
 class WorldKinematics(NamedTuple):
-    """Placements and Jacobians of all joints, from which distances are computed."""
+    """Placements and Jacobians of all joints, from which all others follow."""
 
-    # placements of the joints, shape (njoints, 12): see `joint_placements`
+    # of the joints, with the world: R, column by column, and the origin [m], shape
+    # (njoints, 12)
     placements: Array
-    # pinocchio's J, in world axes at the world's origin, shape (6, nvExtended): see
-    # `joint_support`
+    # Pinocchio's J, in world axes at the world's origin, column by column, shape
+    # (6, nvExtended): see `joint_support`
     jacobian: Array
     jacobian_dot: Array  # its time derivative, shape (6, nvExtended)
     v: Array  # the velocity, shape (nv,)
+
+    @classmethod
+    def allocate(cls, model: pin.Model, v: Array) -> "WorldKinematics":
+        """Return zeros, and a velocity."""
+        J, J_dot = (np.zeros((6, model.nvExtended), order="F") for _ in range(2))
+        return cls(np.zeros((model.njoints, 12)), J, J_dot, v)
+
+    def joint(self, index: int) -> tuple[Array, Array]:
+        """Return R, shape (3, 3), and the origin [m], shape (3,), as views."""
+        row = self.placements[index]
+        return row[:9].reshape(3, 3).T, row[9:]
 
 
 class PointMotion(NamedTuple):
@@ -95,25 +107,23 @@ class FrameKinematics:
     )
 
     def __init__(
-        self, model: pin.Model, data: pin.Data, v: Array, stamp: Indices, index: int
+        self, model: pin.Model, world: WorldKinematics, stamp: Indices, index: int
     ) -> None:
-        nv, frame = model.nv, model.frames[index]
-        joint = data.oMi[frame.parentJoint]  # its arrays are views of data
-        self.motion = motion = FrameMotion.allocate(nv)
+        frame = model.frames[index]
+        self.motion = motion = FrameMotion.allocate(model.nv)
         self.jacobian, self.jacobian_dot = motion.jacobian, motion.jacobian_dot
         self.rotation, self.position = motion.rotation, motion.position
         self.velocity = motion.velocity
         self.drift: Array = np.zeros(6)
         carrier = _ParentJoint(
-            matrix_view(data.J),
-            matrix_view(data.dJ),
-            joint.rotation,
-            joint.translation,
+            world.jacobian,
+            world.jacobian_dot,
+            *world.joint(frame.parentJoint),
             np.ascontiguousarray(frame.placement.rotation),
             frame.placement.translation.copy(),
             *joint_support(model, frame.parentJoint),
         )
-        given = stamp, np.array([-1]), carrier, v, motion, self.drift
+        given = stamp, np.array([-1]), carrier, world.v, motion, self.drift
         self.calls: PartCalls = [(engine.FrameKinematics, given)]
 
     def __setattr__(self, name: str, value: object) -> None:
@@ -184,24 +194,3 @@ def joint_support(model: pin.Model, joint: int) -> tuple[Indices, Indices]:
         columns.extend(range(part.idx_vExtended, part.idx_vExtended + width))
         dofs.extend(range(part.idx_v, part.idx_v + width))
     return np.array(columns, dtype=np.int64), np.array(dofs, dtype=np.int64)
-
-
-def joint_placements(data: pin.Data) -> Array:
-    """Return the placements of all joints, a view of the data, shape (njoints, 12).
-
-    A row is R, column by column, followed by the origin [m]. The view relies on how
-    Pinocchio stores its placements: one after the other in memory.
-    """
-    first, address = data.oMi[0].rotation, "__array_interface__"
-    turns = [getattr(M.rotation, address)["data"][0] for M in data.oMi]
-    origins = [getattr(M.translation, address)["data"][0] for M in data.oMi]
-    strides = set(np.diff(turns))
-    offsets = {b - a for a, b in zip(turns, origins, strict=True)}
-    if len(strides) > 1 or offsets != {9 * 8} or first.strides != (8, 24):
-        raise ModelError(
-            f"Pinocchio {pin.__version__} is not supported: it stores placements in an "
-            "unknown layout; use Pinocchio 4.1"
-        )
-    return np.lib.stride_tricks.as_strided(
-        first.T.reshape(9), (len(turns), 12), (strides.pop() if strides else 96, 8)
-    )

@@ -6,9 +6,12 @@ from functools import cached_property
 import numpy as np
 import pinocchio as pin
 
+from hsp_control import engine
 from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import ModelError
-from hsp_control.robot.inertia import mass_matrix
+from hsp_control.engine import Dynamics
+from hsp_control.engine.plans import PartCalls
+from hsp_control.robot.dynamics import dynamics_of
 from hsp_control.robot.kinematics import Term
 from hsp_control.robot.structure import Structure
 
@@ -25,7 +28,6 @@ class RobotModel(Structure):
     ) -> None:
         """Wrap a Pinocchio model; see `Structure`."""
         super().__init__(model, name, home)
-        self._data = model.createData()
 
     # -- sizes, for defaults ----------------------------------------------------------
 
@@ -139,8 +141,7 @@ class RobotModel(Structure):
         rng, largest = np.random.default_rng(0), np.zeros(self.nv)
         q = self.home()
         for _ in range(65):
-            M = mass_matrix(self.model, self._data, q)
-            largest = np.maximum(largest, np.diag(M))
+            largest = np.maximum(largest, np.diag(self.mass_matrix(q)))
             turned = rng.uniform(-np.pi, np.pi, self.nv)
             q = pin.integrate(self.model, self.neutral(), turned)
         return largest
@@ -155,9 +156,30 @@ class RobotModel(Structure):
 
     # -- dynamics ---------------------------------------------------------------------
 
+    def dynamics(self) -> Dynamics:
+        """Return the dynamics with memory of their own, as an argument of calls.
+
+        They are those of the model as it is now: who changes its masses does so before
+        states, controllers and plants are made of it.
+        """
+        return dynamics_of(self.model)
+
+    @cached_property
+    def _own(self) -> Dynamics:
+        return self.dynamics()
+
+    def mass_matrix(self, q: Array) -> Array:
+        """Return M(q), shape (nv, nv) (CRBA)."""
+        M = np.empty((self.nv, self.nv))
+        engine.MassMatrix(self._own, _packed(q), M)()
+        return M
+
     def inverse_dynamics(self, q: Array, v: Array, a: Array) -> Array:
         """Return the effort M(q) a + N(q, v), shape (nv,) (RNEA)."""
-        return np.array(pin.rnea(self.model, self._data, q, v, a))
+        effort = np.empty(self.nv)
+        given = map(_packed, (q, v, a))
+        engine.InverseDynamics(self._own, *given, effort)()
+        return effort
 
     def forward_dynamics(self, q: Array, v: Array, tau: Array) -> Array:
         """Return the acceleration M(q)⁻¹ (tau - N(q, v)), shape (nv,).
@@ -168,28 +190,28 @@ class RobotModel(Structure):
         Raises:
             ModelError: If M is singular (only detected with mimic joints).
         """
-        if not self.mimics:
-            return np.array(pin.aba(self.model, self._data, q, v, tau))
-        return self._forward_dynamics_of_mimics(q, v, tau)
+        acceleration = np.empty(self.nv)
+        given = map(_packed, (q, v, tau))
+        engine.ForwardDynamics(self._own, *given, acceleration)()
+        self._check_acceleration(acceleration)
+        return acceleration
 
     def bind_forward_dynamics(self, q: Array, v: Array, tau: Array) -> Term:
         """Return `forward_dynamics` for what these arrays hold when it is computed."""
-        if not self.mimics:
-            given = self.model, self._data, q, v, tau
-            return Term(self._data.ddq, [(pin.aba, given)])
-        value = np.zeros(self.nv)
+        acceleration = np.zeros(self.nv)
+        given = self.dynamics(), q, v, tau, acceleration
+        calls: PartCalls = [(engine.ForwardDynamics, given)]
+        if self.mimics:
+            calls = [*calls, (self._check_acceleration, (acceleration,))]
+        return Term(acceleration, calls)
 
-        def compute(q: Array, v: Array, tau: Array) -> None:
-            value[:] = self._forward_dynamics_of_mimics(q, v, tau)
-
-        return Term(value, [(compute, (q, v, tau))])
-
-    def _forward_dynamics_of_mimics(self, q: Array, v: Array, tau: Array) -> Array:
-        M = mass_matrix(self.model, self._data, q)
-        effects = pin.nonLinearEffects(self.model, self._data, q, v)
-        try:
-            return np.asarray(np.linalg.solve(M, tau - effects))
-        except np.linalg.LinAlgError:
+    def _check_acceleration(self, acceleration: Array) -> None:
+        if self.mimics and np.isnan(acceleration).any():
             raise ModelError(
                 f"{self.name}: the mass matrix is singular at this configuration"
-            ) from None
+            )
+
+
+def _packed(array: Array) -> Array:
+    """Return an array as a call can read it."""
+    return np.ascontiguousarray(array, dtype=np.float64)

@@ -1,9 +1,9 @@
 """The robot at one time: kinematic and dynamic terms, each computed once per state.
 
-The controller gets its kinematics and dynamics from `RobotState`, which calls Pinocchio
-here and in `kinematics`. Other modules call Pinocchio directly only for what a state
-does not offer: loading and checks of models, integration, collision geometry,
-derivatives of gravity, plants with models of their own, and the viewer.
+The controller gets its kinematics and dynamics from `RobotState`, by calls of the
+engine, which has Pinocchio's algorithms. Other modules call Pinocchio's bindings only
+for what a state does not offer: loading and checks of models, integration, collision
+geometry, and the viewer.
 """
 
 from collections.abc import Callable, Sequence
@@ -13,16 +13,11 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import ArrayLike
 
-from hsp_control.common.arrays import (
-    Array,
-    Indices,
-    kept_view,
-    matrix_view,
-    read_only_view,
-)
+from hsp_control import engine
+from hsp_control.common.arrays import Array, Indices, read_only_view
 from hsp_control.common.exceptions import ImmutableError, NonFiniteError, ShapeError
 from hsp_control.declaration.quantities import Vector
-from hsp_control.engine import REFUSED, Move, Plan
+from hsp_control.engine import REFUSED, Dynamics, Move, Plan
 from hsp_control.engine.plans import (
     AnyCall,
     Once,
@@ -34,12 +29,7 @@ from hsp_control.engine.plans import (
     says,
 )
 from hsp_control.robot.inertia import CentroidalMotion, inertia_terms
-from hsp_control.robot.kinematics import (
-    FrameKinematics,
-    ShownFrame,
-    WorldKinematics,
-    joint_placements,
-)
+from hsp_control.robot.kinematics import FrameKinematics, ShownFrame, WorldKinematics
 
 if TYPE_CHECKING:  # a robot and its state name each other; it makes the state
     from hsp_control.robot.robot import Robot
@@ -65,6 +55,8 @@ class RobotState:
         v: Velocity, shape (nv,).
         time: `t` as an array of shape (1,), for calls.
         stamp_array: `stamp` as an array of shape (1,), for calls.
+        dynamics: What computes the terms, as an argument of calls.
+        world: Placements and Jacobians of all joints, as an argument of calls.
         inertia: M(q) as an argument of calls; see `mass_matrix`.
         inertia_rate: M' as an argument of calls; see `mass_matrix_rate`.
         effort: What `inverse_dynamics` wrote last, shape (nv,) [N·m or N].
@@ -82,19 +74,21 @@ class RobotState:
         self._memory = self.time, self.q, self.v, blocks, self.stamp_array
         self._seen: RobotState | None = None
         self._read_only: RobotState | None = None
-        self._data: pin.Data = robot.model.createData()
+        self.dynamics: Dynamics = robot.dynamics()
         self._shown_data: tuple[pin.Data, int] | None = None
-        self.effort: Array = kept_view(self._data.tau, self._data)
-        self._at = robot.model, self._data, self.q, self.v  # what Pinocchio is given
+        self._at = self.dynamics, self.q, self.v
+        self.world = WorldKinematics.allocate(robot.model, self.v)
+        self.effort: Array = np.zeros(robot.nv)
         self._acceleration: Array = np.zeros(robot.nv)
         self._inverse_dynamics = self._bound(self.rnea(self._acceleration))
-        self._world: WorldKinematics | None = None
         self._frames: dict[str, tuple[FrameKinematics, Callable[[], object]]] = {}
         stamp = self.stamp_array
         self.inertia, self.inertia_rate = inertia_terms(*self._at, stamp)
         self._compute_inertia = self._bound(*self.inertia.calls)
         self._compute_inertia_rate = self._bound(*self.inertia_rate.calls)
-        effects = pin.nonLinearEffects, self._at
+        self._effects: Array = np.zeros(robot.nv)
+        given = *self._at, np.zeros(robot.nv), self._effects
+        effects = engine.InverseDynamics, given
         self._compute_effects = self._bound(Once.at(stamp, effects))
         self._centroidal: tuple[CentroidalMotion, Callable[[], object]] | None = None
         self._displaced: RobotState | None = None
@@ -118,11 +112,6 @@ class RobotState:
         return self.time.item()
 
     @property
-    def own_data(self) -> pin.Data:
-        """The data that this state steps with: to read placements, never to write."""
-        return self._data
-
-    @property
     def data(self) -> pin.Data:
         """Pinocchio's data at (q, v), for terms that this class does not offer.
 
@@ -130,7 +119,7 @@ class RobotState:
         are nobody else's: nothing here is computed with them.
         """
         stamp, model = self.stamp, self.robot.model
-        if self._shown_data is None or not _fits(self._shown_data[0], self._data):
+        if self._shown_data is None or not _fits(self._shown_data[0], self.world):
             self._shown_data = model.createData(), stamp - 1
         data, computed = self._shown_data
         if computed != stamp:
@@ -172,7 +161,8 @@ class RobotState:
 
     def bind_move(self, calls: Sequence[Step] = ()) -> Move:
         """Return how `advance` moves this state, with calls of the time that follow."""
-        jacobians = pin.computeJointJacobiansTimeVariation, self._at
+        placements, J, J_dot, _ = self.world
+        jacobians = engine.JointJacobians, (*self._at, J, J_dot, placements)
         return Move(Plan([*self.plan([jacobians]).steps(), *calls]), *self._memory)
 
     def _refuse(self, t: float, q: ArrayLike, v: ArrayLike) -> None:
@@ -205,8 +195,8 @@ class RobotState:
         """
         found = self._frames.get(name)
         if found is None:
-            index, (model, data, _, v) = self.robot.frame_id(name), self._at
-            frame = FrameKinematics(model, data, v, self.stamp_array, index)
+            index, model = self.robot.frame_id(name), self.robot.model
+            frame = FrameKinematics(model, self.world, self.stamp_array, index)
             self._frames[name] = found = frame, self._bound(*frame.calls)
         frame, compute = found
         compute()
@@ -220,7 +210,8 @@ class RobotState:
     def centroidal(self) -> CentroidalMotion:
         """The centre of mass, the angular momentum about it, and their Jacobians."""
         if self._centroidal is None:
-            center = CentroidalMotion(*self._at, self.stamp_array)
+            model = self.robot.model
+            center = CentroidalMotion(model, *self._at, self.stamp_array)
             self._centroidal = center, self._bound(*center.calls)
         center, compute = self._centroidal
         compute()
@@ -242,7 +233,7 @@ class RobotState:
     def nonlinear_effects(self) -> Array:
         """N(q, v): Coriolis, centrifugal and gravity efforts, shape (nv,) (RNEA)."""
         self._compute_effects()
-        return kept_view(self._data.nle, self._data)
+        return self._effects
 
     def inverse_dynamics(self, acceleration: Array) -> Array:
         """Return the effort M a + N, shape (nv,), for an acceleration (nv,) (RNEA)."""
@@ -252,24 +243,12 @@ class RobotState:
 
     def rnea(self, acceleration: Array) -> PartCall:
         """Return a call that writes `effort` for what this array (nv,) then holds."""
-        return pin.rnea, (*self._at, acceleration)
+        return engine.InverseDynamics, (*self._at, acceleration, self.effort)
 
     @property
     def stamp(self) -> int:
         """A number that changes with every `update`: use it to invalidate caches."""
         return int(self.stamp_array[0])
-
-    @property
-    def world(self) -> WorldKinematics:
-        """Placements and Jacobians of all joints at the world's origin, as views."""
-        if self._world is None:
-            self._world = WorldKinematics(
-                joint_placements(self._data),
-                matrix_view(self._data.J),
-                matrix_view(self._data.dJ),
-                self._at[3],
-            )
-        return self._world
 
     def cached(self, part: object, what: str, make: Callable[[], Made]) -> Made:
         """Return what ``make`` returned for a part and this state; it is called once.
@@ -418,15 +397,17 @@ class ReadOnlyState(SeenState):
         return robot.inverse_dynamics(self.q, self.v, np.array(acceleration))
 
 
-_FIXED = {"robot", "q", "v", "time", "stamp_array", "inertia", "inertia_rate", "effort"}
+_FIXED = {
+    "robot", "q", "v", "time", "stamp_array", "dynamics", "world", "inertia",
+    "inertia_rate", "effort",
+}  # fmt: skip
 """What native calls read or write: assigning others would change nothing for them."""
 
 
-def _fits(data: pin.Data, other: pin.Data) -> bool:
-    """Return whether what is computed into data still has its size."""
-    return (data.J.shape, data.dJ.shape) == (other.J.shape, other.dJ.shape) and len(
-        data.oMi
-    ) == len(other.oMi)
+def _fits(data: pin.Data, world: WorldKinematics) -> bool:
+    """Return whether what Pinocchio computes into data still has its size."""
+    sizes = data.J.size, data.dJ.size, len(data.oMi)
+    return sizes == (world.jacobian.size,) * 2 + (len(world.placements),)
 
 
 def _copy(robot: "Robot", t: float, q: Array, v: Array) -> RobotState:

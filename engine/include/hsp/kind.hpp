@@ -8,6 +8,7 @@
 //     Out<'n'> gradient;
 //     Scratch<'n'> away;               // no argument
 //     void operator()() { ... }        // or operator()(double t), which may return a number
+//     void check() const { ... }       // optional: throws where arguments do not fit each other
 //   };
 //
 // The members are read into a table in C's layout, and whatever is the same for all kinds is
@@ -150,31 +151,34 @@ template <class T> const Kind& kind_of() {
     detail::collect(reinterpret_cast<const char*>(&x), "", x, found);
     return found;
   }();
-  static const Kind kind = {
-      detail::kept(detail::type_name<T>()),
-      T::doc,
-      timed,
-      sizeof(T),
-      alignof(T),
-      static_cast<std::int64_t>(fields.size()),
-      fields.data(),
-      [](void* self) { new (self) T{}; },
-      [](void* self) { static_cast<T*>(self)->~T(); },
-      [](void* self, const Sizes& size) { detail::prepare(*static_cast<T*>(self), size); },
-      [](void* self, double t) -> double {
-        [[maybe_unused]] const Allocation allocation(false);
-        T& x = *static_cast<T*>(self);
-        const auto call = [&] {
-          if constexpr (timed) return x(t);
-          else return x();
-        };
-        if constexpr (std::is_void_v<decltype(call())>) {
-          call();
-          return 0.0;
-        } else {
-          return static_cast<double>(call());
-        }
-      }};
+  static const Kind kind = {detail::kept(detail::type_name<T>()),
+                            T::doc,
+                            timed,
+                            sizeof(T),
+                            alignof(T),
+                            static_cast<std::int64_t>(fields.size()),
+                            fields.data(),
+                            [](void* self) { new (self) T{}; },
+                            [](void* self) { static_cast<T*>(self)->~T(); },
+                            [](void* self, const Sizes& size) {
+                              T& x = *static_cast<T*>(self);
+                              detail::prepare(x, size);
+                              if constexpr (requires { x.check(); }) x.check();
+                            },
+                            [](void* self, double t) -> double {
+                              [[maybe_unused]] const Allocation allocation(false);
+                              T& x = *static_cast<T*>(self);
+                              const auto call = [&] {
+                                if constexpr (timed) return x(t);
+                                else return x();
+                              };
+                              if constexpr (std::is_void_v<decltype(call())>) {
+                                call();
+                                return 0.0;
+                              } else {
+                                return static_cast<double>(call());
+                              }
+                            }};
   return kind;
 }
 

@@ -109,7 +109,7 @@ template <int... sizes> using OutInts = View<std::int64_t, Access::Out, Order::R
 template <int... sizes> using InOutInts = View<std::int64_t, Access::InOut, Order::Rows, sizes...>;
 template <int... sizes> using Flags = View<bool, Access::In, Order::Rows, sizes...>;
 template <int... sizes> using Columns = View<double, Access::In, Order::Columns, sizes...>;
-template <int... sizes> using InOutColumns = View<double, Access::InOut, Order::Columns, sizes...>;
+template <int... sizes> using OutColumns = View<double, Access::Out, Order::Columns, sizes...>;
 
 // An object that calls share, such as a plan.
 template <class T> struct Shared {

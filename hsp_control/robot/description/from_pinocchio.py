@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike
 
 from hsp_control.common.arrays import Array, Indices
 from hsp_control.common.exceptions import ModelError
+from hsp_control.robot.description.joint_data import joint_data
 from hsp_control.robot.description.loading import completed
 from hsp_control.robot.description.robot_description import ToolFrame
 from hsp_control.robot.description.sources import (
@@ -75,7 +76,7 @@ def _check_type(given: Any, name: str, kind: type) -> None:
 
 
 def _check_joints(model: pin.Model) -> None:
-    """Check that no joint's motion subspace depends on its configuration.
+    """Check that each is known, and that no motion subspace depends on a configuration.
 
     Pinocchio's rates of Jacobians and of the mass matrix leave out S' (seen with 4.1).
     """
@@ -96,6 +97,8 @@ def _check_joints(model: pin.Model) -> None:
                     "joints of one axis each, one after the other, or a ball "
                     "(JointModelSpherical)"
                 )
+    for index in range(1, model.njoints):
+        joint_data(model, index)
 
 
 def _shapes(model: pin.Model, geometry: Any, role: str) -> Iterator[BodyShape]:

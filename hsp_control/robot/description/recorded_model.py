@@ -10,6 +10,7 @@ import pinocchio as pin
 
 from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import ModelError
+from hsp_control.robot.description.joint_data import TURNING, joint_data, pose_numbers
 from hsp_control.robot.description.sources import BodyShape
 
 _LARGEST = 200_000_000
@@ -24,7 +25,6 @@ _JOINTS: dict[str, Any] = {
         "JointModelTranslation",
     )
 }  # fmt: skip
-_TURNING = "JointModelRevoluteUnboundedUnaligned"
 _PER_POSITION = ("lowerPositionLimit", "upperPositionLimit")
 _PER_VELOCITY = (
     "velocityLimit", "effortLimit", "friction", "damping", "armature", "rotorInertia",
@@ -67,9 +67,9 @@ def model_data(model: pin.Model) -> dict[str, Any]:
         joints.append(
             {
                 "name": name,
-                **_joint_data(model, k),
+                **joint_data(model, k),
                 "parent": int(model.parents[k]),
-                "pose": _pose(model.jointPlacements[k]),
+                "pose": pose_numbers(model.jointPlacements[k]),
                 "inertia": _inertia(model.inertias[k]),
             }
         )
@@ -78,7 +78,7 @@ def model_data(model: pin.Model) -> dict[str, Any]:
             "name": frame.name,
             "joint": int(frame.parentJoint),
             "frame": int(frame.parentFrame),
-            "pose": _pose(frame.placement),
+            "pose": pose_numbers(frame.placement),
             "type": int(frame.type),
         }
         for frame in model.frames[1:]
@@ -95,92 +95,6 @@ def model_data(model: pin.Model) -> dict[str, Any]:
         "base_inertia": _inertia(model.inertias[0]),
         **numbers,
     }
-
-
-def _joint_data(model: pin.Model, k: int) -> dict[str, Any]:
-    """Return what a joint's own model is made of."""
-    joint = model.joints[k]
-    if joint.shortname() == "JointModelMimic":
-        return _follower_data(model, k)
-    if (
-        joint.shortname() == _TURNING
-    ):  # Pinocchio does not tell its axis (seen with 4.1)
-        axis = _motion(model, k, k, 0.5)[3:] / 0.5
-        return {"type": _TURNING, "axis": _unit(axis), "pitch": 0.0}
-    return _kind_data(joint, model.names[k])
-
-
-def _kind_data(joint: Any, name: str) -> dict[str, Any]:
-    kind, own = joint.shortname(), joint.extract()
-    if kind == "JointModelComposite":
-        parts = zip(own.joints, own.jointPlacements, strict=True)
-        within = [{**_kind_data(j, name), "pose": _pose(pose)} for j, pose in parts]
-        return {"type": kind, "joints": within}
-    if kind not in _JOINTS or kind == _TURNING:
-        raise ModelError(f"joint {name!r} is a {kind}, which no log contains")
-    axis = np.ravel(getattr(own, "axis", ())).tolist()
-    return {"type": kind, "axis": axis, "pitch": float(getattr(own, "pitch", 0.0))}
-
-
-def _follower_data(model: pin.Model, k: int) -> dict[str, Any]:
-    """Return what a joint that mimics another one is made of.
-
-    Pinocchio does not tell which joint it was: its motion does.
-    """
-    own = model.joints[k].extract()
-    # `model.mimicked_joints` is not in the order of the followers (seen with 4.1).
-    leader = next(
-        j
-        for j in range(1, model.njoints)
-        if model.joints[j].nq and model.idx_qs[j] == model.joints[k].idx_q
-    )
-    # Of a follower that does not move, any joint is right.
-    way = _motion(model, leader, k, 0.5 / own.scaling) if own.scaling else _ABOUT_X
-    linear, angular = way[:3], way[3:]
-    turn, turns = float(np.linalg.norm(angular)), model.joints[leader].nq == 2
-    if turn < _LEAST:
-        kind, axis, pitch = "Prismatic", linear, 0.0
-    else:
-        pitch, axis = float(linear @ angular) / turn**2, angular
-        kind = "Revolute" if abs(pitch) < _LEAST else "Helical"
-    unit = _unit(axis)
-    letter = "XYZ"[int(np.argmax(unit))] if max(unit) == 1.0 else ""
-    if kind == "Helical" and not letter:  # Pinocchio crashes on it (seen with 4.1)
-        raise ModelError(
-            f"joint {model.names[k]!r} follows another one along a screw about "
-            f"{unit}, which no log contains"
-        )
-    short = kind[0] + ("UB" if turns and kind == "Revolute" else "")
-    long = f"{kind}{'Unbounded' if turns and kind == 'Revolute' else ''}Unaligned"
-    return {
-        "type": f"JointModel{short}{letter}" if letter else f"JointModel{long}",
-        "axis": [] if letter else unit,
-        "pitch": pitch if kind == "Helical" else 0.0,
-        "follows": [leader, float(own.scaling), float(own.offset)],
-    }
-
-
-def _motion(model: pin.Model, moved: int, k: int, by: float) -> Array:
-    """Return by which twist joint k moves if another one does [m and rad]."""
-    data, neutral = model.createData(), pin.neutral(model)
-    step = np.zeros(model.nv)
-    step[model.joints[moved].idx_v] = by
-    poses = []
-    for q in (neutral, pin.integrate(model, neutral, step)):
-        pin.forwardKinematics(model, data, q)
-        poses.append(data.liMi[k].copy())
-    twist: Array = pin.log6(poses[0].actInv(poses[1])).vector
-    return twist
-
-
-def _unit(axis: Array) -> list[float]:
-    rounded = np.round(axis / np.linalg.norm(axis), _DIGITS)
-    return [float(each) for each in rounded / np.linalg.norm(rounded)]
-
-
-_ABOUT_X = np.array([0.0, 0.0, 0.0, 1.0, 0.0, 0.0])
-_LEAST, _DIGITS = 1e-9, 14
-"""What is a rounding of nothing, and the digits of an axis."""
 
 
 def model_of(data: Mapping[str, Any]) -> pin.Model:
@@ -238,7 +152,7 @@ def _joint_of(data: Mapping[str, Any]) -> Any:
         for each in data["joints"]:
             whole.addJoint(_joint_of(each), _placement(each["pose"]))
         return whole
-    if data["type"] == _TURNING:
+    if data["type"] == TURNING:
         return _turning(data["axis"])
     arguments: list[Any] = [np.array(data["axis"])] if data["axis"] else []
     if "JointModelH" in data["type"]:
@@ -314,10 +228,6 @@ def _shape_of(data: Mapping[str, Any]) -> BodyShape:
         collides=bool(data["collides"]),
         mesh=mesh,
     )
-
-
-def _pose(placement: pin.SE3) -> list[float]:
-    return [*placement.translation.tolist(), *placement.rotation.ravel().tolist()]
 
 
 def _placement(numbers: Sequence[float]) -> pin.SE3:

@@ -4,14 +4,12 @@ from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
-import pinocchio as pin
 
 from hsp_control import engine
 from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import SimulationError
 from hsp_control.robot import Robot
 from hsp_control.robot.friction import JointFriction
-from hsp_control.robot.inertia import mass_matrix
 from hsp_control.robot.integrators import Integrator, number_of_steps
 from hsp_control.robot.kinematics import Term
 from hsp_control.simulation.plants.plant import (
@@ -91,7 +89,6 @@ class StickingPlant(SampledPlant):
             raise SimulationError(f"step is {step}; must be positive")
         self.friction, self.step = friction, step
         self.pushes = Pushes(robot, pushes)
-        self._data = robot.model.createData()
         self._q, self._v = robot.neutral(), np.zeros(robot.nv)
 
     def reset(self, t: float, q: Array, v: Array) -> None:
@@ -130,9 +127,8 @@ class StickingPlant(SampledPlant):
         self, h: float, q: Array, v: Array, start: Array, tau: Array
     ) -> Array:
         """Return v⁺ after a time h from velocity ``start``, with M and N at (q, v)."""
-        model, data = self.robot.model, self._data
-        M = mass_matrix(model, data, q)
-        N = pin.nonLinearEffects(model, data, q, v)
+        M = self.robot.mass_matrix(q)
+        N = self.robot.inverse_dynamics(q, v, np.zeros(self.robot.nv))
         damping = np.diag(0.5 * h * self.friction.viscous)
         after = start.copy()
         engine.DryFriction(

@@ -127,3 +127,19 @@ def test_the_slides_of_a_translation_keep_their_limits() -> None:
     run = hsp.simulate(law, robot.neutral(), duration=2.0)
     assert (np.abs(run.q[:, 0]) < 0.2).all()
     assert run.q[-1, 0] > 0.18
+
+
+def test_a_follower_along_a_screw_is_refused_by_name() -> None:
+    model = pin.transformJointIntoMimic(chain_of_screws(), 1, 3, 0.7, 0.2)
+    with pytest.raises(ModelError, match="'screw3' follows another one along a screw"):
+        Robot.from_pinocchio(model)
+
+
+def chain_of_screws() -> pin.Model:
+    model, parent = pin.Model(), 0
+    place = pin.SE3(np.eye(3), np.array([0.1, 0.2, 0.3]))
+    for k in range(3):
+        joint = pin.JointModelHX(0.3)
+        parent = model.addJoint(parent, joint, place, f"screw{k + 1}")
+        model.appendBodyToJoint(parent, pin.Inertia.FromSphere(1.0, 0.1), place)
+    return model

@@ -62,7 +62,7 @@ def followers() -> hsp.Robot:
         (pin.JointModelRUBZ(), (2, 1.0, 0.3)),
         (pin.JointModelPrismaticUnaligned(np.array([0.6, 0.0, 0.8])), (1, 0.2, 0.0)),
         (pin.JointModelRZ(), (3, 4.0, 0.0)),
-        (pin.JointModelHX(0.1), (3, 2.0, -0.2)),
+        (pin.JointModelPX(), (3, 2.0, -0.2)),
         (pin.JointModelPY(), None),
     ]  # fmt: skip
     model, last = pin.Model(), 0

@@ -211,9 +211,3 @@ def test_a_type_error_of_a_call_is_its_own() -> None:
 
     with pytest.raises(TypeError, match="a field's own mistake"):
         state.advance(state.bind_move([PythonCall(call, timed=True)]), 1.0, q, v)
-
-
-def test_what_a_state_gave_keeps_its_memory() -> None:
-    state = load("panda").state(0.0, load("panda").home(), np.zeros(7))
-    given = state.mass_matrix, state.nonlinear_effects, state.centroidal.position
-    assert all(array.base.owner is state._data for array in given)

@@ -9,18 +9,16 @@ from pathlib import Path
 from xml.etree import ElementTree
 
 import numpy as np
-import pinocchio as pin
 import pytest
 from robot_cases import everything
 from robot_kinds import KINDS, TEXTS
 
 import hsp_control as hsp
-from hsp_control import Robot
+from hsp_control import Robot, engine
 from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import ModelError
 from hsp_control.null_space.metrics import MassMatrixMetric
 from hsp_control.robot.friction import JointFriction
-from hsp_control.robot.inertia import mass_matrix
 from hsp_control.simulation.plants import Push
 from hsp_control.simulation.plants.rigid_body import RigidBodyPlant, StickingPlant
 
@@ -157,35 +155,20 @@ def test_mimic_joints_move_as_free_ones_that_are_moved_so(tmp_path: Path) -> Non
 
 
 @kinds
-def test_a_mass_matrix_does_not_depend_on_what_the_data_were_used_for(
+def test_a_mass_matrix_does_not_depend_on_what_was_computed_before(
     kind: str, tmp_path: Path
 ) -> None:
-    """Whatever is in them."""
+    """Whatever the memory of the dynamics was used for."""
     robot, rng = KINDS[kind](tmp_path), np.random.default_rng(2)
-    data = robot.model.createData()
     for _ in range(3):
         q = robot.random_configuration(rng)
-        fresh = pin.crba(robot.model, robot.model.createData(), q)
-        for matrix in (*data.Fcrb, data.M, data.Ag, data.J):
-            matrix[:] = rng.standard_normal(matrix.shape)
-        found = mass_matrix(robot.model, data, q)
-        np.testing.assert_array_equal(found, fresh)
-
-
-def test_others_calls_are_not_in_centroidal_terms(tmp_path: Path) -> None:
-    """Pinocchio's A' reads the velocity of the centre, which other algorithms write."""
-    robot, rng = KINDS["arm on a floating base"](tmp_path), np.random.default_rng(4)
-    q, v = robot.random_configuration(rng), rng.standard_normal(robot.nv)
-    state, other = robot.state(0.0, q, v), robot.state(0.0, q, v)
-    _ = state.centroidal
-    pin.centerOfMass(robot.model, state.data, q, v)
-    state.update(0.1, q, v)
-    np.testing.assert_array_equal(
-        state.centroidal.jacobian_dot, other.centroidal.jacobian_dot
-    )
-    np.testing.assert_array_equal(
-        state.centroidal.momentum_matrix_dot, other.centroidal.momentum_matrix_dot
-    )
+        v, tau = rng.standard_normal((2, robot.nv))
+        fresh = np.zeros((robot.nv, robot.nv))
+        engine.MassMatrix(robot.dynamics(), q, fresh)()
+        robot.forward_dynamics(q, v, tau)
+        robot.inverse_dynamics(robot.random_configuration(rng), v, tau)
+        robot.mass_matrix(robot.random_configuration(rng))
+        np.testing.assert_array_equal(robot.mass_matrix(q), fresh)
 
 
 def test_centroidal_terms_of_mimics_are_refused_by_name(tmp_path: Path) -> None:

@@ -1,0 +1,120 @@
+// The dynamics of a robot as calls.
+#pragma once
+#include <hsp/records.hpp>
+#include <hsp/rotations.hpp>
+#include <limits>
+#include <stdexcept>
+#include <string>
+
+#include "dynamics.hpp"
+
+namespace hsp {
+
+// Throws where q, v or another vector of v's size is of another robot.
+inline void check_sizes(const Dynamics& robot, Index q, Index v) {
+  if (q == robot.configuration_size() && v == robot.size()) return;
+  throw std::invalid_argument("q and v have " + std::to_string(q) + " and " + std::to_string(v) +
+                              " entries; this robot's have " +
+                              std::to_string(robot.configuration_size()) + " and " +
+                              std::to_string(robot.size()));
+}
+
+struct JointJacobians {
+  static constexpr const char* doc =
+      "J and J' of all joints in world axes at the world's origin, and the joints' placements: R, "
+      "column by column, and the origin.";
+  Shared<Dynamics> dynamics;
+  In<'q'> q;
+  In<'n'> v;
+  OutColumns<6, 'x'> jacobian, jacobian_dot;
+  Out<'j', 12> placements;
+
+  void check() const {
+    check_sizes(*dynamics.object, q.size(), v.size());
+    if (jacobian.cols() != dynamics->columns() || placements.rows() != dynamics->joints())
+      throw std::invalid_argument("the robot has " + std::to_string(dynamics->columns()) +
+                                  " columns and " + std::to_string(dynamics->joints()) +
+                                  " joints, the world included");
+  }
+  void operator()() { dynamics->joint_jacobians(q, v, jacobian, jacobian_dot, placements); }
+};
+
+struct InverseDynamics {
+  static constexpr const char* doc = "The effort M a + N (RNEA).";
+  Shared<Dynamics> dynamics;
+  In<'q'> q;
+  In<'n'> v, acceleration;
+  Out<'n'> effort;
+
+  void check() const { check_sizes(*dynamics.object, q.size(), v.size()); }
+  void operator()() { dynamics->inverse_dynamics(q, v, acceleration, effort); }
+};
+
+struct ForwardDynamics {
+  static constexpr const char* doc = "The acceleration M⁻¹ (tau - N); NaN where M is singular.";
+  Shared<Dynamics> dynamics;
+  In<'q'> q;
+  In<'n'> v, effort;
+  Out<'n'> acceleration;
+
+  void check() const { check_sizes(*dynamics.object, q.size(), v.size()); }
+  void operator()() {
+    if (!dynamics->forward_dynamics(q, v, effort, acceleration))
+      acceleration.setConstant(std::numeric_limits<double>::quiet_NaN());
+  }
+};
+
+struct MassMatrix {
+  static constexpr const char* doc = "M(q) (CRBA).";
+  Shared<Dynamics> dynamics;
+  In<'q'> q;
+  Out<'n', 'n'> M;
+
+  void check() const { check_sizes(*dynamics.object, q.size(), M.rows()); }
+  void operator()() { dynamics->mass_matrix(q, M); }
+};
+
+struct MassMatrixRate {
+  static constexpr const char* doc = "M' along v.";
+  Shared<Dynamics> dynamics;
+  In<'q'> q;
+  In<'n'> v;
+  Out<'n', 'n'> M_dot;
+
+  void check() const { check_sizes(*dynamics.object, q.size(), v.size()); }
+  void operator()() { dynamics->mass_matrix_rate(q, v, M_dot); }
+};
+
+// The centroidal map A gives momentum and angular momentum about the centre of mass c, A v.
+// Its linear rows are m J, with c' = J v.
+//
+// Pinocchio's A' is the rate about a point at rest, but c moves: the rate of the angular rows
+// about c is A' - m c' × J (checked against finite differences; Pinocchio's product A'v is right
+// as it is, since c' × c' = 0).
+struct CentroidalMotion {
+  static constexpr const char* doc =
+      "The centre of mass, its J, J' and velocity, and the angular rows of A with their rate.";
+  Shared<Dynamics> dynamics;
+  In<'q'> q;
+  In<'n'> v;
+  double mass;
+  Out<3> position, velocity;
+  Out<3, 'n'> J, J_dot, angular, angular_dot;
+  struct Map : Eigen::Matrix<double, 6, Eigen::Dynamic> {
+    void prepare(const Sizes& size) { setZero(6, size('n')); }
+  } A, A_dot;
+
+  void check() const { check_sizes(*dynamics.object, q.size(), v.size()); }
+  void operator()() {
+    Vector3 c;
+    dynamics->centroidal_map(q, v, c, {A.data(), 6, A.cols()}, {A_dot.data(), 6, A.cols()});
+    position = c;
+    J = A.topRows<3>() / mass;
+    J_dot = A_dot.topRows<3>() / mass;
+    velocity = J.lazyProduct(v);
+    angular = A.bottomRows<3>();
+    angular_dot = A_dot.bottomRows<3>() - skew(velocity).lazyProduct(A.topRows<3>());
+  }
+};
+
+}  // namespace hsp

@@ -1,0 +1,74 @@
+// A robot's rigid-body dynamics: Pinocchio's algorithms on a model that came as numbers.
+//
+// Nothing outside of this room sees Pinocchio. Its algorithms are compiled in, so that no
+// release of its Python package has to be the one that this was built with, and so that a step
+// needs no Python. Whatever these functions return does not depend on what was computed before.
+#pragma once
+#include <array>
+#include <hsp/view.hpp>
+#include <memory>
+#include <string>
+#include <vector>
+
+namespace hsp {
+
+using ConstVector = Eigen::Map<const Vector>;
+using Jacobian = Eigen::Map<Eigen::Matrix<double, 6, Eigen::Dynamic>>;
+using Square = Eigen::Map<Matrix>;
+using Placements = Eigen::Map<Eigen::Matrix<double, Eigen::Dynamic, 12, Eigen::RowMajor>>;
+
+// A joint and the body that it moves; in axes of its own where nothing else is said.
+struct Joint {
+  std::string name, type;            // the type as Pinocchio calls it: "JointModelRZ"
+  std::int64_t parent = 0;           // 0: the world
+  std::array<double, 12> placement;  // in the parent: R, row by row, and the origin [m]
+  Vector3 axis = Vector3::UnitX();   // of those that move along or about any axis
+  double pitch = 0.0;                // of a screw [m/rad]
+  std::int64_t leader = 0;           // what it follows: q = ratio q_leader + offset; 0: none
+  double ratio = 1.0, offset = 0.0;
+  std::vector<Joint> parts;  // of a composite joint: one after the other, placed as they say
+  double mass = 0.0;         // of the body [kg]
+  Vector3 center = Vector3::Zero();
+  Matrix3 inertia = Matrix3::Zero();  // about the centre [kg·m²]
+};
+
+const char* pinocchio_version();  // of what is compiled in
+
+class Dynamics {
+ public:
+  static constexpr const char* type_name = "Dynamics";
+
+  // `armature` [kg·m² or kg] is what the rotors add to the diagonal of M, shape (n,).
+  // Throws std::invalid_argument for a joint that is not known, or whose parent or leader does
+  // not come before it.
+  Dynamics(const std::vector<Joint>& joints, const Vector3& gravity, const Vector& armature);
+  ~Dynamics();
+  Dynamics(const Dynamics&) = delete;
+
+  Index configuration_size() const;  // q's
+  Index size() const;                // v's
+  Index columns() const;             // of the Jacobian of all joints, followers included
+  Index joints() const;              // with the world
+
+  // J and J' of all joints in world axes at the world's origin, and the joints' placements: R,
+  // column by column, and the origin.
+  void joint_jacobians(const ConstVector& q, const ConstVector& v, Jacobian J, Jacobian J_dot,
+                       Placements placements);
+  void inverse_dynamics(const ConstVector& q, const ConstVector& v, const ConstVector& a,
+                        Eigen::Map<Vector> effort);  // RNEA
+  void mass_matrix(const ConstVector& q, Square M);  // CRBA
+  void mass_matrix_rate(const ConstVector& q, const ConstVector& v, Square M_dot);
+  // M⁻¹ (tau - N); false if M is singular, which only models with followers can say.
+  bool forward_dynamics(const ConstVector& q, const ConstVector& v, const ConstVector& tau,
+                        Eigen::Map<Vector> a);
+  // The centroidal map: A v = (momentum, angular momentum about the centre of mass c), and A'
+  // about a point at rest. Not of models with followers.
+  void centroidal_map(const ConstVector& q, const ConstVector& v, Vector3& c, Jacobian A,
+                      Jacobian A_dot);
+
+ private:
+  struct Pinocchio;
+  std::unique_ptr<Pinocchio> pinocchio_;
+};
+
+}  // namespace hsp

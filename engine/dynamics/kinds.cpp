@@ -1,0 +1,8 @@
+#include "calls.hpp"
+
+namespace hsp {
+const Kind* const* dynamics_kinds() {
+  return kinds<JointJacobians, InverseDynamics, ForwardDynamics, MassMatrix, MassMatrixRate,
+               CentroidalMotion>();
+}
+}  // namespace hsp

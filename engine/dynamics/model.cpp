@@ -1,0 +1,85 @@
+// The model out of numbers.
+#include <stdexcept>
+
+#include "pinocchio.hpp"
+
+namespace hsp {
+
+namespace {
+
+using RowMatrix3 = Eigen::Matrix<double, 3, 3, Eigen::RowMajor>;
+using Types = JointTypes<double, 0>;
+using AnyJoint = pin::JointModelTpl<double, 0, JointTypes>;
+
+pin::SE3 placement_of(const Joint& joint) {
+  const double* x = joint.placement.data();
+  return {Eigen::Map<const RowMatrix3>(x), Eigen::Map<const Vector3>(x + 9)};
+}
+
+AnyJoint any_joint(const Joint& joint) {
+  const Vector3& u = joint.axis;
+  const std::string type = joint.type.substr(std::string("JointModel").size());
+  if (type == "RX") return pin::JointModelRevoluteTpl<double, 0, 0>();
+  if (type == "RY") return pin::JointModelRevoluteTpl<double, 0, 1>();
+  if (type == "RZ") return pin::JointModelRevoluteTpl<double, 0, 2>();
+  if (type == "Revolute") return pin::JointModelRevoluteUnalignedTpl<double, 0>(u);
+  if (type == "RevoluteUnbounded")
+    return pin::JointModelRevoluteUnboundedUnalignedTpl<double, 0>(u);
+  if (type == "Prismatic") return pin::JointModelPrismaticUnalignedTpl<double, 0>(u);
+  if (type == "Helical") return pin::JointModelHelicalUnalignedTpl<double, 0>(u, joint.pitch);
+  if (type == "FreeFlyer") return pin::JointModelFreeFlyerTpl<double, 0>();
+  if (type == "Spherical") return pin::JointModelSphericalTpl<double, 0>();
+  if (type == "Planar") return pin::JointModelPlanarTpl<double, 0>();
+  if (type == "Translation") return pin::JointModelTranslationTpl<double, 0>();
+  if (type == "Composite") {
+    Types::JointModelComposite whole(joint.parts.size());
+    for (const Joint& part : joint.parts) whole.addJoint(any_joint(part), placement_of(part));
+    return whole;
+  }
+  throw std::invalid_argument("joint '" + joint.name + "' is a " + joint.type +
+                              ", which the engine does not have");
+}
+
+void check_before(std::int64_t index, std::int64_t own, const Joint& joint, const char* role) {
+  if (index < 0 || index >= own)
+    throw std::invalid_argument("joint '" + joint.name + "', number " + std::to_string(own) +
+                                ": its " + role + " is number " + std::to_string(index) +
+                                "; must come before it");
+}
+
+}  // namespace
+
+Dynamics::Dynamics(const std::vector<Joint>& joints, const Vector3& gravity, const Vector& armature)
+    : pinocchio_(new Pinocchio) {
+  auto& model = pinocchio_->model;
+  model.gravity.linear() = gravity;
+  for (const Joint& each : joints) {
+    const std::int64_t own = model.njoints;
+    check_before(each.parent, own, each, "parent");
+    check_before(each.leader, own, each, "leader");
+    AnyJoint joint = any_joint(each);
+    if (each.leader)
+      joint = Types::JointModelMimic(joint, model.joints[each.leader], each.ratio, each.offset);
+    model.addJoint(each.parent, joint, placement_of(each), each.name);
+    model.inertias[own] = pin::Inertia(each.mass, each.center, each.inertia);
+  }
+  if (armature.size() != model.nv)
+    throw std::invalid_argument("armature has " + std::to_string(armature.size()) +
+                                " entries; needs " + std::to_string(model.nv));
+  model.armature = armature;
+  pinocchio_->data = Pinocchio::Data(model);
+  pinocchio_->zero.setZero(model.nv);
+  pinocchio_->step.setZero(model.nv);
+  pinocchio_->there.setZero(model.nq);
+  pinocchio_->factor = Eigen::LLT<Eigen::MatrixXd>(model.nv);
+}
+
+const char* pinocchio_version() { return PINOCCHIO_VERSION; }
+
+Dynamics::~Dynamics() = default;
+Index Dynamics::configuration_size() const { return pinocchio_->model.nq; }
+Index Dynamics::size() const { return pinocchio_->model.nv; }
+Index Dynamics::columns() const { return pinocchio_->model.nvExtended; }
+Index Dynamics::joints() const { return pinocchio_->model.njoints; }
+
+}  // namespace hsp

@@ -1,0 +1,55 @@
+// What only the sources of this room include: Pinocchio, with the joints that we have.
+#pragma once
+#include <pinocchio/multibody.hpp>
+
+#include "dynamics.hpp"
+
+namespace hsp {
+
+namespace pin = pinocchio;
+
+// Of the 25 types of Pinocchio's own collection those that a controlled robot can have. Each
+// costs time to compile; what differs only by its axis is `Unaligned`, but what most joints are.
+template <class S, int O> struct JointTypes {
+  using Scalar = S;
+  static constexpr int Options = O;
+  using JointModelMimic = pin::JointModelMimicTpl<S, O, JointTypes>;
+  using JointDataMimic = pin::JointDataMimicTpl<S, O, JointTypes>;
+  using JointModelComposite = pin::JointModelCompositeTpl<S, O, JointTypes>;
+  using JointDataComposite = pin::JointDataCompositeTpl<S, O, JointTypes>;
+  using JointModelVariant = boost::variant<
+      pin::JointModelRevoluteTpl<S, O, 0>, pin::JointModelRevoluteTpl<S, O, 1>,
+      pin::JointModelRevoluteTpl<S, O, 2>, pin::JointModelRevoluteUnalignedTpl<S, O>,
+      pin::JointModelRevoluteUnboundedUnalignedTpl<S, O>,
+      pin::JointModelPrismaticUnalignedTpl<S, O>, pin::JointModelHelicalUnalignedTpl<S, O>,
+      pin::JointModelFreeFlyerTpl<S, O>, pin::JointModelSphericalTpl<S, O>,
+      pin::JointModelPlanarTpl<S, O>, pin::JointModelTranslationTpl<S, O>,
+      boost::recursive_wrapper<JointModelComposite>, boost::recursive_wrapper<JointModelMimic>>;
+  using JointDataVariant = boost::variant<
+      pin::JointDataRevoluteTpl<S, O, 0>, pin::JointDataRevoluteTpl<S, O, 1>,
+      pin::JointDataRevoluteTpl<S, O, 2>, pin::JointDataRevoluteUnalignedTpl<S, O>,
+      pin::JointDataRevoluteUnboundedUnalignedTpl<S, O>, pin::JointDataPrismaticUnalignedTpl<S, O>,
+      pin::JointDataHelicalUnalignedTpl<S, O>, pin::JointDataFreeFlyerTpl<S, O>,
+      pin::JointDataSphericalTpl<S, O>, pin::JointDataPlanarTpl<S, O>,
+      pin::JointDataTranslationTpl<S, O>, boost::recursive_wrapper<JointDataComposite>,
+      boost::recursive_wrapper<JointDataMimic>>;
+};
+
+struct Dynamics::Pinocchio {
+  using Model = pin::ModelTpl<double, 0, JointTypes>;
+  using Data = pin::DataTpl<double, 0, JointTypes>;
+
+  Model model;
+  Data data;
+  Vector zero, step, there;            // two of v's size, one of q's
+  Eigen::LLT<Eigen::MatrixXd> factor;  // of M, of models with followers
+
+  bool has_followers() const { return !model.mimicking_joints.empty(); }
+  const Data::MatrixXs& mass_matrix(const ConstVector& q);  // both triangles
+  // q ⊕ h v, until the next call.
+  ConstVector moved(const ConstVector& q, const ConstVector& v, double h);
+};
+
+inline ConstVector view(const Vector& x) { return {x.data(), x.size()}; }
+
+}  // namespace hsp

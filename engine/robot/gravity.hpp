@@ -1,0 +1,89 @@
+// What gravity asks of the motors, how that changes with the posture, and along the motion.
+#pragma once
+#include <hsp/records.hpp>
+
+namespace hsp {
+
+// A column of the Jacobian of all joints, (l, w) at the world's origin, moves the bodies beyond
+// it, of mass m, with s = Σ m c of their centres of mass. To Σ m c it adds x = m l + w × s, so
+// gravity g asks for the effort
+//
+//   G_k = -g·x_k,   ∂G_k/∂q_i = w_i·(g × x_k) where i carries k or is of the same joint,
+//                             = w_k·(g × x_i) where i is beyond k,
+//
+// and 0 where neither carries the other. Along v, with what carries k turning by Ω and what is
+// beyond it moving by ξ = Σ x_i v_i,
+//
+//   x_k' = Ω × x_k + w_k × ξ,
+//
+// and G'' at constant v is the rate of ∂G/∂q, times v. Columns of followers add to their leader's.
+struct Gravity {
+  static constexpr const char* doc =
+      "The efforts G that gravity takes, their slope ∂G/∂q, and G'' at constant velocity.";
+  Columns<6, 'x'> jacobian, jacobian_dot;  // in world axes at the world's origin
+  In<'j', 12> placements;                  // of the joints; see JointJacobians
+  In<'j'> mass;                            // of what is fixed to a joint [kg]
+  In<'j', 3> center;                       // its centre of mass in the joint [m]
+  Flags<'x', 'j'> moves;                   // whether a column moves a joint
+  Ints<'x'> joints, dofs;                  // of each column
+  In<3> gravity;
+  In<'n'> v;
+  Out<'n'> effort;
+  Out<'n', 'n'> slope;
+  Out<'n'> drift;
+  struct Memory {
+    Eigen::Matrix3Xd x, x_dot, moment;
+    void prepare(const Sizes& size) {
+      x.setZero(3, size('x'));
+      x_dot.setZero(3, size('x'));
+      moment.setZero(3, size('j'));
+    }
+  } memory;
+
+  auto l(Index k) const { return jacobian.col(k).head<3>(); }
+  auto w(Index k) const { return jacobian.col(k).tail<3>(); }
+  auto w_dot(Index k) const { return jacobian_dot.col(k).tail<3>(); }
+  bool carries(Index i, Index k) const { return moves(i, joints[k]); }
+
+  void operator()() {
+    auto& [x, x_dot, moment] = memory;
+    const Vector3 g = gravity;
+    for (Index b = 0; b < mass.size(); ++b) {
+      const auto R = placements.row(b).head<9>().reshaped(3, 3);  // column by column
+      moment.col(b) =
+          mass[b] * (R * center.row(b).transpose() + placements.row(b).tail<3>().transpose());
+    }
+    effort.setZero();
+    for (Index k = 0; k < x.cols(); ++k) {
+      double m = 0.0;
+      Vector3 s = Vector3::Zero();
+      for (Index b = 0; b < mass.size(); ++b)
+        if (moves(k, b)) {
+          m += mass[b];
+          s += moment.col(b);
+        }
+      x.col(k) = m * l(k) + w(k).cross(s);
+      effort[dofs[k]] -= g.dot(x.col(k));
+    }
+    for (Index k = 0; k < x.cols(); ++k) {
+      Vector3 turns = Vector3::Zero(), beyond = Vector3::Zero();  // Ω and ξ
+      for (Index i = 0; i < x.cols(); ++i)
+        if (carries(i, k)) turns += v[dofs[i]] * w(i);
+        else if (carries(k, i)) beyond += v[dofs[i]] * x.col(i);
+      x_dot.col(k) = turns.cross(x.col(k)) + w(k).cross(beyond);
+    }
+    slope.setZero();
+    drift.setZero();
+    for (Index k = 0; k < x.cols(); ++k)
+      for (Index i = 0; i < x.cols(); ++i) {
+        const bool above = carries(i, k);
+        if (!above && !carries(k, i)) continue;
+        const Index turning = above ? i : k, turned = above ? k : i;
+        const Vector3 z = g.cross(x.col(turned)), z_dot = g.cross(x_dot.col(turned));
+        slope(dofs[k], dofs[i]) += w(turning).dot(z);
+        drift[dofs[k]] += v[dofs[i]] * (w_dot(turning).dot(z) + w(turning).dot(z_dot));
+      }
+  }
+};
+
+}  // namespace hsp

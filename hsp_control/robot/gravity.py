@@ -1,0 +1,52 @@
+"""What gravity asks of the motors at a posture, and how that changes."""
+
+import numpy as np
+import pinocchio as pin
+
+from hsp_control import engine
+from hsp_control.common.arrays import Array
+from hsp_control.engine.plans import PartCalls
+from hsp_control.robot.kinematics import WorldKinematics, joint_support
+
+
+class Gravity:
+    """The efforts that gravity takes, their slope, and their drift along the motion.
+
+    Attributes:
+        calls: Bring the attributes below up to date, after the state has moved.
+        effort: G(q), shape (nv,) [N·m or N].
+        slope: ∂G/∂q, shape (nv, nv).
+        drift: G'' at constant velocity, shape (nv,).
+    """
+
+    def __init__(self, model: pin.Model, world: WorldKinematics) -> None:
+        """Allocate the arrays."""
+        nv, joints = model.nv, range(model.njoints)
+        columns = [joint for joint in joints for _ in range(_width(model, joint))]
+        moves = np.zeros((model.nvExtended, model.njoints), dtype=np.bool_)
+        dofs = np.zeros(model.nvExtended, dtype=np.int64)
+        for joint in joints:
+            support, of_v = joint_support(model, joint)
+            moves[support, joint], dofs[support] = True, of_v
+        bodies = [*model.inertias]
+        self.effort: Array = np.zeros(nv)
+        self.slope: Array = np.zeros((nv, nv))
+        self.drift: Array = np.zeros(nv)
+        given = (
+            world.jacobian,
+            world.jacobian_dot,
+            world.placements,
+            np.array([body.mass for body in bodies]),
+            np.array([body.lever for body in bodies]),
+            moves,
+            np.array(columns, dtype=np.int64),
+            dofs,
+            np.array(model.gravity.linear),
+            world.v,
+        )
+        found = self.effort, self.slope, self.drift
+        self.calls: PartCalls = [(engine.Gravity, (*given, *found))]
+
+
+def _width(model: pin.Model, joint: int) -> int:
+    return int(model.joints[joint].nvExtended) if joint else 0
