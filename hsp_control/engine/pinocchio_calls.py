@@ -195,5 +195,5 @@ def _native(
     kept = arguments, references
     call: Runnable = ForeignCall(_address(_NAMES[what]), words, kept)
     if what == "crba":  # writes one triangle
-        call = Plan([call, engine.Mirror(matrix_view(data.M))])
+        call = Plan([call, engine.Mirror(M=matrix_view(data.M))])
     return PinocchioCall(call, what, *arguments)

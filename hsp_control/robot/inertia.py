@@ -29,10 +29,13 @@ def inertia_terms(
     M = Term(value, [Once.at(stamp, *_mass_matrix_calls(model, data, q))])
     M_dot = np.zeros((model.nv, model.nv))
     if model.mimicking_joints:  # Pinocchio has no C of such a model
-        given = model, model.createData(), q, v, M_dot
-        return M, Term(M_dot, [Once.at(stamp, (_write_difference, given))])
-    coriolis = pin.computeCoriolisMatrix, (model, data, q, v)
-    add = engine.InertiaRate, (matrix_view(data.C), M_dot)
+        own = model.createData()
+        difference = PartCall(
+            _write_difference, model=model, data=own, q=q, v=v, M_dot=M_dot
+        )
+        return M, Term(M_dot, [Once.at(stamp, difference)])
+    coriolis = PartCall(pin.computeCoriolisMatrix, model=model, data=data, q=q, v=v)
+    add = PartCall(engine.InertiaRate, C=matrix_view(data.C), M_dot=M_dot)
     return M, Term(M_dot, [Once.at(stamp, coriolis, add)])
 
 
@@ -53,9 +56,9 @@ def _mass_matrix_calls(
 ) -> Sequence[PartCall]:
     """Return the calls of `mass_matrix`."""
     clearing: list[PartCall] = [
-        (engine.Clear, (matrix,)) for matrix in _remembered(model, data)
+        PartCall(engine.Clear, matrix=matrix) for matrix in _remembered(model, data)
     ]
-    return [*clearing, (pin.crba, (model, data, q))]
+    return [*clearing, PartCall(pin.crba, model=model, data=data, q=q)]
 
 
 def _remembered(model: pin.Model, data: pin.Data) -> list[Array]:
@@ -111,14 +114,26 @@ class CentroidalMotion:
         self.jacobian_dot: Array = np.zeros((3, model.nv))
         self.momentum_matrix: Array = np.zeros((3, model.nv))
         self.momentum_matrix_dot: Array = np.zeros((3, model.nv))
-        momentum = pin.computeCentroidalMapTimeVariation, (model, data, q, v)
-        found = self.velocity, self.jacobian, self.jacobian_dot
-        angular = self.momentum_matrix, self.momentum_matrix_dot
-        sums = matrix_view(data.Ag), matrix_view(data.dAg), self.mass, v
-        extract = engine.CentroidalRows, (*sums, *found, *angular)
+        momentum = PartCall(
+            pin.computeCentroidalMapTimeVariation, model=model, data=data, q=q, v=v
+        )
+        extract = PartCall(
+            engine.CentroidalRows,
+            A=matrix_view(data.Ag),
+            A_dot=matrix_view(data.dAg),
+            mass=self.mass,
+            v=v,
+            velocity=self.velocity,
+            J=self.jacobian,
+            J_dot=self.jacobian_dot,
+            angular=self.momentum_matrix,
+            angular_dot=self.momentum_matrix_dot,
+        )
         # It reads the velocity of the centre, which it does not write: of others' calls
         # nothing is to be in A'.
-        rest = engine.Clear, (kept_view(data.vcom[0].reshape(1, 3), data),)
+        rest = PartCall(
+            engine.Clear, matrix=kept_view(data.vcom[0].reshape(1, 3), data)
+        )
         self.calls: PartCalls = [Once.at(stamp, rest, momentum, extract)]
 
     @cached_property

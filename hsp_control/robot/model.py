@@ -8,6 +8,7 @@ import pinocchio as pin
 
 from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import ModelError
+from hsp_control.engine.plans import PartCall
 from hsp_control.robot.inertia import mass_matrix
 from hsp_control.robot.kinematics import Term
 from hsp_control.robot.structure import Structure
@@ -175,14 +176,16 @@ class RobotModel(Structure):
     def bind_forward_dynamics(self, q: Array, v: Array, tau: Array) -> Term:
         """Return `forward_dynamics` for what these arrays hold when it is computed."""
         if not self.mimics:
-            given = self.model, self._data, q, v, tau
-            return Term(self._data.ddq, [(pin.aba, given)])
+            call = PartCall(
+                pin.aba, model=self.model, data=self._data, q=q, v=v, tau=tau
+            )
+            return Term(self._data.ddq, [call])
         value = np.zeros(self.nv)
 
         def compute(q: Array, v: Array, tau: Array) -> None:
             value[:] = self._forward_dynamics_of_mimics(q, v, tau)
 
-        return Term(value, [(compute, (q, v, tau))])
+        return Term(value, [PartCall(compute, q=q, v=v, tau=tau)])
 
     def _forward_dynamics_of_mimics(self, q: Array, v: Array, tau: Array) -> Array:
         M = mass_matrix(self.model, self._data, q)

@@ -79,13 +79,20 @@ class RobotState:
         self.stamp_array: Indices = np.zeros(1, dtype=np.int64)
         blocks = np.array(robot.unit_blocks, dtype=np.int64).reshape(-1, 2)
         # writable, also where `seen` binds calls
-        self._memory = self.time, self.q, self.v, blocks, self.stamp_array
+        self._memory = {
+            "time": self.time,
+            "q": self.q,
+            "v": self.v,
+            "unit_blocks": blocks,
+            "stamp": self.stamp_array,
+        }
         self._seen: RobotState | None = None
         self._read_only: RobotState | None = None
         self._data: pin.Data = robot.model.createData()
         self._shown_data: tuple[pin.Data, int] | None = None
         self.effort: Array = kept_view(self._data.tau, self._data)
         self._at = robot.model, self._data, self.q, self.v  # what Pinocchio is given
+        self._given = dict(zip(("model", "data", "q", "v"), self._at, strict=True))
         self._acceleration: Array = np.zeros(robot.nv)
         self._inverse_dynamics = self._bound(self.rnea(self._acceleration))
         self._world: WorldKinematics | None = None
@@ -94,7 +101,7 @@ class RobotState:
         self.inertia, self.inertia_rate = inertia_terms(*self._at, stamp)
         self._compute_inertia = self._bound(*self.inertia.calls)
         self._compute_inertia_rate = self._bound(*self.inertia_rate.calls)
-        effects = pin.nonLinearEffects, self._at
+        effects = PartCall(pin.nonLinearEffects, **self._given)
         self._compute_effects = self._bound(Once.at(stamp, effects))
         self._centroidal: tuple[CentroidalMotion, Callable[[], object]] | None = None
         self._displaced: RobotState | None = None
@@ -172,8 +179,9 @@ class RobotState:
 
     def bind_move(self, calls: Sequence[Step] = ()) -> Move:
         """Return how `advance` moves this state, with calls of the time that follow."""
-        jacobians = pin.computeJointJacobiansTimeVariation, self._at
-        return Move(Plan([*self.plan([jacobians]).steps(), *calls]), *self._memory)
+        jacobians = PartCall(pin.computeJointJacobiansTimeVariation, **self._given)
+        plan = Plan([*self.plan([jacobians]).steps(), *calls])
+        return Move(calls=plan, **self._memory)
 
     def _refuse(self, t: float, q: ArrayLike, v: ArrayLike) -> None:
         """Raise the error that says what is wrong with t, q and v."""
@@ -252,7 +260,7 @@ class RobotState:
 
     def rnea(self, acceleration: Array) -> PartCall:
         """Return a call that writes `effort` for what this array (nv,) then holds."""
-        return pin.rnea, (*self._at, acceleration)
+        return PartCall(pin.rnea, **self._given, a=acceleration)
 
     @property
     def stamp(self) -> int:

@@ -15,12 +15,17 @@ from hsp_control.engine.pinocchio_calls import PinocchioCall
 from hsp_control.engine.plans import bind
 
 
+def given(*arguments: Any) -> dict[str, Any]:
+    """Return arguments by name; their order is Pinocchio's."""
+    return {f"_{i}": argument for i, argument in enumerate(arguments)}
+
+
 def both(
     what: str, model: pin.Model, *vectors: Array
 ) -> tuple[pin.Data, pin.Data, Any]:
     """Return the data after the native call and after the bindings', and the call."""
     native, bound = model.createData(), model.createData()
-    call = bind(getattr(pin, what), model, native, *vectors)
+    call = bind(getattr(pin, what), given(model, native, *vectors))
     call()
     getattr(pin, what)(model, bound, *vectors)
     return native, bound, call
@@ -80,7 +85,7 @@ def test_what_is_not_packed_is_left_to_the_bindings() -> None:
     )
     assert not isinstance(call, PinocchioCall)
     np.testing.assert_array_equal(native.dJ, bound.dJ)
-    call = bind(pin.crba, robot.model, native, q[:-1])
+    call = bind(pin.crba, given(robot.model, native, q[:-1]))
     with pytest.raises(ValueError, match="size"):
         call()
 
