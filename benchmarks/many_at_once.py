@@ -27,7 +27,11 @@ def ways(robot: Robot) -> dict[str, Callable[[], object]]:
     data, columns = model.createData(), [np.asfortranarray(x.T) for x in (q, v, tau)]
     pool, out = pin.ModelPool(model, 2), np.asfortranarray(np.zeros((robot.nv, STATES)))
     here = q[0].copy(), v[0].copy(), tau[0].copy()
-    call = engine.ForwardDynamics(robot.dynamics(), *here, np.zeros(robot.nv))
+    call = engine.ForwardDynamics(
+        dynamics=robot.dynamics(),
+        **dict(zip(("q", "v", "effort"), here, strict=True)),
+        acceleration=np.zeros(robot.nv),
+    )
 
     def bindings() -> None:
         for k in range(STATES):

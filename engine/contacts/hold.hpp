@@ -18,11 +18,11 @@ template <class Sample, class V> void damp_velocity(const V& v, double damping, 
 // angular rows its rows are l + w × r, and their rate is l' + w' × r + w × r', where r' = ω × R p.
 struct FramePoint {
   FrameMotion<In> frame;
-  In<3> p, s;
+  In<3> position, shift;  // p and s
 
   template <class J, class J_dot> void write_rows(J& rows, J_dot& rows_dot) const {
-    const Vector3 turned = frame.rotation * p, omega = frame.velocity.tail<3>();
-    const Matrix3 r = skew(turned + s), r_dot = skew(omega.cross(turned));
+    const Vector3 turned = frame.rotation * position, omega = frame.velocity.tail<3>();
+    const Matrix3 r = skew(turned + shift), r_dot = skew(omega.cross(turned));
     const auto w = frame.jacobian.bottomRows<3>(), w_dot = frame.jacobian_dot.bottomRows<3>();
     rows = frame.jacobian.topRows<3>() - r.lazyProduct(w);
     rows_dot = frame.jacobian_dot.topRows<3>() - r.lazyProduct(w_dot) - r_dot.lazyProduct(w);

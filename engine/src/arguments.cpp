@@ -2,6 +2,9 @@
 
 #include <nanobind/stl/string.h>
 
+#include <algorithm>
+#include <cmath>
+
 #include "numpy.hpp"
 #include "python_objects.hpp"
 
@@ -63,9 +66,10 @@ void* shared_object(std::string_view type, nb::handle given) {
 Argument argument(const Kind& kind, const Field& field, nb::handle given) {
   Argument found;
   if (field.access == Access::Number) {
-    if (!nb::try_cast(given, found.number))
-      throw nb::type_error((std::string(kind.name) + ": " + field.name + " is a number; got " +
-                            text_of(nb::repr(given)))
+    const bool whole = field.entry != 'd';
+    if (!nb::try_cast(given, found.number) || (whole && found.number != std::floor(found.number)))
+      throw nb::type_error((std::string(kind.name) + ": " + field.name + " is a " +
+                            (whole ? "whole " : "") + "number; got " + text_of(nb::repr(given)))
                                .c_str());
   } else if (field.access == Access::Object) {
     found.data = shared_object(field.object, given);
@@ -76,44 +80,126 @@ Argument argument(const Kind& kind, const Field& field, nb::handle given) {
   return found;
 }
 
-bool ends_with(std::string_view text, std::string_view end) {
-  return end.size() <= text.size() && text.substr(text.size() - end.size()) == end;
-}
+// The arguments of a call while they are read, by name.
+class Given {
+ public:
+  explicit Given(const Kind& kind) : kind_(kind), values_(kind.count) {}
+
+  void add(const std::string& name, nb::handle value) {
+    if (nb::object* place = find(name)) {
+      if (place->is_valid()) complain(": " + name + " is given twice");
+      *place = nb::borrow(value);
+    } else if (!is_group(name)) {
+      complain(" has no argument " + name + suggestion(name));
+    } else if (nb::isinstance<nb::dict>(value)) {
+      for (auto [key, each] : nb::borrow<nb::dict>(value)) add(name + "." + text_of(key), each);
+    } else if (nb::isinstance<nb::tuple>(value) && nb::hasattr(value, "_fields")) {
+      std::size_t i = 0;
+      for (nb::handle key : value.attr("_fields")) add(name + "." + text_of(key), value[i++]);
+    } else {
+      complain(": " + name + " is " + members(name) + "; got " + text_of(nb::repr(value)));
+    }
+  }
+
+  nb::tuple all() const {
+    std::string text;
+    std::string_view last;
+    for (std::int64_t k = 0; k < kind_.count; ++k) {
+      if (values_[k].is_valid()) continue;
+      const std::string_view missing = whole_group(kind_.fields[k].name);
+      if (missing != last) text += std::string(text.empty() ? "" : ", ").append(missing);
+      last = missing;
+    }
+    if (!text.empty()) complain(" needs " + text);
+    nb::list found;
+    for (const nb::object& each : values_) found.append(each);
+    return nb::tuple(found);
+  }
+
+ private:
+  // The place of a field; mostly it is the one after that of the last.
+  nb::object* find(std::string_view name) {
+    for (std::int64_t i = 0; i < kind_.count; ++i) {
+      const std::int64_t k = (next_ + i) % kind_.count;
+      if (name != kind_.fields[k].name) continue;
+      next_ = k + 1;
+      return &values_[k];
+    }
+    return nullptr;
+  }
+
+  static bool is_in(std::string_view group, std::string_view name) {
+    return name.size() > group.size() && name[group.size()] == '.' && name.starts_with(group);
+  }
+  bool is_group(std::string_view name) const {
+    const Field* end = kind_.fields + kind_.count;
+    return std::any_of(kind_.fields, end, [&](const Field& x) { return is_in(name, x.name); });
+  }
+  // The largest group around a member of which nothing is given; else the member.
+  std::string_view whole_group(std::string_view name) const {
+    for (auto dot = name.find('.'); dot != name.npos; dot = name.find('.', dot + 1)) {
+      const std::string_view group = name.substr(0, dot);
+      bool given = false;
+      for (std::int64_t k = 0; k < kind_.count; ++k)
+        given |= values_[k].is_valid() && is_in(group, kind_.fields[k].name);
+      if (!given) return group;
+    }
+    return name;
+  }
+
+  // "a record of position, velocity"
+  std::string members(std::string_view group) const {
+    std::string text = "a record of ", last;
+    for (std::int64_t k = 0; k < kind_.count; ++k) {
+      const std::string_view name = kind_.fields[k].name;
+      if (!is_in(group, name)) continue;
+      const std::string member(
+          name.substr(group.size() + 1, name.find('.', group.size() + 1) - group.size() - 1));
+      if (member != last) text += (last.empty() ? "" : ", ") + member;
+      last = member;
+    }
+    return text;
+  }
+
+  std::string suggestion(const std::string& name) const {
+    nb::list names;
+    for (std::int64_t k = 0; k < kind_.count; ++k) {
+      const std::string_view full = kind_.fields[k].name;
+      for (auto dot = full.find('.'); dot != full.npos; dot = full.find('.', dot + 1))
+        if (const auto group = full.substr(0, dot); !is_in(group, name))
+          names.append(nb::cast(std::string(group)));
+      names.append(nb::cast(std::string(full)));
+    }
+    const nb::object close =
+        nb::module_::import_("difflib").attr("get_close_matches")(name, names, 1);
+    if (nb::len(close) == 0) return "; it is " + signature(kind_);
+    return "; did you mean " + text_of(close[0]) + "?";
+  }
+
+  [[noreturn]] void complain(const std::string& text) const {
+    throw nb::type_error((kind_.name + text).c_str());
+  }
+
+  const Kind& kind_;
+  std::vector<nb::object> values_;
+  std::int64_t next_ = 0;
+};
 
 }  // namespace
 
-void Leaves::add(nb::tuple given, const std::string& prefix) {
-  const nb::object fields = nb::getattr(given, "_fields", nb::none());
-  std::size_t i = 0;
-  for (nb::handle each : given) {
-    std::string name = prefix;
-    if (!fields.is_none()) name += "." + nb::cast<std::string>(fields[i]);
-    ++i;
-    if (nb::isinstance<nb::tuple>(each)) {
-      add(nb::borrow<nb::tuple>(each), name);
-    } else {
-      values.push_back(nb::borrow(each));
-      names.push_back(name);
-    }
-  }
+nb::tuple values_of(const Kind& kind, nb::args by_order, nb::kwargs by_name) {
+  if (by_order.size())
+    throw nb::type_error(
+        (std::string(kind.name) + " takes its arguments by name: " + signature(kind)).c_str());
+  Given given(kind);
+  for (auto [name, value] : by_name) given.add(nb::cast<std::string>(name), value);
+  return given.all();
 }
 
-std::vector<Argument> arguments_of(const Kind& kind, nb::tuple given) {
-  const Leaves leaves(given);
-  if (static_cast<std::int64_t>(leaves.values.size()) != kind.count)
-    throw nb::type_error((std::string(kind.name) + " has " + std::to_string(kind.count) +
-                          " arguments; got " + std::to_string(leaves.values.size()) + ": " +
-                          signature(kind))
-                             .c_str());
+std::vector<Argument> arguments_of(const Kind& kind, nb::tuple values) {
   std::vector<Argument> found;
-  for (std::int64_t k = 0; k < kind.count; ++k) {
-    const Field& field = kind.fields[k];
-    if (!ends_with(std::string(".") + field.name, leaves.names[k]))
-      throw nb::type_error((std::string(kind.name) + ": in the place of " + field.name +
-                            " stands a record's " + leaves.names[k].substr(1))
-                               .c_str());
-    found.push_back(argument(kind, field, leaves.values[k]));
-  }
+  for (std::int64_t k = 0; k < kind.count; ++k)
+    found.push_back(argument(kind, kind.fields[k], values[k]));
   return found;
 }
 

@@ -9,18 +9,13 @@
 
 namespace hsp {
 
-// The leaves of nested tuples in order, and what records call them: ".task.error".
-struct Leaves {
-  explicit Leaves(nanobind::tuple given) { add(given, ""); }
-  std::vector<nanobind::object> values;
-  std::vector<std::string> names;
+// What is given for each field of a kind, in their order. A group is given as a record of its
+// members, which is a named tuple or a dict, or member by member: "task.error". Throws
+// nb::type_error where an argument is missing, unknown, given twice or not by its name.
+nanobind::tuple values_of(const Kind& kind, nanobind::args by_order, nanobind::kwargs by_name);
 
- private:
-  void add(nanobind::tuple given, const std::string& prefix);
-};
-
-// Throws nb::type_error where an argument is not what its field says.
-std::vector<Argument> arguments_of(const Kind& kind, nanobind::tuple given);
+// Throws nb::type_error where a value is not what its field says.
+std::vector<Argument> arguments_of(const Kind& kind, nanobind::tuple values);
 
 // "Circle(rate, center: reads float64 (d,), ...)"
 std::string signature(const Kind& kind);

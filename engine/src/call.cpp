@@ -50,20 +50,25 @@ std::string shape_text(const Field& field) {
 
 Call::Call(const Kind& kind_, const std::vector<Argument>& arguments) : kind(kind_) {
   const Sizes sizes = sizes_of(kind, arguments);
-  self_ = ::operator new(kind.size, std::align_val_t(kind.alignment));
-  kind.construct(self_);
+  const auto release = [&](void* memory) {
+    ::operator delete(memory, std::align_val_t(kind.alignment));
+  };
+  std::unique_ptr<void, decltype(release)> memory(
+      ::operator new(kind.size, std::align_val_t(kind.alignment)), release);
+  kind.construct(memory.get());
+  self_ = std::unique_ptr<void, Delete>(memory.release(), Delete{&kind});
   for (std::int64_t k = 0; k < kind.count; ++k) {
     const Field& field = kind.fields[k];
     Argument given = arguments[k];
     void* data = field.access == Access::Number ? &given.number : given.data;
-    field.bind(static_cast<char*>(self_) + field.offset, data, given.shape);
+    field.bind(static_cast<char*>(self()) + field.offset, data, given.shape);
   }
-  kind.prepare(self_, sizes);
+  kind.prepare(self(), sizes);
 }
 
-Call::~Call() {
-  kind.destroy(self_);
-  ::operator delete(self_, std::align_val_t(kind.alignment));
+void Call::Delete::operator()(void* self) const {
+  kind->destroy(self);
+  ::operator delete(self, std::align_val_t(kind->alignment));
 }
 
 }  // namespace hsp

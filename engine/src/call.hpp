@@ -1,6 +1,7 @@
 // A call: a kind with its arguments, checked and bound once.
 #pragma once
 #include <hsp/kind.hpp>
+#include <memory>
 #include <string>
 #include <vector>
 
@@ -17,17 +18,18 @@ class Call {
   // One argument for each of the kind's fields, in their order. Throws std::invalid_argument
   // where a letter would stand for two numbers, or a size is not as the kind has it.
   Call(const Kind& kind, const std::vector<Argument>& arguments);
-  ~Call();
-  Call(const Call&) = delete;
-  Call& operator=(const Call&) = delete;
 
-  double operator()(double t) const { return kind.run(self_, t); }
-  void* self() const { return self_; }
+  double operator()(double t) const { return kind.run(self(), t); }
+  void* self() const { return self_.get(); }
 
   const Kind& kind;
 
  private:
-  void* self_;
+  struct Delete {
+    const Kind* kind;
+    void operator()(void* self) const;
+  };
+  std::unique_ptr<void, Delete> self_;  // the kind's struct
 };
 
 // A field's shape as one writes it: "(m, 3)".

@@ -19,15 +19,14 @@ using namespace hsp;
 namespace {
 
 std::string described(const CallObject& object) {
-  const Leaves leaves(object.arguments);
   const Kind& kind = object.call.kind;
   std::string text = std::string(kind.name) + "(";
   for (std::int64_t k = 0; k < kind.count; ++k) {
     const Field& field = kind.fields[k];
     text += std::string(k ? ", " : "") + field.name + "=";
-    text += field.access == Access::Number   ? text_of(nb::repr(leaves.values[k]))
+    text += field.access == Access::Number   ? text_of(nb::repr(object.values[k]))
             : field.access == Access::Object ? field.object
-                                             : "array" + text_of(leaves.values[k].attr("shape"));
+                                             : "array" + text_of(object.values[k].attr("shape"));
   }
   return text + ")";
 }
@@ -73,8 +72,11 @@ NB_MODULE(_engine, m) {
   nb::class_<Kind>(m, "Kind", "A kind of call: what its arguments are, and its mathematics.")
       .def("__repr__", &signature)
       .def(
-          "__call__", [](const Kind& kind, nb::args given) { return new CallObject(kind, given); },
-          "Return a call with these arguments; those of a group may be a record.")
+          "__call__",
+          [](const Kind& kind, nb::args by_order, nb::kwargs by_name) {
+            return new CallObject(kind, values_of(kind, by_order, by_name));
+          },
+          "Return a call with these arguments, by name; a group is a record of its members.")
       .def_prop_ro("doc", [](const Kind& kind) { return kind.doc; })
       .def_prop_ro("name", [](const Kind& kind) { return kind.name; })
       .def_prop_ro("timed", [](const Kind& kind) { return kind.timed; })
@@ -98,26 +100,18 @@ NB_MODULE(_engine, m) {
 
   nb::class_<CallObject, Runnable>(
       m, "Call", "A kind with its arguments, whose memory it reads each time that it is made.",
-      nb::type_slots(slots<CallObject, &CallObject::arguments>))
+      nb::type_slots(slots<CallObject, &CallObject::values>))
       .def("__repr__", &described)
       .def_prop_ro(
           "kind", [](const CallObject& c) -> const Kind& { return c.call.kind; },
           nb::rv_policy::reference)
-      .def_ro("arguments", &CallObject::arguments)
       .def_prop_ro(
-          "values",
-          [](const CallObject& c) {
-            const Leaves leaves(c.arguments);
-            nb::dict found;
-            for (std::size_t k = 0; k < leaves.values.size(); ++k)
-              found[c.call.kind.fields[k].name] = leaves.values[k];
-            return found;
-          },
-          "The arguments by name.")
+          "values", [](const CallObject& c) { return named_values(c.call.kind, c.values); },
+          "The arguments by name, those of groups as in 'out.position'.")
       .def("__reduce__", [](const CallObject& c) {
-        return nb::make_tuple(
-            engine("call"),
-            nb::make_tuple(nb::cast(c.call.kind, nb::rv_policy::reference), c.arguments));
+        return nb::make_tuple(engine("call"),
+                              nb::make_tuple(nb::cast(c.call.kind, nb::rv_policy::reference),
+                                             named_values(c.call.kind, c.values)));
       });
 
   nb::class_<PlanObject, Runnable>(m, "Plan", "Calls that are made one after the other.",
@@ -159,13 +153,21 @@ NB_MODULE(_engine, m) {
            [](const DynamicsObject& d) { return nb::make_tuple(engine("Dynamics"), d.given); });
 
   nb::class_<MoveObject>(m, "Move", "Copies t, q and v where they are valid, and makes a plan.",
-                         nb::type_slots(slots<MoveObject, &MoveObject::arguments>))
-      .def("__init__", [](MoveObject* self, nb::args given) { new (self) MoveObject(given); })
+                         nb::type_slots(slots<MoveObject, &MoveObject::values>))
+      .def("__init__",
+           [](MoveObject* self, nb::args by_order, nb::kwargs by_name) {
+             new (self) MoveObject(values_of(kind_of<Move>(), by_order, by_name));
+           })
       .def("__call__", &MoveObject::operator(), "t"_a, "q"_a, "v"_a)
-      .def_ro("arguments", &MoveObject::arguments)
+      .def_prop_ro(
+          "values",
+          [](const MoveObject& move) { return named_values(kind_of<Move>(), move.values); })
       .def_ro("python", &MoveObject::python)
-      .def("__reduce__",
-           [](const MoveObject& move) { return nb::make_tuple(engine("Move"), move.arguments); });
+      .def("__reduce__", [](const MoveObject& move) {
+        return nb::make_tuple(
+            engine("call"),
+            nb::make_tuple(engine("Move"), named_values(kind_of<Move>(), move.values)));
+      });
   m.attr("REFUSED") = refused;
   m.attr("PINOCCHIO") = pinocchio_version();
 

@@ -17,6 +17,12 @@ bool CallObject::runs_python(nb::tuple given) {
   return false;
 }
 
+nb::dict named_values(const Kind& kind, nb::tuple values) {
+  nb::dict found;
+  for (std::int64_t k = 0; k < kind.count; ++k) found[kind.fields[k].name] = values[k];
+  return found;
+}
+
 bool PlanObject::is_python(nb::handle call) {
   if (nb::isinstance<MoveObject>(call)) return nb::cast<MoveObject&>(call).python;
   return nb::isinstance<Runnable>(call) && nb::cast<Runnable&>(call).python;
@@ -109,7 +115,7 @@ DynamicsObject::DynamicsObject(nb::tuple joints, nb::tuple gravity, nb::tuple ar
       dynamics(joints_of(joints), vector3(gravity), vector_of(armature)) {}
 
 MoveObject::MoveObject(nb::tuple given)
-    : arguments(given),
+    : values(given),
       call(kind_of<Move>(), arguments_of(kind_of<Move>(), given)),
       python(CallObject::runs_python(given)) {}
 

@@ -22,15 +22,17 @@ struct Runnable {
 // A kind with its arguments, which own the memory.
 struct CallObject : Runnable {
   CallObject(const Kind& kind, nanobind::tuple given)
-      : arguments(given), call(kind, arguments_of(kind, given)) {
+      : values(given), call(kind, arguments_of(kind, given)) {
     row = {kind.run, call.self()};
     python = runs_python(given);
   }
   static bool runs_python(nanobind::tuple given);
 
-  nanobind::tuple arguments;
+  nanobind::tuple values;  // in the order of the kind's fields
   Call call;
 };
+
+nanobind::dict named_values(const Kind& kind, nanobind::tuple values);
 
 // Calls that are made one after the other.
 struct PlanObject : Runnable {
@@ -72,10 +74,10 @@ struct DynamicsObject {
 
 // A state's move, as Python makes it.
 struct MoveObject {
-  MoveObject(nanobind::tuple given);
+  explicit MoveObject(nanobind::tuple given);
   double operator()(double t, nanobind::handle q, nanobind::handle v);
 
-  nanobind::tuple arguments;
+  nanobind::tuple values;
   Call call;
   bool python;
 };

@@ -23,28 +23,26 @@ struct Circle {
 
 struct Lissajous {
   static constexpr const char* doc = "x(t) = c + a sin(ω t + φ), for each coordinate.";
-  In<4, 'd'> parameters;  // c, a, ω, φ
+  In<'d'> center, amplitudes, rates, phases;
   TrajectorySample<Out> out;
 
   void operator()(double t) {
-    const auto center = parameters.row(0).transpose().array();
-    const auto amplitude = parameters.row(1).transpose().array();
-    const auto rate = parameters.row(2).transpose().array();
-    const auto angle = rate * t + parameters.row(3).transpose().array();
-    out.position = center + amplitude * angle.sin();
-    out.velocity = rate * amplitude * angle.cos();
-    out.acceleration = -rate.square() * amplitude * angle.sin();
+    const auto a = amplitudes.array(), w = rates.array();
+    const auto angle = w * t + phases.array();
+    out.position = center.array() + a * angle.sin();
+    out.velocity = w * a * angle.cos();
+    out.acceleration = -w.square() * a * angle.sin();
   }
 };
 
 struct UniformLine {
   static constexpr const char* doc = "x(t) = x0 + t v.";
-  In<'d'> start, speed;
+  In<'d'> start, velocity;
   TrajectorySample<Out> out;
 
   void operator()(double t) {
-    out.position = start + t * speed;
-    out.velocity = speed;
+    out.position = start + t * velocity;
+    out.velocity = velocity;
     out.acceleration.setZero();
   }
 };

@@ -47,13 +47,13 @@ struct OrientationPath {
 
 struct Spin {
   static constexpr const char* doc = "R(t) = exp(t ω) R0, ω in world axes.";
-  In<3> omega;
+  In<3> angular_velocity;
   In<3, 3> start;
   OrientationSample<Out> out;
 
   void operator()(double t) {
-    out.rotation = exp3(t * omega) * start;
-    out.angular_velocity = omega;
+    out.rotation = exp3(t * angular_velocity) * start;
+    out.angular_velocity = angular_velocity;
     out.angular_acceleration.setZero();
   }
 };

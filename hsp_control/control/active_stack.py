@@ -15,7 +15,7 @@ from hsp_control.control.actuation.support import Support
 from hsp_control.control.setup import PlannedTask
 from hsp_control.edge import Resolution
 from hsp_control.edge.threshold import Following
-from hsp_control.engine.plans import AnyCall
+from hsp_control.engine.plans import AnyCall, PartCall
 from hsp_control.law import CONSTANT, FieldSample, Outcome, TaskSample
 from hsp_control.law.outcome import outcome_of
 from hsp_control.null_space.fields import FieldSum, NullSpaceField
@@ -110,8 +110,14 @@ class ActiveStack:
                 ends = each.task.part_ends()
                 away = partial(slipped, in_force.numbers, ends)
                 pulls = self.resolution.problem.pulls[here]
-                given = parts_of(in_force.numbers), ends, sample.error, pulls
-                self._calls.append((engine.SpringPulls, given))
+                call = PartCall(
+                    engine.SpringPulls,
+                    impedance=parts_of(in_force.numbers),
+                    ends=ends,
+                    e=sample.error,
+                    pulls=pulls,
+                )
+                self._calls.append(call)
                 self.bounds.append((each.task.name, here, away))
             elif len(in_force.feedback.largest):
                 away = partial(beyond_largest, largest=in_force.feedback.largest)
@@ -126,8 +132,14 @@ class ActiveStack:
             if (follows or draws) and not balances:
                 # at rest: what damps is not lost, at any speed
                 stretched = self.resolution.problem.stretched[here]
-                rest = in_force.feedback, sample.error, asked, stretched
-                self._calls.append((engine.AskedAtRest, rest))
+                call = PartCall(
+                    engine.AskedAtRest,
+                    feedback=in_force.feedback,
+                    e=sample.error,
+                    asked=asked,
+                    stretched=stretched,
+                )
+                self._calls.append(call)
             row += each.task.rows
         # names of each level's tasks; ``contacts`` for those at the top
         self.level_names = [
@@ -172,7 +184,8 @@ class ActiveStack:
         if self._rest is not None:
             held = self.rows.rows(0, self._held)
             free = self.rows.rows(self._held, self.first_task_row)
-            calls.append((self._rest.evaluate, (state, held, free)))
+            rest = PartCall(self._rest.evaluate, state=state, contacts=held, out=free)
+            calls.append(rest)
         calls += metric.calls(state, problem.metric)
         sample, form = problem.field, metric.form
         if isinstance(field, FieldSum):

@@ -103,5 +103,14 @@ def limited_target(
         permitted: What excesses are relative to.
         barred: Rows of barriers; ``lower`` then is for deviations from the new a.
     """
-    given = M, a, effort, parts, bounds, permitted, barred, LARGE
-    return engine.LimitedTarget, given
+    return PartCall(
+        engine.LimitedTarget,
+        M=M,
+        a=a,
+        effort=effort,
+        parts=parts,
+        bounds=bounds,
+        permitted=permitted,
+        barred=barred,
+        large=LARGE,
+    )

@@ -75,16 +75,32 @@ class Resolution:
     def call(self, v: Array, *, controls: bool = True) -> PartCall:
         """Return the call that writes a and e_N; it returns what `outcome_of` takes."""
         problem = self.problem
-        law = (
-            *(problem.task, problem.field, problem.metric, self.form),
-            *(v, problem.gain, controls),
-        )
-        rows = self.ends, *problem.rows
-        found = self.null_space_error, self.acceleration, self.code
-        return engine.Resolve, (
-            *(law, rows, self.threshold, self._following, self._exact_beside),
-            *(self.alone, BEYOND_ANY_LEVEL, self._thresholds, self.factors),
-            *(self.projectors, self.edge, self.damped_code, *found),
+        law = {
+            "task": problem.task,
+            "field": problem.field,
+            "metric": problem.metric,
+            "form": self.form,
+            "v": v,
+            "K_N": problem.gain,
+            "controls": controls,
+        }
+        return PartCall(
+            engine.Resolve,
+            law=law,
+            rows={"ends": self.ends, **problem.rows},
+            least=self.threshold,
+            following=self._following,
+            exact_beside=self._exact_beside,
+            alone=self.alone,
+            beyond=BEYOND_ANY_LEVEL,
+            thresholds=self._thresholds,
+            factors=self.factors,
+            projectors=self.projectors,
+            edge=self.edge,
+            damped_code=self.damped_code,
+            e_N=self.null_space_error,
+            a=self.acceleration,
+            code=self.code,
         )
 
     def self_motions(self, v: Array) -> tuple[PartCall, tuple[Array, Array]]:
@@ -97,14 +113,28 @@ class Resolution:
             The call, and what it writes: φ_N of a and of a_damped, shape (2, nv), and
             P K_N P v, what brakes them, shape (2, nv).
         """
-        (J, J_dot, *_, a_x), metric = self.problem.task, self.problem.metric
+        task, metric = self.problem.task, self.problem.metric
         written = self._self_motions, self._brakings
-        given = (
-            *(J, J_dot, a_x, metric.W, metric.L, self.form, v, self.problem.gain),
-            *(self.alone, self.factors, self.projectors.Q, self.edge),
-            *(self.damped_code, self.acceleration, *written),
+        call = PartCall(
+            engine.SelfMotions,
+            J=task.jacobian,
+            J_dot=task.jacobian_dot,
+            a_x=task.acceleration,
+            W=metric.W,
+            L=metric.L,
+            form=self.form,
+            v=v,
+            K_N=self.problem.gain,
+            alone=self.alone,
+            factors=self.factors,
+            Q_K=self.projectors.Q,
+            edge=self.edge,
+            damped_code=self.damped_code,
+            a=self.acceleration,
+            self_motions=self._self_motions,
+            brakings=self._brakings,
         )
-        return (engine.SelfMotions, given), written
+        return call, written
 
     def diagnosis(self, first: int) -> tuple[PartCall, Array, Array]:
         """Return a call that finds how near the law is to singular and to rest.
@@ -120,5 +150,14 @@ class Resolution:
         J, metric = self.problem.task.jacobian[first:], self.problem.metric
         smaller = min(J.shape)
         T, length = np.zeros((smaller, smaller)), np.zeros(1)
-        given = J, metric.W, metric.L, self.form, self.null_space_error, T, length
-        return (engine.Diagnose, given), T, length
+        call = PartCall(
+            engine.Diagnose,
+            J=J,
+            W=metric.W,
+            L=metric.L,
+            form=self.form,
+            e_N=self.null_space_error,
+            T=T,
+            length=length,
+        )
+        return call, T, length

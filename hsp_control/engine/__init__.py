@@ -9,8 +9,11 @@ Eigen's assertions: ``python hatch_build.py Debug`` builds it.
 
 import os
 import sys
+from collections.abc import Callable
 from importlib.util import module_from_spec, spec_from_file_location
-from typing import Any
+from typing import Any, TypeVar
+
+Made = TypeVar("Made")
 
 
 def _load(file: str) -> None:
@@ -55,9 +58,9 @@ def kind(name: str) -> Kind:
     return _BY_NAME[name]
 
 
-def call(kind: Kind, arguments: tuple[Any, ...]) -> Call:
+def call(kind: Callable[..., Made], values: dict[str, Any]) -> Made:
     """Return a call of a kind with these arguments; copies and pickles use it."""
-    return kind(*arguments)
+    return kind(**values)
 
 
 def __getattr__(name: str) -> Kind:

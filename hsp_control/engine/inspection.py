@@ -14,8 +14,8 @@ def calls(step: object) -> Iterator[Any]:
         for each in step.calls:
             yield from calls(each)
         return
-    inner = step.arguments if isinstance(step, Call | Move) else ()
-    for each in inner:
+    inner = step.values if isinstance(step, Call | Move) else {}
+    for each in inner.values():
         if isinstance(each, Plan | Move):
             yield from calls(each)
     if not isinstance(step, Move):
@@ -62,7 +62,7 @@ def first_not_finite(step: object, t: float = 0.0) -> tuple[Any, list[str]] | No
     """
     for call in calls(step):
         if isinstance(call, Call) and any(
-            isinstance(x, Plan | Move) for x in call.arguments
+            isinstance(x, Plan | Move) for x in call.values.values()
         ):
             continue  # what it makes was made
         if isinstance(call, Runnable):

@@ -1,12 +1,12 @@
 """Plans: the calls of parts, bound once, and what supplies their arguments.
 
-A part says its mathematics as a kind of call with its arguments, a `PartCall`. An
+A part says its mathematics as a kind of call with arguments by name, a `PartCall`. An
 argument may be something that has to be brought up to date first: the kinematics of a
 frame, a trajectory, what another call writes. Its method ``supplied`` returns what is
 read, and the calls that write it. `planned` makes a plan of it all.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 from typing import Any, NamedTuple, Self
 
@@ -16,12 +16,33 @@ from hsp_control import engine
 from hsp_control.common.arrays import Array, Indices
 from hsp_control.engine import Kind, Plan, PythonCall
 
-PartCall = tuple[Callable[..., Any], tuple[Any, ...]]
-"""A kind of the engine, or a function, with its first arguments: what a part's
-mathematics is. Who calls it adds the others; `planned` says what may be among them."""
-
 TIME = object()
-"""The last argument of a call that brings a reference up to a time [s]."""
+"""The argument ``t`` of a call that brings a reference up to a time [s]."""
+
+
+class PartCall:
+    """A kind of the engine, or a function, with arguments: a part's mathematics.
+
+    Arguments have the names of the kind's members, or of the function's parameters.
+    Who makes the call adds the others; `planned` says what may be among them.
+    """
+
+    __slots__ = ("arguments", "function")
+
+    def __init__(self, function: Callable[..., Any], /, **arguments: Any) -> None:
+        self.function, self.arguments = function, arguments
+
+    def given(self, **others: Any) -> "PartCall":
+        """Return the call with further arguments.
+
+        Raises:
+            TypeError: If it has one of them.
+        """
+        return PartCall(self.function, **self.arguments, **others)
+
+    def __repr__(self) -> str:
+        name = getattr(self.function, "name", None) or self.function.__name__
+        return f"PartCall({name}, {', '.join(self.arguments)})"
 
 
 class Once(NamedTuple):
@@ -53,16 +74,10 @@ PartCalls = Sequence[AnyCall]
 
 
 class CallOutput(NamedTuple):
-    """An argument of a call: what another call writes into its last argument."""
+    """An argument of a call: what another call writes into its argument ``out``."""
 
     call: PartCall
     out: Any
-
-
-def with_outputs(call: PartCall, *others: Any) -> PartCall:
-    """Return a call with further arguments after its own."""
-    function, arguments = call
-    return function, (*arguments, *others)
 
 
 def says(part: object, *ways: str) -> str:
@@ -116,45 +131,59 @@ def planned(calls: PartCalls) -> StepPlan:
 
 def _plan(call: AnyCall) -> StepPlan:
     """Return the plan of one call."""
-    if isinstance(call, Once | OnlyIf):
-        follow, write = planned(call.calls)
-        kind = engine.Once if isinstance(call, Once) else engine.OnlyIf
-        return StepPlan(follow, (kind(Plan(write), *call[1:]),))
-    function, arguments = call
-    timed = bool(arguments) and arguments[-1] is TIME
-    given, (follow, write) = supplied(arguments[:-1] if timed else arguments)
-    own = bind(function, *given, timed=timed)
-    if timed:
-        return StepPlan((*follow, own), write)
-    return StepPlan(follow, (*write, own))
+    if isinstance(call, PartCall):
+        timed = call.arguments.get("t") is TIME
+        follow: list[Step] = []
+        write: list[Step] = []
+        given = {}
+        for name, argument in call.arguments.items():
+            if argument is not TIME:
+                given[name], plan = supplied(argument)
+                follow += plan.follow
+                write += plan.write
+        (follow if timed else write).append(bind(call.function, given, timed=timed))
+        return StepPlan(tuple(follow), tuple(write))
+    inner = planned(call.calls)
+    if isinstance(call, Once):
+        own = engine.Once(calls=inner.call(), stamp=call.stamp, made=call.made)
+    else:
+        own = engine.OnlyIf(calls=inner.call(), found=call.found)
+    return StepPlan(inner.follow, (own,))
+
+
+_NOTHING = StepPlan()
 
 
 def supplied(argument: Any) -> tuple[Any, StepPlan]:
     """Return an argument as a call reads it, and the plan of what writes it."""
     if type(argument) is CallOutput:
-        return argument.out, planned([with_outputs(*argument)])
+        return argument.out, planned([argument.call.given(out=argument.out)])
     if hasattr(argument, "supplied"):
         value, calls = argument.supplied()
         return value, planned(calls)
-    if type(argument) is not tuple:
-        return argument, StepPlan()
-    parts = [supplied(each) for each in argument]
-    follow = tuple(call for _, plan in parts for call in plan.follow)
-    write = tuple(call for _, plan in parts for call in plan.write)
-    return tuple(value for value, _ in parts), StepPlan(follow, write)
+    if type(argument) is not dict:
+        return argument, _NOTHING
+    parts = {name: supplied(each) for name, each in argument.items()}
+    follow = tuple(call for _, plan in parts.values() for call in plan.follow)
+    write = tuple(call for _, plan in parts.values() for call in plan.write)
+    values = {name: value for name, (value, _) in parts.items()}
+    return values, StepPlan(follow, write)
 
 
-def bind(function: Callable[..., Any], *arguments: Any, timed: bool = False) -> Step:
+def bind(
+    function: Callable[..., Any], arguments: Mapping[str, Any], *, timed: bool = False
+) -> Step:
     """Return a call with these arguments, as a plan makes it.
 
     Args:
         function: A kind of the engine, or a function.
-        arguments: Arrays, numbers, and tuples or records of them. The call reads and
-            writes the memory of these arrays each time; numbers are constants.
-        timed: Whether it has one more argument, the time, given to the call.
+        arguments: By name: arrays, numbers, and records of them, which are named tuples
+            or dicts. The call reads and writes the memory of these arrays each time;
+            numbers are constants.
+        timed: Whether it is also given the time; a function takes it first.
     """
     if isinstance(function, Kind):
-        return function(*arguments)
+        return function(**arguments)
     if not arguments and not timed and hasattr(function, "row"):
         return function
-    return PythonCall(partial(function, *arguments) if arguments else function, timed)
+    return PythonCall(partial(function, **arguments) if arguments else function, timed)

@@ -14,7 +14,7 @@ import numpy as np
 
 from hsp_control import engine
 from hsp_control.common.arrays import Array, Indices
-from hsp_control.engine.plans import PartCalls
+from hsp_control.engine.plans import PartCall, PartCalls
 from hsp_control.geometry.links import LinkShape
 from hsp_control.geometry.scene import Obstacle
 from hsp_control.geometry.shapes import Box, Capsule, Cylinder, HalfSpace, Shape, Sphere
@@ -95,10 +95,18 @@ class ClosedFormDistances:
 
     def calls(self, state: RobotState) -> PartCalls:
         """Return the calls of `measure` for this state."""
-        bodies = self  # see `supplied`
-        given = state.world.placements, bodies, self._used, self._pairs
-        found = self._segments, self._cores, self._distances
-        return [(engine.MeasureDistances, (self.measurements, *given, *found))]
+        call = PartCall(
+            engine.MeasureDistances,
+            measurements=self.measurements,
+            placements=state.world.placements,
+            bodies=self,  # see `supplied`
+            used=self._used,
+            pairs=self._pairs,
+            segments=self._segments,
+            cores=self._cores,
+            distances=self._distances,
+        )
+        return [call]
 
     def supplied(self) -> "tuple[_Bodies, PartCalls]":
         """Return the bodies as the engine reads them, and the calls that move them."""
@@ -122,16 +130,33 @@ class ClosedFormDistances:
         run = state.cached(
             self,
             "derivatives",
-            lambda: state.plan(self.derivatives(state, *sums)).call(),
+            lambda: state.plan(self.derivatives(state, **sums._asdict())).call(),
         )
         sums.slopes[:], sums.curvatures[:] = slopes, curvatures
         run()
         return sums.gradient, sums.rate
 
-    def derivatives(self, state: RobotState, *sums: Array) -> PartCalls:
+    def derivatives(
+        self,
+        state: RobotState,
+        slopes: Array,
+        curvatures: Array,
+        gradient: Array,
+        rate: Array,
+    ) -> PartCalls:
         """Return the calls of `differentiate` for these arguments."""
-        given = state.world, self._bodies, self._pairs, self._segments
-        return [(engine.DistanceGradients, (*given, *sums))]
+        call = PartCall(
+            engine.DistanceGradients,
+            world=state.world,
+            bodies=self._bodies,
+            pairs=self._pairs,
+            segments=self._segments,
+            slopes=slopes,
+            curvatures=curvatures,
+            gradient=gradient,
+            rate=rate,
+        )
+        return [call]
 
 
 def _link(link: LinkShape) -> list[float]:

@@ -1,6 +1,7 @@
 """Distances of pairs of shapes, by Coal or in closed form, and their gradients."""
 
 from collections.abc import Sequence
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -89,9 +90,10 @@ class CoalDistances:
             columns, dofs, columns2, dofs2 = self._supports[k]
             first, second, normal = self.witness(k)
             force = -own[k] * normal
-            engine.AddForce(J, columns, dofs, first, force, gradient)()
+            add = partial(engine.AddForce, jacobian=J, out=gradient)
+            add(columns=columns, dofs=dofs, point=first, force=force)()
             if len(columns2):
-                engine.AddForce(J, columns2, dofs2, second, -force, gradient)()
+                add(columns=columns2, dofs=dofs2, point=second, force=-force)()
 
     def _add(self, name: str, joint: int, placement: pin.SE3, geometry: Any) -> None:
         self._geometry.addGeometryObject(

@@ -16,5 +16,5 @@ def singular_values(triangle: bytes) -> Array:
     """
     T = np.frombuffer(triangle).copy()
     values = np.zeros(isqrt(len(T)))
-    engine.SingularValues(T.reshape(len(values), len(values)), values)()
+    engine.SingularValues(T=T.reshape(len(values), len(values)), values=values)()
     return values

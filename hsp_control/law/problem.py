@@ -82,6 +82,7 @@ class Problem:
         self.springs = np.zeros(rows, dtype=np.bool_)
 
     @property
-    def rows(self) -> tuple[Array, Array, Array, Flags, Array]:
-        """What is asked of each row: asked, yields, pulls, springs and stretched."""
-        return self.asked, self.yields, self.pulls, self.springs, self.stretched
+    def rows(self) -> dict[str, Array | Flags]:
+        """What is asked of each row, by name."""
+        names = "asked", "yields", "pulls", "springs", "stretched"
+        return {name: getattr(self, name) for name in names}

@@ -34,6 +34,13 @@ def nearest_effort(
     except np.linalg.LinAlgError:
         return None
     nearest = np.empty(wanted.size)
-    given = inverse, np.asarray(wanted), np.asarray(least), np.asarray(most)
-    engine.NearestEffort(*given, nearest, _SWEEPS, _NEAR)()
+    engine.NearestEffort(
+        inverse=inverse,
+        wanted=np.asarray(wanted),
+        least=np.asarray(least),
+        most=np.asarray(most),
+        nearest=nearest,
+        sweeps=_SWEEPS,
+        small=_NEAR,
+    )()
     return nearest if np.isfinite(nearest).all() else None

@@ -5,7 +5,7 @@ import pinocchio as pin
 
 from hsp_control import engine
 from hsp_control.common.arrays import Array
-from hsp_control.engine.plans import PartCalls
+from hsp_control.engine.plans import PartCall, PartCalls
 from hsp_control.robot.kinematics import WorldKinematics, joint_support
 
 
@@ -32,20 +32,23 @@ class Gravity:
         self.effort: Array = np.zeros(nv)
         self.slope: Array = np.zeros((nv, nv))
         self.drift: Array = np.zeros(nv)
-        given = (
-            world.jacobian,
-            world.jacobian_dot,
-            world.placements,
-            np.array([body.mass for body in bodies]),
-            np.array([body.lever for body in bodies]),
-            moves,
-            np.array(columns, dtype=np.int64),
-            dofs,
-            np.array(model.gravity.linear),
-            world.v,
+        call = PartCall(
+            engine.Gravity,
+            jacobian=world.jacobian,
+            jacobian_dot=world.jacobian_dot,
+            placements=world.placements,
+            mass=np.array([body.mass for body in bodies]),
+            center=np.array([body.lever for body in bodies]),
+            moves=moves,
+            joints=np.array(columns, dtype=np.int64),
+            dofs=dofs,
+            gravity=np.array(model.gravity.linear),
+            v=world.v,
+            effort=self.effort,
+            slope=self.slope,
+            drift=self.drift,
         )
-        found = self.effort, self.slope, self.drift
-        self.calls: PartCalls = [(engine.Gravity, (*given, *found))]
+        self.calls: PartCalls = [call]
 
 
 def _width(model: pin.Model, joint: int) -> int:

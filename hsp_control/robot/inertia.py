@@ -11,7 +11,7 @@ from hsp_control.common.arrays import Array, Indices, read_only_view
 from hsp_control.common.exceptions import ModelError
 from hsp_control.common.suggestions import listing
 from hsp_control.engine import Dynamics
-from hsp_control.engine.plans import Once, PartCalls
+from hsp_control.engine.plans import Once, PartCall, PartCalls
 from hsp_control.robot.kinematics import PointMotion, Term
 
 
@@ -20,8 +20,8 @@ def inertia_terms(
 ) -> tuple[Term, Term]:
     """Return M (CRBA) and M' along v, shape (nv, nv) each."""
     M, M_dot = np.zeros((v.size, v.size)), np.zeros((v.size, v.size))
-    mass_matrix = engine.MassMatrix, (dynamics, q, M)
-    rate = engine.MassMatrixRate, (dynamics, q, v, M_dot)
+    mass_matrix = PartCall(engine.MassMatrix, dynamics=dynamics, q=q, M=M)
+    rate = PartCall(engine.MassMatrixRate, dynamics=dynamics, q=q, v=v, M_dot=M_dot)
     return Term(M, [Once.at(stamp, mass_matrix)]), Term(M_dot, [Once.at(stamp, rate)])
 
 
@@ -62,10 +62,20 @@ class CentroidalMotion:
         self.jacobian_dot: Array = np.zeros((3, model.nv))
         self.momentum_matrix: Array = np.zeros((3, model.nv))
         self.momentum_matrix_dot: Array = np.zeros((3, model.nv))
-        found = self.position, self.velocity, self.jacobian, self.jacobian_dot
-        angular = self.momentum_matrix, self.momentum_matrix_dot
-        given = dynamics, q, v, self.mass, *found, *angular
-        self.calls: PartCalls = [Once.at(stamp, (engine.CentroidalMotion, given))]
+        call = PartCall(
+            engine.CentroidalMotion,
+            dynamics=dynamics,
+            q=q,
+            v=v,
+            mass=self.mass,
+            position=self.position,
+            velocity=self.velocity,
+            J=self.jacobian,
+            J_dot=self.jacobian_dot,
+            angular=self.momentum_matrix,
+            angular_dot=self.momentum_matrix_dot,
+        )
+        self.calls: PartCalls = [Once.at(stamp, call)]
 
     @cached_property
     def shown(self) -> "CentroidalMotion":

@@ -19,7 +19,7 @@ from hsp_control.common.exceptions import HspControlError, SimulationError
 from hsp_control.declaration import Part
 from hsp_control.declaration.quantities import Positive
 from hsp_control.engine import Plan
-from hsp_control.engine.plans import TIME, AnyCall, PartCalls, planned
+from hsp_control.engine.plans import TIME, AnyCall, PartCall, PartCalls, planned
 from hsp_control.robot.kinematics import Term
 from hsp_control.robot.robot import Robot
 
@@ -132,7 +132,7 @@ def bound(dynamics: Dynamics) -> Bind:
         def compute(t: float) -> None:
             value[:] = dynamics(t, q, v)
 
-        return Term(value, [(compute, (TIME,))])
+        return Term(value, [PartCall(compute, t=TIME)])
 
     return bind_dynamics
 
@@ -193,7 +193,13 @@ class Steps(ABC):
         self.acceleration = bind_dynamics(self.q, self.v)
         self.interval, self.now, self.h = np.zeros(2), np.zeros(1), np.zeros(1)
         step = Plan(planned(self._calls()).steps())
-        self.take = engine.EqualSteps(step, self.interval, longest, self.now, self.h)
+        self.take = engine.EqualSteps(
+            calls=step,
+            interval=self.interval,
+            longest=longest,
+            now=self.now,
+            h=self.h,
+        )
         self.native = not self.take.python
 
     @abstractmethod
@@ -213,7 +219,8 @@ class Steps(ABC):
         plan = planned(calls)
         if not plan.follow:
             return calls
-        return [(lambda: plan.run(self.now.item() + fraction * self.h.item()), ())]
+        now, h = self.now, self.h
+        return [PartCall(lambda: plan.run(now.item() + fraction * h.item()))]
 
 
 class _EulerStep(Steps):
@@ -221,8 +228,10 @@ class _EulerStep(Steps):
         robot = self.robot
         self._moved = np.zeros(robot.nv)
         q, a = self.q if robot.linear else np.zeros(0), self.acceleration.value
-        step = engine.EulerStep, (self.h, a, q, self.v, self._moved)
-        place = [] if robot.linear else [(self._place, ())]
+        step = PartCall(
+            engine.EulerStep, h=self.h, a=a, q=q, v=self.v, moved=self._moved
+        )
+        place = [] if robot.linear else [PartCall(self._place)]
         return [*self.compute_at(0.0), step, *place]
 
     def _place(self) -> None:
@@ -239,20 +248,21 @@ class _Rk4Stages(Steps):
         self._chart = TangentChart(robot, self.q)
         self._base = self._chart.base
         base, q = self._base, self.q
-        begin = engine.Rk4Begin, (q, self.v, base, v0, self._D)
+        begin = PartCall(engine.Rk4Begin, q=q, v=self.v, base=base, v0=v0, D=self._D)
         if not robot.linear:
             base = q = np.zeros(0)
-        slopes = self.h, self._D, A, self.acceleration.value
-        point = base, v0, self._delta, q, self.v
+        slopes = {"h": self.h, "D": self._D, "A": A, "a": self.acceleration.value}
+        point = {"base": base, "v0": v0, "delta": self._delta, "q": q, "v": self.v}
         parts: list[AnyCall] = [begin, *self.compute_at(0.0)]
         for i, fraction in enumerate((0.5, 0.5, 1.0)):
-            parts.append((engine.Rk4Stage, (i, fraction, *slopes, *point)))
+            stage = {"stage": i, "fraction": fraction}
+            parts.append(PartCall(engine.Rk4Stage, **stage, **slopes, **point))
             if not robot.linear:
-                parts.append((self._place, (i + 1,)))
+                parts.append(PartCall(self._place, stage=i + 1))
             parts += self.compute_at(fraction)
-        parts.append((engine.Rk4End, (*slopes, *point)))
+        parts.append(PartCall(engine.Rk4End, **slopes, **point))
         if not robot.linear:
-            parts.append((self._place, (None,)))
+            parts.append(PartCall(self._place, stage=None))
         return parts
 
     def _place(self, stage: int | None) -> None:

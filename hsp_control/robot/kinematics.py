@@ -8,7 +8,7 @@ import pinocchio as pin
 from hsp_control import engine
 from hsp_control.common.arrays import Array, Indices, read_only_view
 from hsp_control.common.exceptions import ImmutableError
-from hsp_control.engine.plans import PartCalls
+from hsp_control.engine.plans import PartCall, PartCalls
 
 
 class FrameMotion(NamedTuple):
@@ -123,8 +123,16 @@ class FrameKinematics:
             frame.placement.translation.copy(),
             *joint_support(model, frame.parentJoint),
         )
-        given = stamp, np.array([-1]), carrier, world.v, motion, self.drift
-        self.calls: PartCalls = [(engine.FrameKinematics, given)]
+        call = PartCall(
+            engine.FrameKinematics,
+            stamp=stamp,
+            computed=np.array([-1]),
+            carrier=carrier,
+            v=world.v,
+            motion=motion,
+            drift=self.drift,
+        )
+        self.calls: PartCalls = [call]
 
     def __setattr__(self, name: str, value: object) -> None:
         if hasattr(self, name):

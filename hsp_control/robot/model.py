@@ -10,7 +10,7 @@ from hsp_control import engine
 from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import ModelError
 from hsp_control.engine import Dynamics
-from hsp_control.engine.plans import PartCalls
+from hsp_control.engine.plans import PartCall, PartCalls
 from hsp_control.robot.dynamics import dynamics_of
 from hsp_control.robot.kinematics import Term
 from hsp_control.robot.structure import Structure
@@ -171,14 +171,14 @@ class RobotModel(Structure):
     def mass_matrix(self, q: Array) -> Array:
         """Return M(q), shape (nv, nv) (CRBA)."""
         M = np.empty((self.nv, self.nv))
-        engine.MassMatrix(self._own, _packed(q), M)()
+        engine.MassMatrix(dynamics=self._own, q=_packed(q), M=M)()
         return M
 
     def inverse_dynamics(self, q: Array, v: Array, a: Array) -> Array:
         """Return the effort M(q) a + N(q, v), shape (nv,) (RNEA)."""
         effort = np.empty(self.nv)
-        given = map(_packed, (q, v, a))
-        engine.InverseDynamics(self._own, *given, effort)()
+        given = {"q": _packed(q), "v": _packed(v), "acceleration": _packed(a)}
+        engine.InverseDynamics(dynamics=self._own, **given, effort=effort)()
         return effort
 
     def forward_dynamics(self, q: Array, v: Array, tau: Array) -> Array:
@@ -191,18 +191,29 @@ class RobotModel(Structure):
             ModelError: If M is singular (only detected with mimic joints).
         """
         acceleration = np.empty(self.nv)
-        given = map(_packed, (q, v, tau))
-        engine.ForwardDynamics(self._own, *given, acceleration)()
+        given = {"q": _packed(q), "v": _packed(v), "effort": _packed(tau)}
+        call = engine.ForwardDynamics(
+            dynamics=self._own, **given, acceleration=acceleration
+        )
+        call()
         self._check_acceleration(acceleration)
         return acceleration
 
     def bind_forward_dynamics(self, q: Array, v: Array, tau: Array) -> Term:
         """Return `forward_dynamics` for what these arrays hold when it is computed."""
         acceleration = np.zeros(self.nv)
-        given = self.dynamics(), q, v, tau, acceleration
-        calls: PartCalls = [(engine.ForwardDynamics, given)]
+        call = PartCall(
+            engine.ForwardDynamics,
+            dynamics=self.dynamics(),
+            q=q,
+            v=v,
+            effort=tau,
+            acceleration=acceleration,
+        )
+        calls: PartCalls = [call]
         if self.mimics:
-            calls = [*calls, (self._check_acceleration, (acceleration,))]
+            check = PartCall(self._check_acceleration, acceleration=acceleration)
+            calls = [*calls, check]
         return Term(acceleration, calls)
 
     def _check_acceleration(self, acceleration: Array) -> None:

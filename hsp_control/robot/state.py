@@ -71,24 +71,34 @@ class RobotState:
         self.stamp_array: Indices = np.zeros(1, dtype=np.int64)
         blocks = np.array(robot.unit_blocks, dtype=np.int64).reshape(-1, 2)
         # writable, also where `seen` binds calls
-        self._memory = self.time, self.q, self.v, blocks, self.stamp_array
+        self._memory = {
+            "time": self.time,
+            "q": self.q,
+            "v": self.v,
+            "unit_blocks": blocks,
+            "stamp": self.stamp_array,
+        }
         self._seen: RobotState | None = None
         self._read_only: RobotState | None = None
         self.dynamics: Dynamics = robot.dynamics()
         self._shown_data: tuple[pin.Data, int] | None = None
-        self._at = self.dynamics, self.q, self.v
+        self._at: dict[str, Any] = {"dynamics": self.dynamics, "q": self.q, "v": self.v}
         self.world = WorldKinematics.allocate(robot.model, self.v)
         self.effort: Array = np.zeros(robot.nv)
         self._acceleration: Array = np.zeros(robot.nv)
         self._inverse_dynamics = self._bound(self.rnea(self._acceleration))
         self._frames: dict[str, tuple[FrameKinematics, Callable[[], object]]] = {}
         stamp = self.stamp_array
-        self.inertia, self.inertia_rate = inertia_terms(*self._at, stamp)
+        self.inertia, self.inertia_rate = inertia_terms(**self._at, stamp=stamp)
         self._compute_inertia = self._bound(*self.inertia.calls)
         self._compute_inertia_rate = self._bound(*self.inertia_rate.calls)
         self._effects: Array = np.zeros(robot.nv)
-        given = *self._at, np.zeros(robot.nv), self._effects
-        effects = engine.InverseDynamics, given
+        effects = PartCall(
+            engine.InverseDynamics,
+            **self._at,
+            acceleration=np.zeros(robot.nv),
+            effort=self._effects,
+        )
         self._compute_effects = self._bound(Once.at(stamp, effects))
         self._centroidal: tuple[CentroidalMotion, Callable[[], object]] | None = None
         self._displaced: RobotState | None = None
@@ -161,9 +171,15 @@ class RobotState:
 
     def bind_move(self, calls: Sequence[Step] = ()) -> Move:
         """Return how `advance` moves this state, with calls of the time that follow."""
-        placements, J, J_dot, _ = self.world
-        jacobians = engine.JointJacobians, (*self._at, J, J_dot, placements)
-        return Move(Plan([*self.plan([jacobians]).steps(), *calls]), *self._memory)
+        jacobians = PartCall(
+            engine.JointJacobians,
+            **self._at,
+            jacobian=self.world.jacobian,
+            jacobian_dot=self.world.jacobian_dot,
+            placements=self.world.placements,
+        )
+        plan = Plan([*self.plan([jacobians]).steps(), *calls])
+        return Move(calls=plan, **self._memory)
 
     def _refuse(self, t: float, q: ArrayLike, v: ArrayLike) -> None:
         """Raise the error that says what is wrong with t, q and v."""
@@ -211,7 +227,7 @@ class RobotState:
         """The centre of mass, the angular momentum about it, and their Jacobians."""
         if self._centroidal is None:
             model = self.robot.model
-            center = CentroidalMotion(model, *self._at, self.stamp_array)
+            center = CentroidalMotion(model, **self._at, stamp=self.stamp_array)
             self._centroidal = center, self._bound(*center.calls)
         center, compute = self._centroidal
         compute()
@@ -243,7 +259,12 @@ class RobotState:
 
     def rnea(self, acceleration: Array) -> PartCall:
         """Return a call that writes `effort` for what this array (nv,) then holds."""
-        return engine.InverseDynamics, (*self._at, acceleration, self.effort)
+        return PartCall(
+            engine.InverseDynamics,
+            **self._at,
+            acceleration=acceleration,
+            effort=self.effort,
+        )
 
     @property
     def stamp(self) -> int:

@@ -43,7 +43,7 @@ class LimitExcess:
         if limits is not self._limits:
             self._limits = limits
             given = self._arguments(limits, self._q, self._v)
-            self._record = engine.LimitExcess(*given)
+            self._record = engine.LimitExcess(**given)
         self._q[:], self._v[:] = q, v
         self._record()
 
@@ -53,12 +53,20 @@ class LimitExcess:
         """Return `record` of what these arrays then hold, as calls."""
         if limits is None:
             return []
-        return [(engine.LimitExcess, self._arguments(limits, q, v))]
+        return [PartCall(engine.LimitExcess, **self._arguments(limits, q, v))]
 
-    def _arguments(self, limits: RobotLimits, q: Array, v: Array) -> tuple[Any, ...]:
-        bounds = limits.lower, limits.upper, limits.velocity
-        most = self.position, self.velocity
-        return self._coordinates, self._dofs, q, v, *bounds, *most
+    def _arguments(self, limits: RobotLimits, q: Array, v: Array) -> dict[str, Any]:
+        return {
+            "coordinates": self._coordinates,
+            "dofs": self._dofs,
+            "q": q,
+            "v": v,
+            "lower": limits.lower,
+            "upper": limits.upper,
+            "speed": limits.velocity,
+            "position": self.position,
+            "velocity": self.velocity,
+        }
 
     def collect(self, limits: RobotLimits | None) -> dict[str, LogChannel]:
         """Return what to log, and begin anew; nothing without limits."""

@@ -16,7 +16,7 @@ from hsp_control.control.actuation.actuation import LOOK
 from hsp_control.control.bound_step import FreeStep
 from hsp_control.control.controller import Controller
 from hsp_control.engine import Call, Plan
-from hsp_control.engine.plans import bind
+from hsp_control.engine.plans import planned
 from hsp_control.robot.integrators import Steps
 from hsp_control.simulation.limit_excess import LimitExcess
 from hsp_control.simulation.plants import IntegratedPlant
@@ -81,6 +81,15 @@ class NativeLoop:
         if steps.take.python or step.move.python or sending.python:
             return None
         seeing = self._excess.recording(self._controller.limits, steps.q, steps.v)
-        moving = Plan([steps.take, *(bind(kind, *given) for kind, given in seeing)])
-        own = steps.q, steps.v, self._plant.effort, step.effort, steps.interval
-        return engine.Periods(moving, step.move, sending, *own, LOOK, self._which)
+        return engine.Periods(
+            moving=Plan([steps.take, *planned(seeing).write]),
+            law=step.move,
+            sending=sending,
+            q=steps.q,
+            v=steps.v,
+            held=self._plant.effort,
+            effort=step.effort,
+            interval=steps.interval,
+            free_below=LOOK,
+            which=self._which,
+        )

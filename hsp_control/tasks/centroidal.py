@@ -49,8 +49,12 @@ class CenterOfMass(TrackingTask, type="center_of_mass"):
 
     def call(self, state: RobotState) -> PartCall:
         """Return the call; see `Task.call`."""
-        axes = axis_indices(self.axes)
-        return engine.TrackAxes, (axes, state.centroidal, self.trajectory)
+        return PartCall(
+            engine.TrackAxes,
+            axes=axis_indices(self.axes),
+            point=state.centroidal,
+            desired=self.trajectory,
+        )
 
     def reference_rate(self, state: RobotState) -> Array:
         """Return c_d', shape (m,) [m/s]."""

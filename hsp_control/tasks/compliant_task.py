@@ -9,7 +9,7 @@ from hsp_control import engine
 from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import GainError
 from hsp_control.declaration import within
-from hsp_control.engine.plans import PartCalls
+from hsp_control.engine.plans import PartCall, PartCalls
 from hsp_control.law import TaskSample
 from hsp_control.robot import Robot, RobotState
 from hsp_control.tasks.feedback import Feedback, InForce
@@ -100,11 +100,20 @@ class CompliantTask(SecondOrderTask):
         task = self.calls(state, in_force.feedback, out)
         if self.impedance is None:
             return task
-        inertia = state.inertia, state.inertia_rate
-        impedance = parts_of(in_force.numbers), self.part_ends()
-        given = *inertia, self._rotating(state), *impedance, out, _THRESHOLD
-        own = in_force.mobility, in_force.feedback.Kp, in_force.feedback.Kv
-        return [*task, (engine.ImpedanceGains, (*given, *own)), *task]
+        gains = PartCall(
+            engine.ImpedanceGains,
+            M=state.inertia,
+            M_dot=state.inertia_rate,
+            rotating=self._rotating(state),
+            impedance=parts_of(in_force.numbers),
+            ends=self.part_ends(),
+            sample=out,
+            threshold=_THRESHOLD,
+            G=in_force.mobility,
+            Kp=in_force.feedback.Kp,
+            Kv=in_force.feedback.Kv,
+        )
+        return [*task, gains, *task]
 
     def feedback_at(self, state: RobotState) -> Feedback:
         """Return new arrays of feedback at a state; see `Task.feedback_at`."""

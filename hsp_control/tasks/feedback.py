@@ -4,6 +4,7 @@ from collections.abc import Mapping, Sequence
 from typing import Annotated, Any, Literal, NamedTuple
 
 import numpy as np
+from numpy.typing import ArrayLike
 from pydantic import AfterValidator, BeforeValidator
 
 from hsp_control import engine
@@ -38,10 +39,16 @@ class Feedback(NamedTuple):
 
     def acceleration(self, e: Array, e_dot: Array) -> Array:
         """Return Kv e' + Kp s(e) + offset, shape (m,), for a task in plain Python."""
-        given = [np.ascontiguousarray(x, dtype=float) for x in (*self, e, e_dot)]
+        own = Feedback(*map(_packed, self))
         out = np.zeros(len(self.offset))
-        engine.FeedbackAcceleration(*given, out)()
+        engine.FeedbackAcceleration(
+            feedback=own, e=_packed(e), e_dot=_packed(e_dot), out=out
+        )()
         return out
+
+
+def _packed(x: ArrayLike) -> Array:
+    return np.ascontiguousarray(x, dtype=float)
 
 
 class InForce(NamedTuple):

@@ -63,7 +63,7 @@ class FrameOrientation(
     def call(self, state: RobotState) -> PartCall:
         """Return the call; see `Task.call`."""
         frame = state.frame(self.frame_name)
-        return engine.TrackOrientation, (frame, self.trajectory)
+        return PartCall(engine.TrackOrientation, frame=frame, desired=self.trajectory)
 
     def _rotating(self, state: RobotState) -> Rotating:
         motion = state.frame(self.frame_name).motion
@@ -154,7 +154,8 @@ class FramePose(FrameTask, PoseTask, CompliantTask, type="frame_pose"):
 
     def call(self, state: RobotState) -> PartCall:
         """Return the call; see `Task.call`."""
-        return engine.TrackPose, (state.frame(self.frame_name), self.followed)
+        frame = state.frame(self.frame_name)
+        return PartCall(engine.TrackPose, frame=frame, desired=self.followed)
 
     def _rotating(self, state: RobotState) -> Rotating:
         motion = state.frame(self.frame_name).motion

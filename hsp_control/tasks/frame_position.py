@@ -46,8 +46,12 @@ class FramePosition(FrameTask, TrackingTask, CompliantTask, type="frame_position
 
     def call(self, state: RobotState) -> PartCall:
         """Return the call; see `Task.call`."""
-        frame = state.frame(self.frame_name)
-        return engine.TrackAxes, (axis_indices(self.axes), frame.point, self.trajectory)
+        return PartCall(
+            engine.TrackAxes,
+            axes=axis_indices(self.axes),
+            point=state.frame(self.frame_name).point,
+            desired=self.trajectory,
+        )
 
     def reference_rate(self, state: RobotState) -> Array:
         """Return x_d', shape (m,) [m/s]."""

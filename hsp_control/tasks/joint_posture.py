@@ -92,8 +92,14 @@ class JointPosture(CompliantTask, type="joint_posture"):
         # The rows of `single_dof_joints`, in the order of the joints of the task.
         place = {int(row[0]): row for row in robot.single_dof_joints}
         joints = np.array([place[i] for i in self._indices(robot)], dtype=np.int64)
-        where = state.q, state.v, self._configuration(robot), joints
-        return engine.TrackPosture, (*where, self.followed)
+        return PartCall(
+            engine.TrackPosture,
+            q=state.q,
+            v=state.v,
+            reference=self._configuration(robot),
+            joints=joints,
+            displacement=self.followed,
+        )
 
     def reference_rate(self, state: RobotState) -> Array:
         """Return the desired velocities of the joints, shape (m,) [rad/s or m/s]."""

@@ -111,9 +111,13 @@ class Pointing(FrameTask, type="pointing"):
 
     def call(self, state: RobotState) -> PartCall:
         """Return the call; see `Task.call`."""
-        axes = self._axis, self._normals
-        frame = state.frame(self.frame_name)
-        return engine.TrackDirection, (*axes, frame, self._desired)
+        return PartCall(
+            engine.TrackDirection,
+            axis=self._axis,
+            normals=self._normals,
+            frame=state.frame(self.frame_name),
+            desired=self._desired,
+        )
 
     def reference_rate(self, state: RobotState) -> Array:
         """Return the part of w_d perpendicular to the axis, shape (2,) [rad/s]."""

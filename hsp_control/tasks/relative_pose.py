@@ -64,14 +64,19 @@ class RelativePose(PoseTask, type="relative_pose"):
 
     def call(self, state: RobotState) -> PartCall:
         """Return the call; see `Task.call`."""
-        frames = state.frame(self.frame_name), state.frame(self.reference)
-        motion = FrameMotion.allocate(state.robot.nv)
-        relative = CallOutput((engine.RelativeKinematics, frames), motion)
-        return engine.TrackPose, (relative, self.followed)
+        kinematics = PartCall(
+            engine.RelativeKinematics,
+            frame=state.frame(self.frame_name),
+            reference=state.frame(self.reference),
+        )
+        relative = CallOutput(kinematics, FrameMotion.allocate(state.robot.nv))
+        return PartCall(engine.TrackPose, frame=relative, desired=self.followed)
 
     def actual(self, state: RobotState) -> tuple[Array, Array]:
         """Return position and rotation of the frame in the reference."""
         frame, reference = state.frame(self.frame_name), state.frame(self.reference)
         relative = FrameMotion.allocate(state.robot.nv)
-        engine.RelativeKinematics(frame.motion, reference.motion, relative)()
+        engine.RelativeKinematics(
+            frame=frame.motion, reference=reference.motion, out=relative
+        )()
         return relative.position, relative.rotation

@@ -20,7 +20,7 @@ def spring_force(numbers: Array, ends: Indices, e: Array) -> Array:
     """
     e = np.ascontiguousarray(e, dtype=float)
     S = np.zeros((len(e), len(e)))
-    engine.SpringStiffness(parts_of(numbers), ends, e, S)()
+    engine.SpringStiffness(impedance=parts_of(numbers), ends=ends, e=e, S=S)()
     return np.asarray(S @ e)
 
 

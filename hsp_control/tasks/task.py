@@ -12,7 +12,7 @@ from hsp_control.common.exceptions import TaskError
 from hsp_control.declaration import Part, within
 from hsp_control.declaration.nested import parts_within, with_memories_copied
 from hsp_control.declaration.quantities import PositiveCount
-from hsp_control.engine.plans import PartCall, PartCalls, says, with_outputs
+from hsp_control.engine.plans import PartCall, PartCalls, says
 from hsp_control.geometry.scene import Start
 from hsp_control.law import TaskSample
 from hsp_control.robot import Robot, RobotState
@@ -205,10 +205,10 @@ class Task(Part, ABC, family="tasks", error=TaskError):
         return False
 
     def call(self, state: RobotState) -> PartCall:
-        """Return a kind of call and its first arguments; `feedback` and `out` follow.
+        """Return a kind of call with its arguments, without ``feedback`` and ``out``.
 
-        ``kind(*arguments, feedback: Feedback, out: TaskSample)`` writes what
-        `evaluate` describes. Arguments are numbers, arrays and records of them, which
+        With these two, a `Feedback` and a `TaskSample`, it writes what `evaluate`
+        describes. Arguments are numbers, arrays and records of them, which
         may be memory of the state; and what is brought up to date before each call:
         ``state.frame(name)`` becomes a `FrameMotion`, a trajectory its sample.
 
@@ -222,8 +222,9 @@ class Task(Part, ABC, family="tasks", error=TaskError):
     ) -> PartCalls:
         """Return the calls that write the sample of each step."""
         if says(self, "call", "evaluate") == "call":
-            return [with_outputs(self.call(state), feedback, out)]
-        return [(self.evaluate, (state.read_only, out, feedback))]
+            return [self.call(state).given(feedback=feedback, out=out)]
+        seen = state.read_only
+        return [PartCall(self.evaluate, state=seen, out=out, feedback=feedback)]
 
     def evaluate(
         self,
@@ -249,7 +250,8 @@ class Task(Part, ABC, family="tasks", error=TaskError):
         def make() -> tuple[tuple[Feedback, TaskSample], PartCalls]:
             own = self.feedback()
             sample = TaskSample.allocate(self.rows, state.robot.nv)
-            return (own, sample), [with_outputs(self.call(state), own, sample)]
+            call = self.call(state).given(feedback=own, out=sample)
+            return (own, sample), [call]
 
         (own, sample), run = state.prepared(self, "evaluate", make)
         for array, value in zip(own, feedback, strict=True):

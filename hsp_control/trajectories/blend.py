@@ -71,7 +71,13 @@ class Blend(Trajectory, type="blend"):
         x = np.asarray(self.start)
         v = np.zeros_like(x) if self.start_velocity is None else self.start_velocity
         start = np.stack([x, np.asarray(v)])
-        return engine.Blend, (self.start_time, self.duration, start, self.trajectory)
+        return PartCall(
+            engine.Blend,
+            start_time=self.start_time,
+            duration=self.duration,
+            start=start,
+            desired=self.trajectory,
+        )
 
 
 class BlendOrientation(OrientationTrajectory, type="blend"):
@@ -137,8 +143,11 @@ class BlendOrientation(OrientationTrajectory, type="blend"):
 
     def call(self) -> PartCall:
         """Return the call; see `Trajectory.call`."""
-        when, motion = (
-            (self.start_time, self.duration),
-            (self._start, self._coefficients),
+        return PartCall(
+            engine.BlendOrientation,
+            start_time=self.start_time,
+            duration=self.duration,
+            start=self._start,
+            coefficients=self._coefficients,
+            desired=self.trajectory,
         )
-        return engine.BlendOrientation, (*when, *motion, self.trajectory)

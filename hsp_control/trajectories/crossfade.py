@@ -68,8 +68,12 @@ class Crossfade(Trajectory, type="crossfade"):
             return self.before.sample(t, out)
         self.after.sample(t, out)
         if t < self.start_time + self.duration:
-            old = self.before.sample(t)
-            engine.Crossfade(self.start_time, self.duration, old, out)(float(t))
+            engine.Crossfade(
+                start_time=self.start_time,
+                duration=self.duration,
+                before=self.before.sample(t),
+                after=out,
+            )(float(t))
         return out
 
 

@@ -79,7 +79,13 @@ class Circle(Trajectory, type="circle"):
         """Return the call; see `Trajectory.call`."""
         radii = self.radius * self._plane
         center = np.asarray(self.center, dtype=float)
-        return engine.Circle, (self.angular_rate, self.phase, center, radii)
+        return PartCall(
+            engine.Circle,
+            rate=self.angular_rate,
+            phase=self.phase,
+            center=center,
+            radii=radii,
+        )
 
 
 def _axes_from_normal(normal: Array, toward: ArrayLike | None) -> Array:
@@ -130,8 +136,13 @@ class Lissajous(Trajectory, type="lissajous"):
     def call(self) -> PartCall:
         """Return the call; see `Trajectory.call`."""
         phases = np.zeros(self.dimension) if self.phases is None else self.phases
-        parameters = [self.center, self.amplitudes, self.rates, phases]
-        return engine.Lissajous, (np.array(parameters, dtype=float),)
+        return PartCall(
+            engine.Lissajous,
+            center=np.array(self.center, dtype=float),
+            amplitudes=np.array(self.amplitudes, dtype=float),
+            rates=np.array(self.rates, dtype=float),
+            phases=np.array(phases, dtype=float),
+        )
 
 
 class UniformLine(Trajectory, type="uniform_line"):
@@ -158,4 +169,4 @@ class UniformLine(Trajectory, type="uniform_line"):
     def call(self) -> PartCall:
         """Return the call; see `Trajectory.call`."""
         start, velocity = np.asarray(self.start), np.asarray(self.velocity)
-        return engine.UniformLine, (start, velocity)
+        return PartCall(engine.UniformLine, start=start, velocity=velocity)

@@ -71,7 +71,7 @@ class OrientationTrajectory(Part, ABC, family="orientations", error=TrajectoryEr
         return replace(self, **rotated)
 
     def call(self) -> PartCall:
-        """Return a kind of call and its first arguments; see `Trajectory.call`."""
+        """Return a kind of call with its arguments; see `Trajectory.call`."""
         raise TypeError(f"{type(self).__name__} implements neither call nor sample")
 
     def sample(
@@ -138,7 +138,12 @@ class OrientationPath(OrientationTrajectory, type="path"):
         turns = np.zeros((len(R), 3))
         for i in range(len(R) - 1):
             turns[i] = R[i] @ log3(R[i].T @ R[i + 1])
-        return engine.OrientationPath, (np.asarray(self.times), R, turns)
+        return PartCall(
+            engine.OrientationPath,
+            times=np.asarray(self.times),
+            rotations=R,
+            turns=turns,
+        )
 
 
 class Spin(OrientationTrajectory, type="spin"):
@@ -165,4 +170,8 @@ class Spin(OrientationTrajectory, type="spin"):
     def _call(self) -> PartCall:
         assert self.rotation is not None
         omega = self.rate * checks.direction(self.axis, "axis")
-        return engine.Spin, (np.asarray(omega), matrix_of(self.rotation))
+        return PartCall(
+            engine.Spin,
+            angular_velocity=np.asarray(omega),
+            start=matrix_of(self.rotation),
+        )

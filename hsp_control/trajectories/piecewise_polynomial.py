@@ -78,7 +78,7 @@ class PolynomialTrajectory(Trajectory):
 
     def call(self) -> PartCall:
         """Return the call; see `Trajectory.call`."""
-        return engine.PiecewisePolynomial, tuple(self.pieces)
+        return PartCall(engine.PiecewisePolynomial, **self.pieces._asdict())
 
 
 class PiecewisePolynomial(PolynomialTrajectory):

@@ -3,7 +3,7 @@
 from abc import ABC, abstractmethod
 from dataclasses import KW_ONLY, replace
 from functools import cached_property
-from typing import Any, NamedTuple, Self
+from typing import NamedTuple, Self
 
 import numpy as np
 import pinocchio as pin
@@ -14,7 +14,7 @@ from hsp_control.common.exceptions import TrajectoryError
 from hsp_control.declaration import Part
 from hsp_control.declaration.quantities import Number, Positive, Vector3, numbers
 from hsp_control.declaration.rotation import Rotation, matrix_of
-from hsp_control.engine.plans import TIME, PartCalls, says
+from hsp_control.engine.plans import TIME, PartCall, PartCalls, says
 from hsp_control.engine.rotations import jlog3, log3
 from hsp_control.trajectories.hold import Hold, HoldOrientation
 from hsp_control.trajectories.orientation import (
@@ -85,7 +85,7 @@ class PoseTrajectory(Part, ABC, family="poses", error=TrajectoryError):
 
     def calls(self, out: PoseSample) -> PartCalls:
         """Return the calls that write ``out`` at a time; see `Trajectory.calls`."""
-        return [(write_sample, (self.sample, out, TIME))]
+        return [PartCall(write_sample, sampler=self.sample, out=out, t=TIME)]
 
     def supplied(self) -> tuple[PoseSample, PartCalls]:
         """Return its sample as an argument of a call; see `planned`."""
@@ -233,23 +233,31 @@ class ScrewInterpolation(PoseTrajectory, type="screw"):
         )
 
     @cached_property
-    def _arguments(self) -> tuple[Any, ...]:
+    def _call(self) -> PartCall:
         positions, rotations = self._ends
-        when, screw = (self.start_time, self.duration), _screw(positions, rotations)
-        return *when, positions, rotations, *screw
+        a, b = _screw(positions, rotations)
+        return PartCall(
+            engine.Screw,
+            start_time=self.start_time,
+            duration=self.duration,
+            positions=positions,
+            rotations=rotations,
+            a=a,
+            b=b,
+        )
 
     def sample(self, t: float, out: PoseSample | None = None) -> PoseSample:
         """Return the pose at time t; see `PoseTrajectory.sample`."""
         if out is None:
             out = PoseSample.allocate()
-        engine.Screw(*self._arguments, out)(float(t))
+        engine.Screw(**self._call.arguments, out=out)(float(t))
         return out
 
     def calls(self, out: PoseSample) -> PartCalls:
         """Return the calls that write ``out``; see `Trajectory.calls`."""
         if says(self, "calls", "sample") == "sample":  # of a class that derives from it
             return super().calls(out)
-        return [(engine.Screw, (*self._arguments, out, TIME))]
+        return [self._call.given(out=out, t=TIME)]
 
 
 def _screw(positions: Array, rotations: Array) -> tuple[Array, Array]:

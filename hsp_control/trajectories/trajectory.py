@@ -11,18 +11,17 @@ from numpy.typing import ArrayLike
 from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import ShapeError, TrajectoryError
 from hsp_control.declaration import Part
-from hsp_control.engine import Kind
-from hsp_control.engine.plans import TIME, PartCall, PartCalls, says
+from hsp_control.engine.plans import TIME, PartCall, PartCalls, bind, says
 
 
 def sampled(trajectory: Any, t: float, out: Any) -> Any:
     """Write a trajectory's sample at time t [s] with its call, and return it."""
-    function, arguments = trajectory.call()
-    given = [x.sample(t) if hasattr(x, "sample") else x for x in arguments]
-    if isinstance(function, Kind):
-        function(*given, out)(float(t))
-    else:
-        function(*given, out, float(t))
+    call = trajectory.call().given(out=out)
+    given = {
+        name: x.sample(t) if hasattr(x, "sample") else x
+        for name, x in call.arguments.items()
+    }
+    bind(call.function, given, timed=True)(float(t))
     return out
 
 
@@ -32,12 +31,11 @@ def calls_of_sample(trajectory: Any, out: Any) -> PartCalls:
         trajectory.sample(0.0, out)
         return []
     if says(trajectory, "call", "sample") == "call":
-        function, arguments = trajectory.call()
-        return [(function, (*arguments, out, TIME))]
-    return [(write_sample, (trajectory.sample, out, TIME))]
+        return [trajectory.call().given(out=out, t=TIME)]
+    return [PartCall(write_sample, sampler=trajectory.sample, out=out, t=TIME)]
 
 
-def write_sample(sampler: Callable[[float, Any], Any], out: Any, t: float) -> None:
+def write_sample(t: float, sampler: Callable[[float, Any], Any], out: Any) -> None:
     """Call ``sampler(t, out)``, and write ``out`` if it returns another sample."""
     _copy(sampler(t, out), out)
 
@@ -144,9 +142,10 @@ class Trajectory(Part, ABC, family="trajectories", error=TrajectoryError):
         """The number n of coordinates."""
 
     def call(self) -> PartCall:
-        """Return a kind of call and its first arguments; the sample and t follow.
+        """Return a kind of call with its arguments, without ``out``.
 
-        ``kind(*arguments, out: TrajectorySample, t)`` writes what `sample` returns.
+        With it, a `TrajectorySample`, it writes what `sample` returns at a time t; a
+        function takes t first.
         """
         raise TypeError(f"{type(self).__name__} implements neither call nor sample")
 

@@ -37,7 +37,12 @@ def turned(*rpy: float) -> Array:
 def barrier_at(d: float, influence: float) -> tuple[float, float, float]:
     """Return b, b' and b'' at one distance."""
     slopes, curvatures = np.full(1, np.nan), np.full(1, np.nan)
-    value = engine.Barrier(np.array([d]), influence, slopes, curvatures)()
+    value = engine.Barrier(
+        distances=np.array([d]),
+        influence=influence,
+        slopes=slopes,
+        curvatures=curvatures,
+    )()
     return float(value), float(slopes[0]), float(curvatures[0])
 
 

@@ -1,6 +1,6 @@
 """Robots that the law is tested on, and the pseudo-inverse by itself."""
 
-from functools import cache
+from functools import cache, partial
 
 import numpy as np
 import pytest
@@ -14,9 +14,16 @@ def pseudo_inverse(J: Array, W: Array | None, threshold: float) -> tuple[Array, 
     """Return the package's J# and whether it was damped; W None: the identity."""
     m, n = J.shape
     form, L = (IDENTITY, np.eye(n)) if W is None else (CONSTANT, np.linalg.cholesky(W))
-    columns, given = np.zeros((m, n)), (np.ascontiguousarray(J), L, form, threshold)
+    columns = np.zeros((m, n))
+    inverse = partial(
+        engine.SmallestMotion,
+        J=np.ascontiguousarray(J),
+        L=L,
+        form=form,
+        threshold=threshold,
+    )
     damped = [
-        engine.SmallestMotion(*given, unit, column)()
+        inverse(x=unit, motion=column)()
         for unit, column in zip(np.eye(m), columns, strict=True)
     ]
     return columns.T, any(damped)

@@ -255,7 +255,13 @@ def answer(
     x, warm = case.x0.copy(), work is not None
     if work is None:
         work = Workspace.of(len(x), len(case.A), softness is not None)
-    code = engine.Minimise(packed(case, softness), iterations, warm, x, work)()
+    code = engine.Minimise(
+        problem=packed(case, softness),
+        iterations=iterations,
+        warm=warm,
+        x=x,
+        work=work,
+    )()
     active = work.active[: work.counts[0]].copy()
     return Answer(
         int(code),

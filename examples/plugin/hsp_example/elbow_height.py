@@ -17,6 +17,6 @@ class ElbowHeight(Cost, type="elbow_height"):
     """The height [m]."""
 
     def call(self, state) -> PartCall:
-        """Return the kind of call and its first arguments; see `Cost.call`."""
-        kinds = load(Path(__file__).with_name("elbow_height.cpp"))
-        return kinds.ElbowHeight, (state.frame(self.frame), self.height)
+        """Return the kind of call with its arguments; see `Cost.call`."""
+        kind = load(Path(__file__).with_name("elbow_height.cpp")).ElbowHeight
+        return PartCall(kind, frame=state.frame(self.frame), height=self.height)

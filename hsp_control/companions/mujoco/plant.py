@@ -143,7 +143,14 @@ class MujocoEngine(SampledPlant):
             points = np.array([origins[name] for name in names])
             where = np.ascontiguousarray(contact.pos)  # both are members of structs
             axes = np.ascontiguousarray(contact.frame).reshape(count, 3, 3)
-            engine.AddContactWrenches(touched, where, axes, local, points, sums)()
+            engine.AddContactWrenches(
+                touched=touched,
+                positions=where,
+                frames=axes,
+                wrenches=local,
+                origins=points,
+                sums=sums,
+            )()
         return dict(zip(names, sums, strict=True))
 
 

@@ -70,7 +70,7 @@ class Fed(Written, Trajectory):
     def call(self) -> PartCall:
         """Return the call; see `Trajectory.call`."""
         motion = self.memory[1:].reshape(3, self.size)
-        return engine.Extrapolation, (self.memory[:1], motion)
+        return PartCall(engine.Extrapolation, start_time=self.memory[:1], motion=motion)
 
 
 class FedOrientation(Written, OrientationTrajectory):
@@ -107,4 +107,6 @@ class FedOrientation(Written, OrientationTrajectory):
     def call(self) -> PartCall:
         """Return the call; see `Trajectory.call`."""
         motion = self.memory[1:].reshape(5, 3)
-        return engine.ExtrapolatedOrientation, (self.memory[:1], motion)
+        return PartCall(
+            engine.ExtrapolatedOrientation, start_time=self.memory[:1], motion=motion
+        )

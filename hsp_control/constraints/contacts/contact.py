@@ -20,7 +20,7 @@ from hsp_control.declaration.quantities import (
     Vector3,
     read_only,
 )
-from hsp_control.engine.plans import PartCall, PartCalls, with_outputs
+from hsp_control.engine.plans import PartCall, PartCalls
 from hsp_control.geometry.scene import Start
 from hsp_control.law import TaskSample
 from hsp_control.robot import Robot, RobotState
@@ -262,7 +262,7 @@ class Contact(Part, ABC, family="contacts", error=ContactError):
 
     @abstractmethod
     def call(self, state: RobotState) -> PartCall:
-        """Return a kind of call, and what comes before ``v``, ``damping``, ``out``.
+        """Return a kind of call with its arguments but ``v``, ``damping``, ``out``.
 
         It writes J and J', shape (rows, nv) each, e' = -J v, and the acceleration Kd e'
         that damps it; see `Task.call` for its arguments.
@@ -270,7 +270,7 @@ class Contact(Part, ABC, family="contacts", error=ContactError):
 
     def calls(self, state: RobotState, out: TaskSample) -> PartCalls:
         """Return the calls that write the rows of each step."""
-        return [with_outputs(self.call(state), state.v, self.damping, out)]
+        return [self.call(state).given(v=state.v, damping=self.damping, out=out)]
 
     def evaluate(self, state: RobotState, out: TaskSample) -> TaskSample:
         """Write the rows: J, J', and the acceleration that damps the motion."""

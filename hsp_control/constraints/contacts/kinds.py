@@ -33,13 +33,16 @@ class PointContact(Contact, type="point"):
 
     def call(self, state: RobotState) -> PartCall:
         """Return the call of the velocity rows of the point."""
-        return engine.HoldPoint, _point_of(self, state)
+        return PartCall(engine.HoldPoint, point=_point_of(self, state))
 
 
-def _point_of(contact: Contact, state: RobotState) -> tuple[Any, Array, Array]:
-    """Return a frame, and the point and the shift of its arm from the origin."""
-    point, shift = np.array(contact.points[0]), np.array(contact.shift)
-    return state.frame(contact.frame), point, shift
+def _point_of(contact: Contact, state: RobotState) -> dict[str, Any]:
+    """Return a point of a frame: where it is in the frame, and its shift."""
+    return {
+        "frame": state.frame(contact.frame),
+        "position": np.array(contact.points[0]),
+        "shift": np.array(contact.shift),
+    }
 
 
 class BallContact(Contact, type="ball"):
@@ -68,7 +71,7 @@ class BallContact(Contact, type="ball"):
 
     def call(self, state: RobotState) -> PartCall:
         """Return the call of the velocity rows of the material point in contact."""
-        return engine.HoldPoint, _point_of(self, state)
+        return PartCall(engine.HoldPoint, point=_point_of(self, state))
 
 
 class SlidingContact(Contact, type="sliding"):
@@ -135,7 +138,8 @@ class SlidingContact(Contact, type="sliding"):
     def call(self, state: RobotState) -> PartCall:
         """Return the call of the normal's row, nᵀ times the point's velocity rows."""
         normal = np.ascontiguousarray(self.axes[:, 2])
-        return engine.HoldNormal, (*_point_of(self, state), normal)
+        point = _point_of(self, state)
+        return PartCall(engine.HoldNormal, point=point, normal=normal)
 
 
 def _surface(corners: Array) -> Array:
@@ -198,4 +202,4 @@ class SurfaceContact(Contact, type="surface"):
 
     def call(self, state: RobotState) -> PartCall:
         """Return the call of the frame's six rows: it neither moves nor turns."""
-        return engine.HoldSurface, (state.frame(self.frame),)
+        return PartCall(engine.HoldSurface, frame=state.frame(self.frame))

@@ -67,7 +67,7 @@ class Actuation:
         nv = state.robot.nv
         self._state, self._law = state, law
         self._support, self._limits = support, limits
-        base, bounds = support.base, limits.bounds
+        base = support.base
         # Whether M a + N is the effort wherever it is within the bounds, and so is a.
         self.direct = limits.box and not base.size and not support.size
         # what is delivered there of the law's own acceleration
@@ -80,10 +80,8 @@ class Actuation:
         self._checks = [state.rnea(wanted.acceleration), self._check()]
         self._check_wanted = state.plan(self._checks)
         self._tau = support.tau if support.size else wanted.effort
-        self._effort_within, self._tau_within = (
-            state.plan([(engine.Within, (effort, *bounds[2:]))]).call()
-            for effort in (wanted.effort, self._tau)
-        )
+        self._effort_within = self._within_bounds(wanted.effort)
+        self._tau_within = self._within_bounds(self._tau)
         self._qp: LimitedStep | None = None
         if limits.limits is not None or support.size:
             held = limits.limits.static_effort if limits.limits else None
@@ -95,13 +93,36 @@ class Actuation:
     def _check(self) -> PartCall:
         """Return the call that compares a and M a + N with their bounds."""
         state, limits = self._state, self._limits
-        found = self._law.code, BEYOND_ANY_LEVEL, self.found
+        found = {
+            "code": self._law.code,
+            "not_finite": BEYOND_ANY_LEVEL,
+            "found": self.found,
+        }
         if limits.limits is None:
-            return engine.CheckLaw, found
-        moving = state.time, state.q, state.v, self._wanted.acceleration, state.effort
-        within = limits.motion, limits.ends, limits.sent.held, limits.bounds
-        given = *moving, state.robot.dof_indices, *within, *found, self._solve_if
-        return engine.CheckLimits, given
+            return PartCall(engine.CheckLaw, **found)
+        return PartCall(
+            engine.CheckLimits,
+            time=state.time,
+            q=state.q,
+            v=state.v,
+            a=self._wanted.acceleration,
+            tau=state.effort,
+            where=state.robot.dof_indices,
+            limits=limits.motion,
+            ends=limits.ends,
+            held=limits.sent.held,
+            bounds=limits.bounds,
+            **found,
+            solve_if=self._solve_if,
+        )
+
+    def _within_bounds(self, effort: Array) -> Callable[[], float]:
+        """Return the call that says whether an effort is within its bounds."""
+        bounds = self._limits.bounds
+        call = PartCall(
+            engine.Within, x=effort, lower=bounds.tau_lower, upper=bounds.tau_upper
+        )
+        return self._state.plan([call]).call()
 
     def calls(self) -> list[Callable[[float], Any]]:
         """Return the calls of the time that deliver the law's own acceleration.
@@ -111,9 +132,10 @@ class Actuation:
         that is needed where a bound is violated, it is solved at once.
         """
         law, wanted = self._law.acceleration, self._wanted
-        calls: PartCalls = [(engine.Copy, (law, wanted.acceleration)), *self._checks]
+        begin = PartCall(engine.Copy, x=law, out=wanted.acceleration)
+        calls: PartCalls = [begin, *self._checks]
         if self._qp is not None and self.direct:
-            keep = engine.Copy, (self._state.effort, wanted.effort)
+            keep = PartCall(engine.Copy, x=self._state.effort, out=wanted.effort)
             calls = [*calls, self._qp.nearest_if(keep, self._solve_if)]
         return self._state.plan(calls).steps()
 

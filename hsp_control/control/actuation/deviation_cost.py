@@ -79,7 +79,7 @@ class Directions(NamedTuple):
 
 def write_directions(levels: Levels, out: Directions) -> PartCall:
     """Return the call that writes the directions of levels and of the null space."""
-    return engine.Directions, (levels, out)
+    return PartCall(engine.Directions, **levels._asdict(), **out._asdict())
 
 
 def write_inverse_root(
@@ -94,5 +94,12 @@ def write_inverse_root(
         JT: Jᵀ, shape (nv, nv).
         moving: How many of its rows these are, shape (1,).
     """
-    metric = levels.L, levels.form
-    return engine.InverseRoot, (directions, *metric, standing, JT, moving)
+    return PartCall(
+        engine.InverseRoot,
+        **directions._asdict(),
+        L=levels.L,
+        form=levels.form,
+        standing=standing,
+        JT=JT,
+        moving=moving,
+    )

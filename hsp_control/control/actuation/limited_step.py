@@ -187,23 +187,51 @@ class LimitedStep:
         levels = Levels.of(resolution, p > 0, state.robot.size or 1.0)
         directions = Directions.of(n)
         x, moving, none = self._x, np.zeros(1, np.int64), np.zeros(1, np.int64)
-        unsolved, around = np.zeros(2), (wanted, forces, bounds, places)
+        unsolved = np.zeros(2)
+        around = {
+            "wanted": wanted,
+            "forces": forces,
+            "bounds": bounds,
+            "places": places,
+        }
 
         # The calls that solve them
         def optimum(
             qp: QP, count: Indices, work: Workspace, reached: Status, *, warm: bool
         ) -> PartCalls:
-            solve = int(reached), warm, qp, count, x, work, status
-            outcome = *around, x, self.result, status, unsolved
-            return [(engine.SolveLimitedStep, solve), (engine.LimitedResult, outcome)]
+            return [
+                PartCall(
+                    engine.SolveLimitedStep,
+                    reached=int(reached),
+                    warm=warm,
+                    problem=qp,
+                    moving=count,
+                    x=x,
+                    work=work,
+                    status=status,
+                ),
+                PartCall(
+                    engine.LimitedResult,
+                    **around,
+                    x=x,
+                    result=self.result,
+                    status=status,
+                    unsolved=unsolved,
+                ),
+            ]
+
+        def begin_with(cost: float, own: Array) -> PartCall:
+            return PartCall(
+                engine.BeginLimitedStep, forces=forces, cost=cost, own=own, x=x
+            )
 
         def nearest(*, standing: bool, warm: bool) -> PartCalls:
             root = write_inverse_root(
                 levels, directions, standing, self._rows.JT, moving
             )
-            begin = forces, _FORCE_COST, self._rows.own, x
+            begin = begin_with(_FORCE_COST, self._rows.own)
             found = optimum(self._rows, moving, memories[0], LIMITED, warm=warm)
-            return [root, (engine.BeginLimitedStep, begin), *found]
+            return [root, begin, *found]
 
         rows: list[AnyCall] = [*state.inertia.calls]
         if permitted is not None:
@@ -214,13 +242,15 @@ class LimitedStep:
             barred = Barred(A[kept], lower[kept])
             target = *wanted, parts, Within(*bounds[:2]), permitted, barred
             rows += own, limited_target(*target)
-        rows.append((engine.LimitedRows, (*around, A, lower, upper)))
+        rows.append(
+            PartCall(engine.LimitedRows, **around, A=A, lower=lower, upper=upper)
+        )
         write = write_directions(levels, directions)
         closest = write, *nearest(standing=p > 0, warm=True)
         self._nearest = [*rows, *closest]
         self._find_nearest = self._find_forces = state.plan(self._nearest).call()
         if p > 0:
-            begun = engine.BeginLimitedStep, (forces, 1.0, redistributed.own, x)
+            begun = begin_with(1.0, redistributed.own)
             at_once = optimum(
                 redistributed, none, memories[1], Status.REDISTRIBUTED, warm=True
             )

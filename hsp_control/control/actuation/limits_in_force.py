@@ -44,9 +44,14 @@ class LimitSet:
         self.motion = MotionLimits(*numbers)
         self.ends = Ends.of(limits.lower, limits.upper, limits.velocity)
         # writes the bounds on the next effort
-        most = np.array(limits.effort), np.array(limits.effort_rate)
-        window = self.bounds.tau_lower, self.bounds.tau_upper
-        self.updating: PartCall = engine.EffortWindow, (sent.last, *most, *window)
+        self.updating = PartCall(
+            engine.EffortWindow,
+            last=sent.last,
+            effort=np.array(limits.effort),
+            rate=np.array(limits.effort_rate),
+            lower=self.bounds.tau_lower,
+            upper=self.bounds.tau_upper,
+        )
         self.update: Callable[[], object] = state.plan([self.updating]).call()
         self.update()
 

@@ -71,12 +71,19 @@ class SentEffort:
         The period is that of the last one.
         """
         state, held = self._state, self.held
-        arrays = acceleration, held.disturbance, held.timing, held.expected
-        return engine.ExpectedVelocity, (state.time, state.v, *arrays)
+        return PartCall(
+            engine.ExpectedVelocity,
+            time=state.time,
+            v=state.v,
+            a=acceleration,
+            disturbance=held.disturbance,
+            timing=held.timing,
+            expected=held.expected,
+        )
 
     def recording(self) -> PartCall:
         """Return a call that makes `RobotState.effort` the last effort."""
-        return engine.Copy, (self._state.effort, self.last[:-1])
+        return PartCall(engine.Copy, x=self._state.effort, out=self.last[:-1])
 
     def forget_rate(self) -> None:
         """Forget the last effort: the rate of the next one has no limit."""

@@ -13,6 +13,7 @@ from hsp_control.constraints.contacts import Contact, SlidingContact
 from hsp_control.constraints.contacts.contact import NORMAL, WRENCH, shares
 from hsp_control.control.evolution import PlannedContact
 from hsp_control.edge import Resolution
+from hsp_control.engine.plans import PartCall
 from hsp_control.robot import Robot, RobotState
 from hsp_control.trajectories import TrajectorySample
 
@@ -100,9 +101,17 @@ class Support:
         calls = []
         for contact, where in zip(self.contacts, self.points, strict=True):
             frame = self._state.frame(contact.frame)
-            points, shift = np.array(contact.points), np.array(contact.shift)
-            own = points, shift, np.array(contact.axes), where.start
-            calls.append((engine.ForceMap, (frame, *own, self.positions, self.map)))
+            call = PartCall(
+                engine.ForceMap,
+                frame=frame,
+                points=np.array(contact.points),
+                shift=np.array(contact.shift),
+                axes=np.array(contact.axes),
+                first=where.start,
+                positions=self.positions,
+                out=self.map,
+            )
+            calls.append(call)
         return self._state.plan(calls).steps()
 
     def minimum_norm_forces(self, wanted: Array) -> Array:
@@ -113,15 +122,29 @@ class Support:
 
     @cached_property
     def _solve(self) -> Callable[[], object]:
-        given = self.map, self.base, self.inverse_cost, self.reference, self._wanted
-        call = engine.MinimumNormForces, (*given, self.forces, self.tau)
+        call = PartCall(
+            engine.MinimumNormForces,
+            F=self.map,
+            base=self.base,
+            inverse_cost=self.inverse_cost,
+            reference=self.reference,
+            wanted=self._wanted,
+            forces=self.forces,
+            tau=self.tau,
+        )
         return self._state.plan([call]).call()
 
     @cached_property
     def permits(self) -> Callable[[], float]:
         """The call that says whether `forces` are within cones and bounds."""
-        given = self.cone, self.forces, self.lower, self.upper
-        return self._state.plan([(engine.WithinCones, given)]).call()
+        call = PartCall(
+            engine.WithinCones,
+            cone=self.cone,
+            forces=self.forces,
+            lower=self.lower,
+            upper=self.upper,
+        )
+        return self._state.plan([call]).call()
 
     def in_world(self, forces: Array) -> Array:
         """Return the forces in world axes, shape (size/3, 3) [N]."""

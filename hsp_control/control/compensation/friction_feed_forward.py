@@ -103,8 +103,13 @@ def desired_velocity(state: RobotState, active: ActiveStack) -> Array:
         minimal = np.linalg.pinv(B.T, rcond=resolution.threshold) @ rate_error
         raised = np.linalg.solve(metric.L.T, minimal)
         return np.asarray(v + resolution.null_space_error + raised)
-    motion, threshold = np.zeros(n), resolution.threshold
+    motion = np.zeros(n)
     engine.SmallestMotion(
-        task.jacobian, metric.L, VARYING, threshold, rate_error, motion
+        J=task.jacobian,
+        L=metric.L,
+        form=VARYING,
+        threshold=resolution.threshold,
+        x=rate_error,
+        motion=motion,
     )()
     return np.asarray(v + resolution.null_space_error + motion)

@@ -202,5 +202,12 @@ def task_wrench(
         L = np.linalg.cholesky(state.mass_matrix)
     except np.linalg.LinAlgError:
         return np.full(len(J), np.nan)
-    engine.TaskForce(J, L, VARYING, threshold, np.array(disturbance), force)()
+    engine.TaskForce(
+        J=J,
+        L=L,
+        form=VARYING,
+        threshold=threshold,
+        effort=np.array(disturbance),
+        force=force,
+    )()
     return force

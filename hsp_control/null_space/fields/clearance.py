@@ -136,7 +136,12 @@ class Clearance(Cost):
         distances = np.full(len(self.proximity(state).pairs), np.inf)
         slopes, curvatures = np.zeros((2, len(distances)))
         coal.measure(state, distances)
-        engine.Barrier(distances, self.influence, slopes, curvatures)()
+        engine.Barrier(
+            distances=distances,
+            influence=self.influence,
+            slopes=slopes,
+            curvatures=curvatures,
+        )()
         gradient = np.zeros(state.robot.nv)
         coal.add_gradient(state, slopes, gradient)
         return gradient
@@ -147,8 +152,13 @@ class Clearance(Cost):
         def make() -> _Work:
             proximity = self._pairs(state.robot)
             slopes, curvatures = np.zeros((2, len(proximity.pairs)))
-            arguments = proximity.distances, self.influence, slopes, curvatures
-            call = engine.Barrier, arguments
+            call = PartCall(
+                engine.Barrier,
+                distances=proximity.distances,
+                influence=self.influence,
+                slopes=slopes,
+                curvatures=curvatures,
+            )
             add_barriers = state.plan([call]).call()
             return _Work(proximity, slopes, curvatures, call, add_barriers)
 

@@ -10,7 +10,7 @@ from hsp_control import engine
 from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import FieldError
 from hsp_control.declaration.imported import AS_TEXT, NAMED
-from hsp_control.engine.plans import PartCall, PartCalls, says, with_outputs
+from hsp_control.engine.plans import PartCall, PartCalls, says
 from hsp_control.law import FieldSample, MetricSample
 from hsp_control.null_space.differences import gradient, rate_along_flow
 from hsp_control.null_space.fields.field import NullSpaceField
@@ -51,16 +51,16 @@ class Cost(NullSpaceField):
     """
 
     def call(self, state: RobotState) -> PartCall:
-        """Return a kind of call, and what comes before ``gradient`` and ``rate``.
+        """Return a kind of call with its arguments, without ``gradient`` and ``rate``.
 
-        ``kind(*arguments, gradient, rate) -> float`` writes ∇f and (∇f)', shape (nv,)
-        each, and returns f; see `Task.call` for its arguments.
+        With these two it writes ∇f and (∇f)', shape (nv,) each, and returns f; see
+        `Task.call` for its arguments.
         """
         raise TypeError(f"{type(self).__name__} implements neither call nor value")
 
     def derivatives(self, state: RobotState, gradient: Array, rate: Array) -> PartCalls:
         """Return the calls that write ∇f and (∇f)' with `call`, and give f."""
-        return [with_outputs(self.call(state), gradient, rate)]
+        return [self.call(state).given(gradient=gradient, rate=rate)]
 
     def _has_kernel(self, *ways: str) -> bool:
         """Return whether no subclass overrides any of these methods in plain Python."""
@@ -107,7 +107,10 @@ class Cost(NullSpaceField):
         descend = descent(metric, form, out)
         if self._has_kernel("gradient", "gradient_rate", "differentiate"):
             return [*self.derivatives(state, *out), descend]
-        return [(self._differentiated, (state.read_only, *out)), descend]
+        write = PartCall(
+            self._differentiated, state=state.read_only, gradient=out.g, rate=out.g_dot
+        )
+        return [write, descend]
 
     def evaluate(
         self, state: RobotState, metric: MetricSample, form: int, out: FieldSample
@@ -218,4 +221,6 @@ class FunctionCost(Cost, type="function_cost"):
 
 def descent(metric: MetricSample, form: int, out: FieldSample) -> PartCall:
     """Return the call that overwrites ∇f and (∇f)' by g = -W⁻¹∇f and g'."""
-    return engine.GradientDescent, (metric.L, metric.W_dot, form, out)
+    return PartCall(
+        engine.GradientDescent, L=metric.L, W_dot=metric.W_dot, form=form, field=out
+    )

@@ -15,7 +15,7 @@ from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import FieldError
 from hsp_control.declaration import Part, within
 from hsp_control.declaration.quantities import NonNegative, OrInstance
-from hsp_control.engine.plans import AnyCall, PartCalls, says
+from hsp_control.engine.plans import AnyCall, PartCall, PartCalls, says
 from hsp_control.geometry.scene import Start
 from hsp_control.law import FieldSample, MetricSample
 from hsp_control.null_space.fields.weight import Ramp, Weight, product, sample_weight
@@ -105,7 +105,10 @@ class NullSpaceField(Part, ABC, family="fields", error=FieldError):
         if self.zero:
             self.evaluate(state.read_only, metric, form, out)
             return []
-        return [(self.evaluate, (state.read_only, metric, form, out))]
+        call = PartCall(
+            self.evaluate, state=state.read_only, metric=metric, form=form, out=out
+        )
+        return [call]
 
     def own_calls(
         self, state: RobotState, metric: MetricSample, form: int, out: FieldSample
@@ -221,10 +224,17 @@ class FieldSum(NullSpaceField):
             calls += term.calls(state, metric, form, sample)
             weights = np.zeros(2)
             if isinstance(term.weight, Weight) and not term.weight.constant:
-                calls.append((_update, (term.weight, state.read_only, weights)))
+                seen = state.read_only
+                update = PartCall(
+                    _update, weight=term.weight, state=seen, weights=weights
+                )
+                calls.append(update)
             else:
                 weights[:] = sample_weight(term.weight, state)
-            calls.append((engine.AddWeighted, (k == 0, weights, sample, out)))
+            add = PartCall(
+                engine.AddWeighted, first=k == 0, weight=weights, term=sample, sum=out
+            )
+            calls.append(add)
         return calls
 
     def value(self, state: RobotState) -> float:

@@ -96,17 +96,17 @@ class JacobianCost(Cost):
         raise TypeError(f"{type(self).__name__} has neither terms nor terms_call")
 
     def terms_call(self, nv: int) -> PartCall:
-        """Return a kind of call and its first arguments, instead of `terms`.
+        """Return a kind of call with its arguments, instead of `terms`.
 
-        The further arguments are J, J', ∂φ/∂J and its rate, shape (k, nv) each. It
-        writes ∂φ/∂J and its rate, and returns φ.
+        The others are ``J``, ``J_dot``, ``slope`` and ``slope_rate``, shape (k, nv)
+        each. It writes the last two, ∂φ/∂J and its rate, and returns φ.
         """
 
         def write(J: Array, J_dot: Array, slope: Array, slope_rate: Array) -> float:
             value, slope[:], slope_rate[:] = self.terms(J, J_dot)
             return value
 
-        return write, ()
+        return PartCall(write)
 
     def value(self, state: RobotState) -> float:
         """Return f, which the calls before the last one give."""
@@ -122,15 +122,24 @@ class JacobianCost(Cost):
         dofs, first = _chain(state.robot, self._frame(state.robot))
         selected = self._selected()
         length = self.length if self.rows == "pose" else 1.0
-        rows = selected, np.where(selected < 3, 1.0, length)
+        scale = np.where(selected < 3, 1.0, length)
+        rows = {"selected": selected, "scale": scale}
         J, J_dot, slope, slope_rate = np.zeros((4, len(selected), nv))
-        motion = frame.jacobian, frame.jacobian_dot
-        function, parameters = self.terms_call(nv)
-        slopes, chain = (slope, slope_rate), (dofs, first)
+        slopes = {"slope": slope, "slope_rate": slope_rate}
         return [
-            (engine.SelectRows, (frame, *rows, J, J_dot)),
-            (function, (*parameters, J, J_dot, *slopes)),
-            (engine.ChainGradient, (*motion, *slopes, *rows, *chain, gradient, rate)),
+            PartCall(engine.SelectRows, frame=frame, **rows, J=J, J_dot=J_dot),
+            self.terms_call(nv).given(J=J, J_dot=J_dot, **slopes),
+            PartCall(
+                engine.ChainGradient,
+                J=frame.jacobian,
+                J_dot=frame.jacobian_dot,
+                **slopes,
+                **rows,
+                dofs=dofs,
+                first=first,
+                gradient=gradient,
+                rate=rate,
+            ),
         ]
 
 

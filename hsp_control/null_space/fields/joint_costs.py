@@ -57,7 +57,14 @@ class JointCentering(LimitedJointsCost, type="joint_centering"):
         half = np.maximum(0.5 * (high - low), 1.0)
         stiffness = per_dof(self.weights, robot.nv)[dofs] / half**2
         middle = 0.5 * (low + high)
-        return engine.JointCentering, (state.q, state.v, limited, middle, stiffness)
+        return PartCall(
+            engine.JointCentering,
+            q=state.q,
+            v=state.v,
+            limited=limited,
+            middle=middle,
+            stiffness=stiffness,
+        )
 
 
 def limited_joints(robot: Robot) -> Indices:
@@ -122,9 +129,15 @@ class TargetPosture(Cost, type="target_posture"):
             raise self._not_placed("posture")
         target = np.asarray(self.target, dtype=float)
         moved = self.displacement or Hold(np.zeros(robot.nv))
-        joints, weights = robot.single_dof_joints, per_dof(self.weights, robot.nv)
-        where = state.q, state.v, target
-        return engine.TargetPosture, (*where, moved, joints, weights)
+        return PartCall(
+            engine.TargetPosture,
+            q=state.q,
+            v=state.v,
+            target=target,
+            displacement=moved,
+            single_dof_joints=robot.single_dof_joints,
+            weights=per_dof(self.weights, robot.nv),
+        )
 
 
 class EqualJointAngles(Cost, type="equal_joint_angles"):
@@ -154,8 +167,14 @@ class EqualJointAngles(Cost, type="equal_joint_angles"):
         """Return the call; see `Cost.call`."""
         robot = state.robot
         chain = [robot.velocity_index(joint).start for joint in self.joints]
-        where = state.q, state.v, robot.neutral(), robot.single_dof_joints
-        return engine.EqualJointAngles, (*where, np.array(chain, dtype=np.int64))
+        return PartCall(
+            engine.EqualJointAngles,
+            q=state.q,
+            v=state.v,
+            neutral=robot.neutral(),
+            single_dof_joints=robot.single_dof_joints,
+            chain=np.array(chain, dtype=np.int64),
+        )
 
 
 class LimitBarrier(LimitedJointsCost, type="limit_barrier"):
@@ -178,5 +197,13 @@ class LimitBarrier(LimitedJointsCost, type="limit_barrier"):
         lower, upper = low[dofs], high[dofs]
         unit = 0.5 * self.zone * (upper - lower)  # u_i
         weights = per_dof(self.weights, robot.nv)[dofs]
-        where = state.q, state.v, limited
-        return engine.LimitBarrier, (*where, lower, upper, unit, weights)
+        return PartCall(
+            engine.LimitBarrier,
+            q=state.q,
+            v=state.v,
+            limited=limited,
+            lower=lower,
+            upper=upper,
+            unit=unit,
+            weights=weights,
+        )

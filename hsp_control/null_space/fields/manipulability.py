@@ -62,8 +62,13 @@ class Manipulability(JacobianCost, type="manipulability"):
         # Larger if the entries of W are small: it must exceed the rounding error of G.
         floor = FLOOR**2 * max(1.0, 0.1 * float(np.trace(W_inv)) / nv)
         power = {"log": 0, "root": 1, "determinant": 2}[self.form]
-        inverse = np.ascontiguousarray(W_inv)
-        return engine.Manipulability, (inverse, weighted, floor, power)
+        return PartCall(
+            engine.Manipulability,
+            inverse_metric=np.ascontiguousarray(W_inv),
+            weighted=weighted,
+            floor=floor,
+            power=power,
+        )
 
 
 class InverseCondition(JacobianCost, type="inverse_condition"):
@@ -82,4 +87,4 @@ class InverseCondition(JacobianCost, type="inverse_condition"):
 
     def terms_call(self, nv: int) -> PartCall:
         """Return the call; see `JacobianCost.terms_call`."""
-        return engine.InverseCondition, (FLOOR**2,)
+        return PartCall(engine.InverseCondition, floor=FLOOR**2)

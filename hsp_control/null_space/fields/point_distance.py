@@ -11,7 +11,7 @@ from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import FieldError
 from hsp_control.declaration import within
 from hsp_control.declaration.quantities import Name, Names, OrInstance
-from hsp_control.engine.plans import PartCalls
+from hsp_control.engine.plans import PartCall, PartCalls
 from hsp_control.geometry.scene import Obstacle, Start
 from hsp_control.null_space.fields.cost import Cost
 from hsp_control.robot import RobotState
@@ -56,12 +56,20 @@ class PointDistance(Cost, type="point_distance"):
     def derivatives(self, state: RobotState, gradient: Array, rate: Array) -> PartCalls:
         """Return the calls that add a frame each to f, ∇f and (∇f)'."""
         center, moving = self._placed_obstacle.center.supplied()
-        sums = np.zeros(1), gradient, rate
-        frames = enumerate(map(state.frame, self.frames))
-        return [
-            *moving,
-            *((engine.PointDistance, (k == 0, x, center, *sums)) for k, x in frames),
+        total = np.zeros(1)
+        adding = [
+            PartCall(
+                engine.PointDistance,
+                first=k == 0,
+                frame=state.frame(frame),
+                center=center,
+                total=total,
+                gradient=gradient,
+                rate=rate,
+            )
+            for k, frame in enumerate(self.frames)
         ]
+        return [*moving, *adding]
 
     def value(self, state: RobotState) -> float:
         """Return f; see `Cost.value`.

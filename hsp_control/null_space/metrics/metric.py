@@ -21,7 +21,7 @@ from hsp_control.declaration.quantities import (
     numbers,
     read_only,
 )
-from hsp_control.engine.plans import PartCall, PartCalls, says, with_outputs
+from hsp_control.engine.plans import PartCall, PartCalls, says
 from hsp_control.geometry.scene import Start
 from hsp_control.law import CONSTANT, IDENTITY, VARYING, MetricSample
 from hsp_control.robot import RobotState
@@ -58,9 +58,10 @@ class Metric(Part, ABC, family="metrics", error=MetricError):
         return self
 
     def call(self, state: RobotState) -> PartCall:
-        """Return a kind of call, and what comes before ``W``, ``L`` and ``W_dot``.
+        """Return a kind of call with its arguments, without ``out``.
 
-        It writes what `evaluate` describes; see `Task.call` for its arguments.
+        With it, a `MetricSample`, it writes what `evaluate` describes; see `Task.call`
+        for its arguments.
         """
         raise TypeError(f"{type(self).__name__} implements neither call nor evaluate")
 
@@ -70,8 +71,8 @@ class Metric(Part, ABC, family="metrics", error=MetricError):
             self.evaluate(state.read_only, out)
             return []
         if says(self, "call", "evaluate") == "call":
-            return [with_outputs(self.call(state), *out)]
-        return [(self.evaluate, (state.read_only, out))]
+            return [self.call(state).given(out=out)]
+        return [PartCall(self.evaluate, state=state.read_only, out=out)]
 
     def evaluate(self, state: RobotState, out: MetricSample) -> MetricSample:
         """Write W = L Lᵀ and W' at a state into ``out`` and return ``out``.
@@ -83,7 +84,7 @@ class Metric(Part, ABC, family="metrics", error=MetricError):
             state: The robot's state: t, q, v and the kinematics.
             out: The sample to write into, shapes (nv, nv).
         """
-        state.run([with_outputs(self.call(state), *out)])
+        state.run([self.call(state).given(out=out)])
         return out
 
 
@@ -113,7 +114,12 @@ class MassMatrixMetric(Metric, type="mass_matrix"):
         """Return the call; see `Metric.call`."""
         known = self.inertia != "robot"
         unit = self.inertia if known else state.robot.typical_inertia
-        return engine.MassMatrixMetric, (state.inertia, state.inertia_rate, unit)
+        return PartCall(
+            engine.MassMatrixMetric,
+            M=state.inertia,
+            M_dot=state.inertia_rate,
+            inertia=unit,
+        )
 
     def evaluate(self, state: RobotState, out: MetricSample) -> MetricSample:
         """Write W = M/m, L and W' = M'/m; see `Metric.evaluate`."""

@@ -11,7 +11,7 @@ from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import SimulationError
 from hsp_control.control.measurement import NO_WRENCHES, Inertial, LogChannel
 from hsp_control.declaration import Part
-from hsp_control.engine.plans import TIME
+from hsp_control.engine.plans import TIME, PartCall
 from hsp_control.robot import Robot
 from hsp_control.robot.integrators import Advance, Integrator, Steps
 from hsp_control.robot.kinematics import Term
@@ -103,7 +103,7 @@ class ContinuousPlant(Plant, ABC):
         def compute(t: float) -> None:
             value[:] = self.acceleration(t, q, v, tau)
 
-        return Term(value, [(compute, (TIME,))])
+        return Term(value, [PartCall(compute, t=TIME)])
 
 
 class SampledPlant(Plant, ABC):

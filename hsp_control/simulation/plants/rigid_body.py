@@ -132,10 +132,10 @@ class StickingPlant(SampledPlant):
         damping = np.diag(0.5 * h * self.friction.viscous)
         after = start.copy()
         engine.DryFriction(
-            np.ascontiguousarray(M + damping),
-            (M - damping) @ start + h * (tau - N),
-            h * self.friction.coulomb,
-            after,
+            A=np.ascontiguousarray(M + damping),
+            b=(M - damping) @ start + h * (tau - N),
+            c=h * self.friction.coulomb,
+            x=after,
         )()
         return after
 

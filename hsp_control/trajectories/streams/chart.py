@@ -15,6 +15,7 @@ from hsp_control import engine
 from hsp_control.common.arrays import Array
 from hsp_control.engine.rotations import exp3, jlog3
 from hsp_control.trajectories.orientation import OrientationSample
+from hsp_control.trajectories.trajectory import TrajectorySample
 
 
 class State:
@@ -57,8 +58,8 @@ class Chart:
     def write_orientation(self, state: State, out: OrientationSample) -> None:
         """Write R, ω and ω' of a state, in world axes."""
         n = self.linear
-        y = state.x[n:], state.rate[n:], state.acceleration[n:]
-        engine.OrientationOfChart(state.base, *y, out)()
+        y = TrajectorySample(state.x[n:], state.rate[n:], state.acceleration[n:])
+        engine.OrientationOfChart(base=state.base, y=y, out=out)()
 
     def local(self, values: Array, base: Array) -> Array:
         """Return values, (k, width), in local coordinates about a base, (k, n).
@@ -70,7 +71,8 @@ class Chart:
         x[:, :n] = values[:, :n]
         if self.rotational:
             y = np.empty((len(values), 3))
-            engine.RotationVectors(np.ascontiguousarray(values[:, n:]), base, y)()
+            quaternions = np.ascontiguousarray(values[:, n:])
+            engine.RotationVectors(quaternions=quaternions, base=base, y=y)()
             x[:, n:] = y
         return x
 

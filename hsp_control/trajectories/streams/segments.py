@@ -185,8 +185,12 @@ class QuinticSegment(Segment):
         """Set x, T x', T² x'' at the start, then at the end, shape (6, n)."""
         super().__init__(start, end, base)
         self._found = TrajectorySample.allocate(ends.shape[1])
-        given = self.start, self.end, QUINTIC @ ends, self._found
-        self._motion = engine.Polynomial(*given)
+        self._motion = engine.Polynomial(
+            start=self.start,
+            end=self.end,
+            coefficients=QUINTIC @ ends,
+            out=self._found,
+        )
 
     def state(self, t: float) -> State:
         """Return the state at time t [s]."""

@@ -100,7 +100,15 @@ def test_the_closed_form_is_the_optimum(without_support: int, seed: int) -> None
     F[:n] -= lost @ (lost.T @ F[:n])
     wanted[:n] -= lost @ (lost.T @ wanted[:n])
     forces, tau = np.zeros(size), np.zeros(nv)
-    engine.MinimumNormForces(F, base, e, r, wanted, forces, tau)()
+    engine.MinimumNormForces(
+        F=F,
+        base=base,
+        inverse_cost=e,
+        reference=r,
+        wanted=wanted,
+        forces=forces,
+        tau=tau,
+    )()
     A = F[:n]
     np.testing.assert_allclose(A @ forces, wanted[:n], atol=1e-9)
     multipliers = np.linalg.lstsq(A.T, (forces - r) / e, rcond=None)[0]

@@ -13,6 +13,7 @@ from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import RateError
 from hsp_control.declaration import imported
 from hsp_control.declaration.language import in_yaml
+from hsp_control.engine.plans import PartCall
 from hsp_control.law import VARYING
 from hsp_control.null_space.fields import FunctionField, StateWeight, VectorField
 
@@ -130,8 +131,8 @@ class Kernel(hsp.Cost):
 
     factor: float
 
-    def call(self, state: hsp.RobotState) -> Any:
-        return _square, (state.q, state.v, self.factor)
+    def call(self, state: hsp.RobotState) -> PartCall:
+        return PartCall(_square, q=state.q, v=state.v, factor=self.factor)
 
 
 class Reach(hsp.fields.JacobianCost):

@@ -22,6 +22,7 @@ from hsp_control.control.actuation.deviation_cost import (
     write_inverse_root,
 )
 from hsp_control.edge import Resolution
+from hsp_control.engine.plans import planned
 
 seeds = st.integers(0, 2**32 - 1)
 NOWHERE = np.zeros(0, dtype=np.int64)
@@ -47,11 +48,11 @@ def inverse_cost(resolution: Resolution) -> Array:
     """Return J Jᵀ, which is to be H⁻¹."""
     levels, directions = Levels.of(resolution, False, panda().size), Directions.of(7)
     JT, moving = np.zeros((7, 7)), np.zeros(1, dtype=np.int64)
-    for kind, arguments in (
+    calls = [
         write_directions(levels, directions),
         write_inverse_root(levels, directions, False, JT, moving),
-    ):
-        kind(*arguments)()
+    ]
+    planned(calls).run(0.0)
     assert moving[0] == 7
     return JT.T @ JT
 

@@ -161,4 +161,4 @@ def test_sizes_that_do_not_fit_are_refused() -> None:
     x, work = case.x0.copy(), Workspace.of(2, 2)
     problem = packed(case)._replace(own=np.ones(1))
     with pytest.raises(ValueError, match="a QP: the sizes do not fit together"):
-        engine.Minimise(problem, 10, False, x, work)
+        engine.Minimise(problem=problem, iterations=10, warm=False, x=x, work=work)

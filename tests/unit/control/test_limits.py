@@ -64,10 +64,22 @@ def bounds(
     a_lower, a_upper = np.zeros(7), np.zeros(7)
     lasting = drift if lasting is None else lasting
     least, most = np.full(7, min(drift, 0.0)), np.full(7, max(drift, 0.0))
-    observed = np.full(7, error), least, most, np.full(7, lasting), np.full(7, steady)
-    where = limits.robot.dof_indices
-    known = q, v, where, limits.motion, *observed
-    engine.AccelerationBounds(*known, a_lower, a_upper)()
+    observed = {
+        "error": np.full(7, error),
+        "least": least,
+        "most": most,
+        "lasting": np.full(7, lasting),
+        "steady": np.full(7, steady),
+    }
+    engine.AccelerationBounds(
+        q=q,
+        v=v,
+        where=limits.robot.dof_indices,
+        limits=limits.motion,
+        held=observed,
+        a_lower=a_lower,
+        a_upper=a_upper,
+    )()
     return a_lower, a_upper
 
 
@@ -303,8 +315,8 @@ def test_the_error_of_the_acceleration_is_what_is_observed() -> None:
         state.update(0.001 * k, q, v)
         effort.record(tau, a, 0.001)
         v = v + 0.001 * (a + np.array([3.0, 0.0, 0.0]))
-        engine.Observe(9.0 * v, held)(0.001 * k + 0.0005)  # not the end of the period
-        engine.Observe(v, held)(0.001 * (k + 1))
+        engine.Observe(v=9.0 * v, held=held)(0.001 * k + 0.0005)  # within it
+        engine.Observe(v=v, held=held)(0.001 * (k + 1))
     np.testing.assert_allclose(held.error, [3.0, 0.0, 0.0], rtol=1e-3, atol=1e-9)
     # The mean over 0.1 s, of an error that has lasted as long.
     mean = [3.0 * (1.0 - np.exp(-1.0)), 0.0, 0.0]
@@ -318,7 +330,7 @@ def test_the_error_of_the_acceleration_is_what_is_observed() -> None:
     np.testing.assert_allclose(held.least, 0.0, atol=1e-9)
     state.update(0.1, q, v)
     effort.record(tau, a, 0.02)  # a longer period counts alone
-    engine.Observe(v + 0.02 * (a - 8.0), held)(0.12)
+    engine.Observe(v=v + 0.02 * (a - 8.0), held=held)(0.12)
     np.testing.assert_allclose(held.error, [8.0, 8.0, 8.0], rtol=1e-9)
     # The first one's mean still has the old sign: nothing of it is there any more.
     assert held.drift[0] > 0.0

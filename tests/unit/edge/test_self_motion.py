@@ -7,6 +7,7 @@ from hypothesis import strategies as st
 from task_cases import load
 
 import hsp_control as hsp
+from hsp_control.engine.plans import planned
 
 FAR = hsp.Hold([2.0, 0.5, 0.5])
 
@@ -38,8 +39,7 @@ def test_it_is_what_the_law_does_with_a_field_and_not_without(
     assert law.damped_code[0] > 0  # damped, and beyond limits
     _, (self_motions, _) = law.self_motions(v)
     whole, self_motion = law.edge.damped.copy(), self_motions[1].copy()
-    kind, arguments = law.call(v, controls=False)
-    kind(*arguments)()
+    planned([law.call(v, controls=False)]).run(0.0)
     by_tasks = law.edge.damped.copy()
     scale = np.abs(whole).max()
     np.testing.assert_allclose(self_motion, whole - by_tasks, atol=1e-9 * scale)

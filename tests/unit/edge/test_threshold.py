@@ -48,11 +48,45 @@ def written(
     m, thresholds = len(asked), Thresholds.allocate(len(ends))
     J, pulling = np.ones((m, 7)), np.broadcast_to(pulls, m)
     springs = np.full(m, bool(pulling.any()))
-    asked_of = np.array(ends), asked, np.full(m, yields), np.array(pulling), springs
+    rows = {
+        "ends": np.array(ends),
+        "asked": asked,
+        "yields": np.full(m, yields),
+        "pulls": np.array(pulling),
+        "springs": springs,
+        "stretched": np.zeros(m),
+    }
     largest = engine.WriteThresholds(
-        J, J * whitened, *asked_of, np.zeros(m), LEAST, turning, following, thresholds
+        J=J,
+        B=J * whitened,
+        rows=rows,
+        least=LEAST,
+        turning=turning,
+        following=following,
+        thresholds=thresholds,
     )()
     return largest, thresholds
+
+
+def how_held(lacking: float, wanted: float, following: Following) -> float:
+    """Return how much a level is held, of squares of what it lacks and wants."""
+    return engine.HowHeld(
+        lacking=lacking, wanted=wanted, least=LEAST, following=following
+    )()
+
+
+def threshold_below(
+    asked: Array, held: float, above: float, thresholds: Thresholds
+) -> float:
+    """Return the threshold of the second level, which follows slowly."""
+    return engine.ThresholdBelow(
+        asked=asked,
+        held=held,
+        above=above,
+        level=1,
+        following=SLOW,
+        thresholds=thresholds,
+    )()
 
 
 @given(seeds, st.floats(-3.0, 6.0), st.floats(0.1, 10.0))
@@ -91,15 +125,15 @@ def test_a_level_below_a_held_one_asks_for_less_than_draws_that_one(
     rng, following = np.random.default_rng(seed), SLOW
     asked, above = 10.0 ** rng.uniform(-1.0, 4.0, (2, 1)) * unit(rng, 3)
     square = above @ above
-    held = engine.HowHeld(lacks**2 * square, square, LEAST, following)()
+    held = how_held(lacks**2 * square, square, following)
     assert 0.0 <= held <= 1.0
     assert held == 0.0 or (lacks > 0.0 and square > 1.3**2)
     # it fades with what is asked for: nothing jumps where an error vanishes
     arm = following._replace(modest=0.0)
-    least = engine.HowHeld(lacks**2 * 1e-12 * square, 1e-12 * square, LEAST, arm)()
+    least = how_held(lacks**2 * 1e-12 * square, 1e-12 * square, arm)
     assert least <= 1e-6 * np.sqrt(square) / (150.0 * LEAST**2)
     _, thresholds = written(np.zeros(6), [3, 6], following)
-    below = engine.ThresholdBelow(asked, held, np.inf, 1, following, thresholds)()
+    below = threshold_below(asked, held, np.inf, thresholds)
     beyond = max(np.linalg.norm(asked) - 1.3, 0.0)
     assert below**2 == pytest.approx(held * beyond * 40.0 / 150.0)
 
@@ -115,7 +149,7 @@ def test_a_level_below_follows_as_slowly_as_those_above_turn(
     largest, thresholds = written(asked, [3, 6], following, whitened=scales)
     s = largest * 10.0 ** (log_s * rng.random(2))  # of both levels
     above = s[0] / thresholds.scales[0]
-    below = engine.ThresholdBelow(np.zeros(3), 0.0, above, 1, following, thresholds)()
+    below = threshold_below(np.zeros(3), 0.0, above, thresholds)
     assert below**2 == pytest.approx(thresholds.follows[1] ** 2 * 0.8 / above)
     assert below <= s[1] * (1.0 + 1e-12)
 

@@ -12,6 +12,7 @@ import pytest
 
 from hsp_control import engine
 from hsp_control.common.arrays import Array
+from hsp_control.edge.threshold import NOT, Thresholds
 from hsp_control.engine import Move, Plan, PythonCall
 from hsp_control.engine.inspection import calls, first_not_finite, listing
 from hsp_control.trajectories import TrajectorySample
@@ -21,13 +22,15 @@ def line(out: TrajectorySample | None = None, **changed: Any) -> Any:
     """Return a call of a line in the plane, with arguments changed."""
     given: dict[str, Any] = {
         "start": np.array([1.0, 2.0]),
-        "speed": np.array([0.5, -1.0]),
-        "position": np.zeros(2),
-        "velocity": np.zeros(2),
-        "acceleration": np.ones(2),
-    } | changed
-    start, speed, *sample = given.values()
-    return engine.UniformLine(start, speed, out or TrajectorySample(*sample))
+        "velocity": np.array([0.5, -1.0]),
+        "out": out or sample(),
+    }
+    return engine.UniformLine(**given | changed)
+
+
+def sample(**changed: Any) -> TrajectorySample:
+    """Return a sample to be written, with arrays changed."""
+    return TrajectorySample(np.zeros(2), np.zeros(2), np.ones(2))._replace(**changed)
 
 
 def test_a_call_reads_its_arrays_anew_each_time() -> None:
@@ -43,13 +46,13 @@ def test_a_call_reads_its_arrays_anew_each_time() -> None:
 
 def test_a_kind_tells_its_arguments() -> None:
     kind = engine.UniformLine
-    assert repr(kind).startswith("UniformLine(start: reads float64 (d,), speed: ")
+    assert repr(kind).startswith("UniformLine(start: reads float64 (d,), velocity: ")
     assert kind.timed
-    assert kind.reads == ["start", "speed"]
+    assert kind.reads == ["start", "velocity"]
     assert kind.writes == ["out.position", "out.velocity", "out.acceleration"]
     assert "x0 + t v" in kind.doc
     assert repr(line()) == (
-        "UniformLine(start=array(2,), speed=array(2,), out.position=array(2,), "
+        "UniformLine(start=array(2,), velocity=array(2,), out.position=array(2,), "
         "out.velocity=array(2,), out.acceleration=array(2,))"
     )
 
@@ -62,10 +65,24 @@ class Other(NamedTuple):
     acceleration: Array
 
 
+def circle(**changed: Any) -> Any:
+    """Return a call of a circle in the plane, with arguments changed."""
+    given: dict[str, Any] = {"rate": 1.0, "phase": 0.0, "center": np.zeros(2)}
+    given |= {"radii": np.eye(2), "out": sample()}
+    return engine.Circle(**given | changed)
+
+
+def threshold_below(**changed: Any) -> Any:
+    """Return a call with an integer among its numbers, with arguments changed."""
+    given: dict[str, Any] = {"asked": np.zeros(3), "held": 0.0, "above": 1.0}
+    given |= {"level": 1, "following": NOT, "thresholds": Thresholds.allocate(2)}
+    return engine.ThresholdBelow(**given | changed)
+
+
 WRONG: dict[str, tuple[Callable[[], Any], str]] = {
     "another size": (
-        lambda: line(speed=np.zeros(3)),
-        r"UniformLine: speed has the shape \(3,\); needs \(d,\), where d = 2 as in st",
+        lambda: line(velocity=np.zeros(3)),
+        r"UniformLine: velocity has the shape \(3,\); needs \(d,\), where d = 2 as in ",
     ),
     "no array": (
         lambda: line(start=[0.0, 1.0]),
@@ -76,7 +93,7 @@ WRONG: dict[str, tuple[Callable[[], Any], str]] = {
         r"start reads float64 \(d,\); got an array of int64 with the shape \(2,\)",
     ),
     "single precision": (
-        lambda: line(position=np.zeros(2, dtype=np.float32)),
+        lambda: line(sample(position=np.zeros(2, dtype=np.float32))),
         r"out.position writes float64 \(d,\); got an array of float32",
     ),
     "another number of axes": (
@@ -93,24 +110,57 @@ WRONG: dict[str, tuple[Callable[[], Any], str]] = {
         r"start reads float64",
     ),
     "written, but read-only": (
-        lambda: line(position=np.broadcast_to(0.0, 2)),
+        lambda: line(sample(position=np.broadcast_to(0.0, 2))),
         r"out.position writes float64 \(d,\); .*read-only",
     ),
-    "too few": (
-        lambda: engine.UniformLine(np.zeros(2)),
-        r"UniformLine has 5 arguments; got 1: UniformLine\(start: reads",
+    "by order": (
+        lambda: engine.UniformLine(np.zeros(2), velocity=np.zeros(2), out=sample()),
+        r"^UniformLine takes its arguments by name: UniformLine\(start: reads float64",
     ),
-    "too many": (lambda: engine.UniformLine(*6 * [np.zeros(2)]), "got 6"),
-    "another record": (
-        lambda: engine.UniformLine(*np.zeros((2, 2)), Other(*np.zeros((3, 2)))),
-        "in the place of out.velocity stands a record's speed",
+    "missing": (
+        lambda: engine.UniformLine(start=np.zeros(2)),
+        "^UniformLine needs velocity, out$",
+    ),
+    "missing in a group": (
+        lambda: line(out={"position": np.zeros(2), "velocity": np.zeros(2)}),
+        "^UniformLine needs out.acceleration$",
+    ),
+    "unknown": (
+        lambda: line(velocty=np.zeros(2)),
+        r"^UniformLine has no argument velocty; did you mean velocity\?$",
+    ),
+    "unknown, like nothing": (
+        lambda: line(gain=np.zeros(2)),
+        r"^UniformLine has no argument gain; it is UniformLine\(start: reads float64",
+    ),
+    "unknown in a group": (
+        lambda: line(out=Other(*np.zeros((3, 2)))),
+        "^UniformLine has no argument out.speed; ",
+    ),
+    "given twice": (
+        lambda: line(**{"out.position": np.zeros(2)}),
+        "^UniformLine: out.position is given twice$",
+    ),
+    "no record": (
+        lambda: line(out=7),
+        "^UniformLine: out is a record of position, velocity, acceleration; got 7$",
+    ),
+    "a record where an array stands": (
+        lambda: line(start=Other(1, 2, 3)),  # type: ignore[arg-type]
+        r"UniformLine: start reads float64 \(d,\); got Other\(position=1, speed=2, ",
     ),
     "no number": (
-        lambda: engine.Circle("fast", 0.0, np.zeros(2), np.eye(2), *np.zeros((3, 2))),
-        "Circle: rate is a number; got 'fast'",
+        lambda: circle(rate="fast"),
+        "^Circle: rate is a number; got 'fast'$",
+    ),
+    "no whole number": (
+        lambda: threshold_below(level=0.5),
+        "^ThresholdBelow: level is a whole number; got 0.5$",
     ),
     "no plan": (
-        lambda: engine.Once(line(), np.zeros(1, dtype=int), np.zeros(1, dtype=int)),
+        lambda: engine.Once(
+            calls=line(), stamp=np.zeros(1, dtype=int), made=np.zeros(1, dtype=int)
+        ),
         "Once: calls a Plan; got UniformLine",
     ),
     "no call": (lambda: Plan([3]), "row"),
@@ -153,7 +203,8 @@ def test_what_python_raises_goes_through_a_plan() -> None:
 
     after = PythonCall(lambda: told.append(1))
     stamp = np.ones(1, dtype=int)
-    once = engine.Once(Plan([PythonCall(fail), after]), stamp, 0 * stamp)
+    plan = Plan([PythonCall(fail), after])
+    once = engine.Once(calls=plan, stamp=stamp, made=0 * stamp)
     with pytest.raises(KeyboardInterrupt, match="enough"):
         Plan([once, after])(0.0)
     assert told == []
@@ -164,7 +215,8 @@ def test_calls_are_made_once_at_a_stamp_and_only_if_found() -> None:
     calls = Plan([PythonCall(lambda: told.append(1) or 4.0)])  # type: ignore[func-returns-value]
     stamp, made = np.zeros((2, 1), dtype=int)
     stamp[0], found = 3, np.array([16.0, 0.0])
-    once, only_if = engine.Once(calls, stamp, made), engine.OnlyIf(calls, found)
+    once = engine.Once(calls=calls, stamp=stamp, made=made)
+    only_if = engine.OnlyIf(calls=calls, found=found)
     once()
     once()
     assert (len(told), made[0]) == (1, 3)
@@ -173,6 +225,21 @@ def test_calls_are_made_once_at_a_stamp_and_only_if_found() -> None:
     found[1] = 1.0
     assert only_if() == 20.0
     assert len(told) == 2
+
+
+def test_a_group_is_a_record_or_given_member_by_member() -> None:
+    out = sample()
+    call = line(out)
+    by_member = {f"out.{name}": array for name, array in out._asdict().items()}
+    assert call.values.keys() == {"start", "velocity", *by_member}
+    for same in (line(out=out._asdict()), call.kind(**call.values)):
+        assert all(same.values[name] is array for name, array in by_member.items())
+
+
+def test_what_is_told_of_a_call_is_not_its_memory() -> None:
+    call = line()
+    call.values.clear()
+    assert call.values["start"][0] == 1.0
 
 
 @pytest.mark.parametrize(
@@ -189,7 +256,7 @@ def test_copies_have_memory_of_their_own(how: Callable[[Any], Any]) -> None:
 def test_a_call_keeps_its_arrays_and_lets_them_go() -> None:
     position = np.zeros(2)
     watched = weakref.ref(position)
-    plan = Plan([line(position=position)])
+    plan = Plan([line(sample(position=position))])
     del position
     gc.collect()
     plan(1.0)
@@ -220,7 +287,10 @@ def moving(told: list[float], blocks: Any = ()) -> tuple[Move, list[Array]]:
     memory = [np.zeros(1), np.zeros(3), np.zeros(2)]
     unit = np.array(blocks, dtype=int).reshape(-1, 2)
     plan = Plan([PythonCall(told.append, timed=True), PythonCall(lambda: 5.0)])
-    return Move(plan, *memory, unit, np.zeros(1, dtype=int)), memory
+    time, q, v = memory
+    stamp = np.zeros(1, dtype=int)
+    move = Move(calls=plan, time=time, q=q, v=v, unit_blocks=unit, stamp=stamp)
+    return move, memory
 
 
 def test_a_move_copies_what_is_valid_and_makes_its_calls() -> None:
@@ -262,7 +332,11 @@ def test_equal_steps_divide_an_interval() -> None:
     told: list[float] = []
     now, h = np.zeros((2, 1))
     steps = engine.EqualSteps(
-        Plan([PythonCall(told.append, timed=True)]), np.array([1.0, 1.3]), 0.11, now, h
+        calls=Plan([PythonCall(told.append, timed=True)]),
+        interval=np.array([1.0, 1.3]),
+        longest=0.11,
+        now=now,
+        h=h,
     )
     steps()
     np.testing.assert_allclose(told, [1.0, 1.1, 1.2], rtol=1e-15)
@@ -283,9 +357,10 @@ def test_a_plan_says_what_it_does_and_what_writes_it() -> None:
 
 def test_the_first_call_that_writes_nan_is_found() -> None:
     out = TrajectorySample.allocate(2)
-    wrong = line(out, speed=np.array([0.0, np.nan]))
+    wrong = line(out, velocity=np.array([0.0, np.nan]))
     stamp = np.zeros(1, dtype=int)
-    once = engine.Once(Plan([line(), wrong]), stamp, stamp - 1)
+    inner = Plan([line(), wrong])
+    once = engine.Once(calls=inner, stamp=stamp, made=stamp - 1)
     assert first_not_finite(Plan([line(), once, line(start=out.position)])) == (
         wrong,
         ["out.position", "out.velocity"],

@@ -17,9 +17,9 @@ import sys
 
 import hsp_control.engine as engine
 import numpy as np
-out = np.zeros((3, 1))
-engine.UniformLine(np.ones(1), np.ones(1), *out)(2.0)
-print(sys.modules["hsp_control.engine._engine"].__file__, out[0, 0])
+x, y = np.ones(1), np.zeros(1)
+engine.Copy(x=x, out=y)()
+print(sys.modules["hsp_control.engine._engine"].__file__, y[0])
 """
 
 
@@ -35,7 +35,7 @@ def asked(library: Path) -> subprocess.CompletedProcess[str]:
 
 def test_another_library_is_used_instead(tmp_path: Path) -> None:
     other = Path(shutil.copy2(_engine.__file__, tmp_path / "_engine.so"))
-    assert asked(other).stdout.split() == [str(other), "3.0"]
+    assert asked(other).stdout.split() == [str(other), "1.0"]
 
 
 def test_a_library_that_is_not_there_is_an_error(tmp_path: Path) -> None:

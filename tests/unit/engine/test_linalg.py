@@ -39,31 +39,31 @@ def junk(*shape: int) -> Array:
 
 
 def cholesky(A: Array, L: Array) -> bool:
-    return bool(engine.Cholesky(np.ascontiguousarray(A), L)())
+    return bool(engine.Cholesky(A=np.ascontiguousarray(A), L=L)())
 
 
 def solve_lower(L: Array, x: Array) -> None:
-    engine.SolveLower(L, x)()
+    engine.SolveLower(L=L, x=x)()
 
 
 def solve_lower_transposed(L: Array, x: Array) -> None:
-    engine.SolveLowerTransposed(L, x)()
+    engine.SolveLowerTransposed(L=L, x=x)()
 
 
 def orthonormalise_rows(J: Array, Q: Array, X: Array) -> float:
-    return engine.OrthonormaliseRows(np.ascontiguousarray(J), Q, X)()
+    return engine.OrthonormaliseRows(J=np.ascontiguousarray(J), Q=Q, X=X)()
 
 
 def orthogonalise_rows(Y: Array, U: Array) -> None:
-    engine.OrthogonaliseRows(Y, U)()
+    engine.OrthogonaliseRows(Y=Y, U=U)()
 
 
 def triangularise_rows(Y: Array) -> float:
-    return engine.TriangulariseRows(Y)()
+    return engine.TriangulariseRows(Y=Y)()
 
 
 def smallest_singular_value_bound(X: Array) -> float:
-    return engine.SmallestSingularValueBound(X)()
+    return engine.SmallestSingularValueBound(X=X)()
 
 
 def close(actual: Array, expected: Array, atol: float) -> None:

@@ -38,17 +38,56 @@ def test_a_file_is_compiled_once_and_used(
 ) -> None:
     kinds = own_kinds.load(source)
     x, y = np.arange(3.0), np.zeros(3)
-    call = kinds.Doubled(x, y)
+    call = kinds.Doubled(x=x, y=y)
     call()
     np.testing.assert_array_equal(y, 2.0 * x)
     assert "-> y [3]" in listing(call)
     with pytest.raises(ValueError, match=r"Doubled: y has the shape \(2,\)"):
-        kinds.Doubled(x, np.zeros(2))
+        kinds.Doubled(x=x, y=np.zeros(2))
     monkeypatch.setenv("CXX", "false")  # what is compiled is kept
     assert own_kinds.load(source) is kinds
     source.write_text(SOURCE.replace("2.0 * x", "3.0 * x"))
     with pytest.raises(EngineError, match=r"doubled\.cpp does not compile"):
         own_kinds.load(source)
+
+
+REFUSING = """
+#include <hsp/kind.hpp>
+#include <stdexcept>
+
+struct Memory {  // is refused, and counts how many of it there are
+  static inline int alive = 0;
+  Memory() { ++alive; }
+  ~Memory() { --alive; }
+  void prepare(const hsp::Sizes&) { throw std::length_error("too much memory"); }
+};
+
+struct Large {
+  static constexpr const char* doc = "Needs more memory than there is.";
+  hsp::In<'n'> x;
+  Memory memory;
+  void operator()() {}
+};
+
+struct Alive {
+  static constexpr const char* doc = "Return how many memories there are.";
+  hsp::In<1> x;
+  double operator()() { return Memory::alive; }
+};
+
+extern "C" auto hsp_kinds_1() { return hsp::kinds<Large, Alive>(); }
+"""
+
+
+def test_a_call_that_cannot_be_prepared_leaves_nothing_behind(source: Path) -> None:
+    source.write_text(REFUSING)
+    kinds = own_kinds.load(source)
+    alive = kinds.Alive(x=np.zeros(1))
+    before = alive()  # the one of which its members were read has gone
+    for _ in range(3):
+        with pytest.raises(ValueError, match="too much memory"):
+            kinds.Large(x=np.zeros(1))
+    assert alive() == before == 0.0
 
 
 def test_a_library_beside_its_file_needs_no_compiler(

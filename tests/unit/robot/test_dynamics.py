@@ -52,7 +52,9 @@ def compare(model: pin.Model, q: Array, v: Array, a: Array) -> None:
     J, J_dot = np.zeros((6, x), order="F"), np.zeros((6, x), order="F")
     places = np.zeros((model.njoints, 12))
     pin.computeJointJacobiansTimeVariation(model, data, q, v)
-    engine.JointJacobians(own, q, v, J, J_dot, places)()
+    at = {"dynamics": own, "q": q, "v": v}
+    given = {"jacobian": J, "jacobian_dot": J_dot, "placements": places}
+    engine.JointJacobians(**at, **given)()
     assert_allclose(J, np.reshape(data.J, (6, x)), **near)
     assert_allclose(J_dot, np.reshape(data.dJ, (6, x)), **near)
     for place, expected in zip(places, data.oMi, strict=True):
@@ -60,20 +62,20 @@ def compare(model: pin.Model, q: Array, v: Array, a: Array) -> None:
         assert_allclose(place[9:], expected.translation, **near)
 
     effort, M, acceleration = np.zeros(nv), np.zeros((nv, nv)), np.zeros(nv)
-    engine.InverseDynamics(own, q, v, a, effort)()
+    engine.InverseDynamics(**at, acceleration=a, effort=effort)()
     scale = 1e-12 * float(np.abs(effort).max()) + 1e-12
     assert_allclose(
         effort, pin.rnea(model, model.createData(), q, v, a), rtol=0, atol=scale
     )
-    engine.MassMatrix(own, q, M)()
+    engine.MassMatrix(dynamics=own, q=q, M=M)()
     assert_allclose(M, pin.crba(model, model.createData(), q), **near)
-    engine.ForwardDynamics(own, q, v, effort, acceleration)()
+    engine.ForwardDynamics(**at, effort=effort, acceleration=acceleration)()
     conditioned = 1e-14 * float(np.linalg.cond(M)) * float(np.abs(effort).max() + 1.0)
     assert_allclose(acceleration, a, rtol=0, atol=1e-10 + conditioned)
     if len(model.mimicking_joints):
         return
     M_dot = np.zeros((nv, nv))
-    engine.MassMatrixRate(own, q, v, M_dot)()
+    engine.MassMatrixRate(**at, M_dot=M_dot)()
     C = np.reshape(pin.computeCoriolisMatrix(model, data, q, v), (nv, nv))
     assert_allclose(M_dot, C + C.T, rtol=0, atol=1e-11 * float(np.abs(C).max() + 1.0))
 
@@ -118,7 +120,8 @@ def test_gravity_has_the_slope_and_the_drift_of_its_differences(case: str) -> No
 def test_a_copy_computes_in_memory_of_its_own() -> None:
     robot, q, v, rng = draw("panda", seed=22)
     a, effort = rng.standard_normal(7), np.zeros(7)
-    call = engine.InverseDynamics(robot.dynamics(), q, v, a, effort)
+    at = {"dynamics": robot.dynamics(), "q": q, "v": v}
+    call = engine.InverseDynamics(**at, acceleration=a, effort=effort)
     expected = robot.inverse_dynamics(q, v, a)
     for other in (copy.deepcopy(call), pickle.loads(pickle.dumps(call))):
         other()
@@ -128,13 +131,19 @@ def test_a_copy_computes_in_memory_of_its_own() -> None:
 
 def test_sizes_of_another_robot_are_refused() -> None:
     robot, q, v, _ = draw("panda", seed=23)
+    own, J = robot.dynamics(), np.zeros((6, 7), order="F")
+    others = {"v": v, "acceleration": v, "effort": np.zeros(7)}
     with pytest.raises(ValueError, match="8 and 7 entries; this robot's have 7 and 7"):
-        engine.InverseDynamics(robot.dynamics(), np.zeros(8), v, v, np.zeros(7))
-    J = np.zeros((6, 7), order="F")
+        engine.InverseDynamics(dynamics=own, q=np.zeros(8), **others)
+    given = {
+        "jacobian": J,
+        "jacobian_dot": J.copy("F"),
+        "placements": np.zeros((3, 12)),
+    }
     with pytest.raises(ValueError, match="7 columns and 8 joints"):
-        engine.JointJacobians(robot.dynamics(), q, v, J, J.copy("F"), np.zeros((3, 12)))
+        engine.JointJacobians(dynamics=own, q=q, v=v, **given)
     with pytest.raises(TypeError, match="dynamics a Dynamics; got None"):
-        engine.InverseDynamics(None, q, v, v, np.zeros(7))
+        engine.InverseDynamics(dynamics=None, q=q, **others)
 
 
 def test_numbers_that_are_no_robot_are_refused() -> None:

@@ -164,7 +164,7 @@ def test_a_mass_matrix_does_not_depend_on_what_was_computed_before(
         q = robot.random_configuration(rng)
         v, tau = rng.standard_normal((2, robot.nv))
         fresh = np.zeros((robot.nv, robot.nv))
-        engine.MassMatrix(robot.dynamics(), q, fresh)()
+        engine.MassMatrix(dynamics=robot.dynamics(), q=q, M=fresh)()
         robot.forward_dynamics(q, v, tau)
         robot.inverse_dynamics(robot.random_configuration(rng), v, tau)
         robot.mass_matrix(robot.random_configuration(rng))

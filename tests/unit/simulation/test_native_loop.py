@@ -130,12 +130,28 @@ def test_a_step_is_free_whose_law_is_finite_within_limits(
     """Also with a bounded inverse, 1; `LOOK`: a limit is violated."""
     stamp, unit_blocks = np.zeros(1, dtype=np.int64), np.zeros((0, 2), dtype=np.int64)
     law = Plan([PythonCall(lambda: value)])
-    move = Move(law, np.zeros(1), np.zeros(2), np.zeros(2), unit_blocks, stamp)
-    which = np.array([0.0, 1.0, 10.0, 3.0, 7.0])
-    numbers = np.zeros(2), np.zeros(2), np.zeros(2), np.ones(2), np.zeros(2)
-    assert engine.Periods(Plan(), move, Plan(), *numbers, LOOK, which)() == (
-        7.0 if free else 4.0
+    move = Move(
+        calls=law,
+        time=np.zeros(1),
+        q=np.zeros(2),
+        v=np.zeros(2),
+        unit_blocks=unit_blocks,
+        stamp=stamp,
     )
+    which = np.array([0.0, 1.0, 10.0, 3.0, 7.0])
+    periods = engine.Periods(
+        moving=Plan(),
+        law=move,
+        sending=Plan(),
+        q=np.zeros(2),
+        v=np.zeros(2),
+        held=np.zeros(2),
+        effort=np.ones(2),
+        interval=np.zeros(2),
+        free_below=LOOK,
+        which=which,
+    )
+    assert periods() == (7.0 if free else 4.0)
 
 
 @pytest.mark.parametrize("part", ["move", "sending"])
@@ -151,8 +167,9 @@ def test_calls_in_python_are_not_left_out(
         step = made(bound)
         assert step is not None
         if part == "move":
-            plan, *memory = step.move.arguments
-            return step._replace(move=Move(Plan([plan, nothing]), *memory))
+            values = step.move.values
+            plan = Plan([values.pop("calls"), nothing])
+            return step._replace(move=Move(calls=plan, **values))
         return step._replace(sending=[*step.sending, nothing])
 
     monkeypatch.setattr(BoundStep, "free", property(with_python))
