@@ -160,7 +160,7 @@ NB_MODULE(_engine, m) {
   nb::class_<MoveObject>(m, "Move", "Copies t, q and v where they are valid, and makes a plan.",
                          nb::type_slots(slots<MoveObject, &MoveObject::arguments>))
       .def("__init__", [](MoveObject* self, nb::args given) { new (self) MoveObject(given); })
-      .def("__call__", &MoveObject::operator(), "t"_a, "q"_a, "v"_a)
+      .def("__call__", &MoveObject::operator(), "t"_a.none(), "q"_a.none(), "v"_a.none())
       .def_ro("arguments", &MoveObject::arguments)
       .def_ro("python", &MoveObject::python)
       .def("__reduce__",
