@@ -153,10 +153,7 @@ class ActiveStack:
 
     def resolve(self, t: float) -> Outcome:
         """Resolve contacts, tasks and field at the state, into `resolution`."""
-        code = 0.0
-        for call in self.calls:
-            code = call(t)
-        return outcome_of(code)
+        return outcome_of(self._plan(t))
 
     @property
     def damped_level(self) -> int:
@@ -168,6 +165,10 @@ class ActiveStack:
         """The names of that level's tasks, or ``contacts``; empty: none."""
         level = self.damped_level
         return self.level_names[level - 1] if level else ""
+
+    @cached_property
+    def _plan(self) -> engine.Plan:
+        return engine.Plan(self.calls)
 
     @cached_property
     def calls(self) -> list[Callable[[float], Any]]:
