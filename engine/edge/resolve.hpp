@@ -40,12 +40,14 @@ struct Resolve {
     DampedMemory damped;
     LevelMemory levels;
     Scratch<'m', 'n'> B, turned;
+    Scratch<'m', 'm'> square;
     void prepare(const Sizes& size) {
       law.prepare(size);
       damped.prepare(size);
       levels.prepare(size);
       B.prepare(size);
       turned.prepare(size);
+      square.prepare(size);
     }
   } memory;
 
@@ -59,8 +61,7 @@ struct Resolve {
     return PseudoInverse(q, factor, law.metric.L, law.form);
   }
 
-  // All tasks at once. If the tasks of several levels are exact together, they are exact one after
-  // the other: this is the same then.
+  // All tasks at once.
   std::int64_t at_once() {
     auto& [Q, X] = factors;
     const bool damped = bounded_inverse(memory.B, whitened(), Q, X);
@@ -68,13 +69,15 @@ struct Resolve {
     return std::isfinite(a.sum()) ? damped : static_cast<std::int64_t>(beyond);
   }
 
-  // All levels at once, or level by level if they conflict.
+  // All levels at once, or level by level if they conflict. If the tasks of several levels are
+  // exact together, they are exact one after the other: this is the same then.
   std::int64_t by_levels() {
-    if (law.task.jacobian.rows() <= law.task.jacobian.cols()) {
-      const std::int64_t found = at_once();
-      if (found == 0) return found;
-    } else {
-      whitened();
+    const auto& J = law.task.jacobian;
+    const double threshold = whitened();
+    auto& [Q, X] = factors;
+    if (J.rows() <= J.cols() && exact_inverse(memory.B, threshold, Q, X, memory.square)) {
+      write_law(law, inverse(Q, X), memory.law, e_N, a);
+      if (std::isfinite(a.sum())) return 0;
     }
     const int damped = write_damped_levels(law, rows, least, following, thresholds, projectors,
                                            memory.damped, memory.levels, edge.by_tasks, e_N, a);

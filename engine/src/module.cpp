@@ -158,7 +158,7 @@ NB_MODULE(_engine, m) {
            [](MoveObject* self, nb::args by_order, nb::kwargs by_name) {
              new (self) MoveObject(values_of(kind_of<Move>(), by_order, by_name));
            })
-      .def("__call__", &MoveObject::operator(), "t"_a, "q"_a, "v"_a)
+      .def("__call__", &MoveObject::operator(), "t"_a.none(), "q"_a.none(), "v"_a.none())
       .def_prop_ro(
           "values",
           [](const MoveObject& move) { return named_values(kind_of<Move>(), move.values); })

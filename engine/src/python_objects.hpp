@@ -72,10 +72,11 @@ struct DynamicsObject {
   Dynamics dynamics;
 };
 
-// A state's move, as Python makes it.
+// A state's move, as Python makes it: refused where t is no number, or q and v are no vectors of
+// doubles.
 struct MoveObject {
   explicit MoveObject(nanobind::tuple given);
-  double operator()(double t, nanobind::handle q, nanobind::handle v);
+  double operator()(nanobind::handle t, nanobind::handle q, nanobind::handle v);
 
   nanobind::tuple values;
   Call call;

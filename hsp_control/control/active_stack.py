@@ -2,7 +2,8 @@
 
 from collections.abc import Callable, Mapping, Sequence
 from functools import cached_property, partial
-from typing import Any, NoReturn
+from math import isfinite
+from typing import Any, NamedTuple, NoReturn
 
 import numpy as np
 
@@ -28,6 +29,15 @@ from hsp_control.tasks.feedback import InForce, beyond_largest
 from hsp_control.tasks.impedance import parts_of
 from hsp_control.tasks.slipping import slipped
 from hsp_control.trajectories.streams.stream import Streamed
+
+
+class Layout(NamedTuple):
+    """What the rows of a stack are."""
+
+    rows: int
+    places: Mapping[str, slice]  # the rows of each task, by name
+    # tasks with a largest error: the name, the rows, and `Feedback.largest`
+    bounds: Sequence[tuple[str, slice, Callable[[Array], float]]]
 
 
 class ActiveStack:
@@ -71,7 +81,6 @@ class ActiveStack:
             Following.of(robot.size, on_legs=bool(robot.unactuated)),
         )
         self.rows = self.resolution.problem.task  # all rows stacked: J, J', e, e', a_x
-        self.row_count = len(self.rows.error)
         self.streamed = any(
             isinstance(task.followed, Streamed)
             for level in self.levels
@@ -86,8 +95,8 @@ class ActiveStack:
         tasks = [each for level in planned for each in level]
         below = {each.key for level in planned[1:] for each in level}
         self.task_rows = _places([each.task for each in tasks], self.first_task_row)
-        # tasks with a largest error: the name, the first row, and `Feedback.largest`
-        self.bounds: list[tuple[str, slice, Callable[[Array], float]]] = []
+        bounds: list[tuple[str, slice, Callable[[Array], float]]] = []
+        self.layout = Layout(len(self.rows.error), self.task_rows, bounds)
         self._parts: list[tuple[Task | Contact, TaskSample]] = []
         self._calls: list[AnyCall] = []
         row = 0
@@ -118,10 +127,10 @@ class ActiveStack:
                     pulls=pulls,
                 )
                 self._calls.append(call)
-                self.bounds.append((each.task.name, here, away))
+                bounds.append((each.task.name, here, away))
             elif len(in_force.feedback.largest):
                 away = partial(beyond_largest, largest=in_force.feedback.largest)
-                self.bounds.append((each.task.name, here, away))
+                bounds.append((each.task.name, here, away))
                 parts = each.task.error_parts
                 yields = [part.yields for part in parts for _ in range(part.size)]
                 self.resolution.problem.yields[here] = yields
@@ -156,10 +165,7 @@ class ActiveStack:
 
     def resolve(self, t: float) -> Outcome:
         """Resolve contacts, tasks and field at the state, into `resolution`."""
-        code = 0.0
-        for call in self.calls:
-            code = call(t)
-        return outcome_of(code)
+        return outcome_of(self._plan(t))
 
     @property
     def damped_level(self) -> int:
@@ -171,6 +177,10 @@ class ActiveStack:
         """The names of that level's tasks, or ``contacts``; empty: none."""
         level = self.damped_level
         return self.level_names[level - 1] if level else ""
+
+    @cached_property
+    def _plan(self) -> engine.Plan:
+        return engine.Plan(self.calls)
 
     @cached_property
     def calls(self) -> list[Callable[[float], Any]]:
@@ -233,6 +243,11 @@ class ActiveStack:
         flow.problem.metric.W[:], flow.problem.metric.L[:] = law.problem.metric[:2]
         state.run([flow.call(state.v)])
         return flow.acceleration
+
+    def check(self, effort: Array) -> None:
+        """Raise if an effort that a step delivers is not finite."""
+        if not isfinite(effort.dot(effort)):
+            self.raise_not_finite()
 
     def raise_not_finite(self) -> NoReturn:
         """Say what made a step's effort NaN or infinite."""

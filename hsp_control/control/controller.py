@@ -14,7 +14,6 @@ from numpy.typing import ArrayLike
 from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import ControllerError, NonFiniteError
 from hsp_control.control.active_stack import ActiveStack
-from hsp_control.control.actuation.limited_step import BEYOND, RELAXED
 from hsp_control.control.bound_step import FreeStep
 from hsp_control.control.changes import Change
 from hsp_control.control.composition import Composition, PresentRun
@@ -102,14 +101,14 @@ class Controller(Composition):
                 mixture.resolve(self._state.t)  # references, and the law
                 delivered = mixture.deliver(modifier)  # within the limits
                 stack, damped = self.active_stack, mixture.damped
+                stack.check(delivered[0])
                 run.bound = bound or mixture.bound_step()
-            run.acceleration, status = delivered[1], delivered[3]
-            # The engine has looked at all other efforts already.
-            unlike = status is RELAXED or status is BEYOND or modifier is not None
-            if unlike and not isfinite(delivered[0] @ delivered[0]):
-                stack.raise_not_finite()
-            out = ControlOutput() if out is None else out
-            out.overwrite(delivered, stack, damped)
+            run.acceleration = delivered[1]
+            if out is None:
+                out = ControlOutput()
+                out.write(delivered, stack, damped)
+            else:
+                out.overwrite(delivered, stack, damped)
             return out
 
     def _observe(

@@ -75,7 +75,7 @@ class Evolution(Generic[Value]):
 
     def at(self, t: float) -> Value:
         """Return x(t)."""
-        return self.with_rate(t)[0]
+        return self.with_rate(t)[0] if self.transitions else self.initial
 
     def with_rate(self, t: float) -> tuple[Value, Value]:
         """Return x(t) and x'(t)."""
@@ -145,9 +145,7 @@ class PlannedContact:
 
     def active(self, t: float) -> bool:
         """Return whether the contact is kept at rest at time t [s]."""
-        return self.contact.active(t) and (
-            self.presence == PRESENT or self.presence.at(t) > 0.0
-        )
+        return self.contact.active(t) and self.presence.at(t) > 0.0
 
     def weight(self, t: float) -> float:
         """Return how active it is at time t [s], in [0, 1]."""

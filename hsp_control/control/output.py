@@ -1,6 +1,5 @@
 """What a controller returns: an effort, and everything that explains it."""
 
-from collections.abc import Callable, Mapping, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -8,13 +7,10 @@ import numpy as np
 from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import ControllerError
 from hsp_control.common.suggestions import did_you_mean, listing
-from hsp_control.control.active_stack import ActiveStack
+from hsp_control.control.active_stack import ActiveStack, Layout
 from hsp_control.control.actuation import Delivered, Status
 from hsp_control.law import FieldSample, TaskSample, singular_values
 from hsp_control.law.problem import Record
-
-_NOTHING = b""
-"""The memory of an output before its first step."""
 
 
 class ControlOutput:
@@ -39,10 +35,8 @@ class ControlOutput:
 
     __slots__ = (
         "_acceleration",
-        "_bounds",
+        "_layout",
         "_memory",
-        "_places",
-        "_rows",
         "_views",
         "damped",
         "forces",
@@ -58,38 +52,38 @@ class ControlOutput:
     relaxation: float
     # Bytes are made faster than arrays, and most are never looked at.
     _acceleration: bytes | None  # None: the law's own
-    _bounds: Sequence[
-        tuple[str, slice, Callable[[Array], float]]
-    ]  # see `ActiveStack.bounds`
-    _memory: Array | bytes
-    _places: Mapping[str, slice]  # the rows of each task, by name
-    _rows: int
+    _layout: Layout  # of the memory
+    _memory: Array | bytes  # see `ActiveStack.memory`
     _views: Record | None  # of the memory, once they were asked for
-
-    def __init__(self) -> None:
-        """Allocate nothing yet: see `overwrite`."""
-        self._memory = _NOTHING
 
     @property
     def size(self) -> int:
         """Number of efforts; 0 before the first step."""
-        return 0 if self._memory is _NOTHING else len(self.tau)
+        return len(self.tau) if hasattr(self, "tau") else 0
+
+    def write(self, delivered: Delivered, stack: ActiveStack, damped: str) -> None:
+        """Make this, which is new, the output of a step."""
+        self.tau, self._memory = delivered[0].copy(), stack.memory.tobytes()
+        self._explain(delivered, stack, damped)
 
     def overwrite(self, delivered: Delivered, stack: ActiveStack, damped: str) -> None:
-        """Make this the output of a step."""
-        tau, a, forces, self.status, self.relaxation = delivered
-        own, memory = self._memory, stack.memory
-        if own is _NOTHING:
-            self.tau, self._memory, self._views = tau.copy(), memory.tobytes(), None
+        """Make this, which may have been that of another step, the output of a step."""
+        if not self.size:
+            self.write(delivered, stack, damped)
+            return
+        self.tau[:] = delivered[0]
+        own, memory, views = self._memory, stack.memory, self._views
+        if isinstance(own, bytes) or len(own) != len(memory):
+            self._memory, views = memory.copy(), None
         else:
-            self.tau[:] = tau
-            if isinstance(own, bytes) or len(own) != len(memory):
-                self._memory, self._views = memory.copy(), None
-            else:
-                own[:] = memory
-        self._rows, self._bounds = stack.row_count, stack.bounds
-        self._places = stack.task_rows
+            own[:] = memory
+        self._explain(delivered, stack, damped)
+        self._views = views
+
+    def _explain(self, delivered: Delivered, stack: ActiveStack, damped: str) -> None:
+        _, a, forces, self.status, self.relaxation = delivered
         self._acceleration = None if a is stack.acceleration else a.tobytes()
+        self._layout, self._views = stack.layout, None
         self.forces = forces.copy() if stack.has_forces else forces
         self.damped = damped
 
@@ -108,7 +102,7 @@ class ControlOutput:
         [m or rad]. Empty, and so false, if none is.
         """
         error, found = self._record.task.error, {}
-        for task, rows, away_of in self._bounds:
+        for task, rows, away_of in self._layout.bounds:
             away = away_of(error[rows])
             if away > 0.0:
                 found[task] = away
@@ -127,7 +121,7 @@ class ControlOutput:
         return self._record.task.error_rate[self._rows_of(task)].copy()
 
     def _rows_of(self, task: str) -> slice:
-        places = self._places
+        places = self._layout.places
         if task not in places:
             near = did_you_mean(task, places)
             raise ControllerError(
@@ -151,9 +145,9 @@ class ControlOutput:
         return self._record.null_space_error
 
     def __repr__(self) -> str:
-        if self._memory is _NOTHING:
+        if not self.size:
             return "ControlOutput(not computed yet)"
-        sizes = {f"e of {name}": self.error(name) for name in self._places}
+        sizes = {f"e of {name}": self.error(name) for name in self._layout.places}
         sizes["e_N"] = self.null_space_error
         notes = [
             f"|{name}| = {np.linalg.norm(each):.3g}" for name, each in sizes.items()
@@ -169,7 +163,7 @@ class ControlOutput:
         Args:
             own: A record to overwrite, if it is of the same size; None: a new one.
         """
-        rows = self._rows
+        rows = self._layout.rows
         if own is None or len(own.task.error) != rows:
             own = Record.allocate(rows, len(self.tau))
         own.memory[:] = np.frombuffer(self._memory)
@@ -181,7 +175,7 @@ class ControlOutput:
     def _record(self) -> Record:
         if self._views is None:
             memory = np.frombuffer(self._memory)
-            self._views = Record.over(memory, self._rows, len(self.tau))
+            self._views = Record.over(memory, self._layout.rows, len(self.tau))
         return self._views
 
 

@@ -36,8 +36,6 @@ if TYPE_CHECKING:  # a robot and its state name each other; it makes the state
 
 Made = TypeVar("Made")
 
-_DOUBLE = np.dtype(np.float64)
-
 _MADE_LIMIT = 1000
 """Number of parts whose memory a state keeps; then it starts anew."""
 
@@ -150,23 +148,19 @@ class RobotState:
 
     def advance(self, move: Move, t: float, q: ArrayLike, v: ArrayLike) -> float:
         """`update`, with the calls of `bind_move`; return what the last one returns."""
-        q_in: Any = q
-        v_in: Any = v
-        try:
-            known = q_in.dtype is v_in.dtype is _DOUBLE and q_in.ndim == v_in.ndim == 1
-        except AttributeError:  # a list, for example
-            known = False
-        if not known:
+        value = move(t, q, v)
+        if value == REFUSED:  # lists, for example, or what is not valid
+            if not isinstance(t, float | int | np.number) or not np.isfinite(t):
+                raise NonFiniteError(
+                    f"time t is {t!r}; needs a finite number of seconds"
+                )
             q_in = self.robot.check_configuration(q)
             v_in = self.robot.check_tangent(v, "velocity v")
-        try:
             value = move(t, q_in, v_in)
-        except TypeError:
-            if isinstance(t, float | int | np.number):
-                raise
-            value = REFUSED
-        if value == REFUSED:
-            self._refuse(t, q, v)
+            if value == REFUSED:
+                raise NonFiniteError(
+                    f"t = {t!r}, q = {q!r}, v = {v!r}: their sum overflows"
+                )
         return value
 
     def bind_move(self, calls: Sequence[Step] = ()) -> Move:
@@ -180,14 +174,6 @@ class RobotState:
         )
         plan = Plan([*self.plan([jacobians]).steps(), *calls])
         return Move(calls=plan, **self._memory)
-
-    def _refuse(self, t: float, q: ArrayLike, v: ArrayLike) -> None:
-        """Raise the error that says what is wrong with t, q and v."""
-        if not isinstance(t, float | int | np.number) or not np.isfinite(t):
-            raise NonFiniteError(f"time t is {t!r}; needs a finite number of seconds")
-        self.robot.check_configuration(q)
-        self.robot.check_tangent(v, "velocity v")
-        raise NonFiniteError(f"t = {t!r}, q = {q!r}, v = {v!r}: their sum overflows")
 
     @property
     def seen(self) -> "RobotState":

@@ -166,6 +166,23 @@ template <class Y, class U> void orthogonalise_rows(Y& rows, U& turned) {
   }
 }
 
+// Write Q = X B as `orthonormalise_rows` does, so that B⁺ = Qᵀ X; return whether every singular
+// value of B is above the threshold. `square` (m, m) is used.
+//
+// The largest singular value of X is 1/s for the smallest s of B: no spectrum is needed.
+template <class B, class Q, class X, class S>
+bool exact_inverse(const B& wide, double threshold, Q& q, X& factor, S& square) {
+  const double bound = orthonormalise_rows(wide, q, factor);
+  if (bound >= threshold) return true;
+  if (bound == 0.0) return false;
+  square.setZero();
+  square.diagonal().setConstant(1.0 / (threshold * threshold));
+  for (Index i = 0; i < factor.rows(); ++i)
+    for (Index j = 0; j <= i; ++j)
+      square(i, j) -= factor.row(i).head(j + 1).dot(factor.row(j).head(j + 1));
+  return cholesky(square, square);  // of 1/threshold² - X Xᵀ
+}
+
 // Write the factors of B# = Bᵀ q(B Bᵀ) = Qᵀ X, and return whether it was damped.
 //
 // q(x) = 1/x for x ≥ threshold² and (2 - x/threshold²)/threshold² below it: exactly the

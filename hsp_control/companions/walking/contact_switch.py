@@ -44,23 +44,29 @@ class Switch(Written, Schedule):
         self.memory[:] = self._unwritten()
 
     @property
+    def _last(self) -> tuple[float, float, float, float]:
+        """The last `set`: when, its ramp [s], the weight before, and the one after."""
+        start, ramp, origin, target = self.memory.tolist()
+        return start, ramp, origin, target
+
+    @property
     def is_on(self) -> bool:
         """Whether it was last turned on, or is on from the beginning."""
         return bool(self.memory[3] > 0.0)
 
     def active(self, t: float) -> bool:
         """Return whether it counts at time t [s]."""
-        start, ramp, _, target = map(float, self.memory)
+        start, ramp, _, target = self._last
         return target > 0.0 or t < start + ramp
 
     def edge(self, t: float) -> float:
         """Return when it is not active, just before or after the last `set` [s]."""
-        start, ramp, _, target = map(float, self.memory)
+        start, ramp, _, target = self._last
         return nextafter(start, -inf) if target > 0.0 else start + ramp
 
     def weight(self, t: float) -> float:
         """Return w(t), t in s; in a ramp it is C² in t."""
-        start, ramp, origin, target = map(float, self.memory)
+        start, ramp, origin, target = self._last
         if t >= start + ramp:
             return target
         if t <= start:

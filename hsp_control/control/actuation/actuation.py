@@ -78,7 +78,7 @@ class Actuation:
         self.found: Indices = np.zeros(2, dtype=np.int64)
         self._solve_if = np.zeros(2)
         self._checks = [state.rnea(wanted.acceleration), self._check()]
-        self._check_wanted = state.plan(self._checks)
+        self._check_wanted = state.plan(self._checks).call()
         self._tau = support.tau if support.size else wanted.effort
         self._effort_within = self._within_bounds(wanted.effort)
         self._tau_within = self._within_bounds(self._tau)
@@ -147,7 +147,7 @@ class Actuation:
             offset: Effort besides M a + N, shape (nv,); None: none.
         """
         self._wanted.acceleration[:] = a
-        self._check_wanted.run(self._state.t)
+        self._check_wanted()
         return self.delivered(a, offset)
 
     def delivered(self, a: Array, offset: Array | None = None) -> Delivered:

@@ -3,7 +3,6 @@
 from collections.abc import Callable, Sequence
 from functools import cached_property
 from itertools import pairwise
-from typing import Any
 
 import numpy as np
 
@@ -86,8 +85,7 @@ class Support:
     def update(self, resolution: Resolution) -> None:
         """Compute the map, the positions, the bounds of schedules, and the commands."""
         state = self._state
-        for write in self._write_maps:
-            write(state.t)
+        self._write_maps()
         for planned, columns, full in self._scheduled:
             on = max(planned.weight(state.t), 1e-6)
             self.upper[columns][2::3] = on * _MAX_FORCE * self.weight
@@ -96,8 +94,8 @@ class Support:
             command.write(state, planned.weight(state.t), resolution, own)
 
     @cached_property
-    def _write_maps(self) -> list[Callable[[float], Any]]:
-        """The calls that write the map and the positions."""
+    def _write_maps(self) -> Callable[[], object]:
+        """The call that writes the map and the positions."""
         calls = []
         for contact, where in zip(self.contacts, self.points, strict=True):
             frame = self._state.frame(contact.frame)
@@ -112,7 +110,7 @@ class Support:
                 out=self.map,
             )
             calls.append(call)
-        return self._state.plan(calls).steps()
+        return self._state.plan(calls).call()
 
     def minimum_norm_forces(self, wanted: Array) -> Array:
         """Return the forces of minimum Σ (f - f_ref)²/e, and write `tau`."""
@@ -184,7 +182,8 @@ class CommandedForces:
         self._contact, self._offset = contact, planned.force_offset
         n = contact.force.dimension
         self._command = TrajectorySample.allocate(n)
-        self._follow = state.plan(contact.force.followed.calls(self._command))
+        calls = contact.force.followed.calls(self._command)
+        self._follow = engine.Plan(state.plan(calls).steps())
         k = len(contact.points)
         self._varies = n == WRENCH  # with the arms
         self._shares = np.zeros((3 * k, n))
@@ -199,7 +198,7 @@ class CommandedForces:
         self, state: RobotState, weight: float, resolution: Resolution, out: Array
     ) -> None:
         """Write f_ref."""
-        self._follow.run(state.t)
+        self._follow(state.t)
         command = self._command.position.copy()
         command[self._normal] = max(command[self._normal] + self._offset[0], 0.0)
         contact = self._contact
