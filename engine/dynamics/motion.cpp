@@ -30,7 +30,7 @@ const Dynamics::Pinocchio::Data::MatrixXs& Dynamics::Pinocchio::mass_matrix(cons
     for (auto& each : data.Fcrb) each.setZero();
     data.M.setZero();
   }
-  pin::crba(model, data, q, pin::Convention::LOCAL);
+  pin::impl::crbaLocalConvention(model, data, q);  // `pin::crba` compiles another one, too
   data.M.triangularView<Eigen::StrictlyLower>() = data.M.transpose();
   return data.M;
 }

@@ -37,7 +37,7 @@ bool Dynamics::forward_dynamics(const ConstVector& q, const ConstVector& v, cons
                                 Eigen::Map<Vector> a) {
   auto& own = *pinocchio_;
   if (!own.has_followers()) {
-    a = pin::aba(own.model, own.data, q, v, tau, pin::Convention::LOCAL);
+    a = pin::impl::abaLocalConvention(own.model, own.data, q, v, tau);
     return true;
   }
   inverse_dynamics(q, v, view(own.zero), a);
