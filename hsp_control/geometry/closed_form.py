@@ -7,14 +7,14 @@ engine/geometry/distances.hpp.
 """
 
 from collections.abc import Sequence
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import coal
 import numpy as np
 
 from hsp_control import engine
 from hsp_control.common.arrays import Array, Indices
-from hsp_control.engine.plans import PartCalls
+from hsp_control.engine.plans import PartCall, PartCalls
 from hsp_control.geometry.links import LinkShape
 from hsp_control.geometry.scene import Obstacle
 from hsp_control.geometry.shapes import Box, Capsule, Cylinder, HalfSpace, Shape, Sphere
@@ -99,6 +99,13 @@ class ClosedFormDistances:
         given = state.world.placements, bodies, self._used, self._pairs
         found = self._segments, self._cores, self._distances
         return [(engine.MeasureDistances, (self.measurements, *given, *found))]
+
+    def row_call(
+        self, state: RobotState, near: Indices, least: Array, rows: tuple[Any, ...]
+    ) -> PartCall:
+        """Return the call that adds rows of single distances; see `Proximity`."""
+        given = state.world.jacobian, self._bodies, self._pairs, self._cores
+        return engine.DistanceRows, (*given, near, least, rows)
 
     def supplied(self) -> "tuple[_Bodies, PartCalls]":
         """Return the bodies as the engine reads them, and the calls that move them."""

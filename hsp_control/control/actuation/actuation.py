@@ -21,6 +21,7 @@ import numpy as np
 from hsp_control import engine
 from hsp_control.common.arrays import Array, Indices
 from hsp_control.constraints.limits.acceleration_bounds import EFFORT, MOTION
+from hsp_control.constraints.limits.barriers import BarrierRows
 from hsp_control.control.actuation.limited_step import (
     BEYOND,
     EXACT,
@@ -68,8 +69,11 @@ class Actuation:
         self._state, self._law = state, law
         self._support, self._limits = support, limits
         base, bounds = support.base, limits.bounds
+        # the rows of barriers, where the engine writes them all
+        self._rows = self._engine_rows()
         # Whether M a + N is the effort wherever it is within the bounds, and so is a.
-        self.direct = limits.box and not base.size and not support.size
+        boxed = limits.box or (self._rows is not None and not limits.static)
+        self.direct = boxed and not base.size and not support.size
         # what is delivered there of the law's own acceleration
         self.own = Delivered(state.effort, law.acceleration, np.zeros(0), EXACT, 0.0)
         self._wanted = wanted = Wanted(state.mass_matrix, np.zeros(nv), np.zeros(nv))
@@ -77,8 +81,10 @@ class Actuation:
         # `Status` of the QP if it was solved at once
         self.found: Indices = np.zeros(2, dtype=np.int64)
         self._solve_if = np.zeros(2)
-        self._checks = [state.rnea(wanted.acceleration), self._check()]
-        self._check_wanted = state.plan(self._checks).call()
+        self._violated: Indices = np.zeros(1, dtype=np.int64)  # whether a row is
+        checks = state.rnea(wanted.acceleration), self._check()
+        self._checks: PartCalls = [*checks, *self._row_checks()]
+        self._check_wanted = engine.Plan(state.plan(self._checks).steps())
         self._tau = support.tau if support.size else wanted.effort
         self._effort_within, self._tau_within = (
             state.plan([(engine.Within, (effort, *bounds[2:]))]).call()
@@ -103,6 +109,28 @@ class Actuation:
         given = *moving, state.robot.dof_indices, *within, *found, self._solve_if
         return engine.CheckLimits, given
 
+    def _engine_rows(self) -> BarrierRows | None:
+        """Return room for the rows of barriers; None if Python has to compute some."""
+        limits, state = self._limits.limits, self._state
+        if limits is None or not limits.barriers:
+            return None
+        rooms = [each.room(state) for each in limits.barriers]
+        return BarrierRows.allocate(sum(rooms), state.robot.nv) if all(rooms) else None
+
+    def _row_checks(self) -> PartCalls:
+        """Return the calls that write the rows of barriers, and compare a with them."""
+        limits, rows, state = self._limits.limits, self._rows, self._state
+        if limits is None or rows is None:
+            return []
+        a = self._wanted.acceleration
+        written = [
+            call
+            for each in limits.barriers
+            for call in each.row_calls(state, limits.bandwidth, a, rows)
+        ]
+        check = self._solve_if, rows, a, self._violated
+        return [(engine.ClearRows, (rows.number,)), *written, (engine.CheckRows, check)]
+
     def calls(self) -> list[Callable[[float], Any]]:
         """Return the calls of the time that deliver the law's own acceleration.
 
@@ -112,7 +140,7 @@ class Actuation:
         """
         law, wanted = self._law.acceleration, self._wanted
         calls: PartCalls = [(engine.Copy, (law, wanted.acceleration)), *self._checks]
-        if self._qp is not None and self.direct:
+        if self._qp is not None and self.direct and self._rows is None:
             keep = engine.Copy, (self._state.effort, wanted.effort)
             calls = [*calls, self._qp.nearest_if(keep, self._solve_if)]
         return self._state.plan(calls).steps()
@@ -125,7 +153,7 @@ class Actuation:
             offset: Effort besides M a + N, shape (nv,); None: none.
         """
         self._wanted.acceleration[:] = a
-        self._check_wanted()
+        self._check_wanted(self._state.t)
         return self.delivered(a, offset)
 
     def delivered(self, a: Array, offset: Array | None = None) -> Delivered:
@@ -140,9 +168,11 @@ class Actuation:
         if self.found.item(1) != UNSOLVED:
             return self._solved
         violated = self.found.item(0) & ~_BEYOND
-        if self.direct and not violated and offset is None:
+        rows_ok = not self._violated.item()
+        if self.direct and not violated and rows_ok and offset is None:
             return Delivered(self._state.effort, a, self.own.forces, EXACT, 0.0)
-        motion_ok, effort_ok = not violated & MOTION, not violated & EFFORT
+        motion_ok = not violated & MOTION and rows_ok
+        effort_ok = not violated & EFFORT
         # A QP that was tried at once has overwritten what is wanted.
         wanted, support = self._wanted.effort, self._support
         self._wanted.acceleration[:], wanted[:] = a, self._state.effort
@@ -150,7 +180,7 @@ class Actuation:
             wanted += offset
             effort_ok = bool(self._effort_within())
         elif self.direct:
-            return self._nearest(a, False, {})
+            return self._nearest(a, False, self._barriers())
         forces, tau = self.own.forces, self._tau
         if self.direct and motion_ok and effort_ok:
             return Delivered(tau, a, forces, EXACT, 0.0)
@@ -172,7 +202,9 @@ class Actuation:
         found: dict[str, tuple[Array, Array]] = {}
         if limits is None:
             return found
-        if limits.barriers:
+        if self._rows is not None:
+            found["barriers"] = self._rows.used
+        elif limits.barriers:
             wanted = self._wanted.acceleration
             parts = [
                 each.rows(state, limits.bandwidth, wanted) for each in limits.barriers

@@ -36,6 +36,7 @@ class LimitSet:
         )
         # whether there are but bounds on accelerations and efforts
         self.box = limits is None or not (limits.barriers or limits.static_effort)
+        self.static = limits is not None and limits.static_effort is not None
         self.rate = False  # whether the effort's rate is limited
         if limits is None:
             return
