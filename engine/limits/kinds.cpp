@@ -2,7 +2,10 @@
 
 #include "../src/rooms.hpp"
 #include "acceleration_bounds.hpp"
+#include "barrier_rows.hpp"
 #include "check.hpp"
+#include "distance_rows.hpp"
+#include "holding_rows.hpp"
 #include "nearest_effort.hpp"
 #include "sent_effort.hpp"
 #include "support.hpp"
@@ -10,6 +13,7 @@
 namespace hsp {
 const Kind* const* limit_kinds() {
   return kinds<NearestEffort, Copy, AccelerationBounds, Within, EffortWindow, ExpectedVelocity,
-               Observe, CheckLaw, CheckLimits, ForceMap, MinimumNormForces, WithinCones>();
+               Observe, CheckLaw, CheckLimits, ForceMap, MinimumNormForces, WithinCones, Displace,
+               DistancesAt, NearPairs, ApproachedPairs, DistanceRows, HoldingRows, Clear, CheckRows>();
 }
 }  // namespace hsp

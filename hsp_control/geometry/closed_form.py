@@ -7,7 +7,7 @@ engine/geometry/distances.hpp.
 """
 
 from collections.abc import Sequence
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import coal
 import numpy as np
@@ -107,6 +107,21 @@ class ClosedFormDistances:
             distances=self._distances,
         )
         return [call]
+
+    def row_call(
+        self, state: RobotState, near: Indices, least: Array, rows: tuple[Any, ...]
+    ) -> PartCall:
+        """Return the call that adds rows of single distances; see `Proximity`."""
+        return PartCall(
+            engine.DistanceRows,
+            jacobian=state.world.jacobian,
+            bodies=self._bodies,
+            pairs=self._pairs,
+            cores=self._cores,
+            near=near,
+            least_of_all=least,
+            rows=rows,
+        )
 
     def supplied(self) -> "tuple[_Bodies, PartCalls]":
         """Return the bodies as the engine reads them, and the calls that move them."""

@@ -10,6 +10,7 @@ import pinocchio as pin
 from hsp_control import engine
 from hsp_control.common.arrays import Array, Indices
 from hsp_control.common.exceptions import FieldError
+from hsp_control.engine.plans import PartCall, PartCalls
 from hsp_control.geometry.closed_form import ClosedFormDistances, has_closed_form
 from hsp_control.geometry.links import LinkShape
 from hsp_control.geometry.scene import Obstacle
@@ -162,6 +163,35 @@ class Proximity:
             self.coal.measure(state, self.distances)
         self._measured, self._stamp = state.stamp_array, self._stamp_of(state)
         return self.distances
+
+    def calls(self, state: RobotState) -> PartCalls:
+        """Return the calls that write `distances` for this state."""
+        if self.closed_form is None or self.coal is not None:
+            return [PartCall(self.measure, state=state)]
+        return self.closed_form.calls(state)
+
+    def row_call(
+        self, state: RobotState, near: Indices, least: Array, rows: tuple[Any, ...]
+    ) -> PartCall:
+        """Return a call that adds rows ∇d·a ≥ least, after `calls`.
+
+        Args:
+            state: The state.
+            near: Whether a pair has a row, shape (k,).
+            least: What each row needs, shape (k,).
+            rows: What they are added to: how many there are, A and least.
+        """
+        if self.closed_form is not None and self.coal is None:
+            return self.closed_form.row_call(state, near, least, rows)
+        number, A, all_least = rows
+
+        def add() -> None:
+            chosen, first = np.flatnonzero(near), number.item()
+            number[0] = end = first + len(chosen)
+            A[first:end] = self.gradients(state, chosen)
+            all_least[first:end] = least[chosen]
+
+        return PartCall(add)
 
     def _stamp_of(self, state: RobotState) -> tuple[int, int]:
         """Return a value that changes when anything is measured at another state."""

@@ -312,10 +312,15 @@ class RobotState:
             dt: Time difference [s].
             displacement: Shape (nv,) [rad or m].
         """
+        q = pin.integrate(self.robot.model, self.q, displacement)
+        return self.companion.update(self.t + dt, q, self.v)
+
+    @property
+    def companion(self) -> "RobotState":
+        """The state that `displaced` moves: this robot at other places."""
         if self._displaced is None:
             self._displaced = RobotState(self.robot)
-        q = pin.integrate(self.robot.model, self.q, displacement)
-        return self._displaced.update(self.t + dt, q, self.v)
+        return self._displaced
 
     def ahead(self, dt: float) -> "RobotState":
         """Return the companion state at (t + dt, q ⊕ v dt), see `displaced`; dt [s]."""

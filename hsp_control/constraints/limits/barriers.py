@@ -4,26 +4,26 @@ from abc import ABC, abstractmethod
 from collections.abc import Sequence
 from dataclasses import KW_ONLY, dataclass, replace
 from functools import cached_property
-from typing import Annotated, Self
+from typing import Annotated, NamedTuple, Self
 
 import numpy as np
 import pinocchio as pin
 from numpy.typing import ArrayLike
 from pydantic import AfterValidator, Field
 
+from hsp_control import engine
 from hsp_control.common.arrays import Array, Indices
 from hsp_control.common.exceptions import LimitError
 from hsp_control.declaration import Part
 from hsp_control.declaration.quantities import Names, NonNegative, Number
+from hsp_control.engine.plans import OnlyIf, PartCall, PartCalls, says
 from hsp_control.geometry.scene import Start
 from hsp_control.null_space.differences import gradient
 from hsp_control.null_space.fields import Clearance, ObstacleClearance, SelfClearance
 from hsp_control.null_space.fields.clearance import ObstacleOrName
 from hsp_control.robot import RobotState
+from hsp_control.robot.gravity import Gravity
 
-_STEP = 3e-4
-"""Step of the differences of efforts along the motion [s]: rounding and truncation
-errors are equal near 1e-7."""
 _SPAN = 3e-3
 """Step of those of a barrier's values [s]. The curvature of a capsule jumps where its
 side ends, and so would efforts: this far ahead and behind makes a ramp of it, at an
@@ -36,6 +36,25 @@ at its present rate."""
 _NEAR = 0.5
 """A motor gets one if gravity takes more than this part of what it may take, now or
 within the time `_AHEAD` at the present rate."""
+
+
+class BarrierRows(NamedTuple):
+    """Rows A a ≥ least, which calls of the engine write."""
+
+    number: Indices  # how many of the first are used, shape (1,)
+    A: Array  # shape (r, nv)
+    least: Array  # shape (r,)
+
+    @classmethod
+    def allocate(cls, rows: int, nv: int) -> Self:
+        """Return room for a number of rows."""
+        return cls(np.zeros(1, dtype=np.int64), np.zeros((rows, nv)), np.zeros(rows))
+
+    @property
+    def used(self) -> tuple[Array, Array]:
+        """A and least of the rows that are used."""
+        number = self.number.item()
+        return self.A[:number], self.least[:number]
 
 
 class Barrier(Part, ABC, family="barriers", error=LimitError):
@@ -97,8 +116,25 @@ class Barrier(Part, ABC, family="barriers", error=LimitError):
             bandwidth: α [1/s].
             wanted: The acceleration without them, shape (nv,): it may tell which count.
         """
-        _, _, least = self._least_acceleration(state, bandwidth)
+        least = self._least_acceleration(state, bandwidth)
         return self.gradients(state.read_only), least
+
+    def room(self, state: RobotState) -> int:
+        """Return how many rows `row_calls` may write; 0: `rows` has to be called."""
+        return 0
+
+    def row_calls(
+        self, state: RobotState, bandwidth: float, wanted: Array, rows: BarrierRows
+    ) -> PartCalls:
+        """Return the calls that add to ``rows`` what `rows` returns; see `room`.
+
+        Args:
+            state: The state.
+            bandwidth: α [1/s].
+            wanted: Where the acceleration without them stands, shape (nv,).
+            rows: What is added to.
+        """
+        raise NotImplementedError
 
     def check_start(self, state: RobotState) -> None:
         """Check that none starts below the minimum."""
@@ -123,17 +159,15 @@ class Barrier(Part, ABC, family="barriers", error=LimitError):
             )
         return found
 
-    def _least_acceleration(
-        self, state: RobotState, bandwidth: float
-    ) -> tuple[Array, Array, Array]:
-        """Return h, h', and the least ∇h·a, shape (k,) each."""
+    def _least_acceleration(self, state: RobotState, bandwidth: float) -> Array:
+        """Return the least ∇h·a, shape (k,)."""
         h = self._numbers(state)
         ahead = self._numbers(state.ahead(_SPAN))
         behind = self._numbers(state.ahead(-_SPAN))
         rate = (ahead - behind) / (2.0 * _SPAN)
         drift = (ahead - 2.0 * h + behind) / _SPAN**2
         left = h - self.minimum
-        return h, rate, -drift - 2.0 * bandwidth * rate - bandwidth**2 * left
+        return -drift - 2.0 * bandwidth * rate - bandwidth**2 * left
 
 
 class MinimumDistance(Barrier):
@@ -163,25 +197,73 @@ class MinimumDistance(Barrier):
         self.clearance.proximity(start.state)
         return self
 
+    def room(self, state: RobotState) -> int:
+        """Return the number of pairs; see `Barrier.room`."""
+        ways = "row_calls", "rows", "values", "gradients", "_numbers"
+        own = says(self, *ways) == "row_calls"
+        return len(self.clearance.proximity(state).pairs) if own else 0
+
     def rows(
         self, state: RobotState, bandwidth: float, wanted: Array
     ) -> tuple[Array, Array]:
-        """Return the rows of pairs close or approaching; see `Barrier.rows`.
+        """Return the rows of `row_calls`; see `Barrier.rows`."""
+        room, a = self.room(state), np.array(wanted)
+        if not room:
+            return super().rows(state, bandwidth, a)
+        rows = BarrierRows.allocate(room, state.robot.nv)
+        state.run(self.row_calls(state, bandwidth, a, rows))
+        return rows.used
+
+    def row_calls(
+        self, state: RobotState, bandwidth: float, wanted: Array, rows: BarrierRows
+    ) -> PartCalls:
+        """Return the calls that add rows of pairs close or approaching.
 
         Others have one as soon as the wanted acceleration takes half of what b leaves:
         an effort with a limited rate could not follow a row that is violated where it
         appears.
         """
-        d, rate, b = self._least_acceleration(state, bandwidth)
-        near = d - self.minimum + _AHEAD * np.minimum(rate, 0.0) < 2.0 / bandwidth
-        # no joint moves a point by more than the robot's size for each radian
-        most = float(np.sqrt(len(wanted) * (wanted @ wanted)))
-        if np.where(near, -np.inf, b).max() > -2.0 * state.robot.size * most:
-            step = _TURN / max(most, 1.0)
-            turned = self._numbers(state.displaced(0.0, step * wanted))
-            near |= (turned - d) / step < 0.5 * b
-        chosen = np.flatnonzero(near)
-        return self.clearance.proximity(state).gradients(state, chosen), b[chosen]
+        robot, turning = state.robot, {"turn": _TURN, "size": state.robot.size}
+        here = self.clearance.proximity(state)
+        now, count = here.distances, len(here.distances)
+        ahead, behind, turned, least = np.zeros((4, count))
+        near: Indices = np.zeros(count, dtype=np.int64)
+        turn, turn_if = np.zeros(robot.nv), np.zeros(2)
+        measured = _Elsewhere(state, self.clearance).calls
+        close = PartCall(
+            engine.NearPairs,
+            minimum=self.minimum,
+            bandwidth=bandwidth,
+            span=_SPAN,
+            look_ahead=_AHEAD,
+            turning=turning,
+            now=now,
+            ahead=ahead,
+            behind=behind,
+            a=wanted,
+            least=least,
+            near=near,
+            displacement=turn,
+            turn_if=turn_if,
+        )
+        approached = PartCall(
+            engine.ApproachedPairs,
+            turning=turning,
+            now=now,
+            turned=turned,
+            least=least,
+            a=wanted,
+            near=near,
+        )
+        look = [*measured(1.0, turn, 0.0, turned), approached]
+        return [
+            *here.calls(state),
+            *measured(_SPAN, state.v, _SPAN, ahead),
+            *measured(-_SPAN, state.v, -_SPAN, behind),
+            close,
+            OnlyIf(look, turn_if),
+            here.row_call(state, near, least, rows),
+        ]
 
     def check_start(self, state: RobotState) -> None:
         """Check that no pair starts closer than the minimum distance."""
@@ -191,6 +273,39 @@ class MinimumDistance(Barrier):
                 f"the start is outside the limits: {pair} are {distance:.4g} m apart, "
                 f"must be at least {self.minimum:g} m"
             )
+
+
+class _Elsewhere:
+    """Distances where a displacement leads, at a later time."""
+
+    def __init__(self, state: RobotState, clearance: Clearance) -> None:
+        self._state, companion = state, state.companion
+        proximity = clearance.proximity(companion)
+        measure = companion.plan(proximity.calls(companion)).steps()
+        self._move, self._measured = companion.bind_move(measure), proximity.distances
+        self._q = state.robot.neutral()
+
+    def calls(self, h: float, x: Array, later: float, out: Array) -> PartCalls:
+        """Return the calls that measure at q ⊕ h x, and later by a time [s]."""
+        state, q = self._state, self._q
+
+        def displace() -> None:
+            q[:] = pin.integrate(state.robot.model, state.q, h * x)
+
+        place = PartCall(displace)
+        if state.robot.linear:
+            place = PartCall(engine.Displace, h=h, q=state.q, x=x, displaced=q)
+        at = PartCall(
+            engine.DistancesAt,
+            move=self._move,
+            time=state.time,
+            later=later,
+            q=q,
+            v=state.v,
+            measured=self._measured,
+            distances=out,
+        )
+        return [place, at]
 
 
 class ObstacleDistance(MinimumDistance, type="obstacle_distance"):
@@ -238,8 +353,7 @@ class StaticEffort:
     Else an arm reaches postures in which its motors cannot hold it, and falls. A
     motor's gravity effort, G_i(q), depends on the posture only, so this is a limit on
     postures: with h = share - |G_i|/effort_i, the rows require h'' + 2α h' + α² h ≥ 0,
-    with G_i'' = ∇G_i·a + the drift of G_i' at constant velocity. Robots with mimic
-    joints are not supported.
+    with G_i'' = ∇G_i·a + the drift of G_i' at constant velocity.
 
     Attributes:
         effort: Maximum effort, shape (nv,) [N·m or N]; inf where unlimited.
@@ -249,31 +363,41 @@ class StaticEffort:
     effort: Array
     share: float
 
-    def rows(
-        self, state: RobotState, bandwidth: float, excluded: Indices
-    ) -> tuple[Array, Array]:
-        """Return the rows A a ≥ b, (k, nv) and (k,), of the motors near their limit.
+    def room(self) -> int:
+        """Return how many rows `row_calls` may write."""
+        return int(np.isfinite(self.effort).sum())
 
-        Efforts of ``excluded`` dofs, from root to contact, depend on contact forces.
+    def row_calls(
+        self,
+        state: RobotState,
+        bandwidth: float,
+        excluded: Indices,
+        rows: BarrierRows,
+    ) -> PartCalls:
+        """Return the calls that add rows A a ≥ b of the motors near their limit.
+
+        Args:
+            state: The state.
+            bandwidth: α [1/s].
+            excluded: Indices in v of motors whose effort depends on contact forces:
+                those from the root to a contact.
+            rows: What is added to.
         """
-        robot, model = state.robot, state.robot.model
-        data = state.cached(self, "data", model.createData)
-        slope = pin.computeGeneralizedGravityDerivatives(model, data, state.q)
-
-        def gravity(dt: float) -> Array:
-            """Return G(q ⊕ v dt), shape (nv,)."""
-            q = pin.integrate(model, state.q, dt * state.v) if dt else state.q
-            return np.array(pin.computeGeneralizedGravity(model, data, q))
-
-        G, ahead, behind = gravity(0.0), gravity(_STEP), gravity(-_STEP)
-        rate = slope @ state.v
-        sign = np.where(G < 0.0, -1.0, 1.0)
-        used, growth = sign * G / self.effort, sign * rate / self.effort
-        soon = used + _AHEAD * np.maximum(growth, 0.0)
-        near = np.isfinite(self.effort) & (soon > _NEAR * self.share)
-        near[[*robot.unactuated, *excluded]] = False
-        i = np.flatnonzero(near)
-        side = (sign / self.effort)[i]
-        drift = side * (ahead - 2.0 * G + behind)[i] / _STEP**2
-        b = drift + 2.0 * bandwidth * growth[i] - bandwidth**2 * (self.share - used[i])
-        return -side[:, None] * slope[i], b
+        gravity = Gravity(state.robot.model, state.world)
+        held = np.isfinite(self.effort)
+        held[[*state.robot.unactuated, *excluded]] = False
+        near = PartCall(
+            engine.HoldingRows,
+            share=self.share,
+            bandwidth=bandwidth,
+            look_ahead=_AHEAD,
+            near=_NEAR,
+            motors=np.flatnonzero(held),
+            limit=self.effort,
+            effort=gravity.effort,
+            slope=gravity.slope,
+            drift=gravity.drift,
+            v=state.v,
+            rows=rows,
+        )
+        return [*gravity.calls, near]

@@ -21,6 +21,7 @@ import numpy as np
 from hsp_control import engine
 from hsp_control.common.arrays import Array, Indices
 from hsp_control.constraints.limits.acceleration_bounds import EFFORT, MOTION
+from hsp_control.constraints.limits.barriers import BarrierRows
 from hsp_control.control.actuation.limited_step import (
     BEYOND,
     EXACT,
@@ -35,7 +36,7 @@ from hsp_control.control.actuation.limits_in_force import LimitSet
 from hsp_control.control.actuation.support import Support
 from hsp_control.edge import Resolution
 from hsp_control.edge.limited_target import Permitted
-from hsp_control.engine.plans import PartCall, PartCalls
+from hsp_control.engine.plans import AnyCall, PartCall, PartCalls
 from hsp_control.law.outcome import BEYOND_ANY_LEVEL
 from hsp_control.robot import RobotState
 
@@ -68,8 +69,12 @@ class Actuation:
         self._state, self._law = state, law
         self._support, self._limits = support, limits
         base = support.base
+        # the rows that the engine writes, by kind; Python writes those of own barriers
+        self._rows = self._engine_rows()
+        own = limits.limits is not None and bool(limits.limits.barriers)
+        compiled = not own or "barriers" in self._rows
         # Whether M a + N is the effort wherever it is within the bounds, and so is a.
-        self.direct = limits.box and not base.size and not support.size
+        self.direct = compiled and not base.size and not support.size
         # what is delivered there of the law's own acceleration
         self.own = Delivered(state.effort, law.acceleration, np.zeros(0), EXACT, 0.0)
         self._wanted = wanted = Wanted(state.mass_matrix, np.zeros(nv), np.zeros(nv))
@@ -77,16 +82,17 @@ class Actuation:
         # `Status` of the QP if it was solved at once
         self.found: Indices = np.zeros(2, dtype=np.int64)
         self._solve_if = np.zeros(2)
-        self._checks = [state.rnea(wanted.acceleration), self._check()]
-        self._check_wanted = state.plan(self._checks).call()
+        self._violated: Indices = np.zeros(1, dtype=np.int64)  # how many rows are
+        checks = state.rnea(wanted.acceleration), self._check()
+        self._checks: PartCalls = [*checks, *self._row_checks()]
+        self._check_wanted = engine.Plan(state.plan(self._checks).steps())
         self._tau = support.tau if support.size else wanted.effort
         self._effort_within = self._within_bounds(wanted.effort)
         self._tau_within = self._within_bounds(self._tau)
         self._qp: LimitedStep | None = None
         if limits.limits is not None or support.size:
-            held = limits.limits.static_effort if limits.limits else None
-            rows = 0 if held is None else int(np.isfinite(held.effort).sum())
-            self._qp = self._limited_step(rows)
+            holding = self._rows.get("holding")
+            self._qp = self._limited_step(0 if holding is None else len(holding.least))
             # what is delivered where it was solved at once
             self._solved = Delivered(*self._qp.result, LIMITED, 0.0)
 
@@ -124,6 +130,45 @@ class Actuation:
         )
         return self._state.plan([call]).call()
 
+    def _engine_rows(self) -> dict[str, BarrierRows]:
+        """Return room for the rows that the engine writes, by kind."""
+        limits, state = self._limits.limits, self._state
+        if limits is None:
+            return {}
+        found, nv = {}, state.robot.nv
+        rooms = [each.room(state) for each in limits.barriers]
+        if rooms and all(rooms):  # else Python has to compute some
+            found["barriers"] = BarrierRows.allocate(sum(rooms), nv)
+        if limits.static_effort is not None:
+            found["holding"] = BarrierRows.allocate(limits.static_effort.room(), nv)
+        return found
+
+    def _row_checks(self) -> PartCalls:
+        """Return the calls that write these rows, and compare a with them."""
+        limits, state, a = self._limits.limits, self._state, self._wanted.acceleration
+        calls: list[AnyCall] = []
+        if limits is None or not self._rows:
+            return calls
+        calls.append(PartCall(engine.Clear, number=self._violated))
+        for kind, rows in self._rows.items():
+            calls.append(PartCall(engine.Clear, number=rows.number))
+            if kind == "barriers":
+                for each in limits.barriers:
+                    calls += each.row_calls(state, limits.bandwidth, a, rows)
+            elif limits.static_effort is not None:
+                excluded = self._support.supporting_dofs
+                given = state, limits.bandwidth, excluded, rows
+                calls += limits.static_effort.row_calls(*given)
+            check = PartCall(
+                engine.CheckRows,
+                of_bounds=self._solve_if,
+                rows=rows,
+                a=a,
+                violated=self._violated,
+            )
+            calls.append(check)
+        return calls
+
     def calls(self) -> list[Callable[[float], Any]]:
         """Return the calls of the time that deliver the law's own acceleration.
 
@@ -134,7 +179,7 @@ class Actuation:
         law, wanted = self._law.acceleration, self._wanted
         begin = PartCall(engine.Copy, x=law, out=wanted.acceleration)
         calls: PartCalls = [begin, *self._checks]
-        if self._qp is not None and self.direct:
+        if self._qp is not None and self.direct and not self._rows:
             keep = PartCall(engine.Copy, x=self._state.effort, out=wanted.effort)
             calls = [*calls, self._qp.nearest_if(keep, self._solve_if)]
         return self._state.plan(calls).steps()
@@ -147,7 +192,7 @@ class Actuation:
             offset: Effort besides M a + N, shape (nv,); None: none.
         """
         self._wanted.acceleration[:] = a
-        self._check_wanted()
+        self._check_wanted(self._state.t)
         return self.delivered(a, offset)
 
     def delivered(self, a: Array, offset: Array | None = None) -> Delivered:
@@ -162,9 +207,11 @@ class Actuation:
         if self.found.item(1) != UNSOLVED:
             return self._solved
         violated = self.found.item(0) & ~_BEYOND
-        if self.direct and not violated and offset is None:
+        rows_ok = not self._violated.item()
+        if self.direct and not violated and rows_ok and offset is None:
             return Delivered(self._state.effort, a, self.own.forces, EXACT, 0.0)
-        motion_ok, effort_ok = not violated & MOTION, not violated & EFFORT
+        motion_ok = not violated & MOTION and rows_ok
+        effort_ok = not violated & EFFORT
         # A QP that was tried at once has overwritten what is wanted.
         wanted, support = self._wanted.effort, self._support
         self._wanted.acceleration[:], wanted[:] = a, self._state.effort
@@ -172,7 +219,7 @@ class Actuation:
             wanted += offset
             effort_ok = bool(self._effort_within())
         elif self.direct:
-            return self._nearest(a, False, {})
+            return self._nearest(a, False, self._barriers())
         forces, tau = self.own.forces, self._tau
         if self.direct and motion_ok and effort_ok:
             return Delivered(tau, a, forces, EXACT, 0.0)
@@ -194,17 +241,14 @@ class Actuation:
         found: dict[str, tuple[Array, Array]] = {}
         if limits is None:
             return found
-        if limits.barriers:
+        found |= {kind: rows.used for kind, rows in self._rows.items()}
+        if limits.barriers and "barriers" not in self._rows:
             wanted = self._wanted.acceleration
             parts = [
                 each.rows(state, limits.bandwidth, wanted) for each in limits.barriers
             ]
             A, lower = (np.concatenate(each) for each in zip(*parts, strict=True))
             found["barriers"] = A, lower
-        if limits.static_effort is not None:
-            found["holding"] = limits.static_effort.rows(
-                state, limits.bandwidth, self._support.supporting_dofs
-            )
         return found
 
     def _nearest(self, a: Array, redistribute: bool, barriers: Barriers) -> Delivered:

@@ -34,8 +34,6 @@ class LimitSet:
             np.full(nv, -np.inf),
             np.full(nv, np.inf),
         )
-        # whether there are but bounds on accelerations and efforts
-        self.box = limits is None or not (limits.barriers or limits.static_effort)
         self.rate = False  # whether the effort's rate is limited
         if limits is None:
             return

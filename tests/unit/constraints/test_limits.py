@@ -32,7 +32,7 @@ from hsp_control.constraints.limits import (
     SelfDistance,
 )
 from hsp_control.geometry.scene import Scene, Start
-from hsp_control.geometry.shapes import Box
+from hsp_control.geometry.shapes import Box, PointCloud
 from hsp_control.trajectories import Lissajous
 
 
@@ -276,6 +276,33 @@ def test_distance_rows_are_its_second_derivative(kind: str) -> None:
         scale = 1e-2 * np.linalg.norm(wanted)
         np.testing.assert_allclose(A @ wanted, asked[chosen], rtol=0, atol=scale)
         np.testing.assert_allclose(b, least[chosen], rtol=0, atol=2e-2)
+
+
+@pytest.mark.parametrize("name", ["panda", "kinova", "solo12"])
+def test_the_rows_are_those_of_single_pairs(name: str) -> None:
+    """Also where q is no vector, and where Coal computes a distance (the cloud)."""
+    robot, rng = Robot.load(name), np.random.default_rng(4)
+    points = rng.uniform(-0.05, 0.05, (20, 3))
+    cloud = Obstacle("cloud", PointCloud(points, 0.01), Hold([0.4, 0.3, 0.4]))
+    start = at_home(robot, [Obstacle("ball", Sphere(0.08), Hold([0.4, -0.3, 0.4]))])
+    seen = at_home(robot, [cloud])
+    q = robot.integrate(robot.home(), 0.1 * rng.standard_normal(robot.nv))
+    state = robot.state(0.4, q, 0.3 * rng.standard_normal(robot.nv))
+    wanted = 1e4 * rng.standard_normal(robot.nv)  # so that also far pairs count
+    for limit in (
+        SelfDistance().placed(start),
+        ObstacleDistance().placed(start),
+        ObstacleDistance().placed(seen),
+    ):
+        A, b = limit.rows(state, 10.0, wanted)
+        least = limit._least_acceleration(state, 10.0)
+        gradients = limit.clearance.proximity(state).gradients(state, range(len(least)))
+        chosen = [int(np.abs(least - each).argmin()) for each in b]
+        assert len(b) > 0
+        assert chosen == sorted(set(chosen))
+        # second differences over 3 ms: 1e5 times the rounding of a distance
+        np.testing.assert_allclose(b, least[chosen], rtol=0, atol=1e-9)
+        np.testing.assert_allclose(A, gradients[chosen], rtol=0, atol=1e-14)
 
 
 def test_a_row_turns_no_corner_in_one_step() -> None:

@@ -12,7 +12,7 @@ from runs import held
 import hsp_control as hsp
 from hsp_control import engine
 from hsp_control.common.arrays import Array
-from hsp_control.constraints.limits import ObstacleDistance, RobotLimits
+from hsp_control.constraints.limits import ObstacleDistance, RobotLimits, SelfDistance
 from hsp_control.control.actuation import Status
 from hsp_control.control.actuation.sent_effort import SentEffort
 from hsp_control.control.compensation import Compensation, MomentumObserver
@@ -437,6 +437,18 @@ def elbow(limits: hsp.Limits | None) -> hsp.Controller:
         limits=limits,
         scene=[swinging()],
     )
+
+
+def test_a_step_with_minimum_distances_runs_no_python() -> None:
+    """As one without them; else it costs ten times as much."""
+    robot = panda()
+    limits = hsp.Limits(barriers=[ObstacleDistance(0.02), SelfDistance()])
+    law = elbow(limits)
+    law.compute(0.0, robot.home(), np.zeros(7))
+    bound = law._run.bound
+    assert bound is not None
+    assert bound.direct
+    assert not bound.move.python
 
 
 @pytest.mark.slow
