@@ -72,12 +72,15 @@ class RobotModel(Structure):
         g = float(np.linalg.norm(model.gravity.linear))
         for joint in range(1, model.njoints):
             own = model.joints[joint]
+            # What a follower carries its leader's motor carries, too.
+            ratio = 1.0 if own.nv else abs(float(own.extract().scaling))
             turns = self.units[own.idx_v] == "rad"
             for body in model.subtrees[joint]:
                 inertia = model.inertias[body]
                 away = self._lengths[body] - self._lengths[joint]
                 lever = away + float(np.linalg.norm(inertia.lever)) if turns else 1.0
-                most[own.idx_v : own.idx_v + own.nv] += g * inertia.mass * lever
+                dofs = slice(own.idx_v, own.idx_v + own.nvExtended)
+                most[dofs] += ratio * g * inertia.mass * lever
         return most
 
     @property

@@ -87,11 +87,20 @@ def test_by_default_gravity_may_overload_no_motor_of_an_arm() -> None:
         assert (np.abs(asked) < robot.largest_gravity).all()
     for none in ({}, {"effort": "none"}, {"effort": 1.0, "static_effort": "none"}):
         assert of(robot, **none).static_effort is None
-    assert of(fingers(), effort=1.0).static_effort is None
     held = of(robot, effort=[87.0, 87.0, 30.0, 50.0, 12.0, 12.0, 12.0]).static_effort
     assert held is not None
     assert held.share == 0.95
     np.testing.assert_array_equal(np.isfinite(held.effort), np.arange(7) == 2)
+
+
+def test_gravity_asks_a_leader_for_what_its_followers_carry() -> None:
+    robot, rng, rest = fingers(), np.random.default_rng(1), np.zeros(8)
+    for _ in range(500):
+        asked = robot.inverse_dynamics(robot.random_configuration(rng), rest, rest)
+        assert (np.abs(asked) < robot.largest_gravity).all()
+    held = of(robot, effort=1e-3).static_effort
+    assert held is not None
+    assert np.isfinite(held.effort).sum() > 6
 
 
 def test_the_rate_of_efforts_is_one_for_all_joints_of_a_unit() -> None:
@@ -177,10 +186,6 @@ MISFITS: list[tuple[Any, dict[str, Any], type[HspControlError], str, str]] = [
     (
         *(panda, {"position": PositionRange(-1.0, 1.0), "position_margin": 1.0}),
         *(LimitError, "position", "panda_joint1 leave no room: -1 to 1 with a margin"),
-    ),
-    (
-        *(fingers, {"static_effort": 0.5}, LimitError),
-        *("static_effort", "does not support mimic joints; panda has some"),
     ),
     (
         *(panda, {"barriers": [SelfDistance(), ObstacleDistance(obstacles=["bal"])]}),

@@ -14,6 +14,7 @@ from runs import held
 import hsp_control as hsp
 from hsp_control.common.arrays import Array
 from hsp_control.constraints.limits import StaticEffort
+from hsp_control.constraints.limits.barriers import BarrierRows
 from hsp_control.control.actuation import Status
 from hsp_control.control.actuation.deviation_cost import (
     Directions,
@@ -186,18 +187,22 @@ def test_efforts_are_continuous_near_a_straight_elbow(
 # --- postures that motors can hold ---------------------------------------------------
 
 
-def test_static_rows_are_the_second_derivative() -> None:
+@pytest.mark.parametrize("locked", [None, {}])  # with {} one finger follows the other
+def test_static_rows_are_the_second_derivative(locked: dict[str, float] | None) -> None:
     """∇G·a + drift = G'' along q + s v + ½ s² a, by differences."""
-    robot, rng = panda(), np.random.default_rng(4)
-    effort, share, alpha, h = np.full(7, 20.0), 0.6, 7.0, 1e-3
+    robot = panda() if locked is None else hsp.Robot.load("panda", locked=locked)
+    n, rng = robot.nv, np.random.default_rng(4)
+    effort, share, alpha, h = np.full(n, 20.0), 0.6, 7.0, 1e-3
     limit = StaticEffort(effort, share)
-    q, v, a = robot.home(), 0.5 * rng.standard_normal(7), rng.standard_normal(7)
-    A, b = limit.rows(robot.state(0.0, q, v), alpha, NOWHERE)
+    q, v, a = robot.home(), 0.5 * rng.standard_normal(n), rng.standard_normal(n)
+    state, rows = robot.state(0.0, q, v), BarrierRows.allocate(limit.room(), n)
+    state.run(limit.row_calls(state, alpha, NOWHERE, rows))
+    A, b = rows.used
     assert len(A) > 0
 
     def room(s: float) -> Array:
         there = robot.integrate(q, s * v + 0.5 * s * s * a)
-        still = robot.inverse_dynamics(there, np.zeros(7), np.zeros(7))
+        still = robot.inverse_dynamics(there, np.zeros(n), np.zeros(n))
         return share - np.abs(still) / effort
 
     rate = (room(h) - room(-h)) / (2.0 * h)
