@@ -10,6 +10,6 @@
 namespace hsp {
 const Kind* const* limit_kinds() {
   return kinds<NearestEffort, Copy, AccelerationBounds, Within, EffortWindow, ExpectedVelocity,
-               Observe, CheckLaw, CheckLimits, ForceMap, MinimumNormForces, WithinCones>();
+               Observe, IsPlain, CheckLimits, ForceMap, MinimumNormForces, WithinCones>();
 }
 }  // namespace hsp

@@ -69,11 +69,11 @@ MoveObject::MoveObject(nb::tuple given)
       call(kind_of<Move>(), arguments_of(kind_of<Move>(), given)),
       python(CallObject::runs_python(given)) {}
 
-double MoveObject::operator()(double t, nb::handle q, nb::handle v) {
+std::optional<double> MoveObject::operator()(double t, nb::handle q, nb::handle v) {
   Move& move = *static_cast<Move*>(call.self());
   const Strided q_in = vector_of(q), v_in = vector_of(v);
   const bool fits = q_in.size() == move.q.size() && v_in.size() == move.v.size();
-  return fits ? move.to(t, q_in, v_in) : refused;
+  return fits ? move.to(t, q_in, v_in) : std::nullopt;
 }
 
 }  // namespace hsp

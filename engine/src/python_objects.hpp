@@ -79,7 +79,8 @@ struct ForeignCall : Runnable {
 // A state's move, as Python makes it.
 struct MoveObject {
   explicit MoveObject(nanobind::tuple given);
-  double operator()(double t, nanobind::handle q, nanobind::handle v);
+  // None where it is refused.
+  std::optional<double> operator()(double t, nanobind::handle q, nanobind::handle v);
 
   nanobind::tuple values;
   Call call;

@@ -29,7 +29,6 @@ def _load(file: str) -> None:
 if _given := os.environ.get("HSP_ENGINE"):
     _load(_given)
 try:
-    from ._engine import REFUSED as REFUSED
     from ._engine import Call as Call
     from ._engine import ForeignCall as ForeignCall
     from ._engine import Kind as Kind

@@ -7,7 +7,7 @@ derivatives of gravity, plants with models of their own, and the viewer.
 """
 
 from collections.abc import Callable, Sequence
-from typing import TYPE_CHECKING, Annotated, Any, Literal, Self, TypeVar
+from typing import TYPE_CHECKING, Annotated, Any, Literal, NoReturn, Self, TypeVar
 
 import numpy as np
 import pinocchio as pin
@@ -22,7 +22,7 @@ from hsp_control.common.arrays import (
 )
 from hsp_control.common.exceptions import ImmutableError, NonFiniteError, ShapeError
 from hsp_control.declaration.quantities import Vector
-from hsp_control.engine import REFUSED, Move, Plan
+from hsp_control.engine import Move, Plan
 from hsp_control.engine.plans import (
     AnyCall,
     Once,
@@ -172,8 +172,8 @@ class RobotState:
         except TypeError:
             if isinstance(t, float | int | np.number):
                 raise
-            value = REFUSED
-        if value == REFUSED:
+            value = None
+        if value is None:
             self._refuse(t, q, v)
         return value
 
@@ -183,7 +183,7 @@ class RobotState:
         plan = Plan([*self.plan([jacobians]).steps(), *calls])
         return Move(calls=plan, **self._memory)
 
-    def _refuse(self, t: float, q: ArrayLike, v: ArrayLike) -> None:
+    def _refuse(self, t: float, q: ArrayLike, v: ArrayLike) -> NoReturn:
         """Raise the error that says what is wrong with t, q and v."""
         if not isinstance(t, float | int | np.number) or not np.isfinite(t):
             raise NonFiniteError(f"time t is {t!r}; needs a finite number of seconds")
