@@ -1,5 +1,6 @@
 // The two laws of the edge, one with bounded inverses and the exact one, and their blend.
 #pragma once
+#include "../law/outcome.hpp"
 #include "damped_levels.hpp"
 #include "shares.hpp"
 
@@ -17,23 +18,20 @@ template <template <int...> class As> struct EdgeMemory {
 };
 
 struct Resolve {
-  static constexpr const char* doc =
-      "Write e_N and a; return and write a code: 0: exact; from 1 on, the first level with a "
-      "bounded inverse; beyond any level: not finite.";
+  static constexpr const char* doc = "Write e_N and a, and what became of the law.";
   LawInput law;
   Asked rows;
   double least;  // ε_0
   Following following;
   bool exact_beside;  // whether there is an exact law beside the damped one
   bool alone;         // whether the tasks are one level, which is resolved at once
-  double beyond;      // the code of what is not finite
   Thresholds thresholds;
   Factors<InOut> factors;
   Projectors<InOut> projectors;
   EdgeMemory<InOut> edge;
-  OutInts<1> damped_code;
   Out<'n'> e_N, a;
-  OutInts<1> code;
+  OutInts<1> edge_level;  // the first level whose inverse the damped law bounds; 0: none
+  LawOutcome<OutInts> outcome;
 
   struct Memory {
     LawMemory law;
@@ -51,49 +49,50 @@ struct Resolve {
     }
   } memory;
 
-  double operator()() {
-    code[0] = damped_code[0] = alone ? at_once() : by_levels();
+  void operator()() {
+    edge_level[0] = outcome.damped_level[0] = alone ? at_once() : by_levels();
     blend();
-    return static_cast<double>(code[0]);
+    outcome.finite[0] = is_finite();
   }
+
+  bool is_finite() const { return std::isfinite(a.sum()); }
 
   template <class Q, class X> auto inverse(const Q& q, const X& factor) const {
     return PseudoInverse(q, factor, law.metric.L, law.form);
   }
 
   // All tasks at once.
-  std::int64_t at_once() {
+  bool at_once() {
     auto& [Q, X] = factors;
     const bool damped = bounded_inverse(memory.B, whitened(), Q, X);
     write_law(law, inverse(Q, X), memory.law, e_N, a);
-    return std::isfinite(a.sum()) ? damped : static_cast<std::int64_t>(beyond);
+    return damped;
   }
 
   // All levels at once, or level by level if they conflict. If the tasks of several levels are
   // exact together, they are exact one after the other: this is the same then.
-  std::int64_t by_levels() {
+  int by_levels() {
     const auto& J = law.task.jacobian;
     const double threshold = whitened();
     auto& [Q, X] = factors;
     if (J.rows() <= J.cols() && exact_inverse(memory.B, threshold, Q, X, memory.square)) {
       write_law(law, inverse(Q, X), memory.law, e_N, a);
-      if (std::isfinite(a.sum())) return 0;
+      if (is_finite()) return 0;
     }
-    const int damped = write_damped_levels(law, rows, least, following, thresholds, projectors,
-                                           memory.damped, memory.levels, edge.by_tasks, e_N, a);
-    return std::isfinite(a.sum()) ? damped : static_cast<std::int64_t>(beyond);
+    return write_damped_levels(law, rows, least, following, thresholds, projectors, memory.damped,
+                               memory.levels, edge.by_tasks, e_N, a);
   }
 
   // a = a_exact + μ (a_damped - a_exact); the first two shares count here.
   void blend() {
     auto& [Q, X, exact, damped, by_tasks, exact_e_N, share] = edge;
-    if (damped_code[0] == 0) {
+    if (edge_level[0] == 0) {
       share[0] = 0.0;
       return;
     }
     damped = a;
     share[0] = 1.0;
-    if (damped_code[0] >= beyond || !exact_beside) return;
+    if (!is_finite() || !exact_beside) return;
     double mu = far_share(rows.stretched, following.far);
     if (mu < 1.0) {
       const auto& J = law.task.jacobian;
@@ -106,7 +105,7 @@ struct Resolve {
     exact = a;
     a += mu * (damped - exact);
     e_N = exact_e_N + mu * (e_N - exact_e_N);
-    if (mu == 0.0) code[0] = 0;
+    if (mu == 0.0) outcome.damped_level[0] = 0;
   }
 
   // Write J L⁻ᵀ and the thresholds; return a singular value from which on no level is bounded.

@@ -22,7 +22,7 @@ struct SelfMotions {
   Factors<In> factors;
   In<'n', 'n'> Q_K;  // P W⁻¹ of the levels
   EdgeMemory<InOut> edge;
-  Ints<1> damped_code;
+  Ints<1> edge_level;
   In<'n'> a;
   Out<2, 'n'> self_motions, brakings;
   struct Memory {
@@ -36,7 +36,7 @@ struct SelfMotions {
 
   void operator()() {
     auto& [self_motion, braking, exact, moved, lowered, missing, part] = memory;
-    const bool one_law = damped_code[0] == 0;
+    const bool one_law = edge_level[0] == 0;
     if (one_law) edge.damped = a;
     if (one_law || alone) {
       const auto inverse = PseudoInverse(factors.Q, factors.X, L, form);

@@ -1,9 +1,6 @@
 // Rows A a ≥ least that barriers add in each step, and whether the wanted acceleration keeps them.
 #pragma once
-#include <algorithm>
-#include <hsp/kind.hpp>
-
-#include "check.hpp"
+#include "records.hpp"
 
 namespace hsp {
 
@@ -22,17 +19,14 @@ struct Clear {
 };
 
 struct CheckRows {
-  static constexpr const char* doc =
-      "Count the rows that are violated; return what `CheckLimits` does, or that one has to look.";
-  In<2> of_bounds;  // what it returned; and what is violated
+  static constexpr const char* doc = "Compare a with the rows, after CheckLimits.";
   BarrierRows<In, Ints> rows;
   In<'n'> a;
-  InOutInts<1> violated;
+  LimitsOutcome<InOutInts> outcome;
 
-  double operator()() {
+  void operator()() {
     for (Index r = 0; r < rows.number[0]; ++r)
-      violated[0] += !(rows.A.row(r).dot(a) >= rows.least[r]);
-    return violated[0] ? std::max(of_bounds[0], LOOK) : of_bounds[0];
+      if (!(rows.A.row(r).dot(a) >= rows.least[r])) outcome.rows[0] = outcome.violated[0] = 1;
   }
 };
 

@@ -3,34 +3,20 @@
 #include <algorithm>
 #include <cmath>
 
+#include "../law/outcome.hpp"
 #include "acceleration_bounds.hpp"
 #include "sent_effort.hpp"
 
 namespace hsp {
 
-// What is violated: bounds on the acceleration, bounds on the effort; and whether the robot is
-// beyond a limit. The sum is written.
-enum Violated { MOTION = 1, EFFORT = 2, BEYOND = 4 };
+struct IsPlain {
+  static constexpr const char* doc =
+      "Whether the law is exact and within all limits: else its outcome and theirs say more.";
+  LawOutcome<Ints> law;
+  LimitsOutcome<Ints> limits;
 
-// What a check returns, or more, where a limit is violated or the law is not finite. Where neither
-// is the case it returns 0, or 1 if an inverse is bounded.
-constexpr double LOOK = 2.0;
-
-// From the code `not_finite` of the law on, its acceleration is not finite.
-inline double look_at_law(std::int64_t code, double not_finite) {
-  if (code >= not_finite) return LOOK;
-  return code > 0 ? 1.0 : 0.0;
-}
-
-struct CheckLaw {
-  static constexpr const char* doc = "What `CheckLimits` does where nothing is limited.";
-  Ints<1> code;
-  double not_finite;
-  OutInts<2> found;
-
-  double operator()() {
-    found.setZero();
-    return look_at_law(code[0], not_finite);
+  bool operator()() {
+    return law.finite[0] && law.damped_level[0] == 0 && !limits.violated[0] && !limits.beyond[0];
   }
 };
 
@@ -45,21 +31,19 @@ struct CheckLimits {
   Ends<In> ends;
   Held<InOut> held;
   Bounds<Out, In> bounds;
-  Ints<1> code;       // the law's outcome
-  double not_finite;  // its code from which on a is not finite
-  OutInts<2> found;   // which limits the next effort violates; and 0, no QP was solved
-  Out<2> solve_if;    // what is returned, and whether a bound is violated
+  LimitsOutcome<OutInts> outcome;
+  OutInts<1> unsolved;  // 1: until one is solved, there is no result of a QP
 
-  double operator()() {
+  void operator()() {
     observe(v, held, time[0]);
     write_acceleration_bounds(q, v, where, limits, held, bounds.a_lower, bounds.a_upper);
     move_bounds();
-    const int flags = (is_within(a, bounds.a_lower, bounds.a_upper) ? 0 : MOTION) +
-                      (is_within(tau, bounds.tau_lower, bounds.tau_upper) ? 0 : EFFORT);
-    const int all = flags + (is_beyond() ? BEYOND : 0);
-    found << all, 0;
-    solve_if << (all ? LOOK : look_at_law(code[0], not_finite)), flags;
-    return solve_if[0];
+    outcome.motion[0] = !is_within(a, bounds.a_lower, bounds.a_upper);
+    outcome.effort[0] = !is_within(tau, bounds.tau_lower, bounds.tau_upper);
+    outcome.rows[0] = 0;  // until `CheckRows` finds one
+    outcome.violated[0] = outcome.motion[0] || outcome.effort[0];
+    outcome.beyond[0] = is_beyond();
+    unsolved[0] = 1;
   }
 
  private:

@@ -36,9 +36,8 @@ struct DistancesAt {
   Out<'d'> distances;
 
   void operator()() {
-    if (move->to(time[0] + later, q, v) == refused)
-      distances.setConstant(std::numeric_limits<double>::quiet_NaN());
-    else distances = measured;
+    if (move->to(time[0] + later, q, v)) distances = measured;
+    else distances.setConstant(std::numeric_limits<double>::quiet_NaN());
   }
 };
 
@@ -63,7 +62,7 @@ struct NearPairs {
   Out<'d'> least;
   OutInts<'d'> near;
   Out<'n'> displacement;
-  Out<2> turn_if;
+  OutInts<1> turning_matters;
 
   void operator()() {
     double others = -std::numeric_limits<double>::infinity();
@@ -76,7 +75,7 @@ struct NearPairs {
       if (!near[k]) others = std::max(others, least[k]);
     }
     displacement = turning.step(a) * a;
-    turn_if << 0.0, others > -2.0 * turning.size * turning.most(a);
+    turning_matters[0] = others > -2.0 * turning.size * turning.most(a);
   }
 };
 

@@ -13,7 +13,8 @@
 namespace hsp {
 const Kind* const* limit_kinds() {
   return kinds<NearestEffort, Copy, AccelerationBounds, Within, EffortWindow, ExpectedVelocity,
-               Observe, CheckLaw, CheckLimits, ForceMap, MinimumNormForces, WithinCones, Displace,
-               DistancesAt, NearPairs, ApproachedPairs, DistanceRows, HoldingRows, Clear, CheckRows>();
+               Observe, IsPlain, CheckLimits, ForceMap, MinimumNormForces, WithinCones, Displace,
+               DistancesAt, NearPairs, ApproachedPairs, DistanceRows, HoldingRows, Clear,
+               CheckRows>();
 }
 }  // namespace hsp

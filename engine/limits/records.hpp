@@ -22,6 +22,14 @@ template <template <int...> class As, template <int...> class Effort = As> struc
   Effort<'n'> tau_lower, tau_upper;
 };
 
+// What a check of the limits found: 0 or 1 each.
+template <template <int...> class As> struct LimitsOutcome {
+  As<1> motion, effort;  // whether a bound on accelerations, on efforts is violated
+  As<1> rows;            // whether a row of a barrier is, see BarrierRows
+  As<1> violated;        // whether one of them is
+  As<1> beyond;          // whether a joint is beyond its range, or faster than its limit
+};
+
 // The errors of the acceleration that are known from efforts that were held, see `Held`.
 template <template <int...> class As> struct Errors {
   As<'n'> error, least, most, lasting, steady;

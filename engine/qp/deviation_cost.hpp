@@ -58,11 +58,11 @@ struct Directions {
   In<'l'> thresholds;     // singular value below which a direction belongs to a level in part
   Factors<In> factors;
   Projectors<In> projectors;
-  Ints<1> code;     // outcome of the damped law: 0, or its first damped level from 1 on
-  bool alone;       // whether the law resolves its one level at once, whatever happens
-  Out<'n', 'n'> N;  // directions n_k as rows
-  OutInts<1> kept;  // how many of the first belong to the first level alone
-  Out<'n'> root;    // 1/√ρ of each
+  Ints<1> edge_level;  // the first level whose inverse the damped law bounds; 0: none
+  bool alone;          // whether the law resolves its one level at once, whatever happens
+  Out<'n', 'n'> N;     // directions n_k as rows
+  OutInts<1> kept;     // how many of the first belong to the first level alone
+  Out<'n'> root;       // 1/√ρ of each
   LevelCosts costs;
   Scratch<'m', 'n'> B;  // whitened rows
   Scratch<'m', 'm'> square;
@@ -72,7 +72,7 @@ struct Directions {
 
   void operator()() {
     write_costs();
-    const Index levels = ends.size(), damped = code[0], rows = jacobian.rows();
+    const Index levels = ends.size(), damped = edge_level[0], rows = jacobian.rows();
     if (damped == 0) {
       const Index count = is_law_orthonormal() ? rows : write_levels(levels);
       write_roots(count);
@@ -145,7 +145,7 @@ struct Directions {
       auto rows = B.middleRows(start, ends[k] - start);
       for (Index r = 0; r < rows.rows(); ++r)
         for (Index i = 0; i < count; ++i) rows.row(r) -= N.row(i).dot(rows.row(r)) * N.row(i);
-      if (k < code[0] - 1 || code[0] == 0) {
+      if (k < edge_level[0] - 1 || edge_level[0] == 0) {
         // No singular value is small: any orthonormal rows will do, at a tenth of the cost.
         auto own = N.middleRows(count, rows.rows());
         auto factor = square.topLeftCorner(rows.rows(), rows.rows());

@@ -38,6 +38,12 @@ struct Places {
   std::int64_t base;
 };
 
+// What became of a QP.
+template <template <int...> class As> struct QPOutcome {
+  As<1> unsolved;  // 1: there is no result; 0
+  As<1> status;    // that of the result, as `Status` in Python
+};
+
 // What is delivered.
 struct Result {
   InOut<'n'> effort, acceleration;
@@ -91,37 +97,35 @@ struct LimitedRows {
 
 struct SolveLimitedStep {
   static constexpr const char* doc = "The optimum of the QP, and what is reached with it.";
-  std::int64_t reached;  // the status if it is solved
+  std::int64_t reached;  // the status that its solution has
   bool warm;
   QP problem;
   Ints<1> moving;  // how many rows of Jᵀ move
   InOut<'n'> x;
   ActiveSet work;
-  OutInts<1> status;  // 0: none
+  QPOutcome<OutInts> outcome;
   ActiveSetMemory memory;
 
   void operator()() {
     DualActiveSet solver(problem, moving[0], x, work, memory);
-    status[0] = solver.minimise(warm) == DualActiveSet::SOLVED ? reached : 0;
+    outcome.unsolved[0] = solver.minimise(warm) != DualActiveSet::SOLVED;
+    outcome.status[0] = reached;
   }
 };
 
 struct LimitedResult {
   static constexpr const char* doc =
-      "Effort, acceleration and forces of x, without the solver's violations; the status.";
+      "Effort, acceleration and forces of x, without the solver's violations.";
   Wanted wanted;
   Forces forces;
   Bounds<In> bounds;
   Places places;
   In<'x'> x;
   Result result;
-  InOutInts<1> status;  // 0: there is no result, or none that is finite
-  Out<2> unsolved;      // the status, and whether it is 0
+  InOutInts<1> unsolved;  // also where the effort is not finite
 
-  std::int64_t operator()() {
-    if (status[0] != 0 && !write()) status[0] = 0;
-    unsolved << status[0], status[0] == 0;
-    return status[0];
+  void operator()() {
+    if (!unsolved[0]) unsolved[0] = !write();
   }
 
  private:

@@ -3,7 +3,5 @@
 #include "gravity.hpp"
 
 namespace hsp {
-const Kind* const* robot_kinds() {
-  return kinds<FrameKinematics, Gravity>();
-}
+const Kind* const* robot_kinds() { return kinds<FrameKinematics, Gravity>(); }
 }  // namespace hsp

@@ -1,40 +1,57 @@
 // Many control periods of a simulation as one call, as long as its controller's steps are free.
 #pragma once
+#include "../law/outcome.hpp"
+#include "../limits/records.hpp"
 #include "../src/move.hpp"
 
 namespace hsp {
+
+// The k-th period begins at start + k span/periods.
+struct Timing {
+  In<1> start, span;  // [s]
+  Ints<1> periods;
+  Ints<1> first, last;  // the period that begins now, and the one that is not made any more
+};
 
 struct Periods {
   static constexpr const char* doc =
       "Move a plant on from one period to another, or to one that is not free; return which.";
   Shared<Plan> moving;   // integrates the plant over the interval
-  Shared<Move> law;      // (t, q, v) ↦ whether the step is free; writes the effort
+  Shared<Move> step;     // writes the effort, and what became of law and limits
   Shared<Plan> sending;  // records that this effort is held from now on
   In<'q'> q;
   In<'n'> v;
-  Out<'n'> held;      // what the plant is under
-  In<'n'> effort;     // what the law writes
-  Out<2> interval;    // both ends of a period
-  double free_below;  // a step that returns a number from 0 to this one is free
-  In<5> which;        // start of period 0, length of all [s], how many, the present one, the last
+  Out<'n'> held;    // what the plant is under
+  In<'n'> effort;   // what the step writes
+  Out<2> interval;  // both ends of a period
+  LawOutcome<Ints> law;
+  LimitsOutcome<Ints> limits;
+  Timing timing;
 
-  double operator()() {
-    const double start = which[0], span = which[1], periods = which[2];
-    const double first = which[3], last = which[4];
-    double t = start + first * span / periods;
-    for (double k = first + 1.0; k <= last; ++k) {
+  std::int64_t operator()() {
+    const std::int64_t last = timing.last[0];
+    double t = beginning(timing.first[0]);
+    for (std::int64_t k = timing.first[0] + 1; k <= last; ++k) {
       interval[0] = t;
-      interval[1] = t = start + k * span / periods;
+      interval[1] = t = beginning(k);
       moving->run(t);
       if (k == last) break;
-      const double code = law->to(t, q, v);
-      if (!(0.0 <= code && code < free_below)) return k;
+      if (!step->to(t, q, v) || !is_free()) return k;
       held = effort;
       if (!std::isfinite(effort.squaredNorm())) return k;
       sending->run(t);
     }
     return last;
   }
+
+ private:
+  double beginning(std::int64_t k) const {
+    const double passed = static_cast<double>(k) * timing.span[0];
+    return timing.start[0] + passed / static_cast<double>(timing.periods[0]);
+  }
+
+  // Whether the effort is that of the law, as it is; its inverse may be bounded.
+  bool is_free() const { return law.finite[0] && !limits.violated[0] && !limits.beyond[0]; }
 };
 
 }  // namespace hsp

@@ -1,5 +1,6 @@
 // The Python module: kinds, calls and plans, once for all kinds.
 #include <nanobind/nanobind.h>
+#include <nanobind/stl/optional.h>
 #include <nanobind/stl/pair.h>
 #include <nanobind/stl/string.h>
 #include <nanobind/stl/vector.h>
@@ -168,7 +169,6 @@ NB_MODULE(_engine, m) {
             engine("call"),
             nb::make_tuple(engine("Move"), named_values(kind_of<Move>(), move.values)));
       });
-  m.attr("REFUSED") = refused;
   m.attr("PINOCCHIO") = pinocchio_version();
 
   m.def(

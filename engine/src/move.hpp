@@ -1,10 +1,10 @@
 // A state's move: valid t, q and v are copied, then the calls of a plan are made.
 #pragma once
+#include <optional>
+
 #include "plan.hpp"
 
 namespace hsp {
-
-constexpr double refused = -1.0;  // what a move returns if it was refused
 
 struct Move {
   static constexpr const char* type_name = "Move";
@@ -18,9 +18,9 @@ struct Move {
 
   double operator()(double t) { return calls->run(t); }
 
-  // Copy t, q and v if all are finite and the norms are right, and make the calls.
-  template <class Q, class V> double to(double t, const Q& q_in, const V& v_in) {
-    if (!is_valid(t, q_in, v_in)) return refused;
+  // Copy t, q and v, and make the calls; nothing, if not all are finite or a norm is wrong.
+  template <class Q, class V> std::optional<double> to(double t, const Q& q_in, const V& v_in) {
+    if (!is_valid(t, q_in, v_in)) return std::nullopt;
     time[0] = t;
     q = q_in;
     v = v_in;

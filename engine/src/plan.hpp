@@ -42,12 +42,13 @@ struct Once {
 };
 
 struct OnlyIf {
-  static constexpr const char* doc =
-      "Return found[0]; and make calls if found[1] is not 0, and add what the last returns.";
+  static constexpr const char* doc = "Make calls if a condition is not 0.";
   Shared<Plan> calls;
-  In<2> found;
+  Ints<1> condition;
 
-  double operator()(double t) { return found[0] + (found[1] != 0.0 ? calls->run(t) : 0.0); }
+  void operator()(double t) {
+    if (condition[0]) calls->run(t);
+  }
 };
 
 struct EqualSteps {

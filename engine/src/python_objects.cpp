@@ -119,16 +119,16 @@ MoveObject::MoveObject(nb::tuple given)
       call(kind_of<Move>(), arguments_of(kind_of<Move>(), given)),
       python(CallObject::runs_python(given)) {}
 
-double MoveObject::operator()(nb::handle t, nb::handle q, nb::handle v) {
+std::optional<double> MoveObject::operator()(nb::handle t, nb::handle q, nb::handle v) {
   Move& move = *static_cast<Move*>(call.self());
   const double time = PyFloat_AsDouble(t.ptr());
   if (time == -1.0 && PyErr_Occurred()) {
     PyErr_Clear();
-    return refused;
+    return std::nullopt;
   }
   const Strided q_in = vector_of(q), v_in = vector_of(v);
   const bool fits = q_in.size() == move.q.size() && v_in.size() == move.v.size();
-  return fits ? move.to(time, q_in, v_in) : refused;
+  return fits ? move.to(time, q_in, v_in) : std::nullopt;
 }
 
 }  // namespace hsp

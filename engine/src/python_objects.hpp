@@ -76,7 +76,8 @@ struct DynamicsObject {
 // doubles.
 struct MoveObject {
   explicit MoveObject(nanobind::tuple given);
-  double operator()(nanobind::handle t, nanobind::handle q, nanobind::handle v);
+  // None where it is refused.
+  std::optional<double> operator()(nanobind::handle t, nanobind::handle q, nanobind::handle v);
 
   nanobind::tuple values;
   Call call;

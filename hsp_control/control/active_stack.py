@@ -18,7 +18,6 @@ from hsp_control.edge import Resolution
 from hsp_control.edge.threshold import Following
 from hsp_control.engine.plans import AnyCall, PartCall
 from hsp_control.law import CONSTANT, FieldSample, Outcome, TaskSample
-from hsp_control.law.outcome import outcome_of
 from hsp_control.null_space.fields import FieldSum, NullSpaceField
 from hsp_control.null_space.metrics import Metric
 from hsp_control.robot import Robot, RobotState
@@ -165,12 +164,13 @@ class ActiveStack:
 
     def resolve(self, t: float) -> Outcome:
         """Resolve contacts, tasks and field at the state, into `resolution`."""
-        return outcome_of(self._plan(t))
+        self._plan(t)
+        return self.resolution.outcome.outcome
 
     @property
     def damped_level(self) -> int:
         """The first level with a bounded inverse in the last `resolve`; 0: none."""
-        return int(self.resolution.code[0])
+        return int(self.resolution.outcome.damped_level[0])
 
     @property
     def damped(self) -> str:
@@ -184,10 +184,7 @@ class ActiveStack:
 
     @cached_property
     def calls(self) -> list[Callable[[float], Any]]:
-        """The calls of `resolve`, each of the time [s]; bound when first asked for.
-
-        The last one returns what `outcome_of` takes.
-        """
+        """The calls of `resolve`, each of the time [s]; bound when first asked for."""
         state, metric, field = self._state, self._metric, self._field
         problem = self.resolution.problem
         calls = [*self._calls]

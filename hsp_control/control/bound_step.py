@@ -9,12 +9,12 @@ from numpy.typing import ArrayLike
 from hsp_control.common.arrays import Array
 from hsp_control.control.active_stack import ActiveStack
 from hsp_control.control.actuation import Actuation, Delivered
-from hsp_control.control.actuation.actuation import LOOK
+from hsp_control.control.actuation.actuation import LimitsOutcome
 from hsp_control.control.actuation.limited_step import BEYOND, RELAXED
 from hsp_control.control.actuation.limits_in_force import LimitsInForce
-from hsp_control.engine import REFUSED, Move
+from hsp_control.engine import Move
 from hsp_control.engine.plans import Step
-from hsp_control.law.outcome import BEYOND_ANY_LEVEL
+from hsp_control.law.outcome import LawOutcome
 from hsp_control.robot import RobotState
 
 
@@ -36,22 +36,22 @@ class BoundStep:
         self._move = self.move.__call__  # bound once: half the time of a look-up
         self._own = actuation.own
         self._state, self._actuation, self._limits = state, actuation, limits
-        self._code = active.resolution.code
+        self._law, self._found = active.resolution.outcome, actuation.outcome
 
     def make(self, t: float, q: ArrayLike, v: ArrayLike) -> Delivered:
         """Move to a state; return what is delivered there."""
-        value = self._move(t, q, v)
-        if value == REFUSED:
-            value = self._state.advance(self.move, t, q, v)
+        plain = self._move(t, q, v)
+        if plain is None:  # refused
+            plain = self._state.advance(self.move, t, q, v)
         self.damped = ""
-        if value == 0.0 and self.direct:
+        if plain and self.direct:
             return self._own
-        active, level = self.active, self._code.item(0)
-        if level == BEYOND_ANY_LEVEL:
+        active, law, found = self.active, self._law, self._found
+        if not law.finite.item():
             active.raise_not_finite()
-        if level:
+        if law.damped_level.item():
             self.damped = active.damped
-        if self.direct and value < LOOK:
+        if self.direct and not (found.violated.item() or found.beyond.item()):
             return self._actuation.own
         delivered = self._actuation.delivered(active.acceleration)
         status = delivered[3]
@@ -65,15 +65,16 @@ class BoundStep:
         if self.active.streamed or not self.direct:
             return None
         sending = self._limits.applying(self.active.acceleration)
-        return FreeStep(self.move, self._state.effort, sending)
+        return FreeStep(self.move, self._law, self._found, self._state.effort, sending)
 
 
 class FreeStep(NamedTuple):
     """What `compute` and `applied` of a controller do where no limit is violated."""
 
-    # (t, q, v) ↦ a number, from 0 to `LOOK` where the step is free; the effort and the
-    # acceleration are written
+    # writes the effort, the acceleration and what became of the law and the limits
     move: Move
+    law: LawOutcome
+    limits: LimitsOutcome
     effort: Array  # M a + N, shape (nv,) [N·m or N]
     # calls of the time that record that this effort is held from now on, for the period
     # of the last `Controller.applied`

@@ -13,7 +13,7 @@ from hsp_control.common.arrays import Array, Indices
 from hsp_control.edge.step import EdgeMemory, Factors, Projectors
 from hsp_control.edge.threshold import NOT, Following, Thresholds
 from hsp_control.engine.plans import PartCall
-from hsp_control.law.outcome import BEYOND_ANY_LEVEL
+from hsp_control.law.outcome import LawOutcome
 from hsp_control.law.problem import Problem
 
 
@@ -30,13 +30,14 @@ class Resolution:
         thresholds: ε of each level, as `call` wrote it last, shape (levels,).
         acceleration: a, as `call` wrote it last, shape (nv,).
         null_space_error: e_N, as `call` wrote it last, shape (nv,).
-        code: What `call` returned last, see `outcome_of`, shape (1,).
+        outcome: What became of the law then.
         edge: What the two laws of the edge left then.
-        damped_code: The code of the damped law, shape (1,).
+        edge_level: The first level whose inverse the damped law bounds, from 1 on,
+            shape (1,); 0: none. That of the outcome, unless the exact law counts alone.
         factors: The stack's pseudo-inverse then.
         alone: Whether the tasks of one level are resolved at once, whatever happens.
-        projectors: The levels' projectors then, if the code is not 0 and the level is
-            not alone.
+        projectors: The levels' projectors then, if the damped law bounds an inverse and
+            the level is not alone.
     """
 
     def __init__(
@@ -60,7 +61,7 @@ class Resolution:
         self.factors = Factors(np.zeros((m, nv)), np.zeros((m, m)))
         self.projectors = Projectors.allocate(m, nv)
         self.edge = EdgeMemory.allocate(m, nv)
-        self.damped_code: Indices = np.zeros(1, dtype=np.int64)
+        self.edge_level: Indices = np.zeros(1, dtype=np.int64)
         self._self_motions, self._brakings = np.zeros((2, 2, nv))
         # Only a fixed base has a law beside the damped one. Who stands keeps the
         # balance by tasks that nothing damps.
@@ -70,10 +71,10 @@ class Resolution:
         self.alone = len(self.ends) == 1 and m <= nv
         self.acceleration = self.problem.record.acceleration
         self.null_space_error = self.problem.record.null_space_error
-        self.code: Indices = np.zeros(1, dtype=np.int64)
+        self.outcome = LawOutcome.allocate()
 
     def call(self, v: Array, *, controls: bool = True) -> PartCall:
-        """Return the call that writes a and e_N; it returns what `outcome_of` takes."""
+        """Return the call that writes a, e_N and the outcome."""
         problem = self.problem
         law = {
             "task": problem.task,
@@ -92,15 +93,14 @@ class Resolution:
             following=self._following,
             exact_beside=self._exact_beside,
             alone=self.alone,
-            beyond=BEYOND_ANY_LEVEL,
             thresholds=self._thresholds,
             factors=self.factors,
             projectors=self.projectors,
             edge=self.edge,
-            damped_code=self.damped_code,
             e_N=self.null_space_error,
             a=self.acceleration,
-            code=self.code,
+            edge_level=self.edge_level,
+            outcome=self.outcome,
         )
 
     def self_motions(self, v: Array) -> tuple[PartCall, tuple[Array, Array]]:
@@ -129,7 +129,7 @@ class Resolution:
             factors=self.factors,
             Q_K=self.projectors.Q,
             edge=self.edge,
-            damped_code=self.damped_code,
+            edge_level=self.edge_level,
             a=self.acceleration,
             self_motions=self._self_motions,
             brakings=self._brakings,

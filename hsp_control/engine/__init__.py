@@ -30,7 +30,6 @@ if _given := os.environ.get("HSP_ENGINE"):
     _load(_given)
 try:
     from ._engine import PINOCCHIO as PINOCCHIO
-    from ._engine import REFUSED as REFUSED
     from ._engine import Call as Call
     from ._engine import Dynamics as Dynamics
     from ._engine import Kind as Kind

@@ -6,7 +6,6 @@ from numpy.typing import ArrayLike
 from hsp_control.common.arrays import Array
 
 PINOCCHIO: str
-REFUSED: float
 
 class Kind:
     @property
@@ -64,7 +63,7 @@ class Move:
     def values(self) -> dict[str, Any]: ...
     @property
     def python(self) -> bool: ...
-    def __call__(self, t: float, q: Any, v: Any) -> float: ...
+    def __call__(self, t: float, q: Any, v: Any) -> float | None: ...
 
 kinds: list[Kind]
 

@@ -13,7 +13,7 @@ from typing import Any, NamedTuple, Self
 import numpy as np
 
 from hsp_control import engine
-from hsp_control.common.arrays import Array, Indices
+from hsp_control.common.arrays import Indices
 from hsp_control.engine import Kind, Plan, PythonCall
 
 TIME = object()
@@ -41,8 +41,9 @@ class PartCall:
         return PartCall(self.function, **self.arguments, **others)
 
     def __repr__(self) -> str:
-        name = getattr(self.function, "name", None) or self.function.__name__
-        return f"PartCall({name}, {', '.join(self.arguments)})"
+        kind = self.function
+        what = kind.name if isinstance(kind, Kind) else repr(kind)
+        return f"PartCall({', '.join([what, *self.arguments])})"
 
 
 class Once(NamedTuple):
@@ -59,13 +60,10 @@ class Once(NamedTuple):
 
 
 class OnlyIf(NamedTuple):
-    """Calls that are made if ``found[1]`` is not zero.
-
-    Their result is ``found[0]``, and what the last of them returns if they are made.
-    """
+    """Calls that are made if a condition is not 0."""
 
     calls: "PartCalls"
-    found: Array  # shape (2,)
+    condition: Indices  # shape (1,)
 
 
 AnyCall = PartCall | Once | OnlyIf
@@ -147,7 +145,7 @@ def _plan(call: AnyCall) -> StepPlan:
     if isinstance(call, Once):
         own = engine.Once(calls=inner.call(), stamp=call.stamp, made=call.made)
     else:
-        own = engine.OnlyIf(calls=inner.call(), found=call.found)
+        own = engine.OnlyIf(calls=inner.call(), condition=call.condition)
     return StepPlan(inner.follow, (own,))
 
 

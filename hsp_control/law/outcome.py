@@ -1,6 +1,11 @@
 """Whether the law's equations hold, and how the engine says it."""
 
 from enum import IntEnum
+from typing import NamedTuple, Self
+
+import numpy as np
+
+from hsp_control.common.arrays import Indices
 
 
 class Outcome(IntEnum):
@@ -17,17 +22,23 @@ class Outcome(IntEnum):
 EXACT, DAMPED, NOT_FINITE = tuple(Outcome)
 """By name, for the step: up to Python 3.11 `Outcome.EXACT` takes 80 ns."""
 
-BEYOND_ANY_LEVEL = 1_000_000
-"""What the law's call returns if the acceleration is not finite."""
 
+class LawOutcome(NamedTuple):
+    """What became of the law in a step: the engine writes it, shape (1,) each."""
 
-def outcome_of(code: float) -> Outcome:
-    """Return the outcome that the call's number means.
+    damped_level: Indices
+    """The first level whose inverse is bounded, from 1 on; 0: none is."""
+    finite: Indices
+    """Whether the acceleration is finite: 0 or 1."""
 
-    Args:
-        code: 0: exact; from 1 on, the first level with a bounded inverse; or
-            `BEYOND_ANY_LEVEL`.
-    """
-    if code == 0.0:
-        return EXACT
-    return DAMPED if code < BEYOND_ANY_LEVEL else NOT_FINITE
+    @classmethod
+    def allocate(cls) -> Self:
+        """Return that of a law that was not resolved yet."""
+        return cls(*np.zeros((2, 1), dtype=np.int64))
+
+    @property
+    def outcome(self) -> Outcome:
+        """Whether the equations hold."""
+        if not self.finite[0]:
+            return NOT_FINITE
+        return DAMPED if self.damped_level[0] else EXACT

@@ -17,7 +17,7 @@ from hsp_control import engine
 from hsp_control.common.arrays import Array, Indices, read_only_view
 from hsp_control.common.exceptions import ImmutableError, NonFiniteError, ShapeError
 from hsp_control.declaration.quantities import Vector
-from hsp_control.engine import REFUSED, Dynamics, Move, Plan
+from hsp_control.engine import Dynamics, Move, Plan
 from hsp_control.engine.plans import (
     AnyCall,
     Once,
@@ -149,7 +149,7 @@ class RobotState:
     def advance(self, move: Move, t: float, q: ArrayLike, v: ArrayLike) -> float:
         """`update`, with the calls of `bind_move`; return what the last one returns."""
         value = move(t, q, v)
-        if value == REFUSED:  # lists, for example, or what is not valid
+        if value is None:  # refused: lists, for example, or what is not valid
             if not isinstance(t, float | int | np.number) or not np.isfinite(t):
                 raise NonFiniteError(
                     f"time t is {t!r}; needs a finite number of seconds"
@@ -157,7 +157,7 @@ class RobotState:
             q_in = self.robot.check_configuration(q)
             v_in = self.robot.check_tangent(v, "velocity v")
             value = move(t, q_in, v_in)
-            if value == REFUSED:
+            if value is None:
                 raise NonFiniteError(
                     f"t = {t!r}, q = {q!r}, v = {v!r}: their sum overflows"
                 )

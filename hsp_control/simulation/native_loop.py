@@ -7,12 +7,12 @@ period makes, by their addresses: the motion is the same, to the last bit.
 """
 
 from functools import partial
+from typing import NamedTuple, Self
 
 import numpy as np
 
 from hsp_control import engine
-from hsp_control.common.arrays import Array
-from hsp_control.control.actuation.actuation import LOOK
+from hsp_control.common.arrays import Array, Indices
 from hsp_control.control.bound_step import FreeStep
 from hsp_control.control.controller import Controller
 from hsp_control.engine import Call, Plan
@@ -23,6 +23,22 @@ from hsp_control.simulation.plants import IntegratedPlant
 
 MOST = 100
 """Most periods of one call: then Ctrl-C is noticed, and other threads go on."""
+
+
+class _Timing(NamedTuple):
+    """The k-th period begins at start + k span/periods."""
+
+    start: Array  # shape (1,) each [s]
+    span: Array
+    periods: Indices
+    first: Indices  # the period that begins now
+    last: Indices  # the one that is not made any more
+
+    @classmethod
+    def allocate(cls) -> Self:
+        """Return zeros."""
+        start, span = np.zeros((2, 1))
+        return cls(start, span, *np.zeros((3, 1), dtype=np.int64))
 
 
 class NativeLoop:
@@ -39,7 +55,7 @@ class NativeLoop:
         self._plant, self._steps = plant, steps
         self._step: FreeStep | None = None
         self._loop: Call | None = None
-        self._which = np.zeros(5)  # the loop's last argument
+        self._timing = _Timing.allocate()
 
     def advance(
         self, start: float, end: float, periods: int, k: int, tau: Array
@@ -70,9 +86,9 @@ class NativeLoop:
         if self._loop is None:
             return 0
         self._plant.hold(self._steps, tau)
-        which = self._which
-        which[0], which[1], which[2] = start, span, periods
-        which[3], which[4] = k, min(periods, k + MOST)
+        timing = self._timing
+        timing.start[0], timing.span[0], timing.periods[0] = start, span, periods
+        timing.first[0], timing.last[0] = k, min(periods, k + MOST)
         return int(self._loop()) - k
 
     def _bind(self, step: FreeStep) -> Call | None:
@@ -83,13 +99,14 @@ class NativeLoop:
         seeing = self._excess.recording(self._controller.limits, steps.q, steps.v)
         return engine.Periods(
             moving=Plan([steps.take, *planned(seeing).write]),
-            law=step.move,
+            step=step.move,
             sending=sending,
             q=steps.q,
             v=steps.v,
             held=self._plant.effort,
             effort=step.effort,
             interval=steps.interval,
-            free_below=LOOK,
-            which=self._which,
+            law=step.law,
+            limits=step.limits,
+            timing=self._timing,
         )

@@ -9,7 +9,6 @@ from hsp_control.common.arrays import Array
 from hsp_control.edge import Resolution
 from hsp_control.engine.plans import planned
 from hsp_control.law import IDENTITY, VARYING, Outcome, Problem
-from hsp_control.law.outcome import outcome_of
 
 
 def orthogonal(seed: int, n: int, m: int) -> Array:
@@ -87,6 +86,6 @@ def resolve(
     m, n = x.J.shape
     resolution = Resolution(levels or [m], n, form, x.K_N, threshold)
     fill(resolution.problem, x)
-    code = planned([resolution.call(x.v, controls=controls)]).run(0.0)
+    planned([resolution.call(x.v, controls=controls)]).run(0.0)
     a, e_N = resolution.acceleration, resolution.null_space_error
-    return a.copy(), e_N.copy(), outcome_of(code) is Outcome.DAMPED
+    return a.copy(), e_N.copy(), resolution.outcome.outcome is Outcome.DAMPED

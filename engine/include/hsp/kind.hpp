@@ -7,9 +7,12 @@
 //     double stiffness;                // a number: it does not change
 //     Out<'n'> gradient;
 //     Scratch<'n'> away;               // no argument
-//     void operator()() { ... }        // or operator()(double t), which may return a number
+//     void operator()() { ... }        // or operator()(double t)
 //     void check() const { ... }       // optional: throws where arguments do not fit each other
 //   };
+//
+// What operator() returns is a number with one meaning, which `doc` says: a value (f of a cost), or
+// a bool. What there is more to say of a call it writes, into a record with names (`LawOutcome`).
 //
 // The members are read into a table in C's layout, and whatever is the same for all kinds is
 // written once, over that table: the checks of shapes and entries, what Python sees, what a

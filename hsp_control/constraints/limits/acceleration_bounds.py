@@ -4,9 +4,6 @@ from typing import NamedTuple
 
 from hsp_control.common.arrays import Array
 
-MOTION, EFFORT = 1, 2
-"""Flags of what is violated: bounds on the acceleration, bounds on the effort."""
-
 BEYOND_POSITION = 1e-3
 """A joint that is so far behind the end of its range is beyond it [rad or m]."""
 BEYOND_SPEED = 0.02

@@ -228,7 +228,8 @@ class MinimumDistance(Barrier):
         now, count = here.distances, len(here.distances)
         ahead, behind, turned, least = np.zeros((4, count))
         near: Indices = np.zeros(count, dtype=np.int64)
-        turn, turn_if = np.zeros(robot.nv), np.zeros(2)
+        turn: Array = np.zeros(robot.nv)
+        matters: Indices = np.zeros(1, dtype=np.int64)
         measured = _Elsewhere(state, self.clearance).calls
         close = PartCall(
             engine.NearPairs,
@@ -244,7 +245,7 @@ class MinimumDistance(Barrier):
             least=least,
             near=near,
             displacement=turn,
-            turn_if=turn_if,
+            turning_matters=matters,
         )
         approached = PartCall(
             engine.ApproachedPairs,
@@ -261,7 +262,7 @@ class MinimumDistance(Barrier):
             *measured(_SPAN, state.v, _SPAN, ahead),
             *measured(-_SPAN, state.v, -_SPAN, behind),
             close,
-            OnlyIf(look, turn_if),
+            OnlyIf(look, matters),
             here.row_call(state, near, least, rows),
         ]
 

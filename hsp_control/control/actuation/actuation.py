@@ -14,21 +14,20 @@ Contacts and floating bases, and Limits.
 """
 
 from collections.abc import Callable
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, Self
 
 import numpy as np
 
 from hsp_control import engine
 from hsp_control.common.arrays import Array, Indices
-from hsp_control.constraints.limits.acceleration_bounds import EFFORT, MOTION
 from hsp_control.constraints.limits.barriers import BarrierRows
 from hsp_control.control.actuation.limited_step import (
     BEYOND,
     EXACT,
     LIMITED,
-    UNSOLVED,
     Barriers,
     LimitedStep,
+    QPOutcome,
     Status,
     Wanted,
 )
@@ -37,15 +36,27 @@ from hsp_control.control.actuation.support import Support
 from hsp_control.edge import Resolution
 from hsp_control.edge.limited_target import Permitted
 from hsp_control.engine.plans import AnyCall, PartCall, PartCalls
-from hsp_control.law.outcome import BEYOND_ANY_LEVEL
 from hsp_control.robot import RobotState
 
-_BEYOND = 4
-"""Flag besides `MOTION` and `EFFORT`: the robot is beyond a limit; see `Status`."""
-LOOK = 2.0
-"""What the last of `Actuation.calls` returns, or more, where a limit is violated or the
-law is not finite: `Actuation.found` and the law's code say which. Where neither is the
-case it returns 0, or 1 if an inverse is bounded, and M a + N is within the bounds."""
+
+class LimitsOutcome(NamedTuple):
+    """What a check of the limits found: the engine writes 0 or 1, shape (1,) each."""
+
+    motion: Indices
+    """Whether a bound on the accelerations is violated."""
+    effort: Indices
+    """Whether a bound on the efforts is violated."""
+    rows: Indices
+    """Whether a row of a barrier or of static efforts is violated."""
+    violated: Indices
+    """Whether one of them is."""
+    beyond: Indices
+    """Whether a joint is beyond its range, or faster than its limit; see `Status`."""
+
+    @classmethod
+    def allocate(cls) -> Self:
+        """Return that of a check that found nothing."""
+        return cls(*np.zeros((5, 1), dtype=np.int64))
 
 
 class Delivered(NamedTuple):
@@ -78,14 +89,13 @@ class Actuation:
         # what is delivered there of the law's own acceleration
         self.own = Delivered(state.effort, law.acceleration, np.zeros(0), EXACT, 0.0)
         self._wanted = wanted = Wanted(state.mass_matrix, np.zeros(nv), np.zeros(nv))
-        # which limits are violated, a sum of `MOTION`, `EFFORT` and `_BEYOND`; and the
-        # `Status` of the QP if it was solved at once
-        self.found: Indices = np.zeros(2, dtype=np.int64)
-        self._solve_if = np.zeros(2)
-        self._violated: Indices = np.zeros(1, dtype=np.int64)  # how many rows are
-        checks = state.rnea(wanted.acceleration), self._check()
-        self._checks: PartCalls = [*checks, *self._row_checks()]
-        self._check_wanted = engine.Plan(state.plan(self._checks).steps())
+        self.outcome = LimitsOutcome.allocate()
+        self._qp_outcome = QPOutcome.allocate()
+        checks: list[AnyCall] = [state.rnea(wanted.acceleration)]
+        if limits.limits is not None:
+            checks += [self._check(), *self._row_checks()]
+        self._checks: PartCalls = checks
+        self._check_wanted = engine.Plan(state.plan(checks).steps())
         self._tau = support.tau if support.size else wanted.effort
         self._effort_within = self._within_bounds(wanted.effort)
         self._tau_within = self._within_bounds(self._tau)
@@ -99,13 +109,6 @@ class Actuation:
     def _check(self) -> PartCall:
         """Return the call that compares a and M a + N with their bounds."""
         state, limits = self._state, self._limits
-        found = {
-            "code": self._law.code,
-            "not_finite": BEYOND_ANY_LEVEL,
-            "found": self.found,
-        }
-        if limits.limits is None:
-            return PartCall(engine.CheckLaw, **found)
         return PartCall(
             engine.CheckLimits,
             time=state.time,
@@ -118,8 +121,8 @@ class Actuation:
             ends=limits.ends,
             held=limits.sent.held,
             bounds=limits.bounds,
-            **found,
-            solve_if=self._solve_if,
+            outcome=self.outcome,
+            unsolved=self._qp_outcome.unsolved,
         )
 
     def _within_bounds(self, effort: Array) -> Callable[[], float]:
@@ -149,7 +152,6 @@ class Actuation:
         calls: list[AnyCall] = []
         if limits is None or not self._rows:
             return calls
-        calls.append(PartCall(engine.Clear, number=self._violated))
         for kind, rows in self._rows.items():
             calls.append(PartCall(engine.Clear, number=rows.number))
             if kind == "barriers":
@@ -159,29 +161,27 @@ class Actuation:
                 excluded = self._support.supporting_dofs
                 given = state, limits.bandwidth, excluded, rows
                 calls += limits.static_effort.row_calls(*given)
-            check = PartCall(
-                engine.CheckRows,
-                of_bounds=self._solve_if,
-                rows=rows,
-                a=a,
-                violated=self._violated,
+            calls.append(
+                PartCall(engine.CheckRows, rows=rows, a=a, outcome=self.outcome)
             )
-            calls.append(check)
         return calls
 
     def calls(self) -> list[Callable[[float], Any]]:
         """Return the calls of the time that deliver the law's own acceleration.
 
-        The last one returns a number, see `LOOK`: below it, where `direct`, the effort
-        is M a + N. Else `delivered` has it. If a QP without forces and barriers is all
-        that is needed where a bound is violated, it is solved at once.
+        The last one returns whether it is exact and within the limits: then, where
+        `direct`, it is delivered with the effort M a + N. Else the law's outcome and
+        `outcome` say what is not so. If a QP without forces and barriers is all that is
+        needed where a bound is violated, it is solved at once.
         """
         law, wanted = self._law.acceleration, self._wanted
         begin = PartCall(engine.Copy, x=law, out=wanted.acceleration)
         calls: PartCalls = [begin, *self._checks]
         if self._qp is not None and self.direct and not self._rows:
             keep = PartCall(engine.Copy, x=self._state.effort, out=wanted.effort)
-            calls = [*calls, self._qp.nearest_if(keep, self._solve_if)]
+            calls = [*calls, self._qp.nearest_if(self.outcome.violated, keep)]
+        plain = PartCall(engine.IsPlain, law=self._law.outcome, limits=self.outcome)
+        calls = [*calls, plain]
         return self._state.plan(calls).steps()
 
     def deliver(self, a: Array, offset: Array | None = None) -> Delivered:
@@ -198,20 +198,19 @@ class Actuation:
     def delivered(self, a: Array, offset: Array | None = None) -> Delivered:
         """Return what is delivered, after `calls`; for the arguments see `deliver`."""
         delivered = self._within_limits(a, offset)
-        if self.found.item(0) & _BEYOND:
+        if self.outcome.beyond.item():
             return delivered._replace(status=BEYOND)
         return delivered
 
     def _within_limits(self, a: Array, offset: Array | None) -> Delivered:
         """Return what is delivered, whether or not a joint is beyond a limit."""
-        if self.found.item(1) != UNSOLVED:
+        found = self.outcome
+        if self.direct and not self._qp_outcome.unsolved.item():
             return self._solved
-        violated = self.found.item(0) & ~_BEYOND
-        rows_ok = not self._violated.item()
-        if self.direct and not violated and rows_ok and offset is None:
+        if self.direct and not found.violated.item() and offset is None:
             return Delivered(self._state.effort, a, self.own.forces, EXACT, 0.0)
-        motion_ok = not violated & MOTION and rows_ok
-        effort_ok = not violated & EFFORT
+        motion_ok = not (found.motion.item() or found.rows.item())
+        effort_ok = not found.effort.item()
         # A QP that was tried at once has overwritten what is wanted.
         wanted, support = self._wanted.effort, self._support
         self._wanted.acceleration[:], wanted[:] = a, self._state.effort
@@ -287,5 +286,6 @@ class Actuation:
                 motion.bandwidth[0],
             )
         law = self._state, self._law, self._support, self._limits.bounds, self._wanted
-        status = self.found[1:]
-        return LimitedStep(*law, motors[some[motors]], status, capacity, permitted)
+        return LimitedStep(
+            *law, motors[some[motors]], self._qp_outcome, capacity, permitted
+        )

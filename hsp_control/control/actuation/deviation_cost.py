@@ -38,7 +38,7 @@ class Levels(NamedTuple):
     thresholds: Array
     factors: Factors  # law's pseudo-inverse of the stack
     projectors: Projectors  # what its levels left, where it went level by level
-    code: Indices  # outcome of the damped law, see `Resolution.damped_code`
+    edge_level: Indices  # see `Resolution`, shape (1,)
     alone: bool  # see `Resolution`
 
     @classmethod
@@ -59,7 +59,7 @@ class Levels(NamedTuple):
             resolution.thresholds,
             resolution.factors,
             resolution.projectors,
-            resolution.damped_code,
+            resolution.edge_level,
             resolution.alone,
         )
 

@@ -16,7 +16,7 @@ those of f.
 
 from collections.abc import Mapping
 from enum import IntEnum
-from typing import NamedTuple
+from typing import NamedTuple, Self
 
 import numpy as np
 
@@ -67,8 +67,21 @@ BEYOND = Status.BEYOND
 _FORCE_COST = 1e-6
 """Cost of squared forces, in robot weights, relative to accelerations. It makes the
 forces unique, and is small beside the cost of any deviation."""
-UNSOLVED = 0
-"""No `Status` of a QP: the constraints contradict each other, or the solver gave up."""
+
+
+class QPOutcome(NamedTuple):
+    """What became of a QP: the engine writes it, shape (1,) each."""
+
+    unsolved: Indices
+    """1 where there is no result: none was asked for, the constraints contradict each
+    other, or the solver gave up; else 0."""
+    status: Indices
+    """The `Status` of the result."""
+
+    @classmethod
+    def allocate(cls) -> Self:
+        """Return that of a QP that was not solved yet."""
+        return cls(np.ones(1, dtype=np.int64), np.zeros(1, dtype=np.int64))
 
 
 class Wanted(NamedTuple):
@@ -134,7 +147,7 @@ class LimitedStep:
         bounds: Bounds,
         wanted: Wanted,
         limited: Indices,
-        status: Indices,
+        outcome: QPOutcome,
         capacity: int,
         permitted: Permitted | None,
     ) -> None:
@@ -187,7 +200,7 @@ class LimitedStep:
         levels = Levels.of(resolution, p > 0, state.robot.size or 1.0)
         directions = Directions.of(n)
         x, moving, none = self._x, np.zeros(1, np.int64), np.zeros(1, np.int64)
-        unsolved = np.zeros(2)
+        self._outcome = outcome
         around = {
             "wanted": wanted,
             "forces": forces,
@@ -208,15 +221,14 @@ class LimitedStep:
                     moving=count,
                     x=x,
                     work=work,
-                    status=status,
+                    outcome=outcome,
                 ),
                 PartCall(
                     engine.LimitedResult,
                     **around,
                     x=x,
                     result=self.result,
-                    status=status,
-                    unsolved=unsolved,
+                    unsolved=outcome.unsolved,
                 ),
             ]
 
@@ -254,19 +266,19 @@ class LimitedStep:
             at_once = optimum(
                 redistributed, none, memories[1], Status.REDISTRIBUTED, warm=True
             )
-            calls = [*rows, begun, *at_once, OnlyIf(closest, unsolved)]
+            calls = [*rows, begun, *at_once, OnlyIf(closest, outcome.unsolved)]
             self._find_forces = state.plan(calls).call()
         # It again, with the rows as they are, those of the contacts too
         self._again = state.plan(nearest(standing=False, warm=False)).call()
         least = optimum(soft, none, soft_memory, RELAXED, warm=False)
         self._least_violation = state.plan(least).call()
 
-    def nearest_if(self, before: PartCall, found: Array) -> OnlyIf:
-        """Return a call that writes the nearest, as `solve`, if ``found[1]`` is not 0.
+    def nearest_if(self, condition: Indices, before: PartCall) -> OnlyIf:
+        """Return a call that writes the nearest, as `solve`, if a condition is not 0.
 
-        A call is made before. It returns ``found[0]``, or more if the QP was solved.
+        A call is made before.
         """
-        return OnlyIf([before, *self._nearest], found)
+        return OnlyIf([before, *self._nearest], condition)
 
     def solve(
         self, redistribute: bool, barriers: Barriers
@@ -275,10 +287,10 @@ class LimitedStep:
         where = {}
         if barriers or self._used:
             where = self._write_barriers(barriers, self._wanted.acceleration)
-        code = self._find_forces() if redistribute else self._find_nearest()
-        if code != UNSOLVED:
-            return _STATUS[int(code)], 0.0
-        return self._relax(where)
+        (self._find_forces if redistribute else self._find_nearest)()
+        if self._outcome.unsolved.item():
+            return self._relax(where)
+        return _STATUS[self._outcome.status.item()], 0.0
 
     def _write_barriers(
         self, barriers: Barriers, acceleration: Array
@@ -333,7 +345,8 @@ class LimitedStep:
         self._x[:] = 0.0
         found = np.full_like(self._x, np.nan)
         for _ in range(_ROUNDS):
-            if self._least_violation() == UNSOLVED:
+            self._least_violation()
+            if self._outcome.unsolved.item():
                 break
             found[:] = self._x
         if not np.isfinite(found).all():

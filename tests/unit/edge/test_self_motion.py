@@ -36,7 +36,7 @@ def test_it_is_what_the_law_does_with_a_field_and_not_without(
     )
     made.compute(0.0, q, v)
     law = made.active_stack.resolution
-    assert law.damped_code[0] > 0  # damped, and beyond limits
+    assert law.edge_level[0] > 0  # damped, and beyond limits
     _, (self_motions, _) = law.self_motions(v)
     whole, self_motion = law.edge.damped.copy(), self_motions[1].copy()
     planned([law.call(v, controls=False)]).run(0.0)

@@ -214,16 +214,16 @@ def test_calls_are_made_once_at_a_stamp_and_only_if_found() -> None:
     told: list[int] = []
     calls = Plan([PythonCall(lambda: told.append(1) or 4.0)])  # type: ignore[func-returns-value]
     stamp, made = np.zeros((2, 1), dtype=int)
-    stamp[0], found = 3, np.array([16.0, 0.0])
+    stamp[0], condition = 3, np.zeros(1, dtype=int)
     once = engine.Once(calls=calls, stamp=stamp, made=made)
-    only_if = engine.OnlyIf(calls=calls, found=found)
+    only_if = engine.OnlyIf(calls=calls, condition=condition)
     once()
     once()
     assert (len(told), made[0]) == (1, 3)
-    assert only_if() == 16.0
+    only_if()
     assert len(told) == 1
-    found[1] = 1.0
-    assert only_if() == 20.0
+    condition[0] = 1
+    only_if()
     assert len(told) == 2
 
 
@@ -286,7 +286,7 @@ def moving(told: list[float], blocks: Any = ()) -> tuple[Move, list[Array]]:
     """Return a move of 3 coordinates and 2 velocities, and its memory."""
     memory = [np.zeros(1), np.zeros(3), np.zeros(2)]
     unit = np.array(blocks, dtype=int).reshape(-1, 2)
-    plan = Plan([PythonCall(told.append, timed=True), PythonCall(lambda: 5.0)])
+    plan = Plan([PythonCall(told.append, timed=True), PythonCall(lambda: -1.0)])
     time, q, v = memory
     stamp = np.zeros(1, dtype=int)
     move = Move(calls=plan, time=time, q=q, v=v, unit_blocks=unit, stamp=stamp)
@@ -296,7 +296,7 @@ def moving(told: list[float], blocks: Any = ()) -> tuple[Move, list[Array]]:
 def test_a_move_copies_what_is_valid_and_makes_its_calls() -> None:
     told: list[float] = []
     move, (t, q, v) = moving(told)
-    assert move(0.5, np.arange(6.0)[::2], np.ones(2)) == 5.0
+    assert move(0.5, np.arange(6.0)[::2], np.ones(2)) == -1.0
     np.testing.assert_array_equal(np.concatenate([t, q, v]), [0.5, 0, 2, 4, 1, 1])
     assert told == [0.5]
 
@@ -317,15 +317,15 @@ def test_a_move_copies_what_is_valid_and_makes_its_calls() -> None:
 def test_a_move_refuses_what_is_not(t: float, q: Any, v: Any) -> None:
     told: list[float] = []
     move, memory = moving(told)
-    assert move(t, q, v) == engine.REFUSED
+    assert move(t, q, v) is None
     assert told == []
     assert not np.concatenate(memory).any()
 
 
 def test_a_move_refuses_directions_that_are_not_of_norm_1() -> None:
     move, _ = moving([], blocks=[[0, 2]])
-    assert move(0.0, np.array([0.6, 0.8, 9.0]), np.zeros(2)) == 5.0
-    assert move(0.0, np.array([0.6, 0.9, 9.0]), np.zeros(2)) == engine.REFUSED
+    assert move(0.0, np.array([0.6, 0.8, 9.0]), np.zeros(2)) == -1.0
+    assert move(0.0, np.array([0.6, 0.9, 9.0]), np.zeros(2)) is None
 
 
 def test_equal_steps_divide_an_interval() -> None:

@@ -20,12 +20,12 @@ from hsp_control import (
 from hsp_control.common.exceptions import SimulationError
 from hsp_control.config import Experiment
 from hsp_control.constraints.limits import RobotLimits
-from hsp_control.control.actuation import Status
-from hsp_control.control.actuation.actuation import LOOK
+from hsp_control.control.actuation.actuation import LimitsOutcome
 from hsp_control.control.bound_step import BoundStep, FreeStep
 from hsp_control.control.changes import Changes
 from hsp_control.control.controller import Controller
-from hsp_control.engine import REFUSED, Move, Plan, PythonCall
+from hsp_control.engine import Move, Plan, PythonCall
+from hsp_control.law.outcome import LawOutcome
 from hsp_control.robot.integrators import SemiImplicitEuler
 from hsp_control.simulation import loops
 from hsp_control.simulation.limit_excess import LimitExcess
@@ -118,40 +118,53 @@ def test_the_same_to_the_last_bit(case: tuple[str, ...], counted: Counted) -> No
 
 
 @pytest.mark.parametrize(
-    ("value", "free"),
+    ("outcome", "q", "free"),
     [
-        *[(0.0, True), (1.0, True), (REFUSED, False), (LOOK, False)],
-        *[(LOOK + Status.LIMITED, False), (np.nan, False), (np.inf, False)],
+        ({}, 0.0, True),
+        ({"damped_level": 1}, 0.0, True),
+        ({"finite": 0}, 0.0, False),
+        ({"violated": 1}, 0.0, False),
+        ({"beyond": 1}, 0.0, False),
+        ({}, np.nan, False),
     ],
 )
 def test_a_step_is_free_whose_law_is_finite_within_limits(
-    value: float, free: bool
+    outcome: dict[str, int], q: float, free: bool
 ) -> None:
-    """Also with a bounded inverse, 1; `LOOK`: a limit is violated."""
-    stamp, unit_blocks = np.zeros(1, dtype=np.int64), np.zeros((0, 2), dtype=np.int64)
-    law = Plan([PythonCall(lambda: value)])
+    """Also with a bounded inverse; not a state that is refused."""
+    law, limits = LawOutcome.allocate(), LimitsOutcome.allocate()
+    told = law._asdict() | limits._asdict()
+    for name, value in ({"finite": 1} | outcome).items():
+        told[name][0] = value
     move = Move(
-        calls=law,
+        calls=Plan(),
         time=np.zeros(1),
         q=np.zeros(2),
         v=np.zeros(2),
-        unit_blocks=unit_blocks,
-        stamp=stamp,
+        unit_blocks=np.zeros((0, 2), dtype=np.int64),
+        stamp=np.zeros(1, dtype=np.int64),
     )
-    which = np.array([0.0, 1.0, 10.0, 3.0, 7.0])
-    periods = engine.Periods(
+    periods, first, last = np.array([[10], [3], [7]])
+    loop = engine.Periods(
         moving=Plan(),
-        law=move,
+        step=move,
         sending=Plan(),
-        q=np.zeros(2),
+        q=np.full(2, q),
         v=np.zeros(2),
         held=np.zeros(2),
         effort=np.ones(2),
         interval=np.zeros(2),
-        free_below=LOOK,
-        which=which,
+        law=law,
+        limits=limits,
+        timing={
+            "start": np.zeros(1),
+            "span": np.ones(1),
+            "periods": periods,
+            "first": first,
+            "last": last,
+        },
     )
-    assert periods() == (7.0 if free else 4.0)
+    assert loop() == (7.0 if free else 4.0)
 
 
 @pytest.mark.parametrize("part", ["move", "sending"])
