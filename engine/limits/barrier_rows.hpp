@@ -1,5 +1,7 @@
 // Rows A a ≥ least that barriers add in each step, and whether the wanted acceleration keeps them.
 #pragma once
+#include <limits>
+
 #include "records.hpp"
 
 namespace hsp {
@@ -27,6 +29,27 @@ struct CheckRows {
   void operator()() {
     for (Index r = 0; r < rows.number[0]; ++r)
       if (!(rows.A.row(r).dot(a) >= rows.least[r])) outcome.rows[0] = outcome.violated[0] = 1;
+  }
+};
+
+struct PlaceRows {
+  static constexpr const char* doc =
+      "Write the rows into a QP in the difference from a; those that are not used bind nothing.";
+  BarrierRows<In, Ints> rows;
+  In<'n'> a;
+  Out<'r', 'w'> A;
+  OutInts<'r'> end;  // of the entries of each row that are not 0
+  Out<'r'> lower;
+
+  void operator()() {
+    const Index used = rows.number[0], n = a.size();
+    for (Index r = 0; r < used; ++r) {
+      A.row(r).head(n) = rows.A.row(r);
+      lower[r] = rows.least[r] - rows.A.row(r).dot(a);
+    }
+    end.head(used).setConstant(n);
+    end.tail(end.size() - used).setZero();
+    lower.tail(lower.size() - used).setConstant(-std::numeric_limits<double>::infinity());
   }
 };
 

@@ -14,7 +14,7 @@ namespace hsp {
 const Kind* const* limit_kinds() {
   return kinds<NearestEffort, Copy, AccelerationBounds, Within, EffortWindow, ExpectedVelocity,
                Observe, IsPlain, CheckLimits, ForceMap, MinimumNormForces, WithinCones, Displace,
-               DistancesAt, NearPairs, ApproachedPairs, DistanceRows, HoldingRows, Clear,
-               CheckRows>();
+               DistancesAt, NearPairs, ApproachedPairs, DistanceRows, HoldingRows, Clear, CheckRows,
+               PlaceRows>();
 }
 }  // namespace hsp

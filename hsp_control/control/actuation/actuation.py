@@ -171,15 +171,17 @@ class Actuation:
 
         The last one returns whether it is exact and within the limits: then, where
         `direct`, it is delivered with the effort M a + N. Else the law's outcome and
-        `outcome` say what is not so. If a QP without forces and barriers is all that is
-        needed where a bound is violated, it is solved at once.
+        `outcome` say what is not so. If a QP without forces and distances is all that
+        is needed where a bound is violated, it is solved at once.
         """
         law, wanted = self._law.acceleration, self._wanted
         begin = PartCall(engine.Copy, x=law, out=wanted.acceleration)
         calls: PartCalls = [begin, *self._checks]
-        if self._qp is not None and self.direct and not self._rows:
+        # Of distances there may be hundreds, and each row costs time, used or not.
+        if self._qp is not None and self.direct and "barriers" not in self._rows:
             keep = PartCall(engine.Copy, x=self._state.effort, out=wanted.effort)
-            calls = [*calls, self._qp.nearest_if(self.outcome.violated, keep)]
+            given = self.outcome.violated, keep, self._rows.get("holding")
+            calls = [*calls, self._qp.nearest_if(*given)]
         plain = PartCall(engine.IsPlain, law=self._law.outcome, limits=self.outcome)
         calls = [*calls, plain]
         return self._state.plan(calls).steps()

@@ -23,6 +23,7 @@ import numpy as np
 from hsp_control import engine
 from hsp_control.common.arrays import Array, Indices
 from hsp_control.constraints.limits.acceleration_bounds import Bounds
+from hsp_control.constraints.limits.barriers import BarrierRows
 from hsp_control.control.actuation.deviation_cost import (
     Directions,
     Levels,
@@ -273,12 +274,30 @@ class LimitedStep:
         least = optimum(soft, none, soft_memory, RELAXED, warm=False)
         self._least_violation = state.plan(least).call()
 
-    def nearest_if(self, condition: Indices, before: PartCall) -> OnlyIf:
+    def nearest_if(
+        self, condition: Indices, before: PartCall, rows: BarrierRows | None
+    ) -> OnlyIf:
         """Return a call that writes the nearest, as `solve`, if a condition is not 0.
 
-        A call is made before.
+        Args:
+            condition: Shape (1,).
+            before: A call that is made first.
+            rows: The only rows of barriers, if there are any.
         """
-        return OnlyIf([before, *self._nearest], condition)
+        begin = [before] if rows is None else [before, self._placed(rows)]
+        return OnlyIf([*begin, *self._nearest], condition)
+
+    def _placed(self, rows: BarrierRows) -> PartCall:
+        """Return the call that writes rows of barriers into the QP."""
+        own = slice(self._barriers, self._barriers + len(rows.least))
+        return PartCall(
+            engine.PlaceRows,
+            rows=rows,
+            a=self._wanted.acceleration,
+            A=self._rows.A[own],
+            end=self._rows.end[own],
+            lower=self._rows.lower[own],
+        )
 
     def solve(
         self, redistribute: bool, barriers: Barriers
