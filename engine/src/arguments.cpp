@@ -63,11 +63,13 @@ void* shared_object(std::string_view type, nb::handle given) {
   return nullptr;
 }
 
+bool is_integer(double x) { return x == std::floor(x) && std::abs(x) <= 2147483647.0; }
+
 Argument argument(const Kind& kind, const Field& field, nb::handle given) {
   Argument found;
   if (field.access == Access::Number) {
     const bool whole = field.entry != 'd';
-    if (!nb::try_cast(given, found.number) || (whole && found.number != std::floor(found.number)))
+    if (!nb::try_cast(given, found.number) || (whole && !is_integer(found.number)))
       throw nb::type_error((std::string(kind.name) + ": " + field.name + " is a " +
                             (whole ? "whole " : "") + "number; got " + text_of(nb::repr(given)))
                                .c_str());

@@ -157,6 +157,10 @@ WRONG: dict[str, tuple[Callable[[], Any], str]] = {
         lambda: threshold_below(level=0.5),
         "^ThresholdBelow: level is a whole number; got 0.5$",
     ),
+    "no number that an integer holds": (
+        lambda: threshold_below(level=np.inf),
+        "^ThresholdBelow: level is a whole number; got inf$",
+    ),
     "no plan": (
         lambda: engine.Once(
             calls=line(), stamp=np.zeros(1, dtype=int), made=np.zeros(1, dtype=int)

@@ -1,0 +1,31 @@
+"""What the law's outcome says where an exact law stands beside the damped one."""
+
+import numpy as np
+import pytest
+from task_cases import load
+
+import hsp_control as hsp
+from hsp_control.law.outcome import DAMPED, EXACT, NOT_FINITE, LawOutcome
+
+
+@pytest.mark.parametrize(("away", "damped"), [(0.0, ""), (0.2, ""), (2.0, "panda_tcp")])
+def test_in_the_middle_the_exact_law_counts_alone(away: float, damped: str) -> None:
+    """The threshold follows the error, and the damped law with it."""
+    robot = load("panda")
+    q = robot.home() + np.array([0.08, -0.3, 0.4, -0.1, -0.3, 0.2, 0.5])
+    here = robot.state(0.0, q, np.zeros(7)).position("panda_tcp")
+    goal = away * np.array([0.6, 0.0, 1.0])
+    task = hsp.FramePosition("panda_tcp", hsp.Hold(here + goal))
+    made = hsp.Controller(robot, [task], start=q, limits=None)
+    output = made.compute(0.0, q, np.zeros(7))
+    law = made.active_stack.resolution
+    assert law.edge_level[0] == (away > 0.0)
+    assert output.damped == damped
+    assert law.outcome.outcome is (DAMPED if damped else EXACT)
+
+
+def test_a_law_that_was_not_resolved_is_not_finite() -> None:
+    outcome = LawOutcome.allocate()
+    assert outcome.outcome is NOT_FINITE
+    outcome.finite[0] = 1
+    assert outcome.outcome is EXACT
