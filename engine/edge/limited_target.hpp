@@ -50,34 +50,39 @@ struct LimitedTarget {
     In<'k', 'w'> A;    // the first n columns count
     InOut<'k'> lower;  // for a deviation δ from a: A δ ≥ lower
   } barred;
-  Scratch<'n'> change, asked, reached, effort_reached;
+  Scratch<'n'> change, asked;
+  Scratch<'n'> effort_change, effort_asked;  // M times them
 
   void operator()() {
     change = -parts.law_self_motion;
+    effort_change.noalias() = M * change;
     const double of_tasks = excess();
     change.setZero();
+    effort_change.setZero();
     const double beyond = std::min(of_tasks, excess());
     const double damped = 1.0 - 1.0 / (1.0 + beyond);  // also of inf
 
     change = damped * (parts.damped - parts.law);
+    effort_change.noalias() = M * change;
     asked = (1.0 - damped) * (parts.law_self_motion + parts.law_braking);
     asked += damped * (parts.damped_self_motion + parts.damped_braking);
-    change -= (1.0 - 1.0 / std::min(1.0 + excess(), times_permitted())) * asked;
+    effort_asked.noalias() = M * asked;
+    const double lost = 1.0 - 1.0 / std::min(1.0 + excess(), times_permitted());
+    change -= lost * asked;
+    effort_change -= lost * effort_asked;
 
     a += change;
-    reached.noalias() = M * change;
-    effort += reached;
+    effort += effort_change;
     barred.lower.noalias() -= barred.A.leftCols(a.size()) * change;
   }
 
   // By how much a + change is beyond limits, relative to what they permit.
-  double excess() {
-    reached = a + change;
-    effort_reached = effort;
-    effort_reached.noalias() += M * change;
-    const auto beyond = (reached - bounds.upper).cwiseMax(bounds.lower - reached).array();
-    double most = (effort_reached.array().abs() / permitted.effort.array()).maxCoeff() - 1.0;
-    most = std::max({0.0, most, (beyond / permitted.acceleration.array()).maxCoeff()});
+  double excess() const {
+    const auto efforts = (effort + effort_change).array().abs() / permitted.effort.array();
+    const auto above = (a + change - bounds.upper).array();
+    const auto below = (bounds.lower - a - change).array();
+    const auto motions = above.max(below) / permitted.acceleration.array();
+    double most = std::max({0.0, efforts.maxCoeff() - 1.0, motions.maxCoeff()});
     const double least = permitted.acceleration.minCoeff();
     for (Index r = 0; r < barred.lower.size(); ++r) {
       const auto row = barred.A.row(r).head(change.size());
@@ -88,9 +93,8 @@ struct LimitedTarget {
   }
 
   // How many times what the limits permit far from them is asked for; 1 if it is less.
-  double times_permitted() {
-    reached.noalias() = M * asked;
-    const double efforts = (reached.array().abs() / permitted.effort.array()).maxCoeff();
+  double times_permitted() const {
+    const double efforts = (effort_asked.array().abs() / permitted.effort.array()).maxCoeff();
     const double motions = (asked.array().abs() / permitted.acceleration.array()).maxCoeff();
     return std::max({1.0, efforts, motions});
   }
