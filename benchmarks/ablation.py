@@ -69,7 +69,6 @@ _HALF_T, _TWICE_T, _NO_T = constant(
     _EDGE, "TURNING, QUICKEST = 50.0", 25.0, 100.0, 1e12
 )
 _HALF_N, _TWICE_N = constant(_SHARES, "NEAR = 0.1", 0.05, 0.2)
-_HALF_P, _TWICE_P = constant(_TARGET, "LARGE = 0.1", 0.05, 0.2)
 
 INGREDIENTS: dict[str, tuple[Edit, ...]] = {
     "nothing": (),
@@ -110,8 +109,6 @@ INGREDIENTS: dict[str, tuple[Edit, ...]] = {
     "share: limits": (
         (_TARGET, "change[i] = tasks * (", "change[i] = 0.0 * ("),
     ),
-    "limits, 0.1: half of it": _HALF_P,
-    "limits, 0.1: twice": _TWICE_P,
     "static effort": (
         ("constraints/limits/limits.py", "_HELD = 0.95", "_HELD = 100.0"),
     ),

@@ -1,24 +1,29 @@
-// What a step comes near to where a limit binds, and how dear the null space is then.
+// What a step comes near to where a limit binds.
 //
 // The law promises nothing where a limit binds. Then it is taken apart,
 //
 //   a = a_t + φ_N,
 //
-// into what moves the tasks and the self-motion. Two things change, as far as a is beyond a limit,
-// so that the step is a continuous function of the state:
+// into what moves the tasks and the self-motion. Two things change, each as far as a is beyond a
+// limit, so that the step is a continuous function of the state. With E the excess, relative to
+// what the limit permits, 1/(1 + E) is the part of what is asked for that is within it.
 //
 // *The tasks are damped.* An arm that is held at its edge, or rushes to it, asks for more than its
 // motors give, from one side and then from the other: the nearest step within the limits would
-// swing with it. So as far as a_t alone is beyond the limits, the step comes near to the damped
-// law.
+// swing with it. So of the step towards the tasks, 1/(1 + E_t) is the law's, with E_t the excess of
+// a_t alone, and the rest the damped law's.
 //
 // *What a field asks for is bounded.* That is φ_N + P K_N P v, the self-motion without what brakes
-// it. A field may ask for anything; at most what the limits permit far from them is asked of the
-// QP, and what brakes stays whole: else it would swing.
+// it. A field may ask for anything, r times what the limits permit far from them; 1/(1 + E) of it
+// is left, and never less than 1/r. What brakes stays whole: else it would swing.
 //
-// An excess is relative to what the limit permits: of an effort, the maximum; of an acceleration,
-// what the barriers of `Limits` permit far from them. The limit on the effort's rate does not
-// count: it depends on the last effort, and a step that waits for it would wait for ever.
+// Both begin slowly: a step that loses more than what it is beyond a limit asks for the opposite
+// where it begins to violate one, and swings from one side of the limit to the other
+// (docs/edge.md).
+//
+// What a limit permits is, of an effort, the maximum; of an acceleration, what the barriers of
+// `Limits` permit far from them. The limit on the effort's rate does not count: it depends on the
+// last effort, and a step that waits for it would wait for ever.
 #pragma once
 #include <hsp/records.hpp>
 
@@ -45,51 +50,53 @@ struct LimitedTarget {
     In<'k', 'w'> A;    // the first n columns count
     InOut<'k'> lower;  // for a deviation δ from a: A δ ≥ lower
   } barred;
-  double large;  // the excess from which on it counts wholly
-  Scratch<'n'> a_t, tau_t, change, part, asked;
+  Scratch<'n'> change, asked;
+  Scratch<'n'> effort_change, effort_asked;  // M times them
 
   void operator()() {
-    change.setZero();
-    const double whole = excess(a, effort, change);
-    part.noalias() = M * parts.law_self_motion;
-    a_t = a - parts.law_self_motion;
-    tau_t = effort - part;
     change = -parts.law_self_motion;
-    const double tasks = std::min(excess(a_t, tau_t, change), whole);
+    effort_change.noalias() = M * change;
+    const double of_tasks = excess();
+    change.setZero();
+    effort_change.setZero();
+    const double beyond = std::min(of_tasks, excess());
+    const double damped = 1.0 - 1.0 / (1.0 + beyond);  // also of inf
 
-    change = tasks * (parts.damped - parts.law);
-    asked = parts.law_self_motion + parts.law_braking;
-    change -= whole * (1.0 - tasks) * (1.0 - permitted_part(asked)) * asked;
-    asked = parts.damped_self_motion + parts.damped_braking;
-    change -= whole * tasks * (1.0 - permitted_part(asked)) * asked;
+    change = damped * (parts.damped - parts.law);
+    effort_change.noalias() = M * change;
+    asked = (1.0 - damped) * (parts.law_self_motion + parts.law_braking);
+    asked += damped * (parts.damped_self_motion + parts.damped_braking);
+    effort_asked.noalias() = M * asked;
+    const double lost = 1.0 - 1.0 / std::min(1.0 + excess(), times_permitted());
+    change -= lost * asked;
+    effort_change -= lost * effort_asked;
 
     a += change;
-    part.noalias() = M * change;
-    effort += part;
+    effort += effort_change;
     barred.lower.noalias() -= barred.A.leftCols(a.size()) * change;
   }
 
-  // By how much an acceleration that differs by δ from a is beyond limits, from 0 to 1.
-  template <class A, class Tau, class D>
-  double excess(const A& x, const Tau& tau, const D& difference) const {
-    const auto beyond = (x - bounds.upper).cwiseMax(bounds.lower - x).array();
-    double most = std::max(0.0, (tau.array().abs() / permitted.effort.array()).maxCoeff() - 1.0);
-    most = std::max(most, (beyond / permitted.acceleration.array()).maxCoeff());
+  // By how much a + change is beyond limits, relative to what they permit.
+  double excess() const {
+    const auto efforts = (effort + effort_change).array().abs() / permitted.effort.array();
+    const auto above = (a + change - bounds.upper).array();
+    const auto below = (bounds.lower - a - change).array();
+    const auto motions = above.max(below) / permitted.acceleration.array();
+    double most = std::max({0.0, efforts.maxCoeff() - 1.0, motions.maxCoeff()});
     const double least = permitted.acceleration.minCoeff();
     for (Index r = 0; r < barred.lower.size(); ++r) {
-      const auto row = barred.A.row(r).head(x.size());
-      const double missing = barred.lower[r] - row.dot(difference.transpose());
+      const auto row = barred.A.row(r).head(change.size());
+      const double missing = barred.lower[r] - row.dot(change.transpose());
       if (missing > 0.0) most = std::max(most, missing / (row.norm() * least));
     }
-    return std::min(most / large, 1.0);
+    return most;
   }
 
-  // Which part of an acceleration the limits permit far from them.
-  template <class A> double permitted_part(const A& x) {
-    part.noalias() = M * x;
-    const double efforts = (part.array().abs() / permitted.effort.array()).maxCoeff();
-    const double motions = (x.array().abs() / permitted.acceleration.array()).maxCoeff();
-    return 1.0 / std::max({1.0, efforts, motions});
+  // How many times what the limits permit far from them is asked for; 1 if it is less.
+  double times_permitted() const {
+    const double efforts = (effort_asked.array().abs() / permitted.effort.array()).maxCoeff();
+    const double motions = (asked.array().abs() / permitted.acceleration.array()).maxCoeff();
+    return std::max({1.0, efforts, motions});
   }
 };
 

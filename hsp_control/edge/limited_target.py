@@ -17,10 +17,11 @@ near to the damped law instead (`shares.py`).
 what brakes it. A field may ask for anything; at most what the limits permit far from
 them is asked of the QP, and what brakes stays whole: else it would swing at the limits.
 
-An excess is relative to what the limit permits: of an effort, the maximum; of an
-acceleration, what the barriers of `Limits` permit far from them. It counts wholly from
-a tenth on. The limit on the effort's rate does not count: it depends on the last
-effort, and a step that waits for it would wait for ever.
+An excess E is relative to what the limit permits: of an effort, the maximum; of an
+acceleration, what the barriers of `Limits` permit far from them. Neither is cut to less
+than 1/(1 + E): what is cut by more than it is beyond a limit swings there. The limit on
+the effort's rate does not count: it depends on the last effort, and a step that waits
+for it would wait for ever.
 """
 
 from typing import NamedTuple, Self
@@ -30,9 +31,6 @@ import numpy as np
 from hsp_control import engine
 from hsp_control.common.arrays import Array
 from hsp_control.engine.plans import PartCall
-
-LARGE = 0.1
-"""Excess from which on it counts wholly."""
 
 
 class Permitted(NamedTuple):
@@ -112,5 +110,4 @@ def limited_target(
         bounds=bounds,
         permitted=permitted,
         barred=barred,
-        large=LARGE,
     )

@@ -8,6 +8,7 @@ import pytest
 import hsp_control as hsp
 from hsp_control.common.arrays import Array
 from hsp_control.control.actuation.limited_step import Status
+from hsp_control.simulation.plants import Push, RigidBodyPlant
 
 ARMS = {
     "panda": (0.0, -0.5, 0.0, -2.0, 0.0, 1.6, 0.8),
@@ -98,6 +99,37 @@ def test_a_step_within_reach_is_made_whatever_a_field_asks_for(name: str) -> Non
         assert np.linalg.norm(errors[-1][-1, 3:]) < TURNED
     apart = np.linalg.norm(errors[1][:, :3] - errors[0][:, :3], axis=1)
     assert apart.max() < 0.1 * 0.15
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("period", [0.002, 0.01])
+def test_a_pushed_hand_comes_back_whatever_a_field_asks_for(period: float) -> None:
+    """As the law was damped wholly a tenth beyond a limit, it stayed 86 mm away."""
+    robot, rng = hsp.Robot.load("xarm7"), np.random.default_rng([0, 3, 23])
+    q0 = np.array(ARMS["xarm7"])
+    d, u = rng.normal(size=robot.nv), rng.normal(size=3)
+    g = partial(constant, 1e3 * d / np.linalg.norm(d))
+    force = 15.0 * u / np.linalg.norm(u)
+    here = robot.state(0.0, q0, np.zeros(robot.nv)).position(robot.end_effector).copy()
+    goal = hsp.trajectories.ComposedPose(hsp.Hold(here))
+    made = hsp.Controller(
+        robot,
+        [hsp.FramePose(robot.end_effector, goal, name="hand")],
+        hsp.fields.FunctionField(g),
+        start=q0,
+    )
+    push = Push(robot.end_effector, force, start=0.3, duration=0.2)
+    run = hsp.simulate(
+        made,
+        q0,
+        duration=2.5,
+        control_period=period,
+        check_rate=False,
+        plant=RigidBodyPlant(robot, [push]),
+    )
+    e = run["task.hand.error"][-1]
+    assert np.linalg.norm(e[:3]) < KEPT
+    assert np.linalg.norm(e[3:]) < TURNED
 
 
 def test_efforts_are_continuous_where_a_field_begins_to_violate_limits() -> None:

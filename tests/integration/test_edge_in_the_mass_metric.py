@@ -1,0 +1,55 @@
+"""Out of reach in the metric M(q): a field at a limit does not shake the arm.
+
+There a field asks light wrists for several times what limits permit. A step that began
+to violate a limit by a tenth had left a quarter of that: the arms swung at 4 to 8 Hz.
+"""
+
+import numpy as np
+import pytest
+
+import hsp_control as hsp
+from hsp_control.common.arrays import Array
+
+BEGIN, END = 0.5, 5.0  # [s]
+STILL = (
+    1e-3  # change of an effort in 1 ms, as a part of its limit; it was 1.5e-3 and 0.011
+)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("name", "period", "q0", "goal"),
+    [
+        (
+            "panda",
+            0.005,
+            [-0.085, -0.959, -0.084, -2.587, 0.186, 1.746, 0.924],
+            [-0.4007, 1.0571, -0.1834],
+        ),
+        (
+            "xarm7",
+            0.01,
+            [-0.255, -0.361, -0.011, 1.233, 0.202, 1.314, -0.07],
+            [-0.6081, -0.5279, 0.1203],
+        ),
+    ],
+)
+def test_a_hand_above_an_orientation_rests(
+    name: str, period: float, q0: Array, goal: Array
+) -> None:
+    """0.3 m and 5 mm beyond the reach, with the default field."""
+    robot = hsp.Robot.load(name)
+    frame = robot.end_effector
+    hand = hsp.FramePosition(frame, name="hand")
+    tasks: list[hsp.Task] = [hand, hsp.FrameOrientation(frame, priority=2)]
+    metric = hsp.metrics.MassMatrixMetric()
+    made = hsp.Controller(
+        robot, tasks, hsp.JointCentering(), metric=metric, start=np.array(q0)
+    )
+    made.at(BEGIN).ramp(0.0).reference("hand", hsp.Hold(goal))
+    run = hsp.simulate(
+        made, np.array(q0), duration=END, control_period=period, log_period=period
+    )
+    changes = np.abs(np.diff(run.tau, axis=0)) / robot.model.effortLimit
+    late = changes[-round(0.5 / period) :] * (1e-3 / period)
+    assert late.max() <= STILL

@@ -1,0 +1,142 @@
+"""What a step comes near to where a limit binds, beside plain formulas."""
+
+from typing import NamedTuple
+
+import numpy as np
+from hypothesis import given
+from hypothesis import strategies as st
+
+from hsp_control.common.arrays import Array
+from hsp_control.edge.limited_target import (
+    Barred,
+    Parts,
+    Permitted,
+    Within,
+    limited_target,
+)
+
+NV = 4
+seeds = st.integers(0, 2**32 - 1)
+
+
+class Asked(NamedTuple):
+    """What is asked for, and what limits permit."""
+
+    M: Array
+    a: Array
+    effort: Array
+    parts: Parts
+    bounds: Within
+    permitted: Permitted
+    barred: Barred
+
+
+def drawn(seed: int, size: float, bound: float) -> Asked:
+    """Return a random request: accelerations are of a size, bounds as far as bound."""
+    rng = np.random.default_rng(seed)
+    root = rng.normal(size=(NV, NV))
+    M = np.asfortranarray(root @ root.T + np.eye(NV))
+    a, *parts = size * rng.normal(size=(1 + len(Parts._fields), NV))
+    parts[0] = a.copy()
+    away = bound * rng.uniform(0.1, 1.0, size=(2, NV))
+    permitted = Permitted(*(bound * rng.uniform(0.5, 2.0, size=(2, NV))))
+    rows = Barred(rng.normal(size=(2, NV)), -bound * rng.uniform(0.1, 1.0, size=2))
+    return Asked(
+        M, a, M @ a + rng.normal(size=NV), Parts(*parts), Within(-away[0], away[1]),
+        permitted, rows,
+    )  # fmt: skip
+
+
+def excess(given: Asked, change: Array) -> float:
+    """Return by how much a + change is beyond limits, relative to what they permit."""
+    a, effort = given.a + change, given.effort + given.M @ change
+    beyond = np.maximum(a - given.bounds.upper, given.bounds.lower - a)
+    found = [0.0, *(np.abs(effort) / given.permitted.effort - 1.0)]
+    found += list(beyond / given.permitted.acceleration)
+    missing = given.barred.lower - given.barred.A @ change
+    length = np.linalg.norm(given.barred.A, axis=1)
+    found += list(missing / length / given.permitted.acceleration.min())
+    return float(max(found))
+
+
+def times_permitted(given: Asked, x: Array) -> float:
+    """Return how many times what limits permit an acceleration is."""
+    efforts = np.abs(given.M @ x) / given.permitted.effort
+    motions = np.abs(x) / given.permitted.acceleration
+    return float(max(1.0, efforts.max(), motions.max()))
+
+
+def called(given: Asked) -> Asked:
+    """Return what the call makes of it."""
+    a, effort, lower = given.a.copy(), given.effort.copy(), given.barred.lower.copy()
+    made = given._replace(a=a, effort=effort, barred=Barred(given.barred.A, lower))
+    kind, arguments = limited_target(*made)
+    kind(*arguments)()
+    return made
+
+
+@given(seeds, st.floats(0.1, 1e4))
+def test_it_is_the_plain_formula(seed: int, size: float) -> None:
+    """Of the tasks 1/(1 + E_t) is the law's, of a field 1/min(1 + E, r) is left."""
+    asked = drawn(seed, size, 10.0)
+    law, damped, own, own_damped, braking, braking_damped = asked.parts
+    beyond = min(excess(asked, -own), excess(asked, np.zeros(NV)))
+    exact = 1.0 / (1.0 + beyond)
+    to_damped = (1.0 - exact) * (damped - law)
+    field = exact * (own + braking) + (1.0 - exact) * (own_damped + braking_damped)
+    times = min(1.0 + excess(asked, to_damped), times_permitted(asked, field))
+    change = to_damped - (1.0 - 1.0 / times) * field
+
+    found = called(asked)
+    scale = 1e-12 * (1.0 + size)  # rounding of some 50 operations
+    np.testing.assert_allclose(found.a, asked.a + change, atol=scale)
+    np.testing.assert_allclose(
+        found.effort, asked.effort + asked.M @ change, atol=100.0 * scale
+    )
+    np.testing.assert_allclose(
+        found.barred.lower, asked.barred.lower - asked.barred.A @ change, atol=scale
+    )
+
+
+@given(seeds)
+def test_within_limits_nothing_changes(seed: int) -> None:
+    """Whatever the damped law and a field ask for."""
+    asked = drawn(seed, 1e4, 10.0)
+    asked.a[:] = 0.0
+    asked.effort[:] = 0.0
+    np.testing.assert_array_equal(called(asked).a, asked.a)
+
+
+@given(seeds, st.floats(1e-6, 10.0))
+def test_no_more_is_lost_than_is_beyond(seed: int, beyond: float) -> None:
+    """Of a field alone, at most the part E of what is left; and all but the permitted.
+
+    What loses more where it begins to violate a limit swings from one side of it to the
+    other.
+    """
+    asked = drawn(seed, 1.0, 10.0)
+    direction = asked.a / times_permitted(asked, asked.a)
+    most = times_permitted(asked, 1e6 * direction) / 1e6  # of a direction, 1
+    field = (1.0 + beyond) / most * direction
+    zero = np.zeros(NV)
+    far = np.full(NV, 1e9)
+    alone = asked._replace(
+        a=field,
+        effort=asked.M @ field,
+        parts=Parts(field, field, field, field, zero, zero),
+        bounds=Within(-asked.permitted.acceleration, asked.permitted.acceleration),
+        barred=Barred(asked.barred.A, -far[:2]),
+    )
+    left = called(alone).a
+    assert times_permitted(asked, left) <= 1.0 + 1e-9
+    lost = np.linalg.norm(field - left) / np.linalg.norm(left)
+    assert lost <= beyond * (1.0 + 1e-6) + 1e-12
+
+
+def test_an_excess_without_end_leaves_finite_numbers() -> None:
+    """A joint without a range permits no acceleration: it is 0, or beyond wholly."""
+    asked = drawn(0, 1.0, 10.0)
+    asked.permitted.acceleration[0] = 0.0
+    asked.bounds.upper[0] = asked.a[0] - 1.0
+    found = called(asked)
+    assert np.isfinite(found.a).all()
