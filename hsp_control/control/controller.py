@@ -106,7 +106,8 @@ class Controller(Composition):
             run.acceleration = delivered[1]
             if out is None:
                 out = ControlOutput()
-                out.write(delivered, stack, damped)
+                tau, memory = delivered[0].copy(), stack.memory.tobytes()
+                out.write(tau, memory, delivered, stack, damped)
             else:
                 out.overwrite(delivered, stack, damped)
             return out
