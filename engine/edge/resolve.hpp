@@ -64,7 +64,7 @@ struct Resolve {
   // All tasks at once.
   bool at_once() {
     auto& [Q, X] = factors;
-    const bool damped = bounded_inverse(memory.B, whitened(), Q, X);
+    const bool damped = bounded_inverse(memory.B, whitened(), Q, X, memory.square);
     write_law(law, inverse(Q, X), memory.law, e_N, a);
     return damped;
   }
@@ -96,11 +96,11 @@ struct Resolve {
     double mu = far_share(rows.stretched, following.far);
     if (mu < 1.0) {
       const auto& J = law.task.jacobian;
-      mu = std::max(mu, near_share(J, following.near, least, memory.turned));
+      mu = std::max(mu, near_share(J, following.near, least, memory.turned, X, memory.square));
     }
     if (mu == 1.0) return;
     share[0] = mu;
-    bounded_inverse(memory.B, 0.0, Q, X);
+    bounded_inverse(memory.B, 0.0, Q, X, memory.square);
     write_law(law, inverse(Q, X), memory.law, exact_e_N, a);
     exact = a;
     a += mu * (damped - exact);

@@ -7,11 +7,11 @@ namespace hsp {
 // A bounded pseudo-inverse with memory of its own.
 struct OwnInverse {
   Scratch<'m', 'n'> B, Q;
-  Scratch<'m', 'm'> X;
+  Scratch<'m', 'm'> X, square;
   Scratch<'m'> part;
   void prepare(const Sizes& size) {
     for (auto* each : {&B, &Q}) each->prepare(size);
-    X.prepare(size);
+    for (auto* each : {&X, &square}) each->prepare(size);
     part.prepare(size);
   }
 
@@ -19,7 +19,7 @@ struct OwnInverse {
   template <class J, class L>
   bool compute(const J& jacobian, const L& factor, int form, double threshold) {
     whiten(jacobian, factor, form, B);
-    return bounded_inverse(B, threshold, Q, X);
+    return bounded_inverse(B, threshold, Q, X, square);
   }
 };
 

@@ -115,7 +115,7 @@ struct ImpedanceGains {
   // rank. The rows of Q are orthogonal. The law whitens with its own metric: W = I at worst, where
   // the singular values of J L⁻ᵀ may be less than those of J by √(largest eigenvalue of M).
   void write_bounded_inertia() {
-    bounded_inverse(B, threshold / std::sqrt(1.0 + M.trace()), Q, factor);
+    bounded_inverse(B, threshold / std::sqrt(1.0 + M.trace()), Q, factor, S);
     for (Index k = 0; k < Q.rows(); ++k) factor.row(k) *= Q.row(k).norm();
     Lambda = factor.transpose().lazyProduct(factor);
   }

@@ -61,31 +61,35 @@ class ControlOutput:
         """Number of efforts; 0 before the first step."""
         return len(self.tau) if hasattr(self, "tau") else 0
 
-    def write(self, delivered: Delivered, stack: ActiveStack, damped: str) -> None:
-        """Make this, which is new, the output of a step."""
-        self.tau, self._memory = delivered[0].copy(), stack.memory.tobytes()
-        self._explain(delivered, stack, damped)
+    def write(
+        self,
+        tau: Array,
+        memory: Array | bytes,
+        delivered: Delivered,
+        stack: ActiveStack,
+        damped: str,
+    ) -> None:
+        """Make this the output of a step; its effort and its memory are copies."""
+        _, a, forces, self.status, self.relaxation = delivered
+        self.tau, self._memory, self._views = tau, memory, None
+        self._acceleration = None if a is stack.acceleration else a.tobytes()
+        self._layout, self.damped = stack.layout, damped
+        self.forces = forces.copy() if stack.has_forces else forces
 
     def overwrite(self, delivered: Delivered, stack: ActiveStack, damped: str) -> None:
-        """Make this, which may have been that of another step, the output of a step."""
+        """Make this the output of a step, in the arrays that it has."""
+        tau, memory, views = delivered[0], stack.memory, None
         if not self.size:
-            self.write(delivered, stack, damped)
+            self.write(tau.copy(), memory.tobytes(), delivered, stack, damped)
             return
-        self.tau[:] = delivered[0]
-        own, memory, views = self._memory, stack.memory, self._views
+        self.tau[:] = tau
+        own = self._memory
         if isinstance(own, bytes) or len(own) != len(memory):
-            self._memory, views = memory.copy(), None
+            own = memory.copy()
         else:
-            own[:] = memory
-        self._explain(delivered, stack, damped)
+            own[:], views = memory, self._views
+        self.write(self.tau, own, delivered, stack, damped)
         self._views = views
-
-    def _explain(self, delivered: Delivered, stack: ActiveStack, damped: str) -> None:
-        _, a, forces, self.status, self.relaxation = delivered
-        self._acceleration = None if a is stack.acceleration else a.tobytes()
-        self._layout, self._views = stack.layout, None
-        self.forces = forces.copy() if stack.has_forces else forces
-        self.damped = damped
 
     @property
     def acceleration(self) -> Array:

@@ -169,12 +169,14 @@ template <class Y, class U> void orthogonalise_rows(Y& rows, U& turned) {
 // Write Q = X B as `orthonormalise_rows` does, so that B⁺ = Qᵀ X; return whether every singular
 // value of B is above the threshold. `square` (m, m) is used.
 //
-// The largest singular value of X is 1/s for the smallest s of B: no spectrum is needed.
+// The largest singular value of X is 1/s for the smallest s of B. Where bounds of it do not decide,
+// a factorisation does: no spectrum is needed.
 template <class B, class Q, class X, class S>
 bool exact_inverse(const B& wide, double threshold, Q& q, X& factor, S& square) {
-  const double bound = orthonormalise_rows(wide, q, factor);
+  double bound = orthonormalise_rows(wide, q, factor);
+  if (bound == 0.0) return threshold <= 0.0;
+  if (bound < threshold) bound = smallest_singular_value_bound(factor);
   if (bound >= threshold) return true;
-  if (bound == 0.0) return false;
   square.setZero();
   square.diagonal().setConstant(1.0 / (threshold * threshold));
   for (Index i = 0; i < factor.rows(); ++i)
@@ -187,13 +189,11 @@ bool exact_inverse(const B& wide, double threshold, Q& q, X& factor, S& square) 
 //
 // q(x) = 1/x for x ≥ threshold² and (2 - x/threshold²)/threshold² below it: exactly the
 // pseudo-inverse while every singular value of B is above the threshold, continuously
-// differentiable, and bounded: ‖B#‖ ≤ 1.09/threshold. B has the shape (m, n), m ≤ n.
-template <class B, class Q, class X>
-bool bounded_inverse(const B& wide, double threshold, Q& q, X& factor) {
-  // The spectrum is computed only where cheaper bounds cannot decide.
-  double bound = orthonormalise_rows(wide, q, factor);
-  if (0.0 < bound && bound < threshold) bound = smallest_singular_value_bound(factor);
-  if (bound >= threshold) return false;
+// differentiable, and bounded: ‖B#‖ ≤ 1.09/threshold. B has the shape (m, n), m ≤ n; `square`
+// (m, m) is used.
+template <class B, class Q, class X, class S>
+bool bounded_inverse(const B& wide, double threshold, Q& q, X& factor, S& square) {
+  if (exact_inverse(wide, threshold, q, factor, square)) return false;
   q = wide;
   orthogonalise_rows(q, factor);
   const double floor = threshold * threshold;
