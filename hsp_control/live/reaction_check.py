@@ -69,7 +69,7 @@ class ReactionCheck:
         if not others.any():
             return
         self._inertia = inertia[np.ix_(others, others)]
-        self._rest = np.linalg.solve(self._inertia, (inertia @ free)[others])
+        self._rest[:] = np.linalg.solve(self._inertia, (inertia @ free)[others])
         self._added = free[others] - self._rest
 
     def update(self, v: Array, passed: float) -> None:
