@@ -465,3 +465,21 @@ def test_whatever_a_field_raises_ends_the_run_and_not_the_session(
     session.reset()
     go(session, 0.05)
     assert not session.over
+
+
+@pytest.mark.parametrize(
+    "error", [RuntimeError("mine"), CancelledError(), GeneratorExit(), MemoryError()]
+)
+def test_whatever_a_change_of_a_page_raises_ends_the_run_and_not_the_session(
+    error: BaseException, session: Session, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def fail(*_: object, **__: object) -> None:
+        raise error
+
+    with monkeypatch.context() as patch:
+        patch.setattr(type(session.handles), "receive", fail)
+        session.receive({"do": "anything"})
+    assert session.over.startswith(type(error).__name__)
+    session.reset()
+    go(session, 0.05)
+    assert not session.over
