@@ -438,6 +438,9 @@ def test_a_robot_that_walks_can_be_pulled_but_not_led(tmp_path: Path) -> None:
     """The feet and the trunk are the plan's; its run is that of `simulate`."""
     session = Session(playable("walking/talos_walk"))
     assert [*session.handles.targets] == ["posture"]
+    plan = session.recorder.plan  # whose streams are recorded
+    assert plan is not None
+    assert plan.plan is session.experiment.scenario.plan
     go(session, 0.5)
     log = session.rollout()
     assert log["plan.phase"][-1] >= 1.0

@@ -8,7 +8,7 @@ import pytest
 
 import hsp_control as hsp
 from hsp_control.common.arrays import Array
-from hsp_control.companions.rerun.log import _archetypes, _shape
+from hsp_control.companions.rerun.log import _archetypes, _normals, _shape
 from hsp_control.companions.viewer.robot_drawing import Visual
 
 
@@ -86,3 +86,16 @@ def test_a_links_shape_is_about_its_place(kind: str) -> None:
 def test_an_obstacle_is_about_its_centre(shape: Any, half: tuple[float, ...]) -> None:
     (drawn,) = _shape(Rerun(), shape)
     np.testing.assert_allclose(extent(drawn), [np.negative(half), half])
+
+
+def test_the_normals_of_a_solid_point_outwards() -> None:
+    """Else its inner side is lit."""
+    corners = np.array(
+        [[1.0, 0, 0], [-1, 0, 0], [0, 1, 0], [0, -1, 0], [0, 0, 1], [0, 0, -1]]
+    )
+    triangles = np.array(
+        [[0, 2, 4], [2, 1, 4], [1, 3, 4], [3, 0, 4],
+         [2, 0, 5], [1, 2, 5], [3, 1, 5], [0, 3, 5]]
+    )  # fmt: skip
+    normals = _normals(corners, triangles)
+    np.testing.assert_allclose(normals, corners, atol=1e-12)
