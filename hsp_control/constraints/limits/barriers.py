@@ -30,6 +30,8 @@ side ends, and so would efforts: this far ahead and behind makes a ramp of it, a
 error of a hundredth of a m/s² at 2 m/s, 0.1 m away."""
 _TURN = 1e-4
 """How far joints turn to see what an acceleration does to distances [rad]."""
+_SLOPE = 1e-5
+"""Step of the central differences of gravity [rad or m]: they err by 1e-10 of it."""
 _AHEAD = 0.5
 """A pair gets a row if its distance may come close to the minimum within this time [s]
 at its present rate."""
@@ -238,8 +240,8 @@ class StaticEffort:
     Else an arm reaches postures in which its motors cannot hold it, and falls. A
     motor's gravity effort, G_i(q), depends on the posture only, so this is a limit on
     postures: with h = share - |G_i|/effort_i, the rows require h'' + 2α h' + α² h ≥ 0,
-    with G_i'' = ∇G_i·a + the drift of G_i' at constant velocity. Robots with mimic
-    joints are not supported.
+    with G_i'' = ∇G_i·a + the drift of G_i' at constant velocity. With mimic joints,
+    of which Pinocchio has no ∇G, it is taken by central differences.
 
     Attributes:
         effort: Maximum effort, shape (nv,) [N·m or N]; inf where unlimited.
@@ -258,14 +260,20 @@ class StaticEffort:
         """
         robot, model = state.robot, state.robot.model
         data = state.cached(self, "data", model.createData)
-        slope = pin.computeGeneralizedGravityDerivatives(model, data, state.q)
 
-        def gravity(dt: float) -> Array:
-            """Return G(q ⊕ v dt), shape (nv,)."""
-            q = pin.integrate(model, state.q, dt * state.v) if dt else state.q
+        def gravity(step: Array) -> Array:
+            """Return G(q ⊕ step), shape (nv,)."""
+            q = pin.integrate(model, state.q, step) if step.any() else state.q
             return np.array(pin.computeGeneralizedGravity(model, data, q))
 
-        G, ahead, behind = gravity(0.0), gravity(_STEP), gravity(-_STEP)
+        if robot.mimics:
+            steps = _SLOPE * np.eye(robot.nv)
+            differences = [gravity(step) - gravity(-step) for step in steps]
+            slope = np.array(differences).T / (2.0 * _SLOPE)
+        else:
+            slope = pin.computeGeneralizedGravityDerivatives(model, data, state.q)
+        forth = _STEP * state.v
+        G, ahead, behind = gravity(0.0 * forth), gravity(forth), gravity(-forth)
         rate = slope @ state.v
         sign = np.where(G < 0.0, -1.0, 1.0)
         used, growth = sign * G / self.effort, sign * rate / self.effort

@@ -206,16 +206,11 @@ class Limits(Part, error=LimitError):
         share = self.static_effort
         if share == "robot":
             effort = np.where(robot.largest_gravity > effort, effort, np.inf)
-            if robot.unactuated or robot.mimics or not np.isfinite(effort).any():
+            if robot.unactuated or not np.isfinite(effort).any():
                 return None
             share = _HELD
         if share is None or isinstance(share, str):
             return None
-        if robot.mimics:
-            with within("static_effort"):
-                raise LimitError(
-                    f"does not support mimic joints; {robot.name} has some"
-                )
         return StaticEffort(read_only(effort), share)
 
     def _numbers(self, field: str, robot: Robot) -> Array:

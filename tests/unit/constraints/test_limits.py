@@ -87,7 +87,7 @@ def test_by_default_gravity_may_overload_no_motor_of_an_arm() -> None:
         assert (np.abs(asked) < robot.largest_gravity).all()
     for none in ({}, {"effort": "none"}, {"effort": 1.0, "static_effort": "none"}):
         assert of(robot, **none).static_effort is None
-    assert of(fingers(), effort=1.0).static_effort is None
+    assert of(fingers(), effort=1.0).static_effort is not None
     held = of(robot, effort=[87.0, 87.0, 30.0, 50.0, 12.0, 12.0, 12.0]).static_effort
     assert held is not None
     assert held.share == 0.95
@@ -177,10 +177,6 @@ MISFITS: list[tuple[Any, dict[str, Any], type[HspControlError], str, str]] = [
     (
         *(panda, {"position": PositionRange(-1.0, 1.0), "position_margin": 1.0}),
         *(LimitError, "position", "panda_joint1 leave no room: -1 to 1 with a margin"),
-    ),
-    (
-        *(fingers, {"static_effort": 0.5}, LimitError),
-        *("static_effort", "does not support mimic joints; panda has some"),
     ),
     (
         *(panda, {"barriers": [SelfDistance(), ObstacleDistance(obstacles=["bal"])]}),
