@@ -101,6 +101,8 @@ class RobotSource:
     omitted: tuple[str, ...] = ()
     # the URDF that xacro makes of the file; None if the file is the URDF
     expanded: str | None = None
+    # where meshes are that are not found: by their names in the URDF, those of a log
+    meshes: tuple[tuple[str, Path], ...] = field(default=(), repr=False)
 
 
 def find_robot(
