@@ -36,6 +36,8 @@ _NO_CHANGE = 1e-12
 """A smaller change of a position is rounding [rad or m]."""
 _STOPS = 50.0
 """Largest deceleration of a joint that friction stops [rad/s² or m/s²]."""
+_WENT = 0.05
+"""Speed from which a joint that stands has moved before [rad/s or m/s]."""
 _STEP = 2e-3
 """Largest step of an encoder [rad or m], until smaller changes are seen: between two
 steps a velocity that is taken from them stays the same, too."""
@@ -163,7 +165,9 @@ class VelocityCheck:
         self._before = np.where(still, self._before, speed)
         self._still = np.where(still, self._still + 1, 0)
         moved = self._before * self._still * self._period
-        fast = (self._before > 2.0 * _STOPS * self._period) & (
-            moved > np.maximum(_STEP, np.minimum(_STEPS * self._step, _COARSEST))
-        )
-        self.dead = (self._still >= _STILL) & fast & self._judged
+        far = moved > np.maximum(_STEP, np.minimum(_STEPS * self._step, _COARSEST))
+        # Friction may stop one joint soon, but not several in the same period.
+        went = still & (self._before > _WENT)
+        together = (went[:, None] & (self._still[:, None] == self._still)).sum(axis=0)
+        fast = self._before > 2.0 * _STOPS * self._period / np.maximum(together, 1)
+        self.dead = (self._still >= _STILL) & fast & far & self._judged

@@ -435,6 +435,22 @@ def test_a_coarse_encoder_with_a_velocity_between_its_steps_is_not_dead() -> Non
         assert not check.dead.any(), k
 
 
+@pytest.mark.parametrize(("joints", "dead"), [(1, False), (2, True), (7, True)])
+def test_no_friction_stops_several_joints_in_one_period(
+    joints: int, dead: bool
+) -> None:
+    """At 5 ms and 0.3 rad/s; one of them may well have stopped."""
+    check = VelocityCheck(panda(), SETTINGS, 0.005)
+    v = 0.3 * (np.arange(7) < joints)
+    for k in range(40):
+        moving = v * (k < 30)
+        noise = 1e-4 * np.sin(1.0 + 7.0 * k) * (np.arange(7) >= joints)
+        check.update(0.005 * moving + noise, moving + noise, 0.005)
+        if k < 32:
+            assert not check.dead.any()
+    assert check.dead.sum() == (joints if dead else 0)
+
+
 def oscillation(
     check: ResponseCheck, sign: float, *, missed: float = 0.0, seconds: float = 1.0
 ) -> bool:
