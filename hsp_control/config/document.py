@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 
 from hsp_control.common.exceptions import ConfigError, HspControlError
+from hsp_control.common.regular_file import check_ends
 from hsp_control.common.resources import bundled_configs, is_file
 from hsp_control.common.suggestions import did_you_mean, listing, nearest
 from hsp_control.config.streams import with_recordings
@@ -95,6 +96,7 @@ class Document:
         """Read a YAML file."""
         name = fspath(path)
         try:
+            check_ends(Path(name))
             with Path(name).open("rb") as file:
                 content = file.read(MAX_SIZE + 1)
         except (OSError, ValueError) as error:

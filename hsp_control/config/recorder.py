@@ -17,6 +17,7 @@ from hsp_control.control.controller import Controller
 from hsp_control.control.output import ControlOutput
 from hsp_control.declaration.language import check_kind
 from hsp_control.declaration.plain_data import plain_data
+from hsp_control.live.hardware import described
 from hsp_control.simulation import Rollout
 from hsp_control.simulation.log_writer import LogWriter
 
@@ -167,7 +168,7 @@ class Recorder:
         elif self._begun > -inf:
             interrupted = isinstance(error, KeyboardInterrupt)
             status = "interrupted" if interrupted else "stopped"
-            self.close(status, f"{type(error).__name__}: {error}")
+            self.close(status, described(error))
         else:  # there is nothing to keep
             self._writer.close()
             self._journal.unlink(missing_ok=True)

@@ -225,6 +225,10 @@ def _instants(controller: Controller) -> Iterator[float]:
         yield change.end
 
 
+def _called(request: BaseException) -> str:
+    return "Ctrl-C" if isinstance(request, KeyboardInterrupt) else "exit"
+
+
 _ROOT = 1
 """Index of the joint that a floating base is."""
 
@@ -278,9 +282,10 @@ class LiveRun:
                 self.one_period(on_period)
             except OPERATOR as request:
                 if self.phase != Phase.RUNNING:  # the second: the robot must stop
-                    self.silent = self.done = self.abandoned = True
-                name = "Ctrl-C" if isinstance(request, KeyboardInterrupt) else "exit"
-                reason = f"stopped by the operator ({name})"
+                    self.silent = self.done = True
+                    self.abandon(request)
+                    continue
+                reason = f"stopped by the operator ({_called(request)})"
                 # Who raises it in the law would raise it again in the stop.
                 self.log.controller_failed |= self.chain.plan is None
                 if self.ending is None:
@@ -291,6 +296,15 @@ class LiveRun:
             except BaseException as error:  # nobody knows what to send now
                 self.silent = self.done = True
                 self.fail(error)
+
+    def abandon(self, request: BaseException) -> None:
+        """Leave the safe stop to the robot, because the operator asks again."""
+        self.abandoned = True
+        if self.ended == "completed":  # it is not: nobody knows whether it rests
+            self.ended = "operator"
+            self.reason += (
+                f"; the safe stop was cut short by the operator ({_called(request)})"
+            )
 
     def one_period(self, on_period: Callable[[float], object] | None) -> None:
         """Read a state, send an effort, then log and make the requested changes."""

@@ -5,6 +5,7 @@ from math import ceil, exp
 import numpy as np
 
 from hsp_control.common.arrays import Array, Flags, Indices
+from hsp_control.live.reaction_check import ReactionCheck
 from hsp_control.live.settings import LiveSettings
 from hsp_control.robot import Robot
 
@@ -30,6 +31,7 @@ class StillSensors:
     before: changes to and fro, of different sizes, so that a coarse encoder on the edge
     of a step is none. Or if the effort is beyond what holds the joint by more than
     friction (`LiveSettings.friction`) and the model's errors: a live joint would move.
+    Or if the other joints move as they do where this one moves (`ReactionCheck`).
 
     Attributes:
         dead: Joints whose sensor says nothing any more, shape (nv,).
@@ -48,6 +50,7 @@ class StillSensors:
         self._judged = np.ones(robot.nv, dtype=bool)
         self._judged[list(robot.unactuated)] = False
         self._none = np.zeros(robot.nv, dtype=bool)
+        self._reaction = ReactionCheck(settings.velocity_error)
         self.restart()
 
     def restart(self) -> None:
@@ -58,6 +61,7 @@ class StillSensors:
         self._count = np.zeros(nv, dtype=np.int64)
         self.dead: Flags = self._none
         self.beyond: Array = np.zeros(nv)
+        self._reaction.restart()
 
     def update(self, way: Array, v: Array, mean: Array, passed: float) -> None:
         """Take a new measurement.
@@ -76,6 +80,7 @@ class StillSensors:
         noise &= np.abs(mean) < _REST
         still = (np.abs(way) < 1e-12) & (changes[1] == 0.0)
         self._count = np.where(still, self._count + 1, 0)
+        self._reaction.update(mean, passed)
         # A joint that says nothing any more keeps what is known of its noise.
         part = 1.0 - exp(-passed / _MEMORY)
         self._alive = np.where(
@@ -89,30 +94,37 @@ class StillSensors:
             self.dead = self._none
             return
         dead = quiet & (self._alive > _ALIVE)
-        standing = np.flatnonzero(quiet & (v == 0.0))
         self.beyond = np.zeros(v.size)
-        if standing.size and not self._robot.unactuated:
-            self.beyond[standing] = self._holding(standing, q, v, tau)
+        if not self._robot.unactuated:
+            inertia = self._robot.state(0.0, q, v).mass_matrix
+            free = self._robot.forward_dynamics(q, v, tau)
+            silent = np.flatnonzero(quiet)
+            self.beyond[silent] = _holding(silent, inertia, free)
             gravity = self._robot.inverse_dynamics(q, 0.0 * v, 0.0 * v)
             allowed = self._friction + _GRAVITY * np.abs(gravity)
             dead |= np.abs(self.beyond) > allowed
+            self._reaction.expect(quiet, inertia, free)
+            if self._reaction.felt:
+                dead |= quiet
         self.dead = dead
 
     def why(self, i: int) -> str:
         """Return why the sensor of a dead joint is dead."""
         if self._alive[i] > _ALIVE:
             return "its sensor had noise, and has none any more; it is dead"
+        if self._reaction.felt:
+            return "the other joints feel it move; its sensor is dead"
         return (
             f"its effort is {self.beyond[i]:.3g} {_EFFORT[self._robot.units[i]]} "
             "beyond what holds it; its sensor is dead, or it is blocked"
         )
 
-    def _holding(self, standing: Indices, q: Array, v: Array, tau: Array) -> Array:
-        """Return what must hold some joints, so that they stand under an effort."""
-        # By Gauss's principle: M⁻¹ of these joints times the force is what they lack.
-        state = self._robot.state(0.0, q, v)
-        inverse = np.linalg.inv(state.mass_matrix)
-        acceleration = self._robot.forward_dynamics(q, v, tau)
-        among = inverse[np.ix_(standing, standing)]
-        held: Array = np.linalg.solve(among, acceleration[standing])
-        return held
+
+def _holding(silent: Indices, inertia: Array, free: Array) -> Array:
+    """Return what must hold some joints, so that they stand under an effort.
+
+    By Gauss's principle M⁻¹ of these joints times the force is what they lack.
+    """
+    among = np.linalg.inv(inertia)[np.ix_(silent, silent)]
+    held: Array = np.linalg.solve(among, free[silent])
+    return held

@@ -182,10 +182,9 @@ class TrustedMotion:
             return new
         check, expected = self._check, self._expected
         way = self._robot.difference(last.q, new.q)
-        if not self._moving:  # a robot starts at rest: the smaller one is right
+        if not self._moving:  # a robot starts at rest
             self._moving = True
-            slope = way / passed
-            expected.begin(np.where(np.abs(slope) < np.abs(new.v), slope, new.v))
+            expected.begin(_smaller(way / passed, new.v))
         expected.advance(passed)
         check.update(way, new.v, passed)
         self._sensors.update(way, new.v, check.mean, passed)
@@ -244,6 +243,7 @@ class TrustedMotion:
         self._useless |= bool(runs.any() or self._contrary.any())
         self._positions &= ~lost
         self._velocities &= ~lost
+        self._check.trust(self._positions, self._velocities)
         self.complete = bool(self._positions.all() and self._velocities.all())
         if (wrong | lost).any():
             i = int(np.flatnonzero(wrong | lost)[0])
@@ -290,3 +290,9 @@ class TrustedMotion:
             f"are measured, and its positions change by {self._check.slope[i]:.3g} "
             f"{unit}/s"
         )
+
+
+def _smaller(a: Array, b: Array) -> Array:
+    """Return the smaller of two velocities; 0 if they contradict each other."""
+    smaller: Array = np.where(np.abs(a) < np.abs(b), a, b)
+    return np.where(a * b > 0.0, smaller, 0.0)

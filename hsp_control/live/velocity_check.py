@@ -1,6 +1,6 @@
 """Compares measured velocities with the slope of the measured positions."""
 
-from math import ceil, exp
+from math import ceil, exp, inf
 
 import numpy as np
 
@@ -32,10 +32,19 @@ _GAP = 3.5
 the velocity was another one: the velocity after them is not compared with it."""
 _STILL = 3
 """States with the same position and velocity from which a sensor is dead."""
+_NO_CHANGE = 1e-12
+"""A smaller change of a position is rounding [rad or m]."""
 _STOPS = 50.0
 """Largest deceleration of a joint that friction stops [rad/s² or m/s²]."""
+_WENT = 0.05
+"""Speed from which a joint that stands has moved before [rad/s or m/s]."""
 _STEP = 2e-3
-"""Largest step of an encoder [rad or m]."""
+"""Largest step of an encoder [rad or m], until smaller changes are seen: between two
+steps a velocity that is taken from them stays the same, too."""
+_COARSEST = 0.01
+"""No encoder has coarser steps than a few of these together [rad or m]."""
+_STEPS = 2.5
+"""Steps of the encoder that a slowing joint may lack, by its last velocity."""
 
 
 class VelocityCheck:
@@ -84,14 +93,21 @@ class VelocityCheck:
         self._count = 0
         self._sum, self._fastest, self._doubts, self._beyond = np.zeros((4, nv))
         self._still = np.zeros(nv, dtype=np.int64)
+        self._step = np.full(nv, inf)  # the smallest change of a position
         self._before, self._last_v, self._speed = np.zeros((3, nv))
         self.slope: Array = np.zeros(nv)
         self.mean: Array = np.zeros(nv)
         self.difference: Array = np.zeros(nv)
         self.doubtful: Flags = np.zeros(nv, dtype=bool)
         self.contradicted: Flags = np.zeros(nv, dtype=bool)
+        self._by_q: Flags = np.ones(nv, dtype=bool)  # whose positions are trusted
+        self._by_v: Flags = np.ones(nv, dtype=bool)  # whose velocities are
         self._none, self._nothing = np.zeros(nv, dtype=bool), np.zeros(nv)
         self.dead: Flags = self._none
+
+    def trust(self, positions: Flags, velocities: Flags) -> None:
+        """From now on a sensor is dead if what is trusted of it stands, (nv,) each."""
+        self._by_q, self._by_v = positions.copy(), velocities.copy()
 
     def update(self, way: Array, v: Array, passed: float) -> None:
         """Judge a new measurement.
@@ -128,11 +144,20 @@ class VelocityCheck:
         self._find_dead(way, v, slope)
 
     def _find_dead(self, way: Array, v: Array, slope: Array) -> None:
-        still = (np.abs(way) < 1e-12) & (v == self._last_v)
+        size = np.abs(way)
+        self._step = np.where(
+            size > _NO_CHANGE, np.minimum(size, self._step), self._step
+        )
+        still = (size < _NO_CHANGE) | ~self._by_q
+        still &= (v == self._last_v) | ~self._by_v
+        still &= self._by_q | self._by_v
         self._last_v = v
         # The speed before it stood, of two states: the last may show a part of the lie.
         # It is measured: friction that the model misses must not count.
-        now = np.minimum(np.abs(v), np.abs(slope))
+        now = np.minimum(
+            np.where(self._by_v, np.abs(v), inf),
+            np.where(self._by_q, np.abs(slope), inf),
+        )
         speed, self._speed = np.maximum(now, self._speed), now
         if not still.any():
             self._still[:], self._before, self.dead = 0, speed, self._none
@@ -140,5 +165,9 @@ class VelocityCheck:
         self._before = np.where(still, self._before, speed)
         self._still = np.where(still, self._still + 1, 0)
         moved = self._before * self._still * self._period
-        fast = (self._before > 2.0 * _STOPS * self._period) & (moved > _STEP)
-        self.dead = (self._still >= _STILL) & fast & self._judged
+        far = moved > np.maximum(_STEP, np.minimum(_STEPS * self._step, _COARSEST))
+        # Friction may stop one joint soon, but not several in the same period.
+        went = still & (self._before > _WENT)
+        together = (went[:, None] & (self._still[:, None] == self._still)).sum(axis=0)
+        fast = self._before > 2.0 * _STOPS * self._period / np.maximum(together, 1)
+        self.dead = (self._still >= _STILL) & fast & far & self._judged

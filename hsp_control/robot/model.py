@@ -72,16 +72,27 @@ class RobotModel(Structure):
         g = float(np.linalg.norm(model.gravity.linear))
         for joint in range(1, model.njoints):
             own = model.joints[joint]
-            # What a follower carries its leader's motor carries, too.
-            ratio = 1.0 if own.nv else abs(float(own.extract().scaling))
-            turns = self.units[own.idx_v] == "rad"
+            turns, ratio, follows = self.units[own.idx_v] == "rad", 1.0, own.nv == 0
+            if follows:  # its leader bears it
+                turns, ratio = self._followed(joint)
             for body in model.subtrees[joint]:
                 inertia = model.inertias[body]
                 away = self._lengths[body] - self._lengths[joint]
                 lever = away + float(np.linalg.norm(inertia.lever)) if turns else 1.0
-                dofs = slice(own.idx_v, own.idx_v + own.nvExtended)
-                most[dofs] += ratio * g * inertia.mass * lever
+                columns = slice(own.idx_v, own.idx_v + (1 if follows else own.nv))
+                most[columns] += ratio * g * inertia.mass * lever
         return most
+
+    def _followed(self, joint: int) -> tuple[bool, float]:
+        """Return whether a follower turns, and how fast, relative to its leader."""
+        model, data = self.model, self.model.createData()
+        v = np.zeros(self.nv)
+        v[model.joints[joint].idx_v] = 1.0
+        pin.forwardKinematics(model, data, pin.neutral(model), v)
+        carried = data.liMi[joint].actInv(data.v[model.parents[joint]])
+        own = data.v[joint] - carried
+        turns = bool(np.linalg.norm(own.angular) > 0.0)
+        return turns, float(np.linalg.norm(own.angular if turns else own.linear))
 
     @property
     def effort_rate(self) -> Array:

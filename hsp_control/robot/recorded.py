@@ -17,6 +17,7 @@ from hsp_control.common.exceptions import (
 from hsp_control.declaration.plain_data import plain_data
 from hsp_control.robot.description.access import ANYWHERE, Access, XmlError, read_xml
 from hsp_control.robot.description.loading import load_model, placement
+from hsp_control.robot.description.recorded_meshes import meshes_data, meshes_of
 from hsp_control.robot.description.recorded_model import (
     model_data,
     model_of,
@@ -79,10 +80,12 @@ def _model_record(robot: Robot) -> dict[str, Any]:
 
 
 def _text_record(source: RobotSource) -> dict[str, Any]:
+    text = text_of(source)
     return {
         "name": source.name,
         "file": str(source.urdf),
-        "urdf": packed(text_of(source)),
+        "urdf": packed(text),
+        "meshes": meshes_data(source, text),
         "root": source.root,
         "locked": dict(source.locked),
         "motor_inertia": dict(source.motor_inertia),
@@ -120,7 +123,7 @@ def recorded_robot(record: Any, access: Access = ANYWHERE) -> Robot:
 
     It is the one that the log was made with: where the file of its URDF says something
     else today, a warning names it. Meshes are looked up beside that file, or in the
-    robot's package.
+    robot's package; else they are those of the log (`meshes_data`).
 
     Args:
         record: What `robot_record` returned.
@@ -220,4 +223,6 @@ def _source(record: Mapping[str, Any], told: OneRobot, access: Access) -> RobotS
         access=access,
         excluded=frozenset(frozenset(pair) for pair in record["excluded"]),
         expanded=text,
+        # An untrusted log writes no files.
+        meshes=() if access.strict else meshes_of(record.get("meshes", {})),
     )

@@ -30,6 +30,8 @@ def check_columns(columns: Mapping[str, Array], meta: Mapping[str, Any]) -> None
         WrongColumnError: If one is missing, has another shape or length than it must
             have, or is not finite where it has to be; or times run back.
     """
+    if not columns:
+        raise WrongColumnError("the log has no rows: its run ended before the first")
     for name in _REQUIRED:
         if name not in columns:
             raise WrongColumnError(f"the log lacks the column {name!r}")

@@ -176,14 +176,16 @@ _lock = Lock()
 def _listen(port: _Port, part: str, inbox: "ref[Inbox]") -> None:
     """Hear what comes for as long as an inbox is there, in turn with the others."""
     port.parts[part] = inbox
-    while inbox() is not None:
-        if port.reading.acquire(timeout=_POLL):
-            try:
-                port.poll()
-            finally:
-                port.reading.release()
-    with _lock:
-        del port.parts[part]
-        if not port.parts:
-            port.close()
-            _ports.pop(next(key for key, each in _ports.items() if each is port))
+    try:
+        while inbox() is not None:
+            if port.reading.acquire(timeout=_POLL):
+                try:
+                    port.poll()
+                finally:
+                    port.reading.release()
+    finally:
+        with _lock:
+            del port.parts[part]
+            if not port.parts:
+                port.close()
+                _ports.pop(next(key for key, each in _ports.items() if each is port))

@@ -192,7 +192,10 @@ class GripperClient:
             known, other = (":".join(map(str, who)) for who in (self.sender, sender))
             raise ValueError(f"{other} sends while {known} does")
         self.sender, self.last_time = sender, monotonic()
-        if not 0.0 <= (opening := float(value[0])) <= 1.0:
+        numbers = value if isinstance(value, list) else []
+        if len(numbers) != 1 or type(numbers[0]) not in (int, float):
+            raise ValueError(f"the value is {str(value)[:40]}; needs [OPENING]")
+        if not 0.0 <= (opening := float(numbers[0])) <= 1.0:
             raise ValueError(f"the opening is {opening} m")
         return opening
 

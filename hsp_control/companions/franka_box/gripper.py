@@ -28,6 +28,8 @@ _LARGEST = 256
 """Most bytes of a request."""
 _PATIENCE = 2.0
 """How long a client may be silent amid a request, and before its first [s]."""
+_SLOWEST = 1e-3
+"""Slowest motion [m/s]; a slower one would keep the hand for hours."""
 _FAILED = 2
 """The status of what did not come about; that of success is 0."""
 
@@ -53,7 +55,11 @@ class Gripper(Thread):
     def run(self) -> None:
         """Serve until the process ends."""
         while True:
-            tcp, self._peer = self._listener.accept()[0], ("", 0)
+            try:
+                tcp, self._peer = self._listener.accept()[0], ("", 0)
+            except OSError:  # who came has left, or there are too many files
+                time.sleep(_PERIOD)
+                continue
             tcp.settimeout(_PATIENCE)
             with tcp, suppress(OSError, struct.error, KeyError, ValueError):
                 self._serve(tcp)
@@ -77,18 +83,26 @@ class Gripper(Thread):
                 self._peer = tcp.getpeername()[0], given[1]
                 answer = struct.pack("<HH", 0, given[0])
             else:
-                answer = struct.pack("<H", 0 if self._obey(command, given) else _FAILED)
+                answer = struct.pack(
+                    "<H", 0 if self._obey(tcp, command, given) else _FAILED
+                )
             size = _HEADER.size + len(answer)
             tcp.sendall(_HEADER.pack(command, number, size) + answer)
 
-    def _obey(self, command: int, given: tuple[float, ...]) -> bool:
-        """Move, and return whether what was to be came about."""
+    def _obey(self, tcp: socket.socket, command: int, given: tuple[float, ...]) -> bool:
+        """Move, and return whether what was to be came about.
+
+        Raises:
+            ConnectionError: If the client leaves meanwhile: the fingers stop.
+        """
         if command == _STOP:
             return True
         goal, speed = (WIDEST, 0.05) if command == _HOMING else (given[0], given[1])
         if command == _GRASP:
             goal, inner, outer, speed, force = given
-        if not (isfinite(goal) and isfinite(speed) and speed > 0.0 and goal >= 0.0):
+        if not (
+            isfinite(goal) and isfinite(speed) and speed >= _SLOWEST and goal >= 0.0
+        ):
             self._say(f"the gripper cannot go to {goal:g} m at {speed:g} m/s")
             return False
         does = f"grasps with {force:g} N" if command == _GRASP else "goes"
@@ -100,6 +114,8 @@ class Gripper(Thread):
             self.width += min(max(end - self.width, -most), most)
             self._tell()
             time.sleep(_PERIOD)
+            if select([tcp], [], [], 0.0)[0] and not tcp.recv(1, socket.MSG_PEEK):
+                raise ConnectionError("the client has left")
         if command != _GRASP:
             return end == goal
         self.grasped = end == self.thing and goal - inner < end < goal + outer

@@ -141,6 +141,11 @@ class Session:
                     self.handles.receive(message)
         except (ValueError, TypeError, OverflowError) as error:
             self.handles.say(str(error), warning=True)
+        except (KeyboardInterrupt, SystemExit):
+            raise
+        except BaseException as error:  # a user's task or field may raise anything
+            self.over = f"{described(error)}; reset to go on"
+            _log.warning("%s", described(error))
 
     def _compare(self, _at: Changes, operational: bool) -> None:
         """Follow another law; it is no part of the controller, nor of its log."""

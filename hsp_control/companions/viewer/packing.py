@@ -9,6 +9,7 @@ from pathlib import PurePath
 from typing import Any, NamedTuple
 
 import numpy as np
+import umsgpack  # type: ignore[import-untyped]
 from numpy.typing import ArrayLike, NDArray
 
 from hsp_control.common.arrays import Array, Indices
@@ -194,6 +195,8 @@ def read_mesh(thing: Json, owner: str) -> list[Piece]:
             f"{INSTALL}"
         ) from None
     data = thing["data"]
+    if isinstance(data, umsgpack.Ext):  # as it is sent to a page
+        data = data.data
     content = data.encode() if isinstance(data, str) else bytes(data)
     try:
         with warnings.catch_warnings():

@@ -18,6 +18,7 @@ from xml.etree.ElementTree import Element
 from xml.parsers import expat
 
 from hsp_control.common.exceptions import AccessError
+from hsp_control.common.regular_file import check_ends
 from hsp_control.common.resources import bundled
 
 MAX_SIZE = 20_000_000
@@ -93,6 +94,7 @@ class XmlError(Exception):
 
 def read_xml(path: Path) -> Element:
     """Return the top element of an XML file."""
+    check_ends(path)
     with path.open("rb") as file:
         data = file.read(MAX_SIZE + 1)
     if len(data) > MAX_SIZE:

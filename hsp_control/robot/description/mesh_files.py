@@ -54,6 +54,10 @@ def find_problem(file: Path) -> str:
 
 def candidates(source: RobotSource, name: str) -> list[Path]:
     """Return the paths that a file name in a URDF may mean; the first existing wins."""
+    return [*_places(source, name), *(f for n, f in source.meshes if n == name)]
+
+
+def _places(source: RobotSource, name: str) -> list[Path]:
     scheme, _, rest = name.rpartition("://")
     if scheme in ("package", "model"):
         package, _, inside = rest.partition("/")

@@ -18,6 +18,7 @@ import yaml
 
 from hsp_control.common.arrays import Array, Indices
 from hsp_control.common.exceptions import AccessError, ModelError, RobotNotFoundError
+from hsp_control.common.regular_file import check_ends
 from hsp_control.common.resources import bundled_robots, is_file, is_folder
 from hsp_control.common.suggestions import did_you_mean, listing
 from hsp_control.robot.description.access import ANYWHERE, Access
@@ -100,6 +101,8 @@ class RobotSource:
     omitted: tuple[str, ...] = ()
     # the URDF that xacro makes of the file; None if the file is the URDF
     expanded: str | None = None
+    # where meshes are that are not found: by their names in the URDF, those of a log
+    meshes: tuple[tuple[str, Path], ...] = field(default=(), repr=False)
 
 
 def find_robot(
@@ -282,7 +285,7 @@ def _from_path(
         path = path.expanduser()
     access.check(path, "robot")
     try:
-        path.is_file()
+        check_ends(path)
     except OSError as error:  # the name is too long, or its folder may not be read
         raise RobotNotFoundError(f"{path!s:.200}: {error.strerror}") from None
     if path.is_dir():

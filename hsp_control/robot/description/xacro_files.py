@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from hsp_control.common.exceptions import ModelError
+from hsp_control.common.regular_file import check_ends
 from hsp_control.common.suggestions import did_you_mean
 from hsp_control.robot.description.access import MAX_SIZE, XmlError, read_xml
 
@@ -51,6 +52,7 @@ def is_xacro(file: Path) -> bool:
     if file.suffix.lower() == ".xacro":
         return True
     try:
+        check_ends(file)
         with file.open("rb") as opened:
             text = _COMMENT.sub(b"", opened.read(MAX_SIZE))
     except OSError:  # reported by who reads the URDF

@@ -60,12 +60,18 @@ class Inbox:
         self.space, self._source = space, source
         self.count = self.rejected = self.taken = 0
         self.reason = ""
+        self.failure = ""  # why nobody listens any more
         self._waiting: deque[Received] = deque(maxlen=CAPACITY)
         self._lock = Lock()
         self._said: set[str] = set()
         self._sender, self._until = "", -inf  # who is heard alone, and until when
         self._seen: dict[str, float] = {}
         self._newest, self._behind = -inf, inf  # of its clock: its time, ours after it
+
+    @property
+    def source(self) -> str:
+        """The address that is heard; empty without one."""
+        return self._source
 
     def check_sender(self, sender: str, now: float) -> None:
         """Raise if another one sends, who was first; ``now`` is our own time [s]."""
@@ -111,6 +117,15 @@ class Inbox:
             self.count += 1
             self._waiting.append(Received(self.count, message))
 
+    def fail(self, error: BaseException) -> None:
+        """Let each reader raise: the thread that listens has ended with an error."""
+        try:
+            text = str(error)
+        except Exception:  # of somebody's own type
+            text = ""
+        name = type(error).__name__
+        self.failure = f"{name}: {text}" if text else name
+
     def reject(self, reason: str, *, aloud: bool = True) -> None:
         """Count an invalid message; each kind of reason is said once."""
         with self._lock:
@@ -153,7 +168,15 @@ class InboxReader:
         self._previews = False
 
     def take(self, t: float) -> list[tuple[float, Message]]:
-        """Return what is there at a time [s] and was not taken, and this time."""
+        """Return what is there at a time [s] and was not taken, and this time.
+
+        Raises:
+            StreamError: If nobody listens any more.
+        """
+        if self._inbox.failure:
+            raise StreamError(
+                f"{self._inbox.source}: its thread has ended: {self._inbox.failure}"
+            )
         if self._inbox.count == self._number:
             return []
         received = self._inbox.after(self._number, take=not self._previews)

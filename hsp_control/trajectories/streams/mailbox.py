@@ -40,7 +40,7 @@ def is_address(source: str) -> bool:
 def listening_inbox(source: str, space: Space) -> Inbox:
     """Return the inbox of an address, one per process; unused, it closes."""
     known = _inboxes.get(source)
-    if known is not None:
+    if known is not None and not known.failure:
         if known.space != space:
             raise StreamError(
                 f"{source} already carries {known.space.width} numbers; this stream "
@@ -53,10 +53,19 @@ def listening_inbox(source: str, space: Space) -> Inbox:
     inbox = Inbox(space, source)
     _inboxes[source] = inbox
     _threads[source] = Thread(
-        target=listen, args=(ref(inbox),), name=f"stream {source}", daemon=True
+        target=_run, args=(listen, ref(inbox)), name=f"stream {source}", daemon=True
     )
     _threads[source].start()
     return inbox
+
+
+def _run(listen: Listen, inbox: "ref[Inbox]") -> None:
+    """Listen; who reads the inbox is told if that fails, whatever is raised."""
+    try:
+        listen(inbox)
+    except BaseException as error:
+        if (there := inbox()) is not None:
+            there.fail(error)
 
 
 def kind_of(source: str) -> AddressKind:

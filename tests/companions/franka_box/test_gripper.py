@@ -38,7 +38,7 @@ def asked(made: socket.socket, command: int, payload: bytes) -> int:
     return int(struct.unpack_from("<H", made.recv(size, socket.MSG_WAITALL))[0])
 
 
-@pytest.mark.parametrize("speed", [0.0, -1.0, np.nan, np.inf])
+@pytest.mark.parametrize("speed", [0.0, -1.0, 1e-9, 1e-300, np.nan, np.inf])
 @pytest.mark.parametrize("goal", [0.02, np.nan, -np.inf, -0.1])
 def test_no_speed_is_a_failure_and_no_endless_motion(
     served: Gripper, speed: float, goal: float
@@ -64,3 +64,16 @@ def test_who_says_nothing_or_nonsense_makes_room(served: Gripper, sent: bytes) -
             assert asked(made, CONNECT, struct.pack("<HH", 3, 0)) == 0
             assert asked(made, MOVE, struct.pack("<2d", 0.04, 10.0)) == 0
     assert served.is_alive()
+
+
+def test_who_leaves_during_a_motion_makes_room(served: Gripper) -> None:
+    """It would last two minutes."""
+    with closing(client()) as first:
+        assert asked(first, CONNECT, struct.pack("<HH", 3, 0)) == 0
+        assert asked(first, MOVE, struct.pack("<2d", 0.08, 10.0)) == 0
+        payload = struct.pack("<2d", 0.0, 1.01e-3)
+        first.sendall(HEADER.pack(MOVE, 1, HEADER.size + len(payload)) + payload)
+    with closing(client()) as made:
+        made.settimeout(10.0)
+        assert asked(made, CONNECT, struct.pack("<HH", 3, 0)) == 0
+    assert served.width > 0.07

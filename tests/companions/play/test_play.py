@@ -438,6 +438,9 @@ def test_a_robot_that_walks_can_be_pulled_but_not_led(tmp_path: Path) -> None:
     """The feet and the trunk are the plan's; its run is that of `simulate`."""
     session = Session(playable("walking/talos_walk"))
     assert [*session.handles.targets] == ["posture"]
+    plan = session.recorder.plan  # whose streams are recorded
+    assert plan is not None
+    assert plan.plan is session.experiment.scenario.plan
     go(session, 0.5)
     log = session.rollout()
     assert log["plan.phase"][-1] >= 1.0
@@ -462,6 +465,24 @@ def test_whatever_a_field_raises_ends_the_run_and_not_the_session(
         session.advance()
     assert session.over.startswith(type(error).__name__)
     assert len(session.rollout()) >= 5
+    session.reset()
+    go(session, 0.05)
+    assert not session.over
+
+
+@pytest.mark.parametrize(
+    "error", [RuntimeError("mine"), CancelledError(), GeneratorExit(), MemoryError()]
+)
+def test_whatever_a_change_of_a_page_raises_ends_the_run_and_not_the_session(
+    error: BaseException, session: Session, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def fail(*_: object, **__: object) -> None:
+        raise error
+
+    with monkeypatch.context() as patch:
+        patch.setattr(type(session.handles), "receive", fail)
+        session.receive({"do": "anything"})
+    assert session.over.startswith(type(error).__name__)
     session.reset()
     go(session, 0.05)
     assert not session.over

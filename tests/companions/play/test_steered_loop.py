@@ -196,3 +196,11 @@ def test_the_picture_follows_the_journal(steered: Steered) -> None:
     assert passed["position"] == [0.3, 0.3, 0.3]
     loop_side.close()
     heard.close()
+
+
+def test_a_page_whose_process_ends_is_a_fault(steered: Steered) -> None:
+    """Nobody could stop the robot any more: it is no operator's stop."""
+    steered.each.append(lambda t: steered.page.close() if t > 0.05 else None)
+    report = steered.run(1.0)
+    assert "the process of the page has ended" in report.reason
+    assert steered.requests.fault

@@ -1,15 +1,18 @@
 """What Rerun draws stands where the shape is: each in its own way of saying so."""
 
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
+from mesh_texts import CORNERS, SIDES, tetrahedron
+from robot_texts import INERTIA, joint, link, robot_xml
 
 import hsp_control as hsp
 from hsp_control.common.arrays import Array
-from hsp_control.companions.rerun.log import _archetypes, _shape
-from hsp_control.companions.viewer.robot_drawing import Visual
+from hsp_control.companions.rerun.log import _archetypes, _normals, _shape
+from hsp_control.companions.viewer.robot_drawing import Visual, read_visuals
 
 
 @dataclass
@@ -86,3 +89,36 @@ def test_a_links_shape_is_about_its_place(kind: str) -> None:
 def test_an_obstacle_is_about_its_centre(shape: Any, half: tuple[float, ...]) -> None:
     (drawn,) = _shape(Rerun(), shape)
     np.testing.assert_allclose(extent(drawn), [np.negative(half), half])
+
+
+def test_the_normals_of_a_solid_point_outwards() -> None:
+    """Else its inner side is lit."""
+    corners = np.array(
+        [[1.0, 0, 0], [-1, 0, 0], [0, 1, 0], [0, -1, 0], [0, 0, 1], [0, 0, -1]]
+    )
+    triangles = np.array(
+        [[0, 2, 4], [2, 1, 4], [1, 3, 4], [3, 0, 4],
+         [2, 0, 5], [1, 2, 5], [3, 1, 5], [0, 3, 5]]
+    )  # fmt: skip
+    normals = _normals(corners, triangles)
+    np.testing.assert_allclose(normals, corners, atol=1e-12)
+
+
+@pytest.mark.parametrize("ending", ["stl", "obj", "dae", "ply", "off", "gltf"])
+def test_a_links_mesh_is_drawn_of_any_format(ending: str, tmp_path: Path) -> None:
+    file = tmp_path / f"mesh.{ending}"
+    if ending == "stl":
+        faces = CORNERS[np.array(SIDES)].astype("<f4").reshape(4, 9)
+        rows = [np.zeros(3, "<f4").tobytes() + f.tobytes() + b"\0\0" for f in faces]
+        file.write_bytes(bytes(80) + (4).to_bytes(4, "little") + b"".join(rows))
+    else:
+        tetrahedron(file)
+    urdf = tmp_path / "arm.urdf"
+    mesh = f'<geometry><mesh filename="{file}"/></geometry>'
+    shape = f"<visual>{mesh}</visual>"
+    urdf.write_text(
+        robot_xml(link("a"), link("b", INERTIA + shape), joint("j", "a", "b"))
+    )
+    (visual,) = read_visuals(hsp.Robot.load(urdf))
+    (drawn,) = _archetypes(Rerun(), visual, "link")
+    np.testing.assert_allclose(extent(drawn), [np.zeros(3), [1.0, 2.0, 3.0]])

@@ -16,8 +16,16 @@ from hsp_control import Robot
 from hsp_control.cli import main
 from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import ExportError
-from hsp_control.companions.rerun.log import _archetypes, log_to_rerun
+from hsp_control.companions.rerun.log import (
+    _archetypes,
+    _log_paths,
+    _log_robot,
+    log_to_rerun,
+)
+from hsp_control.companions.viewer.commands import path_element
+from hsp_control.companions.viewer.motion import RunMotion
 from hsp_control.companions.viewer.robot_drawing import read_visuals
+from hsp_control.companions.viewer.targets import read_targets
 
 
 @pytest.fixture(scope="module")
@@ -174,3 +182,43 @@ def test_every_kind_of_geom_is_drawn_as_what_it_is() -> None:
         "Ellipsoids3D",
         "Mesh3D",
     ]
+
+
+def test_what_is_turned_is_turned_the_same_way(log: hsp.Rollout) -> None:
+    """A link's shape in its joint, and the target of an orientation."""
+    robot = hsp.Robot.load("panda")
+    sent: dict[str, Any] = {}
+
+    class Recording:
+        def log(self, path: str, thing: Any, **_: Any) -> None:
+            sent[path] = thing
+
+        def send_columns(self, path: str, _: Any, columns: Any) -> None:
+            sent[path] = columns
+
+    class Rerun:
+        """Keeps what it is given."""
+
+        class Transform3D(dict[str, Any]):
+            @staticmethod
+            def columns(**given: Any) -> Any:
+                return given
+
+        def __getattr__(self, kind: str) -> Any:
+            return lambda *_, **__: kind
+
+    motion = RunMotion(robot, log)
+    _log_robot(Rerun(), Recording(), motion)
+    turned = 0
+    for k, visual in enumerate(read_visuals(robot)):
+        ends = f"/{path_element(visual.link)}/{k}"
+        (pose,) = (thing for path, thing in sent.items() if path.endswith(ends))
+        np.testing.assert_array_equal(pose["mat3x3"], visual.pose[:3, :3])
+        np.testing.assert_array_equal(pose["translation"], visual.pose[:3, 3])
+        turned += not np.allclose(visual.pose[:3, :3], visual.pose[:3, :3].T)
+    assert turned
+    _log_paths(Rerun(), Recording(), motion)
+    (target,) = (t for t in read_targets(motion.rows) if t.name == "hand")
+    assert target.rotation is not None
+    given = sent["/targets/hand"]["quaternion"]
+    np.testing.assert_array_equal(given, target.rotation)

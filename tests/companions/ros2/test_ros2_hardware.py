@@ -294,3 +294,16 @@ def sender_of(hardware: Ros2Hardware) -> int:
     sender = hardware._sender
     assert sender is not None
     return sender
+
+
+def test_the_first_two_reads_are_a_period_apart(rig: tuple[Rig, Ros2Hardware]) -> None:
+    """Whatever the robot's clock did while the loop prepared between them."""
+    made, hardware = rig
+    hardware._reads, times = 0, []
+    for _ in range(4):
+        made.robot.stamp += 700 * MILLISECOND * (len(times) == 1)
+        made.robot.send()
+        found = hardware.read(LONG)
+        assert found is not None
+        times.append(found.t)
+    np.testing.assert_allclose(times, PERIOD * np.arange(4), atol=1e-9)

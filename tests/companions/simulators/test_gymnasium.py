@@ -152,3 +152,13 @@ def test_what_the_page_shows_runs() -> None:
     assert np.isfinite(space["observation"]).all()
     (settings,) = re.findall(r"^```yaml\n(.*?)^```", text, re.MULTILINE | re.DOTALL)
     read_settings(yaml.safe_load(settings))
+
+
+def test_a_change_turns_about_the_axes_of_the_world(arm: ArmEnv) -> None:
+    env = HandTargets(arm, "hand", FREE, scale=(0.1, 1.0))
+    env.reset(seed=0)
+    here, turn = pose_of(env), np.array([0.3, -0.2, 0.5])
+    goal = env._goal(np.concatenate([[0.5, 0.0, -1.0], turn]))
+    np.testing.assert_allclose(goal.rotation, pin.exp3(turn) @ here.rotation, atol=1e-9)
+    moved = goal.translation - here.translation
+    np.testing.assert_allclose(moved, [0.05, 0.0, -0.1], atol=1e-9)

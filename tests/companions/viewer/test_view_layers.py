@@ -14,7 +14,7 @@ from hsp_control.companions.viewer.analysis import (
     null_space_projector,
     terms_of_type,
 )
-from hsp_control.companions.viewer.arrows import ELLIPSOID_SECONDS
+from hsp_control.companions.viewer.arrows import ELLIPSOID_SECONDS, principal_axes
 from hsp_control.companions.viewer.clearances import capsules, zone
 from hsp_control.companions.viewer.commands import CAPTION, CLIP, unpack
 from hsp_control.companions.viewer.motion import motion_of
@@ -528,3 +528,16 @@ def test_a_view_that_ends_does_not_end_the_run(
         rollout = experiment.run(on_row=view.on_row)
     assert rollout.status == "completed"
     assert "the run continues without a view" in caplog.text
+
+
+def test_the_axes_of_an_ellipsoid_are_a_rotation_that_does_not_jump() -> None:
+    """Mirrored axes are no quaternion; and the nearest order of the axes is kept."""
+    rng, last = np.random.default_rng(0), np.eye(3)
+    J = rng.standard_normal((3, 7))
+    for size in [0.02] * 100 + [1.0] * 100:
+        J = J + size * rng.standard_normal((3, 7))
+        axes, lengths = principal_axes(J, last)
+        assert np.linalg.det(axes) == pytest.approx(1.0)
+        squares = axes @ np.diag(lengths**2) @ axes.T
+        np.testing.assert_allclose(squares, J @ J.T, atol=1e-10)
+        last = axes

@@ -1,5 +1,6 @@
 """Check what is read from a text, and every message of one that is no YAML."""
 
+import os
 from pathlib import Path
 
 import pytest
@@ -158,3 +159,14 @@ def test_a_file_may_begin_with_a_byte_order_mark(tmp_path: Path) -> None:
     document = Document.read(path)
     assert document.to_dict() == {"a": 1, "b": 2}
     assert document.location(("b",)) == f"{path}:2"
+
+
+def test_a_pipe_is_not_read_for_ever(tmp_path: Path) -> None:
+    for name in ("made.yaml", "zero.yaml"):
+        path = tmp_path / name
+        if name == "zero.yaml":
+            path.symlink_to("/dev/zero")
+        else:
+            os.mkfifo(path)
+        with pytest.raises(ConfigError, match="a device or a pipe, which may never"):
+            Document.read(path)

@@ -72,12 +72,25 @@ def test_what_cannot_be_repeated_says_why_and_an_error_ends_the_log(
         hsp.Recorder(controller, log_period=0)
 
 
+class NamelessError(Exception):
+    def __str__(self) -> str:
+        raise RuntimeError("it has no text")
+
+
 @pytest.mark.parametrize("rows", [0, 1])
 @pytest.mark.parametrize(
     "error",
-    [ValueError("mine"), CancelledError(), GeneratorExit(), SystemExit(1)],
-    ids=repr,
-)
+    [
+        ValueError("mine"),
+        CancelledError(),
+        GeneratorExit(),
+        SystemExit(1),
+        NamelessError(),
+    ],
+    ids=lambda error: (
+        type(error).__name__ if isinstance(error, BaseException) else None
+    ),
+)  # fmt: skip
 def test_whatever_is_raised_the_next_recorder_can_write(
     error: BaseException, rows: int, tmp_path: Path
 ) -> None:

@@ -87,6 +87,7 @@ def test_by_default_gravity_may_overload_no_motor_of_an_arm() -> None:
         assert (np.abs(asked) < robot.largest_gravity).all()
     for none in ({}, {"effort": "none"}, {"effort": 1.0, "static_effort": "none"}):
         assert of(robot, **none).static_effort is None
+    assert of(fingers(), effort=1.0).static_effort is not None
     held = of(robot, effort=[87.0, 87.0, 30.0, 50.0, 12.0, 12.0, 12.0]).static_effort
     assert held is not None
     assert held.share == 0.95

@@ -10,11 +10,11 @@ from controller_cases import panda
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 from runs import held
+from static_rows import static_rows
 
 import hsp_control as hsp
 from hsp_control.common.arrays import Array
 from hsp_control.constraints.limits import StaticEffort
-from hsp_control.constraints.limits.barriers import BarrierRows
 from hsp_control.control.actuation import Status
 from hsp_control.control.actuation.deviation_cost import (
     Directions,
@@ -26,7 +26,6 @@ from hsp_control.edge import Resolution
 from hsp_control.engine.plans import planned
 
 seeds = st.integers(0, 2**32 - 1)
-NOWHERE = np.zeros(0, dtype=np.int64)
 FAR = [0.8, 0.6, 0.9]
 
 
@@ -195,9 +194,7 @@ def test_static_rows_are_the_second_derivative(locked: dict[str, float] | None) 
     effort, share, alpha, h = np.full(n, 20.0), 0.6, 7.0, 1e-3
     limit = StaticEffort(effort, share)
     q, v, a = robot.home(), 0.5 * rng.standard_normal(n), rng.standard_normal(n)
-    state, rows = robot.state(0.0, q, v), BarrierRows.allocate(limit.room(), n)
-    state.run(limit.row_calls(state, alpha, NOWHERE, rows))
-    A, b = rows.used
+    A, b = static_rows(limit, robot.state(0.0, q, v), alpha)
     assert len(A) > 0
 
     def room(s: float) -> Array:

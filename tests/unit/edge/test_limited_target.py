@@ -14,6 +14,7 @@ from hsp_control.edge.limited_target import (
     Within,
     limited_target,
 )
+from hsp_control.engine.plans import planned
 
 NV = 4
 seeds = st.integers(0, 2**32 - 1)
@@ -70,8 +71,7 @@ def called(given: Asked) -> Asked:
     """Return what the call makes of it."""
     a, effort, lower = given.a.copy(), given.effort.copy(), given.barred.lower.copy()
     made = given._replace(a=a, effort=effort, barred=Barred(given.barred.A, lower))
-    kind, arguments = limited_target(*made)
-    kind(*arguments)()
+    planned([limited_target(*made)]).run(0.0)
     return made
 
 

@@ -20,6 +20,7 @@ from hsp_control.live import (
     StopSettings,
     run_loop,
 )
+from hsp_control.live.reaction_check import ReactionCheck
 from hsp_control.live.response_check import ResponseCheck
 from hsp_control.live.state_reader import RobotClock
 from hsp_control.live.still_sensors import StillSensors
@@ -142,6 +143,45 @@ def test_a_dead_sensor_leaves_it_to_the_robot() -> None:
     _, report = run(IN_MOTION, LIES["both: stands"], [3])
     assert "panda_joint4 stands from one state to the next" in report.reason
     assert report.silent
+
+
+@pytest.mark.parametrize("kind", ["stands", "frozen"])
+@pytest.mark.parametrize("joint", [0, 2, 3])
+def test_a_sensor_that_is_dead_from_the_start_is_found(kind: str, joint: int) -> None:
+    """Friction could hold the joint; but the others feel it move (12 rad/s before)."""
+    robot = Liar(LIES[f"both: {kind}"], [joint], 2)
+    report = run_loop(moving(), robot, duration=0.3, settings=SETTINGS)
+    assert report.ended == "fault"
+    assert f"panda_joint{joint + 1} stands to the last bit" in report.reason
+    assert "the other joints feel it move" in report.reason
+    assert report.silent
+    assert np.abs(robot.speeds).max() < 2.7
+
+
+@pytest.mark.parametrize("kind", ["both: stuck, with +1", "both: stands"])
+def test_what_replaces_a_lie_may_die_as_well(kind: str) -> None:
+    """The arm accelerates; the positions that replace the wrong velocity stand."""
+    robot = Liar(LIES[kind], [1, 3], 30)
+    report = run_loop(
+        moving(),
+        robot,
+        duration=0.2,
+        settings=SETTINGS,
+        on_period=lambda t: robot.running(),
+    )
+    assert report.ended == "fault"
+    assert report.silent
+    # What was sent before ends by its rate; 0.94 rad/s if the positions are believed.
+    assert np.array(robot.speeds)[robot.stopped :].max() < 0.6
+
+
+def test_a_lie_of_both_from_the_start_is_no_motion() -> None:
+    """Velocity and slope contradict each other at the first state: it is at rest."""
+    for joints in ([1], ALL):
+        robot = Liar(LIES["both: contrary"], joints, 2)
+        report = run_loop(moving(), robot, duration=0.3, settings=SETTINGS)
+        assert report.ended == "fault"
+        assert np.abs(robot.speeds).max() < 0.3
 
 
 @pytest.mark.parametrize("begin", [2, IN_MOTION])
@@ -346,6 +386,69 @@ def test_a_gap_without_states_contradicts_nothing() -> None:
     for _ in range(3):
         check.update(1.3 * PERIOD * one, -1.3 * one, PERIOD)
     assert check.contradicted.all()
+
+
+def reaction(moves: float, *, beside: float = 0.0) -> bool:
+    """Return whether the others feel a silent elbow that moves, by a part, or stands.
+
+    Shoulder and forearm are pushed beside, as by friction that the model misses.
+    """
+    robot, zero = panda(), np.zeros(7)
+    check, silent = ReactionCheck(0.3), np.eye(7, dtype=bool)[3]
+    rng, v = np.random.default_rng(0), np.zeros(7)
+    inertia = robot.state(0.0, start(), zero).mass_matrix
+    others, felt = ~silent, False
+    for k in range(300):
+        push = 6.0 * np.sin(12.0 * k * PERIOD) * np.eye(7)[3]
+        force = push + np.eye(7)[1] * 2.0
+        free = np.linalg.solve(inertia, force)
+        check.expect(silent, inertia, free)
+        among = inertia[np.ix_(others, others)]
+        true = force[others] + beside * np.array([3.0, -3.0, 2.0, 0.5, 0.3, 0.1])
+        at_rest = np.linalg.solve(among, true)
+        all_move = at_rest + free[others] - np.linalg.solve(among, force[others])
+        v[others] += PERIOD * (at_rest + moves * (all_move - at_rest))
+        check.update(v + rng.normal(0.0, 0.005, 7), PERIOD)
+        felt |= check.felt
+    return felt
+
+
+def test_the_others_feel_a_joint_that_moves() -> None:
+    assert reaction(1.0)
+    assert reaction(0.8)  # its friction brakes it
+    assert not reaction(0.0)
+    assert not reaction(0.2)
+    assert not reaction(0.0, beside=1.0)  # their own friction is something else
+    assert not reaction(0.0, beside=-1.0)
+
+
+def test_a_coarse_encoder_with_a_velocity_between_its_steps_is_not_dead() -> None:
+    """A slowing joint: 1.5 mrad a step, and the velocity of the last 20 ms."""
+    check, step = VelocityCheck(panda(), SETTINGS, PERIOD), 1.5e-3
+    q, seen = 0.0, [0.0]
+    for k in range(400):
+        q += PERIOD * max(0.15 - 0.5 * k * PERIOD, 0.0)
+        seen.append(np.floor(q / step) * step)
+        v = (seen[-1] - seen[max(len(seen) - 21, 0)]) / (20 * PERIOD)
+        way = (seen[-1] - seen[-2]) * np.ones(7)
+        check.update(way, v * np.ones(7), PERIOD)
+        assert not check.dead.any(), k
+
+
+@pytest.mark.parametrize(("joints", "dead"), [(1, False), (2, True), (7, True)])
+def test_no_friction_stops_several_joints_in_one_period(
+    joints: int, dead: bool
+) -> None:
+    """At 5 ms and 0.3 rad/s; one of them may well have stopped."""
+    check = VelocityCheck(panda(), SETTINGS, 0.005)
+    v = 0.3 * (np.arange(7) < joints)
+    for k in range(40):
+        moving = v * (k < 30)
+        noise = 1e-4 * np.sin(1.0 + 7.0 * k) * (np.arange(7) >= joints)
+        check.update(0.005 * moving + noise, moving + noise, 0.005)
+        if k < 32:
+            assert not check.dead.any()
+    assert check.dead.sum() == (joints if dead else 0)
 
 
 def oscillation(

@@ -307,6 +307,21 @@ ERRORS = st.sampled_from(
 )  # fmt: skip
 
 
+@pytest.mark.parametrize("asked", ASKED, ids=repr)
+def test_a_stop_that_is_cut_short_is_not_completed(asked: BaseException) -> None:
+    """The duration is over, and Ctrl-C comes while the safe stop brakes."""
+
+    def ask(found: Measurement) -> Measurement:
+        raise asked
+
+    robot = Rig(watched(SETTINGS), {25: ask})
+    report = run_loop(law(), robot, duration=20 * PERIOD, settings=SETTINGS)
+    assert report.silent
+    assert not report.at_rest
+    assert report.ended == "operator"
+    assert report.reason.startswith("the duration is over; the safe stop was cut short")
+
+
 class Failing(Rig):
     """A robot whose methods raise: from their nth call on, some times or always."""
 

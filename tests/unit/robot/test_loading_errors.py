@@ -1,5 +1,6 @@
 """Check every error of a robot that cannot be loaded."""
 
+import os
 import re
 from collections.abc import Callable
 from pathlib import Path
@@ -205,3 +206,13 @@ def test_option_that_does_not_fit(
     with pytest.raises(error, match=re.escape(message)) as caught:
         Robot.load(write(ARM), **options)
     assert isinstance(caught.value, HspControlError)
+
+
+def test_a_pipe_is_not_read_for_ever(tmp_path: Path) -> None:
+    os.mkfifo(tmp_path / "arm.urdf")
+    with pytest.raises(RobotNotFoundError, match="a device or a pipe, which may never"):
+        Robot.load(tmp_path / "arm.urdf")
+    os.mkfifo(tmp_path / "package.xml")  # it is read where a mesh is looked for
+    (tmp_path / "b.urdf").write_text(robot_xml(link("a")))
+    with pytest.raises(ModelError, match="no moving joint"):
+        Robot.load(tmp_path / "b.urdf")

@@ -9,9 +9,11 @@ import numpy as np
 import pytest
 from robot_kinds import TEXTS, chain, follow
 from robot_texts import assert_same_placements, placements
+from static_rows import static_rows
 
 from hsp_control import Robot
 from hsp_control.common.arrays import Array
+from hsp_control.constraints.limits import StaticEffort
 from hsp_control.robot.friction import JointFriction
 
 Write = Callable[..., Path]
@@ -156,3 +158,39 @@ def test_a_leader_that_comes_late_keeps_its_name(write: Write) -> None:
         free.state(0.0, np.array([0.45, 0.5, *q]), np.zeros(4)).position("link3"),
         rtol=0, atol=1e-12,
     )  # fmt: skip
+
+
+@pytest.mark.parametrize("multiplier", [1.0, 2.5, -1.5, 0.0])
+@pytest.mark.parametrize("kinds", [*itertools.product(TYPES, TYPES)])
+def test_what_gravity_takes_of_a_leader_counts_its_followers(
+    kinds: tuple[str, str], multiplier: float, write: Write
+) -> None:
+    """The limit on it: its bound holds, and its rows are G'' along the motion."""
+    leader, follower = kinds
+    path = write(
+        chain(
+            ("leader", leader, ""), ("middle", "revolute", ""),
+            ("follower", follower, follow("leader", multiplier, 0.3)),
+        )
+    )  # fmt: skip
+    robot, rng, none = Robot.load(path), np.random.default_rng(5), np.zeros(2)
+    v, a = 0.5 * rng.standard_normal((2, 2))
+    for _ in range(50):
+        q = robot.integrate(robot.neutral(), rng.uniform(-1.0, 1.0, 2))
+        gravity = np.abs(robot.inverse_dynamics(q, none, none))
+        assert (gravity <= robot.largest_gravity * (1.0 + 1e-12)).all()
+    effort, share, alpha, h = 0.5 * np.maximum(gravity, 1e-3), 0.9, 7.0, 1e-3
+    limit = StaticEffort(effort, share)
+    A, b = static_rows(limit, robot.state(0.0, q, v), alpha)
+    assert len(A) == (gravity > 1e-3).sum()
+
+    def room(s: float) -> Array:
+        there = robot.integrate(q, s * v + 0.5 * s * s * a)
+        return share - np.abs(robot.inverse_dynamics(there, none, none)) / effort
+
+    rate = (room(h) - room(-h)) / (2.0 * h)
+    second = (room(h) - 2.0 * room(0.0) + room(-h)) / h**2
+    barrier = second + 2.0 * alpha * rate + alpha**2 * room(0.0)
+    # Differences of differences, of numbers about 2: rounding and truncation.
+    expected = barrier[gravity > 1e-3]
+    np.testing.assert_allclose(A @ a - b, expected, rtol=0.0, atol=1e-3)

@@ -1,5 +1,6 @@
 """A log contains its robot: another computer, or an edited file, changes nothing."""
 
+import json
 import logging
 import shutil
 from pathlib import Path
@@ -7,9 +8,15 @@ from pathlib import Path
 import numpy as np
 import pinocchio as pin
 import pytest
+from robot_texts import INERTIA, joint, robot_xml
 
 import hsp_control as hsp
 from hsp_control.common.exceptions import ModelError
+from hsp_control.companions.viewer.robot_drawing import read_visuals
+from hsp_control.geometry.links import link_shapes
+from hsp_control.robot.description import recorded_meshes
+from hsp_control.robot.description.access import only_within
+from hsp_control.robot.description.recorded_model import packed
 from hsp_control.robot.description.robot_description import (
     PlacedRobot,
     RobotDescription,
@@ -225,3 +232,80 @@ def test_a_recorded_run_is_repeated_without_its_files(tmp_path: Path) -> None:
 def test_a_damaged_record_is_one_message(record: object) -> None:
     with pytest.raises(ModelError, match=r"the (log|recorded)|recorded robot"):
         recorded_robot(record)
+
+
+PYRAMID = (
+    "v 0 0 0\nv 0.1 0 0\nv 0 0.1 0\nv 0 0 0.3\nf 1 3 2\nf 1 2 4\nf 2 3 4\nf 3 1 4\n"
+)
+
+
+def with_meshes(folder: Path) -> Path:
+    """Return a URDF of two links whose shapes are meshes, named in three ways."""
+    package = folder / "mine"
+    (package / "meshes").mkdir(parents=True)
+    (package / "package.xml").write_text("<package><name>mine</name></package>")
+    for name in ("a.obj", "b.obj", "c.obj"):
+        (package / "meshes" / name).write_text(PYRAMID + f"# {name}\n")
+    text = robot_xml(
+        *(
+            f'<link name="{name}">{INERTIA}'
+            f'<visual><geometry><mesh filename="{seen}"/></geometry></visual>'
+            f'<collision><geometry><mesh filename="{felt}"/></geometry></collision>'
+            "</link>"
+            for name, seen, felt in (
+                ("one", "meshes/a.obj", "meshes/b.obj"),
+                ("two", f"{package}/meshes/c.obj", "package://mine/meshes/b.obj"),
+            )
+        ),
+        joint("j", "one", "two"),
+    )
+    urdf = package / "arm.urdf"
+    urdf.write_text(text)
+    return urdf
+
+
+def test_a_log_contains_the_meshes_of_somebodys_robot(tmp_path: Path) -> None:
+    """Its shapes are drawn, and distances measured, where its files are not."""
+    urdf = with_meshes(tmp_path)
+    robot = hsp.Robot.load(urdf)
+    record = json.loads(json.dumps(robot_record(robot)))
+    assert len(record["parts"][0]["meshes"]) == 4
+    before = [shape.geometry.aabb_radius for shape in link_shapes(robot)]
+    shutil.rmtree(urdf.parent)
+    again = recorded_robot(record)
+    after = [shape.geometry.aabb_radius for shape in link_shapes(again)]
+    assert len(after) == 2
+    np.testing.assert_array_equal(after, before)
+    assert not any(visual.missing for visual in read_visuals(again))
+    # And a log of what was replayed contains them, too.
+    assert robot_record(again)["parts"][0]["meshes"] == record["parts"][0]["meshes"]
+
+
+def test_packages_are_no_part_of_a_log_and_large_meshes_neither(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    panda = robot_record(hsp.Robot.load("panda"))
+    assert panda["parts"][0]["meshes"] == {}
+    urdf = with_meshes(tmp_path)
+    monkeypatch.setattr(recorded_meshes, "MOST", 2 * len(PYRAMID) + 20)
+    (part,) = robot_record(hsp.Robot.load(urdf))["parts"]
+    assert [*part["meshes"]] == ["meshes/b.obj", "package://mine/meshes/b.obj"]
+
+
+@pytest.mark.parametrize(
+    "meshes",
+    [[], 5, {"a.obj": "x"}, {"a.obj": 5}, {"a.sh": packed(b"x")}, {"a": packed(b"x")},
+     {"a.obj": packed(bytes(5_000_000))}],
+    ids=lambda meshes: str(meshes)[:20],
+)  # fmt: skip
+def test_damaged_meshes_are_named(meshes: object, tmp_path: Path) -> None:
+    record = robot_record(hsp.Robot.load(with_meshes(tmp_path)))
+    record["parts"][0]["meshes"] = meshes
+    with pytest.raises(ModelError, match=r"damaged|not whole"):
+        recorded_robot(record)
+
+
+def test_an_untrusted_log_writes_no_mesh(tmp_path: Path) -> None:
+    record = robot_record(hsp.Robot.load(with_meshes(tmp_path)))
+    robot = recorded_robot(record, only_within([tmp_path]))
+    assert robot.source.meshes == ()

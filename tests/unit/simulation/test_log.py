@@ -220,6 +220,7 @@ FOREIGN: dict[str, tuple[Callable[[], bytes], str]] = {
                NOT_OURS),
     "another robot": (lambda: npz(meta=meta(robot={"nq": 9, "nv": 9}), **TWO),
                       r"the column 'q' has shape .*; needs \(2, 9\)"),
+    "no column": (lambda: npz(meta=meta()), r"the log has no rows: its run ended"),
     "described column": (lambda: npz(meta=meta(columns={"e": {}}), **TWO),
                          r"the log lacks the column 'e'"),
 }  # fmt: skip

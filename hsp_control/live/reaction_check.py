@@ -1,0 +1,107 @@
+"""Finds joints that move though their sensors say nothing, by what the others feel."""
+
+from math import exp
+
+import numpy as np
+
+from hsp_control.common.arrays import Array, Flags
+
+_WASHOUT = 0.1
+"""Time constant with which a change of velocity is forgotten [s]."""
+_MEMORY = 0.1
+"""Time constant of the mean squares that are compared [s]."""
+_FELT, _MOST = 0.5, 1.6
+"""Which part of the reaction is felt at least, and at most: masses may be wrong, and
+friction may brake the joint."""
+_EXPLAINED = 0.8
+"""Which part of what the others do beyond their own motion the reaction explains."""
+_LEAST = 0.1
+"""Smallest reaction that is judged, relative to the error of velocities."""
+_HELD = 0.03
+"""How long that must last [s]."""
+
+
+class ReactionCheck:
+    """Compares the other joints' motion with a silent joint at rest, and in motion.
+
+    Some joints s say the same to the last bit, under efforts that friction could hold.
+    If they stand, the others o accelerate by M_oo⁻¹ (tau - h)_o; if they move, by the
+    rows of M⁻¹ (tau - h). Where the others do what they would if the silent ones moved,
+    and not what they would if those stood, the sensors of the silent ones are dead.
+
+    Attributes:
+        felt: Whether the others feel that the silent joints move.
+    """
+
+    def __init__(self, error: float) -> None:
+        """``error`` is that of velocities [rad/s or m/s]."""
+        self._error = error
+        self._silent: Flags = np.zeros(0, dtype=bool)
+        self.restart()
+
+    def restart(self) -> None:
+        """Forget all motion."""
+        self._begin(np.zeros(self._silent.size, dtype=bool))
+
+    def _begin(self, silent: Flags) -> None:
+        self._silent = silent
+        others = int((~silent).sum())
+        # velocity that is expected at rest, that motion adds, and that is measured
+        self._sums = np.zeros((3, others))
+        self._squares = np.zeros(3)
+        self._rest, self._added = np.zeros((2, others))
+        self._inertia = np.zeros((others, others))
+        self._v: Array | None = None
+        self._lasts = 0.0
+        self.felt = False
+
+    def expect(self, silent: Flags, inertia: Array, free: Array) -> None:
+        """Record what is expected from now on.
+
+        Args:
+            silent: Joints that say nothing, shape (nv,).
+            inertia: The mass matrix M, shape (nv, nv).
+            free: The acceleration if all joints move, M⁻¹ (tau - h), shape (nv,).
+        """
+        if not np.array_equal(silent, self._silent):
+            self._begin(silent.copy())
+        others = ~silent
+        if not others.any():
+            return
+        self._inertia = inertia[np.ix_(others, others)]
+        self._rest[:] = np.linalg.solve(self._inertia, (inertia @ free)[others])
+        self._added = free[others] - self._rest
+
+    def update(self, v: Array, passed: float) -> None:
+        """Judge a new state.
+
+        Args:
+            v: Mean measured velocity of some milliseconds, shape (nv,).
+            passed: Time since the last one [s].
+        """
+        if not self._silent.any() or self._silent.all():
+            return
+        now = v[~self._silent]
+        last = now if self._v is None else self._v
+        self._v = now
+        self._sums *= exp(-passed / _WASHOUT)
+        self._sums += np.stack([passed * self._rest, passed * self._added, now - last])
+        at_rest, added, measured = self._sums
+        beyond = measured - at_rest
+        products = np.array(
+            [
+                x @ self._inertia @ y
+                for x, y in ((beyond,) * 2, (beyond, added), (added,) * 2)
+            ]
+        )
+        part = 1.0 - exp(-passed / _MEMORY)
+        self._squares += part * (products - self._squares)
+        own, both, reaction = self._squares
+        least = (_LEAST * self._error) ** 2 * np.trace(self._inertia)
+        felt = (
+            reaction > least
+            and _FELT * reaction < both < _MOST * reaction
+            and both * both > _EXPLAINED * own * reaction
+        )
+        self._lasts = self._lasts + passed if felt else 0.0
+        self.felt = self._lasts >= _HELD

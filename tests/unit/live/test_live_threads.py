@@ -1,0 +1,83 @@
+"""A live loop whose stream's thread ends with an error."""
+
+from asyncio import CancelledError
+from threading import Event
+from typing import Any
+
+import pytest
+from live_rigs import PERIOD, Rig, panda, start, watched
+
+import hsp_control as hsp
+from hsp_control.live import LoopReport, run_loop
+from hsp_control.trajectories.streams import mailbox, stream
+
+
+class PanicError(BaseException):
+    """What an extension in Rust raises."""
+
+
+class NamelessError(Exception):
+    def __str__(self) -> str:
+        raise RuntimeError("it has no text")
+
+
+class FailingKind:
+    """A kind of address whose thread raises as soon as the loop runs."""
+
+    def __init__(self, error: BaseException | None) -> None:
+        self.error, self.go, self.ended = error, Event(), Event()
+
+    def check_address(self, source: str) -> None:
+        """All are valid."""
+
+    def is_local(self, source: str) -> bool:
+        return True
+
+    def opened(self, source: str, space: Any) -> Any:
+        def listen(inbox: Any) -> None:
+            try:
+                self.go.wait(10.0)
+                if self.error is not None:
+                    raise self.error
+            finally:
+                self.ended.set()
+
+        return listen
+
+
+def streamed(kind: FailingKind, monkeypatch: pytest.MonkeyPatch) -> hsp.Controller:
+    for module in (mailbox, stream):
+        monkeypatch.setattr(module, "kind_of", lambda source: kind)
+    tip = panda().state(0.0, start(), 0.0 * start()).position("panda_tcp")
+    task = hsp.FramePosition("panda_tcp", hsp.Stream(tip, source="mine://here"))
+    return hsp.Controller(panda(), [task], hsp.TargetPosture(start()))
+
+
+@pytest.mark.parametrize(
+    "error",
+    [CancelledError("x"), GeneratorExit(), PanicError("panic"), NamelessError()],
+    ids=lambda error: type(error).__name__,
+)
+def test_what_a_streams_thread_raises_ends_in_the_safe_stop(
+    error: BaseException, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    kind = FailingKind(error)
+    controller = streamed(kind, monkeypatch)
+
+    def after_some(t: float) -> None:
+        if t > 20 * PERIOD:
+            kind.go.set()
+            assert kind.ended.wait(10.0)
+            mailbox._threads["mine://here"].join(10.0)
+
+    def run(controller: hsp.Controller) -> LoopReport:
+        rig = Rig(watched())
+        return run_loop(controller, rig, duration=0.1, on_period=after_some)
+
+    report = run(controller)
+    assert report.ended == "fault"
+    assert "mine://here: its thread has ended: " in report.reason
+    assert type(error).__name__ in report.reason
+    assert report.at_rest
+    # The address is listened to again in the next run.
+    assert run(streamed(FailingKind(None), monkeypatch)).ended == "completed"
