@@ -8,7 +8,6 @@
 #include "functions.hpp"
 #include "python_objects.hpp"
 #include "rooms.hpp"
-#include "step_lock.hpp"
 
 #define NPY_NO_DEPRECATED_API NPY_2_0_API_VERSION
 #define PY_ARRAY_UNIQUE_SYMBOL hsp_engine_numpy
@@ -171,16 +170,6 @@ NB_MODULE(_engine, m) {
             nb::make_tuple(engine("Move"), named_values(kind_of<Move>(), move.values)));
       });
   m.attr("PINOCCHIO") = pinocchio_version();
-
-  nb::class_<StepLock>(m, "StepLock",
-                       "A lock: other threads wait for it, and the one that has it is refused.",
-                       nb::is_weak_referenceable())
-      .def(nb::init<nb::object, nb::object, nb::object>(), "error"_a, "by_itself"_a, "by_fork"_a)
-      .def("__enter__", &StepLock::enter)
-      .def(
-          "__exit__", [](StepLock& lock, nb::handle, nb::handle, nb::handle) { lock.exit(); },
-          nb::arg().none(), nb::arg().none(), nb::arg().none())
-      .def("forked", &StepLock::forked);
 
   m.def(
       "load_library",

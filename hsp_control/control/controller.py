@@ -4,6 +4,8 @@ import os
 from collections.abc import Callable, Collection, Mapping, Sequence
 from copy import deepcopy
 from math import isfinite
+from threading import RLock
+from typing import Any
 from weakref import WeakSet
 
 import numpy as np
@@ -18,7 +20,6 @@ from hsp_control.control.composition import Composition, PresentRun
 from hsp_control.control.first_state import check_angles, warn_of_jump
 from hsp_control.control.mixture import AccelerationModifier
 from hsp_control.control.output import ControlOutput, Diagnostics
-from hsp_control.engine import StepLock
 from hsp_control.law import TaskSample
 from hsp_control.robot import RobotState
 
@@ -42,8 +43,7 @@ class Controller(Composition):
     """
 
     def _allocate(self, changes: Sequence[Change]) -> None:
-        self._lock = StepLock(ControllerError, _BY_ITSELF, _FORKED)
-        _locks.add(self._lock)
+        self._lock = _StepLock()
         super()._allocate(changes)
 
     # -- the step ---------------------------------------------------------------------
@@ -341,6 +341,33 @@ def _check_output(out: object, nv: int) -> None:
         )
 
 
+class _StepLock:
+    """A lock: other threads wait for it, and the thread that has it is told."""
+
+    __slots__ = ("__weakref__", "_lock", "_taken")
+
+    def __init__(self) -> None:
+        self._lock, self._taken = RLock(), ""  # why it cannot be had, if so
+        _locks.add(self)
+
+    def __enter__(self) -> None:
+        self._lock.acquire()
+        if self._taken:  # by this thread: others are still waiting
+            self._lock.release()
+            raise ControllerError(self._taken)
+        self._taken = _BY_ITSELF
+
+    def __exit__(self, *_: object) -> None:
+        self._taken = ""
+        self._lock.release()
+
+    def forked(self) -> None:
+        """Go on in a child process: a thread that has the lock is not there."""
+        own: Any = self._lock
+        if self._taken and not own._is_owned():
+            self._lock, self._taken = RLock(), _FORKED
+
+
 _BY_ITSELF = (
     "a step of a controller calls the same controller, for example within a field: it "
     "would wait for itself for ever; use the state that the field is given, or a copy, "
@@ -351,7 +378,7 @@ _FORKED = (
     "memory is half a step here: make the controller in each process, or start "
     'processes by "spawn"'
 )
-_locks: WeakSet[StepLock] = WeakSet()
+_locks: WeakSet[_StepLock] = WeakSet()
 
 
 def _after_fork() -> None:

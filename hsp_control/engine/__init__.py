@@ -37,7 +37,6 @@ try:
     from ._engine import Plan as Plan
     from ._engine import PythonCall as PythonCall
     from ._engine import Runnable as Runnable
-    from ._engine import StepLock as StepLock
     from ._engine import kinds as _kinds
     from ._engine import smooth_step as smooth_step
 except ImportError as error:
