@@ -145,43 +145,57 @@ class Allocation {
 #endif
 };
 
+template <class T> constexpr bool is_timed = requires(T x) { x(0.0); };
+
+namespace detail {
+
+template <class T> void construct(void* self) { new (self) T{}; }
+template <class T> void destroy(void* self) { static_cast<T*>(self)->~T(); }
+
+template <class T> void make_ready(void* self, const Sizes& size) {
+  T& x = *static_cast<T*>(self);
+  prepare(x, size);
+  if constexpr (requires { x.check(); }) x.check();
+}
+
+template <class T> double run(void* self, double t) {
+  [[maybe_unused]] const Allocation allocation(false);
+  T& x = *static_cast<T*>(self);
+  const auto call = [&] {
+    if constexpr (is_timed<T>) return x(t);
+    else return x();
+  };
+  if constexpr (std::is_void_v<decltype(call())>) {
+    call();
+    return 0.0;
+  } else {
+    return static_cast<double>(call());
+  }
+}
+
+template <class T> std::vector<Field> fields() {
+  std::vector<Field> found;
+  T x{};
+  collect(reinterpret_cast<const char*>(&x), "", x, found);
+  return found;
+}
+
+}  // namespace detail
+
 // The table of a struct's members, made once.
 template <class T> const Kind& kind_of() {
-  static constexpr bool timed = requires(T x) { x(0.0); };
-  static const std::vector<Field> fields = [] {
-    std::vector<Field> found;
-    T x{};
-    detail::collect(reinterpret_cast<const char*>(&x), "", x, found);
-    return found;
-  }();
-  static const Kind kind = {detail::kept(detail::type_name<T>()),
-                            T::doc,
-                            timed,
-                            sizeof(T),
-                            alignof(T),
-                            static_cast<std::int64_t>(fields.size()),
-                            fields.data(),
-                            [](void* self) { new (self) T{}; },
-                            [](void* self) { static_cast<T*>(self)->~T(); },
-                            [](void* self, const Sizes& size) {
-                              T& x = *static_cast<T*>(self);
-                              detail::prepare(x, size);
-                              if constexpr (requires { x.check(); }) x.check();
-                            },
-                            [](void* self, double t) -> double {
-                              [[maybe_unused]] const Allocation allocation(false);
-                              T& x = *static_cast<T*>(self);
-                              const auto call = [&] {
-                                if constexpr (timed) return x(t);
-                                else return x();
-                              };
-                              if constexpr (std::is_void_v<decltype(call())>) {
-                                call();
-                                return 0.0;
-                              } else {
-                                return static_cast<double>(call());
-                              }
-                            }};
+  static const std::vector<Field> fields = detail::fields<T>();
+  static const Kind kind = {.name = detail::kept(detail::type_name<T>()),
+                            .doc = T::doc,
+                            .timed = is_timed<T>,
+                            .size = sizeof(T),
+                            .alignment = alignof(T),
+                            .count = static_cast<std::int64_t>(fields.size()),
+                            .fields = fields.data(),
+                            .construct = &detail::construct<T>,
+                            .destroy = &detail::destroy<T>,
+                            .prepare = &detail::make_ready<T>,
+                            .run = &detail::run<T>};
   return kind;
 }
 
