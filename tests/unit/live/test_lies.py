@@ -36,6 +36,7 @@ PATIENT = replace(SETTINGS, velocity_margin=99.0)
 AT_REST, IN_MOTION, WATCHED = 30, 250, 150
 """The reads at which a lie begins, and how many periods of it are looked at."""
 ALL = list(range(7))
+NONE = np.zeros(7, dtype=bool)
 FASTER = 1.5
 """Of the speed at the fault: what efforts that were sent before it was found add."""
 
@@ -449,6 +450,32 @@ def test_no_friction_stops_several_joints_in_one_period(
         if k < 32:
             assert not check.dead.any()
     assert check.dead.sum() == (joints if dead else 0)
+
+
+def test_what_the_reaction_does_not_explain_is_something_else() -> None:
+    """As much as a silent joint's motion would add, and more in another joint."""
+    inertia = np.array([[2.0, 0.5, 0.0], [0.5, 1.0, 0.0], [0.0, 0.0, 1.0]])
+    for beside, felt in ((0.0, True), (3.0, False)):
+        check, v, found = ReactionCheck(0.3), np.zeros(3), False
+        for k in range(300):
+            push = 8.0 * np.sin(12.0 * k * PERIOD)
+            free = np.linalg.solve(inertia, [push, 0.0, 0.0])
+            check.expect(np.array([True, False, False]), inertia, free)
+            v[1:] += PERIOD * (free[1:] + beside * np.array([0.0, free[1]]))
+            check.update(v, PERIOD)
+            found |= check.felt
+        assert found == felt
+
+
+def test_a_velocity_that_is_trusted_alone_may_stand_too() -> None:
+    """Positions that are not trusted any more may say what they like."""
+    check, none, all_ = VelocityCheck(panda(), SETTINGS, PERIOD), NONE, ~NONE
+    check.trust(none, all_)
+    for k in range(60):
+        v = (0.5 + 0.001 * min(k, 30)) * np.ones(7)
+        check.update(0.001 * np.sin(3.0 * k) * np.ones(7), v, PERIOD)
+        assert not check.dead.any() or k > 30
+    assert check.dead.all()
 
 
 def oscillation(

@@ -45,6 +45,7 @@ from hsp_control.live import (
     StopSettings,
     run_loop,
 )
+from hsp_control.live.live_log import DueRows
 
 AT_REST = 0.02
 """Speeds of a robot that holds: below twice the speed at which damping ends [rad/s]."""
@@ -307,3 +308,16 @@ def test_the_monitor_follows_limits_that_change(at_first: Limits | None) -> None
     # Only the narrow range is left so early; the ranges grow by 0.02 of tolerance.
     reference = run_loop(Beyond(law(limits=Limits(position=wide))), Rig(), duration=5.0)
     assert 0.2 < report.t < reference.t
+
+
+@pytest.mark.parametrize("error", [-1e-9, 0.0, 1e-9])
+def test_a_row_is_due_at_each_tenth_state_also_where_times_are_rounded(
+    error: float,
+) -> None:
+    due, rows = DueRows(0.01), []
+    for k in range(500):
+        t = 0.001 * k + error
+        if due.is_due(t, 1):
+            due.written(t, 1)
+            rows.append(k)
+    assert rows == [*range(0, 500, 10)]
