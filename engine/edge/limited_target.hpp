@@ -10,8 +10,8 @@
 //
 // *The tasks are damped.* An arm that is held at its edge, or rushes to it, asks for more than its
 // motors give, from one side and then from the other: the nearest step within the limits would
-// swing with it. So of the step towards the tasks, 1/(1 + E_t) is the law's, with E_t the excess of
-// a_t alone, and the rest the damped law's.
+// swing with it. So as far as a_t alone is beyond the limits, by an excess E_t, the step comes near
+// to the damped law, and is wholly that from E_t = `large` on.
 //
 // *What a field asks for is bounded.* That is φ_N + P K_N P v, the self-motion without what brakes
 // it. A field may ask for anything, r times what the limits permit far from them; 1/(1 + E) of it
@@ -50,6 +50,7 @@ struct LimitedTarget {
     In<'k', 'w'> A;    // the first n columns count
     InOut<'k'> lower;  // for a deviation δ from a: A δ ≥ lower
   } barred;
+  double large;  // E_t from which on the damped law counts wholly
   Scratch<'n'> change, asked;
   Scratch<'n'> effort_change, effort_asked;  // M times them
 
@@ -60,7 +61,7 @@ struct LimitedTarget {
     change.setZero();
     effort_change.setZero();
     const double beyond = std::min(of_tasks, excess());
-    const double damped = 1.0 - 1.0 / (1.0 + beyond);  // also of inf
+    const double damped = std::min(beyond / large, 1.0);
 
     change = damped * (parts.damped - parts.law);
     effort_change.noalias() = M * change;

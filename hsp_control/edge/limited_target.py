@@ -11,17 +11,17 @@ state:
 *The tasks are damped.* An arm that is held at its edge, or rushes to it, asks for more
 than its motors give, from one side and then from the other: the nearest step within the
 limits would swing with it. So as far as a_t alone is beyond the limits, the step comes
-near to the damped law instead (`shares.py`).
+near to the damped law instead (`shares.py`), wholly from E_t = 2 on.
 
 *What a field asks for is bounded.* That is φ_N + P K_N P v, the self-motion without
 what brakes it. A field may ask for anything; at most what the limits permit far from
 them is asked of the QP, and what brakes stays whole: else it would swing at the limits.
 
 An excess E is relative to what the limit permits: of an effort, the maximum; of an
-acceleration, what the barriers of `Limits` permit far from them. Neither is cut to less
-than 1/(1 + E): what is cut by more than it is beyond a limit swings there. The limit on
-the effort's rate does not count: it depends on the last effort, and a step that waits
-for it would wait for ever.
+acceleration, what the barriers of `Limits` permit far from them. A field keeps at least
+1/(1 + E): what is cut by more than it is beyond a limit swings there. The limit on the
+effort's rate does not count: it depends on the last effort, and a step that waits for
+it would wait for ever.
 """
 
 from typing import NamedTuple, Self
@@ -31,6 +31,10 @@ import numpy as np
 from hsp_control import engine
 from hsp_control.common.arrays import Array
 from hsp_control.engine.plans import PartCall
+
+LARGE = 2.0
+"""Excess of the tasks from which on the damped law counts wholly: where they ask for
+three times what the limits permit."""
 
 
 class Permitted(NamedTuple):
@@ -110,4 +114,5 @@ def limited_target(
         bounds=bounds,
         permitted=permitted,
         barred=barred,
+        large=LARGE,
     )

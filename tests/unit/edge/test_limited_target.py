@@ -8,6 +8,7 @@ from hypothesis import strategies as st
 
 from hsp_control.common.arrays import Array
 from hsp_control.edge.limited_target import (
+    LARGE,
     Barred,
     Parts,
     Permitted,
@@ -77,11 +78,11 @@ def called(given: Asked) -> Asked:
 
 @given(seeds, st.floats(0.1, 1e4))
 def test_it_is_the_plain_formula(seed: int, size: float) -> None:
-    """Of the tasks 1/(1 + E_t) is the law's, of a field 1/min(1 + E, r) is left."""
+    """E_t/2 of the step is the damped law's, of a field 1/min(1 + E, r) is left."""
     asked = drawn(seed, size, 10.0)
     law, damped, own, own_damped, braking, braking_damped = asked.parts
     beyond = min(excess(asked, -own), excess(asked, np.zeros(NV)))
-    exact = 1.0 / (1.0 + beyond)
+    exact = 1.0 - min(beyond / LARGE, 1.0)
     to_damped = (1.0 - exact) * (damped - law)
     field = exact * (own + braking) + (1.0 - exact) * (own_damped + braking_damped)
     times = min(1.0 + excess(asked, to_damped), times_permitted(asked, field))
