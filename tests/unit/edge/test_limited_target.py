@@ -37,7 +37,7 @@ def drawn(seed: int, size: float, bound: float) -> Asked:
     """Return a random request: accelerations are of a size, bounds as far as bound."""
     rng = np.random.default_rng(seed)
     root = rng.normal(size=(NV, NV))
-    M = np.asfortranarray(root @ root.T + np.eye(NV))
+    M = root @ root.T + np.eye(NV)
     a, *parts = size * rng.normal(size=(1 + len(Parts._fields), NV))
     parts[0] = a.copy()
     away = bound * rng.uniform(0.1, 1.0, size=(2, NV))
