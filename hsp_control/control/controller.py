@@ -20,6 +20,7 @@ from hsp_control.control.composition import Composition, PresentRun
 from hsp_control.control.first_state import check_angles, warn_of_jump
 from hsp_control.control.mixture import AccelerationModifier
 from hsp_control.control.output import ControlOutput, Diagnostics
+from hsp_control.engine import Plan
 from hsp_control.law import TaskSample
 from hsp_control.robot import RobotState
 
@@ -288,6 +289,22 @@ class Controller(Composition):
         if active is None:
             raise ControllerError("nothing has been computed yet")
         return active
+
+    @property
+    def step_plan(self) -> Plan:
+        """The calls of a step, from a state to its effort: see `engine.inspection`.
+
+        Raises:
+            ControllerError: If there was no step yet, or something changes at present.
+        """
+        bound = self._run.bound
+        if bound is None:
+            raise ControllerError(
+                "there is no step whose calls could be shown: compute one, at a time at "
+                "which nothing changes"
+            )
+        plan: Plan = bound.move.values["calls"]
+        return plan
 
     def stack(self, state: RobotState) -> TaskSample:
         """Return the rows of all active contacts and tasks at a state."""

@@ -26,7 +26,10 @@ from hsp_control import (
     Robot,
     RobotState,
 )
+from hsp_control.common.exceptions import ControllerError
 from hsp_control.control.actuation import Status
+from hsp_control.engine import Call
+from hsp_control.engine.inspection import calls, first_not_finite, listing
 from hsp_control.geometry import Proximity, Scene, link_shapes
 from hsp_control.geometry.proximity import CoalDistances
 from hsp_control.geometry.scene import Start
@@ -312,3 +315,22 @@ def test_a_step_allocates_nothing(chain: Robot) -> None:
     peak, left = allocated(compute, 500)
     assert peak < 2 * VECTOR  # 1.5 kB of Python's own small objects, and no vector
     assert left < 50
+
+
+def test_a_step_shows_its_calls_and_steps_through_them() -> None:
+    """From the state to the limits, each argument with the call that writes it."""
+    robot = Robot.load("panda")
+    controller = Controller(robot, [FramePosition("panda_tcp")])
+    with pytest.raises(ControllerError, match="compute one"):
+        _ = controller.step_plan
+    q, v = robot.home(), np.zeros(7)
+    tau = controller.compute(0.0, q, v).tau
+    plan = controller.step_plan
+    names = [each.kind.name for each in calls(plan) if isinstance(each, Call)]
+    assert names[0] == "JointJacobians"
+    assert names.index("Resolve") < names.index("InverseDynamics")
+    assert "carrier.J_world [6 x 7], from 0" in listing(plan)
+    for each in calls(plan):
+        each(0.0)
+    np.testing.assert_array_equal(controller.state.effort, tau)
+    assert first_not_finite(plan) is None
