@@ -54,13 +54,15 @@ quick: $(STAMP) $(ENGINE) ## what to run after every edit: a minute of CPU
 
 # A file's tests stay in one process, which makes what they share once.
 SPREAD := -n $(WORKERS) --dist loadfile --no-loadscope-reorder
-test: $(STAMP) $(ENGINE) ## run the tests
+test: $(STAMP) $(ENGINE) ## run the tests, those of calls with Eigen's assertions first
+	@if [ -z '$(ARGS)' ]; then HSP_ENGINE=$$($(BIN)/python hatch_build.py Debug) \
+	  $(BIN)/python -m pytest $(SPREAD) tests/unit/engine tests/unit/law -m "not process"; fi
 	@$(BIN)/python -m pytest $(SPREAD) -m "not system" $(ARGS)
 
 test-system: $(STAMP) $(ENGINE) ## run those of browsers, notebooks, processes and whole walks
 	@$(BIN)/python -m pytest $(SPREAD) -m system $(ARGS)
 
-thorough: $(STAMP) $(ENGINE) ## run the tests with more seeds, and every configuration's page
+thorough: sanitize ## run the tests with more seeds, and every configuration's page
 	@HSP_THOROUGH=1 $(BIN)/python -m pytest $(SPREAD) $(ARGS)
 
 # What a library of the engine is built with, and the tests whose calls it then makes.

@@ -37,7 +37,7 @@ template <template <int...> class As> struct Errors {
 
 // What was seen of the efforts that were held.
 template <template <int...> class As> struct Held {
-  As<2> timing;          // when the period ends, NaN once that was looked at; its length
+  As<2> timing;          // when the period that is observed ends, inf: none is; its length
   As<'n'> expected;      // velocity that is expected then
   As<'n'> stray;         // differences from it, summed over about 10 ms
   As<'n'> error;         // largest error of the acceleration of late

@@ -62,7 +62,7 @@ inline double shared(double a, double b) {
 inline void observe(const In<'n'>& v, Held<InOut>& held, double t) {
   const double period = held.timing[1];
   if (!(std::abs(t - held.timing[0]) < 0.01 * period)) return;
-  held.timing[0] = std::numeric_limits<double>::quiet_NaN();
+  held.timing[0] = std::numeric_limits<double>::infinity();
   const double fresh = std::min(period / sent::window, 1.0);
   const double fading = std::exp(-period / sent::memory);
   const double quickly = std::exp(-period / sent::quick_time);

@@ -300,8 +300,8 @@ class Controller(Composition):
         bound = self._run.bound
         if bound is None:
             raise ControllerError(
-                "there is no step whose calls could be shown: compute one, at a time at "
-                "which nothing changes"
+                "there is no step whose calls could be shown: compute one, at a time "
+                "at which nothing changes"
             )
         plan: Plan = bound.move.values["calls"]
         return plan

@@ -49,8 +49,8 @@ def listing(step: object) -> str:
     return "\n".join(lines)
 
 
-def first_not_finite(step: object, t: float = 0.0) -> tuple[Any, list[str]] | None:
-    """Make a plan call by call, up to the first one that writes NaN or inf.
+def first_nan(step: object, t: float = 0.0) -> tuple[Any, list[str]] | None:
+    """Make a plan call by call, up to the first one that writes NaN.
 
     Args:
         step: The plan.
@@ -59,6 +59,7 @@ def first_not_finite(step: object, t: float = 0.0) -> tuple[Any, list[str]] | No
     Returns:
         That call, and the names of the arguments that it wrote so; None if there is
         none. A call within `Once` is made whether it was made at this stamp or not.
+        Infinite is what has no limit.
     """
     for call in calls(step):
         if isinstance(call, Call) and any(
@@ -69,9 +70,7 @@ def first_not_finite(step: object, t: float = 0.0) -> tuple[Any, list[str]] | No
             call(t)
         if isinstance(call, Call):
             wrong = [
-                name
-                for name in call.kind.writes
-                if not np.isfinite(call.values[name]).all()
+                name for name in call.kind.writes if np.isnan(call.values[name]).any()
             ]
             if wrong:
                 return call, wrong

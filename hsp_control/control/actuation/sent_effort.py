@@ -94,7 +94,7 @@ class SentEffort:
         self.period = 0.0
         for each in self.held:
             each[:] = 0.0
-        self.held.timing[:] = np.nan
+        self.held.timing[0] = np.inf
         self.forget_rate()
 
     def memory(self) -> tuple[Array, ...]:

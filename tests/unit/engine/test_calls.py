@@ -14,7 +14,7 @@ from hsp_control import engine
 from hsp_control.common.arrays import Array
 from hsp_control.edge.threshold import NOT, Thresholds
 from hsp_control.engine import Move, Plan, PythonCall
-from hsp_control.engine.inspection import calls, first_not_finite, listing
+from hsp_control.engine.inspection import calls, first_nan, listing
 from hsp_control.trajectories import TrajectorySample
 
 
@@ -365,8 +365,8 @@ def test_the_first_call_that_writes_nan_is_found() -> None:
     stamp = np.zeros(1, dtype=int)
     inner = Plan([line(), wrong])
     once = engine.Once(calls=inner, stamp=stamp, made=stamp - 1)
-    assert first_not_finite(Plan([line(), once, line(start=out.position)])) == (
+    assert first_nan(Plan([line(), once, line(start=out.position)])) == (
         wrong,
         ["out.position", "out.velocity"],
     )
-    assert first_not_finite(Plan([line()])) is None
+    assert first_nan(Plan([line()])) is None

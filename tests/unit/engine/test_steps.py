@@ -29,7 +29,7 @@ from hsp_control import (
 from hsp_control.common.exceptions import ControllerError
 from hsp_control.control.actuation import Status
 from hsp_control.engine import Call
-from hsp_control.engine.inspection import calls, first_not_finite, listing
+from hsp_control.engine.inspection import calls, first_nan, listing
 from hsp_control.geometry import Proximity, Scene, link_shapes
 from hsp_control.geometry.proximity import CoalDistances
 from hsp_control.geometry.scene import Start
@@ -333,4 +333,4 @@ def test_a_step_shows_its_calls_and_steps_through_them() -> None:
     for each in calls(plan):
         each(0.0)
     np.testing.assert_array_equal(controller.state.effort, tau)
-    assert first_not_finite(plan) is None
+    assert first_nan(plan) is None
