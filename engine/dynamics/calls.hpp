@@ -19,6 +19,9 @@ inline void check_sizes(const Dynamics& robot, Index q, Index v) {
                               std::to_string(robot.size()));
 }
 
+// Pinocchio's CRBA allocates for planar joints, and for screws about any axis (seen with 4.1).
+using MayAllocate = Allocation;
+
 struct JointJacobians {
   static constexpr const char* doc =
       "J and J' of all joints in world axes at the world's origin, and the joints' placements: R, "
@@ -59,6 +62,7 @@ struct ForwardDynamics {
 
   void check() const { check_sizes(*dynamics.object, q.size(), v.size()); }
   void operator()() {
+    [[maybe_unused]] const MayAllocate crba(true);  // with followers
     if (!dynamics->forward_dynamics(q, v, effort, acceleration))
       acceleration.setConstant(std::numeric_limits<double>::quiet_NaN());
   }
@@ -71,7 +75,10 @@ struct MassMatrix {
   Out<'n', 'n'> M;
 
   void check() const { check_sizes(*dynamics.object, q.size(), M.rows()); }
-  void operator()() { dynamics->mass_matrix(q, M); }
+  void operator()() {
+    [[maybe_unused]] const MayAllocate crba(true);
+    dynamics->mass_matrix(q, M);
+  }
 };
 
 struct MassMatrixRate {
@@ -82,7 +89,10 @@ struct MassMatrixRate {
   Out<'n', 'n'> M_dot;
 
   void check() const { check_sizes(*dynamics.object, q.size(), v.size()); }
-  void operator()() { dynamics->mass_matrix_rate(q, v, M_dot); }
+  void operator()() {
+    [[maybe_unused]] const MayAllocate crba(true);  // with followers
+    dynamics->mass_matrix_rate(q, v, M_dot);
+  }
 };
 
 // The centroidal map A gives momentum and angular momentum about the centre of mass c, A v.

@@ -49,9 +49,9 @@ struct Gravity {
     auto& [x, x_dot, moment] = memory;
     const Vector3 g = gravity;
     for (Index b = 0; b < mass.size(); ++b) {
-      const auto R = placements.row(b).head<9>().reshaped(3, 3);  // column by column
-      moment.col(b) =
-          mass[b] * (R * center.row(b).transpose() + placements.row(b).tail<3>().transpose());
+      const Eigen::Map<const Matrix3> R(placements.row(b).data());  // column by column
+      const Eigen::Map<const Vector3> p(placements.row(b).data() + 9);
+      moment.col(b) = mass[b] * (p + R * center.row(b).transpose());
     }
     effort.setZero();
     for (Index k = 0; k < x.cols(); ++k) {
