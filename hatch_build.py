@@ -4,7 +4,8 @@ pip runs it (the hook of the wheel, also of an editable one), and ``make`` where
 source is newer than the library: ``python hatch_build.py``. A C++ compiler is taken
 from the variable CXX or from the path; where there is none, or CXX is ``zig``, it is
 the package ziglang. What that makes runs on any Linux of the last ten years, and the
-wheel says so.
+wheel says so. With Python 3.12 or newer the library keeps to Python's stable ABI, and
+one wheel serves 3.12 and all later ones.
 """
 
 import os
@@ -19,6 +20,7 @@ from typing import Any
 
 try:
     from hatchling.builders.hooks.plugin.interface import BuildHookInterface
+    from packaging.tags import sys_tags  # hatchling brings it
 except ImportError:  # `make` needs no hook
     BuildHookInterface = object
 
@@ -39,9 +41,25 @@ def compiler() -> str | None:
     return given or next(filter(shutil.which, ("c++", "g++", "clang++")), None)
 
 
+def has_cmake() -> bool:
+    """Return whether the machine's own CMake will do.
+
+    One before 3.26 (Debian 12, Ubuntu 22.04) does not find Python's stable ABI, which
+    there is from Python 3.12 on: what it builds works, but for one Python alone.
+    """
+    if sys.version_info < (3, 12) or not shutil.which("cmake"):
+        return bool(shutil.which("cmake"))
+    said = subprocess.run(
+        ["cmake", "--version"], capture_output=True, text=True, check=True
+    )
+    version = said.stdout.split()[2]
+    return tuple(map(int, version.split(".")[:2])) >= (3, 26)
+
+
 def tools() -> list[str]:
     """Return the packages that stand for tools which this machine lacks."""
-    found = [name for name in ("cmake", "ninja") if not shutil.which(name)]
+    found = [] if has_cmake() else ["cmake>=3.26"]
+    found += [] if shutil.which("ninja") else ["ninja"]
     return found if compiler() else [*found, "ziglang"]
 
 
@@ -110,6 +128,23 @@ def build(kind: str = "Release", folder: Path = ROOT / "build") -> Path:
     return fresh.replace(target)
 
 
+def wheel_tag(library: str) -> str:
+    """Return what a wheel with this library is for: Python, its ABI and the platform.
+
+    Args:
+        library: The library's file name, in which CMake says whether it keeps to the
+            stable ABI, which begins with Python 3.12 (nanobind needs no less).
+    """
+    # This Python's tags, the best first; what a compiler links against the libraries
+    # of this very machine may not call itself manylinux.
+    mine = next(
+        tag for tag in sys_tags() if not tag.platform.startswith(("many", "musl"))
+    )
+    python = "cp312-abi3" if ".abi3." in library else f"{mine.interpreter}-{mine.abi}"
+    zig_made = f"{OLD_LINUX}_{platform.machine()}"
+    return f"{python}-{mine.platform if compiler() else zig_made}"
+
+
 class EngineHook(BuildHookInterface):  # type: ignore[misc]
     """Builds the engine where a wheel is built, also an editable one."""
 
@@ -118,14 +153,10 @@ class EngineHook(BuildHookInterface):  # type: ignore[misc]
         return tools()
 
     def initialize(self, version: str, build_data: dict[str, Any]) -> None:
-        """Build; the wheel is then one of this Python and this machine."""
+        """Build; the wheel is then one of this machine and of some Pythons."""
         library = build()
         build_data["pure_python"] = False
-        if compiler() is None:
-            python = f"cp{sys.version_info.major}{sys.version_info.minor}"
-            build_data["tag"] = f"{python}-{python}-{OLD_LINUX}_{platform.machine()}"
-        else:
-            build_data["infer_tag"] = True
+        build_data["tag"] = wheel_tag(library.name)
         build_data["artifacts"].append(str(library.relative_to(ROOT)))
 
 

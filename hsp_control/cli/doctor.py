@@ -107,7 +107,7 @@ def _real_time() -> Iterator[Check]:
         return
     preempt = "PREEMPT_RT" in platform.version() or _is("/sys/kernel/realtime", "1")
     yield Check(
-        "call",
+        "kernel",
         "ok" if preempt else "note",
         platform.release() + (" with PREEMPT_RT" if preempt else ""),
         "" if preempt else "a robot at 1 kHz wants PREEMPT_RT (docs/latency.md)",

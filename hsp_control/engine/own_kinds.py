@@ -60,8 +60,10 @@ def command(source: Path, library: Path) -> list[str]:
                 f"no C++ compiler is there to compile {source.name}: install one "
                 "(Debian: apt install g++), name it in CXX, or pip install ziglang"
             ) from None
-        compiler = [sys.executable, "-m", "ziglang", "c++"]
-    # The engine's own flags: alignment is part of Eigen's layout.
+        # Left alone, zig takes every instruction of this processor.
+        compiler = [sys.executable, "-m", "ziglang", "c++", "-mcpu=baseline"]
+    # The engine's own flags: alignment is part of Eigen's layout, and follows from the
+    # processor's instructions.
     flags = ["-std=c++20", "-O2", "-DNDEBUG", "-shared", "-fPIC"]
     headers = [f"-I{folder}" for folder in include_folders()]
     return [*compiler, *flags, *headers, str(source), "-o", str(library)]

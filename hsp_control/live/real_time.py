@@ -39,6 +39,8 @@ def real_time_priority(level: int | None) -> Iterator[None]:
         return
     if not 1 <= level <= 99:
         raise SimulationError(f"real-time priority {level}; must be from 1 to 99")
+    if not hasattr(os, "sched_setscheduler"):  # macOS
+        raise SimulationError(f"real-time priority {level}: this system has none")
     policy, parameters = os.sched_getscheduler(0), os.sched_getparam(0)
     try:
         os.sched_setscheduler(0, os.SCHED_FIFO, os.sched_param(level))

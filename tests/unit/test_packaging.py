@@ -1,13 +1,17 @@
 """Whatever says again what pyproject.toml says agrees with it."""
 
+import importlib.util
 import re
 import shlex
 import tomllib
+from pathlib import Path
+from types import ModuleType
 from typing import Any
 
 import pytest
 import yaml
 from packaging.requirements import Requirement
+from packaging.tags import Tag
 from places import ROOT
 
 from hsp_control import __version__
@@ -119,3 +123,67 @@ def test_the_container_has_what_the_wheel_is_built_of() -> None:
     admitted = (ROOT / ".dockerignore").read_text().split()
     assert {f"!{name}" for name in copied} <= set(admitted)
     assert copied <= included()
+
+
+@pytest.fixture
+def hatch_build() -> ModuleType:
+    pytest.importorskip("hatchling")
+    file = importlib.util.spec_from_file_location("_", ROOT / "hatch_build.py")
+    assert file is not None
+    assert file.loader is not None
+    module = importlib.util.module_from_spec(file)
+    file.loader.exec_module(module)
+    return module
+
+
+@pytest.mark.parametrize(
+    ("compiler", "library", "tag"),
+    [
+        ("g++", "_engine.abi3.so", "cp312-abi3-linux_aarch64"),
+        ("g++", "_engine.cpython-314t-linux.so", "cp314-cp314t-linux_aarch64"),
+        ("zig", "_engine.abi3.so", "cp312-abi3-manylinux_2_17_aarch64"),
+        ("zig", "_engine.cpython-314t-linux.so", "cp314-cp314t-manylinux_2_17_aarch64"),
+    ],
+)
+def test_a_wheel_says_what_its_library_runs_with(
+    hatch_build: ModuleType,
+    monkeypatch: pytest.MonkeyPatch,
+    compiler: str,
+    library: str,
+    tag: str,
+) -> None:
+    systems = "manylinux_2_36_aarch64", "musllinux_1_2_aarch64", "linux_aarch64"
+    mine = [Tag("cp314", "cp314t", system) for system in systems]
+    monkeypatch.setattr(hatch_build, "sys_tags", lambda: iter(mine))
+    monkeypatch.setattr(hatch_build.platform, "machine", lambda: "aarch64")
+    monkeypatch.setenv("CXX", compiler)
+    assert hatch_build.wheel_tag(library) == tag
+
+
+@pytest.mark.parametrize(
+    ("python", "cmake", "enough"),
+    [
+        ((3, 11), None, False),
+        ((3, 11), "3.18.0", True),
+        ((3, 12), None, False),
+        ((3, 12), "3.25.1", False),  # without the stable ABI, silently
+        ((3, 12), "3.26.0-rc1", True),
+        ((3, 12), "4.4.5", True),
+    ],
+)
+def test_a_cmake_that_knows_the_stable_abi(
+    hatch_build: ModuleType,
+    monkeypatch: pytest.MonkeyPatch,
+    tmp_path: Path,
+    python: tuple[int, int],
+    cmake: str | None,
+    enough: bool,
+) -> None:
+    if cmake:
+        tool = tmp_path / "cmake"
+        tool.write_text(f"#!/bin/sh\necho cmake version {cmake}\n")
+        tool.chmod(0o755)
+    monkeypatch.setenv("PATH", str(tmp_path))
+    monkeypatch.setattr(hatch_build.sys, "version_info", python)
+    assert hatch_build.has_cmake() == enough
+    assert any("cmake" in name for name in hatch_build.tools()) != enough

@@ -104,7 +104,7 @@ def sweep(
     path = None if out is None else Path(out)
     if path is not None and path.suffix != ".parquet":
         raise SweepError(f"{path}: the name of a sweep's file must end with .parquet")
-    count = len(os.sched_getaffinity(0)) if workers is None else workers
+    count = _processors() if workers is None else workers
     with LocalWorkers(count) as pool:
         store = Store(plan, identity, path, fresh=fresh)
         try:
@@ -116,6 +116,13 @@ def sweep(
             store.close()
             raise
         return store.close()
+
+
+def _processors() -> int:
+    """Return how many processors this process may use."""
+    if hasattr(os, "sched_getaffinity"):
+        return len(os.sched_getaffinity(0))
+    return os.cpu_count() or 1  # macOS
 
 
 def _rehearse(plan: SweepPlan, run: int) -> None:

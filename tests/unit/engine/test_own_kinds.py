@@ -1,6 +1,8 @@
 """Kinds of a user's own: compiled, loaded, used, and refused where they are wrong."""
 
+import sys
 from pathlib import Path
+from types import ModuleType
 
 import numpy as np
 import pytest
@@ -112,11 +114,21 @@ def test_a_library_without_kinds_is_named(source: Path) -> None:
         own_kinds.load(source)
 
 
+def test_zig_compiles_for_any_processor_as_the_engine_does(
+    source: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.delenv("CXX", raising=False)
+    monkeypatch.setenv("PATH", "")
+    monkeypatch.setitem(sys.modules, "ziglang", ModuleType("ziglang"))
+    said = own_kinds.command(source, source.with_suffix(".so"))
+    assert said[:5] == [sys.executable, "-m", "ziglang", "c++", "-mcpu=baseline"]
+
+
 def test_no_file_and_no_compiler(source: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     with pytest.raises(EngineError, match="there is no file"):
         own_kinds.load(source.with_name("nowhere.cpp"))
     monkeypatch.delenv("CXX", raising=False)
     monkeypatch.setenv("PATH", "")
-    monkeypatch.setitem(__import__("sys").modules, "ziglang", None)
+    monkeypatch.setitem(sys.modules, "ziglang", None)
     with pytest.raises(EngineError, match="no C\\+\\+ compiler is there to compile"):
         own_kinds.load(source)

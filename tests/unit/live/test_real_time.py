@@ -108,3 +108,9 @@ def test_priority_that_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(os, "sched_setscheduler", refuse)
     with pytest.raises(SimulationError, match="not permitted; needs root, CAP_SYS"):
         real_time_priority(40).__enter__()
+
+
+def test_priority_where_there_is_none(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.delattr(os, "sched_setscheduler")
+    with pytest.raises(SimulationError, match="priority 40: this system has none"):
+        real_time_priority(40).__enter__()
