@@ -1,5 +1,6 @@
 // What gravity asks of the motors, how that changes with the posture, and along the motion.
 #pragma once
+#include <hsp/indices.hpp>
 #include <hsp/records.hpp>
 
 namespace hsp {
@@ -39,6 +40,11 @@ struct Gravity {
       moment.setZero(3, size('j'));
     }
   } memory;
+
+  void check() const {
+    check_indices("joints", joints, mass.size());
+    check_indices("dofs", dofs, v.size());
+  }
 
   auto l(Index k) const { return jacobian.col(k).head<3>(); }
   auto w(Index k) const { return jacobian.col(k).tail<3>(); }

@@ -63,7 +63,11 @@ Call::Call(const Kind& kind_, const std::vector<Argument>& arguments) : kind(kin
     void* data = field.access == Access::Number ? &given.number : given.data;
     field.bind(static_cast<char*>(self()) + field.offset, data, given.shape);
   }
-  kind.prepare(self(), sizes);
+  try {
+    kind.prepare(self(), sizes);
+  } catch (const std::invalid_argument& error) {
+    throw std::invalid_argument(std::string(kind.name) + ": " + error.what());
+  }
 }
 
 void Call::Delete::operator()(void* self) const {

@@ -13,6 +13,7 @@ struct TrackAxes {
   Feedback<> feedback;
   TaskSample<Out> out;
 
+  void check() const { check_indices("axes", axes, 3); }
   void operator()() {
     for (Index k = 0; k < axes.size(); ++k) {
       const Index i = axes[k];
@@ -37,6 +38,7 @@ struct TrackPosture {
   Feedback<> feedback;
   TaskSample<Out> out;
 
+  void check() const { check_joint_rows(joints, q.size(), v.size()); }
   void operator()() {
     out.jacobian.setZero();
     out.jacobian_dot.setZero();
