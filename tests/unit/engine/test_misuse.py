@@ -232,6 +232,14 @@ REFUSED: dict[str, tuple[Callable[[], Any], str]] = {
         lambda: centering(np.array([[0, 0], [3, 4]])),
         "^JointCentering: the joints' indices in q has the index 4; needs 0 to 3$",
     ),
+    "memory that is read and written": (
+        lambda: engine.Copy(x=(both := np.zeros(3)), out=both),
+        "^Copy: out is written, and is memory of x$",
+    ),
+    "memory that is partly written": (
+        lambda: engine.Copy(x=(both := np.zeros(4))[:3], out=both[1:]),
+        "^Copy: out is written, and is memory of x$",
+    ),
     "a block beyond q": (
         lambda: moving(4, unit_blocks=np.array([[2, 3]])),
         "the sizes of unit_blocks has the index 3; needs 0 to 2",
@@ -288,6 +296,14 @@ def test_misuse_is_refused_with_its_reason(case: str) -> None:
     make, message = REFUSED[case]
     with pytest.raises((TypeError, ValueError, OverflowError), match=message):
         make()
+
+
+def test_arrays_side_by_side_are_apart() -> None:
+    both = np.arange(6.0)
+    engine.Copy(x=both[:3], out=both[3:])()
+    np.testing.assert_array_equal(both, [0, 1, 2, 0, 1, 2])
+    nothing = np.zeros(0)
+    engine.Copy(x=nothing, out=nothing)()
 
 
 def test_plans_as_deep_as_they_may_be_are_run() -> None:
