@@ -1,4 +1,7 @@
 // The dynamics of a robot as calls.
+//
+// q (nq) and v (nv) are Pinocchio's; efforts are in N·m or N, accelerations in rad/s² or m/s², M
+// in kg·m² or kg. N are the efforts of gravity, Coriolis and centrifugal forces: M a + N = tau.
 #pragma once
 #include <hsp/records.hpp>
 #include <hsp/rotations.hpp>
@@ -107,14 +110,18 @@ struct CentroidalMotion {
   Shared<Dynamics> dynamics;
   In<'q'> q;
   In<'n'> v;
-  double mass;
+  double mass;  // of the whole robot [kg]
   Out<3> position, velocity;
   Out<3, 'n'> J, J_dot, angular, angular_dot;
   struct Map : Eigen::Matrix<double, 6, Eigen::Dynamic> {
     void prepare(const Sizes& size) { setZero(6, size('n')); }
   } A, A_dot;
 
-  void check() const { check_sizes(*dynamics.object, q.size(), v.size()); }
+  void check() const {
+    check_sizes(*dynamics.object, q.size(), v.size());
+    if (dynamics->columns() != dynamics->size())
+      throw std::invalid_argument("a robot with joints that follow others has no centroidal map");
+  }
   void operator()() {
     Vector3 c;
     dynamics->centroidal_map(q, v, c, {A.data(), 6, A.cols()}, {A_dot.data(), 6, A.cols()});

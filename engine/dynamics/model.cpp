@@ -1,4 +1,5 @@
 // The model out of numbers.
+#include <cmath>
 #include <stdexcept>
 
 #include "pinocchio.hpp"
@@ -18,7 +19,8 @@ pin::SE3 placement_of(const Joint& joint) {
 
 AnyJoint any_joint(const Joint& joint) {
   const Vector3& u = joint.axis;
-  const std::string type = joint.type.substr(std::string("JointModel").size());
+  const std::string prefix = "JointModel";
+  const std::string type = joint.type.starts_with(prefix) ? joint.type.substr(prefix.size()) : "";
   if (type == "RX") return pin::JointModelRevoluteTpl<double, 0, 0>();
   if (type == "RY") return pin::JointModelRevoluteTpl<double, 0, 1>();
   if (type == "RZ") return pin::JointModelRevoluteTpl<double, 0, 2>();
@@ -32,6 +34,8 @@ AnyJoint any_joint(const Joint& joint) {
   if (type == "Planar") return pin::JointModelPlanarTpl<double, 0>();
   if (type == "Translation") return pin::JointModelTranslationTpl<double, 0>();
   if (type == "Composite") {
+    if (joint.parts.empty())
+      throw std::invalid_argument("joint '" + joint.name + "' is a composite without parts");
     Types::JointModelComposite whole(joint.parts.size());
     for (const Joint& part : joint.parts) whole.addJoint(any_joint(part), placement_of(part));
     return whole;
@@ -47,6 +51,32 @@ void check_before(std::int64_t index, std::int64_t own, const Joint& joint, cons
                                 "; must come before it");
 }
 
+// Throws unless all numbers are finite, the axis has the norm 1, and no mass is negative.
+void check_numbers(const Joint& joint) {
+  const auto wrong = [&](const char* what) {
+    return std::invalid_argument("joint '" + joint.name + "': " + what);
+  };
+  const Eigen::Map<const Eigen::Vector<double, 12>> placement(joint.placement.data());
+  if (!placement.allFinite()) throw wrong("its placement is not finite");
+  if (!(std::abs(joint.axis.norm() - 1.0) < 1e-6)) throw wrong("its axis has not the norm 1");
+  if (!std::isfinite(joint.pitch + joint.ratio + joint.offset))
+    throw wrong("its pitch, ratio or offset is not finite");
+  if (!(joint.mass >= 0.0 && std::isfinite(joint.mass))) throw wrong("its mass is not 0 or more");
+  if (!(joint.center.allFinite() && joint.inertia.allFinite()))
+    throw wrong("its centre of mass or its inertia is not finite");
+  for (const Joint& part : joint.parts) check_numbers(part);
+}
+
+// Throws unless a joint can follow another: Pinocchio's own words are those of a compiler.
+template <class AnyJoint>
+void check_follower(const Joint& own, const AnyJoint& joint, const AnyJoint& leader) {
+  const bool fits = joint.nv() == 1 && leader.nv() == 1 && joint.nq() == leader.nq();
+  if (fits && leader.shortname() != "JointModelMimic" && own.type != "JointModelComposite") return;
+  throw std::invalid_argument("joint '" + own.name +
+                              "' cannot follow: both have one degree of freedom and as many "
+                              "coordinates, and what it follows follows nothing");
+}
+
 }  // namespace
 
 Dynamics::Dynamics(const std::vector<Joint>& joints, const Vector3& gravity, const Vector& armature)
@@ -57,12 +87,16 @@ Dynamics::Dynamics(const std::vector<Joint>& joints, const Vector3& gravity, con
     const std::int64_t own = model.njoints;
     check_before(each.parent, own, each, "parent");
     check_before(each.leader, own, each, "leader");
+    check_numbers(each);
     AnyJoint joint = any_joint(each);
+    if (each.leader) check_follower(each, joint, model.joints[each.leader]);
     if (each.leader)
       joint = Types::JointModelMimic(joint, model.joints[each.leader], each.ratio, each.offset);
     model.addJoint(each.parent, joint, placement_of(each), each.name);
     model.inertias[own] = pin::Inertia(each.mass, each.center, each.inertia);
   }
+  if (!gravity.allFinite() || !armature.allFinite())
+    throw std::invalid_argument("gravity or armature is not finite");
   if (armature.size() != model.nv)
     throw std::invalid_argument("armature has " + std::to_string(armature.size()) +
                                 " entries; needs " + std::to_string(model.nv));

@@ -25,6 +25,7 @@
 // `Limits` permit far from them. The limit on the effort's rate does not count: it depends on the
 // last effort, and a step that waits for it would wait for ever.
 #pragma once
+#include <hsp/indices.hpp>
 #include <hsp/records.hpp>
 
 namespace hsp {
@@ -54,6 +55,10 @@ struct LimitedTarget {
   Scratch<'n'> change, asked;
   Scratch<'n'> effort_change, effort_asked;  // M times them
 
+  void check() const {
+    check_at_least("a", a.size(), 1);
+    check_at_least("the columns of barred.A", barred.A.cols(), a.size());
+  }
   void operator()() {
     change = -parts.law_self_motion;
     effort_change.noalias() = M * change;

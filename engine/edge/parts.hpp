@@ -27,6 +27,7 @@ struct ThresholdBelow {
   Following following;
   Thresholds thresholds;
 
+  void check() const { check_index("level", level, thresholds.own.size()); }
   double operator()() { return threshold_below(asked, held, above, level, following, thresholds); }
 };
 

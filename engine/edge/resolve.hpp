@@ -61,19 +61,20 @@ struct Resolve {
     return PseudoInverse(q, factor, law.metric.L, law.form);
   }
 
-  // All tasks at once.
-  bool at_once() {
+  // All tasks at once; return 1, the only level, if its inverse is bounded, else 0.
+  int at_once() {
     auto& [Q, X] = factors;
-    const bool damped = bounded_inverse(memory.B, whitened(), Q, X, memory.square);
+    const bool damped = bounded_inverse(memory.B, write_whitened(), Q, X, memory.square);
     write_law(law, inverse(Q, X), memory.law, e_N, a);
-    return damped;
+    return damped ? 1 : 0;
   }
 
   // All levels at once, or level by level if they conflict. If the tasks of several levels are
-  // exact together, they are exact one after the other: this is the same then.
+  // exact together, they are exact one after the other: this is the same then. Return the first
+  // level whose inverse is bounded, from 1 on; 0: none is.
   int by_levels() {
     const auto& J = law.task.jacobian;
-    const double threshold = whitened();
+    const double threshold = write_whitened();
     auto& [Q, X] = factors;
     if (J.rows() <= J.cols() && exact_inverse(memory.B, threshold, Q, X, memory.square)) {
       write_law(law, inverse(Q, X), memory.law, e_N, a);
@@ -83,7 +84,9 @@ struct Resolve {
                                memory.levels, edge.by_tasks, e_N, a);
   }
 
-  // a = a_exact + μ (a_damped - a_exact); the first two shares count here.
+  // a = a_exact + μ (a_damped - a_exact); the first two shares count here, see `shares.hpp`. Where
+  // μ = 0 the law is the exact one and the outcome says so; `edge_level` stays what the damped law
+  // bounds, which the limits may still come near to.
   void blend() {
     auto& [Q, X, exact, damped, by_tasks, exact_e_N, share] = edge;
     if (edge_level[0] == 0) {
@@ -108,8 +111,8 @@ struct Resolve {
     if (mu == 0.0) outcome.damped_level[0] = 0;
   }
 
-  // Write J L⁻ᵀ and the thresholds; return a singular value from which on no level is bounded.
-  double whitened() {
+  // Write B = J L⁻ᵀ and the thresholds; return a singular value from which on no level is bounded.
+  double write_whitened() {
     const auto& J = law.task.jacobian;
     whiten(J, law.metric.L, law.form, memory.B);
     const double turning = turning_threshold(law.field.g, following);

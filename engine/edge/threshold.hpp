@@ -10,6 +10,7 @@
 // the acceleration that it causes changes by at most 2 L for each unit of s, whatever the target.
 // docs/edge.md has the propositions, and where each constant is from.
 #pragma once
+#include <hsp/indices.hpp>
 #include <hsp/records.hpp>
 
 namespace hsp {
@@ -42,6 +43,8 @@ struct Asked {
   In<'m'> pulls;       // with how much of its largest force a spring pulls
   Flags<'m'> springs;  // whether a row is that of a spring
   In<'m'> stretched;   // how long an error is, relative to its largest length
+
+  void check() const { check_ends("ends", ends, asked.size()); }
 };
 
 // The ε that a field needs where a spring slips.

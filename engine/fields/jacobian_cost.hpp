@@ -14,6 +14,7 @@
 // which running sums give in O(n), without the kinematic Hessian. Its rate is exact too, because
 // J' is known exactly.
 #pragma once
+#include <hsp/indices.hpp>
 #include <hsp/records.hpp>
 
 namespace hsp {
@@ -25,6 +26,7 @@ struct SelectRows {
   In<'k'> scale;
   Out<'k', 'n'> J, J_dot;
 
+  void check() const { check_indices("selected", selected, 6); }
   void operator()() {
     for (Index k = 0; k < selected.size(); ++k) {
       J.row(k) = scale[k] * frame.jacobian.row(selected[k]);
@@ -44,6 +46,12 @@ struct ChainGradient {
   Out<'n'> gradient, rate;
   Scratch<6, 'n'> B, B_dot;  // zero in the rows that are not selected
   Scratch<'s', 3> before, before_dot, from_here, from_here_dot;
+
+  void check() const {
+    check_indices("selected", selected, 6);
+    check_indices("dofs", dofs, gradient.size());
+    check_indices("first", first, dofs.size());
+  }
 
   // A column of one of these: its linear and its angular part.
   struct Column {

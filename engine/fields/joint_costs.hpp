@@ -9,6 +9,12 @@
 
 namespace hsp {
 
+// Throws where the joints with limits are not those of a robot with these sizes of q and v.
+inline void check_limited(const Ints<'k', 2>& limited, Index q, Index v) {
+  check_indices("the joints' indices in v", limited.col(0), v);
+  check_indices("the joints' indices in q", limited.col(1), q);
+}
+
 struct JointCentering {
   static constexpr const char* doc = "f = ½ Σ k_i (q_i - m_i)² of the joints with limits.";
   In<'q'> q;
@@ -18,6 +24,7 @@ struct JointCentering {
   Out<'n'> gradient, rate;
   Scratch<'k'> away;
 
+  void check() const { check_limited(limited, q.size(), v.size()); }
   double operator()() {
     const auto dofs = limited.col(0), at = limited.col(1);
     away = q(at) - middle;
@@ -41,6 +48,7 @@ struct TargetPosture {
   In<'n'> weights;                 // w [1/s]
   Out<'n'> gradient, rate;
 
+  void check() const { check_joint_rows(single_dof_joints, q.size(), v.size()); }
   double operator()() {
     gradient.setZero();
     rate.setZero();
@@ -75,6 +83,10 @@ struct EqualJointAngles {
   Out<'n'> gradient, rate;
   Scratch<'n'> angles;
 
+  void check() const {
+    check_joint_rows(single_dof_joints, q.size(), v.size());
+    check_indices("chain", chain, v.size());
+  }
   double operator()() {
     joint_displacements(q, neutral, single_dof_joints, angles);
     gradient.setZero();
@@ -102,6 +114,7 @@ struct LimitBarrier {
   In<'k'> lower, upper, unit, weights;  // u, and w [1/s]
   Out<'n'> gradient, rate;
 
+  void check() const { check_limited(limited, q.size(), v.size()); }
   double operator()() {
     gradient.setZero();
     rate.setZero();

@@ -7,6 +7,9 @@
 
 namespace hsp {
 
+// J are the selected rows of a frame's Jacobian, scaled (`SelectRows`), so that metres and radians
+// can be added; A : B = Σ A_ij B_ij. The gradient in q is made of ∂f/∂J by `ChainGradient`.
+//
 // With G = J W⁻¹ Jᵀ + ε I and φ = ½ log det G,
 //
 //   ∂φ/∂J = G⁻¹ J W⁻¹,   (∂φ/∂J)' = G⁻¹ (J'W⁻¹ - G' G⁻¹ J W⁻¹),   φ' = ∂φ/∂J : J'.

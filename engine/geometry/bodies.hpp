@@ -1,8 +1,10 @@
 // Links and obstacles, where they are and how they move.
 #pragma once
+#include <hsp/indices.hpp>
 #include <hsp/kind.hpp>
 
 #include "segments.hpp"
+#include "solids.hpp"
 
 namespace hsp {
 
@@ -24,6 +26,20 @@ struct Bodies {
   Ints<'c'> columns;   // the columns of the Jacobian that move each link
   Ints<'c'> dofs;      // the indices in v of these columns
 
+  void check() const {
+    for (Index i = 0; i < kinds.rows(); ++i)
+      if (is_link(i)) check_range("a link", kinds(i, 2), kinds(i, 3), columns.size());
+    check_indices("kinds", kinds.col(0), HALF_SPACE + 1);
+  }
+  // Throw where the joints, the Jacobian or v are those of another robot.
+  void check_joints(Index joints) const {
+    check_indices("the joints of kinds", kinds.col(1), joints, -motion.rows());
+  }
+  void check_columns(Index all_columns, Index all_dofs) const {
+    check_indices("columns", columns, all_columns);
+    check_indices("dofs", dofs, all_dofs);
+  }
+
   std::int64_t kind(Index i) const { return kinds(i, 0); }
   bool is_link(Index i) const { return kinds(i, 1) >= 0; }
   Vector3 size(Index i) const { return sizes.row(i).head<3>(); }
@@ -33,6 +49,16 @@ struct Bodies {
   }
   auto own_dofs(Index i) const { return dofs.segment(kinds(i, 2), kinds(i, 3) - kinds(i, 2)); }
 };
+
+// Pairs are a link, a body, and where their distance is; a link's core is a segment.
+template <class Pairs> void check_pairs(const Pairs& pairs, const Bodies& bodies, Index distances) {
+  check_indices("pairs", pairs.template leftCols<2>(), bodies.kinds.rows());
+  check_indices("the places of pairs", pairs.col(2), distances);
+  for (Index k = 0; k < pairs.rows(); ++k)
+    if (!bodies.is_link(pairs(k, 0)))
+      throw std::invalid_argument("pairs begin with links; body " + std::to_string(pairs(k, 0)) +
+                                  " is an obstacle");
+}
 
 struct Placement {
   Matrix3 R;

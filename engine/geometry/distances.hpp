@@ -26,6 +26,11 @@ struct MeasureDistances {
   Out<'p', 3, 3> cores;       // x, y and n of each pair
   InOut<'d'> distances;       // [m]
 
+  void check() const {
+    bodies.check_joints(placements.rows());
+    check_indices("used", used, bodies.kinds.rows());
+    check_pairs(pairs, bodies, distances.size());
+  }
   void operator()() {
     measurements[0] += 1;
     for (const Index i : used) {
@@ -62,6 +67,11 @@ struct DistanceGradients {
   In<'d'> slopes, curvatures;  // b' and b'' of all distances
   Out<'n'> gradient, rate;
 
+  void check() const {
+    bodies.check_joints(world.placements.rows());
+    bodies.check_columns(world.jacobian.cols(), gradient.size());
+    check_pairs(pairs, bodies, slopes.size());
+  }
   void operator()() {
     gradient.setZero();
     rate.setZero();
@@ -112,6 +122,10 @@ struct AddForce {
   In<3> point, force;
   InOut<'n'> out;
 
+  void check() const {
+    check_indices("columns", columns, jacobian.cols());
+    check_indices("dofs", dofs, out.size());
+  }
   void operator()() {
     const Vector6 w = wrench(point, force);
     for (Index p = 0; p < columns.size(); ++p) out[dofs[p]] += jacobian.col(columns[p]).dot(w);

@@ -2,7 +2,7 @@
 //
 // q and base are empty where the chart is not linear: then Python computes q and δ'.
 #pragma once
-#include <hsp/view.hpp>
+#include <hsp/indices.hpp>
 
 namespace hsp {
 
@@ -14,6 +14,7 @@ struct EulerStep {
   InOut<'n'> v;
   Out<'n'> moved;
 
+  void check() const { check_at_least("moved", moved.size(), q.size()); }
   void operator()() {
     v += h[0] * a;
     moved = h[0] * v;
@@ -51,6 +52,10 @@ struct Rk4Stage {
   Out<'q'> q;
   Out<'n'> v;
 
+  void check() const {
+    check_index("stage", stage, 3);
+    check_at_least("delta", delta.size(), q.size());
+  }
   void operator()() {
     A.row(stage) = a.transpose();
     delta = fraction * h[0] * D.row(stage).transpose();
@@ -72,6 +77,7 @@ struct Rk4End {
   Out<'q'> q;
   Out<'n'> v;
 
+  void check() const { check_at_least("delta", delta.size(), q.size()); }
   void operator()() {
     A.row(3) = a.transpose();
     const auto sum = [](const auto& K) {

@@ -1,5 +1,7 @@
 // How near the law is to a singular posture and to rest.
 #pragma once
+#include <hsp/indices.hpp>
+
 #include "pseudo_inverse.hpp"
 
 namespace hsp {
@@ -25,6 +27,10 @@ struct Diagnose {
     }
   } memory;
 
+  void check() const {
+    if (T.rows() != std::min(J.rows(), J.cols()))
+      throw std::invalid_argument("T is square, of the smaller size of J");
+  }
   double operator()() {
     auto& [We_N, wide, tall] = memory;
     We_N.noalias() = W * e_N;

@@ -1,5 +1,9 @@
 // The law of Hsu, Hauser and Sastry (1989) over a metric: equations (7) and (13).
 //
+// With m task rows and n degrees of freedom: J (m, n), a_x = x_d'' + feedback (m), the field g and
+// its rate g' (n), the metric W (n, n), the gain K_N (n, n) [1/s], the acceleration a = v' (n). J#
+// is the pseudo-inverse of `pseudo_inverse.hpp` in the metric, and P = I - J#J.
+//
 //   x = g - v                          the self-motion that the field still asks for
 //   e_N = (I - J#J) x                                            the null-space error
 //   u = g' + K_N e_N - W⁻¹[ J'ᵀ w - W'(x - e_N/2) ],  w = J#ᵀ W x     φ_N = P u is (13)
@@ -21,8 +25,10 @@ struct LawInput {
   int form;  // of the metric
   In<'n'> v;
   In<'n', 'n'> K_N;
-  bool controls;  // false for φ_N = 0, the paper's first simulation
+  bool controls;  // false: u = 0, tasks alone, the paper's first simulation
 };
+
+// Intermediate results; `part` is what PseudoInverse computes with.
 
 struct LawMemory {
   Scratch<'n'> x, y, u, bent;
@@ -33,7 +39,7 @@ struct LawMemory {
   }
 };
 
-// Write e_N and a for an inverse J#.
+// Write e_N and a for an inverse J#. In `bent` is first J'ᵀw, then all of W⁻¹[...].
 template <class Inverse, class E, class A>
 void write_law(const LawInput& in, const Inverse& inverse, LawMemory& memory, E& e_N, A& a) {
   const auto& [J, J_dot, error, error_rate, a_x] = in.task;
@@ -55,7 +61,7 @@ void write_law(const LawInput& in, const Inverse& inverse, LawMemory& memory, E&
     y = x - 0.5 * e_N;
     bent.noalias() -= W_dot * y;
   }
-  raise(in.form, L, bent);
+  raise(in.form, L, bent);  // W⁻¹
   u = g_dot - bent;
   u.noalias() += in.K_N * e_N;  // (13)
   if (!in.controls) u.setZero();

@@ -7,6 +7,7 @@
 #pragma once
 #include <algorithm>
 #include <cmath>
+#include <hsp/indices.hpp>
 #include <limits>
 
 #include "records.hpp"
@@ -117,6 +118,7 @@ struct AccelerationBounds {
   Errors<In> held;
   Out<'n'> a_lower, a_upper;
 
+  void check() const { check_indices("where", where, q.size(), -1); }
   void operator()() { write_acceleration_bounds(q, v, where, limits, held, a_lower, a_upper); }
 };
 

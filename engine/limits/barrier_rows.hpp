@@ -1,6 +1,9 @@
 // Rows A a ≥ least that barriers add in each step, and whether the wanted acceleration keeps them.
 #pragma once
+#include <algorithm>
+#include <hsp/indices.hpp>
 #include <limits>
+#include <stdexcept>
 
 #include "records.hpp"
 
@@ -11,6 +14,14 @@ template <template <int...> class As, template <int...> class Counts> struct Bar
   Counts<1> number;
   As<'r', 'n'> A;
   As<'r'> least;
+
+  // The place of one row more. Throws std::length_error where there is none.
+  Index next() {
+    if (number[0] < 0 || number[0] >= least.size())
+      throw std::length_error("a barrier has more rows than there is place for");
+    return number[0]++;
+  }
+  Index used() const { return std::clamp<Index>(number[0], 0, least.size()); }
 };
 
 struct Clear {
@@ -27,7 +38,7 @@ struct CheckRows {
   LimitsOutcome<InOutInts> outcome;
 
   void operator()() {
-    for (Index r = 0; r < rows.number[0]; ++r)
+    for (Index r = 0; r < rows.used(); ++r)
       if (!(rows.A.row(r).dot(a) >= rows.least[r])) outcome.rows[0] = outcome.violated[0] = 1;
   }
 };
@@ -41,8 +52,9 @@ struct PlaceRows {
   OutInts<'r'> end;  // of the entries of each row that are not 0
   Out<'r'> lower;
 
+  void check() const { check_at_least("the columns of A", A.cols(), a.size()); }
   void operator()() {
-    const Index used = rows.number[0], n = a.size();
+    const Index used = rows.used(), n = a.size();
     for (Index r = 0; r < used; ++r) {
       A.row(r).head(n) = rows.A.row(r);
       lower[r] = rows.least[r] - rows.A.row(r).dot(a);

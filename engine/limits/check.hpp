@@ -34,6 +34,7 @@ struct CheckLimits {
   LimitsOutcome<OutInts> outcome;
   OutInts<1> unsolved;  // 1: until one is solved, there is no result of a QP
 
+  void check() const { check_indices("where", where, q.size(), -1); }
   void operator()() {
     observe(v, held, time[0]);
     write_acceleration_bounds(q, v, where, limits, held, bounds.a_lower, bounds.a_upper);

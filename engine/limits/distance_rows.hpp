@@ -103,11 +103,15 @@ struct DistanceRows {
   In<'d'> least_of_all;
   BarrierRows<InOut, InOutInts> rows;
 
+  void check() const {
+    bodies.check_columns(jacobian.cols(), rows.A.cols());
+    check_pairs(pairs, bodies, near.size());
+  }
   void operator()() {
     for (Index k = 0; k < pairs.rows(); ++k) {
       const Index i = pairs(k, 0), j = pairs(k, 1), place = pairs(k, 2);
       if (!near[place]) continue;
-      const Index r = rows.number[0]++;
+      const Index r = rows.next();
       const Vector3 x = cores[k].row(0), y = cores[k].row(1), n = cores[k].row(2);
       rows.A.row(r).setZero();
       add_gradient(i, x, n, r);

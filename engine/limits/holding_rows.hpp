@@ -3,6 +3,7 @@
 //   h = share - |G|/limit,      h'' + 2α h' + α² h ≥ 0,      G'' = ∇G·a + its drift
 #pragma once
 #include <algorithm>
+#include <hsp/indices.hpp>
 
 #include "barrier_rows.hpp"
 
@@ -21,13 +22,14 @@ struct HoldingRows {
   In<'n'> drift, v;  // of gravity's efforts, see Gravity
   BarrierRows<InOut, InOutInts> rows;
 
+  void check() const { check_indices("motors", motors, limit.size()); }
   void operator()() {
     for (Index k = 0; k < motors.size(); ++k) {
       const Index i = motors[k];
       const double side = (effort[i] < 0.0 ? -1.0 : 1.0) / limit[i];
       const double used = side * effort[i], growth = side * slope.row(i).dot(v);
       if (used + look_ahead * std::max(growth, 0.0) <= near * share) continue;
-      const Index r = rows.number[0]++;
+      const Index r = rows.next();
       rows.A.row(r) = -side * slope.row(i);
       rows.least[r] =
           side * drift[i] + 2.0 * bandwidth * growth - bandwidth * bandwidth * (share - used);

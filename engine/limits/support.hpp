@@ -1,6 +1,7 @@
 // Contact forces: their map to generalised forces, those of minimum norm, friction cones.
 #pragma once
 #include <cmath>
+#include <hsp/indices.hpp>
 #include <hsp/linalg.hpp>
 #include <hsp/records.hpp>
 #include <hsp/rotations.hpp>
@@ -19,6 +20,11 @@ struct ForceMap {
   InOut<'a', 3> positions;
   InOut<'n', 'f'> out;  // three columns for each of all points
 
+  void check() const {
+    if (first < 0) throw std::invalid_argument("first is less than 0");
+    check_at_least("positions", positions.rows(), first + points.rows());
+    check_at_least("the columns of out", out.cols(), 3 * (first + points.rows()));
+  }
   void operator()() {
     Eigen::Matrix<double, 6, 3> wrenches;
     wrenches.topRows<3>() = axes;
@@ -47,6 +53,7 @@ struct MinimumNormForces {
   Scratch<'b', 'b'> G, U;
   Scratch<'b'> w, multipliers;
 
+  void check() const { check_indices("base", base, tau.size()); }
   void operator()() {
     for (Index i = 0; i < base.size(); ++i) {
       A.row(i) = F.row(base[i]);
@@ -100,6 +107,7 @@ struct WithinCones {
   In<'c', 'f'> cone;  // four rows for each point, which has three forces
   In<'f'> forces, lower, upper;
 
+  void check() const { check_at_least("the rows of cone", cone.rows(), forces.size() / 3 * 4); }
   bool operator()() {
     bool inside =
         (lower.array() <= forces.array()).all() && (forces.array() <= upper.array()).all();

@@ -2,6 +2,7 @@
 #pragma once
 #include <hsp/kind.hpp>
 #include <hsp/linalg.hpp>
+#include <stdexcept>
 
 namespace hsp {
 
@@ -52,6 +53,9 @@ struct TriangulariseRows {
       "Overwrite the lower triangle of Y by Y H's, H orthogonal; return det(Y Yᵀ).";
   InOut<'m', 'n'> Y;
 
+  void check() const {
+    if (Y.rows() > Y.cols()) throw std::invalid_argument("Y has more rows than columns");
+  }
   double operator()() { return triangularise_rows(Y); }
 };
 

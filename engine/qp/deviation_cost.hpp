@@ -26,6 +26,7 @@
 #pragma once
 #include <algorithm>
 #include <cmath>
+#include <hsp/indices.hpp>
 #include <hsp/linalg.hpp>
 #include <hsp/records.hpp>
 
@@ -70,6 +71,10 @@ struct Directions {
   Scratch<'n', 'm'> FJ, FG;
   Scratch<'n'> remainders, shares;
 
+  void check() const {
+    check_ends("ends", ends, jacobian.rows());
+    check_at_least("ends", ends.size(), alone ? 1 : 0);
+  }
   void operator()() {
     write_costs();
     const Index levels = ends.size(), damped = edge_level[0], rows = jacobian.rows();
@@ -128,6 +133,7 @@ struct Directions {
   // X combines each row with those after it.
   bool is_law_orthonormal() {
     const auto& [Q, X] = factors;
+    if (Q.rows() > N.rows()) return false;
     for (Index r = 0; r < Q.rows(); ++r) {
       if (!(std::abs(Q.row(r).squaredNorm() - 1.0) < 1e-12)) return false;
       if (!(X.row(r).tail(X.cols() - 1 - r).array() == 0.0).all()) return false;
@@ -146,6 +152,7 @@ struct Directions {
       for (Index r = 0; r < rows.rows(); ++r)
         for (Index i = 0; i < count; ++i) rows.row(r) -= N.row(i).dot(rows.row(r)) * N.row(i);
       if (k < edge_level[0] - 1 || edge_level[0] == 0) {
+        if (count + rows.rows() > N.rows()) return count;  // no law is exact with so many rows
         // No singular value is small: any orthonormal rows will do, at a tenth of the cost.
         auto own = N.middleRows(count, rows.rows());
         auto factor = square.topLeftCorner(rows.rows(), rows.rows());
@@ -168,10 +175,10 @@ struct Directions {
   void write_roots(Index count) {
     Index k = 0;
     for (Index r = 0; r < count; ++r) {
-      while (r >= ends[k]) ++k;
+      while (k < ends.size() && r >= ends[k]) ++k;
       root[r] = costs.root[k];
     }
-    kept[0] = std::min<Index>(count, ends[0]);
+    kept[0] = ends.size() ? std::min<Index>(count, ends[0]) : 0;
   }
 
   // Write the directions of the only level, where the law has found its spectrum; return how many.
@@ -185,7 +192,7 @@ struct Directions {
     const auto add = [&](bool partly) {
       for (Index r = 0; r < Q.rows(); ++r) {
         const double s = Q.row(r).norm();
-        if ((s < threshold) != partly || s <= lost * threshold) continue;
+        if ((s < threshold) != partly || s <= lost * threshold || count == N.rows()) continue;
         const double left = std::max(1.0 - (s / threshold) * (s / threshold), 0.0);
         root[count] = own * std::pow(free_root() / own, left * left);
         N.row(count++) = Q.row(r) / s;
@@ -273,7 +280,7 @@ struct InverseRoot {
   OutInts<1> moving;  // how many of its rows these are
 
   void operator()() {
-    const Index rows = N.rows() - (standing ? kept[0] : 0);
+    const Index rows = N.rows() - (standing ? std::clamp<Index>(kept[0], 0, N.rows()) : 0);
     auto moves = JT.topRows(rows);
     moves = root.tail(rows).asDiagonal() * N.bottomRows(rows);
     if (form != IDENTITY) solve_rows_transposed(L, moves);

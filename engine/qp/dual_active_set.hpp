@@ -23,6 +23,7 @@
 #pragma once
 #include <algorithm>
 #include <cmath>
+#include <hsp/indices.hpp>
 #include <hsp/kind.hpp>
 #include <hsp/linalg.hpp>
 #include <limits>
@@ -42,6 +43,10 @@ struct QP {
   In<'c'> lower, upper;     // of the rows and then of x: c = k + n
   In<'s'> softness;         // σ of each constraint, zero if it is hard; none if all are
   std::int64_t equalities;  // how many of the first rows are equalities, lower = upper
+
+  void check() const {
+    for (Index r = 0; r < begin.size(); ++r) check_range("a row of A", begin[r], end[r], A.cols());
+  }
 };
 
 // The active constraints: where the next QP begins, if it begins warm.
@@ -95,7 +100,11 @@ class DualActiveSet {
   static constexpr Index most_iterations = 10;
 
   DualActiveSet(const QP& qp, Index moving, InOut<'n'>& x, ActiveSet& set, ActiveSetMemory& memory)
-      : qp(qp), moving(moving), x(x), set(set), memory(memory) {}
+      : qp(qp),
+        moving(std::clamp<Index>(moving, 0, qp.JT.rows())),
+        x(x),
+        set(set),
+        memory(memory) {}
 
   // Overwrite x0 with the optimum x. A warm start begins with the active constraints of the last
   // solution.

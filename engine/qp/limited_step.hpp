@@ -36,7 +36,16 @@ struct Forces {
 struct Places {
   Ints<'d'> dofs;
   std::int64_t base;
+
+  void check() const { check_index("places.base", base, dofs.size() + 1); }
+  void check_dofs(Index n) const { check_indices("places.dofs", dofs, n); }
 };
+
+// Throws unless x is one deviation and the forces.
+inline void check_step(Index x, const Wanted& wanted, const Forces& forces) {
+  if (x != wanted.effort.size() + forces.first.size())
+    throw std::invalid_argument("x are n deviations and the forces");
+}
 
 // What became of a QP.
 template <template <int...> class As> struct QPOutcome {
@@ -58,6 +67,7 @@ struct BeginLimitedStep {
   Out<'p'> own;
   Out<'x'> x;
 
+  void check() const { check_at_least("x", x.size(), own.size()); }
   void operator()() {
     // While a contact fades its forces become dear, but not infinitely so.
     constexpr double least_inverse_cost = 1e-6;
@@ -77,6 +87,13 @@ struct LimitedRows {
   InOut<'k', 'x'> A;
   InOut<'c'> lower, upper;
 
+  void check() const {
+    places.check_dofs(wanted.effort.size());
+    check_at_least("A", A.rows(), places.dofs.size());
+    check_step(A.cols(), wanted, forces);
+    if (lower.size() != A.rows() + A.cols())
+      throw std::invalid_argument("lower and upper are those of the rows and of x");
+  }
   void operator()() {
     const auto& [M, a, effort] = wanted;
     const Index n = a.size(), p = forces.first.size(), k = A.rows();
@@ -124,6 +141,10 @@ struct LimitedResult {
   Result result;
   InOutInts<1> unsolved;  // also where the effort is not finite
 
+  void check() const {
+    places.check_dofs(wanted.effort.size());
+    check_step(x.size(), wanted, forces);
+  }
   void operator()() {
     if (!unsolved[0]) unsolved[0] = !write();
   }

@@ -1,5 +1,6 @@
 // Placement, Jacobian and motion of a frame that is fixed to a joint.
 #pragma once
+#include <hsp/indices.hpp>
 #include <hsp/records.hpp>
 
 namespace hsp {
@@ -12,6 +13,8 @@ struct ParentJoint {
   In<3, 3> R_local;  // joint ← frame
   In<3> p_local;
   Ints<'c'> columns, dofs;  // what moves the joint: columns of J_world, and their indices in v
+
+  void check() const { check_indices("columns", columns, J_world.cols()); }
 };
 
 // In world axes. A column (l, w) of the Jacobian at the world's origin is
@@ -31,6 +34,7 @@ struct FrameKinematics {
   FrameMotion<Out> motion;
   Out<6> drift;  // J'v
 
+  void check() const { check_indices("dofs", carrier.dofs, v.size()); }
   void operator()() {
     if (computed[0] == stamp[0]) return;
     computed[0] = stamp[0];

@@ -1,5 +1,6 @@
 // What gravity asks of the motors, how that changes with the posture, and along the motion.
 #pragma once
+#include <hsp/indices.hpp>
 #include <hsp/records.hpp>
 
 namespace hsp {
@@ -26,11 +27,11 @@ struct Gravity {
   In<'j', 3> center;                       // its centre of mass in the joint [m]
   Flags<'x', 'j'> moves;                   // whether a column moves a joint
   Ints<'x'> joints, dofs;                  // of each column
-  In<3> gravity;
+  In<3> gravity;                           // in the world [m/s²]
   In<'n'> v;
-  Out<'n'> effort;
-  Out<'n', 'n'> slope;
-  Out<'n'> drift;
+  Out<'n'> effort;      // G [N·m or N]
+  Out<'n', 'n'> slope;  // ∂G/∂q
+  Out<'n'> drift;       // G'' at constant v
   struct Memory {
     Eigen::Matrix3Xd x, x_dot, moment;
     void prepare(const Sizes& size) {
@@ -39,6 +40,11 @@ struct Gravity {
       moment.setZero(3, size('j'));
     }
   } memory;
+
+  void check() const {
+    check_indices("joints", joints, mass.size());
+    check_indices("dofs", dofs, v.size());
+  }
 
   auto l(Index k) const { return jacobian.col(k).head<3>(); }
   auto w(Index k) const { return jacobian.col(k).tail<3>(); }

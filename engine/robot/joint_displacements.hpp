@@ -1,9 +1,17 @@
 // q ⊖ reference of joints with one degree of freedom.
 #pragma once
 #include <cmath>
-#include <hsp/view.hpp>
+#include <hsp/indices.hpp>
 
 namespace hsp {
+
+// Throws where rows of joints are not those of a robot with these sizes of q and v.
+template <class Joints> void check_joint_rows(const Joints& joints, Index q, Index v) {
+  check_indices("the joints' indices in v", joints.col(0), v);
+  check_indices("the joints' indices in q", joints.col(1), q);
+  check_indices("the joints' entries in q", joints.col(2), 3, 1);
+  for (Index k = 0; k < joints.rows(); ++k) check_at_least("q", q, joints(k, 1) + joints(k, 2));
+}
 
 // Of one joint: `row` is its index in v, its index in q, and the number of its entries in q. A
 // continuous joint has two, (cos, sin), and its displacement is within ±π [rad or m].

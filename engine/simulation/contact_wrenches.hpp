@@ -1,6 +1,7 @@
 // The wrenches of contacts on those that they touch.
 #pragma once
-#include <hsp/view.hpp>
+#include <hsp/indices.hpp>
+#include <limits>
 
 namespace hsp {
 
@@ -14,6 +15,9 @@ struct AddContactWrenches {
   In<'m', 3> origins;    // the points about which the moments of the sums are
   InOut<'m', 6> sums;    // in world axes
 
+  void check() const {
+    check_indices("touched", touched, sums.rows(), std::numeric_limits<Index>::min());
+  }
   void operator()() {
     for (Index k = 0; k < touched.rows(); ++k) {
       const Eigen::RowVector3d force = wrenches.row(k).head<3>() * frames[k];

@@ -1,6 +1,6 @@
 // How far a robot is beyond its limits.
 #pragma once
-#include <hsp/view.hpp>
+#include <hsp/indices.hpp>
 
 namespace hsp {
 
@@ -12,6 +12,10 @@ struct LimitExcess {
   In<'n'> v, lower, upper, speed;
   InOut<'n'> position, velocity;
 
+  void check() const {
+    check_indices("coordinates", coordinates, q.size());
+    check_indices("dofs", dofs, v.size());
+  }
   void operator()() {
     for (Index k = 0; k < dofs.size(); ++k) {
       const Index i = dofs[k];

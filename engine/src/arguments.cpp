@@ -27,9 +27,10 @@ std::string use_text(const Field& field) {
 }
 
 [[noreturn]] void refuse(const Kind& kind, const Field& field, const std::string& given) {
-  throw nb::type_error(
-      (std::string(kind.name) + ": " + field.name + " " + use_text(field) + "; got " + given)
-          .c_str());
+  throw nb::type_error((std::string(kind.name) + ": " + field.name +
+                        (field.access == Access::Object ? " is " : " ") + use_text(field) +
+                        "; got " + given)
+                           .c_str());
 }
 
 // The memory of an array, not a copy: a call reads what is there when it is made.
@@ -52,8 +53,9 @@ Argument array(const Kind& kind, const Field& field, nb::handle given) {
   return found;
 }
 
-// The object of a type; null if it is of another one.
+// The object of a type; null if it is of another one, or was made without its constructor.
 void* shared_object(std::string_view type, nb::handle given) {
+  if (!nb::inst_check(given) || !nb::inst_ready(given)) return nullptr;
   if (type == Plan::type_name && nb::isinstance<PlanObject>(given))
     return &nb::cast<PlanObject&>(given).plan;
   if (type == Move::type_name && nb::isinstance<MoveObject>(given))
@@ -194,7 +196,7 @@ nb::tuple values_of(const Kind& kind, nb::args by_order, nb::kwargs by_name) {
     throw nb::type_error(
         (std::string(kind.name) + " takes its arguments by name: " + signature(kind)).c_str());
   Given given(kind);
-  for (auto [name, value] : by_name) given.add(nb::cast<std::string>(name), value);
+  for (auto [name, value] : by_name) given.add(text_of(name), value);
   return given.all();
 }
 
@@ -215,6 +217,13 @@ std::string signature(const Kind& kind) {
   return text + ")";
 }
 
-std::string text_of(nb::handle x) { return nb::cast<std::string>(nb::str(x)); }
+std::string text_of(nb::handle x) {
+  const nb::str text(x);
+  Py_ssize_t size = 0;
+  if (const char* plain = PyUnicode_AsUTF8AndSize(text.ptr(), &size))
+    return {plain, std::size_t(size)};
+  PyErr_Clear();  // half of a pair of surrogates, which is no character
+  return text_of(text.attr("encode")("ascii", "backslashreplace").attr("decode")("ascii"));
+}
 
 }  // namespace hsp

@@ -1,5 +1,6 @@
 #include "call.hpp"
 
+#include <cstdint>
 #include <stdexcept>
 
 namespace hsp {
@@ -42,6 +43,33 @@ Sizes sizes_of(const Kind& kind, const std::vector<Argument>& arguments) {
   return sizes;
 }
 
+std::int64_t bytes_of(const Field& field, const Argument& argument) {
+  std::int64_t count = field.rank > 0 ? 1 : 0;
+  for (int i = 0; i < field.rank; ++i) count *= argument.shape[i];
+  return count * (field.entry == 'b' ? 1 : 8);
+}
+
+// Eigen reads an argument while it writes another one: in the same memory numbers would be wrong.
+void check_apart(const Kind& kind, const std::vector<Argument>& arguments) {
+  const auto is_written = [](const Field& field) {
+    return field.access == Access::Out || field.access == Access::InOut;
+  };
+  for (std::int64_t k = 0; k < kind.count; ++k) {
+    const Field& written = kind.fields[k];
+    if (!is_written(written)) continue;
+    const auto begin = reinterpret_cast<std::uintptr_t>(arguments[k].data);
+    const auto end = begin + bytes_of(written, arguments[k]);
+    for (std::int64_t other = 0; other < kind.count; ++other) {
+      if (other == k) continue;
+      const auto start = reinterpret_cast<std::uintptr_t>(arguments[other].data);
+      const auto stop = start + bytes_of(kind.fields[other], arguments[other]);
+      if (begin < stop && start < end && begin < end && start < stop)
+        throw std::invalid_argument(std::string(kind.name) + ": " + written.name +
+                                    " is written, and is memory of " + kind.fields[other].name);
+    }
+  }
+}
+
 }  // namespace
 
 std::string shape_text(const Field& field) {
@@ -50,6 +78,7 @@ std::string shape_text(const Field& field) {
 
 Call::Call(const Kind& kind_, const std::vector<Argument>& arguments) : kind(kind_) {
   const Sizes sizes = sizes_of(kind, arguments);
+  check_apart(kind, arguments);
   const auto release = [&](void* memory) {
     ::operator delete(memory, std::align_val_t(kind.alignment));
   };
@@ -63,7 +92,11 @@ Call::Call(const Kind& kind_, const std::vector<Argument>& arguments) : kind(kin
     void* data = field.access == Access::Number ? &given.number : given.data;
     field.bind(static_cast<char*>(self()) + field.offset, data, given.shape);
   }
-  kind.prepare(self(), sizes);
+  try {
+    kind.prepare(self(), sizes);
+  } catch (const std::invalid_argument& error) {
+    throw std::invalid_argument(std::string(kind.name) + ": " + error.what());
+  }
 }
 
 void Call::Delete::operator()(void* self) const {

@@ -13,7 +13,9 @@ const Kind* const* library_kinds(const std::string& path) {
   void* found = dlsym(library, "hsp_kinds_1");
   if (!found)
     throw std::runtime_error("it has no function hsp_kinds_1, or was built for another engine");
-  return reinterpret_cast<const Kind* const* (*)()>(found)();
+  const auto* kinds = reinterpret_cast<const Kind* const* (*)()>(found)();
+  if (!kinds) throw std::runtime_error("its function hsp_kinds_1 returns nothing");
+  return kinds;
 }
 
 }  // namespace hsp

@@ -83,9 +83,9 @@ NB_MODULE(_engine, m) {
       .def_prop_ro("timed", [](const Kind& kind) { return kind.timed; })
       .def_prop_ro("reads", [](const Kind& kind) { return names(kind, Access::In); })
       .def_prop_ro("writes", [](const Kind& kind) { return names(kind, Access::Out); })
-      .def("__reduce__", [](const Kind& kind) {
-        return nb::make_tuple(engine("kind"), nb::make_tuple(kind.name));
-      });
+      .def("__copy__", [](nb::object kind) { return kind; })
+      .def("__deepcopy__", [](nb::object kind, nb::handle) { return kind; })
+      .def("__reduce__", [](nb::object kind) { return engine("reduced")(kind); });
 
   nb::class_<Runnable>(m, "Runnable", "What a plan can make: f(t) ↦ a number.")
       .def(

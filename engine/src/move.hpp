@@ -1,5 +1,6 @@
 // A state's move: valid t, q and v are copied, then the calls of a plan are made.
 #pragma once
+#include <hsp/indices.hpp>
 #include <optional>
 
 #include "plan.hpp"
@@ -16,6 +17,12 @@ struct Move {
   Ints<'u', 2> unit_blocks;  // start and size of what in q has norm 1
   InOutInts<1> stamp;        // the number of moves
 
+  void check() const {
+    for (Index k = 0; k < unit_blocks.rows(); ++k) {
+      check_index("unit_blocks", unit_blocks(k, 0), q.size() + 1);
+      check_index("the sizes of unit_blocks", unit_blocks(k, 1), q.size() - unit_blocks(k, 0) + 1);
+    }
+  }
   double operator()(double t) { return calls->run(t); }
 
   // Copy t, q and v, and make the calls; nothing, if not all are finite or a norm is wrong.

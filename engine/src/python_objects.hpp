@@ -3,6 +3,7 @@
 #pragma once
 #include <nanobind/nanobind.h>
 
+#include <stdexcept>
 #include <vector>
 
 #include "../dynamics/dynamics.hpp"
@@ -14,7 +15,8 @@ namespace hsp {
 
 struct Runnable {
   Plan::Row row;
-  bool python;  // whether a function of Python is among what it runs
+  bool python;    // whether a function of Python is among what it runs
+  int depth = 0;  // how many plans it runs one within another
 
   double operator()(double t) const { return row.run(row.self, t); }
 };
@@ -25,8 +27,10 @@ struct CallObject : Runnable {
       : values(given), call(kind, arguments_of(kind, given)) {
     row = {kind.run, call.self()};
     python = runs_python(given);
+    depth = depth_of(given);
   }
   static bool runs_python(nanobind::tuple given);
+  static int depth_of(nanobind::tuple given);  // the largest
 
   nanobind::tuple values;  // in the order of the kind's fields
   Call call;
@@ -39,11 +43,14 @@ struct PlanObject : Runnable {
   explicit PlanObject(nanobind::tuple given) : calls(given), plan(rows(given)) {
     row = {[](void* self, double t) { return static_cast<Plan*>(self)->run(t); }, &plan};
     python = false;
+    depth = CallObject::depth_of(given) + 1;
+    if (depth > most_depth) throw std::length_error("more than 1000 plans, one within another");
     for (nanobind::handle each : given) python |= is_python(each);
   }
   PlanObject(const PlanObject&) = delete;
   static std::vector<Plan::Row> rows(nanobind::tuple given);
   static bool is_python(nanobind::handle call);
+  static constexpr int most_depth = 1000;  // each takes of the stack when it is run
 
   nanobind::tuple calls;
   Plan plan;
@@ -82,6 +89,7 @@ struct MoveObject {
   nanobind::tuple values;
   Call call;
   bool python;
+  int depth;
 };
 
 }  // namespace hsp

@@ -1,6 +1,7 @@
 // The feedback of a task, Kv e' + Kp s(e) + offset.
 #pragma once
 #include <hsp/records.hpp>
+#include <stdexcept>
 
 namespace hsp {
 
@@ -10,6 +11,15 @@ template <int m = 'm'> struct Feedback {
   In<m, m> Kp, Kv;     // [1/s²], [1/s]
   In<m> offset;        // [m/s² or rad/s²]
   In<'p', 3> largest;  // of each bounded part: its first row, the row after its last, and ℓ
+
+  void check() const {
+    for (Index part = 0; part < largest.rows(); ++part) {
+      const double first = largest(part, 0), end = largest(part, 1);
+      const double rows = static_cast<double>(offset.size());
+      if (!(0.0 <= first && first <= end && end <= rows))
+        throw std::invalid_argument("a bounded part has rows that the error does not have");
+    }
+  }
 
   // a += Kv e' + Kp s(e) + offset
   template <class E, class R, class A> void add_to(A& a, const E& e, const R& e_dot) const {

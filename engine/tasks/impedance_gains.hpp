@@ -53,6 +53,11 @@ struct ImpedanceGains {
   Scratch<'m'> frequency;
   BoundedStiffness bounded;
 
+  void check() const {
+    if (rotating.first < 0) throw std::invalid_argument("rotating.first is less than 0");
+    check_at_least("a task", G.rows(), 1);
+    check_groups(ends, G.rows());
+  }
   void operator()() {
     if (!cholesky(M, L)) {
       Kp(0, 0) = Kv(0, 0) = std::numeric_limits<double>::quiet_NaN();

@@ -4,6 +4,7 @@
 #include "track_direction.hpp"
 #include "track_orientation.hpp"
 #include "track_position.hpp"
+#include "track_posture.hpp"
 
 namespace hsp {
 const Kind* const* task_kinds() {

@@ -12,6 +12,7 @@
 // region: one step if the group's stiffness is one number.
 #pragma once
 #include <cmath>
+#include <hsp/indices.hpp>
 #include <hsp/kind.hpp>
 #include <hsp/linalg.hpp>
 #include <limits>
@@ -23,6 +24,13 @@ struct Impedance {
   In<'m', 'm'> K, D;             // stiffness, damping; symmetric
   In<'m'> ratio, inverse_force;  // ζ, the same for all rows; 1/F of each row, 0 for no bound
 };
+
+// Throws unless groups of one row or more divide the rows.
+inline void check_groups(const Ints<'g'>& ends, Index rows) {
+  check_ends("ends", ends, rows);
+  for (Index g = 0; g < ends.size(); ++g)
+    if (ends[g] == (g == 0 ? 0 : ends[g - 1])) throw std::invalid_argument("a group has no rows");
+}
 
 // A group's rows, and F_g, inf for no bound.
 struct Group {
@@ -117,6 +125,7 @@ struct SpringStiffness {
   Out<'m', 'm'> S;
   BoundedStiffness bounded;
 
+  void check() const { check_groups(ends, e.size()); }
   void operator()() {
     if (!bounded.write(impedance, ends, e, S)) S = impedance.K;
   }
@@ -129,6 +138,7 @@ struct SpringPulls {
   In<'m'> e;
   Out<'m'> pulls;
 
+  void check() const { check_groups(ends, e.size()); }
   void operator()() {
     pulls = impedance.K.lazyProduct(e);
     for (Index g = 0; g < ends.size(); ++g) {

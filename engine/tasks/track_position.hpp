@@ -1,18 +1,24 @@
-// The tasks of a point, along axes of the world, and of joint positions.
+// The task of a point along axes of the world: a frame's origin or a centre of mass.
+//
+//   J = the axes' rows of the point's J,    e = x_d - x [m],    a_x = x_d'' + Kv e' + Kp s(e)
+//
+// s(e) is e up to a largest length, see `feedback.hpp`.
 #pragma once
-#include "../robot/joint_displacements.hpp"
+#include <hsp/indices.hpp>
+
 #include "feedback.hpp"
 
 namespace hsp {
 
 struct TrackAxes {
   static constexpr const char* doc = "e = x_d - x of a point along axes of the world.";
-  Ints<'m'> axes;
+  Ints<'m'> axes;  // 0, 1, 2: x, y, z of the world
   PointMotion<In> point;
   TrajectorySample<In, 'm'> desired;
   Feedback<> feedback;
   TaskSample<Out> out;
 
+  void check() const { check_indices("axes", axes, 3); }
   void operator()() {
     for (Index k = 0; k < axes.size(); ++k) {
       const Index i = axes[k];
@@ -22,33 +28,6 @@ struct TrackAxes {
       out.error_rate[k] = desired.velocity[k] - point.velocity[i];
     }
     out.acceleration = desired.acceleration;
-    feedback.add_to(out.acceleration, out.error, out.error_rate);
-  }
-};
-
-// J are rows of the identity. The error of a continuous joint is within ±π.
-struct TrackPosture {
-  static constexpr const char* doc = "e = displacement - (q ⊖ reference) of joints.";
-  In<'q'> q;
-  In<'n'> v;
-  In<'q'> reference;
-  Ints<'m', 3> joints;  // index in v, index in q, entries in q
-  TrajectorySample<In, 'm'> displacement;
-  Feedback<> feedback;
-  TaskSample<Out> out;
-
-  void operator()() {
-    out.jacobian.setZero();
-    out.jacobian_dot.setZero();
-    for (Index k = 0; k < joints.rows(); ++k) {
-      const Index i = joints(k, 0);
-      out.jacobian(k, i) = 1.0;
-      double e = displacement.position[k] - joint_displacement(q, reference, joints.row(k));
-      if (joints(k, 2) == 2) e = std::atan2(std::sin(e), std::cos(e));
-      out.error[k] = e;
-      out.error_rate[k] = displacement.velocity[k] - v[i];
-    }
-    out.acceleration = displacement.acceleration;
     feedback.add_to(out.acceleration, out.error, out.error_rate);
   }
 };

@@ -1,6 +1,7 @@
 // Polynomials of time, alone and joined at knots.
 #pragma once
 #include <algorithm>
+#include <hsp/indices.hpp>
 #include <hsp/records.hpp>
 
 namespace hsp {
@@ -39,6 +40,10 @@ struct PiecewisePolynomial {
   In<'i', 'p', 'd'> coefficients;  // one polynomial less than knots
   TrajectorySample<Out> out;
 
+  void check() const {
+    check_at_least("times", times.size(), 1);
+    check_at_least("coefficients", coefficients.size(), times.size() - 1);
+  }
   // It rests exactly at the first waypoint before, and at the last one after.
   void operator()(double t) {
     const Index last = times.size() - 1;

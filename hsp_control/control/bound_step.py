@@ -34,29 +34,35 @@ class BoundStep:
         self.direct = actuation.direct
         self.move = state.bind_move([*active.calls, *actuation.calls()])
         self._move = self.move.__call__  # bound once: half the time of a look-up
-        self._own = actuation.own
+        self._own = actuation.own  # what is delivered of the law's own acceleration
         self._state, self._actuation, self._limits = state, actuation, limits
-        self._law, self._found = active.resolution.outcome, actuation.outcome
+        self._law_outcome = active.resolution.outcome
+        self._limits_outcome = actuation.outcome
 
     def make(self, t: float, q: ArrayLike, v: ArrayLike) -> Delivered:
-        """Move to a state; return what is delivered there."""
+        """Move to a state; return what is delivered there.
+
+        The move makes all calls of a step, up to the law's own effort M a + N and the
+        check of the limits; the last one, `IsPlain`, returns whether that is the result
+        as it is. Else it is looked at why, and the QP is solved if a limit is violated.
+        """
         plain = self._move(t, q, v)
-        if plain is None:  # refused
+        if plain is None:  # refused: lists, for example, or what is not valid
             plain = self._state.advance(self.move, t, q, v)
         self.damped = ""
         if plain and self.direct:
             return self._own
-        active, law, found = self.active, self._law, self._found
+        active, law, limits = self.active, self._law_outcome, self._limits_outcome
         if not law.finite.item():
             active.raise_not_finite()
         if law.damped_level.item():
             self.damped = active.damped
-        if self.direct and not (found.violated.item() or found.beyond.item()):
+        if self.direct and not (limits.violated.item() or limits.beyond.item()):
             return self._actuation.own
         delivered = self._actuation.delivered(active.acceleration)
-        status = delivered[3]
+        status = delivered.status
         if status is RELAXED or status is BEYOND:
-            active.check(delivered[0])  # the engine has looked at all others
+            active.check(delivered.effort)  # the engine has looked at all others
         return delivered
 
     @cached_property
@@ -65,7 +71,8 @@ class BoundStep:
         if self.active.streamed or not self.direct:
             return None
         sending = self._limits.applying(self.active.acceleration)
-        return FreeStep(self.move, self._law, self._found, self._state.effort, sending)
+        law, limits = self._law_outcome, self._limits_outcome
+        return FreeStep(self.move, law, limits, self._state.effort, sending)
 
 
 class FreeStep(NamedTuple):

@@ -102,12 +102,12 @@ class Controller(Composition):
                 mixture.resolve(self._state.t)  # references, and the law
                 delivered = mixture.deliver(modifier)  # within the limits
                 stack, damped = self.active_stack, mixture.damped
-                stack.check(delivered[0])
+                stack.check(delivered.effort)
                 run.bound = bound or mixture.bound_step()
-            run.acceleration = delivered[1]
+            run.acceleration = delivered.acceleration
             if out is None:
                 out = ControlOutput()
-                tau, memory = delivered[0].copy(), stack.memory.tobytes()
+                tau, memory = delivered.effort.copy(), stack.memory.tobytes()
                 out.write(tau, memory, delivered, stack, damped)
             else:
                 out.overwrite(delivered, stack, damped)

@@ -57,6 +57,15 @@ def kind(name: str) -> Kind:
     return _BY_NAME[name]
 
 
+def reduced(own: Kind) -> tuple[Callable[..., Kind], tuple[str, ...]]:
+    """Return how a kind is made again from a pickle; one of a user's own is loaded."""
+    if _BY_NAME.get(own.name) is own:
+        return kind, (own.name,)
+    from .own_kinds import library_of, of_library
+
+    return of_library, (library_of(own), own.name)
+
+
 def call(kind: Callable[..., Made], values: dict[str, Any]) -> Made:
     """Return a call of a kind with these arguments; copies and pickles use it."""
     return kind(**values)

@@ -16,7 +16,7 @@ from pathlib import Path
 from types import SimpleNamespace
 
 from hsp_control.common.exceptions import EngineError
-from hsp_control.engine._engine import load_library
+from hsp_control.engine._engine import Kind, load_library
 
 _LOADED: dict[Path, SimpleNamespace] = {}
 
@@ -65,7 +65,10 @@ def command(source: Path, library: Path) -> list[str]:
     # The engine's own flags: alignment is part of Eigen's layout, and follows from the
     # processor's instructions.
     flags = ["-std=c++20", "-O2", "-DNDEBUG", "-shared", "-fPIC"]
-    headers = [f"-I{folder}" for folder in include_folders()]
+    folders = include_folders()
+    if sys.platform == "linux":
+        flags.append(f"-Wl,--version-script={folders[0] / 'hsp/exports.map'}")
+    headers = [f"-I{folder}" for folder in folders]
     return [*compiler, *flags, *headers, str(source), "-o", str(library)]
 
 
@@ -78,15 +81,18 @@ def build(source: str | os.PathLike[str], library: Path | None = None) -> Path:
             finds it: a computer without a compiler needs no more.
 
     Raises:
-        EngineError: If it does not compile, with what the compiler says.
+        EngineError: If it does not compile, with what the compiler says, or there is
+            no compiler.
     """
     path = Path(source)
     library = library or path.with_suffix(".so")
     library.parent.mkdir(parents=True, exist_ok=True)
     fresh = library.with_suffix(f".{os.getpid()}")
-    made = subprocess.run(
-        command(path, fresh), capture_output=True, text=True, check=False
-    )
+    compiling = command(path, fresh)
+    try:
+        made = subprocess.run(compiling, capture_output=True, text=True, check=False)
+    except OSError as error:
+        raise EngineError(f"the C++ compiler does not start: {error}") from None
     if made.returncode:
         raise EngineError(f"{path} does not compile:\n{made.stderr.strip()}")
     return fresh.replace(library)
@@ -113,6 +119,31 @@ def load(file: str | os.PathLike[str]) -> SimpleNamespace:
             raise EngineError(f"{path.name} brings no kinds: {error}") from None
         _LOADED[path] = SimpleNamespace(**{kind.name: kind for kind in kinds})
     return _LOADED[path]
+
+
+def library_of(kind: Kind) -> str:
+    """Return the library that a kind was loaded from.
+
+    Raises:
+        ValueError: If there is none.
+    """
+    for path, kinds in _LOADED.items():
+        if vars(kinds).get(kind.name) is kind:
+            return str(path)
+    raise ValueError(f"{kind.name} is no kind that `load` returned")
+
+
+def of_library(library: str, name: str) -> Kind:
+    """Return a kind of a library by name, as a pickle asks for it.
+
+    Raises:
+        EngineError: If there is no such library, or it has no such kind.
+    """
+    try:
+        found: Kind = vars(load(library))[name]
+    except KeyError:
+        raise EngineError(f"{library} has no kind {name}") from None
+    return found
 
 
 def _library(source: Path) -> Path:

@@ -3,7 +3,13 @@
 A part says its mathematics as a kind of call with arguments by name, a `PartCall`. An
 argument may be something that has to be brought up to date first: the kinematics of a
 frame, a trajectory, what another call writes. Its method ``supplied`` returns what is
-read, and the calls that write it. `planned` makes a plan of it all.
+read, and the calls that write it. `planned` makes a plan of it all:
+
+    PartCall   what is to be called, with arguments that may have to be supplied
+    Step       a call that is bound: it has its arrays, and is called with the time
+    StepPlan   the steps of part calls, in order: first what follows the time alone, so
+               that a state may be evaluated after it, then what reads the state
+    Plan       steps as one call of the engine
 """
 
 from collections.abc import Callable, Mapping, Sequence

@@ -11,6 +11,9 @@
 //     void check() const { ... }       // optional: throws where arguments do not fit each other
 //   };
 //
+// A group may have a `check`, too. What a step uses as an index is checked there, when the call is
+// made (`indices.hpp`), and not again: a step reads it as it is.
+//
 // What operator() returns is a number with one meaning, which `doc` says: a value (f of a cost), or
 // a bool. What there is more to say of a call it writes, into a record with names (`LawOutcome`).
 //
@@ -115,6 +118,7 @@ template <class T> void prepare(T& x, const Sizes& size) {
     else if constexpr (!IsView<M> && !IsShared<M> && !std::is_arithmetic_v<M>)
       prepare(member, size);
   });
+  if constexpr (requires { x.check(); }) x.check();
 }
 
 template <class T> consteval std::string_view type_text() {
@@ -153,9 +157,7 @@ template <class T> void construct(void* self) { new (self) T{}; }
 template <class T> void destroy(void* self) { static_cast<T*>(self)->~T(); }
 
 template <class T> void make_ready(void* self, const Sizes& size) {
-  T& x = *static_cast<T*>(self);
-  prepare(x, size);
-  if constexpr (requires { x.check(); }) x.check();
+  prepare(*static_cast<T*>(self), size);
 }
 
 template <class T> double run(void* self, double t) {
@@ -184,6 +186,7 @@ template <class T> std::vector<Field> fields() {
 
 // The table of a struct's members, made once.
 template <class T> const Kind& kind_of() {
+  static_assert(requires { T::doc; }, "a kind says what it does: static constexpr const char* doc");
   static const std::vector<Field> fields = detail::fields<T>();
   static const Kind kind = {.name = detail::kept(detail::type_name<T>()),
                             .doc = T::doc,

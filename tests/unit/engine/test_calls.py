@@ -165,9 +165,9 @@ WRONG: dict[str, tuple[Callable[[], Any], str]] = {
         lambda: engine.Once(
             calls=line(), stamp=np.zeros(1, dtype=int), made=np.zeros(1, dtype=int)
         ),
-        "Once: calls a Plan; got UniformLine",
+        "Once: calls is a Plan; got UniformLine",
     ),
-    "no call": (lambda: Plan([3]), "row"),
+    "no call": (lambda: Plan([3]), r"a plan makes calls.*`row`.*; number 0 is 3$"),
 }
 
 

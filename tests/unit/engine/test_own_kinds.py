@@ -1,5 +1,7 @@
 """Kinds of a user's own: compiled, loaded, used, and refused where they are wrong."""
 
+import copy
+import pickle
 import sys
 from pathlib import Path
 from types import ModuleType
@@ -7,6 +9,7 @@ from types import ModuleType
 import numpy as np
 import pytest
 
+from hsp_control import engine
 from hsp_control.common.exceptions import EngineError
 from hsp_control.engine import own_kinds
 from hsp_control.engine.inspection import listing
@@ -108,6 +111,53 @@ def test_what_does_not_compile_says_what_the_compiler_says(source: Path) -> None
         own_kinds.load(source)
 
 
+def test_files_with_one_name_for_a_kind_do_not_get_each_others(source: Path) -> None:
+    """Also a file that was edited in the meantime."""
+    first = own_kinds.load(source).Doubled
+    source.write_text(SOURCE.replace("2.0 * x", "3.0 * x"))
+    second = own_kinds.load(source).Doubled
+    x, y = np.ones(1), np.zeros((2, 1))
+    first(x=x, y=y[0])()
+    second(x=x, y=y[1])()
+    np.testing.assert_array_equal(y, [[2.0], [3.0]])
+
+
+def test_copies_and_pickles_of_calls_have_the_own_kind(source: Path) -> None:
+    """Not the engine's, where that has one of the same name."""
+    source.write_text(SOURCE.replace("Doubled", "Copy"))
+    call = own_kinds.load(source).Copy(x=np.ones(1), y=np.zeros(1))
+    for same in (
+        copy.copy(call),
+        copy.deepcopy(call),
+        pickle.loads(pickle.dumps(call)),
+    ):
+        assert same.kind is call.kind
+        same()
+        np.testing.assert_array_equal(same.values["y"], [2.0])
+    assert pickle.loads(pickle.dumps(engine.Copy)) is engine.Copy
+    library = own_kinds.library_of(call.kind)
+    with pytest.raises(EngineError, match="has no kind Doubled"):
+        own_kinds.of_library(library, "Doubled")
+    with pytest.raises(ValueError, match="Copy is no kind that `load` returned"):
+        own_kinds.library_of(engine.Copy)
+
+
+def test_a_library_that_returns_nothing_is_named(source: Path) -> None:
+    source.write_text(
+        SOURCE.replace(
+            "auto hsp_kinds_1", "const hsp::Kind* const* hsp_kinds_1"
+        ).replace("hsp::kinds<Doubled>()", "nullptr")
+    )
+    with pytest.raises(EngineError, match="its function hsp_kinds_1 returns nothing"):
+        own_kinds.load(source)
+
+
+def test_a_kind_says_what_it_does(source: Path) -> None:
+    source.write_text(SOURCE.replace("doc =", "words ="))
+    with pytest.raises(EngineError, match="a kind says what it does: static constexpr"):
+        own_kinds.load(source)
+
+
 def test_a_library_without_kinds_is_named(source: Path) -> None:
     source.write_text(SOURCE.replace("hsp_kinds_1", "hsp_kinds_0"))
     with pytest.raises(EngineError, match="brings no kinds: it has no function hsp_k"):
@@ -127,7 +177,10 @@ def test_zig_compiles_for_any_processor_as_the_engine_does(
 def test_no_file_and_no_compiler(source: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     with pytest.raises(EngineError, match="there is no file"):
         own_kinds.load(source.with_name("nowhere.cpp"))
-    monkeypatch.delenv("CXX", raising=False)
+    monkeypatch.setenv("CXX", "/nowhere/c++")
+    with pytest.raises(EngineError, match=r"compiler does not start: .*/nowhere/c\+\+"):
+        own_kinds.load(source)
+    monkeypatch.delenv("CXX")
     monkeypatch.setenv("PATH", "")
     monkeypatch.setitem(sys.modules, "ziglang", None)
     with pytest.raises(EngineError, match="no C\\+\\+ compiler is there to compile"):

@@ -142,7 +142,7 @@ def test_sizes_of_another_robot_are_refused() -> None:
     }
     with pytest.raises(ValueError, match="7 columns and 8 joints"):
         engine.JointJacobians(dynamics=own, q=q, v=v, **given)
-    with pytest.raises(TypeError, match="dynamics a Dynamics; got None"):
+    with pytest.raises(TypeError, match="dynamics is a Dynamics; got None"):
         engine.InverseDynamics(dynamics=None, q=q, **others)
 
 
