@@ -63,7 +63,7 @@ Call::Call(const Kind& kind_, const std::vector<Argument>& arguments) : kind(kin
     void* data = field.access == Access::Number ? &given.number : given.data;
     field.bind(static_cast<char*>(self()) + field.offset, data, given.shape);
   }
-  kind.prepare(self(), sizes);
+  if (const char* reason = kind.prepare(self(), sizes)) throw std::invalid_argument(reason);
 }
 
 void Call::Delete::operator()(void* self) const {
