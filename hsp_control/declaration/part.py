@@ -275,7 +275,8 @@ def _annotated(cls: type) -> Iterable[str]:
         from annotationlib import Format, get_annotations
 
         return get_annotations(cls, format=Format.FORWARDREF)
-    return vars(cls).get("__annotations__", {})
+    own: dict[str, Any] = vars(cls).get("__annotations__", {})
+    return own
 
 
 def _field_property(name: str) -> property:
