@@ -15,6 +15,7 @@ import subprocess
 import sys
 import sysconfig
 import tomllib
+from importlib.machinery import EXTENSION_SUFFIXES
 from pathlib import Path
 from typing import Any
 
@@ -122,6 +123,12 @@ def build(kind: str = "Release", folder: Path = ROOT / "build") -> Path:
     if kind != "Release":
         return library
     target = ROOT / "hsp_control" / "engine" / library.name
+    # Python loads a library named for it alone before one of the stable ABI.
+    for suffix in EXTENSION_SUFFIXES:
+        preferred = target.with_name(f"_engine{suffix}")
+        if preferred == target:
+            break
+        preferred.unlink(missing_ok=True)
     # A new file: a process that has loaded the old one goes on with it.
     fresh = target.with_suffix(".new")
     shutil.copy2(library, fresh)

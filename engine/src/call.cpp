@@ -92,11 +92,8 @@ Call::Call(const Kind& kind_, const std::vector<Argument>& arguments) : kind(kin
     void* data = field.access == Access::Number ? &given.number : given.data;
     field.bind(static_cast<char*>(self()) + field.offset, data, given.shape);
   }
-  try {
-    kind.prepare(self(), sizes);
-  } catch (const std::invalid_argument& error) {
-    throw std::invalid_argument(std::string(kind.name) + ": " + error.what());
-  }
+  if (const char* reason = kind.prepare(self(), sizes))
+    throw std::invalid_argument(std::string(kind.name) + ": " + reason);
 }
 
 void Call::Delete::operator()(void* self) const {

@@ -106,7 +106,7 @@ class _Words(str):
         return str(self)
 
 
-_ARRAY_LIKE = set(get_args(ArrayLike))
+_ARRAY_LIKE = set(get_args(ArrayLike)) or {ArrayLike}  # since NumPy 2.5 one name
 
 
 def _words(annotation: Any) -> str:

@@ -4,7 +4,7 @@ import ast
 import dataclasses
 import inspect
 import sys
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from functools import cache, wraps
 from inspect import cleandoc
 from typing import Any, ClassVar, NoReturn, dataclass_transform
@@ -261,12 +261,22 @@ def _hide_properties(cls: type) -> list[str]:
     own = vars(cls)
     hidden = [
         name
-        for name in own.get("__annotations__", {})
+        for name in _annotated(cls)
         if name not in own and isinstance(getattr(cls, name, None), property)
     ]
     for name in hidden:
         setattr(cls, name, dataclasses.field())
     return hidden
+
+
+def _annotated(cls: type) -> Iterable[str]:
+    """Return the names that a class itself annotates."""
+    if sys.version_info >= (3, 14):  # annotations are evaluated when somebody asks
+        from annotationlib import Format, get_annotations
+
+        return get_annotations(cls, format=Format.FORWARDREF)
+    own: dict[str, Any] = vars(cls).get("__annotations__", {})
+    return own
 
 
 def _field_property(name: str) -> property:

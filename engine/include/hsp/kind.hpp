@@ -24,6 +24,7 @@
 #pragma once
 #include <boost/pfr/core.hpp>
 #include <boost/pfr/core_name.hpp>
+#include <exception>
 #include <new>
 #include <string>
 #include <string_view>
@@ -53,7 +54,9 @@ struct Kind {
   const Field* fields;
   void (*construct)(void* self);
   void (*destroy)(void* self);
-  void (*prepare)(void* self, const Sizes& size);
+  // Returns null, or why the arguments do not fit. No exception goes from one library into
+  // another: a wheel's engine has zig's C++ runtime, a kind compiled here has this computer's.
+  const char* (*prepare)(void* self, const Sizes& size);
   double (*run)(void* self, double t);
 };
 
@@ -156,8 +159,15 @@ namespace detail {
 template <class T> void construct(void* self) { new (self) T{}; }
 template <class T> void destroy(void* self) { static_cast<T*>(self)->~T(); }
 
-template <class T> void make_ready(void* self, const Sizes& size) {
-  prepare(*static_cast<T*>(self), size);
+template <class T> const char* make_ready(void* self, const Sizes& size) {
+  static thread_local std::string reason;
+  try {
+    prepare(*static_cast<T*>(self), size);
+    return nullptr;
+  } catch (const std::exception& error) {
+    reason = error.what();
+  }
+  return reason.c_str();
 }
 
 template <class T> double run(void* self, double t) {
