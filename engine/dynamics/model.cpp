@@ -89,9 +89,11 @@ Dynamics::Dynamics(const std::vector<Joint>& joints, const Vector3& gravity, con
     check_before(each.leader, own, each, "leader");
     check_numbers(each);
     AnyJoint joint = any_joint(each);
-    if (each.leader) check_follower(each, joint, model.joints[each.leader]);
-    if (each.leader)
-      joint = Types::JointModelMimic(joint, model.joints[each.leader], each.ratio, each.offset);
+    if (each.leader) {
+      const AnyJoint& leader = model.joints[each.leader];
+      check_follower(each, joint, leader);
+      joint = Types::JointModelMimic(joint, leader, each.ratio, each.offset);
+    }
     model.addJoint(each.parent, joint, placement_of(each), each.name);
     model.inertias[own] = pin::Inertia(each.mass, each.center, each.inertia);
   }

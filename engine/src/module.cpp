@@ -149,7 +149,6 @@ NB_MODULE(_engine, m) {
   nb::class_<DynamicsObject>(
       m, "Dynamics", "A robot's rigid-body dynamics: Pinocchio's algorithms and their memory.")
       .def(nb::init<nb::tuple, nb::tuple, nb::tuple>(), "joints"_a, "gravity"_a, "armature"_a)
-      .def_prop_ro("columns", [](const DynamicsObject& d) { return d.dynamics.columns(); })
       .def("__reduce__",
            [](const DynamicsObject& d) { return nb::make_tuple(engine("Dynamics"), d.given); });
 

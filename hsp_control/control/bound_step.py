@@ -58,7 +58,7 @@ class BoundStep:
         if law.damped_level.item():
             self.damped = active.damped
         if self.direct and not (limits.violated.item() or limits.beyond.item()):
-            return self._actuation.own
+            return self._own
         delivered = self._actuation.delivered(active.acceleration)
         status = delivered.status
         if status is RELAXED or status is BEYOND:

@@ -94,16 +94,6 @@ def test_by_default_gravity_may_overload_no_motor_of_an_arm() -> None:
     np.testing.assert_array_equal(np.isfinite(held.effort), np.arange(7) == 2)
 
 
-def test_gravity_asks_a_leader_for_what_its_followers_carry() -> None:
-    robot, rng, rest = fingers(), np.random.default_rng(1), np.zeros(8)
-    for _ in range(500):
-        asked = robot.inverse_dynamics(robot.random_configuration(rng), rest, rest)
-        assert (np.abs(asked) < robot.largest_gravity).all()
-    held = of(robot, effort=1e-3).static_effort
-    assert held is not None
-    assert np.isfinite(held.effort).sum() > 6
-
-
 def test_the_rate_of_efforts_is_one_for_all_joints_of_a_unit() -> None:
     limits = of(fingers())
     sliding = np.array(fingers().units) == "m"
