@@ -1,6 +1,7 @@
 """``hsp view`` and ``hsp run --view`` as a person uses them, with a browser or none."""
 
 import socket
+import threading
 import time
 from collections.abc import Iterator
 from pathlib import Path
@@ -11,6 +12,7 @@ from pages import Page
 
 from hsp_control import Rollout
 from hsp_control.cli import main
+from hsp_control.companions.viewer import pages as pages_of_commands
 from hsp_control.companions.viewer import transport
 
 pytestmark = pytest.mark.process
@@ -79,14 +81,28 @@ def test_run_shows_what_it_computes_and_keeps_its_log(
 def test_the_page_of_a_run_opens_once_and_shows_its_robot(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    pages: list[Page] = []
-    monkeypatch.setattr(
-        transport, "open_browser", lambda url: pages.append(Page(url)) or False
-    )
+    monkeypatch.setattr(transport, "RELOAD_TIMEOUT", 0.5)
+    # A run may be over before a page has connected: it waits for the page then.
+    monkeypatch.setattr(pages_of_commands, "PAGE_TIMEOUT", 200.0)
+    opened: list[Page] = []
+
+    def look(url: str) -> bool:
+        opened.append(Page(url))
+        threading.Thread(target=leave_after_the_run, args=opened, daemon=True).start()
+        return True
+
+    def leave_after_the_run(page: Page) -> None:
+        while not any(c["type"] == "ask" for c in list(page.commands)):
+            time.sleep(0.05)
+        time.sleep(0.5)
+        page.leave()
+
+    monkeypatch.setattr(transport, "open_browser", look)
     assert main(["run", MOVING, "--view", "--out", str(tmp_path), *SHORT]) == 0
-    assert pages[0].last("caption", "/caption")["title"]
-    assert pages[0].last("set_object", "/robot/joint3/link3")
-    assert any(c["type"] == "clip" for c in pages[0].commands)
+    (page,) = opened
+    assert page.last("caption", "/caption")["title"]
+    assert page.last("set_object", "/robot/joint3/link3")
+    assert page.last("clip", "/clip")
 
 
 def test_a_port_in_use_is_said_and_the_run_goes_on(
