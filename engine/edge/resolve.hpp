@@ -11,7 +11,7 @@ template <template <int...> class As> struct EdgeMemory {
   As<'m', 'n'> Q;  // factors of the exact inverse
   As<'m', 'm'> X;
   As<'n'> exact;     // a_exact, where μ < 1 and the laws differ
-  As<'n'> damped;    // a_damped, where they differ or a limit is violated
+  As<'n'> damped;    // a_damped, where they differ and it is not left out
   As<'n'> by_tasks;  // a_damped without φ_N, where it went level by level
   As<'n'> exact_e_N;
   As<1> share;  // μ, without the share of the limits
@@ -25,12 +25,14 @@ struct Resolve {
   Following following;
   bool exact_beside;  // whether there is an exact law beside the damped one
   bool alone;         // whether the tasks are one level, which is resolved at once
+  bool beside;        // whether the damped law is written even where it does not count
   Thresholds thresholds;
   Factors<InOut> factors;
   Projectors<InOut> projectors;
   EdgeMemory<InOut> edge;
   Out<'n'> e_N, a;
   OutInts<1> edge_level;  // the first level whose inverse the damped law bounds; 0: none
+  OutInts<1> left_out;    // whether the damped law does not count, and was not written
   LawOutcome<OutInts> outcome;
 
   struct Memory {
@@ -50,8 +52,8 @@ struct Resolve {
   } memory;
 
   void operator()() {
-    edge_level[0] = outcome.damped_level[0] = alone ? at_once() : by_levels();
-    blend();
+    const double threshold = write_whitened();
+    if (!exact_throughout(threshold)) blend(threshold);
     outcome.finite[0] = is_finite();
   }
 
@@ -61,54 +63,67 @@ struct Resolve {
     return PseudoInverse(q, factor, law.metric.L, law.form);
   }
 
-  // All tasks at once; return 1, the only level, if its inverse is bounded, else 0.
-  int at_once() {
+  // Write the exact law, if no inverse is bounded; return whether that is so. If the tasks of
+  // several levels are exact together, they are exact one after the other: this is the same then.
+  bool exact_throughout(double threshold) {
+    edge_level[0] = outcome.damped_level[0] = left_out[0] = 0;
+    edge.share[0] = 0.0;
     auto& [Q, X] = factors;
-    const bool damped = bounded_inverse(memory.B, write_whitened(), Q, X, memory.square);
+    const auto& J = law.task.jacobian;
+    if (J.rows() > J.cols() || !exact_inverse(memory.B, threshold, Q, X, memory.square))
+      return false;
+    write_law(law, inverse(Q, X), memory.law, e_N, a);
+    return alone || is_finite();
+  }
+
+  // a = a_exact + μ (a_damped - a_exact); the first two shares count here, see `shares.hpp`. Where
+  // μ = 0 the law is the exact one and the outcome says so. Only limits may come near to the damped
+  // one then, which is left out until they ask for it.
+  void blend(double threshold) {
+    auto& [Q, X, exact, damped, by_tasks, exact_e_N, share] = edge;
+    const double mu = exact_beside ? share_of_damped() : 1.0;
+    if (mu < 1.0) {
+      Q = factors.Q;
+      X = factors.X;
+      write_law(law, inverse(Q, X), memory.law, exact_e_N, exact);
+    }
+    left_out[0] = mu == 0.0 && !beside;
+    if (left_out[0]) {
+      a = exact;
+      e_N = exact_e_N;
+      return;
+    }
+    edge_level[0] = alone ? damped_at_once(threshold) : damped_by_levels();
+    damped = a;
+    if (mu < 1.0) {
+      a = exact + mu * (damped - exact);
+      e_N = exact_e_N + mu * (e_N - exact_e_N);
+    }
+    if (edge_level[0] == 0) return;
+    share[0] = mu;
+    if (mu > 0.0) outcome.damped_level[0] = edge_level[0];
+  }
+
+  double share_of_damped() {
+    const double far = far_share(rows.stretched, following.far);
+    if (far == 1.0) return far;
+    const auto& J = law.task.jacobian;
+    return std::max(
+        far, near_share(J, following.near, least, memory.turned, edge.X, memory.square));
+  }
+
+  // All tasks at once; return 1, the only level, if its inverse is bounded, else 0.
+  int damped_at_once(double threshold) {
+    auto& [Q, X] = factors;
+    const bool damped = damped_inverse(memory.B, threshold, Q, X);
     write_law(law, inverse(Q, X), memory.law, e_N, a);
     return damped ? 1 : 0;
   }
 
-  // All levels at once, or level by level if they conflict. If the tasks of several levels are
-  // exact together, they are exact one after the other: this is the same then. Return the first
-  // level whose inverse is bounded, from 1 on; 0: none is.
-  int by_levels() {
-    const auto& J = law.task.jacobian;
-    const double threshold = write_whitened();
-    auto& [Q, X] = factors;
-    if (J.rows() <= J.cols() && exact_inverse(memory.B, threshold, Q, X, memory.square)) {
-      write_law(law, inverse(Q, X), memory.law, e_N, a);
-      if (is_finite()) return 0;
-    }
+  // Level by level; return the first one whose inverse is bounded, from 1 on; 0: none is.
+  int damped_by_levels() {
     return write_damped_levels(law, rows, least, following, thresholds, projectors, memory.damped,
                                memory.levels, edge.by_tasks, e_N, a);
-  }
-
-  // a = a_exact + μ (a_damped - a_exact); the first two shares count here, see `shares.hpp`. Where
-  // μ = 0 the law is the exact one and the outcome says so; `edge_level` stays what the damped law
-  // bounds, which the limits may still come near to.
-  void blend() {
-    auto& [Q, X, exact, damped, by_tasks, exact_e_N, share] = edge;
-    if (edge_level[0] == 0) {
-      share[0] = 0.0;
-      return;
-    }
-    damped = a;
-    share[0] = 1.0;
-    if (!is_finite() || !exact_beside) return;
-    double mu = far_share(rows.stretched, following.far);
-    if (mu < 1.0) {
-      const auto& J = law.task.jacobian;
-      mu = std::max(mu, near_share(J, following.near, least, memory.turned, X, memory.square));
-    }
-    if (mu == 1.0) return;
-    share[0] = mu;
-    bounded_inverse(memory.B, 0.0, Q, X, memory.square);
-    write_law(law, inverse(Q, X), memory.law, exact_e_N, a);
-    exact = a;
-    a += mu * (damped - exact);
-    e_N = exact_e_N + mu * (e_N - exact_e_N);
-    if (mu == 0.0) outcome.damped_level[0] = 0;
   }
 
   // Write B = J L⁻ᵀ and the thresholds; return a singular value from which on no level is bounded.

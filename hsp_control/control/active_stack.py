@@ -78,6 +78,7 @@ class ActiveStack:
             gain,
             threshold,
             Following.of(robot.size, on_legs=bool(robot.unactuated)),
+            controls=field.controls,
         )
         self.rows = self.resolution.problem.task  # all rows stacked: J, J', e, e', a_x
         self.streamed = any(
@@ -203,7 +204,7 @@ class ActiveStack:
         else:
             self.term_samples = (sample,)
             calls += field.calls(state, problem.metric, form, sample)
-        calls.append(self.resolution.call(state.v, controls=field.controls))
+        calls.append(self.resolution.call(state.v))
         return state.plan(calls).steps()
 
     def field_value(self) -> float:

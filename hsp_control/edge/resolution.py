@@ -12,7 +12,7 @@ from hsp_control import engine
 from hsp_control.common.arrays import Array, Indices
 from hsp_control.edge.step import EdgeMemory, Factors, Projectors
 from hsp_control.edge.threshold import NOT, Following, Thresholds
-from hsp_control.engine.plans import PartCall
+from hsp_control.engine.plans import OnlyIf, PartCall
 from hsp_control.law.outcome import LawOutcome
 from hsp_control.law.problem import Problem
 
@@ -33,7 +33,7 @@ class Resolution:
         outcome: What became of the law then.
         edge: What the two laws of the edge left then.
         edge_level: The first level whose inverse the damped law bounds, from 1 on,
-            shape (1,); 0: none. That of the outcome, unless the exact law counts alone.
+            shape (1,); 0: none, or it is left out.
         factors: The stack's pseudo-inverse then.
         alone: Whether the tasks of one level are resolved at once, whatever happens.
         projectors: The levels' projectors then, if the damped law bounds an inverse and
@@ -48,20 +48,24 @@ class Resolution:
         gain: Array,
         threshold: float,
         following: Following = NOT,
+        *,
+        controls: bool = True,
     ) -> None:
-        """Allocate."""
+        """Allocate; ``controls``: whether there is a field, else u = 0."""
         m = sum(levels)
         self.problem = Problem(m, nv, gain)
         self.ends: Indices = np.cumsum([*levels] or [0], dtype=np.int64)
         self.form = form
         self.threshold, self._following = threshold, following
+        self._controls = controls
         self._thresholds = Thresholds.allocate(len(self.ends))
         self.thresholds = self._thresholds.own
         self.thresholds[:] = threshold
         self.factors = Factors(np.zeros((m, nv)), np.zeros((m, m)))
         self.projectors = Projectors.allocate(m, nv)
         self.edge = EdgeMemory.allocate(m, nv)
-        self.edge_level: Indices = np.zeros(1, dtype=np.int64)
+        self.edge_level: Indices
+        self.edge_level, self._left_out = np.zeros((2, 1), dtype=np.int64)
         self._self_motions, self._brakings = np.zeros((2, 2, nv))
         # Only a fixed base has a law beside the damped one. Who stands keeps the
         # balance by tasks that nothing damps.
@@ -73,8 +77,13 @@ class Resolution:
         self.null_space_error = self.problem.record.null_space_error
         self.outcome = LawOutcome.allocate()
 
-    def call(self, v: Array, *, controls: bool = True) -> PartCall:
-        """Return the call that writes a, e_N and the outcome."""
+    def call(self, v: Array, *, beside: bool = False) -> PartCall:
+        """Return the call that writes a, e_N and the outcome.
+
+        Args:
+            v: Velocity, shape (nv,).
+            beside: Whether the damped law is written even where it does not count.
+        """
         problem = self.problem
         law = {
             "task": problem.task,
@@ -83,7 +92,7 @@ class Resolution:
             "form": self.form,
             "v": v,
             "K_N": problem.gain,
-            "controls": controls,
+            "controls": self._controls,
         }
         return PartCall(
             engine.Resolve,
@@ -93,6 +102,7 @@ class Resolution:
             following=self._following,
             exact_beside=self._exact_beside,
             alone=self.alone,
+            beside=beside,
             thresholds=self._thresholds,
             factors=self.factors,
             projectors=self.projectors,
@@ -100,8 +110,13 @@ class Resolution:
             e_N=self.null_space_error,
             a=self.acceleration,
             edge_level=self.edge_level,
+            left_out=self._left_out,
             outcome=self.outcome,
         )
+
+    def damped_beside(self, v: Array) -> OnlyIf:
+        """Return what writes the damped law, if `call` left it out; a stays as it is."""
+        return OnlyIf([self.call(v, beside=True)], self._left_out)
 
     def self_motions(self, v: Array) -> tuple[PartCall, tuple[Array, Array]]:
         """Return the call that writes what the null space contributes, after `call`.

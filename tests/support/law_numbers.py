@@ -84,8 +84,9 @@ def resolve(
 ) -> tuple[Array, Array, bool]:
     """Return the package's acceleration and e_N, and whether it was damped."""
     m, n = x.J.shape
-    resolution = Resolution(levels or [m], n, form, x.K_N, threshold)
+    sizes = levels or [m]
+    resolution = Resolution(sizes, n, form, x.K_N, threshold, controls=controls)
     fill(resolution.problem, x)
-    planned([resolution.call(x.v, controls=controls)]).run(0.0)
+    planned([resolution.call(x.v)]).run(0.0)
     a, e_N = resolution.acceleration, resolution.null_space_error
     return a.copy(), e_N.copy(), resolution.outcome.outcome is Outcome.DAMPED

@@ -185,15 +185,13 @@ bool exact_inverse(const B& wide, double threshold, Q& q, X& factor, S& square) 
   return cholesky(square, square);  // of 1/threshold² - X Xᵀ
 }
 
-// Write the factors of B# = Bᵀ q(B Bᵀ) = Qᵀ X, and return whether it was damped.
+// Write the factors of B# = Bᵀ q(B Bᵀ) = Qᵀ X by the spectrum; return whether it was damped.
 //
 // q(x) = 1/x for x ≥ threshold² and (2 - x/threshold²)/threshold² below it: exactly the
 // pseudo-inverse while every singular value of B is above the threshold, continuously
-// differentiable, and bounded: ‖B#‖ ≤ 1.09/threshold. B has the shape (m, n), m ≤ n; `square`
-// (m, m) is used.
-template <class B, class Q, class X, class S>
-bool bounded_inverse(const B& wide, double threshold, Q& q, X& factor, S& square) {
-  if (exact_inverse(wide, threshold, q, factor, square)) return false;
+// differentiable, and bounded: ‖B#‖ ≤ 1.09/threshold. B has the shape (m, n), m ≤ n.
+template <class B, class Q, class X>
+bool damped_inverse(const B& wide, double threshold, Q& q, X& factor) {
   q = wide;
   orthogonalise_rows(q, factor);
   const double floor = threshold * threshold;
@@ -204,6 +202,13 @@ bool bounded_inverse(const B& wide, double threshold, Q& q, X& factor, S& square
     damped |= x < floor;
   }
   return damped;
+}
+
+// The same, but without the spectrum where it is exact; `square` (m, m) is used.
+template <class B, class Q, class X, class S>
+bool bounded_inverse(const B& wide, double threshold, Q& q, X& factor, S& square) {
+  return !exact_inverse(wide, threshold, q, factor, square) &&
+         damped_inverse(wide, threshold, q, factor);
 }
 
 }  // namespace hsp

@@ -246,7 +246,7 @@ class LimitedStep:
             found = optimum(self._rows, moving, memories[0], LIMITED, warm=warm)
             return [root, begin, *found]
 
-        rows: list[AnyCall] = [*state.inertia.calls]
+        rows: list[AnyCall] = [*state.inertia.calls, resolution.damped_beside(state.v)]
         if permitted is not None:
             kept, edge = slice(barriers, contacts), resolution.edge
             law = resolution.acceleration, edge.damped

@@ -5,6 +5,7 @@ import pytest
 from task_cases import load
 
 import hsp_control as hsp
+from hsp_control.engine.plans import planned
 from hsp_control.law.outcome import DAMPED, EXACT, NOT_FINITE, LawOutcome
 
 
@@ -19,9 +20,19 @@ def test_in_the_middle_the_exact_law_counts_alone(away: float, damped: str) -> N
     made = hsp.Controller(robot, [task], start=q, limits=None)
     output = made.compute(0.0, q, np.zeros(7))
     law = made.active_stack.resolution
-    assert law.edge_level[0] == (away > 0.0)
     assert output.damped == damped
     assert law.outcome.outcome is (DAMPED if damped else EXACT)
+
+    # Where a limit may come near to the damped law, it is written; a stays as it is.
+    assert law.edge_level[0] == (away > 1.0)
+    a, e_N = law.acceleration.copy(), law.null_space_error.copy()
+    planned([law.damped_beside(np.zeros(7))]).run(0.0)
+    assert law.edge_level[0] == (away > 0.0)
+    assert law.outcome.outcome is (DAMPED if damped else EXACT)
+    np.testing.assert_array_equal(law.acceleration, a)
+    np.testing.assert_array_equal(law.null_space_error, e_N)
+    differs = np.abs(law.edge.damped - a).max() > 1e-3 * np.abs(a).max()
+    assert differs == (away == 0.2)
 
 
 def test_a_law_that_was_not_resolved_is_not_finite() -> None:

@@ -39,7 +39,8 @@ def test_it_is_what_the_law_does_with_a_field_and_not_without(
     assert law.edge_level[0] > 0  # damped, and beyond limits
     _, (self_motions, _) = law.self_motions(v)
     whole, self_motion = law.edge.damped.copy(), self_motions[1].copy()
-    planned([law.call(v, controls=False)]).run(0.0)
+    law.problem.field.g[:], law.problem.field.g_dot[:] = v, 0.0  # u = 0
+    planned([law.call(v, beside=True)]).run(0.0)
     by_tasks = law.edge.damped.copy()
     scale = np.abs(whole).max()
     np.testing.assert_allclose(self_motion, whole - by_tasks, atol=1e-9 * scale)
