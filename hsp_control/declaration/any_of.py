@@ -4,6 +4,7 @@ from dataclasses import fields, is_dataclass
 from typing import Any, cast
 
 from pydantic import GetCoreSchemaHandler, GetJsonSchemaHandler
+from pydantic.dataclasses import rebuild_dataclass
 from pydantic_core import CoreSchema, SchemaValidator, core_schema
 
 from hsp_control.common.exceptions import ConfigError
@@ -151,6 +152,7 @@ def _union(members: dict[str, type[Declared]]) -> CoreSchema:
 
 def _own_and_others(member: type[Declared]) -> tuple[CoreSchema, list[CoreSchema]]:
     """Return the schema of a member, and the definitions that it refers to."""
+    rebuild_dataclass(cast(Any, member))  # unless it was built
     schema: Any = member.__pydantic_core_schema__
     if schema["type"] == "definitions":
         return schema["schema"], schema["definitions"]

@@ -60,11 +60,9 @@ def _bases(annotation: Any, metadata: Sequence[Any] = ()) -> list[type[Declared]
     return []
 
 
-class PlainSignature:
-    """The signature of a class, without what only pydantic reads in its annotations."""
-
-    def __get__(self, instance: object, cls: type[Declared]) -> Signature:
-        return Signature([_parameter(each) for each in _in_order(cls)])
+def plain_signature(cls: Any) -> Signature:
+    """Return a class's signature, without what only pydantic reads in annotations."""
+    return Signature([_parameter(each) for each in _in_order(cls)])
 
 
 def with_fields(cls: type[Declared], docstring: str) -> str:

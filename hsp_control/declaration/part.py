@@ -1,35 +1,21 @@
 """The base class of all parts: immutable values with checked fields."""
 
 import ast
-import dataclasses
 import inspect
 import sys
-from collections.abc import Callable, Iterable, Iterator
-from functools import cache, wraps
-from inspect import cleandoc
-from typing import Any, ClassVar, NoReturn, dataclass_transform
+from collections.abc import Iterator
+from functools import cache
+from typing import Any, ClassVar, dataclass_transform
 
 import numpy as np
-from pydantic import (
-    ConfigDict,
-    GetCoreSchemaHandler,
-    GetJsonSchemaHandler,
-    ValidationError,
-)
-from pydantic.dataclasses import dataclass
+from pydantic import GetCoreSchemaHandler, GetJsonSchemaHandler
 from pydantic.json_schema import JsonSchemaValue
 from pydantic_core import CoreSchema
 
-from hsp_control.common.exceptions import HspControlError, ImmutableError
 from hsp_control.declaration.any_of import AnyOf
-from hsp_control.declaration.families import Declared, Family, same, value_fields
-from hsp_control.declaration.in_python import (
-    PlainSignature,
-    with_fields,
-    with_parts_made,
-)
-from hsp_control.declaration.mistakes import Carrier, argument_error
+from hsp_control.declaration.families import Declared, same, value_fields
 from hsp_control.declaration.plain_data import plain_data
+from hsp_control.declaration.value_class import ValueClass
 
 
 def attribute_docstrings(cls: type) -> dict[str, str]:
@@ -68,13 +54,6 @@ def _of_attributes(node: ast.ClassDef) -> Iterator[tuple[str, str]]:
             yield field.target.id, " ".join(below.value.value.split())
 
 
-_CONFIG = ConfigDict(
-    extra="forbid",
-    arbitrary_types_allowed=True,
-    validate_default=True,  # a default given as a tuple is stored as an array, too
-)
-
-
 class _Documentation:
     """The docstring of each field: sources are read when somebody asks."""
 
@@ -86,15 +65,8 @@ class _Documentation:
         return found
 
 
-class _Docstring:
-    """The docstring of a class, with those of its fields."""
-
-    def __get__(self, part: object, cls: type["Part"]) -> str:
-        return with_fields(cls, cls._docstring)
-
-
 @dataclass_transform(frozen_default=True)
-class Part(Declared):
+class Part(Declared, metaclass=ValueClass):
     """A value that declares one part of a controller, a world or a simulation.
 
     A subclass annotates its fields; each has a docstring that says what it is and in
@@ -118,43 +90,6 @@ class Part(Declared):
 
     documentation = _Documentation()
     _docstring: ClassVar[str]  # without the fields' own
-    __signature__: ClassVar[PlainSignature]
-
-    def __init_subclass__(
-        cls,
-        *,
-        family: str | None = None,
-        type: str | None = None,
-        error: type[HspControlError] | None = None,
-        **arguments: Any,
-    ) -> None:
-        """Make the class a value class, and register it with its family."""
-        super().__init_subclass__(**arguments)
-        if "__init__" in vars(cls):
-            raise TypeError(
-                f"{cls.__name__} must not have __init__: declare its parameters as "
-                "fields, and check them in __post_init__"
-            )
-        if error is not None:
-            cls.error = error
-        if family is not None:
-            cls.family = Family(family, cls)
-        cls.yaml_type = type
-        if "__post_init__" in vars(cls):
-            cls.__post_init__ = _completed(cls.__post_init__)  # type: ignore[assignment,method-assign]
-        cls._docstring = cleandoc(vars(cls)["__doc__"] or "")
-        hidden = _hide_properties(cls)
-        dataclass(cls, frozen=True, eq=False, repr=False, config=_CONFIG)
-        cls.__doc__ = _Docstring()  # type: ignore[assignment]
-        cls.__signature__ = PlainSignature()
-        for name in hidden:
-            setattr(cls, name, _field_property(name))
-        cls.__init__ = _with_one_error(cls.__init__)  # type: ignore[method-assign]
-        cls.__setattr__ = _refuse_assignment  # type: ignore[assignment,method-assign]
-        cls.__delattr__ = _refuse_deletion  # type: ignore[assignment,method-assign]
-        if type is not None:
-            assert cls.family is not None, f"{cls.__name__} has a type, but no family"
-            cls.family.register(type, cls)
 
     @classmethod
     def __get_pydantic_core_schema__(
@@ -240,78 +175,6 @@ class Part(Declared):
 
     def __deepcopy__(self, memo: dict[int, Any]) -> "Part":
         return self
-
-
-def _with_one_error(init: Callable[..., None]) -> Callable[..., None]:
-    """Return a constructor that raises the part's own error instead of pydantic's."""
-
-    def checked(self: Part, *args: Any, **kwargs: Any) -> None:
-        """Make the part, and check it; see the class for the arguments."""
-        try:
-            given, named = with_parts_made(type(self), args, kwargs)
-            init(self, *given, **named)
-        except ValidationError as error:
-            raise argument_error(type(self), error) from None
-
-    return checked
-
-
-def _hide_properties(cls: type) -> list[str]:
-    """Return the fields without default that hide an inherited property."""
-    own = vars(cls)
-    hidden = [
-        name
-        for name in _annotated(cls)
-        if name not in own and isinstance(getattr(cls, name, None), property)
-    ]
-    for name in hidden:
-        setattr(cls, name, dataclasses.field())
-    return hidden
-
-
-def _annotated(cls: type) -> Iterable[str]:
-    """Return the names that a class itself annotates."""
-    if sys.version_info >= (3, 14):  # annotations are evaluated when somebody asks
-        from annotationlib import Format, get_annotations
-
-        return get_annotations(cls, format=Format.FORWARDREF)
-    own: dict[str, Any] = vars(cls).get("__annotations__", {})
-    return own
-
-
-def _field_property(name: str) -> property:
-    """Return what gives and sets a field, instead of the inherited property."""
-    return property(
-        lambda part: vars(part)[name],
-        lambda part, value: vars(part).update({name: value}),
-    )
-
-
-def _completed(check: Callable[[Any], None]) -> Callable[[Any], None]:
-    """Return a ``__post_init__`` that sets the defaults first."""
-
-    @wraps(check)
-    def checked(self: Part) -> None:
-        self._complete()
-        try:
-            check(self)
-        except HspControlError as error:
-            raise error if isinstance(error, ValueError) else Carrier(error) from None
-
-    return checked
-
-
-def _refuse_assignment(self: Part, name: str, value: object) -> NoReturn:
-    """Raise: a value does not change."""
-    raise ImmutableError(
-        f"{type(self).__name__}.{name} cannot be assigned: parts never change; make "
-        f"another with dataclasses.replace(part, {name}=...)"
-    )
-
-
-def _refuse_deletion(self: Part, name: str) -> NoReturn:
-    """Raise: a value does not change."""
-    raise ImmutableError(f"{type(self).__name__}.{name} cannot be deleted")
 
 
 def _hashable(value: Any) -> Any:

@@ -115,7 +115,7 @@ class Resolution:
         )
 
     def damped_beside(self, v: Array) -> OnlyIf:
-        """Return what writes the damped law, if `call` left it out; a stays as it is."""
+        """Return what writes the damped law if `call` left it out; a stays the same."""
         return OnlyIf([self.call(v, beside=True)], self._left_out)
 
     def self_motions(self, v: Array) -> tuple[PartCall, tuple[Array, Array]]:

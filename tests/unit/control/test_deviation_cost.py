@@ -94,6 +94,7 @@ def test_levels_share_directions_as_the_law_does(
     else:
         controller = computed(threshold, "robot")
     resolution = controller.active_stack.resolution
+    planned([resolution.damped_beside(state.v)]).run(0.0)  # as where a limit binds
     H = limit_oracle.deviation_cost(resolution, False, robot.size)
     np.testing.assert_allclose(inverse_cost(resolution) @ H, np.eye(7), atol=1e-5)
 
