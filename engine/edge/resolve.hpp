@@ -108,8 +108,8 @@ struct Resolve {
     const double far = far_share(rows.stretched, following.far);
     if (far == 1.0) return far;
     const auto& J = law.task.jacobian;
-    return std::max(
-        far, near_share(J, following.near, least, memory.turned, edge.X, memory.square));
+    return std::max(far,
+                    near_share(J, following.near, least, memory.turned, edge.X, memory.square));
   }
 
   // All tasks at once; return 1, the only level, if its inverse is bounded, else 0.

@@ -11,12 +11,13 @@
 //
 // gives Λ e'' + (½ Λ' + D + D_ζ) e' + S e = -f, because Λ' = -Λ G' Λ. S = K up to the spring's
 // largest force (slipping.hpp). D_ζ = 2 ζ Λ √(G K) is symmetric, and damps each mode of (Λ, K)
-// with the ratio ζ. With K = C Cᵀ,
+// with the ratio ζ; where there is no stiffness, nothing. With G = B Bᵀ and K = C Cᵀ, let
+// Cᵀ B = Uᵀ diag(ω) Q, the rows of Q orthonormal and ω the natural frequencies of the modes:
 //
-//   √(G K) = C⁻ᵀ √(Cᵀ G C) Cᵀ,
+//   √(G K) = G C (Cᵀ G C)^(-½) Cᵀ = B Qᵀ U Cᵀ,
 //
-// which needs no inverse of G. Only the first term does. There Λ = J̄ᵀ M J̄, with the
-// pseudo-inverse J̄ = M⁻¹J_eᵀΛ, bounded where the law bounds its own.
+// which needs no inverse, neither of G nor of K. Only the first term does. There Λ = J̄ᵀ M J̄, with
+// the pseudo-inverse J̄ = M⁻¹J_eᵀΛ, bounded where the law bounds its own.
 #pragma once
 #include <cmath>
 #include <hsp/linalg.hpp>
@@ -50,7 +51,6 @@ struct ImpedanceGains {
   Scratch<'n', 'n'> L;
   Scratch<'m', 'n'> J_e, J_e_dot, B, X, Z, Q;
   Scratch<'m', 'm'> G_dot, Lambda, C, U, root, factor, S;
-  Scratch<'m'> frequency;
   BoundedStiffness bounded;
 
   void check() const {
@@ -103,17 +103,18 @@ struct ImpedanceGains {
     J_e_dot.middleRows<3>(first) = T.lazyProduct(J_dot) + T_dot.lazyProduct(J);
   }
 
-  // √(G K) = C⁻ᵀ √(Cᵀ G C) Cᵀ, with G = B Bᵀ and K = C Cᵀ. The singular values of Cᵀ B are the
-  // natural frequencies of the modes [rad/s].
+  // √(G K) = B Qᵀ U Cᵀ. Where a mode has no frequency, Q has no row.
   void write_natural_root() {
-    cholesky(impedance.K, C);
+    factor_stiffness(impedance.K, C, S);
     Z = C.transpose().lazyProduct(B);
-    orthogonalise_rows(Z, U);  // Cᵀ G C = Uᵀ diag(ω²) U
-    frequency = Z.rowwise().norm();
-    root.noalias() = frequency.asDiagonal() * U;
-    S = U.transpose().lazyProduct(root);
-    solve_lower_transposed(C, S);
-    root = S.lazyProduct(C.transpose());
+    orthogonalise_rows(Z, U);  // diag(ω) Q
+    for (Index k = 0; k < Z.rows(); ++k) {
+      const double frequency = Z.row(k).norm();
+      if (frequency > 0.0) Z.row(k) /= frequency;
+    }
+    S = U.lazyProduct(C.transpose());
+    factor = B.lazyProduct(Z.transpose());
+    root = factor.lazyProduct(S);
   }
 
   // Λ = (B#)ᵀ B# = Xᵀ Q Qᵀ X with B# = Qᵀ X, the inverse of B Bᵀ; it fades to zero where B loses

@@ -4,12 +4,13 @@
 // as it does at a friction that is F_g in every direction, and K (e - x) pulls:
 //
 //   U(e) = min_x ½ (e - x)ᵀ K (e - x) + Σ F_g |x_g|
-//   s(e) = ∂U/∂e = S e,    S = (K⁻¹ + diag(c))⁻¹,    c ≥ 0
+//   s(e) = ∂U/∂e = S e,    S = (K⁻¹ + diag(c))⁻¹ = C (I + Cᵀ diag(c) C)⁻¹ Cᵀ,    c ≥ 0
 //
-// with one number c in each group, 0 unless |s_g| = F_g. U is convex, ½ eᵀK e where no force is
-// at its bound, and grows linearly far away, so that the bounded force is conservative for every
-// stiffness. Each c is where a Newton iteration on 1/|s_g| ends, as for the radius of a trust
-// region: one step if the group's stiffness is one number.
+// with K = C Cᵀ, which may be without stiffness along some directions, and one number c in each
+// group, 0 unless |s_g| = F_g. U is convex, ½ eᵀK e where no force is at its bound, and grows
+// linearly far away, so that the bounded force is conservative for every stiffness. Each c is where
+// a Newton iteration on 1/|s_g| ends, as for the radius of a trust region: one step if the group's
+// stiffness is one number.
 #pragma once
 #include <cmath>
 #include <hsp/indices.hpp>
@@ -21,7 +22,7 @@ namespace hsp {
 
 // The numbers of an impedance.
 struct Impedance {
-  In<'m', 'm'> K, D;             // stiffness, damping; symmetric
+  In<'m', 'm'> K, D;             // stiffness, damping; symmetric, not negative
   In<'m'> ratio, inverse_force;  // ζ, the same for all rows; 1/F of each row, 0 for no bound
 };
 
@@ -46,10 +47,19 @@ struct Group {
   template <class X> auto of(X& x) const { return x.segment(first, size); }
 };
 
+// K = C Cᵀ of a symmetric K that is not negative, by its eigenvectors; `turned` is used.
+template <class K, class C, class V>
+void factor_stiffness(const K& stiffness, C& factor, V& turned) {
+  factor = stiffness;
+  orthogonalise_rows(factor, turned);  // V K = diag(λ) V
+  for (Index k = 0; k < factor.rows(); ++k) turned.row(k) *= std::sqrt(factor.row(k).norm());
+  factor = turned.transpose();
+}
+
 // S of an error, in memory of its own.
 struct BoundedStiffness {
-  Scratch<'m', 'm'> inverse, L;
-  Scratch<'m'> s, change;
+  Scratch<'m', 'm'> C, V, L;
+  Scratch<'m'> s, change, part;
   Scratch<'g'> c;
 
   // Write S where a bound acts; return whether one does, else S is K, and is not written.
@@ -61,8 +71,8 @@ struct BoundedStiffness {
       const Group group(g, ends, impedance);
       acts = acts || group.of(s).norm() > group.most;
     }
-    if (!acts || !cholesky(impedance.K, L)) return false;
-    write_inverse(inverse);
+    if (!acts) return false;
+    factor_stiffness(impedance.K, C, V);
     c.setZero();
     bool settled = false;
     for (int sweep = 0; sweep < steps && !settled; ++sweep) {  // where K couples the groups
@@ -71,7 +81,9 @@ struct BoundedStiffness {
         settled = bound(Group(g, ends, impedance), g, ends, e) && settled;
     }
     factorise(ends);
-    write_inverse(S);
+    V = C.transpose();
+    for (Index k = 0; k < V.cols(); ++k) solve_factored(V.col(k));
+    S = C.lazyProduct(V);
     return true;
   }
 
@@ -85,35 +97,39 @@ struct BoundedStiffness {
     for (int step = 0; step < steps; ++step) {
       factorise(ends);
       s = e;
-      solve(s);
+      apply(s);
       const double n = group.of(s).norm(), relative = n / group.most;
       if (relative <= 1.0 + tolerance && (c[g] == 0.0 || relative >= 1.0 - tolerance))
         return step == 0;
       change.setZero();
       group.of(change) = group.of(s);
-      solve(change);  // -∂s/∂c_g
+      apply(change);  // -∂s/∂c_g
       const double slope = group.of(s).dot(group.of(change));
       c[g] = std::max(c[g] + (relative - 1.0) * n * n / slope, 0.0);
     }
     return false;
   }
 
-  // L Lᵀ = K⁻¹ + diag(c)
+  // L Lᵀ = I + Cᵀ diag(c) C
   void factorise(const Ints<'g'>& ends) {
-    L = inverse;
+    V = C;
     for (Index g = 0, i = 0; g < ends.size(); ++g)
-      for (; i < ends[g]; ++i) L(i, i) += c[g];
+      for (; i < ends[g]; ++i) V.row(i) *= c[g];
+    L = C.transpose().lazyProduct(V);
+    L.diagonal().array() += 1.0;
     cholesky(L, L);
   }
 
-  template <class X> void solve(X& x) const {
-    solve_lower(L, x);
-    solve_lower_transposed(L, x);
+  // x = S x
+  void apply(Scratch<'m'>& x) {
+    part = C.transpose().lazyProduct(x);
+    solve_factored(part);
+    x = C.lazyProduct(part);
   }
 
-  template <class X> void write_inverse(X& out) const {
-    out.setIdentity();
-    solve(out);
+  template <class X> void solve_factored(X&& x) const {
+    solve_lower(L, x);
+    solve_lower_transposed(L, x);
   }
 };
 

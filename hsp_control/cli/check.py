@@ -157,8 +157,9 @@ def _check_table(found: dict[str, Any]) -> Table:
         low, high = (f"{1e-3 * each:.2g}" for each in (min(rates), max(rates)))
         most = high if low == high else f"{low} to {high}"
         table.add_row("change of an effort", f"at most {most} N·m or N in 1 ms")
-    values = ", ".join(f"{value:.3g}" for value in found["singular_values"])
-    table.add_row("singular values", f"{values} at the start")
+    if found["singular_values"]:
+        values = ", ".join(f"{value:.3g}" for value in found["singular_values"])
+        table.add_row("singular values", f"{values} at the start")
     largest = f"{found['largest_effort']:.3g} {found['effort_unit']}"
     table.add_row("largest effort", f"{largest} at the start")
     return table
@@ -235,7 +236,8 @@ def robot_advice(robot: Robot) -> Iterator[str]:
 def advice_of_run(experiment: Experiment, rollout: Rollout) -> Iterator[str]:
     """Yield what `hsp check` advises if a run began singular."""
     controller = experiment.controller
-    if not rollout["singular_values"][0].min() < controller.singularity_threshold:
+    least = rollout["singular_values"][0].min(initial=np.inf)
+    if not least < controller.singularity_threshold:
         return
     first = controller.preview().compute(0.0, experiment.q0, experiment.v0)
     if first.damped:

@@ -64,11 +64,12 @@ def summary(rollout: Rollout) -> Table:
     )
     if beyond := beyond_limits(rollout):
         table.add_row("", beyond)
-    smallest = f"smallest singular value {np.nanmin(rollout['singular_values']):.3g}"
-    if rows_compare(rollout):
+    values = rollout["singular_values"]
+    smallest = f"smallest singular value {np.nanmin(values, initial=np.inf):.3g}"
+    if values.size and rows_compare(rollout):
         least = f"minimum {np.nanmin(rollout['manipulability']):.4g}, {smallest}"
         table.add_row("det(J W⁻¹ Jᵀ)", least)
-    else:  # determinants of different sizes do not compare
+    elif values.size:  # determinants of different sizes do not compare
         table.add_row("J L⁻ᵀ", smallest)
     largest = np.abs(rollout.tau).max(axis=0)
     unit = effort_units(rollout)[largest.argmax()]

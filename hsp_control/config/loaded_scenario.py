@@ -53,8 +53,12 @@ def load_scenario(document: Document) -> LoadedScenario:
             "robot's own",
         )
     scenario = validate(document, Scenario)
-    if not scenario.tasks and scenario.plan is None:
-        raise document.error(("tasks",), "needs at least one task, or a plan")
+    if "tasks" not in document.to_dict() and scenario.plan is None:
+        raise document.error(
+            ("tasks",),
+            "nothing given; needs tasks by name, or a plan; write {} for none: gravity "
+            "compensation and the field alone",
+        )
     folder = Path(document.name).resolve().parent
     scenario = replace(scenario, robot=scenario.robot.located(folder))
     with document.at():

@@ -160,7 +160,7 @@ class Scenario(Part, error=ConfigError):
         field(default_factory=ReadOnlyDict)
     )
     """The tasks, by name; tasks of the same priority form one level. A plan adds
-    its own."""
+    its own. Without any, the arm follows the field alone, without weight."""
     plan: Plan | None = None
     """What writes references and switches contacts while the robot moves; none by
     default."""

@@ -178,9 +178,10 @@ def next_numbers(
 
 
 def spring_energy(numbers: Array, ends: Indices, e: Array) -> float:
-    """Return U(e) = sᵀe - ½ sᵀK⁻¹s: ½ eᵀK e, and linear where s is at its bound."""
+    """Return U(e) = sᵀe - ½ sᵀK⁺s: ½ eᵀK e, and linear where s is at its bound."""
     force = spring_force(numbers, ends, e)
-    return float(force @ e - 0.5 * force @ np.linalg.solve(parts_of(numbers)[0], force))
+    length = np.linalg.pinv(parts_of(numbers).K, hermitian=True) @ force
+    return float(force @ e - 0.5 * force @ length)
 
 
 def dissipated(numbers: Array, mobility: Array, e_dot: Array) -> float:
@@ -188,7 +189,8 @@ def dissipated(numbers: Array, mobility: Array, e_dot: Array) -> float:
     K, D, ratio, *_ = parts_of(numbers)
     power = float(e_dot @ D @ e_dot)
     if ratio[0] > 0.0:
-        C = np.linalg.cholesky(K)
+        stiffness, axes = np.linalg.eigh(K)
+        C = axes * np.sqrt(np.maximum(stiffness, 0.0))
         squares, modes = np.linalg.eigh(C.T @ mobility @ C)
         along = modes.T @ C.T @ e_dot
         frequencies = np.sqrt(np.maximum(squares, np.finfo(float).tiny))

@@ -248,8 +248,9 @@ def measures(rollout: Rollout) -> dict[str, Measure]:
     add("null_space_error.max", e_N.max(), unit, "largest null-space error")
     add("null_space_error.end", e_N[-1], unit, "null-space error at the end")
     least, values = rollout["manipulability"].min(), rollout["singular_values"]
-    add("manipulability.min", least, "–", "minimum det(J W⁻¹ Jᵀ)")
-    add("singular_value.min", values.min(), "–", "smallest singular value")
+    if values.size:
+        add("manipulability.min", least, "–", "minimum det(J W⁻¹ Jᵀ)")
+        add("singular_value.min", values.min(), "–", "smallest singular value")
     damped = rollout["damped"].mean()
     add("damped.fraction", damped, "–", "fraction of time near a singularity")
     for field in distances(rollout):

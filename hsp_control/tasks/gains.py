@@ -90,7 +90,18 @@ def as_matrix(gain: Array, size: int, name: str) -> Array:
 
 
 def as_gain(value: ArrayLike, name: str) -> Array:
-    """Return a gain as an array of 0, 1 or 2 dimensions."""
+    """Return a gain as an array of 0, 1 or 2 dimensions; its diagonal is positive."""
+    gain = as_numbers(value, name)
+    diagonal = np.diag(gain) if gain.ndim == 2 else gain.reshape(-1)
+    if diagonal.min() <= 0.0:
+        place = [int(diagonal.argmin())] * gain.ndim
+        where = f"{name}{place}" if place else name
+        raise GainError(f"{where} is {diagonal.min():g}; must be greater than 0")
+    return gain
+
+
+def as_numbers(value: ArrayLike, name: str) -> Array:
+    """Return a number, one for each row, or a square matrix, as an array."""
     try:
         if isinstance(value, str):
             raise TypeError
@@ -105,9 +116,4 @@ def as_gain(value: ArrayLike, name: str) -> Array:
         raise GainError(f"{name} has shape {gain.shape}; a matrix gain must be square")
     if not np.isfinite(gain).all():
         raise GainError(f"{name} is {gain.tolist()}; needs finite numbers")
-    diagonal = np.diag(gain) if gain.ndim == 2 else gain.reshape(-1)
-    if diagonal.min() <= 0.0:
-        place = [int(diagonal.argmin())] * gain.ndim
-        where = f"{name}{place}" if place else name
-        raise GainError(f"{where} is {diagonal.min():g}; must be greater than 0")
     return gain

@@ -10,10 +10,13 @@ from numpy.typing import ArrayLike
 from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import GainError
 from hsp_control.declaration import Part, within
-from hsp_control.declaration.quantities import Gain, Positive
+from hsp_control.declaration.quantities import Positive, Stiffness
 from hsp_control.robot import Robot
 from hsp_control.tasks.feedback import ErrorPart, LargestError, each_part
-from hsp_control.tasks.gains import as_gain, as_matrix
+from hsp_control.tasks.gains import as_matrix, as_numbers
+
+_ROUNDING = 1e-9
+"""Relative rounding errors of a matrix that somebody typed or turned."""
 
 
 class Impedance(Part, error=GainError):
@@ -27,16 +30,18 @@ class Impedance(Part, error=GainError):
     (docs/compliance.md).
     """
 
-    stiffness: Gain
-    """K [N/m or N·m/rad]: a number, one for each row, or a symmetric positive definite
-    matrix. Forces are along the world's axes, moments along those of the desired frame.
+    stiffness: Stiffness
+    """K [N/m or N·m/rad]: a number, one for each row, or a symmetric matrix without
+    negative eigenvalues; along a direction of stiffness 0 the hand may be led. Forces
+    are along the world's axes, moments along those of the desired frame.
     """
     _: KW_ONLY
-    damping: Gain | None = None
-    """D [N·s/m or N·m·s/rad], as the stiffness; instead of a ratio."""
+    damping: Stiffness | None = None
+    """D [N·s/m or N·m·s/rad], as the stiffness; instead of a ratio. Whatever is stiff
+    must be damped."""
     damping_ratio: Positive | None = None
     """ζ of every mode of the task's inertia and K [-]; 1, critical damping, by default.
-    D then follows the inertia."""
+    D then follows the inertia. It damps nothing where there is no stiffness."""
     largest_force: LargestError = "robot"
     """Largest force and moment of the spring [N or N·m]: it yields to more as if it
     slipped, so that a target far away, or out of reach, does not pull with more. One
@@ -47,9 +52,15 @@ class Impedance(Part, error=GainError):
         """Check that the damping is given one way, and that energies are positive."""
         if self.damping is not None and self.damping_ratio is not None:
             raise GainError("give either damping or damping_ratio")
-        _definite(self.stiffness, "stiffness")
+        K = _not_negative(self.stiffness, "stiffness")
         if self.damping is not None:
-            _definite(self.damping, "damping")
+            D = _not_negative(self.damping, "damping")
+            _check_damped(K, D)
+        elif not K.any():
+            raise GainError(
+                "stiffness is 0 in every direction, where a damping ratio damps "
+                "nothing; give damping, or remove the task"
+            )
 
     def placed(self, parts: Sequence[ErrorPart], robot: Robot) -> Self:
         """Return the impedance with its largest force in numbers.
@@ -72,9 +83,9 @@ class Impedance(Part, error=GainError):
         rows = sum(part.size for part in parts)
         out = np.zeros((2 * rows + 2, rows))
         K, D, ratio, inverse_force = parts_of(out)
-        K[:] = as_matrix(as_gain(self.stiffness, "stiffness"), rows, "stiffness")
+        K[:] = as_matrix(as_numbers(self.stiffness, "stiffness"), rows, "stiffness")
         if self.damping is not None:
-            D[:] = as_matrix(as_gain(self.damping, "damping"), rows, "damping")
+            D[:] = as_matrix(as_numbers(self.damping, "damping"), rows, "damping")
         else:
             ratio[:] = 1.0 if self.damping_ratio is None else self.damping_ratio
         if isinstance(self.largest_force, tuple):  # before it is placed it has no bound
@@ -103,20 +114,37 @@ def parts_of(numbers: Array) -> ImpedanceParts:
     return ImpedanceParts(K, D, rest[0], rest[1])
 
 
-def _definite(value: ArrayLike, name: str) -> Array:
-    """Return a number, a list or a matrix that is symmetric positive definite.
+def _not_negative(value: ArrayLike, name: str) -> Array:
+    """Return a number, a list or a symmetric matrix, without negative eigenvalues.
 
     Raises:
         GainError: If it is not.
     """
-    gain = as_gain(value, name)
+    gain = as_numbers(value, name)
     if gain.ndim == 2:
         if not np.allclose(gain, gain.T, rtol=1e-9, atol=0.0):
             raise GainError(f"{name} is {gain.tolist()}; a matrix must be symmetric")
-        smallest = float(np.linalg.eigvalsh(gain).min())
-        if smallest <= 0.0:
+        eigenvalues = np.linalg.eigvalsh(gain)
+        if eigenvalues[0] < -_ROUNDING * eigenvalues[-1]:
             raise GainError(
-                f"{name} is {gain.tolist()}, with the eigenvalue {smallest:.3g}; a "
-                "matrix must be positive definite"
+                f"{name} is {gain.tolist()}, with the eigenvalue {eigenvalues[0]:.3g}; "
+                "no eigenvalue may be negative"
             )
+    elif gain.min() < 0.0:
+        raise GainError(f"{name} is {gain.tolist()}; must not be negative")
     return gain
+
+
+def _check_damped(K: Array, D: Array) -> None:
+    """Check that whatever a spring moves is damped: it would swing for ever."""
+    size = max(K.shape[0] if K.ndim else 1, D.shape[0] if D.ndim else 1)
+    if {len(each) for each in (K, D) if each.ndim} - {size}:
+        return  # of different sizes, which the task says
+    stiff, damped = as_matrix(K, size, "stiffness"), as_matrix(D, size, "damping")
+    values, directions = np.linalg.eigh(damped)
+    free = directions[:, values <= _ROUNDING * max(values[-1], 0.0)]
+    if np.abs(stiff @ free).max(initial=0.0) > _ROUNDING * np.abs(stiff).max():
+        raise GainError(
+            f"damping is {D.tolist()}: it does not damp all that the stiffness "
+            f"{K.tolist()} moves; give damping there, or a damping_ratio"
+        )

@@ -245,8 +245,11 @@ def diagnostics_figure(
 
 def _chosen_panels(runs: Sequence[Rollout], panels: Sequence[str]) -> list[str]:
     """Return the panels that are asked for, or all that can be drawn of all runs."""
+    tasks = all(run["singular_values"].size for run in runs)
     can = {
-        "determinant": all(map(measures.rows_compare, runs)),
+        "determinant": tasks and all(map(measures.rows_compare, runs)),
+        "errors": tasks,
+        "singular_values": tasks,
         "distances": all(map(measures.distances, runs)),
         "terms": all(len(log_series.field_terms(run)) > 1 for run in runs),
     }

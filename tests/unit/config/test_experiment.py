@@ -163,7 +163,7 @@ MISTAKES = [
     ("start.velocity", [0.0] * 3, "ShapeError", "start.velocity: v0 has shape (3,)"),
     ("start", {"coordinates": [0.0] * 7}, "ConfigurationError",
      "start.coordinates: panda defines no joint coordinates; use joints"),
-    ("tasks", {}, "ConfigError", "tasks: "),
+    ("tasks", None, "ConfigError", "tasks: "),
     ("tasks.pen.frame", "pan", "FrameNotFoundError",
      "tasks.pen.frame: no frame 'pan'; did you mean 'pen'?"),
     ("tasks.pen.wieght", 1, "ConfigError", "unknown key 'wieght'"),

@@ -12,7 +12,6 @@ import numpy as np
 import pinocchio as pin
 import pytest
 from places import THOROUGH
-from scipy.linalg import sqrtm
 from task_cases import (
     GAINS,
     SECOND,
@@ -71,6 +70,13 @@ def impedance(kind: str, rows: int, rng: np.random.Generator) -> Impedance:
     each = (200.0 * rng.uniform(0.3, 3.0, rows)).tolist()
     if kind == "ratio":
         return Impedance(each, damping_ratio=0.7, largest_force="none")
+    if kind in ("led", "led, damped"):
+        # without stiffness along one direction, which is no row's
+        turn = np.linalg.qr(rng.normal(size=(rows, rows)))[0]
+        each[0] = 0.0
+        stiffness = (turn * each) @ turn.T
+        ratio = {"damping_ratio": 0.7} if kind == "led" else {"damping": 30.0}
+        return Impedance(0.5 * (stiffness + stiffness.T), **ratio, largest_force="none")
     if kind == "matrices":
         stiffness, damping = definite(rng, rows, 150.0), definite(rng, rows, 20.0)
         return Impedance(stiffness, damping=damping, largest_force="none")
@@ -115,7 +121,7 @@ def inverse_inertias(task: Any, motion: Motion) -> Callable[[float], Array]:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("kind", ["ratio", "matrices", "bounded"])
+@pytest.mark.parametrize("kind", ["ratio", "matrices", "led", "led, damped", "bounded"])
 @every_case
 def test_the_equation_holds_whatever_the_force_and_the_metric(
     case: Case, kind: str
@@ -152,7 +158,9 @@ def test_the_equation_holds_whatever_the_force_and_the_metric(
         K = np.array(spring.stiffness)
         K = np.diag(K) if K.ndim == 1 else K
         if spring.damping is None:
-            D = 2 * 0.7 * inertia @ np.real(sqrtm(inverse @ K))
+            half = sqrtm_psd(inverse)  # √(G K) = √G √(√G K √G) √G⁻¹
+            root = half @ sqrtm_psd(half @ K @ half) @ np.linalg.inv(half)
+            D = 2 * 0.7 * inertia @ root
             np.testing.assert_allclose(D, D.T, rtol=0, atol=1e-6 * np.abs(D).max())
         else:
             D = np.array(spring.damping) * np.eye(rows)

@@ -32,14 +32,16 @@ def springs(kind: str, rng: np.random.Generator) -> Array:
     """Return the numbers of a random impedance of a pose."""
     each = np.exp(rng.uniform(np.log(10.0), np.log(2000.0), 6))
     stiffness: Any = each.tolist()
-    if kind == "coupled":
+    if kind == "led":  # without stiffness along two directions, which are no rows
+        each[:2] = 0.0
+    if kind != "diagonal":
         turn = np.linalg.qr(rng.normal(size=(6, 6)))[0]
         stiffness = (turn * each) @ turn.T
         stiffness = (0.5 * (stiffness + stiffness.T)).tolist()
     return hsp.Impedance(stiffness, largest_force=list(MOST)).numbers(PARTS)
 
 
-kinds = pytest.mark.parametrize("kind", ["diagonal", "coupled"])
+kinds = pytest.mark.parametrize("kind", ["diagonal", "coupled", "led"])
 
 
 @kinds
@@ -62,9 +64,15 @@ def test_the_force_is_the_gradient_of_a_convex_energy(kind: str, seed: int) -> N
     scale = np.abs(force).max()
     np.testing.assert_allclose(slope, force, rtol=0, atol=1e-5 * scale)
     assert (force - spring_force(numbers, ENDS, b)) @ (a - b) >= 0.0
+    assert np.linalg.norm(force[:3]) <= MOST[0] * (1.0 + 1e-9)
+    assert np.linalg.norm(force[3:]) <= MOST[1] * (1.0 + 1e-9)
+    # No force along a direction without stiffness, however far the hand is led.
+    K = parts_of(numbers).K
+    values, axes = np.linalg.eigh(K)
+    assert np.abs(axes[:, values < 1e-9].T @ force).max(initial=0.0) < 1e-7 * scale
 
 
-@kinds
+@pytest.mark.parametrize("kind", ["diagonal", "coupled"])
 @pytest.mark.parametrize("seed", range(20))
 def test_no_part_pulls_with_more_and_slips_only_there(kind: str, seed: int) -> None:
     """The slip e - K⁻¹s of a part is along its force, and zero below its bound."""

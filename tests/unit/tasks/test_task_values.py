@@ -96,7 +96,7 @@ OTHERS: dict[type[Part], dict[str, Any]] = {
      "axes": "y"},
     Gains: {"kp": [3, [1, 2], np.array([1.0, 3.0]), [[4, 0.1], [0.2, 5]]],
      "kv": [np.float32(2.5), [1.0, 2.0]]},
-    Impedance: {"stiffness": [3, [1, 2], np.array([1.0, 3.0]), [[4, 0.1], [0.1, 5]]],
+    Impedance: {"stiffness": [3, [0, 2], np.array([1.0, 3.0]), [[4, 0.1], [0.1, 5]]],
      "damping": [2, [1, 2], [[4, 0.1], [0.1, 5]]], "damping_ratio": 0.7,
      "largest_force": [40, "none", None, [40.0, None], np.array([40.0, 5.0])]},
     JointPosture: {**_TASK, **_GAINS, **_SPRING,
@@ -187,7 +187,7 @@ _WRONG_SPRING: Wrong = {
     "impedance": [
         (100.0, "impedance: 100.0, a float; needs an Imp"),
         ({"damping": 3}, "impedance: missing key 'stiffness'"),
-        ({"stiffness": -1}, "impedance.stiffness: -1 is negative; must be greater"),
+        ({"stiffness": -1}, "impedance.stiffness: -1 is negative; must be at least 0"),
     ]
 }
 _WRONG_FRAME: Wrong = {"frame": [(7, "frame: 7 is an int; expected a str")]}
@@ -223,14 +223,15 @@ WRONG: dict[type[Part], Wrong] = {
      "kv": [([1.0, np.nan], "kv.1: nan is not a finite number")],
      "natural_frequency": [(1.0, "give either kp and kv, or natural_frequency and")],
      "damping_ratio": [(1.0, "give either kp and kv, or .* and damping_ratio")]},
-    Impedance: {"stiffness": [(0, "stiffness: 0 is too small; must be greater than 0"),
+    Impedance: {"stiffness": [(0, "stiffness is 0 in every direction, where a damping"),
         ([1.0, np.nan], "stiffness.1: nan is not a finite number"),
         ([[1, 0, 0], [0, 1, 0]], r"stiffness has shape \(2, 3\); a matrix gain"),
         ([[1, 0.2], [0.1, 1]], r"stiffness is .*; a matrix must be symmetric"),
-        ([[1, 2], [2, 1]], "with the eigenvalue -1; a matrix must be positive def")],
-     "damping": [(-3, "damping: -3 is negative; must be greater than 0"),
+        ([[1, 2], [2, 1]], "with the eigenvalue -1; no eigenvalue may be negative")],
+     "damping": [(-3, "damping: -3 is negative; must be at least 0"),
         ([[2, 1], [0, 2]], "damping is .*; a matrix must be symmetric"),
-        ([[1, 2], [2, 1]], "damping is .* positive definite")],
+        ([[1, 2], [2, 1]], "damping is .* no eigenvalue may be negative"),
+        ([1, 0], r"damping is \[1.0, 0.0\]: it does not damp all that the stiffness")],
      "damping_ratio": [([1, 2], r"damping_ratio: \[1, 2\] is a list; expected")],
      "largest_force": [(0, "largest_force: 0 is too small; must be greater than 0"),
         ([40, -1], "largest_force.1: -1 is negative; must be greater than 0"),
