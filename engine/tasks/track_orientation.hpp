@@ -57,25 +57,57 @@ struct TrackOrientation {
   }
 };
 
+// The position rows of a pose are along the axes of the world, or turn with the desired frame. With
+// ε = x_d - x in the world and e = R_dᵀ ε,
+//
+//   e' = R_dᵀ (ε' - w_d × ε),    e'' = R_dᵀ (ε'' - 2 w_d × ε' - w_d' × ε + w_d × (w_d × ε)),
+//
+// J = R_dᵀ J_x and J v = R_dᵀ x'.
 struct TrackPose {
   static constexpr const char* doc =
       "e = (x_d - x, -log(R_dᵀ R)) of a frame; gains may couple position and orientation.";
   FrameMotion<In> frame;
   PoseSample<In> desired;
+  bool turning;  // whether the position rows are along the axes of the desired frame
   Feedback<6> feedback;
   TaskSample<Out, 6> out;
 
   void operator()() {
     const auto& [x_d, R_d] = desired;
     const RelativeRotation relative(frame, R_d);
+    const Vector3 x_dot = frame.velocity.head<3>();
+    const Vector3 away = x_d.position - frame.position, rate = x_d.velocity - x_dot;
+    const Vector3 w_d = R_d.angular_velocity;
     out.jacobian = frame.jacobian;
     out.jacobian_dot = frame.jacobian_dot;
-    out.error << x_d.position - frame.position, -relative.y;
-    out.error_rate << x_d.velocity - frame.velocity.head<3>(), -relative.y_dot;
-    Eigen::Matrix<double, 6, 1> wanted;  // (x'', y'')
-    wanted << x_d.acceleration, Vector3::Zero();
+    out.error << away, -relative.y;
+    out.error_rate << rate, -relative.y_dot;
+    if (turning) turn(frame.jacobian.topRows<3>(), away, rate);
+
+    Eigen::Matrix<double, 6, 1> wanted = Eigen::Matrix<double, 6, 1>::Zero();  // -e''
     feedback.add_to(wanted, out.error, out.error_rate);
-    out.acceleration << wanted.head<3>(), relative.acceleration(wanted.tail<3>(), R_d);
+    Vector3 x_ddot = x_d.acceleration + wanted.head<3>();
+    if (turning) {
+      x_ddot = x_d.acceleration + R_d.rotation * wanted.head<3>();
+      x_ddot += w_d.cross(w_d.cross(away)) - 2.0 * w_d.cross(rate);
+      x_ddot -= R_d.angular_acceleration.cross(away);
+      x_ddot = R_d.rotation.transpose() * (x_ddot - w_d.cross(x_dot)).eval();  // (R_dᵀ x')'
+    }
+    out.acceleration << x_ddot, relative.acceleration(wanted.tail<3>(), R_d);
+  }
+
+ private:
+  template <class J> void turn(const J& jacobian, const Vector3& away, const Vector3& rate) {
+    const Vector3 w_d = desired.orientation.angular_velocity;
+    const Matrix3 R_T = desired.orientation.rotation.transpose(), R_T_dot = -R_T * skew(w_d);
+    auto J_dot = out.jacobian_dot.template topRows<3>();
+    for (Index k = 0; k < jacobian.cols(); ++k) {
+      const Vector3 column = jacobian.col(k), rate_of_column = J_dot.col(k);
+      out.jacobian.col(k).template head<3>() = R_T * column;
+      J_dot.col(k) = R_T * rate_of_column + R_T_dot * column;
+    }
+    out.error.template head<3>() = R_T * away;
+    out.error_rate.template head<3>() = R_T * (rate - w_d.cross(away));
   }
 };
 

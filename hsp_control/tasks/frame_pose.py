@@ -1,7 +1,8 @@
 """The tasks of a frame's orientation on SO(3), and of its pose."""
 
 from abc import abstractmethod
-from typing import Annotated, Any, ClassVar
+from dataclasses import KW_ONLY
+from typing import Annotated, Any, ClassVar, Literal
 
 import numpy as np
 import pinocchio as pin
@@ -131,10 +132,10 @@ class PoseTask(TrackingTask):
 class FramePose(FrameTask, PoseTask, CompliantTask, type="frame_pose"):
     """e = (x_d - x, -log(R_dᵀ R)), the pose of a frame in the world [m, rad].
 
-    Position rows are in world axes; orientation rows are those of `FrameOrientation`.
-    The two errors are decoupled and exactly linear, and the origin returns on a
-    straight line. With the logarithm on SE(3) it would return on a screw
-    (docs/law.md).
+    Position rows are in world axes, or with ``axes="tool"`` in those of the desired
+    frame, R_dᵀ(x_d - x); orientation rows are those of `FrameOrientation`. The two
+    errors are decoupled and exactly linear, and the origin returns on a straight line.
+    With the logarithm on SE(3) it would return on a screw (docs/law.md).
 
     Python may give what is held as it is: ``FramePose("hand", pin.SE3(...))``, or x, y,
     z and a quaternion (x, y, z, w), or x, y, z.
@@ -146,6 +147,10 @@ class FramePose(FrameTask, PoseTask, CompliantTask, type="frame_pose"):
     trajectory: PoseOrPoint = ComposedPose()
     """The desired pose, world ← frame, or the trajectory of its origin, with the
     orientation of the start [m, rad]; held at the start by default."""
+    _: KW_ONLY
+    axes: Literal["world", "tool"] = "world"
+    """Axes of the position rows, and so of gains, stiffness and forces along them: the
+    world's, or those of the desired frame, the tool where it should be [-]."""
 
     def _placed_at(self, here: FrameKinematics) -> dict[str, Any]:
         place = pin.SE3(here.rotation, here.position)
@@ -155,7 +160,17 @@ class FramePose(FrameTask, PoseTask, CompliantTask, type="frame_pose"):
     def call(self, state: RobotState) -> PartCall:
         """Return the call; see `Task.call`."""
         frame = state.frame(self.frame_name)
-        return PartCall(engine.TrackPose, frame=frame, desired=self.followed)
+        turning = self.axes == "tool"
+        return PartCall(
+            engine.TrackPose, frame=frame, desired=self.followed, turning=turning
+        )
+
+    def reference_rate(self, state: RobotState) -> Array:
+        """Return R_dᵀ x_d' or x_d', along the rows' axes, and w_d [m/s, rad/s]."""
+        rate = super().reference_rate(state)
+        if self.axes == "tool":
+            rate[:3] = self._reference_at(state).orientation.rotation.T @ rate[:3]
+        return rate
 
     def _rotating(self, state: RobotState) -> Rotating:
         motion = state.frame(self.frame_name).motion

@@ -70,7 +70,9 @@ class RelativePose(PoseTask, type="relative_pose"):
             reference=state.frame(self.reference),
         )
         relative = CallOutput(kinematics, FrameMotion.allocate(state.robot.nv))
-        return PartCall(engine.TrackPose, frame=relative, desired=self.followed)
+        return PartCall(
+            engine.TrackPose, frame=relative, desired=self.followed, turning=False
+        )
 
     def actual(self, state: RobotState) -> tuple[Array, Array]:
         """Return position and rotation of the frame in the reference."""

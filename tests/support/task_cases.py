@@ -300,6 +300,17 @@ class Pose(Orientation):
 
 
 @dataclass(frozen=True)
+class ToolPose(Pose):
+    """The pose of a frame, its position along the axes of the desired frame."""
+
+    def make(
+        self, robot: Robot, motion: Motion, error: float, gains: Gains, seed: int
+    ) -> Task:
+        task: Any = super().make(robot, motion, error, gains, seed)
+        return replace(task, axes="tool")
+
+
+@dataclass(frozen=True)
 class Seen(Pose):
     """The pose of one frame in another's axes."""
 

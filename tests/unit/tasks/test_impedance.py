@@ -22,6 +22,7 @@ from task_cases import (
     Pose,
     Position,
     Posture,
+    ToolPose,
     place,
 )
 
@@ -54,6 +55,8 @@ CASES = [
     Case("iiwa14", Position("iiwa_link_ee", "yz")),
     Case("iiwa14", Orientation("iiwa_link_ee")),
     Case("iiwa14", Pose("iiwa_link_ee")),
+    Case("panda", ToolPose("panda_tcp")),
+    Case("iiwa14", ToolPose("iiwa_link_ee")),
     Case("iiwa14", Posture(None, False)),
 ]
 every_case = pytest.mark.parametrize("case", CASES, ids=str)
