@@ -132,7 +132,7 @@ class PoseTask(TrackingTask):
 class FramePose(FrameTask, PoseTask, CompliantTask, type="frame_pose"):
     """e = (x_d - x, -log(R_dᵀ R)), the pose of a frame in the world [m, rad].
 
-    Position rows are in world axes, or with ``axes="tool"`` in those of the desired
+    Position rows are in world axes, or with ``along="tool"`` in those of the desired
     frame, R_dᵀ(x_d - x); orientation rows are those of `FrameOrientation`. The two
     errors are decoupled and exactly linear, and the origin returns on a straight line.
     With the logarithm on SE(3) it would return on a screw (docs/law.md).
@@ -148,8 +148,8 @@ class FramePose(FrameTask, PoseTask, CompliantTask, type="frame_pose"):
     """The desired pose, world ← frame, or the trajectory of its origin, with the
     orientation of the start [m, rad]; held at the start by default."""
     _: KW_ONLY
-    axes: Literal["world", "tool"] = "world"
-    """Axes of the position rows, and so of gains, stiffness and forces along them: the
+    along: Literal["world", "tool"] = "world"
+    """Along which axes the position rows are, and so gains, stiffness and forces: the
     world's, or those of the desired frame, the tool where it should be [-]."""
 
     def _placed_at(self, here: FrameKinematics) -> dict[str, Any]:
@@ -160,7 +160,7 @@ class FramePose(FrameTask, PoseTask, CompliantTask, type="frame_pose"):
     def call(self, state: RobotState) -> PartCall:
         """Return the call; see `Task.call`."""
         frame = state.frame(self.frame_name)
-        turning = self.axes == "tool"
+        turning = self.along == "tool"
         return PartCall(
             engine.TrackPose, frame=frame, desired=self.followed, turning=turning
         )
@@ -168,7 +168,7 @@ class FramePose(FrameTask, PoseTask, CompliantTask, type="frame_pose"):
     def reference_rate(self, state: RobotState) -> Array:
         """Return R_dᵀ x_d' or x_d', along the rows' axes, and w_d [m/s, rad/s]."""
         rate = super().reference_rate(state)
-        if self.axes == "tool":
+        if self.along == "tool":
             rate[:3] = self._reference_at(state).orientation.rotation.T @ rate[:3]
         return rate
 

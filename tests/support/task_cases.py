@@ -307,7 +307,7 @@ class ToolPose(Pose):
         self, robot: Robot, motion: Motion, error: float, gains: Gains, seed: int
     ) -> Task:
         task: Any = super().make(robot, motion, error, gains, seed)
-        return replace(task, axes="tool")
+        return replace(task, along="tool")
 
 
 @dataclass(frozen=True)

@@ -92,7 +92,7 @@ OTHERS: dict[type[Part], dict[str, Any]] = {
     CenterOfMass: {**_TRACKING, "trajectory": _POINT, "axes": ["xy", "zx"]},
     FrameOrientation: {**_TRACKING, **_SPRING, **_FRAME, "trajectory": _TURN},
     FramePose: {**_TRACKING, **_SPRING, **_FRAME, "trajectory": _POSE,
-     "axes": "tool"},
+     "along": "tool"},
     FramePosition: {**_TRACKING, **_SPRING, **_FRAME, "trajectory": _POINT,
      "axes": "y"},
     Gains: {"kp": [3, [1, 2], np.array([1.0, 3.0]), [[4, 0.1], [0.2, 5]]],

@@ -59,7 +59,7 @@ def test_a_polishing_hand_is_soft_along_its_tool_alone() -> None:
     """A force along the tool moves the hand by f/K, whatever the tool's posture."""
     robot = hsp.Robot.load("panda")
     spring = hsp.Impedance([4000.0, 4000.0, 200.0, 200.0, 200.0, 200.0])
-    hand = hsp.FramePose("panda_tcp", impedance=spring, axes="tool", name="hand")
+    hand = hsp.FramePose("panda_tcp", impedance=spring, along="tool", name="hand")
     q0 = robot.integrate(robot.home(), np.array([0.2, 0.3, -0.2, 0.2, 0.5, -0.6, 0.4]))
     tool = robot.state(0.0, q0, np.zeros(7)).frame("panda_tcp").rotation[:, 2].copy()
     push = hsp.plants.Push("panda_tcp", (8.0 * tool).tolist(), duration=10.0)
