@@ -3,6 +3,7 @@
 // q (nq) and v (nv) are Pinocchio's; efforts are in N·m or N, accelerations in rad/s² or m/s², M
 // in kg·m² or kg. N are the efforts of gravity, Coriolis and centrifugal forces: M a + N = tau.
 #pragma once
+#include <hsp/indices.hpp>
 #include <hsp/records.hpp>
 #include <hsp/rotations.hpp>
 #include <limits>
@@ -24,6 +25,43 @@ inline void check_sizes(const Dynamics& robot, Index q, Index v) {
 
 // Pinocchio's CRBA allocates for planar joints, and for screws about any axis (seen with 4.1).
 using MayAllocate = Allocation;
+
+struct Carry {
+  static constexpr const char* doc =
+      "Let a robot carry bodies at its joints, each in part, from now on; in the joints' axes.";
+  Shared<Dynamics> dynamics;
+  Ints<'k'> joints;
+  In<'k'> masses;       // [kg]
+  In<'k', 3> centers;   // [m]
+  In<'k', 9> inertias;  // about the centre [kg·m²]
+  In<'k'> shares, rates;
+
+  void check() const {
+    check_indices("joints", joints, dynamics->joints(), 1);
+    dynamics->make_room(joints.size());
+  }
+  void operator()() {
+    dynamics->put_down();
+    for (Index k = 0; k < joints.size(); ++k)
+      dynamics->carry({joints[k], masses[k], centers.row(k).transpose(),
+                       Eigen::Map<const Matrix3>(inertias.row(k).data()), shares[k], rates[k]});
+  }
+};
+
+struct BodyMasses {
+  static constexpr const char* doc =
+      "The mass of what each joint moves [kg], with what it carries, and its centre [m].";
+  Shared<Dynamics> dynamics;
+  Out<'j'> mass;
+  Out<'j', 3> center;
+
+  void check() const {
+    if (mass.size() != dynamics->joints())
+      throw std::invalid_argument("the robot has " + std::to_string(dynamics->joints()) +
+                                  " joints, the world included");
+  }
+  void operator()() { dynamics->body_masses(mass, center); }
+};
 
 struct JointJacobians {
   static constexpr const char* doc =
@@ -110,8 +148,8 @@ struct CentroidalMotion {
   Shared<Dynamics> dynamics;
   In<'q'> q;
   In<'n'> v;
-  double mass;  // of the whole robot [kg]
   Out<3> position, velocity;
+  Out<1> mass;  // of the whole robot [kg]
   Out<3, 'n'> J, J_dot, angular, angular_dot;
   struct Map : Eigen::Matrix<double, 6, Eigen::Dynamic> {
     void prepare(const Sizes& size) { setZero(6, size('n')); }
@@ -126,8 +164,9 @@ struct CentroidalMotion {
     Vector3 c;
     dynamics->centroidal_map(q, v, c, {A.data(), 6, A.cols()}, {A_dot.data(), 6, A.cols()});
     position = c;
-    J = A.topRows<3>() / mass;
-    J_dot = A_dot.topRows<3>() / mass;
+    mass[0] = dynamics->mass();
+    J = A.topRows<3>() / mass[0];
+    J_dot = A_dot.topRows<3>() / mass[0];
     velocity = J.lazyProduct(v);
     angular = A.bottomRows<3>();
     angular_dot = A_dot.bottomRows<3>() - skew(velocity).lazyProduct(A.topRows<3>());

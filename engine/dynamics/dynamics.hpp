@@ -15,6 +15,7 @@ namespace hsp {
 using ConstVector = Eigen::Map<const Vector>;
 using Jacobian = Eigen::Map<Eigen::Matrix<double, 6, Eigen::Dynamic>>;
 using Square = Eigen::Map<Matrix>;
+using Centers = Eigen::Map<Eigen::Matrix<double, Eigen::Dynamic, 3, Eigen::RowMajor>>;
 using Placements = Eigen::Map<Eigen::Matrix<double, Eigen::Dynamic, 12, Eigen::RowMajor>>;
 
 // A joint and the body that it moves; in axes of its own where nothing else is said.
@@ -30,6 +31,15 @@ struct Joint {
   double mass = 0.0;         // of the body [kg]
   Vector3 center = Vector3::Zero();
   Matrix3 inertia = Matrix3::Zero();  // about the centre [kg·m²]
+};
+
+// A body that is fixed to a joint, in the joint's axes, and how much of it is carried.
+struct Carried {
+  std::int64_t joint;
+  double mass;         // [kg]
+  Vector3 center;      // [m]
+  Matrix3 inertia;     // about the centre [kg·m²]
+  double share, rate;  // how much of it, and the share's rate [1/s]
 };
 
 const char* pinocchio_version();  // of what is compiled in
@@ -50,6 +60,13 @@ class Dynamics {
   Index columns() const;             // of the Jacobian of all joints, followers included
   Index joints() const;              // with the world
 
+  // What is carried from now on, besides what the model has; at most as many as `make_room` said.
+  void make_room(Index bodies);
+  void put_down();
+  void carry(const Carried& body);
+  double mass() const;  // of all bodies [kg]
+  void body_masses(Eigen::Map<Vector> mass, Centers center) const;
+
   // J and J' of all joints in world axes at the world's origin, and the joints' placements: R,
   // column by column, and the origin.
   void joint_jacobians(const ConstVector& q, const ConstVector& v, Jacobian J, Jacobian J_dot,
@@ -57,6 +74,7 @@ class Dynamics {
   void inverse_dynamics(const ConstVector& q, const ConstVector& v, const ConstVector& a,
                         Eigen::Map<Vector> effort);  // RNEA
   void mass_matrix(const ConstVector& q, Square M);  // CRBA
+  // Along v, and with what is carried.
   void mass_matrix_rate(const ConstVector& q, const ConstVector& v, Square M_dot);
   // M⁻¹ (tau - N); false if M is singular, which only models with followers can say.
   bool forward_dynamics(const ConstVector& q, const ConstVector& v, const ConstVector& tau,

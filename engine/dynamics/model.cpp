@@ -103,11 +103,43 @@ Dynamics::Dynamics(const std::vector<Joint>& joints, const Vector3& gravity, con
     throw std::invalid_argument("armature has " + std::to_string(armature.size()) +
                                 " entries; needs " + std::to_string(model.nv));
   model.armature = armature;
+  pinocchio_->own = model.inertias;
   pinocchio_->data = Pinocchio::Data(model);
   pinocchio_->zero.setZero(model.nv);
   pinocchio_->step.setZero(model.nv);
   pinocchio_->there.setZero(model.nq);
   pinocchio_->factor = Eigen::LLT<Eigen::MatrixXd>(model.nv);
+}
+
+void Dynamics::make_room(Index bodies) {
+  pinocchio_->carried.reserve(static_cast<std::size_t>(bodies));
+}
+
+void Dynamics::put_down() {
+  pinocchio_->model.inertias = pinocchio_->own;
+  pinocchio_->carried.clear();
+}
+
+void Dynamics::carry(const Carried& body) {
+  auto& [model, data, own, carried, zero, step, there, factor] = *pinocchio_;
+  if (body.share > 0.0)
+    model.inertias[body.joint] +=
+        pin::Inertia(body.share * body.mass, body.center, body.share * body.inertia);
+  carried.push_back(body);
+}
+
+double Dynamics::mass() const {
+  double sum = 0.0;
+  for (const auto& body : pinocchio_->model.inertias) sum += body.mass();
+  return sum;
+}
+
+void Dynamics::body_masses(Eigen::Map<Vector> mass, Centers center) const {
+  const auto& bodies = pinocchio_->model.inertias;
+  for (Index i = 0; i < mass.size(); ++i) {
+    mass[i] = bodies[i].mass();
+    center.row(i) = bodies[i].lever().transpose();
+  }
 }
 
 const char* pinocchio_version() { return PINOCCHIO_VERSION; }

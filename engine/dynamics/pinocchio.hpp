@@ -41,11 +41,14 @@ struct Dynamics::Pinocchio {
 
   Model model;
   Data data;
+  Model::InertiaVector own;  // without what is carried
+  std::vector<Carried> carried;
   Vector zero, step, there;            // two of v's size, one of q's
   Eigen::LLT<Eigen::MatrixXd> factor;  // of M, of models with followers
 
   bool has_followers() const { return !model.mimicking_joints.empty(); }
   const Data::MatrixXs& mass_matrix(const ConstVector& q);  // both triangles
+  void write_rate_by_differences(const ConstVector& q, const ConstVector& v, Square M_dot);
   // q ⊕ h v, until the next call.
   ConstVector moved(const ConstVector& q, const ConstVector& v, double h);
 };

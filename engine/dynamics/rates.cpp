@@ -15,20 +15,34 @@ ConstVector Dynamics::Pinocchio::moved(const ConstVector& q, const ConstVector& 
 }
 
 // C + Cᵀ, with Coriolis' matrix C. Pinocchio has none of models with followers: there it is by
-// differences of the fourth order.
+// differences of the fourth order. And what a ramp of what is carried adds.
 void Dynamics::mass_matrix_rate(const ConstVector& q, const ConstVector& v, Square M_dot) {
   auto& own = *pinocchio_;
-  if (!own.has_followers()) {
+  if (own.has_followers()) own.write_rate_by_differences(q, v, M_dot);
+  else {
     const auto& C = pin::computeCoriolisMatrix(own.model, own.data, q, v);
     M_dot = C + C.transpose();
-    return;
   }
+  // M is linear in the inertias: what a body adds is the difference with and without all of it.
+  for (const Carried& body : own.carried) {
+    if (body.rate == 0.0) continue;
+    M_dot -= body.rate * own.mass_matrix(q);
+    auto& inertia = own.model.inertias[body.joint];
+    const pin::Inertia without = inertia;
+    inertia += pin::Inertia(body.mass, body.center, body.inertia);
+    M_dot += body.rate * own.mass_matrix(q);
+    inertia = without;
+  }
+}
+
+void Dynamics::Pinocchio::write_rate_by_differences(const ConstVector& q, const ConstVector& v,
+                                                    Square M_dot) {
   const double h = 1e-3 / std::max(1.0, v.lpNorm<Eigen::Infinity>());
   M_dot.setZero();
   for (const double steps : {-2.0, -1.0, 1.0, 2.0}) {
     const double weight = std::abs(steps) == 1.0 ? 8.0 : -1.0;
-    M_dot += std::copysign(weight / (12.0 * h), weight * steps) *
-             own.mass_matrix(own.moved(q, v, steps * h));
+    M_dot +=
+        std::copysign(weight / (12.0 * h), weight * steps) * mass_matrix(moved(q, v, steps * h));
   }
 }
 

@@ -48,7 +48,13 @@ def check(options: argparse.Namespace) -> int:
     controller = experiment.controller
     warn_of_slow_efforts(experiment.robot, experiment.q0, controller.limits)
     if experiment.compensation.start_up_ramp is None:
-        warn_of_jump(experiment.robot, experiment.q0, experiment.v0, output.tau)
+        warn_of_jump(
+            experiment.robot,
+            experiment.q0,
+            experiment.v0,
+            output.tau,
+            experiment.controller.state.dynamics,
+        )
     if options.json:
         print(json.dumps(found | {"advice": advice}, indent=2, ensure_ascii=False))
         return 0

@@ -5,6 +5,8 @@ from dataclasses import dataclass, replace
 from itertools import takewhile
 from typing import Self
 
+from numpy.typing import ArrayLike
+
 from hsp_control.common.entry_points import own_names
 from hsp_control.constraints.contacts import CommandedForce
 from hsp_control.constraints.limits import Limits
@@ -24,6 +26,7 @@ from hsp_control.control.change import (
     MoveObstacle,
     RemoveTask,
 )
+from hsp_control.control.change_payload import ChangePayload
 from hsp_control.control.setup import Setup
 from hsp_control.declaration import within
 from hsp_control.declaration.quantities import Gain
@@ -43,6 +46,7 @@ __all__ = [
     "ChangeImpedance",
     "ChangeLimits",
     "ChangeNullSpaceGain",
+    "ChangePayload",
     "ChangeReference",
     "ChangeWeight",
     "Changes",
@@ -123,6 +127,17 @@ class Changes:
     def force(self, contact: str, force: CommandedForce) -> Self:
         """Change the commanded force of a contact; see `ChangeForce`."""
         return self._do(ChangeForce(contact, force, at=self._at, ramp=self._ramp))
+
+    def payload(
+        self,
+        frame: str,
+        mass: float,
+        center: ArrayLike = (0.0, 0.0, 0.0),
+        inertia: ArrayLike = 0.0,
+    ) -> Self:
+        """Take up a payload at a frame, or put it down, mass=0; see `ChangePayload`."""
+        at, ramp = self._at, self._ramp
+        return self._do(ChangePayload(frame, mass, center, inertia, at=at, ramp=ramp))
 
     def _do(self, change: Change) -> Self:
         self._make(change)

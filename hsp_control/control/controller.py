@@ -20,7 +20,7 @@ from hsp_control.control.composition import Composition, PresentRun
 from hsp_control.control.first_state import check_angles, warn_of_jump
 from hsp_control.control.mixture import AccelerationModifier
 from hsp_control.control.output import ControlOutput, Diagnostics
-from hsp_control.engine import Plan
+from hsp_control.engine import Dynamics, Plan
 from hsp_control.law import TaskSample
 from hsp_control.robot import RobotState
 
@@ -160,6 +160,7 @@ class Controller(Composition):
                 self._follow(self._time_line.settled_at(run.now - _MEMORY))
             self._gains.write(t)
             self._limits.write(t)
+            self._carried.write(t)
 
     def applied(self, tau: ArrayLike, period: float) -> None:
         """Store the effort that was sent to the robot.
@@ -191,7 +192,8 @@ class Controller(Composition):
         if not period > 0.0:
             raise ControllerError(f"period is {period} s; must be positive")
         if not self._limits.sent.period:
-            warn_of_jump(self._declared.robot, self._state.q, self._state.v, tau)
+            state = self._state
+            warn_of_jump(state.robot, state.q, state.v, tau, state.dynamics)
         self._limits.applied(tau, self._run.acceleration, period)
         if self._gains.stiffening:
             self._gains.delay(self.active_stack, self._state.t, period)
@@ -228,6 +230,16 @@ class Controller(Composition):
         """
         known = self._declared.robot.check_tangent(acceleration, "acceleration")
         self._limits.sent.held.disturbance[:] = known
+
+    def carried_by(self, dynamics: Dynamics | None) -> None:
+        """Let other dynamics carry what changes of payload say, such as a plant's.
+
+        Args:
+            dynamics: Those of a robot with the same joints, instead of the last ones;
+                None: nobody else carries it.
+        """
+        with self._lock:
+            self._carried.follow(dynamics)
 
     def restart(self) -> None:
         """Begin anew: forget the last effort, the offsets of tasks, and where it began.

@@ -8,6 +8,7 @@ from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import ConfigurationError
 from hsp_control.constraints.limits import RobotLimits
 from hsp_control.declaration.language import spoken
+from hsp_control.engine import Dynamics
 from hsp_control.robot import Robot
 
 FAR = 2.0
@@ -42,18 +43,20 @@ def check_angles(robot: Robot, q: Array) -> None:
             )
 
 
-def warn_of_jump(robot: Robot, q: Array, v: Array, tau: Array) -> None:
+def warn_of_jump(
+    robot: Robot, q: Array, v: Array, tau: Array, dynamics: Dynamics | None = None
+) -> None:
     """Warn if the first effort is far from the one that held the robot until then.
 
     A robot at rest is held against gravity, so from there the effort jumps. What made a
     start in motion is not known, and it is not looked at: that of the paper's runs lies
     on the trajectory, with its velocity. Nor is a floating base, which contacts hold,
-    nor a joint without an effort limit.
+    nor a joint without an effort limit. ``dynamics``: with what the robot carries.
     """
     if robot.unactuated or (np.abs(v) > REST).any():
         return
     rest = np.zeros(robot.nv)
-    gravity = robot.inverse_dynamics(q, rest, rest)
+    gravity = robot.inverse_dynamics(q, rest, rest, dynamics)
     limit = np.where(robot.model.effortLimit > 0.0, robot.model.effortLimit, np.inf)
     share = np.abs(tau - gravity) / limit
     j = int(share.argmax())

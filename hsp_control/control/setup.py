@@ -20,6 +20,7 @@ from hsp_control.common.exceptions import (
 from hsp_control.common.suggestions import did_you_mean, listing
 from hsp_control.constraints.contacts import Contact
 from hsp_control.constraints.limits import Limits, RobotLimits
+from hsp_control.control.carried import PlannedPayload
 from hsp_control.control.evolution import (
     ABSENT,
     PRESENT,
@@ -228,6 +229,7 @@ class Setup:
     contacts: tuple[PlannedContact, ...]
     limits: PlannedLimits
     count: int  # how many tasks there have ever been; the next one has this key
+    payloads: tuple[PlannedPayload, ...] = ()
 
     @property
     def field(self) -> NullSpaceField:
@@ -246,6 +248,7 @@ class Setup:
             *(task.gains for task in self.tasks),
             *(term.presence for term in self.terms),
             *(contact.presence for contact in self.contacts),
+            *(payload.share for payload in self.payloads),
         ]
         return max(self.limits.end, *(each.end for each in evolutions))
 
@@ -295,6 +298,9 @@ class Setup:
         contacts = [
             _changed(each, presence=each.presence.settled(t)) for each in self.contacts
         ]
+        payloads = [
+            _changed(each, share=each.share.settled(t)) for each in self.payloads
+        ]
         return Setup(
             self.start,
             self.metric,
@@ -304,10 +310,11 @@ class Setup:
             tuple(contacts),
             self.limits.settled(t),
             self.count,
+            tuple(each for each in payloads if each.share != ABSENT),
         )
 
 
-Planned = TypeVar("Planned", PlannedTask, PlannedTerm, PlannedContact)
+Planned = TypeVar("Planned", PlannedTask, PlannedTerm, PlannedContact, PlannedPayload)
 
 
 def _found(kind: str, name: str, there: Mapping[str, Planned]) -> Planned:

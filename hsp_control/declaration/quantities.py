@@ -225,11 +225,11 @@ Gain = Annotated[
     ArrayLike, ArrayField(Positive | list[Positive] | list[list[Number]], read_only)
 ]
 """A number, one number for each row, or a matrix."""
-Stiffness = Annotated[
+Semidefinite = Annotated[
     ArrayLike,
     ArrayField(NonNegative | list[NonNegative] | list[list[Number]], read_only),
 ]
-"""A number, one number for each row, or a matrix; 0 along directions that yield."""
+"""A number, one number for each row, or a matrix: no eigenvalue is negative."""
 PositiveNumbers = Annotated[ArrayLike, ArrayField(Positive | list[Positive], read_only)]
 """One positive number, or one for each coordinate."""
 Weights = Annotated[ArrayLike, ArrayField(NonNegative | list[NonNegative], read_only)]

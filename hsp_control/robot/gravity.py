@@ -5,6 +5,7 @@ import pinocchio as pin
 
 from hsp_control import engine
 from hsp_control.common.arrays import Array
+from hsp_control.engine import Dynamics
 from hsp_control.engine.plans import PartCall, PartCalls
 from hsp_control.robot.kinematics import WorldKinematics, joint_support
 
@@ -19,7 +20,9 @@ class Gravity:
         drift: G'' at constant velocity, shape (nv,).
     """
 
-    def __init__(self, model: pin.Model, world: WorldKinematics) -> None:
+    def __init__(
+        self, model: pin.Model, dynamics: Dynamics, world: WorldKinematics
+    ) -> None:
         """Allocate the arrays."""
         nv, joints = model.nv, range(model.njoints)
         columns = [joint for joint in joints for _ in range(_width(model, joint))]
@@ -28,7 +31,10 @@ class Gravity:
         for joint in joints:
             support, of_v = joint_support(model, joint)
             moves[support, joint], dofs[support] = True, of_v
-        bodies = [*model.inertias]
+        mass, center = np.zeros(model.njoints), np.zeros((model.njoints, 3))
+        bodies = PartCall(
+            engine.BodyMasses, dynamics=dynamics, mass=mass, center=center
+        )
         self.effort: Array = np.zeros(nv)
         self.slope: Array = np.zeros((nv, nv))
         self.drift: Array = np.zeros(nv)
@@ -37,8 +43,8 @@ class Gravity:
             jacobian=world.jacobian,
             jacobian_dot=world.jacobian_dot,
             placements=world.placements,
-            mass=np.array([body.mass for body in bodies]),
-            center=np.array([body.lever for body in bodies]),
+            mass=mass,
+            center=center,
             moves=moves,
             joints=np.array(columns, dtype=np.int64),
             dofs=dofs,
@@ -48,7 +54,7 @@ class Gravity:
             slope=self.slope,
             drift=self.drift,
         )
-        self.calls: PartCalls = [call]
+        self.calls: PartCalls = [bodies, call]
 
 
 def _width(model: pin.Model, joint: int) -> int:

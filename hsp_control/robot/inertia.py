@@ -30,7 +30,6 @@ class CentroidalMotion:
 
     Attributes:
         calls: Bring the attributes below up to date, if they are not.
-        mass: Total mass [kg].
         position: The centre of mass c [m], shape (3,).
         velocity: c' = J v [m/s], shape (3,).
         jacobian: J, shape (3, nv).
@@ -55,7 +54,7 @@ class CentroidalMotion:
                 f"mimic joints, and {listing(map(repr, mimics))} are some; load the "
                 "robot with mimic=False"
             )
-        self.mass: float = pin.computeTotalMass(model)
+        self._mass: Array = np.zeros(1)
         self.position: Array = np.zeros(3)
         self.velocity: Array = np.zeros(3)
         self.jacobian: Array = np.zeros((3, model.nv))
@@ -67,7 +66,7 @@ class CentroidalMotion:
             dynamics=dynamics,
             q=q,
             v=v,
-            mass=self.mass,
+            mass=self._mass,
             position=self.position,
             velocity=self.velocity,
             J=self.jacobian,
@@ -76,6 +75,11 @@ class CentroidalMotion:
             angular_dot=self.momentum_matrix_dot,
         )
         self.calls: PartCalls = [Once.at(stamp, call)]
+
+    @property
+    def mass(self) -> float:
+        """Total mass, with what is carried [kg]."""
+        return float(self._mass[0])
 
     @cached_property
     def shown(self) -> "CentroidalMotion":

@@ -188,18 +188,26 @@ class RobotModel(Structure):
         engine.MassMatrix(dynamics=self._own, q=_packed(q), M=M)()
         return M
 
-    def inverse_dynamics(self, q: Array, v: Array, a: Array) -> Array:
-        """Return the effort M(q) a + N(q, v), shape (nv,) (RNEA)."""
+    def inverse_dynamics(
+        self, q: Array, v: Array, a: Array, dynamics: Dynamics | None = None
+    ) -> Array:
+        """Return the effort M(q) a + N(q, v), shape (nv,) (RNEA).
+
+        ``dynamics``: those of a robot that carries something.
+        """
         effort = np.empty(self.nv)
         given = {"q": _packed(q), "v": _packed(v), "acceleration": _packed(a)}
-        engine.InverseDynamics(dynamics=self._own, **given, effort=effort)()
+        own = dynamics or self._own
+        engine.InverseDynamics(dynamics=own, **given, effort=effort)()
         return effort
 
-    def forward_dynamics(self, q: Array, v: Array, tau: Array) -> Array:
+    def forward_dynamics(
+        self, q: Array, v: Array, tau: Array, dynamics: Dynamics | None = None
+    ) -> Array:
         """Return the acceleration M(q)⁻¹ (tau - N(q, v)), shape (nv,).
 
         Computed by ABA; with mimic joints, which ABA does not support, by CRBA and a
-        linear solve.
+        linear solve. ``dynamics``: those of a robot that carries something.
 
         Raises:
             ModelError: If M is singular (only detected with mimic joints).
@@ -207,18 +215,20 @@ class RobotModel(Structure):
         acceleration = np.empty(self.nv)
         given = {"q": _packed(q), "v": _packed(v), "effort": _packed(tau)}
         call = engine.ForwardDynamics(
-            dynamics=self._own, **given, acceleration=acceleration
+            dynamics=dynamics or self._own, **given, acceleration=acceleration
         )
         call()
         self._check_acceleration(acceleration)
         return acceleration
 
-    def bind_forward_dynamics(self, q: Array, v: Array, tau: Array) -> Term:
+    def bind_forward_dynamics(
+        self, q: Array, v: Array, tau: Array, dynamics: Dynamics | None = None
+    ) -> Term:
         """Return `forward_dynamics` for what these arrays hold when it is computed."""
         acceleration = np.zeros(self.nv)
         call = PartCall(
             engine.ForwardDynamics,
-            dynamics=self.dynamics(),
+            dynamics=dynamics or self.dynamics(),
             q=q,
             v=v,
             effort=tau,

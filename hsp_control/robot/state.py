@@ -60,8 +60,14 @@ class RobotState:
         effort: What `inverse_dynamics` wrote last, shape (nv,) [N·m or N].
     """
 
-    def __init__(self, robot: "Robot") -> None:
-        """Allocate the memory; call `update` before using any term."""
+    def __init__(self, robot: "Robot", dynamics: Dynamics | None = None) -> None:
+        """Allocate the memory; call `update` before using any term.
+
+        Args:
+            robot: The robot.
+            dynamics: Those of another state, which may carry something; None: the
+                robot's own.
+        """
         self.robot = robot
         self.time: Array = np.zeros(1)
         self.q: Array = robot.neutral()
@@ -78,7 +84,7 @@ class RobotState:
         }
         self._seen: RobotState | None = None
         self._read_only: RobotState | None = None
-        self.dynamics: Dynamics = robot.dynamics()
+        self.dynamics: Dynamics = dynamics or robot.dynamics()
         self._shown_data: tuple[pin.Data, int] | None = None
         self._at: dict[str, Any] = {"dynamics": self.dynamics, "q": self.q, "v": self.v}
         self.world = WorldKinematics.allocate(robot.model, self.v)
@@ -319,7 +325,7 @@ class RobotState:
     def companion(self) -> "RobotState":
         """The state that `displaced` moves: this robot at other places."""
         if self._displaced is None:
-            self._displaced = RobotState(self.robot)
+            self._displaced = RobotState(self.robot, self.dynamics)
         return self._displaced
 
     def ahead(self, dt: float) -> "RobotState":

@@ -15,6 +15,7 @@ from hsp_control.common.exceptions import (
     SimulationError,
     StreamError,
 )
+from hsp_control.control.change_payload import ChangePayload
 from hsp_control.control.compensation import Command, Compensation
 from hsp_control.control.compensation import check_rate as check_loop
 from hsp_control.control.controller import Controller
@@ -156,6 +157,15 @@ def simulate(
         raise _no_period("a plan decides once a period: it needs")
     if estimators and not periods:
         raise _no_period("estimators estimate once a period: they need")
+    controller.carried_by(plant.dynamics)
+    if plant.dynamics is None and any(
+        isinstance(each, ChangePayload) for each in controller.changes
+    ):
+        message = (
+            f"{type(plant).__name__} does not carry what changes of payload say; it "
+            "has to be told by its own means"
+        )
+        warnings.warn(message, StartWarning, stacklevel=2)
     # The loop
     exact = is_exact(plant, robot)
     period = log_period / periods if periods else None
@@ -208,7 +218,7 @@ def simulate(
             if row == 0 and periods:  # else efforts are continuous, and have no rate
                 warn_of_slow_efforts(robot, q, controller.limits)
             elif row == 0:  # else `applied` has told
-                warn_of_jump(robot, q, v, tau)
+                warn_of_jump(robot, q, v, tau, controller.state.dynamics)
             plant_channels = plant.log_channels(state.t, state.q, state.v, tau)
             writer.record(state, output, tau, {**own_channels, **plant_channels})
             if on_progress is not None:

@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike
 from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import GainError
 from hsp_control.declaration import Part, within
-from hsp_control.declaration.quantities import Positive, Stiffness
+from hsp_control.declaration.quantities import Positive, Semidefinite
 from hsp_control.robot import Robot
 from hsp_control.tasks.feedback import ErrorPart, LargestError, each_part
 from hsp_control.tasks.gains import as_matrix, as_numbers
@@ -30,13 +30,13 @@ class Impedance(Part, error=GainError):
     (docs/compliance.md).
     """
 
-    stiffness: Stiffness
+    stiffness: Semidefinite
     """K [N/m or N·m/rad]: a number, one for each row, or a symmetric matrix without
     negative eigenvalues; along a direction of stiffness 0 the hand may be led. Forces
     are along the world's axes, moments along those of the desired frame.
     """
     _: KW_ONLY
-    damping: Stiffness | None = None
+    damping: Semidefinite | None = None
     """D [N·s/m or N·m·s/rad], as the stiffness; instead of a ratio. Whatever is stiff
     must be damped."""
     damping_ratio: Positive | None = None

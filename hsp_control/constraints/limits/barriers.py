@@ -384,7 +384,7 @@ class StaticEffort:
                 those from the root to a contact.
             rows: What is added to.
         """
-        gravity = Gravity(state.robot.model, state.world)
+        gravity = Gravity(state.robot.model, state.dynamics, state.world)
         held = np.isfinite(self.effort)
         held[[*state.robot.unactuated, *excluded]] = False
         near = PartCall(

@@ -60,7 +60,9 @@ class Command:
         own, robot = self.compensation, controller.robot
         own.check(robot, controller.tasks, controller.contacts)
         self.state = controller.state
-        self._measured = self.state if own.predictor is None else RobotState(robot)
+        self._measured = self.state
+        if own.predictor is not None:
+            self._measured = RobotState(robot, self.state.dynamics)
         self._tau = np.zeros(robot.nv)
         feedback = own.force_feedback
         self.feels_contacts = feedback is not None and feedback.force == "measured"

@@ -12,6 +12,7 @@ import numpy as np
 from hsp_control.common.arrays import Array
 from hsp_control.control.measurement import Inertial, LogChannel
 from hsp_control.declaration import within
+from hsp_control.engine import Dynamics
 from hsp_control.simulation.plants.drives import Drive, Driving, RunningLag
 from hsp_control.simulation.plants.plant import SampledPlant, to_json_data
 from hsp_control.simulation.plants.sensors import RunningImu, Sensing, Sensor
@@ -47,6 +48,11 @@ class ImperfectPlant(SampledPlant):
         self._measured = plant.robot.neutral(), np.zeros(plant.robot.nv)
         self._applied: Array | None = None
         self._begin(*self._measured)
+
+    @property
+    def dynamics(self) -> Dynamics | None:
+        """Those of the plant; see `Plant.dynamics`."""
+        return self.plant.dynamics
 
     def reset(self, t: float, q: Array, v: Array) -> None:
         """Reset the plant, the sensors and the drives; see `SampledPlant.reset`."""

@@ -11,6 +11,7 @@ from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import SimulationError
 from hsp_control.control.measurement import NO_WRENCHES, Inertial, LogChannel
 from hsp_control.declaration import Part
+from hsp_control.engine import Dynamics
 from hsp_control.engine.plans import TIME, PartCall
 from hsp_control.robot import Robot
 from hsp_control.robot.integrators import Advance, Integrator, Steps
@@ -37,6 +38,14 @@ class Plant:
 
     def __init__(self, robot: Robot) -> None:
         self.robot = robot
+
+    @property
+    def dynamics(self) -> Dynamics | None:
+        """The engine's dynamics that move it, which may carry what a controller says.
+
+        None if it is moved by something else.
+        """
+        return None
 
     def log_channels(
         self, t: float, q: Array, v: Array, tau: Array
@@ -157,6 +166,11 @@ class IntegratedPlant(SampledPlant):
 
     def __getstate__(self) -> dict[str, Any]:
         return vars(self) | {"_advance": None}
+
+    @property
+    def dynamics(self) -> Dynamics | None:
+        """Those of the plant; see `Plant.dynamics`."""
+        return self.plant.dynamics
 
     def reset(self, t: float, q: Array, v: Array) -> None:
         """Set the state; see `SampledPlant.reset`."""

@@ -8,7 +8,8 @@ import numpy as np
 from hsp_control import engine
 from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import SimulationError
-from hsp_control.robot import Robot
+from hsp_control.engine import Dynamics
+from hsp_control.robot import Robot, RobotState
 from hsp_control.robot.friction import JointFriction
 from hsp_control.robot.integrators import Integrator, number_of_steps
 from hsp_control.robot.kinematics import Term
@@ -34,12 +35,18 @@ class RigidBodyPlant(ContinuousPlant):
     def __init__(self, robot: Robot, pushes: Sequence[Push] = ()) -> None:
         super().__init__(robot)
         self.pushes = Pushes(robot, pushes)
+        self._dynamics = robot.dynamics()
+
+    @property
+    def dynamics(self) -> Dynamics:
+        """Of the rigid bodies; see `Plant.dynamics`."""
+        return self._dynamics
 
     def acceleration(self, t: float, q: Array, v: Array, tau: Array) -> Array:
         """Return v'; see `ContinuousPlant.acceleration`."""
         if self.pushes.any_active(t, t):
             tau = tau + self.pushes.effort(t, q)
-        return self.robot.forward_dynamics(q, v, tau)
+        return self.robot.forward_dynamics(q, v, tau, self.dynamics)
 
     def bind(self, q: Array, v: Array, tau: Array) -> Term:
         """Return v'; see `ContinuousPlant.bind`."""
@@ -47,7 +54,7 @@ class RigidBodyPlant(ContinuousPlant):
         pushed = self.pushes.pushes or self.pushes.reachable
         if pushed or changed:  # a subclass has another one
             return super().bind(q, v, tau)
-        return self.robot.bind_forward_dynamics(q, v, tau)
+        return self.robot.bind_forward_dynamics(q, v, tau, self.dynamics)
 
     def describe(self) -> dict[str, Any]:
         """Return its pushes."""
@@ -90,6 +97,12 @@ class StickingPlant(SampledPlant):
         self.friction, self.step = friction, step
         self.pushes = Pushes(robot, pushes)
         self._q, self._v = robot.neutral(), np.zeros(robot.nv)
+        self._state = RobotState(robot)
+
+    @property
+    def dynamics(self) -> Dynamics:
+        """Of the rigid bodies; see `Plant.dynamics`."""
+        return self._state.dynamics
 
     def reset(self, t: float, q: Array, v: Array) -> None:
         """Set the state; see `SampledPlant.reset`."""
@@ -127,8 +140,8 @@ class StickingPlant(SampledPlant):
         self, h: float, q: Array, v: Array, start: Array, tau: Array
     ) -> Array:
         """Return v⁺ after a time h from velocity ``start``, with M and N at (q, v)."""
-        M = self.robot.mass_matrix(q)
-        N = self.robot.inverse_dynamics(q, v, np.zeros(self.robot.nv))
+        state = self._state.update(0.0, q, v)
+        M, N = state.mass_matrix, state.nonlinear_effects
         damping = np.diag(0.5 * h * self.friction.viscous)
         after = start.copy()
         engine.DryFriction(

@@ -14,6 +14,7 @@ from hsp_control.control.measurement import LogChannel
 from hsp_control.declaration import Part, within
 from hsp_control.declaration.nested import BY_FRAME, stored_by_frame
 from hsp_control.declaration.quantities import ArrayField, NonNegative
+from hsp_control.engine import Dynamics
 from hsp_control.robot import Robot, RobotState
 from hsp_control.robot.integrators import Integrator
 from hsp_control.simulation.plants.plant import (
@@ -109,6 +110,11 @@ class ContactPlant(ContinuousPlant):
         self.pushes = Pushes(robot, pushes)
         self._roots = FloatingRoots(robot)
         self._state = RobotState(robot)
+
+    @property
+    def dynamics(self) -> Dynamics:
+        """Of the rigid bodies; see `Plant.dynamics`."""
+        return self._state.dynamics
 
     def acceleration(self, t: float, q: Array, v: Array, tau: Array) -> Array:
         """Return v'; see `ContinuousPlant.acceleration`."""

@@ -327,7 +327,7 @@ def test_a_robot_with_followers_has_no_centroidal_map() -> None:
     given = dict(zip(("J", "J_dot", "angular", "angular_dot"), rows, strict=True))
     with pytest.raises(ValueError, match="joints that follow others has no centroidal"):
         engine.CentroidalMotion(
-            dynamics=of_follower(), q=q, v=q, mass=1.0,
+            dynamics=of_follower(), q=q, v=q, mass=np.zeros(1),
             position=np.zeros(3), velocity=np.zeros(3), **given,
         )  # fmt: skip
 

@@ -98,7 +98,7 @@ def test_every_type_of_joint_steps(joint: str) -> None:
 def test_gravity_has_the_slope_and_the_drift_of_its_differences(case: str) -> None:
     robot, q, v, _ = draw(case, seed=5)
     state, rest = robot.state(0.0, q, v), np.zeros(robot.nv)
-    gravity = Gravity(robot.model, state.world)
+    gravity = Gravity(robot.model, state.dynamics, state.world)
     state.run(gravity.calls)
 
     def efforts(displacement: Array) -> Array:

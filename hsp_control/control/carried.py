@@ -1,0 +1,86 @@
+"""What a robot carries: payloads at its frames, which come and go while it moves.
+
+The inertia of a payload adds to that of the body that carries it, in part while it is
+taken up or put down: M, N, their rates and the law are those of the model of the time.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+
+from hsp_control import engine
+from hsp_control.common.arrays import Array
+from hsp_control.control.evolution import Evolution
+from hsp_control.engine import Dynamics
+from hsp_control.engine.plans import PartCall, planned
+from hsp_control.robot import RobotState
+
+
+class CarriedBody(NamedTuple):
+    """A body that is fixed to a joint, in the axes of the joint."""
+
+    joint: int
+    mass: float  # [kg]
+    center: tuple[float, ...]  # of mass, 3 numbers [m]
+    inertia: tuple[float, ...]  # about it, row by row, 9 numbers [kg·m²]
+
+
+@dataclass(frozen=True)
+class PlannedPayload:
+    """A payload, and when it is carried."""
+
+    frame: str
+    body: CarriedBody
+    share: Evolution[float]  # 1 while it is carried, 0 while it is not
+
+
+class CarriedInForce:
+    """What is carried now, as the dynamics of the state have it, and of who follows."""
+
+    def __init__(self, state: RobotState) -> None:
+        self._planned: Sequence[PlannedPayload] = ()
+        self._shares, self._rates = np.zeros((2, 0))
+        self._carriers = [state.dynamics]
+        self._bind()
+
+    def follow(self, dynamics: Dynamics | None) -> None:
+        """Let other dynamics carry the same from now on, instead of the last ones."""
+        self._carriers[1:] = [] if dynamics is None else [dynamics]
+        self._bind()
+        self._carry()
+
+    def plan(self, payloads: Sequence[PlannedPayload], t: float) -> None:
+        """Follow other payloads from now on; t is the present time [s]."""
+        if payloads != self._planned:
+            self._planned = payloads
+            self._bind()
+        self.write(t)
+
+    def write(self, t: float) -> None:
+        """Carry what is carried at a time [s]."""
+        for k, each in enumerate(self._planned):
+            self._shares[k], self._rates[k] = each.share.with_rate(t)
+        self._carry()
+
+    def _bind(self) -> None:
+        bodies, count = [each.body for each in self._planned], len(self._planned)
+        if len(self._shares) != count:
+            self._shares, self._rates = np.zeros((2, count))
+        of_all = {
+            "joints": np.array([each.joint for each in bodies], dtype=np.int64),
+            "masses": np.array([each.mass for each in bodies]),
+            "centers": _rows([each.center for each in bodies], 3),
+            "inertias": _rows([each.inertia for each in bodies], 9),
+            "shares": self._shares,
+            "rates": self._rates,
+        }
+        calls = [
+            PartCall(engine.Carry, dynamics=each, **of_all) for each in self._carriers
+        ]
+        self._carry = planned(calls).call()
+
+
+def _rows(rows: Sequence[Sequence[float]], size: int) -> Array:
+    return np.array(rows, dtype=float).reshape(len(rows), size)

@@ -1,0 +1,103 @@
+"""The change of what a robot carries."""
+
+from dataclasses import replace
+from typing import Self
+
+import numpy as np
+
+from hsp_control.common.arrays import Array
+from hsp_control.common.exceptions import ControllerError
+from hsp_control.control.carried import CarriedBody, PlannedPayload
+from hsp_control.control.change import Change
+from hsp_control.control.evolution import ABSENT
+from hsp_control.control.setup import Setup
+from hsp_control.declaration import within
+from hsp_control.declaration.quantities import NonNegative, Semidefinite, Vector3
+from hsp_control.geometry.scene import Start
+from hsp_control.robot import Robot
+
+_ROUNDING = 1e-9
+"""Of moments of inertia, relative: what somebody typed has rounding errors."""
+
+
+class ChangePayload(Change, type="payload"):
+    """A frame takes up a payload, or puts it down; the law is that of the model.
+
+    It replaces what the frame carried before. Simulated rigid bodies carry it, too,
+    besides what is wrong with their own masses.
+    """
+
+    frame: str
+    """Name of the frame that the payload is fixed to."""
+    mass: NonNegative
+    """Mass [kg]; 0: it carries nothing from then on."""
+    center: Vector3 = (0.0, 0.0, 0.0)
+    """Centre of mass in the frame [m]."""
+    inertia: Semidefinite = 0.0
+    """Moments of inertia about the centre [kg·m²]: a number, three about the frame's
+    axes, or a symmetric matrix; 0: a point mass."""
+
+    def placed(self, start: Start, setup: Setup) -> Self:
+        """Return the change, checked where the robot is."""
+        self._body(start.state.robot)
+        return self
+
+    def apply(self, setup: Setup) -> Setup:
+        """Return the setup with the payload; see `Change.apply`."""
+        before = [
+            replace(each, share=each.share.then(self.at, self.ramp, 0.0))
+            if each.frame == self.frame
+            else each
+            for each in setup.payloads
+        ]
+        body = self._body(setup.start.state.robot)
+        share = ABSENT.then(self.at, self.ramp, 1.0)
+        new = [PlannedPayload(self.frame, body, share)] if self.mass else []
+        return replace(setup, payloads=(*before, *new))
+
+    def _body(self, robot: Robot) -> CarriedBody:
+        """Return the payload in the axes of the joint that carries it."""
+        with within("frame"):
+            frame = robot.model.frames[robot.frame_id(self.frame)]
+            if frame.parentJoint == 0:
+                raise ControllerError(
+                    f"{self.frame!r} is fixed to the world, which carries everything"
+                )
+            if robot.unactuated:
+                raise ControllerError(
+                    f"{robot.name} has a free-flyer root, on whose balance a payload "
+                    "counts, too; needs a robot with a fixed base"
+                )
+        R = frame.placement.rotation
+        inertia = R @ self._moments() @ R.T
+        return CarriedBody(
+            int(frame.parentJoint),
+            float(self.mass),
+            tuple(frame.placement.act(np.asarray(self.center, dtype=float)).tolist()),
+            tuple(inertia.ravel().tolist()),
+        )
+
+    def _moments(self) -> Array:
+        """Return the inertia about the centre, in the frame's axes, (3, 3)."""
+        given = np.asarray(self.inertia, dtype=float)
+        with within("inertia"):
+            if given.shape not in {(), (3,), (3, 3)}:
+                raise ControllerError(
+                    f"has shape {given.shape}; needs a number, 3 numbers or a 3 × 3 "
+                    "matrix"
+                )
+            moments = given if given.ndim == 2 else np.diag(np.resize(given, 3))
+            if not np.allclose(moments, moments.T, rtol=_ROUNDING, atol=0.0):
+                raise ControllerError(f"is {given.tolist()}; must be symmetric")
+            principal = np.linalg.eigvalsh(moments)
+            least = principal[0] + principal[1] - principal[2]
+            rounding = _ROUNDING * principal[2]
+            if principal[0] < -rounding or least < -rounding:
+                shown = ", ".join(f"{each:.3g}" for each in principal)
+                raise ControllerError(
+                    f"has the principal moments {shown} kg m²; none may be negative, "
+                    "nor greater than the sum of the others"
+                )
+            if self.mass == 0.0 and principal[2] > 0.0:
+                raise ControllerError("is that of a body without mass; give its mass")
+        return moments

@@ -1,0 +1,240 @@
+"""A payload that is taken up while the arm moves: the law of the model of the time."""
+
+import pickle
+import warnings
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pinocchio as pin
+import pytest
+
+import hsp_control as hsp
+from hsp_control.common.arrays import Array
+from hsp_control.common.exceptions import ControllerError, HspControlError
+from hsp_control.control.compensation import Compensation, MomentumObserver
+from hsp_control.control.first_state import StartWarning
+from hsp_control.null_space.metrics import IdentityMetric, MassMatrixMetric, Metric
+from hsp_control.robot.gravity import Gravity
+from hsp_control.simulation import plants
+from hsp_control.simulation.plants.rigid_body import RigidBodyPlant
+
+MASS, CENTER = 2.0, np.array([0.03, -0.02, 0.06])
+INERTIA = np.array([[0.004, 0.001, 0.0], [0.001, 0.005, 0.0], [0.0, 0.0, 0.003]])
+AT, RAMP, GAIN = 0.3, 0.4, 2.0
+
+
+def panda() -> hsp.Robot:
+    return hsp.Robot.load("panda")
+
+
+def start(robot: hsp.Robot) -> Array:
+    return robot.integrate(robot.home(), 0.2 * np.sin(1.0 + np.arange(7)))
+
+
+def controller(metric: Metric | None = None, **options: Any) -> hsp.Controller:
+    robot = panda()
+    made = hsp.Controller(
+        robot,
+        [hsp.FramePose("panda_tcp", hsp.Circle(0.1, 2.0), name="hand")],
+        hsp.TargetPosture(robot.home(), weight=1.5),
+        metric=metric,
+        null_space_gain=GAIN,
+        start=start(robot),
+        **options,
+    )
+    made.at(AT).ramp(RAMP).payload("panda_hand", MASS, CENTER, INERTIA)
+    return made
+
+
+def loaded(share: float) -> pin.Model:
+    """Return the model with a part of the payload, as Pinocchio has it."""
+    model = panda().model.copy()
+    frame = model.frames[model.getFrameId("panda_hand")]
+    body = pin.Inertia(share * MASS, CENTER, share * INERTIA)
+    model.inertias[frame.parentJoint] += frame.placement.act(body)
+    return model
+
+
+def smooth(t: float) -> float:
+    """Return the share: the quintic from 0 to 1 of Siciliano et al. (2009), (4.21)."""
+    x = np.clip((t - AT) / RAMP, 0.0, 1.0)
+    return float(x**3 * (10.0 - 15.0 * x + 6.0 * x * x))
+
+
+@pytest.mark.parametrize("t", [0.0, 0.4, 0.5, 0.65, 5.0])
+def test_terms_are_those_of_the_model_of_the_time(t: float) -> None:
+    made, rng = controller(), np.random.default_rng(int(10 * t))
+    q = start(panda())
+    v = rng.normal(size=7)
+    output = made.compute(t, q, v)
+    model = loaded(smooth(t))
+    data, state = model.createData(), made.state
+    expected = pin.rnea(model, data, q, v, output.acceleration)
+    np.testing.assert_allclose(output.tau, expected, rtol=0, atol=1e-12)
+
+    def inertia(s: float) -> Array:
+        model = loaded(smooth(t + s))
+        data = model.createData()
+        upper = np.triu(pin.crba(model, data, pin.integrate(model, q, s * v)))
+        return upper + np.triu(upper, 1).T
+
+    np.testing.assert_allclose(state.mass_matrix, inertia(0.0), atol=1e-13)
+    h = 1e-4  # its rate, what the ramp adds included: an error of h⁴, and of rounding/h
+    rate = (inertia(-2 * h) - 8 * inertia(-h) + 8 * inertia(h) - inertia(2 * h)) / 12
+    np.testing.assert_allclose(state.mass_matrix_rate, rate / h, atol=1e-9)
+
+
+@pytest.mark.parametrize("metric", [IdentityMetric(), MassMatrixMetric()], ids=str)
+def test_the_law_is_exact_while_it_is_taken_up(metric: Metric) -> None:
+    """The error is what it is without, and ‖e_N‖_W decays, W = M(q, t)."""
+    robot = panda()
+    run = hsp.simulate(controller(metric, limits=None), start(robot), duration=1.0)
+    norm = run["null_space_norm"]
+    np.testing.assert_allclose(norm, norm[0] * np.exp(-GAIN * run.t), rtol=1e-7)
+    bare = controller(metric, limits=None)
+    bare.at(AT).ramp(RAMP).payload("panda_hand", 0.0)
+    same = hsp.simulate(bare, start(robot), duration=1.0)
+    error, usual = run["task.hand.error"], same["task.hand.error"]
+    assert np.abs(usual).max() > 0.05
+    np.testing.assert_allclose(error, usual, rtol=0, atol=1e-8)
+    assert np.abs((run.tau - same.tau)[run.t < AT]).max() == 0.0
+    assert np.abs((run.tau - same.tau)[-1]).max() > 5.0
+
+
+def test_efforts_have_no_jump() -> None:
+    """Across the ends of ramps that overlap, between them as well."""
+    made = controller(limits=None)
+    made.at(0.5).ramp(0.3).payload("panda_link5", 1.0)
+    made.at(0.6).ramp(0.1).payload("panda_hand", 0.5, inertia=0.001)
+    q, v = start(panda()), 0.3 * np.ones(7)
+    made.compute(0.0, q, v)
+    for t in (AT, AT + RAMP, 0.5, 0.8, 0.6, 0.62):
+        before, after = (made.compute(t + s, q, v).tau for s in (-1e-9, 1e-9))
+        assert np.abs(after - before).max() < 1e-6
+
+
+@pytest.mark.parametrize(
+    "plant",
+    [
+        plants.RigidBody(),
+        plants.RigidBody(friction=plants.Friction(viscous=0.1)),
+        plants.RigidBody(sensors=[plants.SensorDelay(1)]),
+        plants.RigidBody(pushes=[plants.Push("panda_link4", (0.0, 1.0, 0.0))]),
+    ],
+    ids=["bodies", "friction", "sensors", "pushes"],
+)
+def test_simulated_bodies_carry_it(plant: Any) -> None:
+    """At 1 kHz; a robot that did not would miss by 0.1 m without an observer."""
+    robot, none = panda(), Compensation(momentum_observer=None)
+    made = controller(MassMatrixMetric())
+    run = hsp.simulate(
+        made, start(robot), duration=1.2, control_period=1e-3, plant=plant,
+        compensation=none,
+    )  # fmt: skip
+    bare = controller(MassMatrixMetric())
+    bare.at(AT).ramp(RAMP).payload("panda_hand", 0.0)
+    same = hsp.simulate(
+        bare, start(robot), duration=1.2, control_period=1e-3, plant=plant,
+        compensation=none,
+    )  # fmt: skip
+    error, usual = (np.abs(r["task.hand.error"]).max() for r in (run, same))
+    assert error < 2.0 * usual + 1e-4
+    assert np.abs(run.tau[-1] - same.tau[-1]).max() > 5.0
+
+
+def test_an_observer_does_not_take_it_for_a_disturbance() -> None:
+    made = controller(MassMatrixMetric())
+    run = hsp.simulate(
+        made, start(panda()), duration=1.2, control_period=1e-3,
+        compensation=Compensation(momentum_observer=MomentumObserver(50.0)),
+    )  # fmt: skip
+    # Efforts are held: what is left is of the size of the period.
+    assert np.abs(run["observer.disturbance"]).max() < 0.1
+
+
+def test_a_plant_that_is_nobody_of_ours_is_named() -> None:
+    class Own(RigidBodyPlant):
+        dynamics = None  # type: ignore[assignment]
+
+        def acceleration(self, t: float, q: Array, v: Array, tau: Array) -> Array:
+            return self.robot.forward_dynamics(q, v, tau)
+
+    made = hsp.Controller(panda(), [hsp.FramePose()])
+    made.at(0.0).payload("panda_hand", 1.0)
+    with pytest.warns(StartWarning, match="Own does not carry what"):
+        hsp.simulate(made, start(panda()), duration=0.01, plant=Own(panda()))
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        hsp.simulate(made, start(panda()), duration=0.01)
+
+
+def test_a_copy_and_a_pickle_carry_it_on() -> None:
+    made, q, v = controller(), start(panda()), 0.2 * np.ones(7)
+    made.compute(0.0, q, v)
+    made.compute(0.45, q, v)  # in the ramp
+    others = [made.preview(), pickle.loads(pickle.dumps(made))]
+    for t in (0.46, 0.6, 1.0, 3.0, 3.1):
+        tau = made.compute(t, q, v).tau
+        for other in others:
+            np.testing.assert_array_equal(other.compute(t, q, v).tau, tau)
+
+
+def test_what_is_over_is_forgotten() -> None:
+    made, q, v = controller(), start(panda()), np.zeros(7)
+    made.compute(0.0, q, v)
+    for k in range(300):
+        made.at(float(k)).ramp(0.1).payload("panda_hand", 0.1 * (k % 3))
+        made.compute(k + 0.5, q, v)
+    made.compute(400.0, q, v)
+    assert len(made._setup.payloads) <= 2
+
+
+def test_what_static_effort_looks_at_counts_it() -> None:
+    made, q = controller(), start(panda())
+    made.compute(0.0, q, np.zeros(7))
+    gravity = Gravity(panda().model, made.state.dynamics, made.state.world)
+    for t in (0.5, 2.0):
+        made.compute(t, q, np.zeros(7))
+        made.state.run(gravity.calls)
+        model = loaded(smooth(t))
+        expected = pin.computeGeneralizedGravity(model, model.createData(), q)
+        np.testing.assert_allclose(gravity.effort, expected, rtol=0, atol=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        (("panda_hnad", 1.0), "frame: .*'panda_hnad'; did you mean 'panda_hand'"),
+        (("panda_link0", 1.0), "frame: 'panda_link0' is fixed to the world"),
+        (("panda_hand", -1.0), "mass: -1.0 is negative"),
+        (("panda_hand", 1.0, [0, 0, 0], [1, 2, 9]), "inertia: .*sum of the others"),
+        (("panda_hand", 1.0, [0, 0, 0], [1, 2]), r"inertia: has shape \(2,\)"),
+        (("panda_hand", 0.0, [0, 0, 0], 0.1), "inertia: .*body without mass"),
+    ],
+)
+def test_what_is_no_payload_is_refused(change: Any, message: str) -> None:
+    made = hsp.Controller(panda(), [hsp.FramePosition()])
+    with pytest.raises(HspControlError, match=message):
+        made.at(0.0).payload(*change)
+
+
+def test_a_robot_that_balances_is_refused() -> None:
+    robot = hsp.Robot.load("solo12", root="free_flyer")
+    made = hsp.Controller(robot, [hsp.JointPosture()], base="flying")
+    with pytest.raises(ControllerError, match="needs a robot with a fixed base"):
+        made.at(0.0).payload("FL_FOOT", 1.0)
+
+
+def test_a_configuration_says_it(tmp_path: Path) -> None:
+    text = (
+        "robot: {name: panda}\ntasks: {hand: {type: frame_pose}}\n"
+        "changes: [{type: payload, frame: panda_hand, mass: 2, center: [0, 0, 0.06],\n"
+        "           inertia: 0.004, at: 0.2, ramp: 0.2}]\n"
+        "simulation: {duration: 0.6, control_period: 0.001}\n"
+    )
+    file = tmp_path / "carry.yaml"
+    file.write_text(text)
+    run = hsp.load_experiment(str(file)).run()
+    assert np.abs(run["task.hand.error"]).max() < 1e-4
+    assert np.abs(run.tau[-1] - run.tau[0]).max() > 5.0
