@@ -48,19 +48,31 @@ struct Carry {
   }
 };
 
-struct BodyMasses {
+struct SetGravity {
+  static constexpr const char* doc = "Let gravity be another one from now on [m/s²].";
+  Shared<Dynamics> dynamics;
+  In<3> gravity;
+
+  void operator()() { dynamics->set_gravity(gravity); }
+};
+
+struct Weights {
   static constexpr const char* doc =
-      "The mass of what each joint moves [kg], with what it carries, and its centre [m].";
+      "The mass of what each joint moves [kg], with what it carries, its centre [m], and gravity.";
   Shared<Dynamics> dynamics;
   Out<'j'> mass;
   Out<'j', 3> center;
+  Out<3> gravity;
 
   void check() const {
     if (mass.size() != dynamics->joints())
       throw std::invalid_argument("the robot has " + std::to_string(dynamics->joints()) +
                                   " joints, the world included");
   }
-  void operator()() { dynamics->body_masses(mass, center); }
+  void operator()() {
+    dynamics->body_masses(mass, center);
+    gravity = dynamics->gravity();
+  }
 };
 
 struct JointJacobians {

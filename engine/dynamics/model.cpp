@@ -128,6 +128,10 @@ void Dynamics::carry(const Carried& body) {
   carried.push_back(body);
 }
 
+void Dynamics::set_gravity(const Vector3& gravity) { pinocchio_->model.gravity.linear() = gravity; }
+
+Vector3 Dynamics::gravity() const { return pinocchio_->model.gravity.linear(); }
+
 double Dynamics::mass() const {
   double sum = 0.0;
   for (const auto& body : pinocchio_->model.inertias) sum += body.mass();

@@ -26,7 +26,7 @@ from hsp_control.control.change import (
     MoveObstacle,
     RemoveTask,
 )
-from hsp_control.control.change_payload import ChangePayload
+from hsp_control.control.change_model import ChangeGravity, ChangePayload
 from hsp_control.control.setup import Setup
 from hsp_control.declaration import within
 from hsp_control.declaration.quantities import Gain
@@ -43,6 +43,7 @@ __all__ = [
     "ChangeField",
     "ChangeForce",
     "ChangeGains",
+    "ChangeGravity",
     "ChangeImpedance",
     "ChangeLimits",
     "ChangeNullSpaceGain",
@@ -138,6 +139,10 @@ class Changes:
         """Take up a payload at a frame, or put it down, mass=0; see `ChangePayload`."""
         at, ramp = self._at, self._ramp
         return self._do(ChangePayload(frame, mass, center, inertia, at=at, ramp=ramp))
+
+    def gravity(self, gravity: ArrayLike) -> Self:
+        """Change gravity in the world [m/s²]; see `ChangeGravity`."""
+        return self._do(ChangeGravity(gravity, at=self._at, ramp=self._ramp))
 
     def _do(self, change: Change) -> Self:
         self._make(change)

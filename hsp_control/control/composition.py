@@ -15,11 +15,11 @@ from hsp_control.constraints.contacts import Contact
 from hsp_control.constraints.limits import Limits, RobotLimits
 from hsp_control.control.actuation.limits_in_force import LimitsInForce
 from hsp_control.control.bound_step import BoundStep
-from hsp_control.control.carried import CarriedInForce
 from hsp_control.control.changes import Change, Changes, TimeLine
 from hsp_control.control.declared_rates import check_field, check_metric
 from hsp_control.control.gains_in_force import GainsInForce, check_held
 from hsp_control.control.mixture import Mixture
+from hsp_control.control.model_in_force import ModelInForce
 from hsp_control.control.setup import Base, DeclaredController, PlannedTerm, Setup
 from hsp_control.control.targets import RAMP, followed_stream, new_stream, target_of
 from hsp_control.declaration import within
@@ -100,7 +100,7 @@ class Composition:
         robot, given = self._declared.robot, self._declared.start
         self._state = RobotState(robot)
         self._gains = GainsInForce(robot.nv)
-        self._carried = CarriedInForce(self._state)
+        self._model = ModelInForce(self._state)
         self._run = PresentRun(self._declared.robot.nv)
         q = robot.home() if given is None else given
         state = robot.state(0.0, q, np.zeros(robot.nv))
@@ -125,7 +125,8 @@ class Composition:
         self._time_line, self._setup = time_line, time_line.setup
         exchanged = self._gains.plan(self._setup, self._latest)
         self._limits.plan(self._setup.limits, self._latest)
-        self._carried.plan(self._setup.payloads, self._latest)
+        setup = self._setup
+        self._model.plan(setup.payloads, setup.gravity, self._latest)
         self._mixture.plan(self._setup, exchanged=exchanged)
 
     @property

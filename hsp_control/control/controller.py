@@ -160,7 +160,7 @@ class Controller(Composition):
                 self._follow(self._time_line.settled_at(run.now - _MEMORY))
             self._gains.write(t)
             self._limits.write(t)
-            self._carried.write(t)
+            self._model.write(t)
 
     def applied(self, tau: ArrayLike, period: float) -> None:
         """Store the effort that was sent to the robot.
@@ -231,15 +231,15 @@ class Controller(Composition):
         known = self._declared.robot.check_tangent(acceleration, "acceleration")
         self._limits.sent.held.disturbance[:] = known
 
-    def carried_by(self, dynamics: Dynamics | None) -> None:
-        """Let other dynamics carry what changes of payload say, such as a plant's.
+    def followed_by(self, dynamics: Dynamics | None) -> None:
+        """Let other dynamics follow changes of payload and gravity, as a plant's do.
 
         Args:
             dynamics: Those of a robot with the same joints, instead of the last ones;
-                None: nobody else carries it.
+                None: nobody follows.
         """
         with self._lock:
-            self._carried.follow(dynamics)
+            self._model.follow(dynamics)
 
     def restart(self) -> None:
         """Begin anew: forget the last effort, the offsets of tasks, and where it began.

@@ -20,7 +20,6 @@ from hsp_control.common.exceptions import (
 from hsp_control.common.suggestions import did_you_mean, listing
 from hsp_control.constraints.contacts import Contact
 from hsp_control.constraints.limits import Limits, RobotLimits
-from hsp_control.control.carried import PlannedPayload
 from hsp_control.control.evolution import (
     ABSENT,
     PRESENT,
@@ -29,6 +28,7 @@ from hsp_control.control.evolution import (
     PlannedContact,
     PlannedLimits,
 )
+from hsp_control.control.model_in_force import PlannedPayload
 from hsp_control.declaration import Part, within
 from hsp_control.declaration.language import check_kind, shortened
 from hsp_control.declaration.nested import parts_within, with_parts_replaced
@@ -229,6 +229,7 @@ class Setup:
     contacts: tuple[PlannedContact, ...]
     limits: PlannedLimits
     count: int  # how many tasks there have ever been; the next one has this key
+    gravity: Evolution[Array]  # in the world, shape (3,) [m/s²]
     payloads: tuple[PlannedPayload, ...] = ()
 
     @property
@@ -244,6 +245,7 @@ class Setup:
         """When the last change is complete [s]; -inf without changes."""
         evolutions: list[Evolution[Any]] = [
             self.gain,
+            self.gravity,
             *(task.presence for task in self.tasks),
             *(task.gains for task in self.tasks),
             *(term.presence for term in self.terms),
@@ -310,6 +312,7 @@ class Setup:
             tuple(contacts),
             self.limits.settled(t),
             self.count,
+            self.gravity.settled(t),
             tuple(each for each in payloads if each.share != ABSENT),
         )
 
@@ -449,6 +452,7 @@ class DeclaredController:
             tuple(contacts),
             PlannedLimits.of(limits),
             len(tasks),
+            Evolution(np.array(robot.model.gravity.linear)),
         )
 
     def preview(self) -> "DeclaredController":

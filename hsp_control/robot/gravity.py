@@ -32,8 +32,13 @@ class Gravity:
             support, of_v = joint_support(model, joint)
             moves[support, joint], dofs[support] = True, of_v
         mass, center = np.zeros(model.njoints), np.zeros((model.njoints, 3))
-        bodies = PartCall(
-            engine.BodyMasses, dynamics=dynamics, mass=mass, center=center
+        gravity = np.zeros(3)
+        weights = PartCall(
+            engine.Weights,
+            dynamics=dynamics,
+            mass=mass,
+            center=center,
+            gravity=gravity,
         )
         self.effort: Array = np.zeros(nv)
         self.slope: Array = np.zeros((nv, nv))
@@ -48,13 +53,13 @@ class Gravity:
             moves=moves,
             joints=np.array(columns, dtype=np.int64),
             dofs=dofs,
-            gravity=np.array(model.gravity.linear),
+            gravity=gravity,
             v=world.v,
             effort=self.effort,
             slope=self.slope,
             drift=self.drift,
         )
-        self.calls: PartCalls = [bodies, call]
+        self.calls: PartCalls = [weights, call]
 
 
 def _width(model: pin.Model, joint: int) -> int:

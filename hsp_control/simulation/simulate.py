@@ -15,7 +15,7 @@ from hsp_control.common.exceptions import (
     SimulationError,
     StreamError,
 )
-from hsp_control.control.change_payload import ChangePayload
+from hsp_control.control.change_model import ChangeGravity, ChangePayload
 from hsp_control.control.compensation import Command, Compensation
 from hsp_control.control.compensation import check_rate as check_loop
 from hsp_control.control.controller import Controller
@@ -157,13 +157,13 @@ def simulate(
         raise _no_period("a plan decides once a period: it needs")
     if estimators and not periods:
         raise _no_period("estimators estimate once a period: they need")
-    controller.carried_by(plant.dynamics)
+    controller.followed_by(plant.dynamics)
     if plant.dynamics is None and any(
-        isinstance(each, ChangePayload) for each in controller.changes
+        isinstance(each, ChangePayload | ChangeGravity) for each in controller.changes
     ):
         message = (
-            f"{type(plant).__name__} does not carry what changes of payload say; it "
-            "has to be told by its own means"
+            f"{type(plant).__name__} does not follow changes of payload and gravity; "
+            "it has to be told by its own means"
         )
         warnings.warn(message, StartWarning, stacklevel=2)
     # The loop

@@ -162,7 +162,7 @@ def test_a_plant_that_is_nobody_of_ours_is_named() -> None:
 
     made = hsp.Controller(panda(), [hsp.FramePose()])
     made.at(0.0).payload("panda_hand", 1.0)
-    with pytest.warns(StartWarning, match="Own does not carry what"):
+    with pytest.warns(StartWarning, match="Own does not follow changes of"):
         hsp.simulate(made, start(panda()), duration=0.01, plant=Own(panda()))
     with warnings.catch_warnings():
         warnings.simplefilter("error")
@@ -188,6 +188,24 @@ def test_what_is_over_is_forgotten() -> None:
         made.compute(k + 0.5, q, v)
     made.compute(400.0, q, v)
     assert len(made._setup.payloads) <= 2
+
+
+def test_gravity_changes_with_the_base() -> None:
+    """A base that is tilted: efforts are those of the model, and the arm stays."""
+    robot, tilted = panda(), np.array([0.0, 4.9, -8.5])
+    made = hsp.Controller(robot, [hsp.FramePose(name="hand")], hsp.JointCentering())
+    made.at(0.2).ramp(0.5).gravity(tilted)
+    run = hsp.simulate(made, robot.home(), duration=1.0)
+    assert np.abs(run["task.hand.error"]).max() < 1e-9
+    output = made.compute(5.0, robot.home(), np.zeros(7))
+    model = robot.model.copy()
+    model.gravity.linear = tilted
+    expected = pin.rnea(
+        model, model.createData(), robot.home(), np.zeros(7), output.acceleration
+    )
+    np.testing.assert_allclose(output.tau, expected, rtol=0, atol=1e-12)
+    with pytest.raises(ControllerError, match=r"gravity: .* is 981 m/s²; at most 300"):
+        made.at(6.0).gravity([0.0, 0.0, -981.0])
 
 
 def test_what_static_effort_looks_at_counts_it() -> None:

@@ -1,4 +1,4 @@
-"""What a robot carries: payloads at its frames, which come and go while it moves.
+"""The model in force: what a robot carries, and gravity, as changes make them.
 
 The inertia of a payload adds to that of the body that carries it, in part while it is
 taken up or put down: M, N, their rates and the law are those of the model of the time.
@@ -36,39 +36,45 @@ class PlannedPayload:
     share: Evolution[float]  # 1 while it is carried, 0 while it is not
 
 
-class CarriedInForce:
-    """What is carried now, as the dynamics of the state have it, and of who follows."""
+class ModelInForce:
+    """What is carried now, and gravity, in a state's dynamics and what follows them."""
 
     def __init__(self, state: RobotState) -> None:
-        self._planned: Sequence[PlannedPayload] = ()
+        self._payloads: Sequence[PlannedPayload] = ()
         self._shares, self._rates = np.zeros((2, 0))
-        self._carriers = [state.dynamics]
+        self._gravity = Evolution(np.array(state.robot.model.gravity.linear))
+        self._now = self._gravity.initial.copy()
+        self._followed_by = [state.dynamics]
         self._bind()
 
     def follow(self, dynamics: Dynamics | None) -> None:
-        """Let other dynamics carry the same from now on, instead of the last ones."""
-        self._carriers[1:] = [] if dynamics is None else [dynamics]
+        """Let other dynamics have the same from now on, instead of the last ones."""
+        self._followed_by[1:] = [] if dynamics is None else [dynamics]
         self._bind()
-        self._carry()
+        self._write()
 
-    def plan(self, payloads: Sequence[PlannedPayload], t: float) -> None:
-        """Follow other payloads from now on; t is the present time [s]."""
-        if payloads != self._planned:
-            self._planned = payloads
+    def plan(
+        self, payloads: Sequence[PlannedPayload], gravity: Evolution[Array], t: float
+    ) -> None:
+        """Follow other changes from now on; t is the present time [s]."""
+        self._gravity = gravity
+        if payloads != self._payloads:
+            self._payloads = payloads
             self._bind()
         self.write(t)
 
     def write(self, t: float) -> None:
-        """Carry what is carried at a time [s]."""
-        for k, each in enumerate(self._planned):
+        """Let the model be that of a time [s]."""
+        for k, each in enumerate(self._payloads):
             self._shares[k], self._rates[k] = each.share.with_rate(t)
-        self._carry()
+        self._now[:] = self._gravity.at(t)
+        self._write()
 
     def _bind(self) -> None:
-        bodies, count = [each.body for each in self._planned], len(self._planned)
+        bodies, count = [each.body for each in self._payloads], len(self._payloads)
         if len(self._shares) != count:
             self._shares, self._rates = np.zeros((2, count))
-        of_all = {
+        carried = {
             "joints": np.array([each.joint for each in bodies], dtype=np.int64),
             "masses": np.array([each.mass for each in bodies]),
             "centers": _rows([each.center for each in bodies], 3),
@@ -76,10 +82,11 @@ class CarriedInForce:
             "shares": self._shares,
             "rates": self._rates,
         }
-        calls = [
-            PartCall(engine.Carry, dynamics=each, **of_all) for each in self._carriers
-        ]
-        self._carry = planned(calls).call()
+        calls = []
+        for each in self._followed_by:
+            calls.append(PartCall(engine.Carry, dynamics=each, **carried))
+            calls.append(PartCall(engine.SetGravity, dynamics=each, gravity=self._now))
+        self._write = planned(calls).call()
 
 
 def _rows(rows: Sequence[Sequence[float]], size: int) -> Array:

@@ -1,4 +1,4 @@
-"""The change of what a robot carries."""
+"""The changes of a robot's model: of what it carries, and of gravity."""
 
 from dataclasses import replace
 from typing import Self
@@ -7,15 +7,17 @@ import numpy as np
 
 from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import ControllerError
-from hsp_control.control.carried import CarriedBody, PlannedPayload
 from hsp_control.control.change import Change
 from hsp_control.control.evolution import ABSENT
+from hsp_control.control.model_in_force import CarriedBody, PlannedPayload
 from hsp_control.control.setup import Setup
 from hsp_control.declaration import within
 from hsp_control.declaration.quantities import NonNegative, Semidefinite, Vector3
 from hsp_control.geometry.scene import Start
 from hsp_control.robot import Robot
 
+MOST_GRAVITY = 300.0
+"""Largest gravity, ten times that of Jupiter: more is in other units [m/s²]."""
 _ROUNDING = 1e-9
 """Of moments of inertia, relative: what somebody typed has rounding errors."""
 
@@ -101,3 +103,22 @@ class ChangePayload(Change, type="payload"):
             if self.mass == 0.0 and principal[2] > 0.0:
                 raise ControllerError("is that of a body without mass; give its mass")
         return moments
+
+
+class ChangeGravity(Change, type="gravity"):
+    """Gravity changes, as on a base that is tilted; the law is that of the model."""
+
+    gravity: Vector3
+    """Gravity in the world [m/s²], such as [0, 0, -9.81]."""
+
+    def apply(self, setup: Setup) -> Setup:
+        """Return the setup with the gravity; see `Change.apply`."""
+        target = np.asarray(self.gravity, dtype=float)
+        with within("gravity"):
+            if np.linalg.norm(target) > MOST_GRAVITY:
+                raise ControllerError(
+                    f"{target.tolist()} is {np.linalg.norm(target):.3g} m/s²; at most "
+                    f"{MOST_GRAVITY:g}"
+                )
+        gravity = setup.gravity.then(self.at, self.ramp, target)
+        return replace(setup, gravity=gravity)
