@@ -46,14 +46,16 @@ def simulated_robot(experiment: Experiment) -> SimulatedRobot:
     """Return the experiment's plant as a robot with a watchdog and a safe stop."""
     period, live = live_period(experiment), experiment.scenario.live
     check_live(experiment)
+    plant = sampled(experiment.plant, experiment.integrator, period)
     return SimulatedRobot(
-        sampled(experiment.plant, experiment.integrator, period),
+        plant,
         experiment.q0,
         experiment.v0,
         period,
         settings=replace(live, stop=replace(live.stop, hold=FINAL_HOLD)),
         limits=experiment.controller.limits,
         contacts=experiment.controller.contacts,
+        follow=experiment.controller.model_changes(plant.dynamics),
     )
 
 

@@ -100,7 +100,7 @@ class Composition:
         robot, given = self._declared.robot, self._declared.start
         self._state = RobotState(robot)
         self._gains = GainsInForce(robot.nv)
-        self._model = ModelInForce(self._state)
+        self._model = ModelInForce(robot, [self._state.dynamics])
         self._run = PresentRun(self._declared.robot.nv)
         q = robot.home() if given is None else given
         state = robot.state(0.0, q, np.zeros(robot.nv))

@@ -19,6 +19,7 @@ from hsp_control.control.changes import Change
 from hsp_control.control.composition import Composition, PresentRun
 from hsp_control.control.first_state import check_angles, warn_of_jump
 from hsp_control.control.mixture import AccelerationModifier
+from hsp_control.control.model_in_force import ModelInForce
 from hsp_control.control.output import ControlOutput, Diagnostics
 from hsp_control.engine import Dynamics, Plan
 from hsp_control.law import TaskSample
@@ -240,6 +241,25 @@ class Controller(Composition):
         """
         with self._lock:
             self._model.follow(dynamics)
+
+    def model_changes(
+        self, dynamics: Dynamics | None
+    ) -> Callable[[float], object] | None:
+        """Return what lets other dynamics follow changes of payload and gravity.
+
+        A simulated robot in another process knows the changes that were declared, and
+        follows them by itself; see `followed_by` for one in this process.
+
+        Returns:
+            A function of the time [s]; None if nothing changes, or ``dynamics`` is.
+        """
+        setup = self._setup
+        constant = setup.gravity.constant and not setup.payloads
+        if dynamics is None or constant:
+            return None
+        model = ModelInForce(self.robot, [dynamics])
+        model.plan(setup.payloads, setup.gravity, -np.inf)
+        return model.write
 
     def restart(self) -> None:
         """Begin anew: forget the last effort, the offsets of tasks, and where it began.

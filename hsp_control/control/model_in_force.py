@@ -15,7 +15,7 @@ from hsp_control.common.arrays import Array
 from hsp_control.control.evolution import Evolution
 from hsp_control.engine import Dynamics
 from hsp_control.engine.plans import PartCall, planned
-from hsp_control.robot import RobotState
+from hsp_control.robot import Robot
 
 
 class CarriedBody(NamedTuple):
@@ -39,17 +39,17 @@ class PlannedPayload:
 class ModelInForce:
     """What is carried now, and gravity, in a state's dynamics and what follows them."""
 
-    def __init__(self, state: RobotState) -> None:
+    def __init__(self, robot: Robot, dynamics: Sequence[Dynamics]) -> None:
         self._payloads: Sequence[PlannedPayload] = ()
         self._shares, self._rates = np.zeros((2, 0))
-        self._gravity = Evolution(np.array(state.robot.model.gravity.linear))
+        self._gravity = Evolution(np.array(robot.model.gravity.linear))
         self._now = self._gravity.initial.copy()
-        self._followed_by = [state.dynamics]
+        self._dynamics = [*dynamics]
         self._bind()
 
     def follow(self, dynamics: Dynamics | None) -> None:
         """Let other dynamics have the same from now on, instead of the last ones."""
-        self._followed_by[1:] = [] if dynamics is None else [dynamics]
+        self._dynamics[1:] = [] if dynamics is None else [dynamics]
         self._bind()
         self._write()
 
@@ -83,7 +83,7 @@ class ModelInForce:
             "rates": self._rates,
         }
         calls = []
-        for each in self._followed_by:
+        for each in self._dynamics:
             calls.append(PartCall(engine.Carry, dynamics=each, **carried))
             calls.append(PartCall(engine.SetGravity, dynamics=each, gravity=self._now))
         self._write = planned(calls).call()

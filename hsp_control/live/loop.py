@@ -131,7 +131,15 @@ def run_loop(
             safe_stop = SafeStop(
                 robot, settings.stop, limiter.effort_limits, period, feet
             )
-            reader = StateReader(robot, limits, hardware, settings, clock, start_time)
+            reader = StateReader(
+                robot,
+                limits,
+                hardware,
+                settings,
+                clock,
+                start_time,
+                controller.state.dynamics,  # with what it is told to carry
+            )
             first = reader.wait_for_first()
             # Bind and allocate everything now, not in real-time operation.
             chain.begin(first.inertial)

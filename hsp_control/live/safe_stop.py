@@ -174,7 +174,8 @@ class SafeStop:
             w = settings.natural_frequency
             displacement = self._robot.difference(self._held_q, state.q)
             braking = -(self._held_mass @ (w * w * displacement + 2.0 * w * v))
-        gravity = self._robot.inverse_dynamics(state.q, self._rest, self._rest)
+        rest = self._rest  # with what the state's robot carries
+        gravity = self._robot.inverse_dynamics(state.q, rest, rest, state.dynamics)
         gravity, braking = (
             self.feet.joint_effort(state, force) for force in (gravity, braking)
         )

@@ -1,6 +1,6 @@
 """A simulated robot behind the interface of a real one; it checks what it is sent."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 import numpy as np
 
@@ -118,6 +118,7 @@ class SimulatedRobot:
         settings: LiveSettings | None = None,
         limits: RobotLimits | None = None,
         contacts: Sequence[Contact] = (),
+        follow: Callable[[float], object] | None = None,
     ) -> None:
         """Set the robot to its start, at rest or moving.
 
@@ -132,6 +133,7 @@ class SimulatedRobot:
                 It accepts what either of them allows.
             contacts: On which it stands, if its base is floating; its own stop needs
                 them.
+            follow: Lets the plant's model be that of a time [s], where it changes.
 
         Raises:
             LiveError: If the settings do not fit the robot or the period.
@@ -142,7 +144,8 @@ class SimulatedRobot:
         self._feet = StandingFeet(robot, contacts)
         self._stop = SafeStop(robot, settings.stop, upper, period, self._feet)
         self._check = EffortCheck(robot, settings, period, upper)
-        self._state = RobotState(robot)
+        self._state = RobotState(robot, plant.dynamics)
+        self._follow = follow
         self.plant, self.period, self.watchdog = plant, period, settings.watchdog
         self.q, self.v = q.copy(), v.copy()
         self.t, self.periods = 0.0, 0
@@ -210,6 +213,8 @@ class SimulatedRobot:
             self._receive(efforts)
         if self.phase == Phase.WAITING:
             return
+        if self._follow is not None:
+            self._follow(self.t)
         if self.phase == Phase.RUNNING:
             self._limiter.hold(self.q)
             fault = self._check.too_fast(self.v)

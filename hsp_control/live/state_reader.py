@@ -12,6 +12,7 @@ from hsp_control.common.arrays import Array, Flags
 from hsp_control.common.exceptions import HardwareError, HspControlError
 from hsp_control.constraints.limits import RobotLimits, own_limits
 from hsp_control.control.measurement import Inertial
+from hsp_control.engine import Dynamics
 from hsp_control.live.hardware import Hardware, Measurement, described
 from hsp_control.live.operator_requests import OPERATOR
 from hsp_control.live.report import Deadlines
@@ -27,9 +28,11 @@ class DeadReckoning:
     push meanwhile, and without them the model would fall.
     """
 
-    def __init__(self, robot: Robot, period: float) -> None:
+    def __init__(
+        self, robot: Robot, period: float, dynamics: Dynamics | None = None
+    ) -> None:
         self._robot, self._period = robot, period
-        self.state = RobotState(robot)  # the state, measured or predicted
+        self.state = RobotState(robot, dynamics)  # the state, measured or predicted
         self.predicted_for = 0.0  # time since the last measurement [s]
 
     def correct(self, t: float, q: Array, v: Array) -> None:
@@ -43,7 +46,7 @@ class DeadReckoning:
         self.predicted_for += h
         v = state.v.copy()
         if not self._robot.unactuated:
-            v += h * self._robot.forward_dynamics(state.q, state.v, tau)
+            v += h * self._robot.forward_dynamics(state.q, state.v, tau, state.dynamics)
         if not np.isfinite(v).all():
             return
         try:
@@ -430,11 +433,12 @@ class StateReader:
         settings: LiveSettings,
         clock: Callable[[], float],
         start_time: float = 0.0,
+        dynamics: Dynamics | None = None,
     ) -> None:
         self._hardware, self._settings, self._clock = hardware, settings, clock
         self._robot, self._period = robot, hardware.period
         self._monitor = MeasurementMonitor(robot, limits, settings, self._period)
-        self._reckoning = DeadReckoning(robot, self._period)
+        self._reckoning = DeadReckoning(robot, self._period, dynamics)
         self._frozen = FrozenState(robot, self._period, settings.missing)
         self._motion = TrustedMotion(robot, settings, self._period)
         self._robot_clock = RobotClock(

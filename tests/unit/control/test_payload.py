@@ -10,10 +10,13 @@ import pinocchio as pin
 import pytest
 
 import hsp_control as hsp
+from hsp_control.cli.live_experiment import simulated_robot
 from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import ControllerError, HspControlError
 from hsp_control.control.compensation import Compensation, MomentumObserver
 from hsp_control.control.first_state import StartWarning
+from hsp_control.live.loop import run_loop
+from hsp_control.live.simulated_robot import InProcessRobot
 from hsp_control.null_space.metrics import IdentityMetric, MassMatrixMetric, Metric
 from hsp_control.robot.gravity import Gravity
 from hsp_control.simulation import plants
@@ -256,3 +259,22 @@ def test_a_configuration_says_it(tmp_path: Path) -> None:
     run = hsp.load_experiment(str(file)).run()
     assert np.abs(run["task.hand.error"]).max() < 1e-4
     assert np.abs(run.tau[-1] - run.tau[0]).max() > 5.0
+
+
+def test_a_live_robot_and_its_safe_stop_carry_it(tmp_path: Path) -> None:
+    """Also while it stops: without, the hand would sink by centimetres."""
+    text = (
+        "robot: {name: panda}\ntasks: {hand: {type: frame_pose}}\n"
+        "changes: [{type: payload, frame: panda_hand, mass: 2, at: 0.2, ramp: 0.2}]\n"
+        "simulation: {duration: 0.8, control_period: 0.002}\n"
+    )
+    file = tmp_path / "carry.yaml"
+    file.write_text(text)
+    experiment = hsp.load_experiment(str(file))
+    arm = simulated_robot(experiment)
+    report = run_loop(experiment.controller, InProcessRobot(arm), duration=0.8)
+    assert report.reason == "the duration is over"
+    moved = np.abs(experiment.robot.difference(experiment.q0, arm.q)).max()
+    assert moved < 1e-3
+    assert np.abs(arm.tau - experiment.robot.state(0.0, arm.q, 0 * arm.v)
+                  .nonlinear_effects).max() > 5.0  # fmt: skip
