@@ -16,6 +16,7 @@ from hsp_control.constraints.limits import Limits, RobotLimits
 from hsp_control.control.actuation.limits_in_force import LimitsInForce
 from hsp_control.control.bound_step import BoundStep
 from hsp_control.control.changes import Change, Changes, TimeLine
+from hsp_control.control.clock_check import ClockCheck
 from hsp_control.control.declared_rates import check_field, check_metric
 from hsp_control.control.gains_in_force import GainsInForce, check_held
 from hsp_control.control.mixture import Mixture
@@ -412,12 +413,13 @@ class PresentRun:
     """What a controller knows of the present run."""
 
     # Not on the controller itself, whose own attributes cost 0.4 µs to set.
-    __slots__ = ("acceleration", "begun", "bound", "now")
+    __slots__ = ("acceleration", "begun", "bound", "clock", "now")
 
     def __init__(self, nv: int) -> None:
         self.acceleration = np.zeros(nv)  # what the last step delivered
         self.begun, self.now = False, -np.inf  # latest time of a step [s]
         self.bound: BoundStep | None = None  # the step, while nothing changes
+        self.clock = ClockCheck()
 
 
 _INSTEAD = {

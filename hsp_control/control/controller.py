@@ -141,6 +141,7 @@ class Controller(Composition):
     def _begin(self) -> None:
         """Look at the first state, and without a start place there what is relative."""
         check_angles(self._declared.robot, self._state.q)
+        self._run.clock.begin(self._state.t)
         if self._declared.start is None:
             here = self._here()._replace(scene=self._declared.scene)
             sent = self._limits.sent.memory()
@@ -192,6 +193,7 @@ class Controller(Composition):
             raise NonFiniteError(f"period is {period}; needs a finite number")
         if not period > 0.0:
             raise ControllerError(f"period is {period} s; must be positive")
+        self._run.clock.look(self._state.t, period)
         if not self._limits.sent.period:
             state = self._state
             warn_of_jump(state.robot, state.q, state.v, tau, state.dynamics)

@@ -1,0 +1,75 @@
+"""Looks whether a clock can be that of the loop: origin, unit and direction."""
+
+import warnings
+
+_FEW = 5
+"""Steps in a row before a clock is called wrong: one may be late, or made twice."""
+_UNITS = 100.0
+"""Times of a step over its period from which on they have different units."""
+_LATE = 1e6
+"""A clock that begins later than eleven days counts from another origin [s]."""
+
+
+class ClockWarning(UserWarning):
+    """The times that a controller is given are not those of its loop."""
+
+
+class ClockCheck:
+    """Says once what is wrong with the times of the steps of a run."""
+
+    def __init__(self) -> None:
+        self._last: float | None = None
+        self._period = 0.0
+        self._kind, self._count = "", 0
+        self._told = False
+
+    def begin(self, t: float) -> None:
+        """Look at the time of the first step [s]."""
+        if abs(t) > _LATE:
+            self._tell(
+                f"the first step is at t = {t:.10g} s: trajectories, schedules and "
+                "changes count from 0, so they are over; give the time since the loop "
+                "began, t - t0"
+            )
+
+    def look(self, t: float, period: float) -> None:
+        """Look at the time of a step [s], and the period for which it is held."""
+        last, held = self._last, self._period
+        self._last, self._period = t, period
+        if self._told or last is None:
+            return
+        passed = t - last
+        kind = ""
+        if passed < 0.0:
+            kind = "back"
+        elif passed == 0.0:
+            kind = "still"
+        elif passed > _UNITS * held:
+            kind = "fast"
+        elif passed * _UNITS < held:
+            kind = "slow"
+        if kind == "":
+            self._count = 0
+            return
+        self._count = self._count + 1 if kind == self._kind else 1
+        self._kind = kind
+        if self._count == _FEW:
+            self._tell(_MESSAGES[kind].format(t=t, passed=passed, period=held))
+
+    def _tell(self, message: str) -> None:
+        self._told = True
+        warnings.warn(message, ClockWarning, stacklevel=4)
+
+
+_UNIT = (
+    "the clock advances by {passed:.3g} s in a period that was said to be "
+    "{period:.3g} s; are both in seconds?"
+)
+_MESSAGES = {
+    "back": "the clock runs back: t = {t:.10g} s came {passed:.3g} s after the step "
+    "before",
+    "still": "the clock stands still at t = {t:.10g} s, while efforts are held for "
+    "{period:.3g} s each",
+    "fast": _UNIT,
+    "slow": _UNIT,
+}

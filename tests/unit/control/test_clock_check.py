@@ -1,0 +1,72 @@
+"""Times that cannot be those of a loop are said once."""
+
+import re
+import warnings
+from collections.abc import Sequence
+from itertools import pairwise
+
+import numpy as np
+import pytest
+
+import hsp_control as hsp
+from hsp_control.control.clock_check import ClockWarning
+
+H = 0.002
+
+
+def told(times: Sequence[float], period: float = H) -> list[str]:
+    """Return what is said of the clock of a loop."""
+    robot = hsp.Robot.load("panda")
+    controller = hsp.Controller(robot, [hsp.FramePosition()])
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always")
+        for t in times:
+            output = controller.compute(t, robot.home(), np.zeros(7))
+            controller.applied(output.tau, period)
+    return [str(each.message) for each in caught if each.category is ClockWarning]
+
+
+STEPS = H * np.arange(40)
+
+
+@pytest.mark.parametrize(
+    ("times", "period", "message"),
+    [
+        (
+            1.76e9 + STEPS,
+            H,
+            "the first step is at t = 1760000000 s: .* since the l",
+        ),
+        (1e3 * STEPS, H, "advances by 2 s in a period that was said to be 0.002 s"),
+        (1e9 * STEPS, H, "advances by 2e.06 s in a period"),
+        (STEPS, 2.0, "advances by 0.002 s in a period that was said to be 2 s"),
+        (-STEPS, H, "the clock runs back: t = -0.01 s came -0.002 s after the step"),
+        (0.0 * STEPS, H, "the clock stands still at t = 0 s, while efforts are held"),
+    ],
+)
+def test_a_clock_of_something_else_is_said_once(
+    times: Sequence[float], period: float, message: str
+) -> None:
+    (found,) = told(times, period)
+    assert re.search(message, found)
+
+
+def test_what_happens_to_a_loop_is_no_wrong_clock() -> None:
+    """Steps that are late, made twice, or after a pause; and a start at any time."""
+    rng = np.random.default_rng(0)
+    late = STEPS + H * rng.uniform(-0.4, 0.4, STEPS.size)
+    twice = np.repeat(STEPS, 2)
+    pause = np.concatenate([STEPS, 60.0 + STEPS])
+    slow = np.cumsum(rng.choice([H, 30 * H], STEPS.size))
+    for times in (STEPS, late, twice, pause, slow, 3600.0 + STEPS):
+        assert told(times) == []
+
+
+def test_the_integrators_stages_are_no_clock() -> None:
+    """They go back and forth, and nothing is held."""
+    robot = hsp.Robot.load("panda")
+    controller = hsp.Controller(robot, [hsp.FramePosition()])
+    with warnings.catch_warnings():
+        warnings.simplefilter("error", ClockWarning)
+        for t in (0.0, 0.5, 0.25, 0.25, 0.0, 0.5, *(a for a, _ in pairwise(STEPS))):
+            controller.compute(t, robot.home(), np.zeros(7))
