@@ -4,6 +4,8 @@ import warnings
 
 _FEW = 5
 """Steps in a row before a clock is called wrong: one may be late, or made twice."""
+_STILL = 100
+"""The same at one time: a loop may rehearse its first step."""
 _UNITS = 100.0
 """Times of a step over its period from which on they have different units."""
 _LATE = 1e6
@@ -19,7 +21,7 @@ class ClockCheck:
 
     def __init__(self) -> None:
         self._last: float | None = None
-        self._period = 0.0
+        self._period, self._stamp = 0.0, -1
         self._kind, self._count = "", 0
         self._told = False
 
@@ -32,8 +34,14 @@ class ClockCheck:
                 "began, t - t0"
             )
 
-    def look(self, t: float, period: float) -> None:
-        """Look at the time of a step [s], and the period for which it is held."""
+    def look(self, t: float, period: float, stamp: int) -> None:
+        """Look at the time of a step [s], and the period for which it is held [s].
+
+        ``stamp`` is that of its state: an effort that is sent instead is no new step.
+        """
+        if stamp == self._stamp:
+            return
+        self._stamp = stamp
         last, held = self._last, self._period
         self._last, self._period = t, period
         if self._told or last is None:
@@ -53,7 +61,7 @@ class ClockCheck:
             return
         self._count = self._count + 1 if kind == self._kind else 1
         self._kind = kind
-        if self._count == _FEW:
+        if self._count == (_STILL if kind == "still" else _FEW):
             self._tell(_MESSAGES[kind].format(t=t, passed=passed, period=held))
 
     def _tell(self, message: str) -> None:

@@ -193,7 +193,7 @@ class Controller(Composition):
             raise NonFiniteError(f"period is {period}; needs a finite number")
         if not period > 0.0:
             raise ControllerError(f"period is {period} s; must be positive")
-        self._run.clock.look(self._state.t, period)
+        self._run.clock.look(self._state.t, period, self._state.stamp)
         if not self._limits.sent.period:
             state = self._state
             warn_of_jump(state.robot, state.q, state.v, tau, state.dynamics)
