@@ -44,12 +44,66 @@ def own_motion(path: Any) -> tuple[Any, Plan]:
     return sample, Plan(planned(calls).steps())
 
 
-def pace(along: Any, rates: Rates) -> Pace:
-    """Return how one of the three below follows its path."""
-    course = followed(along.path, along.interval)
+def pace(rates: Rates, course: Course, part: Any) -> Pace:
+    """Return how a part follows a path: it has speed, acceleration and start_time."""
     path = measured(rates, course)
-    scaling = time_scaling(path, along.speed, along.acceleration, along.start_time)
+    scaling = time_scaling(path, part.speed, part.acceleration, part.start_time)
     return Pace(path.arc, scaling)
+
+
+def point_rates(path: Trajectory) -> Rates:
+    """Return what a length is measured on: dp/du and its rate."""
+    own, plan = own_motion(path)
+
+    def rates(u: float) -> tuple[Array, Array]:
+        plan(u)
+        return own.velocity.copy(), own.acceleration.copy()
+
+    return rates
+
+
+def angle_rates(path: OrientationTrajectory) -> Rates:
+    """Return what an angle is measured on: ω and its rate, by u."""
+    own, plan = own_motion(path)
+
+    def rates(u: float) -> tuple[Array, Array]:
+        plan(u)
+        return own.angular_velocity.copy(), own.angular_acceleration.copy()
+
+    return rates
+
+
+def pose_pace(path: PoseTrajectory, course: Course, part: Any) -> tuple[Pace, bool]:
+    """Return how a part follows poses, and whether their length is the angle."""
+    own, plan = own_motion(path)
+    position, orientation = own
+
+    def rates(u: float) -> tuple[Array, Array]:
+        plan(u)
+        if by_angle:
+            omega, omega_dot = orientation[1:]
+            return omega.copy(), omega_dot.copy()
+        return position.velocity.copy(), position.acceleration.copy()
+
+    by_angle = False
+    first, last = course.knots[0], course.knots[-1]
+    speeds = [np.linalg.norm(rates(u)[0]) for u in np.linspace(first, last, POINTS)]
+    by_angle = bool(max(speeds) * (last - first) < STAYS)
+    return pace(rates, course, part), by_angle
+
+
+def point_call(path: Trajectory, pace: Pace) -> PartCall:
+    """Return the call that follows points."""
+    own, plan = own_motion(path)
+    return PartCall(engine.Along, path=plan, own=own, **pace._asdict())
+
+
+def pose_call(path: PoseTrajectory, pace: Pace, by_angle: bool) -> PartCall:
+    """Return the call that follows poses."""
+    own, plan = own_motion(path)
+    return PartCall(
+        engine.AlongPose, path=plan, own=own, by_angle=by_angle, **pace._asdict()
+    )
 
 
 def followed(path: Any, interval: ArrayLike | None) -> Course:
@@ -80,12 +134,13 @@ def followed(path: Any, interval: ArrayLike | None) -> Course:
 class Along(Trajectory, type="along"):
     """x(t) = p(s(t)): the path of any motion, at a speed along it, s its length.
 
-    x' = p' s' and x'' = p' s'' + p'' s'², with p' and p'' by s: the path's own times say
-    where it goes, and no more how fast. With an acceleration the motion goes from rest
-    to rest, and is C² where the path is: the speed is a trapezoid whose ramps are
-    cubic, because x'' is fed forward, and at the corners of a plain trapezoid it would
-    jump, and efforts with it. A ramp takes 1.5 v/a, not v/a. On a short path the speed
-    is not reached.
+    x' = p' s' and x'' = p' s'' + p'' s'², with p' and p'' by s. The path's own times
+    say where it goes, and no longer how fast.
+
+    With an acceleration the motion goes from rest to rest, and is C² where the path is:
+    the speed is a trapezoid with cubic ramps. x'' is fed forward: at the corners of a
+    plain trapezoid it would jump, and efforts with it. A ramp takes 1.5 v/a instead of
+    v/a; on a short path the speed is not reached.
 
     Without an acceleration the speed is constant. Where the path begins and ends x'
     then jumps, unless it goes on for ever, as a circle does: blend into it.
@@ -142,18 +197,12 @@ class Along(Trajectory, type="along"):
 
     @cached_property
     def _pace(self) -> Pace:
-        own, plan = own_motion(self.path)
-
-        def rates(u: float) -> tuple[Array, Array]:
-            plan(u)
-            return own.velocity.copy(), own.acceleration.copy()
-
-        return pace(self, rates)
+        course = followed(self.path, self.interval)
+        return pace(point_rates(self.path), course, self)
 
     def call(self) -> PartCall:
         """Return the call; see `Trajectory.call`."""
-        own, plan = own_motion(self.path)
-        return PartCall(engine.Along, path=plan, own=own, **self._pace._asdict())
+        return point_call(self.path, self._pace)
 
 
 def course_of(pace: Pace) -> Course | None:
@@ -205,13 +254,8 @@ class AlongOrientation(OrientationTrajectory, type="along"):
 
     @cached_property
     def _pace(self) -> Pace:
-        own, plan = own_motion(self.path)
-
-        def rates(u: float) -> tuple[Array, Array]:
-            plan(u)
-            return own.angular_velocity.copy(), own.angular_acceleration.copy()
-
-        return pace(self, rates)
+        course = followed(self.path, self.interval)
+        return pace(angle_rates(self.path), course, self)
 
     def call(self) -> PartCall:
         """Return the call; see `Trajectory.call`."""
@@ -265,23 +309,7 @@ class AlongPose(PoseTrajectory, type="along"):
     @cached_property
     def _pace(self) -> tuple[Pace, bool]:
         """How the path is followed, and whether its length is the angle."""
-        own, plan = own_motion(self.path)
-        position, orientation = own
-        knots = followed(self.path, self.interval).knots
-        speeds = []
-        for u in np.linspace(knots[0], knots[-1], POINTS):
-            plan(u)
-            speeds.append(np.linalg.norm(position.velocity))
-        by_angle = bool(max(speeds) * (knots[-1] - knots[0]) < STAYS)
-
-        def rates(u: float) -> tuple[Array, Array]:
-            plan(u)
-            if by_angle:
-                omega, omega_dot = orientation[1:]
-                return omega.copy(), omega_dot.copy()
-            return position.velocity.copy(), position.acceleration.copy()
-
-        return pace(self, rates), by_angle
+        return pose_pace(self.path, followed(self.path, self.interval), self)
 
     def sample(self, t: float, out: PoseSample | None = None) -> PoseSample:
         """Return the pose at time t; see `PoseTrajectory.sample`."""
@@ -295,8 +323,4 @@ class AlongPose(PoseTrajectory, type="along"):
         return [self._call().given(out=out, t=TIME)]
 
     def _call(self) -> PartCall:
-        own, plan = own_motion(self.path)
-        pace, by_angle = self._pace
-        return PartCall(
-            engine.AlongPose, path=plan, own=own, by_angle=by_angle, **pace._asdict()
-        )
+        return pose_call(self.path, *self._pace)

@@ -1,7 +1,8 @@
 """The length along a path, as a table, and the speed at which it may be followed."""
 
 from collections.abc import Callable, Iterator
-from math import inf, pi, sqrt
+from itertools import pairwise
+from math import inf, isinf, pi, sqrt
 from typing import NamedTuple, Self
 
 import numpy as np
@@ -58,7 +59,7 @@ class TimeScaling(NamedTuple):
 
 # --- the length -----------------------------------------------------------------------
 
-# In each cell |dp/du| is the polynomial through these points, and compared at the others.
+# In each cell |dp/du| is a polynomial through nodes, and compared between them.
 NODES = 12
 _NODES, _WEIGHTS = np.polynomial.legendre.leggauss(NODES)
 _BETWEEN = np.array([-1.0, *(_NODES[1:] + _NODES[:-1]) / 2, 1.0]) * (1.0 - 1e-9)
@@ -79,7 +80,7 @@ _ROUNDING = 2e-15  # share of the largest coefficient that is rounding error
 _EXACT = 1e-13  # error of |dp/du| beside its largest value, at which no cell is divided
 _NOISE = 1e-8  # from here on a cell is not divided if that does not help
 _DEPTH = 12  # a piece is divided into 2^12 cells at most
-_TURN = 0.85  # cosine of the angle between neighbours: the path turns by 32° at most
+_TURN = 0.99  # cosine of the angle between neighbours: the path turns by 8° at most
 _REST = 1e-9  # share of the largest |dp/du| at which the path's own motion rests
 
 
@@ -102,13 +103,13 @@ def measured(rates: Rates, course: Course) -> Path:
     knots = course.knots
     largest = max(
         float(np.linalg.norm(rates(u)[0]))
-        for a, b in zip(knots, knots[1:], strict=False)
+        for a, b in pairwise(knots)
         for u in _inside(a, b, _POINTS)
     )
     if not largest > 0.0:
         raise TrajectoryError("the path has no length: nothing moves along it")
     found: list[_Cell] = []
-    for a, b in zip(knots, knots[1:], strict=False):
+    for a, b in pairwise(knots):
         length = sum(cell.coefficients.sum() for cell in found)
         if found:
             _check_joint(rates, a, min(b - a, a - found[-1].start), largest, length)
@@ -142,7 +143,7 @@ def _check_joint(
     lengths = [float(np.linalg.norm(each)) for each in (before, after)]
     if min(lengths) <= _REST * largest:
         raise TrajectoryError(
-            f"at s = {s:.4g} along the path its own motion rests (at {u:.4g} s): no "
+            f"at s = {s:.3f} along the path its own motion rests (at {u:.4g} s): no "
             "speed but 0 passes it; give a path that does not stop there"
         )
     cosine = float(before @ after) / (lengths[0] * lengths[1])
@@ -152,7 +153,7 @@ def _check_joint(
 
 def _corner(s: float, u: float) -> TrajectoryError:
     return TrajectoryError(
-        f"at s = {s:.4g} along the path (its own time is {u:.4g} s) it has a corner or "
+        f"at s = {s:.3f} along the path (its own time is {u:.4g} s) it has a corner or "
         "turns back: no speed but 0 passes it; round it, or end the path there"
     )
 
@@ -216,11 +217,11 @@ def time_scaling(
     if acceleration is None:
         return scaling
     needed = path.curvatures * _speeds(scaling, path.places) ** 2
-    worst = int(np.argmax(needed))
+    worst = int(np.argmax(needed >= needed.max() * (1.0 - 1e-9)))  # the first of many
     if needed[worst] <= acceleration * (1.0 + 1e-9):
         return scaling
     raise TrajectoryError(
-        f"at s = {path.places[worst]:.4g} along the path, which bends there with a "
+        f"at s = {path.places[worst]:.3f} along the path, which bends there with a "
         f"radius of {1.0 / path.curvatures[worst]:.3g}, a speed of "
         f"{_speeds(scaling, path.places)[worst]:.3g} needs an acceleration of "
         f"{needed[worst]:.3g} across it; acceleration = {acceleration:g}. "
@@ -240,7 +241,7 @@ def _scaling(
 
 def _speeds(scaling: TimeScaling, places: Array) -> Array:
     """Return s' at lengths s, shape (k,)."""
-    if scaling.ramp == 0.0:
+    if scaling.ramp == 0.0 or isinf(scaling.length):  # each place is passed at last
         return np.full(len(places), scaling.speed)
     # s = v T u³ (1 - u/2) on a ramp, by bisection
     ahead = np.minimum(places, scaling.length - places)

@@ -8,6 +8,7 @@ from typing import ClassVar, Literal, NamedTuple
 import numpy as np
 import pinocchio as pin
 
+from hsp_control import engine
 from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import TrajectoryError
 from hsp_control.declaration.quantities import (
@@ -17,14 +18,20 @@ from hsp_control.declaration.quantities import (
     Positive,
 )
 from hsp_control.declaration.rotation import Rotations
-from hsp_control.engine.plans import PartCall, PartCalls
-from hsp_control.trajectories.along import Along, AlongPose
+from hsp_control.engine.plans import TIME, PartCall, PartCalls
+from hsp_control.trajectories import checks
+from hsp_control.trajectories.along import (
+    Pace,
+    course_of,
+    pace,
+    point_call,
+    point_rates,
+    pose_call,
+    pose_pace,
+)
 from hsp_control.trajectories.arc_length import Course
 from hsp_control.trajectories.hold import HoldOrientation
-from hsp_control.trajectories.orientation import (
-    OrientationPath,
-    OrientationTrajectory,
-)
+from hsp_control.trajectories.orientation import OrientationPath
 from hsp_control.trajectories.piecewise_polynomial import QUINTIC, PiecewisePolynomial
 from hsp_control.trajectories.pose import ComposedPose, PoseSample, PoseTrajectory
 from hsp_control.trajectories.trajectory import Trajectory
@@ -148,7 +155,7 @@ class Polyline(Trajectory, type="polyline"):
 
     def __post_init__(self) -> None:
         """Measure the path, which checks it; it is the same wherever it begins."""
-        self._along  # noqa: B018 (computed, checked and kept)
+        self._pace  # noqa: B018 (computed, checked and kept)
 
     @property
     def dimension(self) -> int:
@@ -158,16 +165,19 @@ class Polyline(Trajectory, type="polyline"):
     @property
     def course(self) -> Course | None:
         """From its start to its end."""
-        return self._along.course
+        return course_of(self._pace)
 
     @cached_property
-    def _along(self) -> Along:
-        path = rounded_lines(np.asarray(self.waypoints), self.blend_radius).path
-        return Along(path, self.speed, self.acceleration, start_time=self.start_time)
+    def _path(self) -> PiecewisePolynomial:
+        return rounded_lines(np.asarray(self.waypoints), self.blend_radius).path
+
+    @cached_property
+    def _pace(self) -> Pace:
+        return pace(point_rates(self._path), self._path.course, self)
 
     def call(self) -> PartCall:
         """Return the call; see `Trajectory.call`."""
-        return self._along.call()
+        return point_call(self._path, self._pace)
 
 
 class PolylinePose(PoseTrajectory, type="polyline"):
@@ -199,7 +209,7 @@ class PolylinePose(PoseTrajectory, type="polyline"):
 
     def __post_init__(self) -> None:
         """Measure the path, which checks it; it is the same wherever it begins."""
-        self._along  # noqa: B018 (computed, checked and kept)
+        self._pace  # noqa: B018 (computed, checked and kept)
 
     @property
     def relative(self) -> bool:
@@ -218,27 +228,27 @@ class PolylinePose(PoseTrajectory, type="polyline"):
     @property
     def course(self) -> Course | None:
         """From its start to its end."""
-        return self._along.course
+        return course_of(self._pace[0])
 
     @cached_property
-    def _along(self) -> AlongPose:
-        waypoints = np.asarray(self.waypoints)
+    def _path(self) -> ComposedPose:
+        waypoints = checks.array(self.waypoints, "waypoints", (None, 3))
         path, passing = rounded_lines(waypoints, self.blend_radius)
-        held: OrientationTrajectory = HoldOrientation(np.eye(3))
-        if self.rotations is not None:
-            given = np.asarray(self.rotations)
-            if len(given) != len(waypoints):
-                raise TrajectoryError(
-                    f"{len(waypoints)} waypoints need as many rotations; there are "
-                    f"{len(given)}"
-                )
-            held = OrientationPath(given, passing)
-        return AlongPose(
-            ComposedPose(path, held),
-            self.speed,
-            self.acceleration,
-            start_time=self.start_time,
-        )
+        if self.rotations is None:  # the length of the path is known all the same
+            return ComposedPose(path, HoldOrientation(np.eye(3)))
+        rotations = np.asarray(self.rotations)
+        if len(rotations) != len(waypoints):
+            raise TrajectoryError(
+                f"{len(waypoints)} waypoints need as many rotations; there are "
+                f"{len(rotations)}"
+            )
+        return ComposedPose(path, OrientationPath(rotations, passing))
+
+    @cached_property
+    def _pace(self) -> tuple[Pace, bool]:
+        course = self._path.course
+        assert course is not None
+        return pose_pace(self._path, course, self)
 
     def sample(self, t: float, out: PoseSample | None = None) -> PoseSample:
         """Return the pose at time t; see `PoseTrajectory.sample`."""
@@ -247,8 +257,14 @@ class PolylinePose(PoseTrajectory, type="polyline"):
                 "PolylinePose depends on where the robot starts, which only a "
                 "controller knows; give rotations, and waypoints in the world"
             )
-        return self._along.sample(t, out)
+        if out is None:
+            out = PoseSample.allocate()
+        engine.AlongPose(**self._call().arguments, out=out)(float(t))
+        return out
 
     def calls(self, out: PoseSample) -> PartCalls:
         """Return the call that writes ``out``; see `Trajectory.calls`."""
-        return self._along.calls(out)
+        return [self._call().given(out=out, t=TIME)]
+
+    def _call(self) -> PartCall:
+        return pose_call(self._path, *self._pace)

@@ -1,5 +1,6 @@
 """Paths at a speed: x(t) = p(s(t)), exact rates, rest at the ends, refusals."""
 
+import itertools
 import re
 from collections.abc import Callable
 from pathlib import Path
@@ -60,6 +61,20 @@ def some_curve(rng: np.random.Generator) -> Trajectory:
     ][rng.integers(4)]
 
 
+def gentle(curve: Trajectory, speed: float, acceleration: float) -> Along:
+    """Return the motion along a curve, at the speed that is proposed if need be."""
+    try:
+        return Along(curve, speed, acceleration)
+    except TrajectoryError as refused:
+        return Along(curve, proposed(refused), acceleration)
+
+
+def proposed(refused: Exception) -> float:
+    found = re.search(r"speed = (\S+) would do", str(refused))
+    assert found
+    return float(found[1])
+
+
 # --- the motion -----------------------------------------------------------------------
 
 
@@ -68,14 +83,14 @@ def some_curve(rng: np.random.Generator) -> Trajectory:
 def test_rates_are_the_slopes_of_the_motion(seed: int) -> None:
     """Beside h⁶ f⁽⁷⁾/140, which grows with the bend, and 1e-15/h of rounding."""
     rng = np.random.default_rng(seed)
-    motion = Along(some_curve(rng), 1.0, 2.0)
+    motion = gentle(some_curve(rng), 1.0, 2.0)
     start, end = motion.course.knots
-    joints = [start, start + 0.75, end - 0.75, end]  # s''' jumps there
+    ramp = 1.5 * motion.speed / 2.0
+    joints = [start, start + ramp, end - ramp, end]  # s''' jumps there
     h = 1e-3
     for t in rng.uniform(start, end, 20):
         x = motion.sample(t)
-        bend = np.linalg.norm(x.acceleration)
-        if min(abs(t - each) for each in joints) < 4 * h or bend > 10:
+        if min(abs(t - each) for each in joints) < 4 * h:
             continue
         for i in (0, 1):
             found = slope(lambda tau, t=t, i=i: motion.sample(t + tau)[i], h)
@@ -154,11 +169,13 @@ def test_it_rests_at_both_ends_and_begins_gently(seed: int) -> None:
 
 @pytest.mark.parametrize("rate", [3.0, -0.7])
 def test_a_circle_at_a_speed_is_the_circle_at_its_rate(rate: float) -> None:
-    fast = Along(Circle(0.4, np.sign(rate) * 2.0, [0, 1, 2], phase=0.3), 0.4 * abs(rate))
+    fast = Along(
+        Circle(0.4, np.sign(rate) * 2.0, [0, 1, 2], phase=0.3), 0.4 * abs(rate)
+    )
     own = Circle(0.4, rate, [0, 1, 2], phase=0.3)
-    for t in np.linspace(-5, 60, 40):  # 30 turns, each with a rounding of 1e-15
+    for t in np.linspace(-5, 60, 40):  # 30 turns: 1e-15 each, times ω² r
         for a, b in zip(fast.sample(t), own.sample(t), strict=True):
-            np.testing.assert_allclose(a, b, rtol=0, atol=2e-13)
+            np.testing.assert_allclose(a, b, rtol=0, atol=1e-12)
 
 
 def test_what_goes_on_for_ever_rises_only() -> None:
@@ -184,7 +201,9 @@ def test_a_path_that_is_too_short_stays_below_its_speed() -> None:
 
 
 def test_a_pose_keeps_pace_with_its_origin() -> None:
-    path = ComposedPose(Line([1.0, 0, 0], 1.0, start=[0, 0, 0]), OrientationPath([R1, R2], [0, 1]))
+    path = ComposedPose(
+        Line([1.0, 0, 0], 1.0, start=[0, 0, 0]), OrientationPath([R1, R2], [0, 1])
+    )
     motion = AlongPose(path, 0.5, 1.0)
     start, end = motion.course.knots
     turned = np.linalg.norm(log3(R1.T @ R2))
@@ -226,7 +245,7 @@ def test_a_polyline_is_on_its_lines_but_for_blends(seed: int) -> None:
         x, x_dot, _ = motion.sample(t)
         np.testing.assert_allclose(np.linalg.norm(x_dot), 1.0, rtol=1e-12)
         near = np.linalg.norm(points - x, axis=1).min() < radius
-        away = min(_distance(x, a, b) for a, b in zip(points, points[1:], strict=False))
+        away = min(_distance(x, a, b) for a, b in itertools.pairwise(points))
         assert away < (radius if near else 1e-12)
     for t, i in zip(motion.course.knots, (0, -1), strict=True):
         np.testing.assert_allclose(motion.sample(t).position, points[i], atol=1e-14)
@@ -285,9 +304,9 @@ def test_waypoints_count_from_where_the_robot_starts() -> None:
 
 LINES = [[[0.0, 0.0], [1.0, 0.0]], [[1.0, 0.0], [0.0, 1.0]]]
 REFUSED: dict[str, Callable[[], Any]] = {
-    r"^Along: at s = 2.58 along the path its own motion rests \(at 0.9 s\): no speed": (
+    r"^Along: at s = 2.580 along the path its own motion rests \(at 0.9 s\): no": (
      lambda: Along(Stops(POINTS, TIMES), 1.0)),
-    r"^Along: at s = 1 along the path \(its own time is 1 s\) it has a corner": (
+    r"^Along: at s = 1.000 along the path \(its own time is 1 s\) it has a corner": (
      lambda: Along(PiecewisePolynomial([0, 1, 2], LINES), 1.0)),
     r"^Along: at s = 1.414 along the path \(its own time is 0.7854 s\) it has a corner "
     r"or turns back": lambda: Along(Lissajous([1, 1], [2, 2], center=[0, 0]), 1.0),
@@ -298,10 +317,11 @@ REFUSED: dict[str, Callable[[], Any]] = {
      lambda: Along(Line([1], 1, start=[0]), 1, interval=[0, 2])),
     r"^Along: interval must increase; it is \[1, 1\]": (
      lambda: Along(Line([1], 1, start=[0]), 1, interval=[1, 1])),
-    r"^Along: at s = .* along the path, which bends there with a radius of 0.5, a speed "
-    r"of 2 needs an acceleration of 8 across it; acceleration = 2. speed = 1 would do": (
+    r"^Along: at s = 0.000 along the path, which bends there with a radius of 0.5, a "
+    r"speed of 2 needs an acceleration of 8 across it; acceleration = 2. speed = 1 "
+    r"would do": (
      lambda: Along(Circle(0.5, 1, [0, 0]), 2.0, 2.0)),
-    r"^Along: origin: start cannot move a Along": (
+    r"^origin: start cannot move a Along": (
      lambda: Along(Circle(0.5, 1), 1.0, origin="start").anchored([0, 0, 0])),
     r"^Polyline: waypoint 1 is a corner of 90 degrees: no speed but 0 passes it; give "
     r"blend_radius, or use stops": lambda: Polyline(CORNER, 1, 1),
@@ -314,9 +334,9 @@ REFUSED: dict[str, Callable[[], Any]] = {
     r"blend_radius = 1 would": lambda: Polyline(CORNER, 1, 1, 1.1),
     r"^Polyline: two blends do not fit between waypoints 1 and 2, which are 1 apart; "
     r"blend_radius = 0.5 would": lambda: Polyline([*CORNER, [0, 1, 1]], 1, 1, 0.6),
-    r"^Polyline: at s = 0.\d* along the path, which bends there with a radius of 0.0839"
-    r", a speed of 0.5 needs an acceleration of 2.98 across it; acceleration = 1. speed "
-    r"= 0.289 would do": lambda: Polyline(CORNER, 0.5, 1, 0.1),
+    r"^Polyline: at s = 0.9\d\d along the path, which bends there with a radius of "
+    r"0.0839, a speed of 0.5 needs an acceleration of 2.98 across it; acceleration = "
+    r"1. speed = 0.289 would do": lambda: Polyline(CORNER, 0.5, 1, 0.1),
     r"^PolylinePose: 3 waypoints need as many rotations; there are 2": (
      lambda: PolylinePose(CORNER, 1, 9, 0.3, rotations=[R1, R2])),
     r"^AlongPose: .* its own motion rests": (
@@ -342,10 +362,9 @@ def test_the_speed_that_is_proposed_would_do(seed: int) -> None:
     if isinstance(curve, Line):
         return
     with pytest.raises(TrajectoryError, match="would do") as refused:
-        Along(curve, 50.0, 0.01 * 50)
-    found = re.search(r"speed = (\S+) would do", str(refused.value))
-    assert found
-    motion = Along(curve, float(found[1]), 0.5)
+        Along(curve, 50.0, 0.5)
+    speed = proposed(refused.value)
+    motion = Along(curve, speed, 0.5)
     times = np.linspace(*motion.course.knots, 500)
     for t in times:
         x = motion.sample(t)
@@ -354,9 +373,9 @@ def test_the_speed_that_is_proposed_would_do(seed: int) -> None:
             v * v, 1e-300
         )
         if v > 1e-6:
-            assert np.linalg.norm(across) <= 0.5 * 1.02  # between the points looked at
+            assert np.linalg.norm(across) <= 0.5 * 1.01  # between the points looked at
     with pytest.raises(TrajectoryError, match="would do"):
-        Along(curve, 1.1 * float(found[1]), 0.5)
+        Along(curve, 1.1 * speed, 0.5)
 
 
 # --- in a step ------------------------------------------------------------------------
@@ -367,8 +386,10 @@ def test_no_step_calls_python() -> None:
     (call,) = planned(Along(MinimumJerk(POINTS, TIMES), 1.0).calls(sample)).follow
     assert not call.python
     (call,) = planned(
-        AlongPose(ComposedPose(Circle(1, 1, [0, 0, 0]), Spin([0, 0, 1], 1.0, rotation=R1)), 1.0)
-        .calls(PoseSample.allocate())
+        AlongPose(
+            ComposedPose(Circle(1, 1, [0, 0, 0]), Spin([0, 0, 1], 1.0, rotation=R1)),
+            1.0,
+        ).calls(PoseSample.allocate())
     ).follow
     assert not call.python
 
