@@ -265,7 +265,7 @@ class AlongOrientation(OrientationTrajectory, type="along"):
         )
 
 
-class AlongPose(PoseTrajectory, type="along"):
+class AlongPose(PoseTrajectory, type="along_pose"):
     """M(t) = P(s(t)): the poses of any motion, at a speed of its origin.
 
     s is the length of the origin's path, and the rotation keeps pace with it. Where the

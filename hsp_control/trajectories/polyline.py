@@ -180,7 +180,7 @@ class Polyline(Trajectory, type="polyline"):
         return point_call(self._path, self._pace)
 
 
-class PolylinePose(PoseTrajectory, type="polyline"):
+class PolylinePose(PoseTrajectory, type="polyline_pose"):
     """Poses along a `Polyline` of the origin, at a speed of the origin.
 
     Between two waypoints the body turns by the shortest rotation, by the `smooth_step`

@@ -399,8 +399,11 @@ def test_no_step_calls_python() -> None:
     [
         "{type: polyline, origin: start, waypoints: [[0, 0, 0], [0.1, 0, 0], "
         "[0.1, 0.1, 0]], blend_radius: 0.03, speed: 0.1, acceleration: 0.5}",
-        "{type: along, speed: 0.2, acceleration: 0.5, path: {type: composed, position: "
-        "{type: circle, radius: 0.1, angular_rate: 1}}}",
+        "{type: along, speed: 0.2, path: {type: circle, radius: 0.1, angular_rate: 1}}",
+        "{type: along_pose, speed: 0.2, acceleration: 0.5, path: {type: composed, "
+        "position: {type: circle, radius: 0.1, angular_rate: 1}}}",
+        "{type: polyline_pose, origin: start, waypoints: [[0, 0, 0], [0.1, 0, 0], "
+        "[0.1, 0.1, 0]], blend_radius: 0.03, speed: 0.1, acceleration: 0.5}",
     ],
 )
 def test_a_robot_follows_what_yaml_says(trajectory: str, tmp_path: Path) -> None:
