@@ -75,7 +75,8 @@ struct ArcLength {
 
  private:
   // The w at which Σ_k c_ik w^k = s: Newton's method, or bisection where it leaves the bracket,
-  // as it may where the path's own motion begins at rest.
+  // as it may where the path's own motion begins at rest. It ends where the length is met but for
+  // rounding, or where the next correction would be the square of a small one.
   double in_cell(Index i, double s, double length) const {
     const auto c = coefficients.row(i);
     double low = -1.0, high = 1.0, w = 2.0 * s / length - 1.0;
@@ -86,10 +87,11 @@ struct ArcLength {
         excess = excess * w + c[k];
       }
       excess -= s;
+      if (std::abs(excess) <= 2e-16 * length) return w;
       (excess > 0.0 ? high : low) = w;
       const double newton = w - excess / slope;
       const double next = low < newton && newton < high ? newton : 0.5 * (low + high);
-      if (std::abs(next - w) <= 2e-16) return next;
+      if (std::abs(next - w) <= 1e-12) return next;
       w = next;
     }
     return w;
