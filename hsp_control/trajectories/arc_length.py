@@ -27,7 +27,11 @@ class Course(NamedTuple):
 
 
 class ArcLength(NamedTuple):
-    """s(u): a polynomial in each cell from one knot to the next; see the engine's."""
+    """s(u): a polynomial in each cell from one knot to the next; see the engine's.
+
+    Its rate is |dp/du| but for 1e-13 of the largest |dp/du|. The rates of a motion that
+    follows the path are those of p itself: they are the motion's to that much.
+    """
 
     knots: Array  # u, increasing, (m,)
     lengths: Array  # s at the knots, (m,)
@@ -142,13 +146,17 @@ def _check_joint(
     before, after = (rates(u + k * 1e-9 * width)[0] for k in (-1, 1))
     lengths = [float(np.linalg.norm(each)) for each in (before, after)]
     if min(lengths) <= _REST * largest:
-        raise TrajectoryError(
-            f"at s = {s:.3f} along the path its own motion rests (at {u:.4g} s): no "
-            "speed but 0 passes it; give a path that does not stop there"
-        )
+        raise _rest(s, u)
     cosine = float(before @ after) / (lengths[0] * lengths[1])
     if cosine < 1.0 - 1e-9:
         raise _corner(s, u)
+
+
+def _rest(s: float, u: float) -> TrajectoryError:
+    return TrajectoryError(
+        f"at s = {s:.3f} along the path its own motion rests (at {u:.4g} s): no speed "
+        "but 0 passes it; give a path that does not stop there"
+    )
 
 
 def _corner(s: float, u: float) -> TrajectoryError:
@@ -161,44 +169,59 @@ def _corner(s: float, u: float) -> TrajectoryError:
 def _cells(
     rates: Rates, start: float, end: float, largest: float, length: float
 ) -> Iterator[_Cell]:
-    """Give the cells of one piece; ``length``: of what lies before it."""
+    """Give the cells of one piece, in order; ``length``: of what lies before it.
+
+    A cell is halved until a polynomial fits |dp/du|, and until the path turns by little
+    from each point to the next.
+    """
     waiting = [(start, end, 0, inf)]
     while waiting:
         a, b, depth, error_before = waiting.pop()
         samples = [rates(u) for u in _inside(a, b, _POINTS)]
-        y, y_u = (np.array([s[i] for s in samples])[_ORDER] for i in (0, 1))
+        y, y_u = (np.array([sample[i] for sample in samples]) for i in (0, 1))
         g = np.linalg.norm(y, axis=1)
-        moves = g > _REST * largest
-        safe = np.where(moves, g, inf)
-        tangent = y / safe[:, np.newaxis]
-        turns = np.einsum("ij,ij->i", tangent[moves][1:], tangent[moves][:-1])
-        straight = bool((turns > _TURN).all())
-        by_node = np.empty_like(g)
-        by_node[_ORDER] = g
-        c = _TO_LEGENDRE @ by_node[:NODES]
-        c[np.abs(c) < _ROUNDING * largest] = 0.0  # as powers they would cost digits
-        c = c @ _TO_POWERS
-        error = float(np.abs(_AT_BETWEEN @ c - by_node[NODES:]).max()) / largest
+        c, error = _fitted(g, largest)
         fits = error <= _EXACT or _NOISE > error > error_before / 4.0
-        if not (fits and straight) and depth < _DEPTH:
+
+        y, y_u, g = y[_ORDER], y_u[_ORDER], g[_ORDER]
+        moves = g > _REST * largest
+        if not moves.any():
+            raise _rest(length, a)
+        g[~moves] = inf  # no direction, and no curvature
+        tangent = y / g[:, np.newaxis]
+        turns = np.einsum("ij,ij->i", tangent[moves][1:], tangent[moves][:-1])
+        smooth = bool((turns > _TURN).all())
+        if not (fits and smooth) and depth < _DEPTH:
             middle = 0.5 * (a + b)
             waiting += [(middle, b, depth + 1, error), (a, middle, depth + 1, error)]
             continue
-        s = np.zeros(NODES + 1)
+        if not smooth:
+            raise _corner(length, 0.5 * (a + b))
+
+        s = np.zeros(NODES + 1)  # the integral of c, from 0 at w = -1
         s[1:] = 0.5 * (b - a) * c / np.arange(1, NODES + 1)
         s[0] = -np.polyval(s[::-1], -1.0)
-        if not straight:
-            raise _corner(length, 0.5 * (a + b))
         across = y_u - np.einsum("ij,ij->i", tangent, y_u)[:, np.newaxis] * tangent
         yield _Cell(
             a,
             b,
             s,
             np.polyval(s[::-1], _POINTS[_ORDER]),
-            np.linalg.norm(across, axis=1) / safe**2,
+            np.linalg.norm(across, axis=1) / g**2,
             tangent[moves][[0, -1]],
         )
         length += float(s.sum())
+
+
+def _fitted(g: Array, largest: float) -> tuple[Array, float]:
+    """Return the powers of a polynomial through |dp/du| at the nodes, and its error.
+
+    The error is that between the nodes, as a share of the largest |dp/du|.
+    """
+    c = _TO_LEGENDRE @ g[:NODES]
+    c[np.abs(c) < _ROUNDING * largest] = 0.0  # as powers they would cost digits
+    c = c @ _TO_POWERS
+    return c, float(np.abs(_AT_BETWEEN @ c - g[NODES:]).max()) / largest
 
 
 # --- the speed ------------------------------------------------------------------------

@@ -310,6 +310,9 @@ REFUSED: dict[str, Callable[[], Any]] = {
      lambda: Along(PiecewisePolynomial([0, 1, 2], LINES), 1.0)),
     r"^Along: at s = 1.414 along the path \(its own time is 0.7854 s\) it has a corner "
     r"or turns back": lambda: Along(Lissajous([1, 1], [2, 2], center=[0, 0]), 1.0),
+    r"^Along: at s = 0.000 along the path its own motion rests \(at 0 s\)": (
+     lambda: Along(hsp.trajectories.Blend(UniformLine([1.0], [0.0]), 0.1, start=[0.0],
+                                          start_time=1.0), 1.0, interval=[0, 2])),
     r"^Along: the path has no length": lambda: Along(Hold([1.0]), 1.0, interval=[0, 1]),
     r"^Along: where a path of CallableTrajectory begins and ends is not known: give "
     r"interval": lambda: Along(hsp.trajectories.CallableTrajectory(np.sin, 1), 1.0),
