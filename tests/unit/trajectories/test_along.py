@@ -186,6 +186,19 @@ def test_what_goes_on_for_ever_rises_only() -> None:
     assert line.course is None
 
 
+@pytest.mark.parametrize(
+    ("rates", "turns"), [([1.2, -0.8], 1 / 0.4), ([2.0, 0.0], 0.5), ([3, 4.5], 1 / 1.5)]
+)
+def test_a_lissajous_figure_repeats_after_its_period(
+    rates: list[float], turns: float
+) -> None:
+    course = Lissajous([1, 2], rates, [0.3, 0.2], [0, 0]).course
+    assert course is not None
+    assert course.repeats
+    np.testing.assert_allclose(course.knots, [0.0, 2 * np.pi * turns], rtol=1e-15)
+    assert Lissajous([1, 2], [1.0, np.sqrt(2)], center=[0, 0]).course is None
+
+
 def test_a_path_that_is_too_short_stays_below_its_speed() -> None:
     line = Along(Line([0.0], 1.0, start=[0.6]), 5.0, 1.0)
     end = line.course.knots[-1]
@@ -344,6 +357,9 @@ REFUSED: dict[str, Callable[[], Any]] = {
      lambda: PolylinePose(CORNER, 1, 9, 0.3, rotations=[R1, R2])),
     r"^AlongPose: .* its own motion rests": (
      lambda: AlongPose(ComposedPose(Stops(POINTS[:3], [0, 1, 2]),
+                                    OrientationPath([R1, R2], [0, 2])), 1)),
+    r"^AlongPose: at s = 1.000 along the path its own motion rests \(at 1 s\)": (
+     lambda: AlongPose(ComposedPose(Line([1, 0, 0], 1, start=[0, 0, 0]),
                                     OrientationPath([R1, R2], [0, 2])), 1)),
     r"^AlongOrientation: at s = .* its own motion rests \(at 1 s\)": (
      lambda: AlongOrientation(OrientationPath([IDENTITY, R1, R2], [0, 1, 2]), 1.0)),
