@@ -3,7 +3,7 @@
 from dataclasses import KW_ONLY
 from fractions import Fraction
 from functools import cached_property
-from math import gcd, lcm
+from math import lcm
 from typing import ClassVar
 
 import numpy as np
@@ -150,11 +150,7 @@ class Lissajous(Trajectory, type="lissajous"):
         ratios = [Fraction(rate / rates[0]).limit_denominator(1000) for rate in rates]
         if not np.allclose(rates, rates[0] * np.array(ratios, float), 1e-12, 0.0):
             return None
-        common = Fraction(
-            gcd(*(ratio.numerator for ratio in ratios)),
-            lcm(*(ratio.denominator for ratio in ratios)),
-        )
-        return Course.turn(rates[0] * float(common))
+        return Course.turn(rates[0] / lcm(*(ratio.denominator for ratio in ratios)))
 
     def call(self) -> PartCall:
         """Return the call; see `Trajectory.call`."""
