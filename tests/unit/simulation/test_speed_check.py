@@ -5,7 +5,7 @@ import pytest
 
 import hsp_control as hsp
 from hsp_control.simulation.demand_check import not_followed
-from hsp_control.simulation.speed_check import TooFast, _share
+from hsp_control.simulation.speed_check import Passed, TooFast, _share, too_fast
 from hsp_control.trajectories import Along
 
 
@@ -49,6 +49,18 @@ def test_what_is_too_fast_is_said_with_place_joint_and_speed(rows: str) -> None:
     assert f"; {4.0 / found.share:.3g} m/s would do there" in found.message
     assert said(0.5 * 4.0 / found.share, rows) == []
     assert said(0.2, rows) == []
+
+
+def test_the_worst_time_is_said() -> None:
+    """A line is fastest in its middle: 1.875 times its mean speed."""
+    robot = hsp.Robot.load("panda")
+    line = hsp.Line([5.0, 0.0, 0.0], 1.0, start=[0.0, 0.0, 0.0])
+    task = hsp.FramePosition("panda_tcp", line)
+    passed = [Passed(t, robot.home(), 0.0) for t in (0.3, 0.5, 0.8)]
+    found = too_fast(robot, task, passed, np.full(7, 2.0))
+    assert found is not None
+    assert found.t == 0.5
+    assert found.speed == pytest.approx(1.875 * 5.0)
 
 
 def test_without_limits_nothing_is_said() -> None:
