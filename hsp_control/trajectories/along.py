@@ -78,18 +78,19 @@ def pose_pace(path: PoseTrajectory, course: Course, part: Any) -> tuple[Pace, bo
     own, plan = own_motion(path)
     position, orientation = own
 
-    def rates(u: float) -> tuple[Array, Array]:
+    def moving(u: float) -> tuple[Array, Array]:
         plan(u)
-        if by_angle:
-            omega, omega_dot = orientation[1:]
-            return omega.copy(), omega_dot.copy()
         return position.velocity.copy(), position.acceleration.copy()
 
-    by_angle = False
+    def turning(u: float) -> tuple[Array, Array]:
+        plan(u)
+        _, omega, omega_dot = orientation
+        return omega.copy(), omega_dot.copy()
+
     first, last = course.knots[0], course.knots[-1]
-    speeds = [np.linalg.norm(rates(u)[0]) for u in np.linspace(first, last, POINTS)]
+    speeds = [np.linalg.norm(moving(u)[0]) for u in np.linspace(first, last, POINTS)]
     by_angle = bool(max(speeds) * (last - first) < STAYS)
-    return pace(rates, course, part), by_angle
+    return pace(turning if by_angle else moving, course, part), by_angle
 
 
 def point_call(path: Trajectory, pace: Pace) -> PartCall:
