@@ -1,4 +1,5 @@
 #include "../src/rooms.hpp"
+#include "along.hpp"
 #include "blends.hpp"
 #include "charts.hpp"
 #include "curves.hpp"
@@ -9,6 +10,6 @@ namespace hsp {
 const Kind* const* trajectory_kinds() {
   return kinds<Circle, Lissajous, UniformLine, Polynomial, PiecewisePolynomial, Blend, Crossfade,
                OrientationPath, Spin, BlendOrientation, Screw, OrientationOfChart, RotationVectors,
-               Extrapolation, ExtrapolatedOrientation>();
+               Extrapolation, ExtrapolatedOrientation, Along, AlongOrientation, AlongPose>();
 }
 }  // namespace hsp

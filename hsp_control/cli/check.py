@@ -21,7 +21,7 @@ from hsp_control.robot import Robot
 from hsp_control.robot.description.inertias import impossible_inertias
 from hsp_control.robot.description.urdf import read_urdf
 from hsp_control.simulation import Rollout
-from hsp_control.simulation.demand_check import missed_forces, out_of_reach, too_weak
+from hsp_control.simulation.demand_check import missed_forces, not_followed, too_weak
 from hsp_control.simulation.heavy_plant import heavy_plant
 from hsp_control.simulation.initial_state import posture_search
 from hsp_control.simulation.model_errors import describe, lines
@@ -205,7 +205,7 @@ def warn_of_reach(experiment: Experiment) -> None:
         return  # it moves contacts and references
     duration = experiment.scenario.simulation.duration
     asked = experiment.q0, duration, law.contacts, law.limits
-    messages = [each.message for each in out_of_reach(robot, law.tasks, *asked)]
+    messages = [each.message for each in not_followed(robot, law.tasks, *asked)]
     push_off = experiment.scenario.plant.push_off
     messages += missed_forces(law, experiment.q0, duration, push_off)
     for message in messages:

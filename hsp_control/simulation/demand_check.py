@@ -18,6 +18,7 @@ from hsp_control.control import Controller
 from hsp_control.control.actuation.support import Support
 from hsp_control.robot import Robot, RobotState
 from hsp_control.robot.inverse_kinematics import Target, reach
+from hsp_control.simulation.speed_check import Passed, TooFast, too_fast
 from hsp_control.tasks import CenterOfMass, FramePose, FramePosition, Task
 from hsp_control.tasks.frame_position import axis_indices
 
@@ -60,19 +61,19 @@ class OutOfReach(NamedTuple):
         )
 
 
-def out_of_reach(
+def not_followed(
     robot: Robot,
     tasks: Iterable[Task],
     q0: Array,
     duration: float,
     contacts: Sequence[Contact] = (),
     limits: RobotLimits | None = None,
-) -> Iterator[OutOfReach]:
-    """Yield the tasks whose targets leave the reach during a run.
+) -> Iterator[OutOfReach | TooFast]:
+    """Yield the tasks whose targets leave the reach, or are too fast, during a run.
 
     By inverse kinematics of each frame by itself, within position limits, for targets
     known before the run; of a robot with a floating base whose contacts stay where they
-    are, whatever its balance asks.
+    are, whatever its balance asks. Speeds are looked at where the base does not move.
     """
     held = _held(robot, contacts, q0)
     if robot.unactuated and not held:
@@ -82,13 +83,20 @@ def out_of_reach(
     for task in tasks:
         if not isinstance(task, FramePose | FramePosition) or task.remembers:
             continue
+        rows = np.arange(6)
         if isinstance(task, FramePosition):
-            found = search.leaves(task, axis_indices(task.axes))
-        elif (found := search.leaves(task, np.arange(6))) is not None:
-            near = search.leaves(task, np.arange(3))
+            rows = axis_indices(task.axes)
+        passed = search.passed(task, rows)
+        found = _leaves(task, passed)
+        if found is not None and isinstance(task, FramePose):
+            near = _leaves(task, search.passed(task, np.arange(3)))
             found = found._replace(turned=True) if near is None else near
         if found is not None:
             yield found
+        elif limits is not None and not robot.unactuated:
+            fast = too_fast(robot, task, passed, limits.velocity)
+            if fast is not None:
+                yield fast
 
 
 def _held(robot: Robot, contacts: Sequence[Contact], q0: Array) -> list[Target]:
@@ -114,28 +122,21 @@ class _Search(NamedTuple):
     lower: Array  # lower joint position limit, shape (nv,) [rad or m]
     upper: Array  # upper joint position limit, shape (nv,) [rad or m]
 
-    def leaves(
-        self, task: FramePose | FramePosition, rows: Indices
-    ) -> OutOfReach | None:
-        """Return when and by how much rows of a target are out of reach, if so."""
+    def passed(self, task: FramePose | FramePosition, rows: Indices) -> list[Passed]:
+        """Return the postures nearest to rows of a target, during the run."""
         times = self.duration * np.linspace(0.0, 1.0, _TIMES) ** _UNEVEN
         places = [target_of(task, t) for t in times]
-        away: list[float] = []
-        q = self.q0
-        for k, place in enumerate(places):
-            if k and place.isApprox(places[k - 1]):
-                away.append(away[-1])
-                continue
-            # Once it is out of reach, the nearest place moves on with the target.
-            starts = 0 if max(away, default=0.0) > _REACHED else _STARTS
-            q, distance = self._nearest(Target(task.frame_name, place, rows), q, starts)
-            away.append(distance)
-        if max(away) <= _REACHED:
-            return None
-        first = next(k for k, distance in enumerate(away) if distance > _REACHED)
-        worst = int(np.argmax(away))
-        since, most = float(times[first]), float(times[worst])
-        return OutOfReach(task.name, since, most, away[worst], turned=False)
+        found: list[Passed] = []
+        q, distance, farthest = self.q0, 0.0, 0.0
+        for k, (t, place) in enumerate(zip(times, places, strict=True)):
+            if not (k and place.isApprox(places[k - 1])):
+                # Once it is out of reach, the nearest place moves on with the target.
+                starts = 0 if farthest > _REACHED else _STARTS
+                target = Target(task.frame_name, place, rows)
+                q, distance = self._nearest(target, q, starts)
+                farthest = max(farthest, distance)
+            found.append(Passed(float(t), q, distance))
+        return found
 
     def _nearest(self, target: Target, q: Array, starts: int) -> tuple[Array, float]:
         """Return the posture nearest to a target, and its distance from it."""
@@ -154,6 +155,19 @@ class _Search(NamedTuple):
             if found.error < best.error:
                 best = found
         return best.q, best.error
+
+
+def _leaves(
+    task: FramePose | FramePosition, passed: Sequence[Passed]
+) -> OutOfReach | None:
+    """Return when and by how much a target is out of reach, if so."""
+    away = [each.distance for each in passed]
+    if max(away) <= _REACHED:
+        return None
+    first = next(k for k, distance in enumerate(away) if distance > _REACHED)
+    worst = int(np.argmax(away))
+    since, most = passed[first].t, passed[worst].t
+    return OutOfReach(task.name, since, most, away[worst], turned=False)
 
 
 def target_of(task: FramePose | FramePosition, t: float) -> pin.SE3:

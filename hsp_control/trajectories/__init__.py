@@ -2,6 +2,9 @@
 
 from hsp_control.common.entry_points import own_names
 
+from .along import Along as Along
+from .along import AlongOrientation as AlongOrientation
+from .along import AlongPose as AlongPose
 from .blend import Blend as Blend
 from .blend import BlendOrientation as BlendOrientation
 from .callables import CallableOrientation as CallableOrientation
@@ -23,6 +26,8 @@ from .piecewise_polynomial import MinimumJerk as MinimumJerk
 from .piecewise_polynomial import PiecewisePolynomial as PiecewisePolynomial
 from .piecewise_polynomial import Spline as Spline
 from .piecewise_polynomial import Stops as Stops
+from .polyline import Polyline as Polyline
+from .polyline import PolylinePose as PolylinePose
 from .pose import ComposedPose as ComposedPose
 from .pose import HoldPose as HoldPose
 from .pose import PoseSample as PoseSample

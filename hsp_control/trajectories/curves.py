@@ -1,7 +1,9 @@
 """Curves in closed form: a circle, a Lissajous figure, a line without end."""
 
 from dataclasses import KW_ONLY
+from fractions import Fraction
 from functools import cached_property
+from math import lcm
 from typing import ClassVar
 
 import numpy as np
@@ -13,6 +15,7 @@ from hsp_control.common.exceptions import TrajectoryError
 from hsp_control.declaration.quantities import Matrix, Number, Positive, Vector, Vector3
 from hsp_control.engine.plans import PartCall
 from hsp_control.trajectories import checks
+from hsp_control.trajectories.arc_length import Course
 from hsp_control.trajectories.trajectory import Trajectory
 
 
@@ -60,6 +63,11 @@ class Circle(Trajectory, type="circle"):
         if self.center is not None:
             return np.size(self.center)
         return 3 if self.axes is None else np.shape(self.axes)[-1]
+
+    @property
+    def course(self) -> Course:
+        """One turn, again and again."""
+        return Course.turn(self.angular_rate)
 
     @cached_property
     def _plane(self) -> Array:
@@ -133,6 +141,17 @@ class Lissajous(Trajectory, type="lissajous"):
         """The number n of coordinates."""
         return np.size(self.amplitudes)
 
+    @property
+    def course(self) -> Course | None:
+        """One period, again and again, where the rates have a common one."""
+        rates = np.asarray(self.rates)[np.asarray(self.rates) != 0.0]
+        if not len(rates):
+            return None
+        ratios = [Fraction(rate / rates[0]).limit_denominator(1000) for rate in rates]
+        if not np.allclose(rates, rates[0] * np.array(ratios, float), 1e-12, 0.0):
+            return None
+        return Course.turn(rates[0] / lcm(*(ratio.denominator for ratio in ratios)))
+
     def call(self) -> PartCall:
         """Return the call; see `Trajectory.call`."""
         phases = np.zeros(self.dimension) if self.phases is None else self.phases
@@ -165,6 +184,11 @@ class UniformLine(Trajectory, type="uniform_line"):
     def dimension(self) -> int:
         """The number n of coordinates."""
         return np.size(self.velocity)
+
+    @property
+    def course(self) -> Course:
+        """The line of one second, again and again."""
+        return Course(np.array([0.0, 1.0]), True)
 
     def call(self) -> PartCall:
         """Return the call; see `Trajectory.call`."""

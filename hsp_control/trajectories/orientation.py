@@ -17,6 +17,7 @@ from hsp_control.declaration.rotation import Rotation, Rotations, matrix_of
 from hsp_control.engine.plans import PartCall, PartCalls
 from hsp_control.engine.rotations import log3
 from hsp_control.trajectories import checks
+from hsp_control.trajectories.arc_length import Course
 from hsp_control.trajectories.trajectory import calls_of_sample, sampled
 
 
@@ -69,6 +70,11 @@ class OrientationTrajectory(Part, ABC, family="orientations", error=TrajectoryEr
             return self
         rotated: dict[str, Any] = {"rotation": start}
         return replace(self, **rotated)
+
+    @property
+    def course(self) -> Course | None:
+        """The times between which it turns; see `Trajectory.course`."""
+        return None
 
     def call(self) -> PartCall:
         """Return a kind of call with its arguments; see `Trajectory.call`."""
@@ -128,6 +134,11 @@ class OrientationPath(OrientationTrajectory, type="path"):
         """Check the waypoints and their times."""
         checks.waypoint_times(self.times, len(self._matrices))
 
+    @property
+    def course(self) -> Course:
+        """From the first orientation to the last."""
+        return Course(np.array(self.times, dtype=float), False)
+
     @cached_property
     def _matrices(self) -> Array:
         return np.array([matrix_of(each) for each in np.asarray(self.rotations)])
@@ -161,6 +172,11 @@ class Spin(OrientationTrajectory, type="spin"):
     def __post_init__(self) -> None:
         """Check that the axis is not zero."""
         checks.direction(self.axis, "axis")
+
+    @property
+    def course(self) -> Course:
+        """One turn, again and again."""
+        return Course.turn(self.rate)
 
     def call(self) -> PartCall:
         """Return the call; see `Trajectory.call`."""

@@ -14,6 +14,7 @@ from hsp_control.common.arrays import Array
 from hsp_control.declaration.quantities import Matrix, Number, Positive, Tensor, Vector
 from hsp_control.engine.plans import PartCall
 from hsp_control.trajectories import checks
+from hsp_control.trajectories.arc_length import Course
 from hsp_control.trajectories.trajectory import Trajectory
 
 # Row k maps (x, x', x'') at u = 0 and (x, x', x'') at u = 1 to the coefficient of u^k.
@@ -75,6 +76,11 @@ class PolynomialTrajectory(Trajectory):
     def dimension(self) -> int:
         """The number n of coordinates."""
         return len(self.pieces.waypoints[0])
+
+    @property
+    def course(self) -> Course:
+        """From the first knot to the last."""
+        return Course(self.pieces.times, False)
 
     def call(self) -> PartCall:
         """Return the call; see `Trajectory.call`."""

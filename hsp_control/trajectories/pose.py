@@ -16,6 +16,7 @@ from hsp_control.declaration.quantities import Number, Positive, Vector3, number
 from hsp_control.declaration.rotation import Rotation, matrix_of
 from hsp_control.engine.plans import TIME, PartCall, PartCalls, says
 from hsp_control.engine.rotations import jlog3, log3
+from hsp_control.trajectories.arc_length import Course
 from hsp_control.trajectories.hold import Hold, HoldOrientation
 from hsp_control.trajectories.orientation import (
     OrientationSample,
@@ -70,6 +71,11 @@ class PoseTrajectory(Part, ABC, family="poses", error=TrajectoryError):
         """Return this trajectory for a robot that starts in a pose, body to world."""
         return self
 
+    @property
+    def course(self) -> Course | None:
+        """The times between which it moves; see `Trajectory.course`."""
+        return None
+
     @abstractmethod
     def sample(self, t: float, out: PoseSample | None = None) -> PoseSample:
         """Return the pose at time t with its first two derivatives.
@@ -113,6 +119,16 @@ class ComposedPose(PoseTrajectory, type="composed"):
     def relative(self) -> bool:
         """Whether one of them depends on where the robot starts."""
         return self.position.relative or self.orientation.relative
+
+    @property
+    def course(self) -> Course | None:
+        """That of the position, on which a length is measured, or of what turns."""
+        moves, turns = self.position.course, self.orientation.course
+        if self.position.constant:
+            return turns
+        if moves is None or turns is None or moves.repeats or turns.repeats:
+            return moves
+        return Course(np.unique(np.concatenate([moves.knots, turns.knots])), False)
 
     def anchored(self, start: pin.SE3) -> "ComposedPose":
         """Return both for a robot that starts in a pose; see `PoseTrajectory`."""
@@ -218,6 +234,12 @@ class ScrewInterpolation(PoseTrajectory, type="screw"):
             start_position=start.translation if position is None else position,
             start_rotation=start.rotation if rotation is None else rotation,
         )
+
+    @property
+    def course(self) -> Course:
+        """From its start to its end."""
+        times = [self.start_time, self.start_time + self.duration]
+        return Course(np.array(times), False)
 
     @cached_property
     def _ends(self) -> tuple[Array, Array]:

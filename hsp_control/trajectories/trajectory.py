@@ -12,6 +12,7 @@ from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import ShapeError, TrajectoryError
 from hsp_control.declaration import Part
 from hsp_control.engine.plans import TIME, PartCall, PartCalls, bind, says
+from hsp_control.trajectories.arc_length import Course
 
 
 def sampled(trajectory: Any, t: float, out: Any) -> Any:
@@ -140,6 +141,11 @@ class Trajectory(Part, ABC, family="trajectories", error=TrajectoryError):
     @abstractmethod
     def dimension(self) -> int:
         """The number n of coordinates."""
+
+    @property
+    def course(self) -> Course | None:
+        """The times between which it goes along its path; None: not known."""
+        return None
 
     def call(self) -> PartCall:
         """Return a kind of call with its arguments, without ``out``.

@@ -118,6 +118,56 @@ POINT_MEMBERS["crossfade"] = (
     ),
     [0.5, 1.5],
 )
+# The paths below are followed at speeds; their pieces join where the ramps end, and
+# where blends do.
+CORNER = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [1.0, 1.0, 0.0]]
+POLYLINE = hsp.trajectories.Polyline(CORNER, 1.0, 5.0, 0.3)
+_END = POLYLINE.course.knots[-1]
+POLYLINE_KNOTS = [0.0, 0.3, 0.85, _END - 0.85, _END - 0.3, _END]
+
+
+def ends(member: Any) -> list[float]:
+    """Return when a motion along a path begins, has risen, falls, and ends."""
+    start, end = member.course.knots
+    ramp = 1.5 * member.speed / member.acceleration
+    return [start, start + ramp, end - ramp, end]
+
+
+def along(path: hsp.trajectories.Trajectory, speed: float, acceleration: float) -> Any:
+    member = hsp.trajectories.Along(path, speed, acceleration, start_time=0.2)
+    return member, ends(member)
+
+
+POINT_MEMBERS |= {
+    "along a circle": (hsp.trajectories.Along(CIRCLE, 0.8), []),
+    "along a circle from rest": (
+        hsp.trajectories.Along(CIRCLE, 0.8, 1.0, start_time=0.5),
+        [0.5, 1.7],
+    ),
+    "along a line": along(hsp.Line([3, -1], 1.5, start=[0, 1]), 2.0, 5.0),
+    "along a lissajous figure": (hsp.trajectories.Along(LISSAJOUS, 2.0), []),
+    "along a parabola": (
+        hsp.trajectories.Along(
+            hsp.trajectories.PiecewisePolynomial(
+                [0, 2], [[[0.0, 0.0], [1.0, 0.5], [0.3, -1.0]]]
+            ),
+            0.7,
+            start_time=0.5,
+        ),
+        [0.5, 0.5 + 1.4786624709008984 / 0.7],
+    ),
+    "along a function": (
+        hsp.trajectories.Along(
+            hsp.trajectories.CallableTrajectory(
+                swinging, 3, swinging_velocity, swinging_acceleration
+            ),
+            1.5,
+            interval=[0.0, 9.0],
+        ),
+        [0.0],
+    ),
+    "polyline": (POLYLINE, POLYLINE_KNOTS),
+}
 ORIENTATION_MEMBERS: dict[
     str, tuple[hsp.trajectories.OrientationTrajectory, list[float]]
 ] = {
@@ -139,7 +189,14 @@ ORIENTATION_MEMBERS: dict[
         ),
         [0.5, 1.5, 2.0],
     ),
+    "along a spin": (
+        hsp.trajectories.AlongOrientation(SPIN, 1.0, 2.0, start_time=0.5),
+        [0.5, 1.25],
+    ),
 }
+_TURN = hsp.trajectories.OrientationPath([R1, R2], TIMES[:2])
+ALONG_TURN = hsp.trajectories.AlongOrientation(_TURN, 1.5, 3.0)
+ORIENTATION_MEMBERS["along a turn"] = (ALONG_TURN, ends(ALONG_TURN))
 POSE_MEMBERS: dict[str, tuple[hsp.trajectories.PoseTrajectory, list[float]]] = {
     "composed pose": (hsp.trajectories.ComposedPose(LISSAJOUS, SPIN), []),
     "hold pose": (hsp.trajectories.HoldPose(POINTS[0], R1), []),
@@ -148,7 +205,26 @@ POSE_MEMBERS: dict[str, tuple[hsp.trajectories.PoseTrajectory, list[float]]] = {
         screw(pin.SE3(R1, POINTS[0]), pin.SE3(R1, POINTS[1]), 1.0),
         [0.0, 1.0],
     ),
+    "along a composed pose": (
+        hsp.trajectories.AlongPose(
+            hsp.trajectories.ComposedPose(LISSAJOUS, SPIN), 1.0, interval=[0.5, 4.0]
+        ),
+        [0.0],
+    ),
+    "polyline pose": (
+        hsp.trajectories.PolylinePose(CORNER, 1.0, 5.0, 0.3, rotations=[R1, R2, R3]),
+        [*POLYLINE_KNOTS, _END / 2],
+    ),
 }
+for _name, _path in (
+    ("along a screw", screw(pose(5), pose(6), 1.5, 0.5)),
+    (
+        "along a turn of a pose",
+        hsp.trajectories.ComposedPose(hsp.Hold(POINTS[0]), _TURN),
+    ),
+):
+    _member = hsp.trajectories.AlongPose(_path, 1.5, 3.0)
+    POSE_MEMBERS[_name] = (_member, ends(_member))
 MEMBERS: dict[str, tuple[Any, list[float]]] = {
     **POINT_MEMBERS,
     **ORIENTATION_MEMBERS,

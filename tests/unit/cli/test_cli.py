@@ -168,6 +168,21 @@ def test_check_tells_before_the_run_what_is_out_of_reach(
     assert ("reach" not in warned) if told is None else re.search(told, warned)
 
 
+def test_check_tells_what_is_too_fast_for_joints(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    config = tmp_path / "fast.yaml"
+    config.write_text(
+        "robot: {name: panda}\ntasks: {hand: {type: frame_pose, trajectory: "
+        "{type: along, speed: 4, path: {type: circle, radius: 0.1, angular_rate: 1}}"
+        "}}\n"
+        "simulation: {duration: 2, control_period: 0.001}\n"
+    )
+    assert main(["check", str(config)]) == 0
+    told = r"task 'hand': its reference moves at 4 m/s at t = .* 'panda_joint\d'"
+    assert re.search(told, capsys.readouterr().err)
+
+
 @pytest.mark.parametrize(("config", "tasks", "told"), [
     (  # three links of 1 m each
         MOVING,

@@ -26,7 +26,7 @@ PROPERTIES = [
 
 _SYMBOL = r"(?:rad|m|s|kg|N|Hz)[²³]?"
 _PRODUCT = rf"(?:1|{_SYMBOL}(?:·{_SYMBOL})*)(?:/{_SYMBOL})?(?:/√Hz)?"
-_WORDS = "control periods|periods|the task's unit(?: per s)?|unit quaternions"
+_WORDS = "control periods|periods|the task's unit(?: per s²?)?|unit quaternions"
 _ONE = rf"(?:-|{_PRODUCT}|{_WORDS})"
 UNIT = re.compile(rf"\[{_ONE}(?:(?:, or |, | or ){_ONE})*\]")
 """Such as [m], [N·m·s/rad or N·s/m], [rad/s/√Hz], [-]."""

@@ -53,7 +53,15 @@ from hsp_control.trajectories import (
 )
 
 # These move already, or still accelerate, where they meet a hold: documented.
-ROUGH = {"spline 3", "polynomial", "blend in motion", "blend orientation in motion"}
+ROUGH = {
+    "spline 3",
+    "polynomial",
+    "blend in motion",
+    "blend orientation in motion",
+    "along a parabola",
+    "along a function",
+    "along a composed pose",
+}
 
 every_member = pytest.mark.parametrize("name", MEMBERS)
 quick = settings(max_examples=60, deadline=None, derandomize=True)

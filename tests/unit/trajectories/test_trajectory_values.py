@@ -29,6 +29,9 @@ import hsp_control.trajectories as family
 from hsp_control.common.exceptions import TrajectoryError
 from hsp_control.engine.plans import planned
 from hsp_control.trajectories import (
+    Along,
+    AlongOrientation,
+    AlongPose,
     Blend,
     BlendOrientation,
     CallableOrientation,
@@ -46,6 +49,8 @@ from hsp_control.trajectories import (
     OrientationPath,
     OrientationSample,
     PiecewisePolynomial,
+    Polyline,
+    PolylinePose,
     PoseSample,
     Schedule,
     ScrewInterpolation,
@@ -86,6 +91,7 @@ def test_trajectories_are_values(name: str) -> None:
 
 NUMBER = ["fast", np.nan, -np.inf, None, True, [1.0], {}, 1j]
 POSITIVE = [*NUMBER, 0, -1.0, 0.0, np.float32(-2)]
+POSITIVE_OR_NONE = [value for value in POSITIVE if value is not None]
 OPTIONAL_VECTOR = [
     1.0, [], "here", ["here"], [np.nan, 0, 0], [0, 0, np.inf], [[1.0, 2.0, 3.0]],
     [True, False, True], [None, 1, 2], {"x": 1}, [1j, 0, 0], b"123", np.zeros((0, 3)),
@@ -181,6 +187,35 @@ WRONG: dict[type, tuple[dict[str, Any], dict[str, list[Any]]]] = {
         {"before": SPIN, "after": SPIN},
         {"before": [*CHILD, CIRCLE], "after": [*CHILD, CIRCLE], "start_time": NUMBER,
          "duration": [-1.0, "up", np.nan, None]},
+    ),
+    Along: (
+        {"path": CIRCLE, "speed": 1},
+        {"path": [*CHILD, SPIN], "speed": POSITIVE,
+         "acceleration": POSITIVE_OR_NONE, "start_time": NUMBER,
+         "interval": [*OPTIONAL_VECTOR, [1], [1, 0], [1, 1, 1]]},
+    ),
+    AlongOrientation: (
+        {"path": SPIN, "speed": 1},
+        {"path": [*CHILD, CIRCLE], "speed": POSITIVE, "acceleration": POSITIVE_OR_NONE,
+         "start_time": NUMBER, "interval": [*OPTIONAL_VECTOR, [1], [1, 0]]},
+    ),
+    AlongPose: (
+        {"path": ComposedPose(LISSAJOUS, SPIN), "speed": 1},
+        {"path": [*CHILD, CIRCLE, SPIN], "speed": POSITIVE,
+         "acceleration": POSITIVE_OR_NONE, "start_time": NUMBER,
+         "interval": [*OPTIONAL_VECTOR, [1], [1, 0]]},
+    ),
+    Polyline: (
+        {"waypoints": POINTS[:2], "speed": 1, "acceleration": 1},
+        {"waypoints": MATRIX, "speed": POSITIVE, "acceleration": POSITIVE,
+         "blend_radius": [-1.0, "wide", np.nan, None], "start_time": NUMBER},
+    ),
+    PolylinePose: (
+        {"waypoints": POINTS[:2], "speed": 1, "acceleration": 1,
+         "rotations": [R1, R2]},
+        {"waypoints": [*MATRIX, [[0, 0], [1, 1]]], "speed": POSITIVE,
+         "acceleration": POSITIVE, "blend_radius": [-1.0, "wide", np.nan, None],
+         "rotations": [1.0, "up", [R1, 2 * R1], [[0, 0]]], "start_time": NUMBER},
     ),
     HoldPose: ({}, {"position": OPTIONAL_VECTOR3, "rotation": OPTIONAL_ROTATION}),
     ComposedPose: (
