@@ -48,12 +48,13 @@ struct Carry {
   }
 };
 
-struct SetGravity {
-  static constexpr const char* doc = "Let gravity be another one from now on [m/s²].";
+struct ChangeGravity {
+  static constexpr const char* doc =
+      "Let gravity be the robot's own and a change of it, from now on [m/s²].";
   Shared<Dynamics> dynamics;
-  In<3> gravity;
+  In<3> change;
 
-  void operator()() { dynamics->set_gravity(gravity); }
+  void operator()() { dynamics->change_gravity(change); }
 };
 
 struct Weights {

@@ -64,7 +64,7 @@ class Dynamics {
   void make_room(Index bodies);
   void put_down();
   void carry(const Carried& body);
-  void set_gravity(const Vector3& gravity);  // in the world [m/s²]
+  void change_gravity(const Vector3& change);  // from the model's own, in the world [m/s²]
   Vector3 gravity() const;
   double mass() const;  // of all bodies [kg]
   void body_masses(Eigen::Map<Vector> mass, Centers center) const;

@@ -2,7 +2,7 @@
 
 namespace hsp {
 const Kind* const* dynamics_kinds() {
-  return kinds<JointJacobians, Carry, SetGravity, Weights, InverseDynamics, ForwardDynamics,
+  return kinds<JointJacobians, Carry, ChangeGravity, Weights, InverseDynamics, ForwardDynamics,
                MassMatrix, MassMatrixRate, CentroidalMotion>();
 }
 }  // namespace hsp

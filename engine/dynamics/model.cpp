@@ -82,7 +82,7 @@ void check_follower(const Joint& own, const AnyJoint& joint, const AnyJoint& lea
 Dynamics::Dynamics(const std::vector<Joint>& joints, const Vector3& gravity, const Vector& armature)
     : pinocchio_(new Pinocchio) {
   auto& model = pinocchio_->model;
-  model.gravity.linear() = gravity;
+  model.gravity.linear() = pinocchio_->own_gravity = gravity;
   for (const Joint& each : joints) {
     const std::int64_t own = model.njoints;
     check_before(each.parent, own, each, "parent");
@@ -121,14 +121,16 @@ void Dynamics::put_down() {
 }
 
 void Dynamics::carry(const Carried& body) {
-  auto& [model, data, own, carried, zero, step, there, factor] = *pinocchio_;
+  auto& [model, data, own, own_gravity, carried, zero, step, there, factor] = *pinocchio_;
   if (body.share > 0.0)
     model.inertias[body.joint] +=
         pin::Inertia(body.share * body.mass, body.center, body.share * body.inertia);
   carried.push_back(body);
 }
 
-void Dynamics::set_gravity(const Vector3& gravity) { pinocchio_->model.gravity.linear() = gravity; }
+void Dynamics::change_gravity(const Vector3& change) {
+  pinocchio_->model.gravity.linear() = pinocchio_->own_gravity + change;
+}
 
 Vector3 Dynamics::gravity() const { return pinocchio_->model.gravity.linear(); }
 

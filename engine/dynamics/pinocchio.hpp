@@ -42,6 +42,7 @@ struct Dynamics::Pinocchio {
   Model model;
   Data data;
   Model::InertiaVector own;  // without what is carried
+  Vector3 own_gravity;
   std::vector<Carried> carried;
   Vector zero, step, there;            // two of v's size, one of q's
   Eigen::LLT<Eigen::MatrixXd> factor;  // of M, of models with followers

@@ -43,7 +43,8 @@ class ModelInForce:
         self._payloads: Sequence[PlannedPayload] = ()
         self._shares, self._rates = np.zeros((2, 0))
         self._gravity = Evolution(np.array(robot.model.gravity.linear))
-        self._now = self._gravity.initial.copy()
+        self._own = self._gravity.initial
+        self._change = np.zeros(3)  # from it: a plant may have another one
         self._dynamics = [*dynamics]
         self._bind()
 
@@ -67,7 +68,7 @@ class ModelInForce:
         """Let the model be that of a time [s]."""
         for k, each in enumerate(self._payloads):
             self._shares[k], self._rates[k] = each.share.with_rate(t)
-        self._now[:] = self._gravity.at(t)
+        self._change[:] = self._gravity.at(t) - self._own
         self._write()
 
     def _bind(self) -> None:
@@ -85,7 +86,9 @@ class ModelInForce:
         calls = []
         for each in self._dynamics:
             calls.append(PartCall(engine.Carry, dynamics=each, **carried))
-            calls.append(PartCall(engine.SetGravity, dynamics=each, gravity=self._now))
+            calls.append(
+                PartCall(engine.ChangeGravity, dynamics=each, change=self._change)
+            )
         self._write = planned(calls).call()
 
 
