@@ -259,6 +259,7 @@ def cost(name: str, run: Run, limits: RobotLimits) -> str:
     def law(t: float, q: Array, v: Array) -> Array:
         return controller.compute(t, q, v).tau
 
+    law.controller = controller  # type: ignore[attr-defined]
     steps = list(zip(run.t, run.q, run.v, strict=True))
     limited = [controller.compute(*step).status != Status.EXACT for step in steps]
     peer = tsid_of(hsp.load_experiment(f"limits/{name}", "limits=none"), limits, 1e-3)

@@ -70,6 +70,7 @@ class Poses:
         def compute(t: float, q: Array, v: Array) -> Array:
             return controller.compute(t, q, v).tau
 
+        compute.controller = controller  # type: ignore[attr-defined]
         return compute
 
     def tsid(self) -> Callable[[float, Array, Array], Array]:
