@@ -89,7 +89,7 @@ class Actuation:
         # what is delivered there of the law's own acceleration
         self.own = Delivered(state.effort, law.acceleration, np.zeros(0), EXACT, 0.0)
         self.nearest = self.own
-        # whether `nearest` is delivered, and nothing else is to be said; shape (1,)
+        # whether `nearest` is delivered, and nothing else is to be said, shape (1,)
         self.is_nearest: Indices = np.zeros(1, dtype=np.int64)
         self._wanted = wanted = Wanted(state.mass_matrix, np.zeros(nv), np.zeros(nv))
         self.outcome = LimitsOutcome.allocate()
@@ -175,7 +175,8 @@ class Actuation:
         The last one returns whether it is exact and within the limits: then, where
         `direct`, it is delivered with the effort M a + N. Else the law's outcome and
         `outcome` say what is not so. If a QP without forces and distances is all that
-        is needed where a bound is violated, it is solved at once.
+        is needed where a bound is violated, it is solved at once; `is_nearest` says
+        whether `nearest` is all that there is to deliver.
         """
         law, wanted = self._law.acceleration, self._wanted
         begin = PartCall(engine.Copy, x=law, out=wanted.acceleration)
