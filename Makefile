@@ -88,7 +88,7 @@ lint: $(STAMP) $(ENGINE) ## ruff, mypy --strict, the layers of the architecture
 coverage: $(STAMP) $(ENGINE) ## run the tests, report the lines of Python not run
 	@$(BIN)/python -m pytest -n $(WORKERS) --cov --cov-report=term $(ARGS)
 
-bench: $(STAMP) $(ENGINE) ## compare with other controllers, in .venv-peers (TSID builds: 20 minutes)
+bench: $(STAMP) $(ENGINE) ## compare with other controllers, in .venv-peers
 	@if ! .venv-peers/bin/python -m pip --version > /dev/null 2>&1; then \
 	  echo "Creating .venv-peers ..."; $(call new-venv,$(BIN)/python,.venv-peers); \
 	fi

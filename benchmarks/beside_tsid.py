@@ -4,19 +4,21 @@ from collections.abc import Sequence
 from time import perf_counter_ns
 
 import numpy as np
-from timing import Compute, State, ratios, spread, step_times
+from steps_in_cpp import StepsInCpp
+from timing import Compute, State, Timed, ratios, spread, step_times
 from tsid_in_cpp import CppSteps
 
 from hsp_control.common.arrays import Array
 
 HEADER = (
     "| steps | share | this law [µs], median / 99 % | TSID through Python = 1 | "
-    "TSID in C++ = 1 |\n|---|--:|--:|--:|--:|\n"
+    "TSID in C++ = 1 | both in C++, TSID = 1 |\n|---|--:|--:|--:|--:|--:|\n"
 )
 CPP = (
     "*TSID in C++* is the same problem without any Python, with its references "
     "computed before (`benchmarks/tsid_in_cpp.cpp`); this law is called from Python "
-    "and computes its references.\n"
+    "and computes its references. *Both in C++*: this law's step is called in C++, too "
+    "(`benchmarks/steps_in_cpp.cpp`), where all of it is in the engine.\n"
 )
 _REPEATS, _STATES = 5, 1000
 
@@ -34,7 +36,7 @@ def row(
 
     Args:
         what: Which steps.
-        law: This law.
+        law: This law; with ``controller``, if its whole step is in the engine.
         peer: TSID, with ``parts``, see `CppSteps`.
         states: The states of a run.
         chosen: Which of them, shape (len(states),).
@@ -45,14 +47,18 @@ def row(
     share = f"{100 * np.mean(chosen):.0f} %"
     block = min(block, len(steps) // 2)
     if block < 10:
-        return f"| {what} | {share} | too few to time | | |\n"
-    compared = {"law": law, "Python": peer, "C++": CppSteps(peer, steps)}
+        return f"| {what} | {share} | too few to time | | | |\n"
+    compared: dict[str, Compute | Timed] = {"law": law, "Python": peer}
+    compared["C++"] = CppSteps(peer, steps)
+    if controller := getattr(law, "controller", None):
+        compared["law in C++"] = StepsInCpp(controller, steps)
     times = step_times(compared, steps, rounds, block, warm_up=min(20, block))
     taken = 1e-3 * _best_times(law, steps[:: -(-len(steps) // _STATES)])
     return (
         f"| {what} | {share} | {np.median(taken):.1f} / {np.quantile(taken, 0.99):.1f} "
         f"| {spread(ratios(times, 'law', 'Python'))} "
-        f"| {spread(ratios(times, 'law', 'C++'))} |\n"
+        f"| {spread(ratios(times, 'law', 'C++'))} "
+        f"| {spread(ratios(times, 'law in C++', 'C++')) if controller else ''} |\n"
     )
 
 

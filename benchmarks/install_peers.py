@@ -3,9 +3,9 @@
 `make bench` calls it with .venv-peers/bin/python. Peers that cannot be installed are
 written to .venv-peers/peers.json with the reason, which then stands in the table.
 
-TSID's wheel on PyPI is built for another Pinocchio and aborts with pin 4.1. Therefore
-it is built here from its source package, with a C++ compiler and about 2 GB of memory
-a job. That takes 15 to 30 minutes, once; the wheels are kept in .venv-peers/wheels.
+TSID's wheels are built for Pinocchio 4.0, and abort with 4.1, which this package asks
+for. Pinocchio's algorithms are compiled into its engine, so that another release may
+load the models: all peers but placo run with 4.0.
 """
 
 import json
@@ -21,14 +21,16 @@ WHEELS = HOME / "wheels"
 
 PLACO_HOME, PLACO = ROOT / ".venv-placo", "placo==0.10.2"
 
-PIN = ["pin==4.1.0", "libpinocchio==4.1.0", "cmeel-eigen==3.4.1"]
+PIN = ["pin==4.0.0", "libpinocchio==4.0.0"]
 PINK = ["pin-pink==4.4.0", "daqp==0.11.0", "proxsuite==0.8.0", "quadprog==0.1.14"]
-# Needed for the build and not in the wheels: CMake files, headers, `wheel pack`.
-BUILD = ["libpinocchio[build]==4.1.0", "eiquadprog==1.3.2", "jrl-cmakemodules==2.1.0"]
-BUILD += ["cmake<4", "cmeel", "wheel"]
+TSID = ["tsid==1.10.0", "eiquadprog==1.3.2"]
+LIBTSID = "libtsid==1.10.0"
+"""TSID's C++ library, with its headers: it has no Python in it, but its wheel is for
+Python 3.14 by name."""
+
 CHECKS = {
     "pink": "import pink, qpsolvers; print(pink.__version__)",
-    # An import of TSID is not enough: the wheel on PyPI aborts on the first robot.
+    # An import of TSID is not enough: with another Pinocchio it aborts at a robot.
     "placo": "import placo, importlib.metadata as m; print(m.version('placo'))",
     "tsid": (
         "import pinocchio as pin, tsid; m = pin.buildSampleModelManipulator(); "
@@ -58,26 +60,40 @@ def pip(*arguments: str, **environment: str) -> None:
     run(sys.executable, "-m", "pip", *arguments, **environment)
 
 
+def install_package() -> None:
+    """Install this checkout, with the engine that `make` has built."""
+    own = [str(ROOT / ".venv" / "bin" / "python"), "-m", "pip", "wheel", "--quiet"]
+    WHEELS.mkdir(exist_ok=True)
+    for old in WHEELS.glob("hsp_control-*.whl"):
+        old.unlink()
+    run(
+        *own, "--no-deps", "--no-build-isolation", "--wheel-dir", str(WHEELS),
+        str(ROOT), PIP_BUILD_CONSTRAINT="",
+    )  # fmt: skip
+    wheel = next(WHEELS.glob("hsp_control-*.whl"))
+    pip("install", "--quiet", f"{wheel}[robots,mujoco,engine]")
+    pip("install", "--quiet", "--force-reinstall", "--no-deps", str(wheel))
+    pip("install", "--quiet", "--no-deps", *PIN, PIP_CONSTRAINT="")
+
+
 def install_pink() -> None:
-    """Install pink and its solvers with this package's version of Pinocchio."""
-    pip("install", "--quiet", *PINK, *PIN)
+    """Install pink and its solvers."""
+    pip("install", "--quiet", *PINK, *PIN, PIP_CONSTRAINT="")
 
 
 def install_tsid() -> None:
-    """Build TSID with this environment's Pinocchio, unless the wheels exist."""
-    pip("install", "--quiet", *BUILD, *PIN)
-    for name in ("libtsid", "tsid"):
-        if not list(WHEELS.glob(f"{name}-1.10.0-*.whl")):
-            print(
-                f"  building {name} 1.10.0 from source (some minutes) ...", flush=True
-            )
-            pip(
-                "wheel", "--no-deps", "--no-build-isolation", "--no-binary", name,
-                "--wheel-dir", str(WHEELS), f"{name}==1.10.0",
-                CMEEL_RUN_TESTS="OFF", CMEEL_JOBS="2",
-            )  # fmt: skip
-        wheel = next(WHEELS.glob(f"{name}-1.10.0-*.whl"))
-        pip("install", "--quiet", "--no-deps", "--force-reinstall", str(wheel))
+    """Install TSID, its library under a name that any Python accepts."""
+    pip("install", "--quiet", "wheel", *TSID[1:], *PIN, PIP_CONSTRAINT="")
+    if not list(WHEELS.glob("libtsid-1.10.0-*-py3-none-*.whl")):
+        pip(
+            "download", "--quiet", "--no-deps", "--only-binary=:all:",
+            "--python-version=3.14", "--dest", str(WHEELS), LIBTSID, PIP_CONSTRAINT="",
+        )  # fmt: skip
+        given = next(WHEELS.glob("libtsid-1.10.0-*-cp314-*.whl"))
+        tags = ["--python-tag=py3", "--abi-tag=none", "--remove", str(given)]
+        run(sys.executable, "-m", "wheel", "tags", *tags)
+    library = next(WHEELS.glob("libtsid-1.10.0-*-py3-none-*.whl"))
+    pip("install", "--quiet", "--no-deps", str(library), *TSID, PIP_CONSTRAINT="")
 
 
 def install_placo() -> None:
@@ -94,7 +110,7 @@ def install_placo() -> None:
 def main() -> None:
     """Install all peers; write the reasons of those that cannot be installed."""
     print("Installing this checkout into", HOME, flush=True)
-    pip("install", "--quiet", "--editable", f"{ROOT}[robots,mujoco]", *PIN)
+    install_package()
     installers: dict[str, Callable[[], None]] = {
         "pink": install_pink,
         "tsid": install_tsid,

@@ -259,6 +259,7 @@ def cost(name: str, run: Run, limits: RobotLimits) -> str:
     def law(t: float, q: Array, v: Array) -> Array:
         return controller.compute(t, q, v).tau
 
+    law.controller = controller  # type: ignore[attr-defined]
     steps = list(zip(run.t, run.q, run.v, strict=True))
     limited = [controller.compute(*step).status != Status.EXACT for step in steps]
     peer = tsid_of(hsp.load_experiment(f"limits/{name}", "limits=none"), limits, 1e-3)
@@ -272,20 +273,24 @@ def cost(name: str, run: Run, limits: RobotLimits) -> str:
 
 
 def cost_of_two_arms() -> str:
-    """Return the row of two Pandas on circles, with a part of their efforts.
+    """Return the rows of two Pandas on circles, with a part of their efforts.
 
     They could not even hold their posture: the states are those of a run with all of
-    their efforts, and each step is limited.
+    their efforts, and each step is limited. With the limit on static efforts, which
+    TSID does not have, the limits contradict each other.
     """
     poses = many_tasks.two_arms()
     _, states = poses.run(poses.law(), 1.0)
     weaken(poses.robot, ARMS_STRENGTH)
-    return beside_tsid.row(
-        f"two Pandas, {100 * ARMS_STRENGTH:.0f} % of their efforts (status 2)",
-        poses.law(),
-        poses.tsid(),
-        states,
-        np.full(len(states), True),
+    what = f"two Pandas, {100 * ARMS_STRENGTH:.0f} % of their efforts"
+    laws = {
+        f"{what} (status 2)": poses.law(),
+        f"{what}, static ones too (status 3)": poses.law(static_effort="robot"),
+    }
+    all_steps = np.full(len(states), True)
+    return "".join(
+        beside_tsid.row(label, law, poses.tsid(), states, all_steps)
+        for label, law in laws.items()
     )
 
 

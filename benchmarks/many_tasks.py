@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Literal
 
 import numpy as np
 import pinocchio as pin
@@ -51,8 +52,13 @@ class Poses:
                 )
             )
 
-    def law(self) -> Callable[[float, Array, Array], Array]:
-        """Return this law as a function (t, q, v) ↦ tau."""
+    def law(
+        self, static_effort: Literal["none", "robot"] = "none"
+    ) -> Callable[[float, Array, Array], Array]:
+        """Return this law as a function (t, q, v) ↦ tau.
+
+        Without a limit on static efforts it has the limits that TSID has.
+        """
         gains = hsp.Gains(natural_frequency=FREQUENCY)
         tasks = [
             hsp.FramePose(frame, trajectory, gains=gains)
@@ -64,12 +70,15 @@ class Poses:
             tasks,
             posture,
             null_space_gain=NULL_SPACE_GAIN,
-            limits=hsp.Limits(velocity=None, position=None),  # as for TSID
+            limits=hsp.Limits(
+                velocity=None, position=None, static_effort=static_effort
+            ),
         )
 
         def compute(t: float, q: Array, v: Array) -> Array:
             return controller.compute(t, q, v).tau
 
+        compute.controller = controller  # type: ignore[attr-defined]
         return compute
 
     def tsid(self) -> Callable[[float, Array, Array], Array]:

@@ -2,7 +2,7 @@
 
     .venv/bin/python benchmarks/qp.py [count]
 
-Eleven kinds, count of them in all (100,000). Prints one line per kind. Where a solver
+Twelve kinds, count of them in all (100,000). Prints one line per kind. Where a solver
 differs, exact rational arithmetic decides: ``wrong`` are answers that it refutes.
 """
 
@@ -14,17 +14,8 @@ import numpy as np
 
 sys.path.insert(0, str(Path(__file__).resolve().parent.parent / "tests" / "support"))
 
-from qp_cases import (
-    KINDS,
-    Answer,
-    Case,
-    answer,
-    by_daqp,
-    by_quadprog,
-    cost,
-    defect,
-    exact_cost,
-)
+from qp_cases import KINDS, Answer, Case, answer, by_daqp, cost, defect
+from qp_oracles import by_quadprog, exact_cost
 
 from hsp_control.control.actuation.dual_active_set import (
     EXHAUSTED,

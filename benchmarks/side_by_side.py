@@ -28,6 +28,7 @@ from cases import FRAME, Case
 from controllers import operational_space, this_law
 from many_tasks import humanoid, two_arms
 from marked_sections import RESULTS
+from steps_in_cpp import StepsInCpp
 from timing import Compute, State, ratios, spread, step_times
 from tsid_in_cpp import CppSteps
 
@@ -219,6 +220,9 @@ def case_times(
     """Return the controllers' step times [s] along the law's path, and that path."""
     path = close_loop(case, this_law.make).states
     controllers: dict[str, Any] = {name: make(case) for name, make in timed.items()}
+    law = "this law"
+    if law in controllers:
+        controllers["this law in C++"] = StepsInCpp(controllers[law].controller, path)
     if "TSID" in controllers:
         controllers[CPP] = CppSteps(controllers["TSID"], path)
     return step_times(controllers, path, rounds, block), path
@@ -406,11 +410,12 @@ def main() -> None:
             f"\nMedians of {options.rounds} interleaved rounds of {options.block} "
             "steps, one process, quartiles in brackets; each step takes (t, q, v) and "
             "returns an effort; TSID in C++ is the same without Python, with its "
-            "references computed before. Default of a row: hand task, posture or "
-            "centering, no obstacle. In the row with the ball, the ball is within the "
-            "field's influence in some rounds only: see below. placo "
-            "runs in its own environment; its ratio is the product of its ratio to the "
-            "operational space there and of that controller's ratio here.\n\n"
+            "references computed before, which this law in C++ computes. Default of a "
+            "row: hand task, posture or centering, no obstacle. In the row with the "
+            "ball, the ball is within the field's influence in some rounds only: see "
+            "below. placo runs in its own environment; its ratio is the product of its "
+            "ratio to the operational space there and of that controller's ratio "
+            "here.\n\n"
         )
     if "tsid" not in missing and not options.only:
         larger_robots(options.rounds, options.block, say)

@@ -1,6 +1,6 @@
 """TSID's step in C++: no Python in it, and the references computed before.
 
-`tsid_in_cpp.cpp` is compiled once, against the TSID that `install_peers.py` built, and
+`tsid_in_cpp.cpp` is compiled once, against the TSID of `install_peers.py`, and
 kept beside it. It takes the objects that a peer made in Python: the same problem.
 """
 

@@ -40,6 +40,7 @@ def make(
     def compute(t: float, q: Array, v: Array) -> Array:
         return controller.compute(t, q, v).tau
 
+    compute.controller = controller  # type: ignore[attr-defined]
     if reads is None:
         return compute
 

@@ -77,12 +77,11 @@ void check_follower(const Joint& own, const AnyJoint& joint, const AnyJoint& lea
                               "coordinates, and what it follows follows nothing");
 }
 
-}  // namespace
+using Model = pin::ModelTpl<double, 0, JointTypes>;
 
-Dynamics::Dynamics(const std::vector<Joint>& joints, const Vector3& gravity, const Vector& armature)
-    : pinocchio_(new Pinocchio) {
-  auto& model = pinocchio_->model;
-  model.gravity.linear() = pinocchio_->own_gravity = gravity;
+Model model_of(const std::vector<Joint>& joints, const Vector3& gravity, const Vector& armature) {
+  Model model;
+  model.gravity.linear() = gravity;
   for (const Joint& each : joints) {
     const std::int64_t own = model.njoints;
     check_before(each.parent, own, each, "parent");
@@ -103,13 +102,13 @@ Dynamics::Dynamics(const std::vector<Joint>& joints, const Vector3& gravity, con
     throw std::invalid_argument("armature has " + std::to_string(armature.size()) +
                                 " entries; needs " + std::to_string(model.nv));
   model.armature = armature;
-  pinocchio_->own = model.inertias;
-  pinocchio_->data = Pinocchio::Data(model);
-  pinocchio_->zero.setZero(model.nv);
-  pinocchio_->step.setZero(model.nv);
-  pinocchio_->there.setZero(model.nq);
-  pinocchio_->factor = Eigen::LLT<Eigen::MatrixXd>(model.nv);
+  return model;
 }
+
+}  // namespace
+
+Dynamics::Dynamics(const std::vector<Joint>& joints, const Vector3& gravity, const Vector& armature)
+    : pinocchio_(new Pinocchio(model_of(joints, gravity, armature))) {}
 
 void Dynamics::make_room(Index bodies) {
   pinocchio_->carried.reserve(static_cast<std::size_t>(bodies));

@@ -47,6 +47,17 @@ struct Dynamics::Pinocchio {
   Vector zero, step, there;            // two of v's size, one of q's
   Eigen::LLT<Eigen::MatrixXd> factor;  // of M, of models with followers
 
+  // Data is made where it stays: its factorisations may not be copied before they are made.
+  explicit Pinocchio(const Model& given)
+      : model(given),
+        data(model),
+        own(model.inertias),
+        own_gravity(model.gravity.linear()),
+        zero(Vector::Zero(model.nv)),
+        step(zero),
+        there(Vector::Zero(model.nq)),
+        factor(model.nv) {}
+
   bool has_followers() const { return !model.mimicking_joints.empty(); }
   const Data::MatrixXs& mass_matrix(const ConstVector& q);  // both triangles
   void write_rate_by_differences(const ConstVector& q, const ConstVector& v, Square M_dot);

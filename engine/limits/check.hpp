@@ -11,12 +11,18 @@ namespace hsp {
 
 struct IsPlain {
   static constexpr const char* doc =
-      "Whether the law is exact and within all limits: else its outcome and theirs say more.";
+      "Whether the law is exact and within all limits: else its outcome and theirs say more, "
+      "unless a QP has found the nearest step, and nothing else was found.";
   LawOutcome<Ints> law;
   LimitsOutcome<Ints> limits;
+  QPOutcome<Ints> qp;
+  std::int64_t limited;  // the status of a nearest step
+  OutInts<1> nearest;    // whether it was found, and nothing else
 
   bool operator()() {
-    return law.finite[0] && law.damped_level[0] == 0 && !limits.violated[0] && !limits.beyond[0];
+    const bool exact = law.finite[0] && law.damped_level[0] == 0 && !limits.beyond[0];
+    nearest[0] = exact && limits.violated[0] && !qp.unsolved[0] && qp.status[0] == limited;
+    return exact && !limits.violated[0];
   }
 };
 

@@ -30,6 +30,12 @@ template <template <int...> class As> struct LimitsOutcome {
   As<1> beyond;          // whether a joint is beyond its range, or faster than its limit
 };
 
+// What became of a QP.
+template <template <int...> class As> struct QPOutcome {
+  As<1> unsolved;  // 1: there is no result; 0
+  As<1> status;    // that of the result, as `Status` in Python
+};
+
 // The errors of the acceleration that are known from efforts that were held, see `Held`.
 template <template <int...> class As> struct Errors {
   As<'n'> error, least, most, lasting, steady;

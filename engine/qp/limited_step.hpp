@@ -47,12 +47,6 @@ inline void check_step(Index x, const Wanted& wanted, const Forces& forces) {
     throw std::invalid_argument("x are n deviations and the forces");
 }
 
-// What became of a QP.
-template <template <int...> class As> struct QPOutcome {
-  As<1> unsolved;  // 1: there is no result; 0
-  As<1> status;    // that of the result, as `Status` in Python
-};
-
 // What is delivered.
 struct Result {
   InOut<'n'> effort, acceleration;

@@ -35,6 +35,7 @@ class BoundStep:
         self.move = state.bind_move([*active.calls, *actuation.calls()])
         self._move = self.move.__call__  # bound once: half the time of a look-up
         self._own = actuation.own  # what is delivered of the law's own acceleration
+        self._nearest, self._is_nearest = actuation.nearest, actuation.is_nearest
         self._state, self._actuation, self._limits = state, actuation, limits
         self._law_outcome = active.resolution.outcome
         self._limits_outcome = actuation.outcome
@@ -44,7 +45,7 @@ class BoundStep:
 
         The move makes all calls of a step, up to the law's own effort M a + N and the
         check of the limits; the last one, `IsPlain`, returns whether that is the result
-        as it is. Else it is looked at why, and the QP is solved if a limit is violated.
+        as it is. Else the QP may have been solved at once; if not, it is looked at why.
         """
         plain = self._move(t, q, v)
         if plain is None:  # refused: lists, for example, or what is not valid
@@ -52,6 +53,8 @@ class BoundStep:
         self.damped = ""
         if plain and self.direct:
             return self._own
+        if self._is_nearest.item():
+            return self._nearest
         active, law, limits = self.active, self._law_outcome, self._limits_outcome
         if not law.finite.item():
             active.raise_not_finite()

@@ -273,7 +273,7 @@ def answer(
     )
 
 
-def _in_y(case: Case) -> tuple[Array, Array, Array] | None:
+def in_y(case: Case) -> tuple[Array, Array, Array] | None:
     """Return the constraints as rows of length 1 on y.
 
     Rows of zeros are left out; None if one of them is violated.
@@ -294,7 +294,7 @@ def norms(rows: Array) -> Array:
 
 def by_daqp(case: Case) -> Array | None:
     """Return x by DAQP, or None."""
-    constraints, nz = _in_y(case), len(case.JT)
+    constraints, nz = in_y(case), len(case.JT)
     if constraints is None:
         return None
     C, lower, upper = constraints

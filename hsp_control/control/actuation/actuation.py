@@ -88,6 +88,9 @@ class Actuation:
         self.direct = compiled and not base.size and not support.size
         # what is delivered there of the law's own acceleration
         self.own = Delivered(state.effort, law.acceleration, np.zeros(0), EXACT, 0.0)
+        self.nearest = self.own
+        # whether `nearest` is delivered, and nothing else is to be said, shape (1,)
+        self.is_nearest: Indices = np.zeros(1, dtype=np.int64)
         self._wanted = wanted = Wanted(state.mass_matrix, np.zeros(nv), np.zeros(nv))
         self.outcome = LimitsOutcome.allocate()
         self._qp_outcome = QPOutcome.allocate()
@@ -104,7 +107,7 @@ class Actuation:
             holding = self._rows.get("holding")
             self._qp = self._limited_step(0 if holding is None else len(holding.least))
             # what is delivered where it was solved at once
-            self._solved = Delivered(*self._qp.result, LIMITED, 0.0)
+            self.nearest = Delivered(*self._qp.result, LIMITED, 0.0)
 
     def _check(self) -> PartCall:
         """Return the call that compares a and M a + N with their bounds."""
@@ -172,7 +175,8 @@ class Actuation:
         The last one returns whether it is exact and within the limits: then, where
         `direct`, it is delivered with the effort M a + N. Else the law's outcome and
         `outcome` say what is not so. If a QP without forces and distances is all that
-        is needed where a bound is violated, it is solved at once.
+        is needed where a bound is violated, it is solved at once; `is_nearest` says
+        whether `nearest` is all that there is to deliver.
         """
         law, wanted = self._law.acceleration, self._wanted
         begin = PartCall(engine.Copy, x=law, out=wanted.acceleration)
@@ -182,7 +186,14 @@ class Actuation:
             keep = PartCall(engine.Copy, x=self._state.effort, out=wanted.effort)
             given = self.outcome.violated, keep, self._rows.get("holding")
             calls = [*calls, self._qp.nearest_if(*given)]
-        plain = PartCall(engine.IsPlain, law=self._law.outcome, limits=self.outcome)
+        plain = PartCall(
+            engine.IsPlain,
+            law=self._law.outcome,
+            limits=self.outcome,
+            qp=self._qp_outcome,
+            limited=int(LIMITED),
+            nearest=self.is_nearest,
+        )
         calls = [*calls, plain]
         return self._state.plan(calls).steps()
 
@@ -207,8 +218,9 @@ class Actuation:
     def _within_limits(self, a: Array, offset: Array | None) -> Delivered:
         """Return what is delivered, whether or not a joint is beyond a limit."""
         found = self.outcome
-        if self.direct and not self._qp_outcome.unsolved.item():
-            return self._solved
+        if self._qp and self.direct and not self._qp_outcome.unsolved.item():
+            status, relaxation = self._qp.found()
+            return self.nearest._replace(status=status, relaxation=relaxation)
         if self.direct and not found.violated.item() and offset is None:
             return Delivered(self._state.effort, a, self.own.forces, EXACT, 0.0)
         motion_ok = not (found.motion.item() or found.rows.item())

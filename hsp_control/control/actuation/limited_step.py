@@ -125,11 +125,10 @@ class Result(NamedTuple):
 _RELAXATION_COST = {"contacts": 1e3, "barriers": 30.0, "motion": 1.0, "holding": 0.1}
 """Cost of a violation, where limits contradict each other: the most expensive kind is
 relaxed last."""
-_REGULARISATION, _ROUNDS = 1e-6, 4
-"""Cost of all other unknowns while the violation is minimised, and the number of
-rounds. Each round penalises the difference from the result of the round before, so that
-this cost fades. Otherwise 1e3 rad/s², which a far target requires, would outweigh a
-violation."""
+_SOFTNESS = {kind: cost**-0.5 for kind, cost in _RELAXATION_COST.items()}
+_REGULARISATION = 1e-6
+"""Cost of all other unknowns while the violation is minimised; it fades, see
+``engine/qp/relaxed_step.hpp``."""
 
 _STATUS = tuple(Status)  # by index: a call of `Status` takes 0.3 µs
 
@@ -159,9 +158,6 @@ class LimitedStep:
         ends = np.cumsum([0, *counts, held])
         cones, barriers, contacts, k = map(int, ends[1:])
         self._barriers, self._used = barriers, 0
-        self._motion = np.arange(k, k + n)
-        self._contacts = np.arange(contacts, k)
-        self._J = resolution.problem.task.jacobian[:held]
         width = n + p
 
         # The rows, and the bounds of x
@@ -182,17 +178,26 @@ class LimitedStep:
         # The QPs on them: of deviation and forces, at the law's cost; of the forces
         # alone; of both, all at the same cost, with soft rows
         alike = np.full(width, _REGULARISATION**-0.5)
-        self._soft, self._x = zeros(k + width), zeros(width)
         hard = lower, upper, zeros(0), len(base)
         self._rows = QP(zeros((n, n)), zeros(p), A, begin, end, *hard)
         redistributed = QP(zeros((0, n)), zeros(p), A, force_begin, force_end, *hard)
-        softened = lower, upper, self._soft, len(base)
-        soft = QP(zeros((0, 0)), alike, A, begin, end, *softened)
+        self._softness = zeros(k + width)
+        self._softness[barriers:contacts] = _SOFTNESS["holding"]
+        self._softness[contacts:k] = _SOFTNESS["contacts"]
+        self._softness[k : k + n] = _SOFTNESS["motion"]
+        relaxed = self._rows._replace(
+            end=end.copy(), lower=lower.copy(), upper=upper.copy()
+        )
+        soft = relaxed._replace(JT=zeros((0, 0)), own=alike, softness=self._softness)
         memories = [Workspace.of(width, k) for _ in range(2)]
         soft_memory = Workspace.of(width, k, soft=True)
+        # It begins with what is active where the violation is least: in this step, so
+        # that not even the last bit depends on steps before.
+        last_memory = Workspace.of(width, k)._replace(held=soft_memory.held)
 
         # What they read and write; the result is that of the last step
         self.result = Result(zeros(n), zeros(n), zeros(p))
+        self.relaxation = zeros(1)  # the largest violation, if it is relaxed
         self._wanted = wanted
         first, edges = support.forces, (support.lower, support.upper)
         cost = support.inverse_cost, support.weight
@@ -200,7 +205,7 @@ class LimitedStep:
         places = Places(np.array([*base, *limited], dtype=np.int64), len(base))
         levels = Levels.of(resolution, p > 0, state.robot.size or 1.0)
         directions = Directions.of(n)
-        x, moving, none = self._x, np.zeros(1, np.int64), np.zeros(1, np.int64)
+        x, moving, none = zeros(width), np.zeros(1, np.int64), np.zeros(1, np.int64)
         self._outcome = outcome
         around = {
             "wanted": wanted,
@@ -210,41 +215,39 @@ class LimitedStep:
         }
 
         # The calls that solve them
+        def written(became: QPOutcome) -> PartCall:
+            return PartCall(
+                engine.LimitedResult,
+                **around,
+                x=x,
+                result=self.result,
+                unsolved=became.unsolved,
+            )
+
         def optimum(
-            qp: QP, count: Indices, work: Workspace, reached: Status, *, warm: bool
+            qp: QP, count: Indices, work: Workspace, reached: Status, became: QPOutcome
         ) -> PartCalls:
-            return [
-                PartCall(
-                    engine.SolveLimitedStep,
-                    reached=int(reached),
-                    warm=warm,
-                    problem=qp,
-                    moving=count,
-                    x=x,
-                    work=work,
-                    outcome=outcome,
-                ),
-                PartCall(
-                    engine.LimitedResult,
-                    **around,
-                    x=x,
-                    result=self.result,
-                    unsolved=outcome.unsolved,
-                ),
-            ]
+            solved = PartCall(
+                engine.SolveLimitedStep,
+                reached=int(reached),
+                warm=True,
+                problem=qp,
+                moving=count,
+                x=x,
+                work=work,
+                outcome=became,
+            )
+            return [solved, written(became)]
 
         def begin_with(cost: float, own: Array) -> PartCall:
             return PartCall(
                 engine.BeginLimitedStep, forces=forces, cost=cost, own=own, x=x
             )
 
-        def nearest(*, standing: bool, warm: bool) -> PartCalls:
-            root = write_inverse_root(
+        def root(*, standing: bool) -> PartCall:
+            return write_inverse_root(
                 levels, directions, standing, self._rows.JT, moving
             )
-            begin = begin_with(_FORCE_COST, self._rows.own)
-            found = optimum(self._rows, moving, memories[0], LIMITED, warm=warm)
-            return [root, begin, *found]
 
         rows: list[AnyCall] = [*state.inertia.calls, resolution.damped_beside(state.v)]
         if permitted is not None:
@@ -259,20 +262,56 @@ class LimitedStep:
             PartCall(engine.LimitedRows, **around, A=A, lower=lower, upper=upper)
         )
         write = write_directions(levels, directions)
-        closest = write, *nearest(standing=p > 0, warm=True)
-        self._nearest = [*rows, *closest]
+        start = begin_with(_FORCE_COST, self._rows.own)
+        within = optimum(self._rows, moving, memories[0], LIMITED, outcome)
+        closest = [write, root(standing=p > 0), start, *within]
+        # Where there is no such step: the rows as they are, those of contacts too.
+        copied = PartCall(
+            engine.RelaxedRows,
+            lower=lower,
+            upper=upper,
+            end=end,
+            J=resolution.problem.task.jacobian[:held],
+            first=contacts,
+            A=A,
+            relaxed_lower=relaxed.lower,
+            relaxed_upper=relaxed.upper,
+            relaxed_end=relaxed.end,
+        )
+        least = PartCall(
+            engine.LeastViolation,
+            reached=int(RELAXED),
+            problem=soft,
+            x=x,
+            work=soft_memory,
+            outcome=outcome,
+        )
+        widened = PartCall(
+            engine.Widen,
+            unsolved=outcome.unsolved,
+            A=A,
+            x=x,
+            softness=self._softness,
+            lower=relaxed.lower,
+            upper=relaxed.upper,
+            relaxation=self.relaxation,
+        )
+        # If rounding leaves no room within the relaxed limits, the result is what
+        # violates them least: nobody asks what became of the last QP.
+        last = optimum(relaxed, moving, last_memory, RELAXED, QPOutcome.allocate())
+        again = [root(standing=False), start, *last]
+        loosened = OnlyIf(
+            [copied, least, written(outcome), widened, *again], outcome.unsolved
+        )
+        self._nearest = [*rows, *closest, loosened]
         self._find_nearest = self._find_forces = state.plan(self._nearest).call()
         if p > 0:
             begun = begin_with(1.0, redistributed.own)
-            at_once = optimum(
-                redistributed, none, memories[1], Status.REDISTRIBUTED, warm=True
-            )
-            calls = [*rows, begun, *at_once, OnlyIf(closest, outcome.unsolved)]
+            forces_alone = redistributed, none, memories[1]
+            at_once = optimum(*forces_alone, Status.REDISTRIBUTED, outcome)
+            otherwise = OnlyIf([*closest, loosened], outcome.unsolved)
+            calls = [*rows, begun, *at_once, otherwise]
             self._find_forces = state.plan(calls).call()
-        # It again, with the rows as they are, those of the contacts too
-        self._again = state.plan(nearest(standing=False, warm=False)).call()
-        least = optimum(soft, none, soft_memory, RELAXED, warm=False)
-        self._least_violation = state.plan(least).call()
 
     def nearest_if(
         self, condition: Indices, before: PartCall, rows: BarrierRows | None
@@ -303,78 +342,28 @@ class LimitedStep:
         self, redistribute: bool, barriers: Barriers
     ) -> tuple[Status | None, float]:
         """Write the nearest to what the law wants to `result`."""
-        where = {}
         if barriers or self._used:
-            where = self._write_barriers(barriers, self._wanted.acceleration)
+            self._write_barriers(barriers, self._wanted.acceleration)
         (self._find_forces if redistribute else self._find_nearest)()
-        if self._outcome.unsolved.item():
-            return self._relax(where)
-        return _STATUS[self._outcome.status.item()], 0.0
+        return (None, np.inf) if self._outcome.unsolved.item() else self.found()
 
-    def _write_barriers(
-        self, barriers: Barriers, acceleration: Array
-    ) -> dict[str, Indices]:
-        """Write the rows of the barriers; return where they are, by kind."""
+    def found(self) -> tuple[Status, float]:
+        """Return what was solved, and the largest violation of a relaxed limit."""
+        status = _STATUS[self._outcome.status.item()]
+        return status, self.relaxation.item() if status is RELAXED else 0.0
+
+    def _write_barriers(self, barriers: Barriers, acceleration: Array) -> None:
+        """Write the rows of the barriers."""
         A, end, lower = self._rows.A, self._rows.end, self._rows.lower
-        n, r, where = len(acceleration), self._barriers, {}
+        r = self._barriers
         for kind, (rows, least) in barriers.items():
-            place = np.arange(r, r + len(least))
-            A[place, :n] = rows
-            end[place] = n
-            lower[place] = least - rows @ acceleration
-            where[kind] = place
+            place, number = slice(r, r + len(least)), np.array([len(least)])
+            given = BarrierRows(number, np.ascontiguousarray(rows), least)
+            at = {"A": A[place], "end": end[place], "lower": lower[place]}
+            # By the call of a step in one call: not even the last bit differs.
+            engine.PlaceRows(rows=given, a=acceleration, **at)()
+            self._softness[place] = _SOFTNESS[kind]
             r += len(least)
         unused = slice(r, self._barriers + self._used)
         end[unused], lower[unused] = 0, -np.inf
         self._used = r - self._barriers
-        return where
-
-    def _relax(self, barriers: dict[str, Indices]) -> tuple[Status | None, float]:
-        """Relax the limits as little as possible, and solve again."""
-        # Contacts are kept longest, then barriers, then joint motion, see
-        # `_RELAXATION_COST`.
-        A, end = self._rows.A, self._rows.end
-        lower, upper = self._rows.lower, self._rows.upper
-        contacts = self._contacts
-        A[contacts, : self._J.shape[1]] = self._J
-        end[contacts] = self._J.shape[1]
-        lower[contacts] = upper[contacts] = 0.0
-        try:
-            soft = {"contacts": contacts, "motion": self._motion, **barriers}
-            relaxation = self._loosen(soft)
-            if not np.isfinite(relaxation):
-                return None, np.inf
-            # If rounding leaves no room within the relaxed limits, the result is what
-            # violates them least.
-            self._again()
-            return Status.RELAXED, relaxation
-        finally:
-            end[contacts] = 0
-            lower[contacts], upper[contacts] = -np.inf, np.inf
-
-    def _loosen(self, soft: Mapping[str, Indices]) -> float:
-        """Widen soft rows as little as the others permit; return the largest violation.
-
-        It is inf if the solver finds none.
-        """
-        A, lower, upper = self._rows.A, self._rows.lower, self._rows.upper
-        self._soft[:] = 0.0
-        for kind, rows in soft.items():
-            self._soft[rows] = _RELAXATION_COST[kind] ** -0.5
-        self._x[:] = 0.0
-        found = np.full_like(self._x, np.nan)
-        for _ in range(_ROUNDS):
-            self._least_violation()
-            if self._outcome.unsolved.item():
-                break
-            found[:] = self._x
-        if not np.isfinite(found).all():
-            return np.inf
-        where = np.concatenate([*soft.values()])
-        reached = np.concatenate([A @ found, found])[where]
-        low, high = lower[where], upper[where]
-        slack = 1e-7 * (1.0 + np.abs(reached))
-        lower[where] = np.minimum(low, reached - slack)
-        upper[where] = np.maximum(high, reached + slack)
-        beyond = np.maximum(low - reached, reached - high)
-        return float(np.maximum(beyond, 0.0).max(initial=0.0))

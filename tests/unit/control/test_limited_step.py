@@ -20,7 +20,9 @@ from hsp_control.control.actuation.limited_step import Barriers
 seeds = st.integers(0, 2**32 - 1)
 
 
-def arm(strength: float = 0.5, **options: Any) -> hsp.Controller:
+def arm(
+    strength: float = 0.5, static: float | str = "none", **options: Any
+) -> hsp.Controller:
     """Return a weak arm whose posture is less important than its hand."""
     path = hsp.Circle(0.2, 4.0, [0.45, 0.0, 0.45], normal=[0.0, 0.0, 1.0])
     gains = hsp.Gains(natural_frequency=10.0)
@@ -29,7 +31,7 @@ def arm(strength: float = 0.5, **options: Any) -> hsp.Controller:
         panda().home(), gains=gains, joints=["panda_joint1"], name="j1", priority=2
     )
     field = 20.0 * hsp.JointCentering()
-    limits = hsp.Limits(effort=Scaled(strength), static_effort="none")
+    limits = hsp.Limits(effort=Scaled(strength), static_effort=static)
     return hsp.Controller(panda(), [hand, elbow], field, limits=limits, **options)
 
 
@@ -183,6 +185,19 @@ def test_distances_are_relaxed_less_than_motion_and_motion_less_than_holding() -
     assert (a[5] + 5.0) / (5.0 - a[5]) == pytest.approx(300.0, rel=1e-2)
 
 
+def test_a_violation_does_not_depend_on_how_far_what_is_wanted_is() -> None:
+    """All other unknowns cost 1e-6, which fades: else it would shift a by 0.01."""
+    made, far = arm(), -1e4
+    made.compute(0.0, panda().home(), np.zeros(7))
+    bounds, first = actuation_of(made)._limits.bounds, np.eye(7)[5]
+    bounds.tau_lower[:], bounds.tau_upper[:] = -np.inf, np.inf
+    bounds.a_upper[5], bounds.a_lower[5] = far, -np.inf
+    _, a, _, status, _ = repeated(made, {"holding": row(first, far + 1.1)})
+    assert status == Status.RELAXED
+    # The costs 1 and 0.1 share the 1.1 rad/s²; rows are widened by 1e-7 of a more.
+    assert a[5] - far == pytest.approx(0.1, abs=2e-3)
+
+
 def test_contacts_are_relaxed_less_than_distances() -> None:
     made = drawn("whole_body/solo12_trunk", 1, 0.0)
     stack = made.active_stack
@@ -199,10 +214,14 @@ def test_contacts_are_relaxed_less_than_distances() -> None:
     np.testing.assert_allclose(found, a, atol=1e-7)
 
 
-@pytest.mark.parametrize("strength", [0.7, 0.01])
-def test_one_native_call_is_the_same_as_its_parts(strength: float) -> None:
+@pytest.mark.parametrize(
+    ("strength", "static"), [(0.7, "none"), (0.01, "none"), (0.2, 0.9)]
+)
+def test_one_native_call_is_the_same_as_its_parts(
+    strength: float, static: float | str
+) -> None:
     """A modifier that changes nothing takes the other way: check, and then deliver."""
-    made, rng, seen = arm(strength), np.random.default_rng(0), set()
+    made, rng, seen = arm(strength, static), np.random.default_rng(0), set()
     for k in range(60):
         if k == 30:  # another stack is prepared, for later
             made.prepare(made.state, without=["j1"])
@@ -218,3 +237,18 @@ def test_one_native_call_is_the_same_as_its_parts(strength: float) -> None:
         np.testing.assert_array_equal(once.tau, parts.tau)
         np.testing.assert_array_equal(once.acceleration, parts.acceleration)
     assert {Status.LIMITED, Status.RELAXED if strength < 0.5 else Status.EXACT} <= seen
+
+
+def test_a_step_is_not_the_result_of_an_earlier_qp() -> None:
+    """Without limits nothing is checked; the QP is solved where a foot would slip."""
+    loaded = hsp.load_experiment("whole_body/solo12_trunk", "limits=none")
+    made, rng, seen = loaded.controller, np.random.default_rng(0), []
+    made.compute(0.0, loaded.q0, loaded.v0)
+    for spread in 10 * [1.0, 0.0]:
+        v = loaded.v0 + spread * rng.standard_normal(made.robot.nv)
+        out = made.compute(0.0, loaded.q0, v)
+        parts = made.compute(0.0, loaded.q0, v, modifier=lambda _, __, a: (a, None))
+        seen.append(out.status)
+        assert out.status is parts.status
+        np.testing.assert_array_equal(out.tau, parts.tau)
+    assert {Status.EXACT, Status.LIMITED} <= set(seen)
