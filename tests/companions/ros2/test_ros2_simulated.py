@@ -6,6 +6,7 @@ from threading import Event, Thread
 import numpy as np
 import pytest
 from live_rigs import PERIOD, law, panda, watched
+from played import wait_until
 from ros2_rigs import DOMAIN, fresh
 
 from hsp_control.companions.ros2.hardware import Ros2Hardware
@@ -91,6 +92,31 @@ def test_a_wrong_effort_stops_the_robot(
     send([0.0] * 7)
     mistake(send, served)
     assert reason in served.ended()
+    assert served.robot.phase == Phase.HOLDING
+
+
+class OddError(BaseException):
+    """What only a bare ``except`` or one of `BaseException` catches."""
+
+
+@pytest.mark.parametrize("function", ["efforts", "send"])
+@pytest.mark.parametrize("raised", [OddError, MemoryError, GeneratorExit])
+def test_whatever_a_topic_raises_stops_the_robot(
+    served: Served,
+    function: str,
+    raised: type[BaseException],
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    publisher = served.sender()
+    publisher.send(Float64MultiArray(MultiArrayLayout(), [0.0] * 7))
+    wait_until(lambda: served.robot.phase == Phase.RUNNING)
+
+    def fails(*_: object) -> None:
+        raise raised("why")
+
+    monkeypatch.setattr(RobotTopics, function, fails)
+    publisher.send(Float64MultiArray(MultiArrayLayout(), [0.0] * 7))
+    assert served.ended() == f"{raised.__name__}: why"
     assert served.robot.phase == Phase.HOLDING
 
 

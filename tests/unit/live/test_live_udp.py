@@ -253,6 +253,49 @@ def test_a_robot_that_nobody_wants_or_whose_parent_dies_ends() -> None:
     link.close()
 
 
+class OddError(BaseException):
+    """What only a bare ``except`` or one of `BaseException` catches."""
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("raised", [OddError, MemoryError, SystemExit, GeneratorExit])
+@pytest.mark.parametrize("what", ["row", "receive", "send"])
+def test_whatever_is_raised_around_a_served_robot_stops_it(
+    what: str, raised: type[BaseException], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Its cameras, its log, its line: it brakes, is held, and then it ends."""
+    hardware = UdpHardware(panda(), PERIOD)
+    robot = watched()
+    link = Link(hardware.session, peer=hardware.address)
+    tau = panda().inverse_dynamics(start(), np.zeros(7), np.zeros(7))
+    rows: list[float] = []
+
+    def pilot() -> None:
+        if hardware.read(0.0) is not None:
+            hardware.write(tau)
+
+    def row(t: float, *_: object) -> None:
+        rows.append(t)
+        if len(rows) == 20 and what != "row":
+            monkeypatch.setattr(link, what, fails)
+        if len(rows) == 20 and what == "row":
+            raise raised("why")
+
+    def fails(*_: object, **__: object) -> None:
+        raise raised("why")
+
+    after: list[float] = []
+    told = [row, lambda t, *_: after.append(t)]
+    serve(robot, link, stop_reason=pilot, on_rows=told)  # type: ignore[arg-type]
+    assert robot.reason.endswith(f": {raised.__name__}: why")
+    assert robot.done
+    if what == "row":
+        assert (len(rows), len(after)) == (20, 19)
+    hardware.close()
+    hardware.drain()
+    link.close()
+
+
 def test_our_own_packets_that_come_back_are_foreign() -> None:
     """A switch that mirrors, or a second socket: states go on to count."""
     robot = Link(7, hears=PacketKind.EFFORT)
