@@ -22,6 +22,7 @@ from tornado.httpserver import HTTPServer
 from tornado.web import Application, HTTPError, RequestHandler
 from tornado.websocket import WebSocketClosedError, WebSocketHandler
 
+from hsp_control.common.host_names import check_host_name
 from hsp_control.companions.viewer.commands import (
     PLAY,
     LatestCommands,
@@ -361,6 +362,7 @@ def _listen(host: str, port: int) -> socket.socket:
     candidates = (port,) if port else PORTS
     for candidate in candidates:
         try:
+            check_host_name(host)
             listener = socket.create_server((host, candidate))
         except OSError as error:
             number = error.errno or 0
