@@ -7,7 +7,14 @@ from pathlib import Path
 
 import pytest
 
-from hsp_control.common.exceptions import LogError, StreamError
+from hsp_control.common.exceptions import (
+    ConfigError,
+    LogError,
+    StreamError,
+    SweepError,
+)
+from hsp_control.companions.sweeps.parquet import read_parquet
+from hsp_control.declaration.imported import import_file
 from hsp_control.simulation import Rollout
 from hsp_control.simulation.journal import JournalReader
 from hsp_control.trajectories.streams.mailbox import read_recording
@@ -105,3 +112,8 @@ def test_what_never_ends_is_no_log_and_no_recording(kind: str, tmp_path: Path) -
         JournalReader(path).read()
     with pytest.raises(StreamError, match="no file, but a folder, a device or a pipe"):
         read_recording(path)
+    with pytest.raises(ConfigError, match=r"a device or a pipe, .*; needs a \.py file"):
+        import_file(path)
+    pytest.importorskip("pyarrow")
+    with pytest.raises(SweepError, match="a device or a pipe"):
+        read_parquet(path)
