@@ -232,6 +232,30 @@ def test_efforts_that_answer_old_states_are_nobody_s() -> None:
 
 
 @pytest.mark.slow
+@pytest.mark.parametrize(("lag", "in_time"), [(9, True), (10, False)])
+def test_an_effort_may_answer_a_state_as_old_as_the_watchdog_waits(
+    lag: int, in_time: bool
+) -> None:
+    """What answers a state comes a period later, so a lag of nine is an age of ten."""
+    receiver, robot = Link(7), watched(LiveSettings(watchdog=10))
+    link = Link(7, peer=receiver.address)
+    tau = panda().inverse_dynamics(start(), np.zeros(7), np.zeros(7))
+    states: list[int] = []
+
+    def pilot() -> str | None:
+        states.extend(packet.sequence for packet in receiver.receive(0.0))
+        if states:
+            receiver.newest = max(states[-1] - lag, 0)
+            receiver.send(PacketKind.EFFORT, tau)
+        return "enough" if len(states) > 60 else None
+
+    served = serve(robot, link, stop_reason=pilot)
+    assert (served.outdated == 0) == in_time
+    receiver.close()
+    link.close()
+
+
+@pytest.mark.slow
 def test_a_robot_that_nobody_wants_or_whose_parent_dies_ends() -> None:
     hardware = UdpHardware(panda(), PERIOD)
     link = Link(hardware.session, peer=hardware.address)
