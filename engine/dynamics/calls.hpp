@@ -168,11 +168,7 @@ struct CentroidalMotion {
     void prepare(const Sizes& size) { setZero(6, size('n')); }
   } A, A_dot;
 
-  void check() const {
-    check_sizes(*dynamics.object, q.size(), v.size());
-    if (dynamics->columns() != dynamics->size())
-      throw std::invalid_argument("a robot with joints that follow others has no centroidal map");
-  }
+  void check() const { check_sizes(*dynamics.object, q.size(), v.size()); }
   void operator()() {
     Vector3 c;
     dynamics->centroidal_map(q, v, c, {A.data(), 6, A.cols()}, {A_dot.data(), 6, A.cols()});

@@ -82,7 +82,7 @@ class Dynamics {
   bool forward_dynamics(const ConstVector& q, const ConstVector& v, const ConstVector& tau,
                         Eigen::Map<Vector> a);
   // The centroidal map: A v = (momentum, angular momentum about the centre of mass c), and A'
-  // about a point at rest. Not of models with followers.
+  // about a point at rest.
   void centroidal_map(const ConstVector& q, const ConstVector& v, Vector3& c, Jacobian A,
                       Jacobian A_dot);
 

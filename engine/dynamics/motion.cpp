@@ -1,7 +1,9 @@
-// Kinematics, the inverse dynamics, and the mass matrix.
+// Kinematics, the inverse dynamics, the mass matrix, and the momentum of followers.
 #include <pinocchio/algorithm/crba.hpp>
 #include <pinocchio/algorithm/jacobian.hpp>
 #include <pinocchio/algorithm/rnea.hpp>
+
+#include <hsp/rotations.hpp>
 
 #include "pinocchio.hpp"
 
@@ -36,5 +38,38 @@ const Dynamics::Pinocchio::Data::MatrixXs& Dynamics::Pinocchio::mass_matrix(cons
 }
 
 void Dynamics::mass_matrix(const ConstVector& q, Square M) { M = pinocchio_->mass_matrix(q); }
+
+// Pinocchio's own takes each joint for columns of v. Here a joint's columns are I J, with the
+// inertia I of all that the joint carries, at the world's origin (Orin, Goswami and Lee 2013,
+// by composite bodies), and those of a follower count for its leader. Then about the centre.
+Vector3 Dynamics::Pinocchio::map_of_followers(const ConstVector& q, const ConstVector& v,
+                                              Jacobian A, Jacobian A_dot) {
+  pin::computeJointJacobiansTimeVariation(model, data, q, v);
+  auto& carried = data.oYcrb;
+  auto& rate = data.doYcrb;
+  carried[0].setZero();
+  for (int i = 1; i < model.njoints; ++i) {
+    carried[i] = data.oMi[i].act(model.inertias[i]);
+    rate[i] = carried[i].variation(data.oMi[i].act(data.v[i]));
+  }
+  A.setZero();
+  A_dot.setZero();
+  for (int i = model.njoints - 1; i > 0; --i) {
+    const auto& joint = model.joints[i];
+    const Eigen::Matrix<double, 6, 6> I = carried[i].matrix();
+    for (int k = 0; k < joint.nvExtended(); ++k) {
+      const auto J = data.J.col(joint.idx_vExtended() + k);
+      const auto J_dot = data.dJ.col(joint.idx_vExtended() + k);
+      A.col(joint.idx_v() + k) += I * J;
+      A_dot.col(joint.idx_v() + k) += rate[i] * J + I * J_dot;
+    }
+    carried[model.parents[i]] += carried[i];
+    if (model.parents[i] > 0) rate[model.parents[i]] += rate[i];
+  }
+  const Vector3 c = carried[0].lever();
+  A.bottomRows<3>() -= skew(c).lazyProduct(A.topRows<3>());
+  A_dot.bottomRows<3>() -= skew(c).lazyProduct(A_dot.topRows<3>());
+  return c;
+}
 
 }  // namespace hsp

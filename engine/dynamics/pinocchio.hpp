@@ -61,6 +61,8 @@ struct Dynamics::Pinocchio {
   bool has_followers() const { return !model.mimicking_joints.empty(); }
   const Data::MatrixXs& mass_matrix(const ConstVector& q);  // both triangles
   void write_rate_by_differences(const ConstVector& q, const ConstVector& v, Square M_dot);
+  // A and A' of `centroidal_map`, of models with followers; returns the centre of mass.
+  Vector3 map_of_followers(const ConstVector& q, const ConstVector& v, Jacobian A, Jacobian A_dot);
   // q ⊕ h v, until the next call.
   ConstVector moved(const ConstVector& q, const ConstVector& v, double h);
 };

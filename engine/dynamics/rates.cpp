@@ -64,6 +64,10 @@ bool Dynamics::forward_dynamics(const ConstVector& q, const ConstVector& v, cons
 void Dynamics::centroidal_map(const ConstVector& q, const ConstVector& v, Vector3& c, Jacobian A,
                               Jacobian A_dot) {
   auto& data = pinocchio_->data;
+  if (pinocchio_->has_followers()) {
+    c = pinocchio_->map_of_followers(q, v, A, A_dot);
+    return;
+  }
   data.vcom[0].setZero();  // it reads this, and writes it later
   pin::computeCentroidalMapTimeVariation(pinocchio_->model, data, q, v);
   c = data.com[0];

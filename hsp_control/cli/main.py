@@ -8,7 +8,7 @@ from typing import Any
 
 from hsp_control.cli.interrupts import INTERRUPTED, end_in_order
 from hsp_control.cli.options import AddedCommand, command_line
-from hsp_control.cli.streams import make_usable
+from hsp_control.cli.streams import lost_text, make_usable
 from hsp_control.common.exceptions import HspControlError
 
 _OWN_FILES = {"check", "doctor", "live"}
@@ -44,7 +44,11 @@ def main(arguments: Sequence[str] | None = None) -> int:
         from hsp_control.declaration.language import in_yaml
 
         with in_yaml(), consoles.warnings_printed():
-            return int(run(options))
+            status = int(run(options))
+        if why := lost_text():
+            print(f"hsp: standard output: {why}", file=sys.stderr)
+            return FAILURE
+        return status
     except HspControlError as error:
         print(f"hsp: {consoles.message_of(error)}", file=sys.stderr)
     except ImportError as error:  # Pinocchio's wheel links what slim systems lack
@@ -54,8 +58,6 @@ def main(arguments: Sequence[str] | None = None) -> int:
         advice = _PACKAGES.get(library, "the package of your system that has it")
         missing = f"hsp: {library} is missing on this system: install {advice}"
         print(missing, file=sys.stderr)
-    except BrokenPipeError:  # `hsp schema | head`
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
     except OSError as error:
         where = "" if error.filename is None else f"{error.filename!s:.200}: "
         print(f"hsp: {where}{error.strerror or error}", file=sys.stderr)

@@ -116,7 +116,10 @@ class RobotProcess:
             answer = self.process.stdout.readline() if ready else b""
         except OSError:
             pass
-        if (reply := answer.decode().strip()) != READY:
+        except BaseException:  # Ctrl-C, say: nobody else ends the process
+            self.close()
+            raise
+        if (reply := answer.decode(errors="replace").strip()) != READY:
             self.close()
             late = "" if ready else f" in {timeout:g} s"
             raise HardwareError(reply or f"the simulated robot did not start{late}")

@@ -1,15 +1,62 @@
-"""Standard streams that a command can write to: closed ones, and those in ASCII."""
+"""Standard streams that a command can write to: closed ones, in ASCII, or full."""
 
+import errno
 import os
 import sys
+from collections.abc import Callable
 from contextlib import suppress
+from typing import Any
 
 _WRITTEN = "·µ°≤→"
 """Characters of our output; where one has no place, a question mark stands for it."""
 
 
+class LastingStream:
+    """A standard stream for as long as somebody takes its text; then it leads nowhere.
+
+    A pipe may lose its reader (``hsp live ... | head``), a disk may be full: that must
+    not end a run, and lose its log.
+
+    Attributes:
+        failure: Why text was lost; None if none was, or its reader has gone.
+    """
+
+    def __init__(self, stream: Any, number: int) -> None:
+        """Store the stream, and the number of its file."""
+        self._stream, self._number = stream, number
+        self.failure: str | None = None
+
+    def write(self, text: str) -> int:
+        """Write a text."""
+        self._try(lambda: self._stream.write(text))
+        return len(text)
+
+    def flush(self) -> None:
+        """Write what is kept."""
+        self._try(self._stream.flush)
+
+    def _try(self, function: Callable[[], object]) -> None:
+        try:
+            function()
+        except OSError as error:
+            if error.errno != errno.EPIPE:
+                self.failure = error.strerror
+            nothing = os.open(os.devnull, os.O_WRONLY)
+            os.dup2(nothing, self._number)
+            os.close(nothing)
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(self._stream, name)
+
+
+def lost_text() -> str | None:
+    """Return why standard output has lost text; None if it has not."""
+    sys.stdout.flush()
+    return getattr(sys.stdout, "failure", None)
+
+
 def make_usable() -> None:
-    """Let closed streams lead nowhere, and others take any text.
+    """Let closed streams lead nowhere, and others take any text while they can.
 
     A file that is opened would else get the number of a closed stream, and what
     libraries print would stand in it.
@@ -34,3 +81,14 @@ def make_usable() -> None:
             except (UnicodeEncodeError, LookupError):
                 with suppress(OSError, ValueError):
                     stream.reconfigure(errors="replace")
+        if number and _is_standard(getattr(sys, name), number):
+            setattr(sys, name, LastingStream(getattr(sys, name), number))
+
+
+def _is_standard(stream: Any, number: int) -> bool:
+    """Return whether a stream is the process's own, and not yet a lasting one."""
+    try:
+        own = stream.fileno() == number
+    except (OSError, ValueError, AttributeError):
+        return False
+    return own and not isinstance(stream, LastingStream)

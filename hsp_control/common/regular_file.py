@@ -3,6 +3,17 @@
 from errno import EINVAL
 from pathlib import Path
 
+_ENDLESS = "a device or a pipe, which may never end"
+
+
+def why_no_file(path: Path) -> str:
+    """Return why what is at a path cannot be read as a file, in words."""
+    return _ENDLESS if _is_endless(path) else "no such file"
+
+
+def _is_endless(path: Path) -> bool:
+    return path.exists() and not (path.is_file() or path.is_dir())
+
 
 def check_ends(path: Path) -> None:
     """Check that what is at a path, if anything is, ends when it is read.
@@ -10,5 +21,5 @@ def check_ends(path: Path) -> None:
     Raises:
         OSError: If it is a device or a pipe; reading one may never return.
     """
-    if path.exists() and not (path.is_file() or path.is_dir()):
-        raise OSError(EINVAL, "a device or a pipe, which may never end", str(path))
+    if _is_endless(path):
+        raise OSError(EINVAL, _ENDLESS, str(path))

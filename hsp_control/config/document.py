@@ -14,6 +14,7 @@ from hsp_control.common.exceptions import ConfigError, HspControlError
 from hsp_control.common.regular_file import check_ends
 from hsp_control.common.resources import bundled_configs, is_file
 from hsp_control.common.suggestions import did_you_mean, listing, nearest
+from hsp_control.config.recorded_scene import with_recorded_scene
 from hsp_control.config.streams import with_recordings
 from hsp_control.config.yaml_reader import (
     MAX_DEPTH,
@@ -248,7 +249,7 @@ def read_document(
     allow: Sequence[str | PathLike[str]] = (),
 ) -> Document:
     """Return the configuration's data with the location of each key."""
-    document = _read(source)
+    document = _read(source, strict)
     if strict:
         own = [] if isinstance(source, dict) else [Path(document.name).parent]
         document.access = only_within([*own, *packaged_folders(), *allow])
@@ -256,7 +257,7 @@ def read_document(
     return document
 
 
-def _read(source: str | PathLike[str] | dict[str, Any]) -> Document:
+def _read(source: str | PathLike[str] | dict[str, Any], strict: bool) -> Document:
     if isinstance(source, dict):
         return Document(source, {}, "configuration")
     if not isinstance(source, str | PathLike):
@@ -264,6 +265,8 @@ def _read(source: str | PathLike[str] | dict[str, Any]) -> Document:
     path = Path(source)
     if path.suffix in {".npz", ".journal"}:
         run = Rollout.load(path)
+        if not strict:  # an untrusted log writes no files
+            run = with_recorded_scene(run)
         if run.config is None:
             raise ConfigError(
                 f"{path}: this log was made from Python and contains no configuration"

@@ -146,7 +146,7 @@ class Scenario(Part, error=ConfigError):
     """A whole configuration."""
 
     _: KW_ONLY
-    title: str = ""
+    title: Annotated[str, Field(max_length=300)] = ""
     """One line that says what the configuration shows; the title of its plots."""
     description: str = ""
     """A longer description, for readers."""

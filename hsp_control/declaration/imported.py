@@ -10,6 +10,7 @@ from typing import Any
 from pydantic import BeforeValidator, WithJsonSchema
 
 from hsp_control.common.exceptions import ConfigError
+from hsp_control.common.regular_file import why_no_file
 from hsp_control.common.suggestions import did_you_mean, listing
 from hsp_control.declaration.language import spoken
 
@@ -29,7 +30,7 @@ def import_file(path: Path | str) -> None:
     path = Path(path)
     spec = spec_from_file_location(path.stem, path)
     if not path.is_file() or spec is None or spec.loader is None:
-        raise ConfigError(f"{path}: no such file; needs a .py file")
+        raise ConfigError(f"{path}: {why_no_file(path)}; needs a .py file")
     known = sys.modules.get(path.stem)
     if known is not None and known.__file__ != str(path):
         raise ConfigError(

@@ -34,6 +34,7 @@ import numpy as np
 
 from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import HardwareError, LiveError
+from hsp_control.common.host_names import check_host_name
 from hsp_control.common.suggestions import did_you_mean
 
 MAGIC, VERSION = b"HSPC", 1
@@ -249,6 +250,7 @@ class Link:
         with suppress(OSError):  # a smaller buffer works, too
             self._socket.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, _BUFFER)
         try:
+            check_host_name(address[0])
             self._socket.bind(address)
         except OSError as error:
             self._socket.close()

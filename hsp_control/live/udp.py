@@ -1,8 +1,8 @@
 """A robot that is connected by UDP: the loop's end, and that of a simulated one."""
 
 import secrets
-from collections.abc import Callable, Sequence
-from contextlib import suppress
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from time import monotonic, sleep
 from typing import NamedTuple
@@ -11,6 +11,7 @@ import numpy as np
 
 from hsp_control.common.arrays import Array
 from hsp_control.control.measurement import Inertial, Measurement
+from hsp_control.live.hardware import described
 from hsp_control.live.link import (
     LOOPBACK,
     Address,
@@ -190,6 +191,15 @@ Row = Callable[[float, Array, Array, bool], object]
 and whether it is the last one."""
 
 
+@contextmanager
+def _halting(robot: SimulatedRobot, what: str) -> Iterator[None]:
+    """Stop the robot at whatever is raised: nobody else would."""
+    try:
+        yield
+    except BaseException as error:
+        robot.halt(f"{what}: {described(error)}")
+
+
 def serve(
     robot: SimulatedRobot,
     link: Link,
@@ -206,6 +216,9 @@ def serve(
 
     If this process overruns by more than a period, the robot's time stands still
     meanwhile, so that the loop's efforts do not count as late.
+
+    Whatever the connection or ``on_rows`` raises stops the robot, too; none of
+    ``on_rows`` is called after that.
 
     Args:
         robot: The robot, waiting for its first effort.
@@ -232,14 +245,15 @@ def serve(
                 report.overrun += now - begin
                 begin = now
             efforts = []
-            for packet in link.receive(0.0):
-                if packet.kind is PacketKind.BYE:
-                    robot.halt(CLOSED_BY_LOOP)
-                elif packet.kind is PacketKind.EFFORT and len(packet.payload) == nv:
-                    if state_sequence - packet.acks > robot.watchdog:
-                        report.outdated += 1
-                    else:
-                        efforts.append(packet.payload)
+            with _halting(robot, "no effort can be received"):
+                for packet in link.receive(0.0):
+                    if packet.kind is PacketKind.BYE:
+                        robot.halt(CLOSED_BY_LOOP)
+                    elif packet.kind is PacketKind.EFFORT and len(packet.payload) == nv:
+                        if state_sequence - packet.acks > robot.watchdog:
+                            report.outdated += 1
+                        else:
+                            efforts.append(packet.payload)
             reason = stop_reason()
             if robot.phase == Phase.WAITING and not efforts:
                 if reason is not None or monotonic() > give_up or robot.halted:
@@ -249,12 +263,16 @@ def serve(
             t, q, v = robot.t, robot.q, robot.v
             robot.advance(efforts)
             state = sensors.pack(robot.measured())
-            with suppress(OSError):  # a line that fails loses packets
+            with _halting(robot, "no state can be sent"), suppress(OSError):
+                # A line that fails loses packets.
                 link.send(PacketKind.STATE, state, t=robot.t, phase=int(robot.phase))
             state_sequence = link.counts["sent"]
             done = robot.done
             if robot.t > t:
-                for on_row in on_rows:
-                    on_row(t, q, v, done)
+                rows, on_rows = on_rows, ()
+                with _halting(robot, "its period cannot be told"):
+                    for on_row in rows:
+                        on_row(t, q, v, done)
+                    on_rows = rows
             if done:
                 return report

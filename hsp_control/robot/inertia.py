@@ -8,8 +8,6 @@ import pinocchio as pin
 
 from hsp_control import engine
 from hsp_control.common.arrays import Array, Indices, read_only_view
-from hsp_control.common.exceptions import ModelError
-from hsp_control.common.suggestions import listing
 from hsp_control.engine import Dynamics
 from hsp_control.engine.plans import Once, PartCall, PartCalls
 from hsp_control.robot.kinematics import PointMotion, Term
@@ -48,12 +46,6 @@ class CentroidalMotion:
         stamp: Indices,
     ) -> None:
         """Allocate the arrays; `calls` take the values that q and v have then."""
-        if mimics := [model.names[index] for index in model.mimicking_joints]:
-            raise ModelError(
-                f"{model.name}: the centre of mass and the momentum do not support "
-                f"mimic joints, and {listing(map(repr, mimics))} are some; load the "
-                "robot with mimic=False"
-            )
         self._mass: Array = np.zeros(1)
         self.position: Array = np.zeros(3)
         self.velocity: Array = np.zeros(3)

@@ -14,10 +14,17 @@ from hsp_control.common.exceptions import (
     ModelError,
     RobotNotFoundError,
 )
+from hsp_control.common.resources import is_file
+from hsp_control.common.suggestions import listing
 from hsp_control.declaration.plain_data import plain_data
 from hsp_control.robot.description.access import ANYWHERE, Access, XmlError, read_xml
 from hsp_control.robot.description.loading import load_model, placement
-from hsp_control.robot.description.recorded_meshes import meshes_data, meshes_of
+from hsp_control.robot.description.mesh_files import find_file, places
+from hsp_control.robot.description.recorded_meshes import (
+    is_recorded,
+    recorded_meshes,
+    robot_meshes,
+)
 from hsp_control.robot.description.recorded_model import (
     model_data,
     model_of,
@@ -85,7 +92,7 @@ def _text_record(source: RobotSource) -> dict[str, Any]:
         "name": source.name,
         "file": str(source.urdf),
         "urdf": packed(text),
-        "meshes": meshes_data(source, text),
+        **robot_meshes(source, text),
         "root": source.root,
         "locked": dict(source.locked),
         "motor_inertia": dict(source.motor_inertia),
@@ -122,8 +129,8 @@ def recorded_robot(record: Any, access: Access = ANYWHERE) -> Robot:
     """Return the robot of a log.
 
     It is the one that the log was made with: where the file of its URDF says something
-    else today, a warning names it. Meshes are looked up beside that file, or in the
-    robot's package; else they are those of the log (`meshes_data`).
+    else today, a warning names it, and so it is with the meshes that the log contains.
+    Others are looked up beside that file, or in the robot's package.
 
     Args:
         record: What `robot_record` returned.
@@ -210,7 +217,9 @@ def _source(record: Mapping[str, Any], told: OneRobot, access: Access) -> RobotS
                 there.urdf,
             )
     urdf = Path(str(record["file"])) if there is None else there.urdf
-    return RobotSource(
+    # An untrusted log writes no files.
+    meshes = {} if access.strict else recorded_meshes(record)
+    source = RobotSource(
         name=str(record["name"]),
         urdf=urdf,
         root=record["root"],
@@ -223,6 +232,32 @@ def _source(record: Mapping[str, Any], told: OneRobot, access: Access) -> RobotS
         access=access,
         excluded=frozenset(frozenset(pair) for pair in record["excluded"]),
         expanded=text,
-        # An untrusted log writes no files.
-        meshes=() if access.strict else meshes_of(record.get("meshes", {})),
+        meshes=tuple(meshes.items()),
     )
+    _name_what_differs(source, record)
+    return source
+
+
+def _name_what_differs(source: RobotSource, record: Mapping[str, Any]) -> None:
+    """Warn of meshes that have changed since, and of those that nobody has."""
+    changed = [
+        name
+        for name, recorded in source.meshes
+        if (file := next(filter(is_file, places(source, name)), None))
+        and source.access.allows(file)
+        and not is_recorded(file, recorded)
+    ]
+    if changed:
+        _log.warning(
+            "%s: meshes have changed since the log was made: those of the log are "
+            "used: %s",
+            source.name, listing(changed),
+        )  # fmt: skip
+    left_out = record.get("left_out", {})
+    lacking = [name for name in left_out if find_file(source, name) is None]
+    if lacking:
+        _log.warning(
+            "%s: the log does not contain these meshes, and they are not on this "
+            "computer: %s",
+            source.name, listing(f"{name} ({left_out[name]})" for name in lacking),
+        )  # fmt: skip

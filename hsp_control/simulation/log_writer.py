@@ -21,10 +21,11 @@ from hsp_control.control.plan import RunningPlan
 from hsp_control.declaration.nested import parts_within, with_parts_replaced
 from hsp_control.declaration.plain_data import plain_data
 from hsp_control.geometry.scene import Obstacle, Scene
-from hsp_control.geometry.shapes import shape_to_log
+from hsp_control.geometry.shapes import Mesh, shape_to_log
 from hsp_control.law.problem import Record
 from hsp_control.null_space.metrics import FixedMetric
 from hsp_control.robot import Robot, RobotState
+from hsp_control.robot.description.recorded_meshes import mesh_data
 from hsp_control.robot.recorded import robot_record
 from hsp_control.simulation.journal import JournalWriter
 from hsp_control.simulation.limit_excess import VELOCITY, LimitExcess
@@ -120,6 +121,7 @@ class LogWriter:
         columns.lay_out()
         self._meta = dict(meta or {})
         self._robot_record = robot_record(robot)
+        self._meshes = _meshes_of(scene)
         self._journal = None if path is None else JournalWriter(path)
         self._headed: Array | None = None  # the row for which there is a heading
 
@@ -301,6 +303,7 @@ class LogWriter:
                 metric.W.tolist() if isinstance(metric, FixedMetric) else None
             ),
             "obstacles": {o.name: _obstacle_meta(o) for o in self._scene.values()},
+            **({"obstacle_meshes": self._meshes} if self._meshes else {}),
             "versions": versions(),
             **self._meta,
             **meta,
@@ -341,6 +344,13 @@ def _changes(controller: Controller) -> dict[str, Any]:
 
 def _as_recorded(stream: Streamed) -> Streamed:
     return replace(stream, source=None, messages=stream.record)
+
+
+def _meshes_of(scene: Scene) -> dict[str, Any]:
+    """Return the meshes of obstacles as JSON data; empty if there are none."""
+    shapes = [each.shape for each in scene.values() if isinstance(each.shape, Mesh)]
+    files = {str(shape.file): Path(shape.file) for shape in shapes}
+    return mesh_data("this scene", files) if files else {}
 
 
 def _obstacle_meta(obstacle: Obstacle) -> dict[str, Any]:

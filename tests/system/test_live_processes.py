@@ -21,6 +21,7 @@ from hsp_control import Rollout
 from hsp_control.cli import main
 from hsp_control.cli.robot_process import RobotProcess
 from hsp_control.common.exceptions import HardwareError, LiveError
+from hsp_control.companions.play.steering import PageProcess
 from hsp_control.live import Faults, LiveSettings, Phase, run_loop
 
 pytestmark = pytest.mark.process
@@ -209,6 +210,35 @@ def test_a_robot_that_cannot_start_says_so(tmp_path: Path) -> None:
     with pytest.raises(HardwareError, match=r"^the simulated robot: .*none"):
         robot.start()
     robot.close()
+
+
+@pytest.mark.parametrize("raised", [KeyboardInterrupt, SystemExit, MemoryError])
+def test_a_start_that_is_cut_short_leaves_no_process(
+    raised: type[BaseException], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Nobody else would end it: a context that did not begin does not end."""
+    robot = RobotProcess(hsp.load_experiment(CONFIG))
+    page = PageProcess(port=None, host="127.0.0.1", held=False)
+    started: list[int] = []
+
+    def fails(*_: object) -> None:
+        assert robot.process is not None
+        started.append(robot.process.pid)
+        raise raised
+
+    monkeypatch.setattr("hsp_control.cli.robot_process.select", fails)
+    with pytest.raises(raised), robot:
+        pass
+    assert gone(started[0])
+
+    def page_fails(self: PageProcess) -> None:
+        started.append(self._process.pid)
+        raise raised
+
+    monkeypatch.setattr(PageProcess, "_wait_for_address", page_fails)
+    with pytest.raises(raised), page:
+        pass
+    assert gone(started[1])
 
 
 @pytest.mark.parametrize(("options", "message"), [

@@ -21,6 +21,7 @@ from PIL import Image
 
 from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import HardwareError
+from hsp_control.common.host_names import check_host_name
 from hsp_control.common.suggestions import did_you_mean, listing
 from hsp_control.companions.mujoco.plant import MujocoEngine
 from hsp_control.simulation.plants import ImperfectPlant, Plant
@@ -105,6 +106,7 @@ def _serve(
     Thread(target=_end_with_parent, daemon=True).start()
     try:
         pictures = _Pictures(compiled, memory, lock)
+        check_host_name(host)
         server = _Drawer((host, port), _Handler)
         server.pictures = pictures
     except ImportError as error:

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from hsp_control.common.exceptions import HardwareError
+from hsp_control.common.host_names import check_host_name
 from hsp_control.common.suggestions import did_you_mean
 from hsp_control.companions.datagrams.targets import address_of
 from hsp_control.companions.shared import Rate, name_and_options, rate_of
@@ -56,6 +57,7 @@ def publish(address: str, source: EffortSource) -> "Teller":
     except ValueError as error:
         raise HardwareError(f"{where}: {error}") from None
     try:
+        check_host_name(to.host)
         found = socket.getaddrinfo(*to[:2], socket.AF_INET, socket.SOCK_DGRAM)
     except OSError as error:
         raise HardwareError(f"{where}: {error.strerror or error}") from None

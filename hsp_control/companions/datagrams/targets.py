@@ -12,6 +12,7 @@ from urllib.parse import urlsplit
 from weakref import ref
 
 from hsp_control.common.exceptions import StreamError
+from hsp_control.common.host_names import check_host_name
 from hsp_control.common.suggestions import did_you_mean
 from hsp_control.trajectories.streams.inbox import Inbox
 from hsp_control.trajectories.streams.message import Space, message_of, parsed
@@ -93,6 +94,7 @@ class _Port:
         self.reading = Lock()
         self._socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
         try:
+            check_host_name(address.host)
             self._socket.bind(address[:2])
         except OSError as error:
             self._socket.close()

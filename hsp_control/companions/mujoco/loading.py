@@ -17,6 +17,7 @@ from numpy.typing import ArrayLike
 
 from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import AccessError, ModelError, RobotNotFoundError
+from hsp_control.common.regular_file import why_no_file
 from hsp_control.common.suggestions import did_you_mean, listing
 from hsp_control.companions.mujoco.conversion import (
     body_shapes,
@@ -53,8 +54,9 @@ def compile_mjcf(path: Path, access: Access) -> Any:
     """Return the ``mujoco.MjModel`` of an MJCF file."""
     access.check(path, "mjcf")
     if not path.is_file():
-        near = sorted(file.name for file in path.parent.glob("*.xml"))
-        raise RobotNotFoundError(f"{path}: no such file{did_you_mean(path.name, near)}")
+        near = sorted(f.name for f in path.parent.glob("*.xml") if f.is_file())
+        why = why_no_file(path)
+        raise RobotNotFoundError(f"{path}: {why}{did_you_mean(path.name, near)}")
     top = _read(path)
     if top.tag != "mujoco":
         hint = "; give a URDF as name" if top.tag == "robot" else ""

@@ -286,7 +286,8 @@ class MujocoScene(PlantPart, type="mujoco_scene"):
         if description is None or description.mjcf is None:
             raise SimulationError(
                 f"{robot.name} is not declared by an MJCF, whose scene this plant "
-                "would be; declare it with robot: {mjcf: ...}, or choose the plant "
+                "would be (a log contains the robot, not the scene: its MJCF is "
+                "needed); declare it with robot: {mjcf: ...}, or choose the plant "
                 "mujoco, which is made of any robot"
             )
         model = compile_mjcf(Path(description.mjcf), robot.source.access)

@@ -71,18 +71,23 @@ class PageProcess:
             start_new_session=True,  # Ctrl-C reaches the loop only
         )
         self._there.close()
+        try:
+            self._wait_for_address()
+        except BaseException:  # Ctrl-C, say: nobody else ends the process
+            self._process.kill()
+            self.close()
+            raise
+        return self
+
+    def _wait_for_address(self) -> None:
         assert self._process.stdout is not None
         self._say(self._settings)
         ready, _, _ = select.select([self._process.stdout], [], [], START)
         if not ready:
-            self._process.kill()
-            self.close()
             raise ViewerError(f"the loop's page did not start within {START:g} s")
         self.url = self._process.stdout.readline().decode().strip()
         if not self.url:
-            self.close()
             raise ViewerError("the loop's page did not start")
-        return self
 
     def __exit__(self, *_: object) -> None:
         self.close()

@@ -13,6 +13,8 @@ from hsp_control.companions.ros2.hardware import JOINT_STATES
 from hsp_control.companions.ros2.joints import Joints
 from hsp_control.companions.ros2.messages import Float64MultiArray, JointState
 from hsp_control.companions.ros2.node import Node
+from hsp_control.live.hardware import described
+from hsp_control.live.operator_requests import OPERATOR
 from hsp_control.live.real_time import no_garbage_collection
 from hsp_control.live.safe_stop import Phase
 from hsp_control.live.simulated_robot import SimulatedRobot
@@ -128,13 +130,20 @@ def serve(
                 reason = CLOSED_BY_LOOP
             try:
                 efforts = topics.efforts(1 if lockstep else 1000)
-            except HardwareError as error:
-                reason = str(error)
+            except OPERATOR:
+                raise
+            except BaseException as error:  # Cyclone DDS may raise anything
+                reason = described(error)
             if reason is not None:
                 robot.halt(reason)
             robot.advance(efforts)
             stamp += step
-            topics.send(stamp, *robot.measure(), robot.tau)
+            try:
+                topics.send(stamp, *robot.measure(), robot.tau)
+            except OPERATOR:
+                raise
+            except BaseException as error:
+                robot.halt(described(error))
             if lockstep and robot.phase == Phase.RUNNING:
                 while not (topics.wait(_POLL) or topics.left or stop_reason()):
                     pass

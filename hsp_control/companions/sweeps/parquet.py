@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hsp_control.common.exceptions import SweepError
+from hsp_control.common.regular_file import check_ends
 from hsp_control.common.suggestions import did_you_mean
 from hsp_control.companions.sweeps.journal import journal_of
 
@@ -63,6 +64,7 @@ def read_parquet(path: Path) -> tuple[dict[str, NDArray[Any]], dict[str, Any]]:
     import pyarrow.parquet as pq
 
     try:
+        check_ends(path)
         with path.open("rb") as file:
             table = pq.read_table(file)
     except FileNotFoundError:

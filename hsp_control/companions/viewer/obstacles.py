@@ -1,5 +1,6 @@
 """Draws obstacles, those of a scene or of a log, and the solids of a plant."""
 
+import logging
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from itertools import product
 from typing import Any, NamedTuple
@@ -28,6 +29,8 @@ from hsp_control.geometry.enclosing import hull_corners
 from hsp_control.geometry.scene import Scene
 from hsp_control.geometry.shapes import Shape, shape_from_log
 from hsp_control.simulation import Rollout
+
+_log = logging.getLogger(__name__)
 
 ROOT = "/obstacles"
 _OPACITY, _PALE = 0.75, 0.05
@@ -203,19 +206,19 @@ def logged_shapes(rollout: Rollout) -> dict[str, Shape]:
     return {
         name: shape
         for name, about in rollout.meta.get("obstacles", {}).items()
-        if (shape := _logged_shape(about)) and f"obstacle.{name}" in rollout
+        if (shape := _logged_shape(name, about)) and f"obstacle.{name}" in rollout
     }
 
 
-def _logged_shape(about: Mapping[str, Any]) -> Shape | None:
+def _logged_shape(name: str, about: Mapping[str, Any]) -> Shape | None:
     """Return the shape that a log describes, or its bounding ball, or None."""
     try:
         shape = shape_from_log(str(about.get("shape")), about.get("parameters", {}))
         if shape is not None:
             shape.geometry()  # raises if a mesh's file no longer exists
             return shape
-    except SceneError:
-        pass
+    except SceneError as error:
+        _log.warning("obstacle %s: %s; a ball around it is drawn", name, error)
     radius = about.get("radius")
     return None if radius is None else shapes.Sphere(float(radius))
 

@@ -22,6 +22,7 @@ from tornado.httpserver import HTTPServer
 from tornado.web import Application, HTTPError, RequestHandler
 from tornado.websocket import WebSocketClosedError, WebSocketHandler
 
+from hsp_control.common.host_names import check_host_name
 from hsp_control.companions.viewer.commands import (
     PLAY,
     LatestCommands,
@@ -125,6 +126,12 @@ class Hub:
             mine = self.steering is page
             page.command(PLAY, "drive", type="play_drive", mine=mine, taken=taken)
 
+    def leave(self) -> "set[Page]":
+        """Return the pages that were open, and forget them."""
+        with self.lock:
+            pages, self.pages = self.pages, set()
+        return pages
+
     def notify(self) -> None:
         """Let pages get what is pending."""
         for page in self.pages:
@@ -148,6 +155,7 @@ class Page(WebSocketHandler):
         """Store the hub, and who is let in; called by Tornado."""
         self.hub, self._door = hub, door
         self.has_pending, self._ready = asyncio.Event(), asyncio.Event()
+        self._delivery: asyncio.Task[None] | None = None
         self.answered = 0
 
     def prepare(self) -> None:
@@ -162,6 +170,13 @@ class Page(WebSocketHandler):
 
     def open(self, *args: str, **kwargs: str) -> None:
         """Send the page the stage, which must not wait for meshes, then all else."""
+        try:
+            self._begin()
+        except BaseException:
+            self._leave()
+            raise
+
+    def _begin(self) -> None:
         hub = self.hub
         with hub.lock:
             self.pending = hub.scene.copy()
@@ -184,6 +199,9 @@ class Page(WebSocketHandler):
                 self.answered = max(self.answered, int(message))
         except ValueError as error:
             self.close(1008, str(error))
+        except BaseException:
+            self._leave()
+            raise
 
     def _hear(self, text: str) -> None:
         if len(text.encode()) > _LONGEST:
@@ -202,9 +220,15 @@ class Page(WebSocketHandler):
         """Remove the page."""
         with self.hub.lock:
             self.hub.pages.discard(self)
-        self._delivery.cancel()
+        if self._delivery is not None:
+            self._delivery.cancel()
         if self.hub.steering is self:
             self.hub.steer(None)
+
+    def _leave(self) -> None:
+        """Remove the page where Tornado would not, and hang up."""
+        self.on_close()
+        self.hang_up()
 
     def ask(self) -> None:
         """Request that the page returns a number once it shows all sent before."""
@@ -218,20 +242,22 @@ class Page(WebSocketHandler):
         self.has_pending.set()
 
     async def _deliver(self, commands: list[bytes]) -> None:
-        """Send the stage, and from then on what is pending."""
-        while True:
-            for message in batch_messages(commands):
-                self._ready.clear()
-                try:
+        """Send the stage, and from then on what is pending; hang up if that fails."""
+        try:
+            while True:
+                for message in batch_messages(commands):
+                    self._ready.clear()
                     await self.write_message(message, binary=True)
-                except WebSocketClosedError:
-                    return
-                # Meanwhile newer commands replace pending ones.
-                await self._ready.wait()
-            await self.has_pending.wait()
-            self.has_pending.clear()
-            with self.hub.lock:
-                commands = self.pending.pop_all()
+                    # Meanwhile newer commands replace pending ones.
+                    await self._ready.wait()
+                await self.has_pending.wait()
+                self.has_pending.clear()
+                with self.hub.lock:
+                    commands = self.pending.pop_all()
+        except WebSocketClosedError:
+            pass
+        finally:
+            self.hang_up()  # the page connects anew
 
     def hang_up(self) -> None:
         """Close the connection at once: the program ends, whatever the page does."""
@@ -261,8 +287,16 @@ class FileHandler(RequestHandler):
         self.finish(content)
 
 
+_CLOSING = 2.0
+"""Longest time in which connections are closed in order [s]."""
+
+
 class ServerThread:
-    """Serves the page, and what a hub has for pages, until it is closed."""
+    """Serves the page, and what a hub has for pages, until it is closed.
+
+    Attributes:
+        failure: What ended it before; None: nothing.
+    """
 
     def __init__(self, hub: Hub, door: Door, port: int, meshcat: Path) -> None:
         """Begin to listen; the thread ends with the program."""
@@ -280,23 +314,32 @@ class ServerThread:
         self._listener = _listen(door.host, port)
         own = self._listener.getsockname()[1]
         self.url = f"http://{door.host}:{own}/?key={door.key}"
+        self.failure: BaseException | None = None
         self._loop, self._end = asyncio.new_event_loop(), asyncio.Event()
         self._thread = Thread(target=self._run, name="page server", daemon=True)
         self._thread.start()
 
     def call(self, function: Callable[[], object]) -> None:
-        """Call a function in the thread, soon."""
-        self._loop.call_soon_threadsafe(function)
+        """Call a function in the thread, soon; if that has ended, nothing happens."""
+        with suppress(RuntimeError):  # its loop is closed
+            self._loop.call_soon_threadsafe(function)
 
     def close(self) -> None:
         """End the thread, and all connections; a second call does nothing."""
-        with suppress(RuntimeError):  # its loop is closed
-            self.call(self._end.set)
+        self.call(self._end.set)
         self._thread.join()
 
     def _run(self) -> None:
-        with asyncio.Runner(loop_factory=lambda: self._loop) as runner:
-            runner.run(self._serve())
+        """Serve; whatever is raised, what is open is closed, and `failure` says it."""
+        try:
+            with asyncio.Runner(loop_factory=lambda: self._loop) as runner:
+                runner.run(self._serve())
+        except BaseException as error:
+            self.failure = error
+        finally:
+            self._listener.close()
+            for page in self._hub.leave():
+                page.hang_up()
 
     async def _serve(self) -> None:
         server = HTTPServer(
@@ -309,15 +352,17 @@ class ServerThread:
         server.add_socket(self._listener)
         await self._end.wait()
         server.stop()
-        for page in list(self._hub.pages):
+        for page in self._hub.leave():
             page.hang_up()
-        await server.close_all_connections()
+        with suppress(TimeoutError):  # the loop closes what is left
+            await asyncio.wait_for(server.close_all_connections(), _CLOSING)
 
 
 def _listen(host: str, port: int) -> socket.socket:
     candidates = (port,) if port else PORTS
     for candidate in candidates:
         try:
+            check_host_name(host)
             listener = socket.create_server((host, candidate))
         except OSError as error:
             number = error.errno or 0

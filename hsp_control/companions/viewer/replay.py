@@ -14,6 +14,7 @@ from hsp_control.companions.viewer.viewer import Viewer
 from hsp_control.config.document import Document
 from hsp_control.config.experiment import build
 from hsp_control.config.loaded_scenario import load_robot, validate
+from hsp_control.config.recorded_scene import with_recorded_scene
 from hsp_control.config.scenario import Scenario
 from hsp_control.control.controller import Controller
 from hsp_control.declaration.language import check_kind
@@ -63,6 +64,8 @@ def robot_of(rollout: Rollout, access: Access = ANYWHERE) -> Robot:
 
 def rebuild_run(rollout: Rollout, name: str, access: Access = ANYWHERE) -> ComparedRun:
     """Return a log with its robot and, if it can be rebuilt, its controller."""
+    if not access.strict:  # an untrusted log writes no files
+        rollout = with_recorded_scene(rollout)
     for obstacle, about in rollout.meta.get("obstacles", {}).items():
         if file := about.get("parameters", {}).get("file"):
             access.check(Path(str(file)), f"{name}: obstacle {obstacle!r}: mesh")
@@ -159,7 +162,7 @@ def show(
     """
     check_kind("rollout is", rollout, Rollout, ViewerError)
     if robot is None:
-        _, robot, _, controller = rebuild_run(rollout, "the log")
+        _, robot, rollout, controller = rebuild_run(rollout, "the log")
     recorder = SceneRecorder()
     own = (rollout.config or {}).get("view", {})
     with Viewer(robot, transport=recorder, **{**own, **view}) as viewer:

@@ -14,6 +14,7 @@ from numpy.typing import ArrayLike
 
 from hsp_control.common.arrays import Array, Indices
 from hsp_control.companions.viewer.commands import Json, typed_array
+from hsp_control.robot.description.mesh_files import PICTURES
 
 
 def pose_at(position: ArrayLike) -> Array:
@@ -287,10 +288,6 @@ def color_number(color: str | Sequence[float]) -> int:
     return red << 16 | green << 8 | blue
 
 
-_PICTURES = {".bmp", ".gif", ".jpeg", ".jpg", ".png", ".tga", ".tif", ".tiff", ".webp"}
-"""Image files that a texture may name: other files must not get into a page."""
-
-
 def mesh_geometry(file: Path) -> Json:
     """Return an OBJ or STL file as a geometry without material."""
     kind = file.suffix.lower()[1:]
@@ -342,7 +339,7 @@ def _textures(file: Path, text: str) -> dict[str, str]:
     found = {}
     for name in names:
         image = file.parent / name.removeprefix("file://")
-        if image.suffix.lower() in _PICTURES and image.is_file():
+        if image.suffix.lower() in PICTURES and image.is_file():
             kind = mimetypes.guess_type(image.name)[0] or "image/png"
             content = base64.b64encode(image.read_bytes()).decode()
             found[name] = f"data:{kind};base64,{content}"

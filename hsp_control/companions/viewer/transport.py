@@ -153,6 +153,9 @@ class PageServer(SceneRecorder):
     def _check_open(self) -> None:
         if self._closed:
             raise ViewerError("the viewer is closed")
+        if (failure := self._thread.failure) is not None:
+            name, text = type(failure).__name__, str(failure)
+            raise ViewerError(f"the page's server has failed: {name} {text}".strip())
 
 
 def page_key(host: str) -> str:

@@ -27,6 +27,8 @@ CHECKED = {".stl", ".obj", ".dae"}
 
 Strict reading allows no other formats.
 """
+PICTURES = {".bmp", ".gif", ".jpeg", ".jpg", ".png", ".tga", ".tif", ".tiff", ".webp"}
+"""Image files that a texture may name: others must not get into a page or a log."""
 
 _PICTURE = re.compile(rb"<init_from[^>]*>([^<]*)<")
 _LIBRARY = re.compile(rb"^[ \t]*mtllib[ \t]+(.+)$", re.M)
@@ -54,10 +56,11 @@ def find_problem(file: Path) -> str:
 
 def candidates(source: RobotSource, name: str) -> list[Path]:
     """Return the paths that a file name in a URDF may mean; the first existing wins."""
-    return [*_places(source, name), *(f for n, f in source.meshes if n == name)]
+    return [*(f for n, f in source.meshes if n == name), *places(source, name)]
 
 
-def _places(source: RobotSource, name: str) -> list[Path]:
+def places(source: RobotSource, name: str) -> list[Path]:
+    """Return the paths on this computer that a file name in a URDF may mean."""
     scheme, _, rest = name.rpartition("://")
     if scheme in ("package", "model"):
         package, _, inside = rest.partition("/")
@@ -68,9 +71,9 @@ def _places(source: RobotSource, name: str) -> list[Path]:
 
 def find_file(source: RobotSource, name: str) -> Path | None:
     """Return what a file name in a URDF means; None if there is nothing."""
-    places = candidates(source, name)
-    file = next(filter(is_file, places), None)
-    return file or next(filter(_is_there, places), None)
+    known = candidates(source, name)
+    file = next(filter(is_file, known), None)
+    return file or next(filter(_is_there, known), None)
 
 
 def where_to_put(name: str) -> str:
@@ -90,12 +93,12 @@ def check_mesh_name(source: RobotSource, name: str, what: str, access: Access) -
     """Check that a file that a URDF names may be read, and the files it refers to."""
     if not access.strict:
         return
-    places = candidates(source, name)
-    found = [place for place in places if is_file(place)]
+    known = candidates(source, name)
+    found = [place for place in known if is_file(place)]
     named_outside = name.rpartition("://")[0] not in ("package", "model")
     # A missing file is reported later. But a path outside the allowed folders is an
     # error in any case, so that the message does not reveal which files exist there.
-    for place in found or (places[:1] if named_outside or ".." in name else []):
+    for place in found or (known[:1] if named_outside or ".." in name else []):
         access.check(place, what)
     for place in found:
         check_references(place, what, access)

@@ -32,9 +32,9 @@ _PER_VELOCITY = (
 )  # fmt: skip
 
 
-def packed(data: bytes) -> str:
-    """Return bytes as a short text."""
-    return base64.b85encode(zlib.compress(data, 9)).decode()
+def packed(data: bytes, level: int = 9) -> str:
+    """Return bytes as a short text; with a lower level quicker, and less short."""
+    return base64.b85encode(zlib.compress(data, level)).decode()
 
 
 def unpacked(text: str) -> bytes:

@@ -101,7 +101,7 @@ class RobotSource:
     omitted: tuple[str, ...] = ()
     # the URDF that xacro makes of the file; None if the file is the URDF
     expanded: str | None = None
-    # where meshes are that are not found: by their names in the URDF, those of a log
+    # the meshes of a log, by their names in the URDF
     meshes: tuple[tuple[str, Path], ...] = field(default=(), repr=False)
 
 

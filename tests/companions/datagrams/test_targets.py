@@ -15,6 +15,7 @@ import hsp_control as hsp
 from hsp_control import Stream
 from hsp_control.cli.live_experiment import of_a_robot
 from hsp_control.common.exceptions import StreamError
+from hsp_control.companions.datagrams.targets import opened
 from hsp_control.config.document import read_document
 from hsp_control.trajectories.streams.inbox import Inbox
 from hsp_control.trajectories.streams.message import Space
@@ -103,6 +104,11 @@ def test_a_second_sender_is_refused_until_the_first_is_silent(
 def test_a_wrong_address_is_named(source: str) -> None:
     with pytest.raises(StreamError, match=re.escape(f"{source!r}; needs udp://HOST")):
         Stream(source=source)
+
+
+def test_a_name_that_no_computer_can_have_is_told() -> None:
+    with pytest.raises(StreamError, match="cannot listen there: no name of a computer"):
+        opened(f"udp://{70 * 'ö'}:5005", Space(3, False))
 
 
 def test_a_port_in_use_is_told_and_streams_of_one_process_share_it(port: int) -> None:

@@ -34,6 +34,7 @@ class Answers:
         self.asked = b""
         self.efforts: list[Array] = []
         self.waiting = self.late = self.closed = False
+        self.last_words = ""
         self.fault: str | None = None
         self.t = 7.0
 
@@ -45,12 +46,13 @@ class Answers:
             self.efforts.append(np.array(client.REQUEST.unpack(message)[1:]))
 
     def receive(self, timeout: float) -> bytes | None:
+        self.fault = self.fault or self.last_words or None
         if self.fault is not None:
             raise HardwareError(self.fault)
         if self.late:
             return None
         self.waiting = False
-        self.t += 0.001
+        self.t = round(self.t + 0.001, 3)  # as the arm counts milliseconds
         numbers = np.concatenate([np.arange(7.0), np.zeros(7), APPLIED])
         return client.STATE.pack(b"S", self.t, *numbers.tolist())
 
@@ -107,6 +109,31 @@ def test_an_effort_answers_a_state() -> None:
         hardware.read(0.001)
     assert hardware.fault == "a reflex"
     hardware.close()
+    assert b"F" not in answers.asked
+
+
+def test_states_are_numbered_by_the_arm_s_time() -> None:
+    """Its clock counts milliseconds, in steps that no binary number is."""
+    hardware, _ = arm()
+    state(hardware)
+    state(hardware)
+    for k in range(1, 500):
+        hardware.write(APPLIED)
+        assert state(hardware).sequence == k
+
+
+def test_at_the_end_the_arm_says_why_it_did_not_answer() -> None:
+    hardware, answers = arm()
+    state(hardware)
+    state(hardware)
+    hardware.write(APPLIED)
+    answers.late = True
+    assert hardware.read(0.001) is None
+    assert hardware.fault is None
+    answers.last_words = "a reflex"
+    hardware.close()
+    assert hardware.fault == "a reflex"
+    assert answers.closed
     assert b"F" not in answers.asked
 
 

@@ -159,6 +159,23 @@ def test_a_faulty_message_is_a_reason_to_stop_once(
     assert after.v[0] == 0.25
 
 
+def test_a_fault_is_not_hidden_by_a_good_state_that_came_with_it(
+    rig: tuple[Rig, Ros2Hardware], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    made, hardware = rig
+    sender = hardware._sender
+    assert sender is not None
+    messages = [
+        joint_state(made.robot.stamp + k * MILLISECOND, v=[0.0] * (6 if k == 2 else 7))
+        for k in range(1, 4)
+    ]
+    taken = [ReceivedMessage(each, sender) for each in messages]
+    monkeypatch.setattr(hardware._subscription, "take", lambda: taken)
+    found = hardware.read(0.0)
+    assert found is not None
+    assert found.fault.endswith("has 7 names, and velocity has 6 numbers")
+
+
 def test_two_publishers_of_these_joints_are_a_reason_to_stop(
     rig: tuple[Rig, Ros2Hardware],
 ) -> None:
@@ -238,6 +255,7 @@ def test_a_robot_that_is_not_there_is_not_waited_for_in_silence() -> None:
 
 @pytest.mark.parametrize(("message", "reason"), [
     ({"step": 2 * MILLISECOND}, r"a state every 0.002 s; the loop's period is"),
+    ({"step": MILLISECOND // 2}, r"a state every 0.0005 s; the loop's period is"),
     ({"step": 0}, r"the stamps of the states do not increase"),
     ({"names": ("a",), "q": [0.0]}, r"no state of panda_joint1, .* arrived"),
     ({"names": NAMES[:3], "q": [0.0] * 3}, r"a message lacks panda_joint4, "),

@@ -6,8 +6,10 @@ from threading import Event, Thread
 import numpy as np
 import pytest
 from live_rigs import PERIOD, law, panda, watched
+from played import wait_until
 from ros2_rigs import DOMAIN, fresh
 
+from hsp_control.companions.ros2 import simulated
 from hsp_control.companions.ros2.hardware import Ros2Hardware
 from hsp_control.companions.ros2.messages import Float64MultiArray, MultiArrayLayout
 from hsp_control.companions.ros2.node import Node, TopicPublisher
@@ -91,6 +93,74 @@ def test_a_wrong_effort_stops_the_robot(
     send([0.0] * 7)
     mistake(send, served)
     assert reason in served.ended()
+    assert served.robot.phase == Phase.HOLDING
+
+
+class Listened:
+    """Topics without a wire: what is sent, by the clock of the test."""
+
+    commands, left = "/commands", False
+
+    def __init__(self, late_at: int, late: float) -> None:
+        self.now, self.late_at, self.late = 0.0, late_at, late
+        self.sent: list[tuple[int, float]] = []
+
+    def efforts(self, most: int) -> list[np.ndarray]:
+        return [np.zeros(7)]
+
+    def send(self, stamp: int, *_: object) -> None:
+        self.sent.append((stamp, self.now))
+        if len(self.sent) == self.late_at:
+            self.now += self.late
+
+    def sleep(self, seconds: float) -> None:
+        self.now += seconds
+
+
+@pytest.mark.parametrize("late", [0.004, 0.2])
+def test_stamps_go_on_where_the_process_did_not(
+    late: float, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A few periods are made up for; in many the robot stands, its clock does not."""
+    topics, robot = Listened(10, late), watched(PATIENT)
+    monkeypatch.setattr(simulated, "monotonic", lambda: topics.now)
+    monkeypatch.setattr(simulated, "sleep", topics.sleep)
+    reasons = iter([None] * 40)
+    serve(
+        robot,
+        topics,  # type: ignore[arg-type]
+        stop_reason=lambda: next(reasons, "enough"),
+    )
+    stamps, times = np.array(topics.sent[:40]).T
+    ahead = (stamps - stamps[0]) * 1e-9 - (times - times[0])
+    # At the end it is back in step, whether periods were made up for or left out.
+    assert abs(ahead[-1]) < 1.5 * PERIOD
+    steps = np.diff(stamps) * 1e-9
+    assert (steps.max() > 0.1) == (late > 0.1)
+
+
+class OddError(BaseException):
+    """What only a bare ``except`` or one of `BaseException` catches."""
+
+
+@pytest.mark.parametrize("function", ["efforts", "send"])
+@pytest.mark.parametrize("raised", [OddError, MemoryError, GeneratorExit])
+def test_whatever_a_topic_raises_stops_the_robot(
+    served: Served,
+    function: str,
+    raised: type[BaseException],
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    publisher = served.sender()
+    publisher.send(Float64MultiArray(MultiArrayLayout(), [0.0] * 7))
+    wait_until(lambda: served.robot.phase == Phase.RUNNING)
+
+    def fails(*_: object) -> None:
+        raise raised("why")
+
+    monkeypatch.setattr(RobotTopics, function, fails)
+    publisher.send(Float64MultiArray(MultiArrayLayout(), [0.0] * 7))
+    assert served.ended() == f"{raised.__name__}: why"
     assert served.robot.phase == Phase.HOLDING
 
 

@@ -315,6 +315,68 @@ def test_a_flood_is_no_more_than_its_newest_words(steered: PageServer) -> None:
     assert len(moves) < 100
 
 
+class OddError(BaseException):
+    """What only a bare ``except`` or one of `BaseException` catches."""
+
+
+@pytest.mark.parametrize("raised", [SystemExit, KeyboardInterrupt])
+def test_a_server_that_ends_by_itself_says_so_and_leaves_nothing(
+    steered: PageServer, raised: type[BaseException], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Its thread ends at these two; all others asyncio and Tornado catch."""
+
+    def fails(*_: object) -> None:
+        raise raised("why")
+
+    assert steered.url is not None
+    page = Steering(steered.url)
+    wait_until(lambda: page.drives() == (True, True))
+    monkeypatch.setattr("hsp_control.companions.viewer.page_server.Page._hear", fails)
+    page.say(do="go")
+    wait_until(lambda: steered._thread.failure)
+    page.join(20.0)
+    assert not page.is_alive()
+    for use in (
+        lambda: steered.send([]),
+        steered.messages,
+        lambda: steered.wait_for_page(0.0),
+    ):
+        with pytest.raises(ViewerError, match=f"has failed: {raised.__name__} why"):
+            use()
+    steered.wait_until_closed()
+    port = port_of(steered.url)
+    PageServer(port).close()
+    steered.close()
+
+
+@pytest.mark.parametrize("raised", [MemoryError, OddError])
+def test_a_page_that_cannot_be_served_is_not_open(
+    steered: PageServer,
+    raised: type[BaseException],
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """It is hung up on, also amid what it gets; others go on."""
+    assert steered.url is not None
+
+    def fails(*_: object) -> None:
+        raise raised
+
+    of = "hsp_control.companions.viewer.page_server."
+    for function in ("Page.ask", "batch_messages", "Page._hear"):
+        with monkeypatch.context() as patched:
+            patched.setattr(of + function, fails)
+            page = Steering(steered.url)
+            if function == "Page._hear":
+                wait_until(lambda page=page: page.drives())
+                page.say(do="go")
+            page.join(20.0)
+            assert not page.is_alive()
+        wait_until(lambda: not steered._hub.pages)
+        assert steered._hub.steering is None
+    after = Steering(steered.url)
+    wait_until(lambda: after.drives() == (True, True))
+
+
 def test_it_is_said_what_to_install(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(transport.importlib.util, "find_spec", lambda name: None)
     with pytest.raises(ViewerError, match="pip install meshcat"):
@@ -388,3 +450,5 @@ def test_importing_the_package_pulls_in_no_viewer_and_that_no_meshcat() -> None:
 def test_a_host_that_nobody_knows_is_named() -> None:
     with pytest.raises(ViewerError, match=r"on no\.such\.host\.invalid: no computer"):
         PageServer(host="no.such.host.invalid")
+    with pytest.raises(ViewerError, match=r"cannot start: cannot listen on ö.*no name"):
+        PageServer(host=70 * "ö")

@@ -7,7 +7,14 @@ from pathlib import Path
 
 import pytest
 
-from hsp_control.common.exceptions import LogError, StreamError
+from hsp_control.common.exceptions import (
+    ConfigError,
+    LogError,
+    StreamError,
+    SweepError,
+)
+from hsp_control.companions.sweeps.parquet import read_parquet
+from hsp_control.declaration.imported import import_file
 from hsp_control.simulation import Rollout
 from hsp_control.simulation.journal import JournalReader
 from hsp_control.trajectories.streams.mailbox import read_recording
@@ -47,6 +54,45 @@ def test_any_text_can_be_written(closed: tuple[int, ...], encoding: str) -> None
         assert done.stdout.strip() == expected.get(encoding, "\u00b5 \u2264".encode())
 
 
+LONG = """
+import sys
+from hsp_control.cli.streams import lost_text, make_usable
+make_usable()
+make_usable()
+for k in range(10_000):
+    print("a line that fills what a pipe holds", k, flush=k % 2 == 0)
+print("done", lost_text(), file=sys.stderr)
+"""
+
+
+@pytest.mark.parametrize("where", ["pipe", "/dev/full"])
+def test_a_command_goes_on_where_nobody_takes_its_text(where: str) -> None:
+    """A run must not be lost with the reader of its summary."""
+    if where == "pipe":
+        reader, writer = os.pipe()
+        os.close(reader)
+    else:
+        writer = os.open(where, os.O_WRONLY)
+    command = [sys.executable, "-c", LONG]
+    try:
+        done = subprocess.run(
+            command, stdout=writer, stderr=subprocess.PIPE, text=True, check=True
+        )
+    finally:
+        os.close(writer)
+    why = "None" if where == "pipe" else "No space left on device"
+    assert done.stderr == f"done {why}\n"
+
+
+@pytest.mark.parametrize(("where", "status"), [("/dev/full", 2), ("/dev/null", 0)])
+def test_the_status_tells_whether_all_was_written(where: str, status: int) -> None:
+    with Path(where).open("w") as file:
+        command = [sys.executable, "-m", "hsp_control", "robots"]
+        done = subprocess.run(command, stdout=file, stderr=subprocess.PIPE, text=True)
+    said = "hsp: standard output: No space left on device" if status else ""
+    assert (done.returncode, done.stderr.strip()) == (status, said)
+
+
 @pytest.mark.smoke
 def test_the_schema_needs_no_docstrings() -> None:
     code = "from hsp_control.config.scenario import json_schema; json_schema()"
@@ -66,3 +112,8 @@ def test_what_never_ends_is_no_log_and_no_recording(kind: str, tmp_path: Path) -
         JournalReader(path).read()
     with pytest.raises(StreamError, match="no file, but a folder, a device or a pipe"):
         read_recording(path)
+    with pytest.raises(ConfigError, match=r"a device or a pipe, .*; needs a \.py file"):
+        import_file(path)
+    pytest.importorskip("pyarrow")
+    with pytest.raises(SweepError, match="a device or a pipe"):
+        read_parquet(path)

@@ -322,16 +322,6 @@ def test_a_number_of_numpy_counts(value: object) -> None:
     assert PythonCall(lambda: value)() == 2.0
 
 
-def test_a_robot_with_followers_has_no_centroidal_map() -> None:
-    q, rows = np.zeros(1), [np.zeros((3, 1)) for _ in range(4)]
-    given = dict(zip(("J", "J_dot", "angular", "angular_dot"), rows, strict=True))
-    with pytest.raises(ValueError, match="joints that follow others has no centroidal"):
-        engine.CentroidalMotion(
-            dynamics=of_follower(), q=q, v=q, mass=np.zeros(1),
-            position=np.zeros(3), velocity=np.zeros(3), **given,
-        )  # fmt: skip
-
-
 class Interrupted:
     """A time that is interrupted where it is read."""
 

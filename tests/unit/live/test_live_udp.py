@@ -154,6 +154,8 @@ def test_nobody_to_send_to_and_nowhere_to_listen() -> None:
         link.send(PacketKind.EFFORT)
     with pytest.raises(HardwareError, match=r"cannot listen at 127\.0\.0\.1"):
         Link(7, link.address)
+    with pytest.raises(HardwareError, match="no name of a computer"):
+        Link(7, (70 * "ö", 0))
     link.close()
 
 
@@ -230,6 +232,30 @@ def test_efforts_that_answer_old_states_are_nobody_s() -> None:
 
 
 @pytest.mark.slow
+@pytest.mark.parametrize(("lag", "in_time"), [(9, True), (10, False)])
+def test_an_effort_may_answer_a_state_as_old_as_the_watchdog_waits(
+    lag: int, in_time: bool
+) -> None:
+    """What answers a state comes a period later, so a lag of nine is an age of ten."""
+    receiver, robot = Link(7), watched(LiveSettings(watchdog=10))
+    link = Link(7, peer=receiver.address)
+    tau = panda().inverse_dynamics(start(), np.zeros(7), np.zeros(7))
+    states: list[int] = []
+
+    def pilot() -> str | None:
+        states.extend(packet.sequence for packet in receiver.receive(0.0))
+        if states:
+            receiver.newest = max(states[-1] - lag, 0)
+            receiver.send(PacketKind.EFFORT, tau)
+        return "enough" if len(states) > 60 else None
+
+    served = serve(robot, link, stop_reason=pilot)
+    assert (served.outdated == 0) == in_time
+    receiver.close()
+    link.close()
+
+
+@pytest.mark.slow
 def test_a_robot_that_nobody_wants_or_whose_parent_dies_ends() -> None:
     hardware = UdpHardware(panda(), PERIOD)
     link = Link(hardware.session, peer=hardware.address)
@@ -248,6 +274,49 @@ def test_a_robot_that_nobody_wants_or_whose_parent_dies_ends() -> None:
     serve(robot, link, stop_reason=dies)
     assert robot.reason == "its parent is gone"
     assert robot.phase is Phase.HOLDING
+    hardware.close()
+    hardware.drain()
+    link.close()
+
+
+class OddError(BaseException):
+    """What only a bare ``except`` or one of `BaseException` catches."""
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("raised", [OddError, MemoryError, SystemExit, GeneratorExit])
+@pytest.mark.parametrize("what", ["row", "receive", "send"])
+def test_whatever_is_raised_around_a_served_robot_stops_it(
+    what: str, raised: type[BaseException], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Its cameras, its log, its line: it brakes, is held, and then it ends."""
+    hardware = UdpHardware(panda(), PERIOD)
+    robot = watched()
+    link = Link(hardware.session, peer=hardware.address)
+    tau = panda().inverse_dynamics(start(), np.zeros(7), np.zeros(7))
+    rows: list[float] = []
+
+    def pilot() -> None:
+        if hardware.read(0.0) is not None:
+            hardware.write(tau)
+
+    def row(t: float, *_: object) -> None:
+        rows.append(t)
+        if len(rows) == 20 and what != "row":
+            monkeypatch.setattr(link, what, fails)
+        if len(rows) == 20 and what == "row":
+            raise raised("why")
+
+    def fails(*_: object, **__: object) -> None:
+        raise raised("why")
+
+    after: list[float] = []
+    told = [row, lambda t, *_: after.append(t)]
+    serve(robot, link, stop_reason=pilot, on_rows=told)  # type: ignore[arg-type]
+    assert robot.reason.endswith(f": {raised.__name__}: why")
+    assert robot.done
+    if what == "row":
+        assert (len(rows), len(after)) == (20, 19)
     hardware.close()
     hardware.drain()
     link.close()

@@ -1,18 +1,23 @@
 """A log contains its robot: another computer, or an edited file, changes nothing."""
 
+import base64
 import json
 import logging
 import shutil
+from hashlib import sha256
 from pathlib import Path
 
 import numpy as np
 import pinocchio as pin
 import pytest
+from mesh_texts import tetrahedron
 from robot_texts import INERTIA, joint, robot_xml
 
 import hsp_control as hsp
+from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import ModelError
 from hsp_control.companions.viewer.robot_drawing import read_visuals
+from hsp_control.companions.viewer.threejs import collada_object
 from hsp_control.geometry.links import link_shapes
 from hsp_control.robot.description import recorded_meshes
 from hsp_control.robot.description.access import only_within
@@ -264,44 +269,164 @@ def with_meshes(folder: Path) -> Path:
     return urdf
 
 
+def vertices(robot: hsp.Robot) -> list[Array]:
+    """Return the vertices of the shapes that distances are measured to."""
+    shapes = link_shapes(robot, "meshes")
+    return [np.array(shape.geometry.vertices()) for shape in shapes]
+
+
 def test_a_log_contains_the_meshes_of_somebodys_robot(tmp_path: Path) -> None:
     """Its shapes are drawn, and distances measured, where its files are not."""
     urdf = with_meshes(tmp_path)
     robot = hsp.Robot.load(urdf)
     record = json.loads(json.dumps(robot_record(robot)))
     assert len(record["parts"][0]["meshes"]) == 4
-    before = [shape.geometry.aabb_radius for shape in link_shapes(robot)]
+    before = vertices(robot)
     shutil.rmtree(urdf.parent)
     again = recorded_robot(record)
-    after = [shape.geometry.aabb_radius for shape in link_shapes(again)]
-    assert len(after) == 2
-    np.testing.assert_array_equal(after, before)
+    assert len(before) == 2
+    np.testing.assert_array_equal(vertices(again), before)
     assert not any(visual.missing for visual in read_visuals(again))
     # And a log of what was replayed contains them, too.
     assert robot_record(again)["parts"][0]["meshes"] == record["parts"][0]["meshes"]
 
 
-def test_packages_are_no_part_of_a_log_and_large_meshes_neither(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+def test_packages_are_no_part_of_a_log_and_large_meshes_are_named(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
 ) -> None:
     panda = robot_record(hsp.Robot.load("panda"))
     assert panda["parts"][0]["meshes"] == {}
+    robot = hsp.Robot.load(with_meshes(tmp_path))
+    (whole,) = robot_record(robot)["parts"]
+    felt = ["meshes/b.obj", "package://mine/meshes/b.obj"]
+    room = sum(len(whole["meshes"][name]) for name in felt)
+    monkeypatch.setattr(recorded_meshes, "MOST", room)
+    (part,) = robot_record(robot)["parts"]
+    assert [*part["meshes"]] == felt
+    (said,) = messages(caplog, "no room")
+    left_out = [name for name in whole["meshes"] if name not in felt]
+    for name in left_out:
+        assert f"{name} (0.0 MB)" in said
+    assert part["left_out"] == dict.fromkeys(left_out, "0.0 MB")
+    caplog.clear()
+    record = robot_record(robot)
+    recorded_robot(record)
+    assert not caplog.records  # the files are there
+    shutil.rmtree(robot.source.urdf.parent)
+    recorded_robot(record)
+    (said,) = messages(caplog, "does not contain")
+    assert all(name in said for name in left_out)
+
+
+def messages(caplog: pytest.LogCaptureFixture, what: str) -> list[str]:
+    return [r.getMessage() for r in caplog.records if what in r.getMessage()]
+
+
+RED = bytes.fromhex(
+    "89504e470d0a1a0a0000000d49484452000000010000000108020000009077"
+    "53de0000000c49444154789c63f8cfc0000003010100c9fe92ef0000000049454e44ae426082"
+)
+"""A picture of one red point, in PNG."""
+
+
+def test_a_mesh_is_recorded_with_the_files_that_are_drawn_of_it(tmp_path: Path) -> None:
+    """A Collada file's picture and a glTF file's buffer are files of their own."""
     urdf = with_meshes(tmp_path)
-    monkeypatch.setattr(recorded_meshes, "MOST", 2 * len(PYRAMID) + 20)
-    (part,) = robot_record(hsp.Robot.load(urdf))["parts"]
-    assert [*part["meshes"]] == ["meshes/b.obj", "package://mine/meshes/b.obj"]
+    folder = urdf.parent / "meshes"
+    (urdf.parent / "pictures").mkdir()
+    (urdf.parent / "pictures" / "red one.png").write_bytes(RED)
+    dae = tetrahedron(folder / "a.dae").read_text()
+    image = (
+        '<library_images><image id="i"><init_from>../pictures/red one.png</init_from>'
+        "</image></library_images><library_geometries>"
+    )
+    (folder / "a.dae").write_text(dae.replace("<library_geometries>", image))
+    scene = json.loads(tetrahedron(folder / "c.gltf").read_text())
+    uri = scene["buffers"][0]["uri"]
+    (folder / "c.bin").write_bytes(base64.b64decode(uri.partition(",")[2]))
+    scene["buffers"][0]["uri"] = "c.bin"
+    (folder / "c.gltf").write_text(json.dumps(scene))
+    text = urdf.read_text().replace("a.obj", "a.dae").replace("c.obj", "c.gltf")
+    urdf.write_text(text.replace("package://mine/meshes/b.obj", "meshes/c.gltf"))
+
+    robot = hsp.Robot.load(urdf)
+    seen, felt = read_visuals(robot), vertices(robot)
+    record = json.loads(json.dumps(robot_record(robot)))
+    shutil.rmtree(urdf.parent)
+    again = recorded_robot(record)
+    dae_again, gltf_again = read_visuals(again)
+    assert dae_again.file is not None
+    pictures = collada_object(dae_again.file)["object"]["resources"]
+    assert [text.partition(",")[2] for text in pictures.values()] == [
+        base64.b64encode(RED).decode()
+    ]
+    assert gltf_again.mesh is not None
+    assert seen[1].mesh is not None
+    np.testing.assert_array_equal(gltf_again.mesh[0], seen[1].mesh[0])
+    np.testing.assert_array_equal(vertices(again), felt)
+    # And a log of what was replayed is the same.
+    assert robot_record(again)["parts"][0] == record["parts"][0]
+
+
+def test_where_there_is_no_room_the_most_links_are_drawn(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    urdf = with_meshes(tmp_path)
+    large = "".join(f"# {k} {k**7}\n" for k in range(200))
+    (urdf.parent / "meshes" / "a.obj").write_text(PYRAMID + large)
+    robot = hsp.Robot.load(urdf)
+    (whole,) = robot_record(robot)["parts"]
+    (first,) = (name for name in whole["meshes"] if name.endswith("a.obj"))
+    room = sum(map(len, whole["meshes"].values())) - 1
+    monkeypatch.setattr(recorded_meshes, "MOST", room)
+    (part,) = robot_record(robot)["parts"]
+    assert {*whole["meshes"]} - {*part["meshes"]} == {first}
+
+
+def test_a_mesh_that_was_edited_since_is_named(
+    tmp_path: Path, caplog: pytest.LogCaptureFixture
+) -> None:
+    """The robot is that of the log, with its shapes."""
+    urdf = with_meshes(tmp_path)
+    robot = hsp.Robot.load(urdf)
+    record = robot_record(robot)
+    before = vertices(robot)
+    recorded_robot(record)
+    assert not caplog.records
+    file = urdf.parent / "meshes" / "b.obj"
+    file.write_text(PYRAMID.replace("0.3", "0.6"))
+    again = recorded_robot(record)
+    (said,) = messages(caplog, "have changed")
+    assert "meshes/b.obj" in said
+    assert "a.obj" not in said
+    np.testing.assert_array_equal(vertices(again), before)
 
 
 @pytest.mark.parametrize(
     "meshes",
     [[], 5, {"a.obj": "x"}, {"a.obj": 5}, {"a.sh": packed(b"x")}, {"a": packed(b"x")},
-     {"a.obj": packed(bytes(5_000_000))}],
+     {"a.obj": packed(bytes(101_000_000))}],
     ids=lambda meshes: str(meshes)[:20],
 )  # fmt: skip
 def test_damaged_meshes_are_named(meshes: object, tmp_path: Path) -> None:
     record = robot_record(hsp.Robot.load(with_meshes(tmp_path)))
     record["parts"][0]["meshes"] = meshes
     with pytest.raises(ModelError, match=r"damaged|not whole"):
+        recorded_robot(record)
+
+
+@pytest.mark.parametrize(
+    "beside",
+    [[], 5, {"../a.png": packed(b"x")}, {f"{'0' * 32}.png": packed(b"x")},
+     {f"{sha256(b'x').hexdigest()[:32]}.sh": packed(b"x")}],
+    ids=lambda beside: str(beside)[:20],
+)  # fmt: skip
+def test_files_beside_recorded_meshes_are_what_their_names_say(
+    beside: object, tmp_path: Path
+) -> None:
+    record = robot_record(hsp.Robot.load(with_meshes(tmp_path)))
+    record["parts"][0]["beside"] = beside
+    with pytest.raises(ModelError, match="damaged"):
         recorded_robot(record)
 
 

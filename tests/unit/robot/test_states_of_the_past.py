@@ -16,7 +16,6 @@ from robot_kinds import KINDS, TEXTS
 import hsp_control as hsp
 from hsp_control import Robot, engine
 from hsp_control.common.arrays import Array
-from hsp_control.common.exceptions import ModelError
 from hsp_control.null_space.metrics import MassMatrixMetric
 from hsp_control.robot.friction import JointFriction
 from hsp_control.simulation.plants import Push
@@ -64,10 +63,9 @@ class Used:
             out = self.controller.compute(t, q, v)
             found["tau"] = out.tau.copy()
             found["acceleration"] = out.acceleration.copy()
-        if not self.robot.mimics:
-            c = self.state.centroidal
-            for name in ("position", "jacobian", "jacobian_dot", "momentum_matrix_dot"):
-                found[f"centroidal {name}"] = getattr(c, name).copy()
+        c = self.state.centroidal
+        for name in ("position", "jacobian", "jacobian_dot", "momentum_matrix_dot"):
+            found[f"centroidal {name}"] = getattr(c, name).copy()
         return found
 
 
@@ -151,6 +149,20 @@ def test_mimic_joints_move_as_free_ones_that_are_moved_so(tmp_path: Path) -> Non
             )
             effort = G.T @ theirs.inverse_dynamics(G @ a)
             np.testing.assert_allclose(ours.inverse_dynamics(a), effort, **close)
+            one, other = ours.centroidal, theirs.centroidal
+            for name in ("position", "velocity"):
+                np.testing.assert_allclose(
+                    getattr(one, name), getattr(other, name), **close
+                )
+            for name in (
+                "jacobian",
+                "jacobian_dot",
+                "momentum_matrix",
+                "momentum_matrix_dot",
+            ):
+                np.testing.assert_allclose(
+                    getattr(one, name), getattr(other, name) @ G, **close
+                )
     assert found >= {"lift below an arm", "chain of mimics", "follower first"}
 
 
@@ -169,12 +181,3 @@ def test_a_mass_matrix_does_not_depend_on_what_was_computed_before(
         robot.inverse_dynamics(robot.random_configuration(rng), v, tau)
         robot.mass_matrix(robot.random_configuration(rng))
         np.testing.assert_array_equal(robot.mass_matrix(q), fresh)
-
-
-def test_centroidal_terms_of_mimics_are_refused_by_name(tmp_path: Path) -> None:
-    robot = KINDS["lift below an arm"](tmp_path)
-    state = robot.state(0.0, robot.home(), np.zeros(robot.nv))
-    with pytest.raises(
-        ModelError, match="do not support mimic joints, and 'stage' are"
-    ):
-        _ = state.centroidal

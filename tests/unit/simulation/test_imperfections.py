@@ -27,8 +27,10 @@ from hsp_control.simulation.plants.drives import (
     Driving,
     DroppedPeriods,
     EffortDelay,
+    EffortLag,
     EffortNoise,
     Jitter,
+    RunningLag,
     Saturation,
 )
 from hsp_control.simulation.plants.imperfect_plant import seeded_generator
@@ -296,6 +298,24 @@ def test_a_saturated_drive() -> None:
 def test_a_late_drive(periods: int) -> None:
     found = [effort[0] for effort in driven(EffortDelay(periods), EFFORTS)]
     assert found == [1.0] * periods + [float(k) for k in range(1, 9 - periods)]
+
+
+@pytest.mark.parametrize("time_constant", [2e-4, 1e-3, 0.02])
+def test_a_lag_acts_by_its_mean_over_the_period(time_constant: float) -> None:
+    """τ f' = effort - f, integrated over the period in small steps."""
+    drive = EffortLag(time_constant).begin(
+        Robot.load("panda"), np.random.default_rng(0)
+    )
+    assert isinstance(drive, RunningLag)
+    drive.period = 1e-3
+    n = 20_000
+    times = (np.arange(n) + 0.5) * drive.period / n
+    has = np.array([1.0, -2.0])
+    np.testing.assert_allclose(drive(has)[0], has, rtol=1e-12)
+    for effort in (np.array([3.0, 0.0]), np.array([-1.0, 5.0])):
+        f = effort + np.exp(-times / time_constant)[:, None] * (has - effort)
+        np.testing.assert_allclose(drive(effort)[0], f.mean(axis=0), rtol=1e-7)
+        has = effort + np.exp(-drive.period / time_constant) * (has - effort)
 
 
 def test_a_drive_that_loses_efforts() -> None:

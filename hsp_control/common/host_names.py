@@ -1,0 +1,16 @@
+"""Names of computers, which users give and sockets look up."""
+
+import socket
+
+
+def check_host_name(host: str) -> None:
+    """Raise `OSError` at a name that no computer can have, as at one that none has.
+
+    Python encodes a name before it is looked up. Labels of more than 63 letters and
+    empty ones raise `UnicodeError` there, or `TypeError`.
+    """
+    try:
+        host.encode("idna")
+    except UnicodeError:
+        reason = "no name of a computer (a part of it is empty, or too long)"
+        raise socket.gaierror(socket.EAI_NONAME, reason) from None

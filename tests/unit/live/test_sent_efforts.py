@@ -1,0 +1,67 @@
+"""Which efforts a robot can have: those that were sent, and its own for a while."""
+
+import numpy as np
+import pytest
+from live_rigs import PERIOD, panda, start, watched
+
+from hsp_control.live import LiveSettings, Phase
+from hsp_control.live.effort_limiter import EffortLimiter
+from hsp_control.live.sent_efforts import SentEfforts
+
+
+def test_its_own_effort_lasts_five_answers_and_then_fades() -> None:
+    """It has 0 where -10 is sent: its brakes, or another load, hold it at first."""
+    sent = SentEfforts(np.array([5.0]), 4)
+    sent.restart(np.array([-10.0]))
+    has = np.array([0.0])
+    for _ in range(5):
+        sent.add(np.array([-10.0]))
+        least, most, spare = sent.bounds_of(has)
+        assert (least, most, spare) == (-10.0, 0.0, 0.5)
+    for k in range(1, 20):  # what is beyond comes nearer by a part in a hundred
+        _, most, spare = sent.bounds_of(has)
+        assert spare == 0.05
+        assert most[0] == pytest.approx(-10.0 + 10.0 * 0.99**k, abs=1e-12)
+        has = most
+    sent.bounds_of(np.array([-10.0]))
+    _, most, _ = sent.bounds_of(np.array([0.0]))
+    assert most == -10.0
+
+
+def test_a_robot_may_have_an_old_effort_for_as_long_as_its_watchdog_waits() -> None:
+    settings = LiveSettings(missing=1, watchdog=30, effort_rate=1e9)
+    limiter, q = EffortLimiter(panda(), settings, PERIOD), start()
+    limiter.reset(q)
+    gravity = limiter.sent.copy()
+    for _ in range(10):  # its start is over
+        assert limiter.contradiction(limiter.sent, halted=False) is None
+        limiter.apply(gravity, q)
+    limiter.apply(gravity + 5.0, q)
+    old = limiter.sent.copy()
+    for _ in range(30):
+        limiter.apply(gravity, q)
+        assert limiter.contradiction(old, halted=False) is None
+
+
+def test_a_robot_that_halted_may_have_what_its_own_stop_needs() -> None:
+    """Half more than its limits, less the gravity that it adds itself."""
+    settings = LiveSettings(compensates_gravity=True)
+    limiter, q = EffortLimiter(panda(), settings, PERIOD), start()
+    limiter.reset(q)
+    i = int(np.abs(limiter.gravity).argmax())
+    assert abs(limiter.gravity[i]) > 10.0
+    for sign in (1.0, -1.0):
+        has = np.zeros(7)
+        has[i] = sign * 1.5 * limiter.effort_limits[i] - limiter.gravity[i]
+        assert limiter.contradiction(has * (1.0 - 1e-9), halted=True) is None
+        has[i] += sign
+        assert limiter.contradiction(has, halted=True) is not None
+
+
+def test_a_robot_waits_for_its_first_effort_without_an_end() -> None:
+    robot = watched(LiveSettings(watchdog=10))
+    for _ in range(100):
+        robot.advance([])
+    assert robot.phase == Phase.WAITING
+    robot.advance([robot.tau])
+    assert robot.phase == Phase.RUNNING

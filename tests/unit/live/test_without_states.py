@@ -1,0 +1,81 @@
+"""Periods without a state: how long is waited for it, and what is known meanwhile."""
+
+import numpy as np
+import pytest
+from live_rigs import PERIOD, panda, start
+
+from hsp_control.common.arrays import Array
+from hsp_control.live import LiveSettings, Measurement
+from hsp_control.live.state_reader import StateReader
+
+
+class Silent:
+    """Hardware with a clock of its own that sends states until it is told to be still.
+
+    Attributes:
+        now: Its clock [s].
+        still: Whether it sends nothing.
+        waits: How long each `read` may wait [s].
+    """
+
+    period = PERIOD
+
+    def __init__(self, v: Array) -> None:
+        self.now, self.still, self.waits = 0.0, False, list[float]()
+        self._q, self._v, self._sequence = start(), v, 0
+
+    def read(self, timeout: float) -> Measurement | None:
+        self.waits.append(timeout)
+        if self.still:
+            self.now += timeout
+            return None
+        self.now += PERIOD
+        self._sequence += 1
+        q = self._q + self._sequence * PERIOD * self._v
+        return Measurement(self._sequence, self._sequence * PERIOD, q, self._v.copy())
+
+    def write(self, effort: Array) -> None:
+        """Take no notice."""
+
+    def close(self) -> None:
+        """Do nothing."""
+
+
+def reader_of(hardware: Silent) -> StateReader:
+    """Return a reader that has read twenty states."""
+    reader = StateReader(
+        panda(), None, hardware, LiveSettings(missing=50), lambda: hardware.now
+    )
+    reader.wait_for_first()
+    reader.start()
+    effort = panda().inverse_dynamics(start(), np.zeros(7), np.zeros(7))
+    for _ in range(20):
+        reader.read(effort, None)
+        reader.effort_sent(effort)
+        assert reader.fault is None
+    return reader
+
+
+def test_after_a_stall_each_missing_state_is_waited_for_as_before() -> None:
+    """Else all that were tolerated would be missing within no time."""
+    hardware = Silent(np.zeros(7))
+    reader = reader_of(hardware)
+    hardware.still = True
+    hardware.now += 0.03  # this computer did not get the processor
+    hardware.waits.clear()
+    for _ in range(10):
+        reader.read(np.zeros(7), None)
+    np.testing.assert_allclose(hardware.waits[2:], PERIOD, rtol=1e-9)
+
+
+def test_the_speed_of_a_robot_that_says_nothing_is_that_of_the_model() -> None:
+    v = np.full(7, 0.01)
+    hardware = Silent(v)
+    reader = reader_of(hardware)
+    assert reader.speed == pytest.approx(0.01, rel=1e-6)
+    hardware.still = True
+    pushes = panda().inverse_dynamics(start(), v, np.full(7, 20.0))
+    for _ in range(20):
+        reader.read(pushes, None)
+    assert reader.speed == np.abs(reader.state.v).max()
+    assert reader.speed == pytest.approx(0.01 + 20 * PERIOD * 20.0, rel=0.2)
