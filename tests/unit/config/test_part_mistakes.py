@@ -58,7 +58,7 @@ def change(**keys: Any) -> dict[str, Any]:
 # Each row: the sections that are replaced, the class of the error, and its message.
 MISTAKES: list[tuple[dict[str, Any], str, str]] = [
     ({"title": 301 * "t"}, "ConfigError",
-     f"title: '{36 * 't'}...' has 301 characters, needs at most 300"),
+     f"title: '{35 * 't'}...' has 301 characters, needs at most 300"),
     # colours: # begins a comment
     ({"view": {"background": None}}, "ConfigError",
      "view.background: nothing given; write a colour in quotes, \"#14202B\": "
