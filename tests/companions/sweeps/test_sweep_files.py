@@ -1,6 +1,7 @@
 """Check that sweeps give the same bits however computed, lost or done twice."""
 
 import json
+import os
 import signal
 import subprocess
 import sys
@@ -26,6 +27,7 @@ from hsp_control.common.exceptions import (
 )
 from hsp_control.companions.sweeps import Choices, Sweep, local_workers, run_task
 from hsp_control.companions.sweeps.journal import SweepJournal, journal_of
+from hsp_control.companions.sweeps.parquet import read_parquet
 from hsp_control.simulation.journal import JournalReader, JournalWriter
 
 pytestmark = [pytest.mark.process, pytest.mark.slow]
@@ -401,3 +403,14 @@ def test_what_is_no_exception_is_a_row() -> None:
             row, _ = run_task.read_result(0, run_task.run_task("{}"))
         assert row.status == "failed"
         assert row.message.startswith(type(error).__name__)
+
+
+@pytest.mark.parametrize("kind", ["fifo", "device"])
+def test_what_never_ends_is_no_table(kind: str, tmp_path: Path) -> None:
+    path = tmp_path / "a.parquet"
+    if kind == "fifo":
+        os.mkfifo(path)
+    else:
+        path.symlink_to("/dev/zero")
+    with pytest.raises(SweepError, match="a device or a pipe"):
+        read_parquet(path)

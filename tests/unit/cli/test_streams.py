@@ -11,9 +11,7 @@ from hsp_control.common.exceptions import (
     ConfigError,
     LogError,
     StreamError,
-    SweepError,
 )
-from hsp_control.companions.sweeps.parquet import read_parquet
 from hsp_control.declaration.imported import import_file
 from hsp_control.simulation import Rollout
 from hsp_control.simulation.journal import JournalReader
@@ -114,6 +112,3 @@ def test_what_never_ends_is_no_log_and_no_recording(kind: str, tmp_path: Path) -
         read_recording(path)
     with pytest.raises(ConfigError, match=r"a device or a pipe, .*; needs a \.py file"):
         import_file(path)
-    pytest.importorskip("pyarrow")
-    with pytest.raises(SweepError, match="a device or a pipe"):
-        read_parquet(path)
