@@ -61,8 +61,9 @@ class Composition:
 
         Args:
             robot: The robot.
-            tasks: One task or more, with distinct names. Tasks of the same priority
-                form one level; see `Task.priority`.
+            tasks: The tasks, with distinct names; without any, the arm has no weight
+                and follows the field. Tasks of the same priority form one level; see
+                `Task.priority`.
             field: The field g that the self-motion follows; None: `Rest`, g = 0.
             null_space_gain: K_N > 0 [1/s]: scalar, shape (nv,) or (nv, nv). Where the
                 metric changes with q, a multiple of the identity.
