@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import suppress
+from itertools import islice
 from os import PathLike
 from pathlib import Path
 from threading import Thread
@@ -22,6 +23,9 @@ if TYPE_CHECKING:
 
     from hsp_control.companions.sweeps.one_run import Row
     from hsp_control.companions.sweeps.row_files import RowFiles
+
+AT_ONCE = 1000
+"""Runs that the scheduler knows: 10^5 would take it a minute, and much memory."""
 
 
 def sweep(
@@ -192,20 +196,18 @@ def _computed(
     left = (run for run in range(len(plan)) if run not in done)
 
     def submitted(most: int) -> "list[Any]":
-        """Submit some of the runs that are left; keys are not used twice."""
-        chosen = [run for run, _ in zip(left, range(most), strict=False)]
+        """Submit some of the runs that are left."""
         return [
             client.submit(
                 one_run, packed.name, run, plan.changes(run), time_limit,
                 key=(packed.name, run), pure=False,
             )
-            for run in chosen
+            for run in islice(left, most)
         ]  # fmt: skip
 
     client.register_plugin(packed, name=packed.name)
-    # Not all at once: 10^5 futures take a scheduler a minute.
     waiting = as_completed(
-        submitted(_AT_ONCE), loop=client.loop, with_results=True, raise_errors=False
+        submitted(AT_ONCE), loop=client.loop, with_results=True, raise_errors=False
     )
     try:
         for future, result in waiting:
@@ -224,9 +226,6 @@ def _tidy(client: "Client", luggage: str) -> None:
     with suppress(Exception):
         if client.status == "running":
             client.unregister_worker_plugin(luggage)
-
-
-_AT_ONCE = 1000
 
 
 def _row(future: Any, result: Any) -> "Row":

@@ -22,7 +22,7 @@ from sweep_runs import MOVING, OVER, QUICK
 
 import hsp_control as hsp
 from hsp_control.common.exceptions import ConfigError, HspControlError, SweepError
-from hsp_control.companions.sweeps import Sweep, cluster
+from hsp_control.companions.sweeps import Sweep, cluster, sweep_runs
 from hsp_control.companions.sweeps.one_run import computed
 from hsp_control.companions.sweeps.row_files import RowFiles, read_rows
 
@@ -168,8 +168,9 @@ def test_failures_are_rows_with_their_reason() -> None:
 
 
 def test_neither_workers_nor_a_cluster_change_a_bit(
-    swept: Sweep, scheduler: str
+    swept: Sweep, scheduler: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
+    monkeypatch.setattr(sweep_runs, "AT_ONCE", 5)  # of twelve
     same(hsp.sweeps.sweep(MOVING, OVER, overrides=QUICK, scheduler=scheduler), swept)
     with Client(scheduler, set_as_default=False) as client:
         same(hsp.sweeps.sweep(MOVING, OVER, overrides=QUICK, scheduler=client), swept)
