@@ -69,6 +69,21 @@ class Delivered(NamedTuple):
     relaxation: float  # largest violation of a relaxed limit [rad/s² or m/s²]
 
 
+class DeliveredAlone(NamedTuple):
+    """What is delivered where no Python looks: see `Actuation.calls_alone`."""
+
+    a: Array  # acceleration, shape (nv,)
+    tau: Array  # effort, shape (nv,) [N·m or N]
+    status: Indices  # the `Status`, shape (1,)
+    delivered: Indices  # whether there is a finite effort, shape (1,)
+
+    @classmethod
+    def allocate(cls, nv: int) -> Self:
+        """Return that of no step."""
+        integers = np.zeros((2, 1), dtype=np.int64)
+        return cls(np.zeros(nv), np.zeros(nv), *integers)
+
+
 class Actuation:
     """Computes efforts and contact forces for one law, within one set of limits."""
 
@@ -184,7 +199,7 @@ class Actuation:
         # Of distances there may be hundreds, and each row costs time, used or not.
         if self._qp is not None and self.direct and "barriers" not in self._rows:
             keep = PartCall(engine.Copy, x=self._state.effort, out=wanted.effort)
-            given = self.outcome.violated, keep, self._rows.get("holding")
+            given = self.outcome.violated, keep, self._rows
             calls = [*calls, self._qp.nearest_if(*given)]
         plain = PartCall(
             engine.IsPlain,
@@ -196,6 +211,43 @@ class Actuation:
         )
         calls = [*calls, plain]
         return self._state.plan(calls).steps()
+
+    def calls_alone(self, delivered: "DeliveredAlone") -> PartCalls:
+        """Return the calls that follow `calls` where no Python looks at a step.
+
+        They do what `delivered` does, where the effort is `direct`.
+
+        Args:
+            delivered: Where they write what is delivered.
+        """
+        law, state, found = self._law, self._state, self.outcome
+        calls: list[AnyCall] = []
+        nearest = self.own
+        if self._qp is not None:
+            qp = self._qp
+            if "barriers" in self._rows:  # which `calls` leaves to Python
+                rooms = {kind: len(rows.least) for kind, rows in self._rows.items()}
+                qp = self._limited_step(sum(rooms.values()))
+                keep = PartCall(engine.Copy, x=state.effort, out=self._wanted.effort)
+                calls = [qp.nearest_if(found.violated, keep, self._rows)]
+            nearest = Delivered(*qp.result, LIMITED, 0.0)
+        deliver = PartCall(
+            engine.Deliver,
+            law=law.outcome,
+            limits=found,
+            qp=self._qp_outcome,
+            acceleration=law.acceleration,
+            effort=state.effort,
+            nearest_acceleration=nearest.acceleration,
+            nearest_effort=nearest.effort,
+            wanted=self._wanted.effort,
+            lower=self._limits.bounds.tau_lower,
+            upper=self._limits.bounds.tau_upper,
+            relaxed=int(Status.RELAXED),
+            beyond=int(BEYOND),
+            **delivered._asdict(),
+        )
+        return [*calls, deliver]
 
     def deliver(self, a: Array, offset: Array | None = None) -> Delivered:
         """Return efforts and forces for the acceleration that is nearest to a.

@@ -1,0 +1,7 @@
+#include "../src/rooms.hpp"
+#include "deliver.hpp"
+#include "offset_effort.hpp"
+
+namespace hsp {
+const Kind* const* frozen_kinds() { return kinds<Deliver, OffsetEffort, Subtract, HasMoved>(); }
+}  // namespace hsp
