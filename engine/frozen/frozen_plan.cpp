@@ -12,12 +12,13 @@ namespace {
 
 constexpr std::string_view magic = "hsp_step";
 
-std::string content_of(const std::string& file) {
-  std::ifstream stream(file, std::ios::binary);
-  if (!stream) throw std::runtime_error("it cannot be read");
-  std::string content{std::istreambuf_iterator<char>(stream), {}};
-  if (stream.bad()) throw std::runtime_error("it cannot be read");
-  return content;
+std::string content_of(const std::string& file) try {
+  std::ifstream stream;
+  stream.exceptions(std::ios::failbit | std::ios::badbit);
+  stream.open(file, std::ios::binary);
+  return {std::istreambuf_iterator<char>(stream), {}};
+} catch (const std::ios_base::failure&) {
+  throw std::runtime_error("it cannot be read");
 }
 
 // What follows the header: magic, checksum, build. All that a reader trusts is behind the checksum.

@@ -13,7 +13,7 @@ from hsp_control.engine.plans import PartCall, StepPlan, planned, supplied
 from hsp_control.frozen.image import refusal
 from hsp_control.law import FieldSample, MetricSample, TaskSample
 from hsp_control.null_space.fields.field import terms_of
-from hsp_control.null_space.fields.weight import Weight
+from hsp_control.null_space.fields.weight import Ramp, Weight
 from hsp_control.robot import RobotState
 
 Path = tuple[str | int, ...]
@@ -83,6 +83,7 @@ def _plans_of(own: Controller, state: RobotState) -> Iterator[tuple[Path, StepPl
     for k, term in enumerate(terms_of(own.field)):
         path = "null_space", "fields", k
         yield path, planned(term.calls(state, metric, form, sample))
-        if isinstance(term.weight, Weight) and not term.weight.constant:
+        known = type(term.weight) is Ramp
+        if isinstance(term.weight, Weight) and not (known or term.weight.constant):
             weight = PartCall(term.weight.sample, state=state)
             yield (*path, "weight"), planned([weight])
