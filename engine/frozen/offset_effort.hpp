@@ -23,11 +23,11 @@ struct OffsetEffort {
 };
 
 struct Subtract {
-  static constexpr const char* doc = "out = a - b.";
-  In<'n'> a, b;
-  Out<'n'> out;
+  static constexpr const char* doc = "out ← out - x.";
+  In<'n'> x;
+  InOut<'n'> out;
 
-  void operator()() { out = a - b; }
+  void operator()() { out -= x; }
 };
 
 struct HasMoved {

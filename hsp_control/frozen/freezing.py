@@ -12,9 +12,12 @@ from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import FreezeError
 from hsp_control.control.actuation.actuation import DeliveredAlone
 from hsp_control.control.bound_step import BoundStep
+from hsp_control.control.compensation import Compensation
 from hsp_control.control.controller import Controller
+from hsp_control.declaration import within
 from hsp_control.engine import Move, Plan
-from hsp_control.engine.plans import OnlyIf
+from hsp_control.engine.plans import OnlyIf, PartCalls
+from hsp_control.frozen.compensated_step import CompensatedStep
 from hsp_control.frozen.image import Image, Port
 from hsp_control.frozen.refusals import check_parts, check_steady
 
@@ -23,18 +26,20 @@ def freeze(
     controller: Controller,
     path: str | os.PathLike[str],
     *,
+    compensation: Compensation | None = None,
     period: float = 0.001,
     start: ArrayLike | None = None,
 ) -> Path:
     """Write a controller for a program without Python, which ``hsp_step.h`` runs.
 
-    Its step is `Controller.compute` followed by `Controller.applied`, to the last bit.
-    The controller itself is not changed, and its run is not continued: the file begins
-    anew.
+    Its step is `Controller.compute` followed by `Controller.applied`, or with
+    compensators `Command.effort`, to the last bit. The controller itself is not
+    changed, and its run is not continued: the file begins anew.
 
     Args:
         controller: The controller.
         path: The file to write, such as ``panda.hsp``.
+        compensation: Compensators for what the model lacks; None: there are none.
         period: How long each effort is held [s].
         start: The configuration at which what is relative is placed, shape (nq,); by
             default the controller's start, or else where its run began.
@@ -47,42 +52,55 @@ def freeze(
     """
     if not 0.0 < period < np.inf:
         raise FreezeError(f"period is {period}; needs a positive number of seconds")
-    content = Image(*_step(controller.preview(), period, start)).content()
+    content = _image(controller.preview(), compensation, period, start).content()
     file = Path(path)
     file.write_bytes(content)
     return file
 
 
-def _step(
-    own: Controller, period: float, start: ArrayLike | None
-) -> tuple[Move, list[Port]]:
+def _image(
+    own: Controller,
+    compensation: Compensation | None,
+    period: float,
+    start: ArrayLike | None,
+) -> Image:
     """Return a step as one move, and what has a name outside of it.
 
     Args:
         own: A controller at the beginning of its run, which is used up.
-        period: How long each effort is held [s].
+        compensation: As of `freeze`.
+        period: As of `freeze`.
         start: As of `freeze`.
     """
     check_steady(own)
     check_parts(own)
     robot = own.robot
+    if compensation is not None:
+        with within("compensation"):
+            compensation.check(robot, own.tasks, own.contacts)
     q = own._setup.start.state.q if start is None else robot.check_configuration(start)
     own.compute(0.0, q, np.zeros(robot.nv))  # binds the step
     own._limits.forget()
     bound = own._run.bound
     assert bound is not None  # it is steady
-    delivered = DeliveredAlone.allocate(robot.nv)
-    held = np.array([period])
-    return _move(bound, delivered, held), [*_ports(own, bound, delivered, held)]
+    held, delivered = np.array([period]), DeliveredAlone.allocate(robot.nv)
+    sending = own._limits.applying_all(delivered.tau, delivered.a, held)
+    chain = None
+    if compensation is not None:
+        chain = CompensatedStep(own, bound, compensation, delivered, held, sending)
+    if chain is None or not chain.stages:
+        move = _bare(bound, delivered, sending)
+    else:
+        move = chain.move()
+    return Image(move, [*_ports(own, bound, delivered, held)])
 
 
-def _move(bound: BoundStep, delivered: DeliveredAlone, period: Array) -> Move:
+def _bare(bound: BoundStep, delivered: DeliveredAlone, sending: PartCalls) -> Move:
     """Return a step that also decides what is delivered, and records that it is."""
-    state, actuation, limits = bound._state, bound._actuation, bound._limits
-    sent = limits.applying_all(delivered.tau, delivered.a, period)
-    after = [*actuation.calls_alone(delivered), OnlyIf(sent, delivered.delivered)]
-    values = bound.move.values
-    calls = [*values["calls"].calls, *state.plan(after).steps()]
+    state = bound.active._state
+    after = bound._actuation.calls_alone(delivered)
+    values, recorded = bound.move.values, OnlyIf(sending, delivered.delivered)
+    calls = [*values["calls"].calls, *state.plan([*after, recorded]).steps()]
     return engine.Move(**values | {"calls": Plan(calls)})
 
 

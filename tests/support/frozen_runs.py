@@ -86,3 +86,18 @@ def simulated_states(experiment: hsp.Experiment, duration: float) -> Rows:
         v = v + period * a
         q = robot.integrate(q, period * v)
     return np.array(rows)
+
+
+def commanded(
+    controller: hsp.Controller,
+    compensation: hsp.compensation.Compensation,
+    states: Rows,
+    period: float = 0.001,
+) -> Rows:
+    """Return status and tau of a controller with compensators, from its start."""
+    command = hsp.compensation.Command(controller.preview(), compensation)
+    nq, found = controller.robot.nq, []
+    for t, *x in states:
+        tau = command.effort(t, np.array(x[:nq]), np.array(x[nq:]), period)
+        found.append([float(command.output.status), *tau])
+    return np.array(found)

@@ -314,13 +314,13 @@ class LimitedStep:
             self._find_forces = state.plan(calls).call()
 
     def nearest_if(
-        self, condition: Indices, before: PartCall, rows: Mapping[str, BarrierRows]
+        self, condition: Indices, before: PartCalls, rows: Mapping[str, BarrierRows]
     ) -> OnlyIf:
         """Return a call that writes the nearest, as `solve`, if a condition is not 0.
 
         Args:
             condition: Shape (1,).
-            before: A call that is made first.
+            before: Calls that are made first.
             rows: All rows of barriers, by kind.
         """
         placed, r = list[PartCall](), self._barriers
@@ -329,7 +329,7 @@ class LimitedStep:
             placed.append(self._placed(each, own))
             self._softness[own] = _SOFTNESS[kind]
             r = own.stop
-        return OnlyIf([before, *placed, *self._nearest], condition)
+        return OnlyIf([*before, *placed, *self._nearest], condition)
 
     def _placed(self, rows: BarrierRows, own: slice) -> PartCall:
         """Return the call that writes rows of barriers into the QP."""

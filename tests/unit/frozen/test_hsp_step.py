@@ -75,12 +75,12 @@ def test_a_flipped_byte_and_a_cut_file(frozen: Path, tmp_path: Path) -> None:
         flipped = bytearray(content)
         flipped[place] ^= 1 << rng.integers(8)
         changed.write_bytes(flipped)
-        with pytest.raises(RuntimeError, match="changed or cut|no frozen controller"):
+        with pytest.raises(RuntimeError, match=r"changed or cut|no frozen controller"):
             Opened(changed)
     for length in (8, 11, 12, 13, *rng.integers(len(content), size=30)):
         changed.write_bytes(content[:length])
         with pytest.raises(
-            RuntimeError, match="changed or cut|no frozen controller|ends too early"
+            RuntimeError, match=r"changed or cut|no frozen controller|ends too early"
         ):
             Opened(changed)
 
