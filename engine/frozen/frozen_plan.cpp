@@ -185,12 +185,21 @@ void FrozenPlan::read_port(Bytes& bytes) {
   port.unit = bytes.text();
   port.meaning = bytes.text();
   port.entry = bytes.number<char>();
-  port.is_input = bytes.number<char>() == 'i';
+  const bool is_input = bytes.number<char>() == 'i';
   const Field field{.rank = 1};
   if (port.entry != 'd' && port.entry != 'i') throw std::runtime_error("a port is of no type");
   const Argument array = read_array(bytes, field);
   port.size = array.shape[0];
   port.data = array.data;
+  port.input = nullptr;
+  if (is_input) {
+    const Object& evolving = object(bytes.number<std::uint32_t>());
+    if (!evolving.call || &evolving.call->kind != &kind_of<Evolve>())
+      throw std::runtime_error("an input is none");
+    port.input = static_cast<Evolve*>(evolving.call->self());
+    if (port.input->x.size() != port.size || port.entry != 'd')
+      throw std::runtime_error("an input has another size");
+  }
   ports_.push_back(std::move(port));
 }
 

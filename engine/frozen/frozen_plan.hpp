@@ -10,6 +10,7 @@
 #include "../src/move.hpp"
 #include "../src/plan.hpp"
 #include "bytes.hpp"
+#include "evolve.hpp"
 
 namespace hsp::frozen {
 
@@ -17,9 +18,9 @@ namespace hsp::frozen {
 struct Port {
   std::string name, unit, meaning;
   char entry;  // 'd' or 'i'
-  bool is_input;
   std::int64_t size;
   void* data;
+  Evolve* input;  // what changes it; null if it is an output
 };
 
 class FrozenPlan {

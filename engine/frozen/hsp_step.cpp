@@ -4,6 +4,7 @@
 #include <atomic>
 #include <cmath>
 #include <cstdio>
+#include <limits>
 #include <optional>
 
 #include "../src/build.hpp"
@@ -15,6 +16,7 @@ using hsp::Index;
 using hsp::frozen::FrozenPlan;
 using hsp::frozen::Port;
 
+constexpr double infinite = std::numeric_limits<double>::infinity();
 constexpr double most_periods = 100.0;  // from one step to the next
 thread_local char opening[1024] = "";   // why `hsp_open` returned null
 
@@ -31,7 +33,7 @@ struct hsp_controller {
         period(plan.array<double>("period", 1)) {
     for (const Port& each : plan.ports())
       ports.push_back({each.name.c_str(), each.unit.c_str(), each.meaning.c_str(),
-                       static_cast<std::size_t>(each.size), each.is_input});
+                       static_cast<std::size_t>(each.size), each.input != nullptr});
   }
 
   FrozenPlan plan;
@@ -79,6 +81,20 @@ hsp_status step(hsp_controller& of, double t, const double* q, const double* v, 
   return status;
 }
 
+// Let an input go to values from now on.
+hsp_status change(hsp_controller& of, const char* name, const double* values, std::size_t size,
+                  double duration) {
+  const Port* port = name ? of.plan.port(name) : nullptr;
+  if (!port || !port->input) return HSP_WRONG_NAME;
+  if (static_cast<std::size_t>(port->size) != size) return HSP_WRONG_SIZE;
+  if (!values || !(duration >= 0.0 && duration < infinite)) return HSP_WRONG_VALUE;
+  const Eigen::Map<const hsp::Vector> wanted(values, port->size);
+  if (!port->input->permits(wanted)) return HSP_WRONG_VALUE;
+  // Before the first step it is so from the beginning.
+  const double now = of.last.value_or(-infinite);
+  return port->input->then(now, of.last ? duration : 0.0, wanted) ? HSP_OK : HSP_TOO_MANY;
+}
+
 const char* sentence(hsp_status status) {
   switch (status) {
     case HSP_OK:
@@ -106,7 +122,9 @@ const char* sentence(hsp_status status) {
     case HSP_WRONG_SIZE:
       return "the input or output has another number of values, see hsp_port_of";
     case HSP_WRONG_VALUE:
-      return "a pointer is null, or a value is not finite or out of bounds";
+      return "a pointer is null, or a value is not finite, out of bounds, or a gain that is not "
+             "positive definite";
+    case HSP_TOO_MANY: return "the input still follows 8 ramps, which is the most";
     case HSP_FAILED:
       return "a call failed, which hsp_last_error says";
   }
@@ -168,6 +186,17 @@ const hsp_port* hsp_port_at(const hsp_controller* controller, size_t number) noe
 const hsp_port* hsp_port_of(const hsp_controller* controller, const char* name) noexcept {
   const Port* found = controller && name ? controller->plan.port(name) : nullptr;
   return found ? &controller->ports[found - controller->plan.ports().data()] : nullptr;
+}
+
+hsp_status hsp_set(hsp_controller* controller, const char* name, const double* values,
+                   size_t size) noexcept {
+  return made(controller, [&](hsp_controller& of) { return change(of, name, values, size, 0.0); });
+}
+
+hsp_status hsp_ramp(hsp_controller* controller, const char* name, const double* values, size_t size,
+                    double duration) noexcept {
+  return made(controller,
+              [&](hsp_controller& of) { return change(of, name, values, size, duration); });
 }
 
 hsp_status hsp_get(hsp_controller* controller, const char* name, double* values,

@@ -47,7 +47,8 @@ typedef enum hsp_status {
   HSP_WRONG_NAME = -5,   /* there is no such input or output */
   HSP_WRONG_SIZE = -6,   /* an input or output has another number of values */
   HSP_WRONG_VALUE = -7,  /* a value is not finite, or outside of its bounds */
-  HSP_FAILED = -8        /* something else, which `hsp_last_error` says */
+  HSP_TOO_MANY = -8,     /* more than 8 ramps of one input at a time */
+  HSP_FAILED = -9        /* something else, which `hsp_last_error` says */
 } hsp_status;
 
 typedef struct hsp_controller hsp_controller;
@@ -83,6 +84,14 @@ HSP_API hsp_status hsp_restart(hsp_controller* controller) HSP_NOEXCEPT;
 HSP_API const hsp_port* hsp_port_at(const hsp_controller* controller, size_t number) HSP_NOEXCEPT;
 HSP_API const hsp_port* hsp_port_of(const hsp_controller* controller,
                                     const char* name) HSP_NOEXCEPT;
+
+/* Let an input have other values from the next step on: at once, or by a smooth ramp of a duration
+ * [s], as `controller.at(t).ramp(duration)` does in Python. A ramp goes on from what is then in
+ * force, and may begin while another is under way. Before the first step both are at once. */
+HSP_API hsp_status hsp_set(hsp_controller* controller, const char* name, const double* values,
+                           size_t size) HSP_NOEXCEPT;
+HSP_API hsp_status hsp_ramp(hsp_controller* controller, const char* name, const double* values,
+                            size_t size, double duration) HSP_NOEXCEPT;
 
 /* Read an output, or an input as it is now. */
 HSP_API hsp_status hsp_get(hsp_controller* controller, const char* name, double* values,

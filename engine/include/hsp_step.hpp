@@ -27,6 +27,12 @@ class FrozenController {
     return fits ? hsp_step(handle_.get(), t, q.data(), v.data(), tau.data()) : HSP_WRONG_SIZE;
   }
   hsp_status restart() noexcept { return hsp_restart(handle_.get()); }
+  hsp_status set(const char* name, std::span<const double> values) noexcept {
+    return hsp_set(handle_.get(), name, values.data(), values.size());
+  }
+  hsp_status ramp(const char* name, std::span<const double> values, double duration) noexcept {
+    return hsp_ramp(handle_.get(), name, values.data(), values.size(), duration);
+  }
   hsp_status get(const char* name, std::span<double> values) noexcept {
     return hsp_get(handle_.get(), name, values.data(), values.size());
   }

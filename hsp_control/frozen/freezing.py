@@ -19,6 +19,7 @@ from hsp_control.engine import Move, Plan
 from hsp_control.engine.plans import OnlyIf, PartCalls
 from hsp_control.frozen.compensated_step import CompensatedStep
 from hsp_control.frozen.image import Image, Port
+from hsp_control.frozen.inputs import inputs_of
 from hsp_control.frozen.refusals import check_parts, check_steady
 
 
@@ -92,7 +93,13 @@ def _image(
         move = _bare(bound, delivered, sending)
     else:
         move = chain.move()
-    return Image(move, [*_ports(own, bound, delivered, held)])
+    inputs = [*inputs_of(own, period)]
+    first = [call for each in inputs for call in each.calls]
+    values = move.values
+    calls = Plan([*first, *values["calls"].calls])
+    move = engine.Move(**values | {"calls": calls})
+    ports = [*_ports(own, bound, delivered, held), *(each.port for each in inputs)]
+    return Image(move, ports)
 
 
 def _bare(bound: BoundStep, delivered: DeliveredAlone, sending: PartCalls) -> Move:

@@ -38,7 +38,7 @@ class Port(NamedTuple):
     unit: str
     meaning: str
     array: Any  # float64 or int64, contiguous
-    is_input: bool = False
+    input: Call | None = None  # what changes it, of the kind Evolve; None: an output
 
 
 class Image:
@@ -120,9 +120,11 @@ class Image:
     def _port(self, port: Port) -> bytes:
         texts = _text(port.name) + _text(port.unit) + _text(port.meaning)
         letters = b"d" if port.array.dtype == np.float64 else b"i"
-        letters += b"i" if port.is_input else b"o"
-        place = self._memory.place(port.array)
-        return texts + letters + struct.pack("=qQ", port.array.size, place)
+        letters += b"o" if port.input is None else b"i"
+        place = struct.pack("=qQ", port.array.size, self._memory.place(port.array))
+        if port.input is not None:
+            place += struct.pack("=I", self._number(port.input))
+        return texts + letters + place
 
 
 class _Memory:

@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 from hsp_control.frozen import library
 
 OK, WRONG_STATE, WRONG_CLOCK, NOT_FINITE, BUSY = 0, -1, -2, -3, -4
-WRONG_NAME, WRONG_SIZE, WRONG_VALUE = -5, -6, -7
+WRONG_NAME, WRONG_SIZE, WRONG_VALUE, TOO_MANY = -5, -6, -7, -8
 _HEADER = 8 + 4
 """Bytes before what the checksum is of."""
 
@@ -43,6 +43,8 @@ def _loaded() -> Any:
         ("hsp_port_at", ctypes.POINTER(PortOfC), handle, size),
         ("hsp_port_of", ctypes.POINTER(PortOfC), handle, text),
         ("hsp_get", ctypes.c_int, handle, text, numbers, size),
+        ("hsp_set", ctypes.c_int, handle, text, numbers, size),
+        ("hsp_ramp", ctypes.c_int, handle, text, numbers, size, number),
         ("hsp_last_error", text, handle),
         ("hsp_status_text", text, ctypes.c_int),
         ("hsp_build", text),
@@ -82,6 +84,17 @@ class Opened:
         if status:
             raise ValueError(status)
         return values
+
+    def ramp(self, name: str, values: ArrayLike, duration: float) -> int:
+        given = np.array(values, dtype=float).ravel()
+        size = len(given)
+        args = self.handle, name.encode(), pointer(given), size, duration
+        return int(LIB.hsp_ramp(*args))
+
+    def set(self, name: str, values: ArrayLike) -> int:
+        given = np.array(values, dtype=float).ravel()
+        args = self.handle, name.encode(), pointer(given), len(given)
+        return int(LIB.hsp_set(*args))
 
     @property
     def error(self) -> str:
