@@ -30,7 +30,8 @@ struct hsp_controller {
         tau(plan.array<double>("tau", plan.move().v.size())),
         status(plan.array<std::int64_t>("status", 1)),
         delivered(plan.array<std::int64_t>("delivered", 1)),
-        period(plan.array<double>("period", 1)) {
+        period(plan.array<double>("period", 1)),
+        origin(plan.array<double>("origin", 1)) {
     for (const Port& each : plan.ports())
       ports.push_back({each.name.c_str(), each.unit.c_str(), each.meaning.c_str(),
                        static_cast<std::size_t>(each.size), each.input != nullptr});
@@ -41,6 +42,7 @@ struct hsp_controller {
   const double* tau;
   const std::int64_t *status, *delivered;
   const double* period;
+  double* origin;                          // what the clock reads at time 0 [s]
   std::optional<double> last;              // time of the last step [s]
   std::atomic<hsp_status> error = HSP_OK;  // of the last request
   char failure[512] = "";                  // what an exception said
@@ -66,18 +68,21 @@ template <class Request> hsp_status made(hsp_controller* controller, Request req
   return status;
 }
 
-hsp_status step(hsp_controller& of, double t, const double* q, const double* v, double* tau) {
+// Make a step; its effort, or the last one, is then `of.tau`.
+hsp_status moved(hsp_controller& of, double t, const double* q, const double* v) {
   hsp::Move& move = of.plan.move();
-  const Index n = move.v.size();
-  const Eigen::Map<const hsp::Vector> q_in(q, move.q.size()), v_in(v, n);
-  hsp_status status = HSP_WRONG_STATE;
-  if (of.last && !(t >= *of.last && t <= *of.last + most_periods * *of.period)) {
-    if (std::isfinite(t)) status = HSP_WRONG_CLOCK;
-  } else if (move.to(t, q_in, v_in)) {
-    of.last = t;
-    status = *of.delivered ? static_cast<hsp_status>(*of.status) : HSP_NOT_FINITE;
-  }
-  for (Index i = 0; i < n; ++i) tau[i] = of.tau[i];
+  const Eigen::Map<const hsp::Vector> q_in(q, move.q.size()), v_in(v, move.v.size());
+  if (!std::isfinite(t)) return HSP_WRONG_STATE;
+  if (!of.last) *of.origin = t;  // times count from the first step, whatever the clock reads
+  else if (t < *of.last || t > *of.last + most_periods * *of.period) return HSP_WRONG_CLOCK;
+  if (!move.to(t, q_in, v_in)) return HSP_WRONG_STATE;
+  of.last = t;
+  return *of.delivered ? static_cast<hsp_status>(*of.status) : HSP_NOT_FINITE;
+}
+
+hsp_status step(hsp_controller& of, double t, const double* q, const double* v, double* tau) {
+  const hsp_status status = moved(of, t, q, v);
+  for (Index i = 0; i < of.plan.move().v.size(); ++i) tau[i] = of.tau[i];
   return status;
 }
 
@@ -91,7 +96,7 @@ hsp_status change(hsp_controller& of, const char* name, const double* values, st
   const Eigen::Map<const hsp::Vector> wanted(values, port->size);
   if (!port->input->permits(wanted)) return HSP_WRONG_VALUE;
   // Before the first step it is so from the beginning.
-  const double now = of.last.value_or(-infinite);
+  const double now = of.last ? of.plan.move().time[0] : -infinite;
   return port->input->then(now, of.last ? duration : 0.0, wanted) ? HSP_OK : HSP_TOO_MANY;
 }
 
@@ -124,7 +129,8 @@ const char* sentence(hsp_status status) {
     case HSP_WRONG_VALUE:
       return "a pointer is null, or a value is not finite, out of bounds, or a gain that is not "
              "positive definite";
-    case HSP_TOO_MANY: return "the input still follows 8 ramps, which is the most";
+    case HSP_TOO_MANY:
+      return "the input still follows 8 ramps, which is the most";
     case HSP_FAILED:
       return "a call failed, which hsp_last_error says";
   }

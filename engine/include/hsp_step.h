@@ -73,7 +73,7 @@ HSP_API size_t hsp_size_v(const hsp_controller* controller) HSP_NOEXCEPT;
 HSP_API double hsp_period(const hsp_controller* controller) HSP_NOEXCEPT;
 
 /* Compute the effort tau at a time t [s], a configuration q and a velocity v, which is sent now and
- * held for a period. Times of a run increase. */
+ * held for a period. The clock may begin anywhere: times count from the first step. */
 HSP_API hsp_status hsp_step(hsp_controller* controller, double t, const double* q, const double* v,
                             double* tau) HSP_NOEXCEPT;
 

@@ -39,7 +39,7 @@ struct Periods {
       if (!step->to(t, q, v) || !is_free()) return k;
       held = effort;
       if (!std::isfinite(effort.squaredNorm())) return k;
-      sending->run(t);
+      sending->run(step->time[0]);
     }
     return last;
   }

@@ -11,7 +11,8 @@ struct Move {
   static constexpr const char* type_name = "Move";
   static constexpr const char* doc = "Make calls at a state, which `to` has moved.";
   Shared<Plan> calls;
-  Out<1> time;
+  In<1> origin;  // reading of the clock at time 0 [s]
+  Out<1> time;   // since then [s]
   Out<'q'> q;
   Out<'n'> v;
   Ints<'u', 2> unit_blocks;  // start and size of what in q has norm 1
@@ -25,14 +26,14 @@ struct Move {
   }
   double operator()(double t) { return calls->run(t); }
 
-  // Copy t, q and v, and make the calls; nothing, if not all are finite or a norm is wrong.
+  // Copy q, v and the time since the origin, and make the calls; nothing, if not all are finite or a norm is wrong.
   template <class Q, class V> std::optional<double> to(double t, const Q& q_in, const V& v_in) {
     if (!is_valid(t, q_in, v_in)) return std::nullopt;
-    time[0] = t;
+    time[0] = t - origin[0];
     q = q_in;
     v = v_in;
     ++stamp[0];
-    return calls->run(t);
+    return calls->run(time[0]);
   }
 
   template <class Q, class V> bool is_valid(double t, const Q& q_in, const V& v_in) const {

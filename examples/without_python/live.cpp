@@ -70,8 +70,8 @@ class Robot {
     char data[65536];
     for (;;) {
       peer_size_ = sizeof peer_;
-      const auto size = recvfrom(socket_, data, sizeof data, 0,
-                                 reinterpret_cast<sockaddr*>(&peer_), &peer_size_);
+      const auto size =
+          recvfrom(socket_, data, sizeof data, 0, reinterpret_cast<sockaddr*>(&peer_), &peer_size_);
       if (size < 0) return false;
       if (static_cast<std::size_t>(size) < sizeof head + 4) continue;
       const std::size_t body = size - 4;
@@ -136,7 +136,9 @@ int run(char** arguments) {
   } while (state.t < duration);
   for (int i = 0; i < 3; ++i) robot.send(BYE);  // one may be lost
   std::sort(times.begin(), times.end());
-  const auto part = [&](double x) { return times[static_cast<std::size_t>(x * (times.size() - 1))]; };
+  const auto part = [&](double x) {
+    return times[static_cast<std::size_t>(x * (times.size() - 1))];
+  };
   std::printf("%zu steps, %ld refused; a step took %.1f us, p99.9 %.1f, at most %.1f\n",
               times.size(), refused, part(0.5), part(0.999), times.back());
   return refused ? 2 : 0;

@@ -27,12 +27,13 @@ class BoundStep:
         active: ActiveStack,
         actuation: Actuation,
         limits: LimitsInForce,
+        origin: Array,
     ) -> None:
         self.active = active
         self.damped = ""  # tasks of the first level with a bounded inverse, by name
         # whether the effort is M a + N wherever no limit is violated
         self.direct = actuation.direct
-        self.move = state.bind_move([*active.calls, *actuation.calls()])
+        self.move = state.bind_move([*active.calls, *actuation.calls()], origin)
         self._move = self.move.__call__  # bound once: half the time of a look-up
         self._own = actuation.own  # what is delivered of the law's own acceleration
         self._nearest, self._is_nearest = actuation.nearest, actuation.is_nearest

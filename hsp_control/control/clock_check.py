@@ -4,12 +4,12 @@ import warnings
 
 _FEW = 5
 """Steps in a row before a clock is called wrong: one may be late, or made twice."""
+_LATE = 1e6
+"""A state later than eleven days has the time of a clock, not of a run [s]."""
 _STILL = 100
 """The same at one time: a loop may rehearse its first step."""
 _UNITS = 100.0
 """Times of a step over its period from which on they have different units."""
-_LATE = 1e6
-"""A clock that begins later than eleven days counts from another origin [s]."""
 
 
 class ClockWarning(UserWarning):
@@ -29,9 +29,9 @@ class ClockCheck:
         """Look at the time of the first step [s]."""
         if abs(t) > _LATE:
             self._tell(
-                f"the first step is at t = {t:.10g} s: trajectories, schedules and "
-                "changes count from 0, so they are over; give the time since the loop "
-                "began, t - t0"
+                f"the first step is at t = {t:.10g} s of its state: trajectories, "
+                "schedules and changes count from 0, so they are over; give "
+                "compute(t, q, v) what the clock reads, which may begin anywhere"
             )
 
     def look(self, t: float, period: float, stamp: int) -> None:

@@ -104,6 +104,8 @@ class Composition:
         self._gains = GainsInForce(robot.nv)
         self._model = ModelInForce(robot, [self._state.dynamics])
         self._run = PresentRun(self._declared.robot.nv)
+        self._origin: Array = np.zeros(1)  # `PresentRun.origin`, for calls [s]
+        self._clocked = self._state.bind_move(origin=self._origin)
         q = robot.home() if given is None else given
         state = robot.state(0.0, q, np.zeros(robot.nv))
         start = Start(state, self._declared.scene, known=given is not None)
@@ -136,6 +138,10 @@ class Composition:
         """The latest time of a step [s]; -inf before the first one."""
         run = self._run
         return max(run.now, self._state.t) if run.begun else -np.inf
+
+    def _count_from(self, origin: float) -> None:
+        """Count times from a reading of the clock [s]."""
+        self._run.origin = self._origin[0] = origin
 
     def _here(self) -> Start:
         """Return where the robot was at the last step."""
@@ -394,6 +400,7 @@ class Composition:
             "declared": self._declared,
             "time_line": self._time_line,
             "begun": self._run.begun,
+            "origin": self._run.origin,
             "now": self._run.now,
             "at": (state.t, state.q.copy(), state.v.copy()),
             "gains": self._gains.memory(),
@@ -407,6 +414,8 @@ class Composition:
         self._follow(saved["time_line"])
         self._gains.remember(saved["gains"])
         self._state.update(*saved["at"])
+        if saved["origin"] is not None:
+            self._count_from(saved["origin"])
         self._limits.remember(saved["sent"])
 
 
@@ -414,9 +423,11 @@ class PresentRun:
     """What a controller knows of the present run."""
 
     # Not on the controller itself, whose own attributes cost 0.4 µs to set.
-    __slots__ = ("acceleration", "begun", "bound", "clock", "now")
+    __slots__ = ("acceleration", "begun", "bound", "clock", "now", "origin")
 
     def __init__(self, nv: int) -> None:
+        # reading of the clock at time 0 [s]; None: that of the first step
+        self.origin: float | None = None
         self.acceleration = np.zeros(nv)  # what the last step delivered
         self.begun, self.now = False, -np.inf  # latest time of a step [s]
         self.bound: BoundStep | None = None  # the step, while nothing changes

@@ -38,6 +38,8 @@ class Controller(Composition):
     same state gives the same effort: its only memory is the last effort, used where
     the effort rate is limited (see `applied`), and how long changes of impedances wait.
 
+    Times count from the first step of a run: a robot's clock may begin anywhere.
+
     The parts are values and do not change; `at` makes changes while the controller
     runs. What they leave relative (a circle without a centre, ``target="start"``)
     refers to ``start``, or else to the first state for which an effort is computed. A
@@ -62,7 +64,9 @@ class Controller(Composition):
         """Return the effort at a time, configuration and velocity.
 
         Args:
-            t: Time [s]; or a `RobotState` instead of all three; its values are copied.
+            t: Time of a clock [s], which may begin anywhere: that of the first step is
+                time 0. Or a `RobotState` instead of all three, whose time counts from
+                there already; its values are copied.
             q: Configuration, shape (nq,).
             v: Velocity, shape (nv,) [rad/s or m/s].
             modifier: Changes the law's acceleration before the limits are applied;
@@ -104,7 +108,7 @@ class Controller(Composition):
                 delivered = mixture.deliver(modifier)  # within the limits
                 stack, damped = self.active_stack, mixture.damped
                 stack.check(delivered.effort)
-                run.bound = bound or mixture.bound_step()
+                run.bound = bound or mixture.bound_step(self._origin)
             run.acceleration = delivered.acceleration
             if out is None:
                 out = ControlOutput()
@@ -122,21 +126,27 @@ class Controller(Composition):
     ) -> None:
         """Move the state; see `compute`."""
         if q is not None and v is not None:
-            self._state.update(t, q, v)  # type: ignore[arg-type]
-        elif not isinstance(t, RobotState):
+            if self._run.origin is None:
+                self._state.update(t, q, v)  # type: ignore[arg-type]
+                self._count_from(self._state.t)
+            self._state.advance(self._clocked, t, q, v)  # type: ignore[arg-type]
+            return
+        if not isinstance(t, RobotState):
             missing = " and ".join(
                 name for name, value in (("q", q), ("v", v)) if value is None
             )
             raise ControllerError(
                 f"compute needs t, q and v, or a RobotState; {missing} is missing"
             )
-        elif t.robot is not self._declared.robot:
+        if t.robot is not self._declared.robot:
             raise ControllerError(
                 f"the state is of another robot object ({t.robot.name}); "
                 f"this controller is for {self._declared.robot.name}"
             )
-        elif t is not self._state.seen and t is not self._state:
+        if t is not self._state.seen and t is not self._state:
             self._state.update(t.t, t.q, t.v)
+        if self._run.origin is None:
+            self._count_from(0.0)
 
     def _begin(self) -> None:
         """Look at the first state, and without a start place there what is relative."""
@@ -263,15 +273,26 @@ class Controller(Composition):
         model.plan(setup.payloads, setup.gravity, -np.inf)
         return model.write
 
-    def restart(self) -> None:
+    def restart(self, *, origin: float | None = None) -> None:
         """Begin anew: forget the last effort, the offsets of tasks, and where it began.
 
         Changes that were made stay on the time line.
+
+        Args:
+            origin: What the clock of `compute` reads at time 0, from which references,
+                schedules and changes count [s]; None: what it reads in the next step.
+
+        Raises:
+            NonFiniteError: If the origin is NaN or inf.
         """
+        if origin is not None and not isfinite(origin):
+            raise NonFiniteError(f"origin is {origin}; needs a finite number")
         with self._lock:
             self._limits.forget()
             self._gains.forget()
             self._run = PresentRun(self._declared.robot.nv)
+            if origin is not None:
+                self._count_from(origin)
             self._mixture.active = None  # the next step places what is relative
             made = self._time_line.made
             if made or any(each.task.remembers for each in self._setup.tasks):
@@ -300,8 +321,9 @@ class Controller(Composition):
     def state(self) -> RobotState:
         """The state that the last effort was computed for; the next one overwrites it.
 
-        `update` moves it, and nothing else does: its t, q and v cannot be assigned or
-        written. Given to `compute` it is not copied.
+        Its time counts from the first step. `update` moves it, and nothing else does:
+        its t, q and v cannot be assigned or written. Given to `compute` it is not
+        copied.
         """
         return self._state.seen
 
@@ -341,12 +363,21 @@ class Controller(Composition):
         return plan
 
     def stack(self, state: RobotState) -> TaskSample:
-        """Return the rows of all active contacts and tasks at a state."""
-        with self._lock:
-            self._observe(state)
-            self._advance()
-            self._mixture.resolve(self._state.t)
-            return self.active_stack.rows
+        """Return the rows of all active contacts and tasks; see `stack_at`."""
+        return self.stack_at(state).rows
+
+    def stack_at(self, state: RobotState) -> ActiveStack:
+        """Return the contacts and tasks that are active at a state, resolved there.
+
+        The state's time counts from the first step. The controller does not move: its
+        copy does.
+        """
+        ahead = self._ahead()
+        with ahead._lock:
+            ahead._observe(state)
+            ahead._advance()
+            ahead._mixture.resolve(state.t)
+            return ahead.active_stack
 
     @property
     def task_rows(self) -> Mapping[str, slice]:
@@ -363,19 +394,33 @@ class Controller(Composition):
 
         The law makes the robot this first-order flow (docs/law.md, Equations (7) and
         (13) over a metric; Liégeois 1977). So it shows what a field will do, and a
-        start with this velocity has no transient.
+        start with this velocity has no transient. The time counts from the first step.
+        The controller does not move: its copy does.
         """
-        self.compute(t, q, np.zeros(self.robot.nv))
-        return self.active_stack.flow()
+        ahead = self._ahead()
+        ahead.compute(t, q, np.zeros(self.robot.nv))
+        return ahead.active_stack.flow()
+
+    def _ahead(self) -> "Controller":
+        """Return a copy that goes on from here, to look ahead with its own times."""
+        with self._lock:
+            ahead = self._copy()
+        ahead._count_from(0.0)
+        return ahead
+
+    def _copy(self) -> "Controller":
+        """Return a copy of the same robot object."""
+        return deepcopy(self, {id(self._declared.robot): self._declared.robot})
 
     def preview(self) -> "Controller":
         """Return a copy at the beginning of a run: to look ahead, or at a log.
 
-        It is of the same robot object. What its streams hear counts for it alone.
+        It is of the same robot object, and counts times from 0. What its streams hear
+        counts for it alone.
         """
-        other = deepcopy(self, {id(self._declared.robot): self._declared.robot})
+        other = self._copy()
         other._declared = other._declared.preview()
-        other.restart()
+        other.restart(origin=0.0)
         return other
 
 

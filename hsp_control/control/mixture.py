@@ -155,13 +155,16 @@ class Mixture:
         )
         return Delivered(effort, a, force, max(statuses), max(relaxations))
 
-    def bound_step(self) -> BoundStep | None:
-        """Return the step that was made last as one call; None if it may change."""
+    def bound_step(self, origin: Array) -> BoundStep | None:
+        """Return the step that was made last as one call; None if it may change.
+
+        ``origin``: what the clock of its calls reads at time 0, shape (1,) [s].
+        """
         if not self.steady or self.active is None:
             return None
         ((limits, _),) = self._limits.sets
         actuation = self.actuation(self.active, limits)
-        return BoundStep(self._state, self.active, actuation, self._limits)
+        return BoundStep(self._state, self.active, actuation, self._limits, origin)
 
     def prepare(self, stack: ActiveStack) -> None:
         """Bind what a step with a stack calls, now instead of in the step."""

@@ -96,10 +96,12 @@ def _image(
     inputs = [*inputs_of(own, period)]
     first = [call for each in inputs for call in each.calls]
     values = move.values
+    origin = np.zeros(1)  # the first step's time is written there
     calls = Plan([*first, *values["calls"].calls])
-    move = engine.Move(**values | {"calls": calls})
+    move = engine.Move(**values | {"calls": calls, "origin": origin})
     ports = [*_ports(own, bound, delivered, held), *(each.port for each in inputs)]
-    return Image(move, ports)
+    read = Port("origin", "s", "what the clock read in the first step", origin)
+    return Image(move, [*ports, read])
 
 
 def _bare(bound: BoundStep, delivered: DeliveredAlone, sending: PartCalls) -> Move:

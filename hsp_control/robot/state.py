@@ -81,7 +81,8 @@ class RobotState:
         self.stamp_array: Indices = np.zeros(1, dtype=np.int64)
         blocks = np.array(robot.unit_blocks, dtype=np.int64).reshape(-1, 2)
         # writable, also where `seen` binds calls
-        self._memory = {
+        self._memory: dict[str, Array | Indices] = {
+            "origin": np.zeros(1),
             "time": self.time,
             "q": self.q,
             "v": self.v,
@@ -176,8 +177,16 @@ class RobotState:
                 )
         return value
 
-    def bind_move(self, calls: Sequence[Step] = ()) -> Move:
-        """Return how `advance` moves this state, with calls of the time that follow."""
+    def bind_move(
+        self, calls: Sequence[Step] = (), origin: Array | None = None
+    ) -> Move:
+        """Return how `advance` moves this state, with calls of the time that follow.
+
+        Args:
+            calls: What is called after it, with the time of the state.
+            origin: What the clock of `advance` reads at time 0, shape (1,) [s]; None:
+                it is no clock, but the time of the state.
+        """
         jacobians = PartCall(
             engine.JointJacobians,
             **self._at,
@@ -186,7 +195,8 @@ class RobotState:
             placements=self.world.placements,
         )
         plan = Plan([*self.plan([jacobians]).steps(), *calls])
-        return Move(calls=plan, **self._memory)
+        memory = self._memory if origin is None else self._memory | {"origin": origin}
+        return Move(calls=plan, **memory)
 
     @property
     def seen(self) -> "RobotState":

@@ -31,8 +31,8 @@ class EffortSource(Protocol):
     def state(self) -> RobotState:
         """The state for which the controller computed it."""
 
-    def restart(self) -> None:
-        """Clear all memory: a new run begins."""
+    def restart(self, *, origin: float | None = None) -> None:
+        """Clear all memory for a new run; see `Controller.restart`."""
 
     def effort(self, t: float, q: Array, v: Array, period: float) -> Array:
         """Return the effort, shape (nv,), for a measurement at time t [s].
@@ -91,7 +91,7 @@ class ControlChain(Generic[Source_co]):
         if self._plan is not None:
             self.plan = self._plan.begin(controller)
         self._estimating = begun(self._estimators, controller, inertial)
-        self.command.restart()
+        self.command.restart(origin=0.0)
         if self.plan is not None and state is not None:
             self.plan.start(state)
 

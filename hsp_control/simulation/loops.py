@@ -44,7 +44,7 @@ def continuous_loop(
 ) -> Iterator[Instant]:
     """Yield the instants of a loop without sampling, as in the proofs."""
     state = controller.state
-    controller.restart()
+    controller.restart(origin=0.0)
 
     def feedback(t: float, q: Array, v: Array) -> Array:
         tau = controller.compute(t, q, v).tau

@@ -240,7 +240,7 @@ def _moved(
     controller: Controller, state: RobotState, whole: WholeLoop
 ) -> tuple[Moved, ...]:
     """Return how far the tasks move for one unit of effort on each joint."""
-    loop, T, to_error = whole
+    loop, T, to_error, rows = whole
     m, nv = len(to_error), len(T)
     # Each column is the acceleration of one unit of effort, in the loop's coordinates.
     pushes = T @ np.linalg.inv(state.mass_matrix)
@@ -256,7 +256,7 @@ def _moved(
         moving[nv : 2 * nv] += h * pushes
         reached.append(to_error @ moving[:m])
     path = np.array(reached)
-    rows, found = controller.active_stack.task_rows, list[Moved]()
+    found = list[Moved]()
     for task in controller.tasks:
         if (at := rows.get(task.name)) is None:
             continue

@@ -87,7 +87,7 @@ class HandControl:
             q: Configuration, shape (nq,).
             v: Velocity, shape (nv,).
         """
-        self.command.restart()
+        self.command.restart(origin=0.0)
         self.command.controller.compute(t, q, v)  # places what refers to the start
         self._expected = nan
 

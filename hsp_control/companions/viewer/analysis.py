@@ -35,11 +35,13 @@ def from_the_start(controller: Controller) -> Controller:
 
 
 def null_space_projector(controller: Controller, state: RobotState) -> Array:
-    """Return P = I - J#J in the metric W, (nv, nv), J of all that is active."""
-    own = controller.state.update(state.t, state.q, state.v)  # of the same robot object
-    J = controller.stack(own).jacobian
-    nv = controller.robot.nv
-    metric = controller.metric.evaluate(own, MetricSample.allocate(nv))
+    """Return P = I - J#J in the metric W, (nv, nv), J of all that is active.
+
+    The controller moves to the state: it is one that looks at a log.
+    """
+    controller.compute(state.t, state.q, state.v)
+    stack, nv = controller.active_stack, controller.robot.nv
+    J, metric = stack.rows.jacobian, stack.resolution.problem.metric
     # With W = L Lᵀ, P = L⁻ᵀ (I - B⁺B) Lᵀ for B = J L⁻ᵀ.
     B = np.linalg.solve(metric.L, J.T).T
     projector = np.eye(nv) - np.linalg.pinv(B, rcond=1e-9) @ B
@@ -78,7 +80,7 @@ def expected_floor(rollout: Rollout, controller: Controller | None) -> Array | N
         return None
     if np.linalg.cond(K_N) > 1e9 or not np.isfinite(rollout.tau).all():
         return None
-    return _solve(rollout, from_the_start(controller), K_N, period)
+    return _solve(rollout, controller.preview(), K_N, period)
 
 
 def _solve(

@@ -12,7 +12,6 @@ from hsp_control.common.arrays import Array
 from hsp_control.companions.plots.palette import FIELD, TASK, WARNING
 from hsp_control.companions.viewer import threejs
 from hsp_control.companions.viewer.analysis import (
-    from_the_start,
     null_space_projector,
 )
 from hsp_control.companions.viewer.commands import (
@@ -207,7 +206,7 @@ def _joint_rates(
     controller: Controller, motion: RunMotion
 ) -> tuple[Array, Array, Array]:
     """Return positions, P v and P g of the joints, (N, njoints - 1, 3) each."""
-    controller = from_the_start(controller)
+    controller = controller.preview()
     data = controller.robot.model.createData()
     rows: list[tuple[Array, Array, Array]] = []
     for state, g in zip(motion.states(), motion.rows["field.g"], strict=True):

@@ -69,9 +69,9 @@ class Command:
         self._changes_state = (own.velocity_filter or own.predictor) is not None
         self.restart()
 
-    def restart(self) -> None:
-        """Reset all memory, for a new run."""
-        self.controller.restart()
+    def restart(self, *, origin: float | None = None) -> None:
+        """Reset all memory, for a new run; see `Controller.restart`."""
+        self.controller.restart(origin=origin)
         ahead = self.compensation.predictor
         periods = 0 if ahead is None else ahead.periods
         self._run = run = Run(self.controller, self._measured, periods)

@@ -1,5 +1,6 @@
 """Sampled control loops of linear errors: rigid, elastic, or loaded by other bodies."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from math import exp
 from typing import Literal, NamedTuple
@@ -213,11 +214,11 @@ def null_space_rates(controller: Controller, state: RobotState) -> tuple[Array, 
     nothing = np.zeros((0, 0))
     if not controller.field.controls:
         return nothing, nothing
-    J = controller.stack(state).jacobian
-    L = controller.active_stack.resolution.problem.metric.L
+    stack = controller.stack_at(state)
+    J, L = stack.rows.jacobian, stack.resolution.problem.metric.L
     across = np.linalg.solve(L, J.T).T  # J L⁻ᵀ
     _, values, Vt = np.linalg.svd(across)
-    rank = int((values > controller.active_stack.resolution.threshold).sum())
+    rank = int((values > stack.resolution.threshold).sum())
     Z = Vt[rank:].T
     if not Z.size:
         return nothing, nothing
@@ -303,6 +304,7 @@ class WholeLoop(NamedTuple):
     loop: LinearLoop
     into: Array  # T, shape (nv, nv)
     to_error: Array  # U S, shape (m, m): e = U S y₁, of the task's rows
+    task_rows: Mapping[str, slice]  # the rows of each task, by name
 
 
 def whole_loop(
@@ -315,18 +317,18 @@ def whole_loop(
     robot = controller.robot
     if robot.unactuated or controller.contacts:
         return None
-    J = controller.stack(state).jacobian
-    problem = controller.active_stack.resolution
-    U, S, Vt = np.linalg.svd(np.linalg.solve(problem.problem.metric.L, J.T).T)
+    stack = controller.stack_at(state)
+    J, L = stack.rows.jacobian, stack.resolution.problem.metric.L
+    U, S, Vt = np.linalg.svd(np.linalg.solve(L, J.T).T)
     m, n = J.shape
-    if m > n or S.min(initial=np.inf) <= problem.threshold:
+    if m > n or S.min(initial=np.inf) <= stack.resolution.threshold:
         return None
     if m < n and not controller.field.controls:
         return None
-    T = Vt @ problem.problem.metric.L.T
+    T = Vt @ L.T
     back = np.linalg.inv(T)
     into, out_of = (U / S).T, U * S  # S⁻¹ Uᵀ and U S
-    rows = controller.active_stack.task_rows
+    rows = stack.task_rows
     Kp, Kv, Ki = (np.zeros((m, m)) for _ in range(3))
     action = chain.compensation.integral_action
     integral = {} if action is None else action.gains(controller.tasks)
@@ -348,7 +350,7 @@ def whole_loop(
         K = (T @ controller.null_space_gain @ back)[m:, m:]
         kp[m:], kv[m:] = K @ A, A
         kv[m:, m:] += K
-    return WholeLoop(replace(chain, kp=kp, kv=kv, ki=ki), T, out_of)
+    return WholeLoop(replace(chain, kp=kp, kv=kv, ki=ki), T, out_of, rows)
 
 
 def loaded_loop(

@@ -48,8 +48,11 @@ class Line:
         q = self.robot.integrate(self.center, self.swing * np.sin(3.0 * t))
         return q, 3.0 * self.swing * np.cos(3.0 * t)
 
+    def state(self, t: float) -> hsp.RobotState:
+        return self.robot.state(t, *self.motion(t))
+
     def efforts(self, controller: hsp.Controller, times: Array) -> Array:
-        return np.array([controller.compute(t, *self.motion(t)).tau for t in times])
+        return np.array([controller.compute(self.state(t)).tau for t in times])
 
     def draw(self, number: int) -> tuple[Change, ...]:
         """Return changes in order of time, so that each is possible."""
@@ -173,6 +176,7 @@ def test_in_the_end_it_is_as_if_built_that_way(name: str, seed: int) -> None:
 def test_copies_made_at_any_time_compute_the_same(duplicate: Any, seed: int) -> None:
     line = Line("panda", seed)
     controller = line.controller(line.draw(20))
+    controller.restart(origin=0.0)
     for t in line.rng.uniform(0.0, SPAN, 3).cumsum():
         controller.compute(t, *line.motion(t))
         twin = duplicate(controller)

@@ -87,7 +87,7 @@ class Case:
         return hsp.Controller(self.robot, tasks, hsp.TargetPosture("home"), **options)
 
     def effort(self, controller: hsp.Controller, t: float) -> Array:
-        output = controller.compute(t, self.q, self.v)
+        output = controller.compute(self.robot.state(t, self.q, self.v))
         self.binds = self.binds or output.status >= Status.LIMITED
         return output.tau
 
@@ -205,14 +205,14 @@ def test_efforts_and_forces_of_legs_are_continuous(seed: int) -> None:
     statuses = []
     for edge in (START, START + RAMP):
         for t in edge + np.linspace(-1e-6, 1e-6, 21):
-            before = controller.compute(t, q, v)
-            after = controller.compute(t + 1e-9, q, v)
+            before = controller.compute(robot.state(t, q, v))
+            after = controller.compute(robot.state(t + 1e-9, q, v))
             statuses.append(before.status)
             for old, now in ((before.tau, after.tau), (before.forces, after.forces)):
                 np.testing.assert_allclose(now, old, rtol=0, atol=1e-6)
     assume(Status.LIMITED in statuses)
     # What no motor drives is what the forces drive, in between as well.
-    out = controller.compute(START + 0.5 * RAMP, q, v)
+    out = controller.compute(robot.state(START + 0.5 * RAMP, q, v))
     support, state = controller.active_stack.support, controller.state
     wanted = state.inverse_dynamics(out.acceleration)
     np.testing.assert_allclose(out.tau + support.map @ out.forces, wanted, atol=1e-7)
@@ -290,7 +290,7 @@ def test_a_foot_that_a_plan_switches(seed: int) -> None:
     controller, q, v = standing(seed, contact=foot.contact, task=foot.task)
 
     def effort(t: float) -> Array:
-        return controller.compute(t, q, v).tau
+        return controller.compute(controller.robot.state(t, q, v)).tau
 
     foot.unload(START, 0.1)
     for t in START + 0.1 + ABOUT:
@@ -330,10 +330,10 @@ def test_a_foot_that_is_lifted_while_it_moves(seed: int) -> None:
     q, v = robot.home(), 0.2 * rng.standard_normal(robot.nv)
     for edge in EVENTS:
         for t in edge + np.linspace(-1e-6, 1e-6, 21):
-            before = controller.compute(t, q, v)
-            after = controller.compute(t + 1e-9, q, v)
+            before = controller.compute(robot.state(t, q, v))
+            after = controller.compute(robot.state(t + 1e-9, q, v))
             np.testing.assert_allclose(after.tau, before.tau, rtol=0, atol=OF_LEGS)
-    out = controller.compute(START + 0.02, q, v)
+    out = controller.compute(robot.state(START + 0.02, q, v))
     support, state = controller.active_stack.support, controller.state
     np.testing.assert_allclose(
         out.tau + support.map @ out.forces,
@@ -367,7 +367,7 @@ def test_a_mixture_keeps_the_limits(name: str, seed: int) -> None:
     case = Case(name, seed)
     controller = a_task_is_added(case)
     for t in START + RAMP * case.rng.uniform(0.0, 1.0, 5):
-        out = controller.compute(t, case.q, case.v)
+        out = controller.compute(case.robot.state(t, case.q, case.v))
         assume(out.status == Status.LIMITED)
         limits = controller.limits
         bounds = controller._limits.sets[-1][0].bounds
@@ -387,7 +387,8 @@ def test_what_opposes_friction_fades_with_the_tasks() -> None:
     times = START + np.array([-1e-9, 1e-9, RAMP - 1e-9, RAMP + 1e-9])
     tau, sent = [], []
     for t in times:
-        controller.restart()  # else the effort's rate joins what it sent before
+        # else the effort's rate joins what it sent before
+        controller.restart(origin=0.0)
         tau.append(command.effort(t, case.q, case.v, 1e-3).copy())
         sent.append(np.array(columns()["friction.feed_forward"].value))
     for found in (tau, sent):

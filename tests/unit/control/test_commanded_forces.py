@@ -242,7 +242,8 @@ def test_a_change_ramps_and_a_schedule_fades_the_force() -> None:
     controller.at(1.0).ramp(1.0).force(TIP, CommandedForce(30.0))
     expected = {0.25: 10.0, 0.8: 20.0, 1.5: 25.0, 2.5: 30.0, 3.75: 15.0}
     for t, force in expected.items():
-        assert controller.compute(t, q, v).forces[-1] == pytest.approx(force, abs=1e-4)
+        output = controller.compute(panda().state(t, q, v))
+        assert output.forces[-1] == pytest.approx(force, abs=1e-4)
 
 
 def test_a_wrench_of_a_surface() -> None:

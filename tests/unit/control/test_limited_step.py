@@ -66,7 +66,8 @@ def drawn(name: str, seed: int, spread: float) -> hsp.Controller:
     made, q0 = controller(name)
     rng = np.random.default_rng(seed)
     q = made.robot.integrate(q0, spread * rng.standard_normal(made.robot.nv))
-    made.compute(0.3, q, 3.0 * spread * rng.standard_normal(made.robot.nv))
+    v = 3.0 * spread * rng.standard_normal(made.robot.nv)
+    made.compute(made.robot.state(0.3, q, v))
     return made
 
 
@@ -222,6 +223,7 @@ def test_one_native_call_is_the_same_as_its_parts(
 ) -> None:
     """A modifier that changes nothing takes the other way: check, and then deliver."""
     made, rng, seen = arm(strength, static), np.random.default_rng(0), set()
+    made.restart(origin=0.0)
     for k in range(60):
         if k == 30:  # another stack is prepared, for later
             made.prepare(made.state, without=["j1"])

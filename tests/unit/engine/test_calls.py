@@ -293,7 +293,8 @@ def moving(told: list[float], blocks: Any = ()) -> tuple[Move, list[Array]]:
     plan = Plan([PythonCall(told.append, timed=True), PythonCall(lambda: -1.0)])
     time, q, v = memory
     stamp = np.zeros(1, dtype=int)
-    move = Move(calls=plan, time=time, q=q, v=v, unit_blocks=unit, stamp=stamp)
+    numbers = {"origin": np.zeros(1), "time": time, "q": q, "v": v}
+    move = Move(calls=plan, **numbers, unit_blocks=unit, stamp=stamp)
     return move, memory
 
 

@@ -49,6 +49,7 @@ def chain(
 def moving(n: int, **changed: Any) -> Move:
     """Return a move of n coordinates, with arguments changed."""
     given: dict[str, Any] = {"calls": Plan(), "time": np.zeros(1), "q": np.zeros(n)}
+    given["origin"] = np.zeros(1)
     given |= {"v": np.zeros(n), "unit_blocks": np.zeros((0, 2), dtype=int)}
     return Move(**given | {"stamp": np.zeros(1, dtype=int)} | changed)
 

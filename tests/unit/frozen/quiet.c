@@ -23,7 +23,9 @@ extern void __libc_free(void*);
 void* malloc(size_t size) { return allocations += counting, __libc_malloc(size); }
 void* calloc(size_t n, size_t size) { return allocations += counting, __libc_calloc(n, size); }
 void* realloc(void* p, size_t size) { return allocations += counting, __libc_realloc(p, size); }
-void* memalign(size_t to, size_t size) { return allocations += counting, __libc_memalign(to, size); }
+void* memalign(size_t to, size_t size) {
+  return allocations += counting, __libc_memalign(to, size);
+}
 void* aligned_alloc(size_t to, size_t size) { return memalign(to, size); }
 int posix_memalign(void** p, size_t to, size_t size) { return !(*p = memalign(to, size)); }
 void free(void* p) { allocations += counting && p, __libc_free(p); }
@@ -61,8 +63,9 @@ int main(int argc, char** argv) {
   }
   counting = 0;
   char text[200];
-  const int n = snprintf(text, sizeof text, "%ld steps, %ld within limits, %ld allocations, %ld locks%s\n",
-                         delivered, others, allocations, locks, watched);
+  const int n =
+      snprintf(text, sizeof text, "%ld steps, %ld within limits, %ld allocations, %ld locks%s\n",
+               delivered, others, allocations, locks, watched);
   if (write(1, text, n) != n) return 2;
   syscall(SYS_exit, 0); /* the only way out that strict seccomp has */
   return 0;

@@ -1,6 +1,8 @@
 """A frozen controller computes the same efforts as in Python, to the last bit."""
 
 from pathlib import Path
+from subprocess import CalledProcessError
+from typing import Any
 
 import numpy as np
 import pytest
@@ -14,7 +16,9 @@ from frozen_runs import (
 )
 
 import hsp_control as hsp
-from hsp_control.common.exceptions import FreezeError
+from hsp_control.common.exceptions import EngineError, FreezeError
+from hsp_control.engine import own_kinds
+from hsp_control.engine.plans import PartCall
 from hsp_control.frozen import cmake_folder, include_folder, library
 
 SEED = 61
@@ -130,3 +134,93 @@ def test_a_wrong_period_is_refused(period: float, tmp_path: Path) -> None:
     controller = hsp.load_experiment("panda_limits").controller
     with pytest.raises(FreezeError, match="period is"):
         hsp.freeze(controller, tmp_path / "frozen.hsp", period=period)
+
+
+HEIGHT = """
+#include <hsp/records.hpp>
+
+struct Height {
+  static constexpr const char* doc = "f = (z - height)² of a frame.";
+  hsp::FrameMotion<hsp::In> frame;
+  double height;
+  hsp::Out<'n'> gradient, rate;
+
+  double operator()() {
+    const auto J = frame.jacobian.row(2).transpose();
+    const auto J_dot = frame.jacobian_dot.row(2).transpose();
+    const double away = frame.position[2] - height;
+    gradient = 2.0 * away * J;
+    rate = 2.0 * (frame.velocity[2] * J + away * J_dot);
+    return away * away;
+  }
+};
+
+extern "C" auto hsp_kinds_1() { return hsp::kinds<Height>(); }
+"""
+
+
+class ElbowHeight(hsp.Cost):
+    """f = (z - 0.6)² of the Panda's elbow, in C++."""
+
+    library: str
+    """The library."""
+
+    def call(self, state: hsp.RobotState) -> PartCall:
+        kind = own_kinds.load(self.library).Height
+        return PartCall(kind, frame=state.frame("panda_link4"), height=0.6)
+
+    def value(self, state: hsp.RobotState) -> float:
+        return float((state.position("panda_link4")[2] - 0.6) ** 2)
+
+
+@pytest.mark.smoke
+def test_a_kind_of_ones_own_is_found_in_its_library(
+    replay: Path, tmp_path: Path
+) -> None:
+    source = tmp_path / "height.cpp"
+    source.write_text(HEIGHT)
+    try:
+        own = own_kinds.build(source)
+    except EngineError as error:
+        pytest.skip(str(error))
+    robot = hsp.Robot.load("panda")
+    q = robot.home()
+    field = hsp.JointCentering() + ElbowHeight(str(own), weight=20.0)
+    hand = hsp.FramePosition("panda_tcp")
+    controller = hsp.Controller(robot, [hand], field, start=q)
+    frozen = hsp.freeze(controller, tmp_path / "frozen.hsp")
+    states = random_states(robot, q, 50, SEED, away=0.1, speed=0.1)
+    np.testing.assert_array_equal(
+        replayed(replay, frozen, states), computed(controller, states)
+    )
+    own.unlink()
+    with pytest.raises(CalledProcessError):
+        replayed(replay, frozen, states)
+
+
+@pytest.mark.smoke
+@pytest.mark.parametrize("static", ["none", 0.8])
+def test_rows_of_barriers_and_of_static_efforts(
+    static: Any, replay: Path, tmp_path: Path
+) -> None:
+    """Rows that Python's step writes when they are needed have their room here."""
+    robot = hsp.Robot.load("panda")
+    q = robot.home()
+    wrist = robot.state(0.0, q, np.zeros(7)).position("panda_link6")
+    ball = hsp.Obstacle("ball", hsp.Sphere(0.1), wrist + np.array([0.05, 0.1, 0.2]))
+    apart = hsp.limits.ObstacleDistance(obstacles=["ball"], minimum=0.05)
+    barriers = [apart, hsp.limits.SelfDistance(minimum=0.02)]
+    controller = hsp.Controller(
+        robot,
+        [hsp.FramePose("panda_tcp")],
+        hsp.JointCentering(),
+        limits=hsp.Limits(barriers=barriers, static_effort=static),
+        scene=[ball],
+        start=q,
+    )
+    frozen = hsp.freeze(controller, tmp_path / "frozen.hsp")
+    for away, speed in ((0.05, 0.1), (0.4, 0.5)):
+        states = random_states(robot, q, 100, SEED, away=away, speed=speed)
+        expected = computed(controller, states)
+        assert len(set(expected[:, 0])) > 1
+        np.testing.assert_array_equal(replayed(replay, frozen, states), expected)

@@ -158,6 +158,20 @@ def test_a_clock_that_jumps_is_refused_until_a_restart(
     np.testing.assert_array_equal(opened.tau, first)
 
 
+def test_times_count_from_the_first_step(
+    opened: Opened, controller: hsp.Controller, q: np.ndarray
+) -> None:
+    own, begin = controller.preview(), 1.76e9
+    own.restart()
+    for k in range(20):
+        t, v = begin + 0.001 * k, np.full(7, 0.1)
+        output = own.compute(t, q, v)
+        own.applied(output.tau, 0.001)
+        assert opened.step(t, q, v) == output.status
+        np.testing.assert_array_equal(opened.tau, output.tau)
+    assert opened.get("origin", 1) == [begin]
+
+
 def test_null_pointers(opened: Opened, q: np.ndarray) -> None:
     q_in = q.copy()
     given = pointer(q_in), pointer(q_in), pointer(opened.tau)

@@ -138,6 +138,7 @@ def test_a_step_is_free_whose_law_is_finite_within_limits(
         told[name][0] = value
     move = Move(
         calls=Plan(),
+        origin=np.zeros(1),
         time=np.zeros(1),
         q=np.zeros(2),
         v=np.zeros(2),

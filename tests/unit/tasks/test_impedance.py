@@ -145,7 +145,7 @@ def test_the_equation_holds_whatever_the_force_and_the_metric(
             plain, gains=Gains(natural_frequency=10.0), impedance=spring, name="hand"
         )
         controller = Controller(robot, [task], metric=metric, limits=None)
-        output = controller.compute(TIME, motion.q, motion.v)
+        output = controller.compute(robot.state(TIME, motion.q, motion.v))
         assert not output.damped
         still = Motion(robot, motion.q, motion.v, np.zeros(robot.nv))
         inverse, J_e = inverse_inertia(task, still, 0.0)
@@ -186,7 +186,7 @@ def test_gains_at_a_state_are_those_of_the_step(case: Case) -> None:
     spring = Impedance(300.0, damping=20.0, largest_force=most)
     task = replace(bare, impedance=spring)
     controller = Controller(robot, [task], limits=None)
-    output = controller.compute(TIME, motion.q, motion.v)
+    output = controller.compute(robot.state(TIME, motion.q, motion.v))
     state = robot.state(TIME, motion.q, motion.v)
     Kp, Kv, offset, *_ = task.feedback_at(state)
     used = controller.feedback("hand")
@@ -275,13 +275,14 @@ def test_stiffness_changes_without_a_jump() -> None:
     v = np.linspace(-0.3, 0.3, 7)
 
     def effort(t: float) -> Array:
-        return controller.compute(t, robot.home(), v).tau.copy()
+        return controller.compute(robot.state(t, robot.home(), v)).tau.copy()
 
     times = np.linspace(0.9, 1.6, 1401)
     tau = np.array([effort(t) for t in times])
     before, after = effort(0.9), effort(1.6)
     np.testing.assert_array_equal(tau[0], before)
-    other = panda_hand(impedance=hard).compute(1.6, robot.home(), v).tau
+    built = panda_hand(impedance=hard)  # already
+    other = built.compute(built.robot.state(1.6, robot.home(), v)).tau
     np.testing.assert_allclose(after, other, rtol=1e-9, atol=1e-9)
     steps = np.abs(np.diff(tau, axis=0)).max(axis=1)
     assert steps.max() < 0.02 * np.abs(after - before).max()

@@ -20,7 +20,8 @@ def test_each_axis_of_the_tool_has_its_own_gains(robot: str, seed: int) -> None:
     motion = place(Case(robot, ToolPose(frame)), seed)
     task = ToolPose(frame).build(motion.robot, motion, 0.4, GAINS, seed)
     controller = hsp.Controller(motion.robot, [task], limits=None)
-    output = controller.compute(TIME, motion.q, motion.v)
+    state = motion.robot.state(TIME, motion.q, motion.v)
+    output = controller.compute(state)
     assert not output.damped
 
     def error(s: float) -> Array:
