@@ -47,6 +47,9 @@ demo: $(USE) $(ENGINE) ## the paper's run, and a Panda under a ball, with and wi
 	@echo "Touch it: $(BIN)/hsp play panda"
 	@echo "The paper's log and figures are in out/demo, too."
 
+without-python: $(USE) $(ENGINE) ## a loop in C++ moves the simulated arm, both processes
+	@$(BIN)/python examples/without_python/start.py --out out/without_python $(ARGS)
+
 ##@ Check
 quick: $(STAMP) $(ENGINE) ## what to run after every edit: a minute of CPU
 	@$(BIN)/python -m pytest tests/unit -m "not slow and not process and not browser" \

@@ -129,7 +129,13 @@ def build(kind: str = "Release", folder: Path = ROOT / "build") -> Path:
         if preferred == target:
             break
         preferred.unlink(missing_ok=True)
-    # A new file: a process that has loaded the old one goes on with it.
+    (step,) = place.glob("libhsp_step.*")
+    _put(step, target.with_name(step.name))
+    return _put(library, target)
+
+
+def _put(library: Path, target: Path) -> Path:
+    """Copy a library to a new file: who has loaded the old one goes on with it."""
     fresh = target.with_suffix(".new")
     shutil.copy2(library, fresh)
     return fresh.replace(target)
@@ -164,7 +170,8 @@ class EngineHook(BuildHookInterface):  # type: ignore[misc]
         library = build()
         build_data["pure_python"] = False
         build_data["tag"] = wheel_tag(library.name)
-        build_data["artifacts"].append(str(library.relative_to(ROOT)))
+        for each in (library, *library.parent.glob("libhsp_step.*")):
+            build_data["artifacts"].append(str(each.relative_to(ROOT)))
 
 
 if __name__ == "__main__":

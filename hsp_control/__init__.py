@@ -40,6 +40,7 @@ if TYPE_CHECKING:  # what a type checker reads; the names are looked up below
     from .control import compensation as compensation
     from .control import estimator as estimation  # noqa: F401 (a namespace)
     from .control import plan as plans  # noqa: F401 (a namespace)
+    from .frozen import freeze as freeze
     from .geometry import Obstacle as Obstacle
     from .geometry import Sphere as Sphere
     from .geometry import shapes as shapes
@@ -94,6 +95,7 @@ _NAMES = {
     "simulation": "Rollout",
     "simulation.simulate": "simulate",
     "live": "run_loop",
+    "frozen": "freeze",
     "config": "Experiment Recorder load_experiment",
     "common.exceptions": "HspControlError",
 }

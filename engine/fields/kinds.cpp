@@ -6,11 +6,12 @@
 #include "joint_costs.hpp"
 #include "manipulability.hpp"
 #include "point_distance.hpp"
+#include "ramp_weight.hpp"
 
 namespace hsp {
 const Kind* const* field_kinds() {
   return kinds<JointCentering, TargetPosture, EqualJointAngles, LimitBarrier, PointDistance,
                SelectRows, ChainGradient, Manipulability, InverseCondition, Barrier,
-               GradientDescent, AddWeighted>();
+               GradientDescent, RampWeight, AddWeighted>();
 }
 }  // namespace hsp

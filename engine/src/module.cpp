@@ -5,6 +5,7 @@
 #include <nanobind/stl/string.h>
 #include <nanobind/stl/vector.h>
 
+#include "build.hpp"
 #include "functions.hpp"
 #include "python_objects.hpp"
 #include "rooms.hpp"
@@ -169,6 +170,7 @@ NB_MODULE(_engine, m) {
             nb::make_tuple(engine("Move"), named_values(kind_of<Move>(), move.values)));
       });
   m.attr("PINOCCHIO") = pinocchio_version();
+  m.attr("BUILD") = build_text();
 
   m.def(
       "load_library",

@@ -5,10 +5,12 @@
 
 namespace hsp {
 
+const Kind* const* compensation_kinds();
 const Kind* const* contact_kinds();
 const Kind* const* dynamics_kinds();
 const Kind* const* edge_kinds();
 const Kind* const* field_kinds();
+const Kind* const* frozen_kinds();
 const Kind* const* geometry_kinds();
 const Kind* const* integrator_kinds();
 const Kind* const* law_kinds();
@@ -27,10 +29,11 @@ const Kind* const* library_kinds(const std::string& path);
 
 inline std::vector<const Kind* const*> rooms() {
   return {
-      plan_kinds(),  contact_kinds(),    dynamics_kinds(),   edge_kinds(),
-      field_kinds(), geometry_kinds(),   integrator_kinds(), law_kinds(),
-      limit_kinds(), linalg_kinds(),     metric_kinds(),     qp_kinds(),
-      robot_kinds(), simulation_kinds(), task_kinds(),       trajectory_kinds(),
+      plan_kinds(),       compensation_kinds(), contact_kinds(), dynamics_kinds(),
+      edge_kinds(),       field_kinds(),        frozen_kinds(),  geometry_kinds(),
+      integrator_kinds(), law_kinds(),          limit_kinds(),   linalg_kinds(),
+      metric_kinds(),     qp_kinds(),           robot_kinds(),   simulation_kinds(),
+      task_kinds(),       trajectory_kinds(),
   };
 }
 

@@ -11,7 +11,7 @@ from hsp_control.cli.options import AddedCommand, command_line
 from hsp_control.cli.streams import lost_text, make_usable
 from hsp_control.common.exceptions import HspControlError
 
-_OWN_FILES = {"check", "doctor", "live"}
+_OWN_FILES = {"check", "doctor", "freeze", "live"}
 """Commands with a file of their own; `commands` has the others."""
 _PACKAGES = {"libgomp.so.1": "libgomp1 (Debian, Ubuntu) or libgomp (Fedora)"}
 """What has a library that the wheels of our dependencies expect."""

@@ -86,6 +86,10 @@ def command_line() -> argparse.ArgumentParser:
 
     _add(commands, added, 0)
 
+    add_freeze(
+        _command(commands, "freeze", "write a controller for a program without Python")
+    )
+
     robots = _command(
         commands, "robots", "list the robots that can be loaded, or describe one"
     )
@@ -167,6 +171,22 @@ def add_live(live: argparse.ArgumentParser) -> None:
         help="real-time priority of the loop (SCHED_FIFO), 1 to 99",
     )
     add_page("live", live)
+
+
+def add_freeze(freeze: argparse.ArgumentParser) -> None:
+    """Add all options of `hsp freeze`."""
+    add_configuration(freeze, default="")
+    add_import(freeze)
+    freeze.add_argument(
+        "--out", type=Path, default=Path("out"), metavar="DIR", help="default: out"
+    )
+    where = freeze.add_mutually_exclusive_group()
+    for name, what in (
+        ("--cmake-dir", "the folder that CMake's find_package(hsp_step) needs"),
+        ("--include-dir", "the folder of hsp_step.h"),
+        ("--library", "the library to link to"),
+    ):
+        where.add_argument(name, action="store_true", help=f"print {what}, and end")
 
 
 # --- what several commands have -------------------------------------------------------

@@ -130,6 +130,10 @@ class UnstableRateError(HspControlError, ValueError):
     """The sampled control loop is unstable with these gains, delays and period."""
 
 
+class FreezeError(HspControlError, ValueError):
+    """A controller cannot run without Python: the message names what in it cannot."""
+
+
 class PlanError(HspControlError, ValueError):
     """A plan is invalid, or does not fit the robot, its contacts or its tasks."""
 

@@ -29,6 +29,7 @@ def _load(file: str) -> None:
 if _given := os.environ.get("HSP_ENGINE"):
     _load(_given)
 try:
+    from ._engine import BUILD as BUILD
     from ._engine import PINOCCHIO as PINOCCHIO
     from ._engine import Call as Call
     from ._engine import Dynamics as Dynamics

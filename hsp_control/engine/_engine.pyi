@@ -6,6 +6,7 @@ from numpy.typing import ArrayLike
 from hsp_control.common.arrays import Array
 
 PINOCCHIO: str
+BUILD: str
 
 class Kind:
     @property

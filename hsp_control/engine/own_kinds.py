@@ -127,10 +127,17 @@ def library_of(kind: Kind) -> str:
     Raises:
         ValueError: If there is none.
     """
+    if library := library_of_own(kind):
+        return library
+    raise ValueError(f"{kind.name} is no kind that `load` returned")
+
+
+def library_of_own(kind: Kind) -> str:
+    """Return the library that a kind was loaded from; empty for the engine's own."""
     for path, kinds in _LOADED.items():
         if vars(kinds).get(kind.name) is kind:
             return str(path)
-    raise ValueError(f"{kind.name} is no kind that `load` returned")
+    return ""
 
 
 def of_library(library: str, name: str) -> Kind:

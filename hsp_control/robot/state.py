@@ -29,7 +29,12 @@ from hsp_control.engine.plans import (
     says,
 )
 from hsp_control.robot.inertia import CentroidalMotion, inertia_terms
-from hsp_control.robot.kinematics import FrameKinematics, ShownFrame, WorldKinematics
+from hsp_control.robot.kinematics import (
+    FrameKinematics,
+    ShownFrame,
+    Term,
+    WorldKinematics,
+)
 
 if TYPE_CHECKING:  # a robot and its state name each other; it makes the state
     from hsp_control.robot.robot import Robot
@@ -57,6 +62,7 @@ class RobotState:
         world: Placements and Jacobians of all joints, as an argument of calls.
         inertia: M(q) as an argument of calls; see `mass_matrix`.
         inertia_rate: M' as an argument of calls; see `mass_matrix_rate`.
+        effects: N as an argument of calls; see `nonlinear_effects`.
         effort: What `inverse_dynamics` wrote last, shape (nv,) [N·m or N].
     """
 
@@ -104,7 +110,8 @@ class RobotState:
             acceleration=np.zeros(robot.nv),
             effort=self._effects,
         )
-        self._compute_effects = self._bound(Once.at(stamp, effects))
+        self.effects = Term(self._effects, [Once.at(stamp, effects)])
+        self._compute_effects = self._bound(*self.effects.calls)
         self._centroidal: tuple[CentroidalMotion, Callable[[], object]] | None = None
         self._displaced: RobotState | None = None
         self._made: dict[tuple[int, str], tuple[object, Any]] = {}
@@ -427,7 +434,7 @@ class ReadOnlyState(SeenState):
 
 _FIXED = {
     "robot", "q", "v", "time", "stamp_array", "dynamics", "world", "inertia",
-    "inertia_rate", "effort",
+    "inertia_rate", "effects", "effort",
 }  # fmt: skip
 """What native calls read or write: assigning others would change nothing for them."""
 

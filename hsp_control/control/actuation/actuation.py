@@ -69,6 +69,21 @@ class Delivered(NamedTuple):
     relaxation: float  # largest violation of a relaxed limit [rad/s² or m/s²]
 
 
+class DeliveredAlone(NamedTuple):
+    """What is delivered where no Python looks: see `Actuation.calls_alone`."""
+
+    a: Array  # acceleration, shape (nv,)
+    tau: Array  # effort, shape (nv,) [N·m or N]
+    status: Indices  # the `Status`, shape (1,)
+    delivered: Indices  # whether there is a finite effort, shape (1,)
+
+    @classmethod
+    def allocate(cls, nv: int) -> Self:
+        """Return that of no step."""
+        integers = np.zeros((2, 1), dtype=np.int64)
+        return cls(np.zeros(nv), np.zeros(nv), *integers)
+
+
 class Actuation:
     """Computes efforts and contact forces for one law, within one set of limits."""
 
@@ -184,7 +199,7 @@ class Actuation:
         # Of distances there may be hundreds, and each row costs time, used or not.
         if self._qp is not None and self.direct and "barriers" not in self._rows:
             keep = PartCall(engine.Copy, x=self._state.effort, out=wanted.effort)
-            given = self.outcome.violated, keep, self._rows.get("holding")
+            given = self.outcome.violated, [keep], self._rows
             calls = [*calls, self._qp.nearest_if(*given)]
         plain = PartCall(
             engine.IsPlain,
@@ -196,6 +211,81 @@ class Actuation:
         )
         calls = [*calls, plain]
         return self._state.plan(calls).steps()
+
+    def calls_alone(self, delivered: "DeliveredAlone") -> PartCalls:
+        """Return the calls that follow `calls` where no Python looks at a step.
+
+        They do what `delivered` does, where the effort is `direct`.
+
+        Args:
+            delivered: Where they write what is delivered.
+        """
+        qp, calls = self._qp, list[AnyCall]()
+        if "barriers" in self._rows:  # which `calls` leaves to Python
+            keep = PartCall(engine.Copy, x=self._state.effort, out=self._wanted.effort)
+            qp, calls = self._whole_step([keep])
+        own = self._law.acceleration, self._state.effort
+        return [*calls, self._delivering(qp, *own, delivered)]
+
+    def calls_with_offset(
+        self, a: Array, offset: Array, delivered: "DeliveredAlone"
+    ) -> PartCalls:
+        """Return the calls that do what `deliver` does, where the effort is `direct`.
+
+        Args:
+            a: The acceleration, shape (nv,).
+            offset: Effort besides M a + N, shape (nv,).
+            delivered: Where they write what is delivered.
+        """
+        wanted, bounds = self._wanted, self._limits.bounds
+        begin = PartCall(engine.Copy, x=a, out=wanted.acceleration)
+        add = PartCall(
+            engine.OffsetEffort,
+            effort=self._state.effort,
+            offset=offset,
+            lower=bounds.tau_lower,
+            upper=bounds.tau_upper,
+            wanted=wanted.effort,
+            limits=self.outcome,
+        )
+        qp, calls = self._whole_step([])
+        deliver = self._delivering(qp, a, wanted.effort, delivered)
+        return [begin, *self._checks, add, *calls, deliver]
+
+    def _whole_step(
+        self, before: PartCalls
+    ) -> tuple[LimitedStep | None, list[AnyCall]]:
+        """Return a QP with room for all rows, and what solves it where it has to be."""
+        if self._qp is None:
+            return None, []
+        qp = self._limited_step(sum(len(each.least) for each in self._rows.values()))
+        return qp, [qp.nearest_if(self.outcome.violated, before, self._rows)]
+
+    def _delivering(
+        self,
+        qp: LimitedStep | None,
+        a: Array,
+        effort: Array,
+        delivered: "DeliveredAlone",
+    ) -> PartCall:
+        """Return the call that decides what is delivered."""
+        nearest = self.own if qp is None else qp.result
+        return PartCall(
+            engine.Deliver,
+            law=self._law.outcome,
+            limits=self.outcome,
+            qp=self._qp_outcome,
+            acceleration=a,
+            effort=effort,
+            nearest_acceleration=nearest.acceleration,
+            nearest_effort=nearest.effort,
+            wanted=self._wanted.effort,
+            lower=self._limits.bounds.tau_lower,
+            upper=self._limits.bounds.tau_upper,
+            relaxed=int(Status.RELAXED),
+            beyond=int(BEYOND),
+            **delivered._asdict(),
+        )
 
     def deliver(self, a: Array, offset: Array | None = None) -> Delivered:
         """Return efforts and forces for the acceleration that is nearest to a.

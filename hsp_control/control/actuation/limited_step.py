@@ -320,21 +320,25 @@ class LimitedStep:
             self._find_forces = state.plan(calls).call()
 
     def nearest_if(
-        self, condition: Indices, before: PartCall, rows: BarrierRows | None
+        self, condition: Indices, before: PartCalls, rows: Mapping[str, BarrierRows]
     ) -> OnlyIf:
         """Return a call that writes the nearest, as `solve`, if a condition is not 0.
 
         Args:
             condition: Shape (1,).
-            before: A call that is made first.
-            rows: The only rows of barriers, if there are any.
+            before: Calls that are made first.
+            rows: All rows of barriers, by kind.
         """
-        begin = [before] if rows is None else [before, self._placed(rows)]
-        return OnlyIf([*begin, *self._nearest], condition)
+        placed, r = list[PartCall](), self._barriers
+        for kind, each in rows.items():
+            own = slice(r, r + len(each.least))
+            placed.append(self._placed(each, own))
+            self._softness[own] = _SOFTNESS[kind]
+            r = own.stop
+        return OnlyIf([*before, *placed, *self._nearest], condition)
 
-    def _placed(self, rows: BarrierRows) -> PartCall:
+    def _placed(self, rows: BarrierRows, own: slice) -> PartCall:
         """Return the call that writes rows of barriers into the QP."""
-        own = slice(self._barriers, self._barriers + len(rows.least))
         return PartCall(
             engine.PlaceRows,
             rows=rows,

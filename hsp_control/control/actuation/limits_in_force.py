@@ -15,7 +15,7 @@ from hsp_control.constraints.limits.acceleration_bounds import (
 )
 from hsp_control.control.actuation.sent_effort import SentEffort
 from hsp_control.control.evolution import Evolution, PlannedLimits
-from hsp_control.engine.plans import PartCall
+from hsp_control.engine.plans import PartCall, PartCalls
 from hsp_control.robot import Robot, RobotState
 
 
@@ -121,6 +121,27 @@ class LimitsInForce:
             windows = [each.updating for each in self.all if each.rate]
             calls += [self.sent.recording(), *windows]
         return self._state.plan(calls).steps()
+
+    def applying_all(self, tau: Array, acceleration: Array, period: Array) -> PartCalls:
+        """Return the calls that do what `applied` does, of what these arrays hold.
+
+        Args:
+            tau: Effort, shape (nv,) [N·m or N].
+            acceleration: The acceleration that it is to give, shape (nv,).
+            period: How long it is held, shape (1,) [s].
+        """
+        if not self._limit_anything:
+            return []
+        last, held = self.sent.last, self.sent.held.timing[1:]
+        calls = [
+            PartCall(engine.Copy, x=period, out=held),
+            self.sent.expecting(acceleration),
+        ]
+        if self._rate:
+            calls.append(PartCall(engine.Copy, x=tau, out=last[:-1]))
+            calls.append(PartCall(engine.Copy, x=period, out=last[-1:]))
+            calls += [each.updating for each in self.all if each.rate]
+        return calls
 
     def update(self) -> None:
         """Find what the last effort leaves for the next one."""

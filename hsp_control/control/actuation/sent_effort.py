@@ -92,7 +92,7 @@ class SentEffort:
     def forget(self) -> None:
         """Begin anew."""
         self.period = 0.0
-        for each in self.held:
+        for each in (self.last, *self.held):
             each[:] = 0.0
         self.held.timing[0] = np.inf
         self.forget_rate()

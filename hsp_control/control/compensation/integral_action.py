@@ -1,16 +1,17 @@
 """Integral action: e'' + Kv e' + Kp e + Ki ∫e = 0."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import KW_ONLY, field
 from typing import Annotated
 
 import numpy as np
 
-from hsp_control.common.arrays import Array
+from hsp_control import engine
+from hsp_control.common.arrays import Array, Indices
 from hsp_control.common.exceptions import CompensationError, GainError
 from hsp_control.common.suggestions import did_you_mean, listing
 from hsp_control.control.actuation import Status
-from hsp_control.control.compensation.stage import Run, Stage
+from hsp_control.control.compensation.stage import Alone, AloneCalls, Run, Stage
 from hsp_control.control.controller import Controller
 from hsp_control.control.measurement import LogChannel
 from hsp_control.declaration import Part, within
@@ -21,6 +22,7 @@ from hsp_control.declaration.quantities import (
     Positive,
     ReadOnlyDict,
 )
+from hsp_control.engine.plans import PartCall, planned
 from hsp_control.tasks import Task
 from hsp_control.tasks.compliant_task import impedance_of
 from hsp_control.tasks.gains import as_gain, as_matrix
@@ -104,6 +106,13 @@ class RunningIntegral(Stage):
         self.integrals: dict[str, Array] = {
             name: np.zeros(len(Ki)) for name, Ki in self._gains.items()
         }
+        self._period, self._hindered = np.zeros(1), np.zeros(1, dtype=np.int64)
+        never = np.zeros(1, dtype=np.int64)
+        self._bound: dict[str, tuple[Array, Callable[[], object]]] = {}
+        for name, Ki in self._gains.items():
+            e = np.zeros(len(Ki))
+            call = self._call(name, e, self._period, never, never, self._hindered)
+            self._bound[name] = e, planned([call]).call()
 
     def finish(self, run: Run) -> None:
         """Integrate the errors of the fully active tasks; see `Stage.finish`."""
@@ -116,6 +125,39 @@ class RunningIntegral(Stage):
         saturated = bool(output.damped) or limited or run.starting
         self.advance(errors, run.period, saturated)
 
+    def alone(self, shared: Alone) -> AloneCalls:
+        """Return the integrals; see `Stage.alone`."""
+        rows, errors = self._controller.task_rows, self._controller.active_stack.rows
+        given = shared.period, shared.damped, shared.status, shared.starting
+        own = [
+            self._call(name, errors.error[rows[name]], *given) for name in self._gains
+        ]
+        return AloneCalls(finish=own)
+
+    def _call(
+        self,
+        name: str,
+        e: Array,
+        period: Array,
+        damped: Indices,
+        status: Indices,
+        starting: Indices,
+    ) -> PartCall:
+        """Return what integrates the error of a task."""
+        return PartCall(
+            engine.IntegrateError,
+            e=e,
+            Ki=self._gains[name],
+            limit=self._limit,
+            period=period,
+            damped=damped,
+            status=status,
+            starting=starting,
+            limited=int(Status.LIMITED),
+            integral=self.integrals[name],
+            offset=self._feedback[name].offset,
+        )
+
     def log_channels(self, run: Run) -> Mapping[str, LogChannel]:
         """Return the integrals; see `Stage.log_channels`."""
         return {
@@ -127,18 +169,12 @@ class RunningIntegral(Stage):
         self, errors: Mapping[str, Array | None], period: float, saturated: bool
     ) -> None:
         """Integrate the errors over one period, for the next effort."""
-        for name, feedback in self._feedback.items():
-            integral, e = self.integrals[name], errors.get(name)
-            if e is None:
-                continue
-            grows = e * integral >= 0.0 if saturated else False
-            integral += np.where(grows, 0.0, e) * period
-            action = self._gains[name] @ integral
-            largest = float(np.abs(action).max(initial=0.0))
-            if largest > self._limit:
-                integral *= self._limit / largest
-                action *= self._limit / largest
-            feedback.offset[:] = action
+        self._period[:], self._hindered[:] = period, saturated
+        for name, (e, integrate) in self._bound.items():
+            given = errors.get(name)
+            if given is not None:
+                e[:] = given
+                integrate()
 
 
 def _check_decay(task: Task, Ki: Array) -> None:

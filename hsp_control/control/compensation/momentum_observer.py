@@ -16,10 +16,10 @@ are as late for slow disturbances, 1/K_O, and carry M n √(2 K_O³ h): at 50 1/
 a third of that. Of all pairs of poles with this delay it is the least.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import KW_ONLY
 from math import exp
-from typing import Literal
+from typing import Literal, NamedTuple
 
 import numpy as np
 
@@ -28,10 +28,11 @@ from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import CompensationError
 from hsp_control.constraints.limits.joint_numbers import Positives, by_dof
 from hsp_control.control.active_stack import ActiveStack
-from hsp_control.control.compensation.stage import Run, Stage
+from hsp_control.control.compensation.stage import Alone, AloneCalls, Run, Stage
 from hsp_control.control.measurement import LogChannel
 from hsp_control.declaration import Part, within
 from hsp_control.declaration.quantities import Flag, Positive
+from hsp_control.engine.plans import PartCall
 from hsp_control.law import VARYING
 from hsp_control.robot import Robot, RobotState
 from hsp_control.robot.state import as_given
@@ -92,6 +93,17 @@ class MomentumObserver(Part, error=CompensationError):
             return by_dof(self.clip, robot.nv, error=CompensationError)
 
 
+class _BoundObserver(NamedTuple):
+    """An observer's calls at one state, and the arrays that they share with Python."""
+
+    state: RobotState
+    acted: Array
+    period: Array
+    besides: Array
+    observe: Callable[[], object]
+    explain: Callable[[], object]
+
+
 class RunningObserver(Stage):
     """A momentum observer in one run: it keeps the estimate and the last momentum."""
 
@@ -102,30 +114,49 @@ class RunningObserver(Stage):
         order: int = 1,
         most_per_period: float = np.inf,
     ) -> None:
-        self._bandwidth, self._clip = bandwidth, clip
-        # K_O [1/s], and the maximum of |r| that is cancelled, shape (nv,)
-        self._most_per_period = most_per_period  # maximum of K_O h [-]
-        self.disturbance: Array = np.zeros(len(clip))  # r, shape (nv,) [N·m or N]
-        # the low-pass's states, r the last of them
-        self._memory = [np.zeros(len(clip)) for _ in range(order - 1)]
-        self._memory.append(self.disturbance)
+        # K_O [1/s], the maximum of |r| that is cancelled, shape (nv,), and of K_O h [-]
+        self._bandwidth, self._clip = bandwidth, np.array(clip)
+        self._most_per_period = most_per_period
+        # the low-pass's states, the last of them r, shape (nv,) [N·m or N]
+        self._memory = np.zeros((order, len(clip)))
+        self.disturbance: Array = self._memory[-1]
         self.cancelled: Array = np.zeros(len(clip))
-        self._momentum: Array | None = None
-        self._drift: Array = np.zeros(len(clip))
+        # p and Cᵀv - G at the last measurement, and whether there was one
+        self._momentum, self._drift = np.zeros((2, len(clip)))
+        self._begun = np.zeros(1, dtype=np.int64)
+        self._bound: _BoundObserver | None = None
 
     def update(self, state: RobotState, tau: Array, period: float) -> Array:
         """Return r; ``tau`` is the effort on the model in the period that ends."""
-        momentum, drift = state.mass_matrix @ state.v, _drift(state)
-        if self._momentum is not None:
-            mean = 0.5 * (drift + self._drift)
-            disturbance = (momentum - self._momentum) / period - tau - mean
-            bandwidth = min(self._bandwidth, self._most_per_period / period)
-            after = low_pass(disturbance, self._memory, bandwidth, period)
-            for own, value in zip(self._memory, after, strict=True):
-                own[:] = value
-            np.clip(self.disturbance, -self._clip, self._clip, out=self.cancelled)
-        self._momentum, self._drift = momentum, drift
+        bound = self._bound
+        if bound is None or bound.state is not state:
+            acted, length, besides = np.zeros(len(tau)), np.zeros(1), np.zeros(len(tau))
+            calls = self._calls(state, acted, length)
+            explain = self._unexplained(state, besides)
+            each = (state.plan([call]).call() for call in (calls, explain))
+            bound = self._bound = _BoundObserver(state, acted, length, besides, *each)
+        bound.acted[:], bound.period[:] = tau, period
+        bound.observe()
         return self.disturbance
+
+    def _calls(self, state: RobotState, acted: Array, period: Array) -> PartCall:
+        return PartCall(
+            engine.ObserveMomentum,
+            M=state.inertia,
+            M_dot=state.inertia_rate,
+            v=state.v,
+            nonlinear_effects=state.effects,
+            acted=acted,
+            period=period,
+            bandwidth=self._bandwidth,
+            most_per_period=self._most_per_period,
+            clip=self._clip,
+            memory=self._memory,
+            momentum=self._momentum,
+            drift=self._drift,
+            begun=self._begun,
+            cancelled=self.cancelled,
+        )
 
     def measure(self, run: Run) -> None:
         """Learn from the effort that acted; see `Stage.measure`."""
@@ -133,10 +164,29 @@ class RunningObserver(Stage):
         state = run.measured.update(run.t, run.q, run.v)
         run.disturbance = self.update(state, acted, run.last_period)
         if run.controller.limits is not None:
-            besides: Array = self.disturbance - self.cancelled
-            if besides.any():  # what is cancelled causes nothing
-                besides = np.asarray(np.linalg.solve(state.mass_matrix, besides), float)
-            run.controller.disturbed(besides)
+            assert self._bound is not None
+            self._bound.explain()
+            run.controller.disturbed(self._bound.besides)
+
+    def _unexplained(self, state: RobotState, besides: Array) -> PartCall:
+        """Return what writes the acceleration of what is not cancelled."""
+        return PartCall(
+            engine.Unexplained,
+            M=state.inertia,
+            disturbance=self.disturbance,
+            cancelled=self.cancelled,
+            acceleration=besides,
+        )
+
+    def alone(self, shared: Alone) -> AloneCalls:
+        """Return what it does; see `Stage.alone`."""
+        state = shared.state
+        observe = [
+            self._calls(state, shared.acted, shared.period),
+            self._unexplained(state, shared.disturbance),
+        ]
+        act = PartCall(engine.Subtract, x=self.cancelled, out=shared.effort)
+        return AloneCalls(observe=observe, act=[act])
 
     def act(self, run: Run, state: RobotState, active: ActiveStack) -> None:
         """Cancel the estimate; see `Stage.act`."""
@@ -179,11 +229,6 @@ def low_pass(
         d = state + share * (d - state)
         after.append(d)
     return tuple(after)
-
-
-def _drift(state: RobotState) -> Array:
-    """Return Cᵀv - G = M'v - N, since M' = C + Cᵀ and N = C v + G."""
-    return state.mass_matrix_rate @ state.v - state.nonlinear_effects
 
 
 def task_wrench(

@@ -2,14 +2,16 @@
 
 from collections import deque
 from collections.abc import Mapping
+from typing import NamedTuple
 
 import numpy as np
 
-from hsp_control.common.arrays import Array
+from hsp_control.common.arrays import Array, Indices
 from hsp_control.control.active_stack import ActiveStack
 from hsp_control.control.controller import Controller
 from hsp_control.control.measurement import NO_WRENCHES, LogChannel
 from hsp_control.control.output import ControlOutput
+from hsp_control.engine.plans import PartCalls
 from hsp_control.robot import RobotState
 
 
@@ -45,6 +47,30 @@ class Run:
         self.under_way: deque[Array] = deque(maxlen=1 + ahead)
 
 
+class Alone(NamedTuple):
+    """What the stages of a run share where no Python looks at a step, as arrays."""
+
+    state: RobotState  # at which the law is evaluated
+    v: Array  # the velocity, at first as it was measured
+    a: Array  # acceleration to deliver, at first the law's, shape (nv,)
+    effort: Array  # effort besides M a + N, at first 0, shape (nv,)
+    period: Array  # how long each effort is held, shape (1,) [s]
+    acted: Array  # the effort on the model since the last measurement, (nv,)
+    disturbance: Array  # acceleration that something else causes, (nv,)
+    starting: Indices  # whether the law is not yet fully active, shape (1,)
+    damped: Indices  # the first level with a bounded inverse, or 0, shape (1,)
+    status: Indices  # the `Status` of what was delivered, shape (1,)
+
+
+class AloneCalls(NamedTuple):
+    """What a stage does where no Python looks at a step."""
+
+    measure: PartCalls = ()  # change the velocity, before the state moves
+    observe: PartCalls = ()  # at the state, before the law
+    act: PartCalls = ()  # change the acceleration or the effort
+    finish: PartCalls = ()  # after the effort is delivered
+
+
 class Stage:
     """What a compensator does in one run; what it does not override stays as it is."""
 
@@ -56,6 +82,10 @@ class Stage:
 
     def finish(self, run: Run) -> None:
         """Go on for the period for which the effort of `Run.output` is held."""
+
+    def alone(self, shared: Alone) -> AloneCalls | None:
+        """Return the calls that do all of the above; None where it takes Python."""
+        return None
 
     def log_channels(self, run: Run) -> Mapping[str, LogChannel]:
         """Return what to log, by name."""

@@ -1,13 +1,18 @@
 """A smooth transition from holding still to the law."""
 
-from hsp_control.common.arrays import Array
+from collections.abc import Callable
+
+import numpy as np
+
+from hsp_control import engine
+from hsp_control.common.arrays import Array, Indices
 from hsp_control.common.exceptions import CompensationError
 from hsp_control.control.active_stack import ActiveStack
-from hsp_control.control.compensation.stage import Run, Stage
+from hsp_control.control.compensation.stage import Alone, AloneCalls, Run, Stage
 from hsp_control.declaration import Part
 from hsp_control.declaration.quantities import NonNegative, Positive
-from hsp_control.robot import RobotState
-from hsp_control.trajectories.schedule import Schedule
+from hsp_control.engine.plans import PartCall, planned
+from hsp_control.robot import Robot, RobotState
 
 
 class StartUpRamp(Part, error=CompensationError):
@@ -30,17 +35,60 @@ class RunningRamp(Stage):
 
     def __init__(self, declared: StartUpRamp) -> None:
         self._declared = declared
-        self._begun: tuple[Schedule, Array] | None = None  # at the first state
+        self._starting = np.zeros(1, dtype=np.int64)
+        self._begun: tuple[float, Array] | None = None  # at the first state
+        self._bound: tuple[Array, Callable[[], object]] | None = None
 
     def act(self, run: Run, state: RobotState, active: ActiveStack) -> None:
         """Blend the law's acceleration with what holds still; see `Stage.act`."""
+        if not _is_plain(state.robot):
+            self._act_on_manifold(run, state)
+            return
+        if self._bound is None:
+            own = np.zeros(state.robot.nv)
+            plan = planned([self._call(state, own, self._starting)])
+            self._bound = own, plan.call()
+        own, blend = self._bound
+        own[:] = run.a
+        blend()
+        run.a, run.starting = own.copy(), bool(self._starting[0])
+
+    def _act_on_manifold(self, run: Run, state: RobotState) -> None:
+        """Blend with the difference that Pinocchio knows of any joint."""
         if self._begun is None:
-            schedule = Schedule([(state.t, None)], ramp=self._declared.duration)
-            self._begun = schedule, state.q.copy()
-        schedule, q0 = self._begun
-        s = schedule.weight(state.t)
+            self._begun = state.t, state.q.copy()
+        begin, q0 = self._begun
+        s = engine.smooth_step(state.t, begin, self._declared.duration)[0]
         run.starting = s < 1.0
         if run.starting:
             w = self._declared.natural_frequency
             away = state.robot.difference(state.q, q0)
             run.a = (1.0 - s) * (w * w * away - 2.0 * w * state.v) + s * run.a
+
+    def alone(self, shared: Alone) -> AloneCalls | None:
+        """Return the blend, of robots whose joints have one degree of freedom each."""
+        if not _is_plain(shared.state.robot):
+            return None
+        return AloneCalls(act=[self._call(shared.state, shared.a, shared.starting)])
+
+    def _call(self, state: RobotState, a: Array, starting: Indices) -> PartCall:
+        """Return the blend; the first call begins it."""
+        return PartCall(
+            engine.StartUp,
+            time=state.time,
+            q=state.q,
+            v=state.v,
+            joints=state.robot.single_dof_joints,
+            duration=self._declared.duration,
+            natural_frequency=self._declared.natural_frequency,
+            begin=np.zeros(1),
+            first=np.zeros(state.robot.nq),
+            begun=np.zeros(1, dtype=np.int64),
+            starting=starting,
+            a=a,
+        )
+
+
+def _is_plain(robot: Robot) -> bool:
+    """Return whether all joints have one degree of freedom each."""
+    return len(robot.single_dof_joints) == robot.nv

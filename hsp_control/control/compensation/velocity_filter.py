@@ -1,15 +1,18 @@
 """A low-pass filter of the measured velocity."""
 
+from collections.abc import Callable
 from math import exp, pi, sqrt, tan
 from typing import Literal
 
 import numpy as np
 
+from hsp_control import engine
 from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import CompensationError
-from hsp_control.control.compensation.stage import Run, Stage
+from hsp_control.control.compensation.stage import Alone, AloneCalls, Run, Stage
 from hsp_control.declaration import Part
 from hsp_control.declaration.quantities import Positive
+from hsp_control.engine.plans import PartCall, planned
 
 
 class VelocityFilter(Part, error=CompensationError):
@@ -65,7 +68,9 @@ class RunningFilter(Stage):
 
     def __init__(self, declared: VelocityFilter) -> None:
         self._filter = declared
-        self._past: tuple[Array, ...] | None = None
+        self._b, self._a = np.zeros(3), np.zeros(2)
+        self._begun = np.zeros(1, dtype=np.int64)
+        self._bound: tuple[Array, Callable[[], object]] | None = None
 
     def measure(self, run: Run) -> None:
         """Filter the velocity; see `Stage.measure`."""
@@ -73,8 +78,22 @@ class RunningFilter(Stage):
 
     def apply(self, v: Array, period: float) -> Array:
         """Return the filtered velocity, a new array of shape (nv,)."""
-        if self._past is None:
-            self._past = tuple(v.copy() for _ in range(4))
-            return v.copy()
-        filtered, self._past = self._filter.step(v, self._past, period)
-        return filtered.copy()
+        if self._bound is None:
+            own = np.zeros(len(v))
+            self._bound = own, planned([self._call(own)]).call()
+        own, filtered = self._bound
+        own[:] = v
+        if self._begun[0]:
+            self._b[:], self._a[:] = self._filter.coefficients(period)
+        filtered()
+        return own.copy()
+
+    def alone(self, shared: Alone) -> AloneCalls:
+        """Return the filter; see `Stage.alone`."""
+        self._b[:], self._a[:] = self._filter.coefficients(shared.period.item())
+        return AloneCalls(measure=[self._call(shared.v)])
+
+    def _call(self, v: Array) -> PartCall:
+        past, begun = np.zeros((4, len(v))), self._begun
+        numbers = {"b": self._b, "a": self._a, "past": past, "begun": begun}
+        return PartCall(engine.FilterVelocity, **numbers, v=v)

@@ -223,7 +223,10 @@ class FieldSum(NullSpaceField):
         for k, (term, sample) in enumerate(zip(self.terms, samples, strict=True)):
             calls += term.calls(state, metric, form, sample)
             weights = np.zeros(2)
-            if isinstance(term.weight, Weight) and not term.weight.constant:
+            if type(term.weight) is Ramp:
+                update = term.weight.call().given(time=state.time, weight=weights)
+                calls.append(update)
+            elif isinstance(term.weight, Weight) and not term.weight.constant:
                 seen = state.read_only
                 update = PartCall(
                     _update, weight=term.weight, state=seen, weights=weights

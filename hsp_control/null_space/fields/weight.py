@@ -7,9 +7,11 @@ from dataclasses import KW_ONLY, replace
 import numpy as np
 from pydantic import InstanceOf
 
+from hsp_control import engine
 from hsp_control.common.exceptions import FieldError
 from hsp_control.declaration import Part
 from hsp_control.declaration.quantities import NonNegative, Number, Positive
+from hsp_control.engine.plans import PartCall
 from hsp_control.null_space.differences import rate_along_flow
 from hsp_control.robot import RobotState
 
@@ -63,13 +65,21 @@ class Ramp(Weight):
     duration: Positive
     """Duration of the ramp [s]."""
 
+    def call(self) -> PartCall:
+        """Return the call that writes w and its rate at a time, shape (2,)."""
+        return PartCall(
+            engine.RampWeight,
+            initial=self.initial,
+            final=self.final,
+            start=self.start,
+            duration=self.duration,
+        )
+
     def sample(self, state: RobotState) -> tuple[float, float]:
         """Return w and w'; see `Weight.sample`."""
-        s = min(max((state.t - self.start) / self.duration, 0.0), 1.0)
+        s, s_dot, _ = engine.smooth_step(state.t, self.start, self.duration)
         rise = self.final - self.initial
-        slope = 30.0 * s * s * (1.0 - s) ** 2 / self.duration
-        value = self.initial + rise * s**3 * (10.0 - 15.0 * s + 6.0 * s * s)
-        return value, rise * slope
+        return self.initial + s * rise, s_dot * rise
 
 
 class StateWeight(Weight):

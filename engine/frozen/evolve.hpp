@@ -1,0 +1,96 @@
+// An input that changes as on the time line of a controller in Python: see `Evolution`.
+#pragma once
+#include <algorithm>
+#include <cmath>
+#include <hsp/indices.hpp>
+#include <hsp/kind.hpp>
+#include <hsp/linalg.hpp>
+#include <limits>
+
+#include "../trajectories/smooth_step.hpp"
+
+namespace hsp {
+
+struct Evolve {
+  static constexpr const char* doc =
+      "x(t): each transition k crossfades from what was before, (1 - s_k) x_(k-1)(t) + s_k "
+      "target_k.";
+  InOut<'n'> initial;       // x before all transitions that are kept
+  InOut<'k', 'n'> targets;  // in order of time
+  InOut<'k', 2> times;      // when each begins, and how long it takes [s]
+  InOutInts<1> count;       // how many there are
+  double least, most;       // bounds of what may be asked for
+  std::int64_t definite;    // size of x as a matrix that has to be positive definite; 0: it is none
+  Out<'n'> x;
+  Scratch<'n'> factor;  // of such a matrix
+
+  void check() const {
+    if (definite * definite != x.size() && definite != 0)
+      throw std::invalid_argument("definite is 0, or the size of a matrix of as many numbers as x");
+  }
+
+  void operator()(double t) {
+    x = initial;
+    for (Index k = 0; k < used(); ++k) {
+      const double s = share(k, t);
+      if (s == 1.0) x = targets.row(k).transpose();
+      else if (s > 0.0) x = (1.0 - s) * x + s * targets.row(k).transpose();
+    }
+  }
+
+  // Whether x may become this.
+  template <class Values> bool permits(const Values& wanted) {
+    if (!wanted.allFinite() || (wanted.array() < least).any() || (wanted.array() > most).any())
+      return false;
+    if (definite == 0) return true;
+    Eigen::Map<Matrix> L(factor.data(), definite, definite);
+    const Eigen::Map<const Matrix> given(wanted.data(), definite, definite);
+    L = 0.5 * (given + given.transpose());
+    return cholesky(L, L);
+  }
+
+  // Go to a value from a time on, which is none before the last one; whether there is room for it.
+  template <class Values> bool then(double t, double ramp, const Values& wanted) {
+    settle(t);
+    if (used() == targets.rows()) return false;
+    targets.row(used()) = wanted.transpose();
+    times.row(used()) << t, ramp;
+    ++count[0];
+    return true;
+  }
+
+ private:
+  Index used() const { return std::clamp<Index>(count[0], 0, targets.rows()); }
+
+  double share(Index k, double t) const {
+    const double start = times(k, 0), ramp = times(k, 1);
+    return ramp == 0.0 ? (t >= start ? 1.0 : 0.0) : smooth_step(t, start, ramp).s;
+  }
+
+  // Forget what is over: x is the target of the last transition that is complete.
+  void settle(double t) {
+    Index done = 0;
+    for (Index k = 0; k < used(); ++k)
+      if (times(k, 0) + times(k, 1) <= t) done = k + 1;
+    if (done == 0) return;
+    initial = targets.row(done - 1).transpose();
+    for (Index k = done; k < used(); ++k) {
+      targets.row(k - done) = targets.row(k);
+      times.row(k - done) = times.row(k);
+    }
+    count[0] -= done;
+  }
+};
+
+struct ScaledIdentity {
+  static constexpr const char* doc = "out = k I.";
+  In<1> k;
+  Out<'n', 'n'> out;
+
+  void operator()() {
+    out.setZero();
+    out.diagonal().setConstant(k[0]);
+  }
+};
+
+}  // namespace hsp

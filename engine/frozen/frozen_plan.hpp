@@ -1,0 +1,75 @@
+// A plan out of a file, with its memory and its robots; see `hsp_control/frozen/image.py`, which
+// writes it.
+#pragma once
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "../dynamics/dynamics.hpp"
+#include "../src/call.hpp"
+#include "../src/move.hpp"
+#include "../src/plan.hpp"
+#include "bytes.hpp"
+#include "evolve.hpp"
+
+namespace hsp::frozen {
+
+// An array of the plan that has a name outside of it.
+struct Port {
+  std::string name, unit, meaning;
+  char entry;  // 'd' or 'i'
+  std::int64_t size;
+  void* data;
+  Evolve* input;  // what changes it; null if it is an output
+};
+
+class FrozenPlan {
+ public:
+  // Throws std::exception where the file is not one of this library, or does not fit itself.
+  explicit FrozenPlan(const std::string& file);
+  FrozenPlan(const FrozenPlan&) = delete;
+
+  void restart() { std::memcpy(arena_.get(), initial_.data(), initial_.size()); }
+  Move& move() const { return *static_cast<Move*>(move_); }
+  const std::vector<Port>& ports() const { return ports_; }
+  // Null if there is none.
+  const Port* port(std::string_view name) const;
+  // Throws std::runtime_error if there is none of this size and type.
+  template <class T> T* array(const char* name, Index size) const {
+    const Port* found = port(name);
+    const char entry = std::is_integral_v<T> ? 'i' : 'd';
+    if (!found || found->size != size || found->entry != entry)
+      throw std::runtime_error(std::string("it has no array ") + name);
+    return static_cast<T*>(found->data);
+  }
+
+ private:
+  struct Aligned {
+    void operator()(char* memory) const { ::operator delete(memory, alignment); }
+  };
+  static constexpr std::align_val_t alignment{64};
+
+  // What calls share, or a plan makes: an address for each type that it can be.
+  struct Object {
+    std::unique_ptr<Dynamics> dynamics;
+    std::unique_ptr<Call> call;
+    std::unique_ptr<Plan> plan;
+    Plan::Row row() const;
+  };
+
+  void read_memory(Bytes& bytes);
+  void read_object(Bytes& bytes);
+  void read_port(Bytes& bytes);
+  Argument read_argument(Bytes& bytes, const Kind& kind, const Field& field);
+  Argument read_array(Bytes& bytes, const Field& field);
+  const Object& object(std::uint32_t index) const;
+  void* shared(std::uint32_t index, std::string_view type) const;
+
+  std::unique_ptr<char, Aligned> arena_;
+  std::string initial_;  // the arena as it was in the file
+  std::vector<Object> objects_;
+  std::vector<Port> ports_;
+  void* move_ = nullptr;
+};
+
+}  // namespace hsp::frozen

@@ -1,0 +1,231 @@
+// The functions of `hsp_step.h`. No exception leaves them.
+#include <hsp_step.h>
+
+#include <atomic>
+#include <cmath>
+#include <cstdio>
+#include <limits>
+#include <optional>
+
+#include "../src/build.hpp"
+#include "frozen_plan.hpp"
+
+namespace {
+
+using hsp::Index;
+using hsp::frozen::FrozenPlan;
+using hsp::frozen::Port;
+
+constexpr double infinite = std::numeric_limits<double>::infinity();
+constexpr double most_periods = 100.0;  // from one step to the next
+thread_local char opening[1024] = "";   // why `hsp_open` returned null
+
+void write(char* to, std::size_t size, const char* text) { std::snprintf(to, size, "%s", text); }
+
+}  // namespace
+
+struct hsp_controller {
+  explicit hsp_controller(const char* file)
+      : plan(file),
+        tau(plan.array<double>("tau", plan.move().v.size())),
+        status(plan.array<std::int64_t>("status", 1)),
+        delivered(plan.array<std::int64_t>("delivered", 1)),
+        period(plan.array<double>("period", 1)),
+        origin(plan.array<double>("origin", 1)) {
+    for (const Port& each : plan.ports())
+      ports.push_back({each.name.c_str(), each.unit.c_str(), each.meaning.c_str(),
+                       static_cast<std::size_t>(each.size), each.input != nullptr});
+  }
+
+  FrozenPlan plan;
+  std::vector<hsp_port> ports;
+  const double* tau;
+  const std::int64_t *status, *delivered;
+  const double* period;
+  double* origin;                          // what the clock reads at time 0 [s]
+  std::optional<double> last;              // time of the last step [s]
+  std::atomic<hsp_status> error = HSP_OK;  // of the last request
+  char failure[512] = "";                  // what an exception said
+  std::atomic_flag busy = ATOMIC_FLAG_INIT;
+};
+
+namespace {
+
+// A request of one handle: refused while another thread makes one.
+template <class Request> hsp_status made(hsp_controller* controller, Request request) noexcept {
+  if (!controller) return HSP_WRONG_VALUE;
+  if (controller->busy.test_and_set(std::memory_order_acquire)) return HSP_BUSY;
+  hsp_status status = HSP_FAILED;
+  try {
+    status = request(*controller);
+  } catch (const std::exception& error) {
+    write(controller->failure, sizeof controller->failure, error.what());
+  } catch (...) {
+    write(controller->failure, sizeof controller->failure, "an unknown exception");
+  }
+  controller->error = status < 0 ? status : HSP_OK;
+  controller->busy.clear(std::memory_order_release);
+  return status;
+}
+
+// Make a step; its effort, or the last one, is then `of.tau`.
+hsp_status moved(hsp_controller& of, double t, const double* q, const double* v) {
+  hsp::Move& move = of.plan.move();
+  const Eigen::Map<const hsp::Vector> q_in(q, move.q.size()), v_in(v, move.v.size());
+  if (!std::isfinite(t)) return HSP_WRONG_STATE;
+  if (!of.last) *of.origin = t;  // times count from the first step, whatever the clock reads
+  else if (t < *of.last || t > *of.last + most_periods * *of.period) return HSP_WRONG_CLOCK;
+  if (!move.to(t, q_in, v_in)) return HSP_WRONG_STATE;
+  of.last = t;
+  return *of.delivered ? static_cast<hsp_status>(*of.status) : HSP_NOT_FINITE;
+}
+
+hsp_status step(hsp_controller& of, double t, const double* q, const double* v, double* tau) {
+  const hsp_status status = moved(of, t, q, v);
+  for (Index i = 0; i < of.plan.move().v.size(); ++i) tau[i] = of.tau[i];
+  return status;
+}
+
+// Let an input go to values from now on.
+hsp_status change(hsp_controller& of, const char* name, const double* values, std::size_t size,
+                  double duration) {
+  const Port* port = name ? of.plan.port(name) : nullptr;
+  if (!port || !port->input) return HSP_WRONG_NAME;
+  if (static_cast<std::size_t>(port->size) != size) return HSP_WRONG_SIZE;
+  if (!values || !(duration >= 0.0 && duration < infinite)) return HSP_WRONG_VALUE;
+  const Eigen::Map<const hsp::Vector> wanted(values, port->size);
+  if (!port->input->permits(wanted)) return HSP_WRONG_VALUE;
+  // Before the first step it is so from the beginning.
+  const double now = of.last ? of.plan.move().time[0] : -infinite;
+  return port->input->then(now, of.last ? duration : 0.0, wanted) ? HSP_OK : HSP_TOO_MANY;
+}
+
+const char* sentence(hsp_status status) {
+  switch (status) {
+    case HSP_OK:
+      return "the law's own effort";
+    case HSP_REDISTRIBUTED:
+      return "the law's own acceleration, with other contact forces";
+    case HSP_LIMITED:
+      return "the nearest effort within the limits";
+    case HSP_RELAXED:
+      return "the limits contradict each other, and are violated as little as "
+             "possible";
+    case HSP_BEYOND:
+      return "a joint is beyond its range, or faster than its limit";
+    case HSP_WRONG_STATE:
+      return "t, q or v is not finite, or a quaternion or (cos, sin) pair in q has not norm 1";
+    case HSP_WRONG_CLOCK:
+      return "the time went back, or on by more than 100 periods, since the last step: times are "
+             "seconds, and increase by the period; hsp_restart begins a new run";
+    case HSP_NOT_FINITE:
+      return "the effort is not finite at this state";
+    case HSP_BUSY:
+      return "another thread uses this handle: open one for each thread";
+    case HSP_WRONG_NAME:
+      return "there is no input or output of this name; hsp_port_at lists them";
+    case HSP_WRONG_SIZE:
+      return "the input or output has another number of values, see hsp_port_of";
+    case HSP_WRONG_VALUE:
+      return "a pointer is null, or a value is not finite, out of bounds, or a gain that is not "
+             "positive definite";
+    case HSP_TOO_MANY:
+      return "the input still follows 8 ramps, which is the most";
+    case HSP_FAILED:
+      return "a call failed, which hsp_last_error says";
+  }
+  return "no status of hsp_step.h";
+}
+
+}  // namespace
+
+hsp_controller* hsp_open(const char* file) noexcept {
+  opening[0] = 0;
+  if (!file) {
+    write(opening, sizeof opening, "hsp_open was given no file");
+    return nullptr;
+  }
+  try {
+    return new hsp_controller(file);
+  } catch (const std::exception& error) {
+    std::snprintf(opening, sizeof opening, "%s: %s", file, error.what());
+  } catch (...) {
+    std::snprintf(opening, sizeof opening, "%s: it cannot be opened", file);
+  }
+  return nullptr;
+}
+
+void hsp_close(hsp_controller* controller) noexcept { delete controller; }
+
+size_t hsp_size_q(const hsp_controller* controller) noexcept {
+  return controller ? controller->plan.move().q.size() : 0;
+}
+
+size_t hsp_size_v(const hsp_controller* controller) noexcept {
+  return controller ? controller->plan.move().v.size() : 0;
+}
+
+double hsp_period(const hsp_controller* controller) noexcept {
+  return controller ? *controller->period : 0.0;
+}
+
+hsp_status hsp_step(hsp_controller* controller, double t, const double* q, const double* v,
+                    double* tau) noexcept {
+  return made(controller, [&](hsp_controller& of) {
+    return q && v && tau ? step(of, t, q, v, tau) : HSP_WRONG_VALUE;
+  });
+}
+
+hsp_status hsp_restart(hsp_controller* controller) noexcept {
+  return made(controller, [](hsp_controller& of) {
+    of.plan.restart();
+    of.last.reset();
+    return HSP_OK;
+  });
+}
+
+const hsp_port* hsp_port_at(const hsp_controller* controller, size_t number) noexcept {
+  if (!controller || number >= controller->ports.size()) return nullptr;
+  return &controller->ports[number];
+}
+
+const hsp_port* hsp_port_of(const hsp_controller* controller, const char* name) noexcept {
+  const Port* found = controller && name ? controller->plan.port(name) : nullptr;
+  return found ? &controller->ports[found - controller->plan.ports().data()] : nullptr;
+}
+
+hsp_status hsp_set(hsp_controller* controller, const char* name, const double* values,
+                   size_t size) noexcept {
+  return made(controller, [&](hsp_controller& of) { return change(of, name, values, size, 0.0); });
+}
+
+hsp_status hsp_ramp(hsp_controller* controller, const char* name, const double* values, size_t size,
+                    double duration) noexcept {
+  return made(controller,
+              [&](hsp_controller& of) { return change(of, name, values, size, duration); });
+}
+
+hsp_status hsp_get(hsp_controller* controller, const char* name, double* values,
+                   size_t size) noexcept {
+  return made(controller, [&](hsp_controller& of) {
+    const Port* port = name ? of.plan.port(name) : nullptr;
+    if (!port) return HSP_WRONG_NAME;
+    if (static_cast<std::size_t>(port->size) != size) return HSP_WRONG_SIZE;
+    if (!values) return HSP_WRONG_VALUE;
+    for (std::size_t i = 0; i < size; ++i)
+      values[i] = port->entry == 'd'
+                      ? static_cast<const double*>(port->data)[i]
+                      : static_cast<double>(static_cast<const std::int64_t*>(port->data)[i]);
+    return HSP_OK;
+  });
+}
+
+const char* hsp_last_error(const hsp_controller* controller) noexcept {
+  if (!controller) return opening;
+  const hsp_status error = controller->error;
+  return error == HSP_FAILED ? controller->failure : error < 0 ? sentence(error) : "";
+}
+
+const char* hsp_status_text(hsp_status status) noexcept { return sentence(status); }
+
+const char* hsp_build(void) noexcept { return hsp::build_text(); }

@@ -1,0 +1,10 @@
+#include "../src/rooms.hpp"
+#include "deliver.hpp"
+#include "evolve.hpp"
+#include "offset_effort.hpp"
+
+namespace hsp {
+const Kind* const* frozen_kinds() {
+  return kinds<Deliver, OffsetEffort, Subtract, HasMoved, Evolve, ScaledIdentity>();
+}
+}  // namespace hsp

@@ -1,0 +1,113 @@
+/* A step of a controller without Python: what `hsp freeze` wrote is opened and run here.
+ *
+ *   hsp_controller* arm = hsp_open("panda.hsp");
+ *   if (!arm) fail(hsp_last_error(NULL));
+ *   while (running) {                                 // at the control period
+ *     hsp_status status = hsp_step(arm, t, q, v, tau);
+ *     if (status < 0) warn(hsp_last_error(arm));      // tau is the last one delivered
+ *     send(tau);
+ *   }
+ *   hsp_close(arm);
+ *
+ * The effort is that of the controller in Python, to the last bit. `hsp_step`, `hsp_set`,
+ * `hsp_ramp`, `hsp_get` and `hsp_restart` allocate nothing, take no lock and make no system call.
+ * A handle belongs to one thread at a time; different handles do not know of each other.
+ *
+ * Units are SI, axes those of the world, linear rows before angular rows. */
+#ifndef HSP_STEP_H
+#define HSP_STEP_H
+
+#include <stddef.h>
+
+#if defined(__GNUC__)
+#define HSP_API __attribute__((visibility("default")))
+#else
+#define HSP_API
+#endif
+
+#ifdef __cplusplus
+extern "C" {
+#define HSP_NOEXCEPT noexcept
+#else
+#define HSP_NOEXCEPT
+#endif
+
+/* What became of a step, or of a request. From 0 on there is a new effort; below, nothing was done,
+ * and tau is the effort that was delivered last, or 0 if there was none yet. */
+typedef enum hsp_status {
+  HSP_OK = 0,            /* the law's own effort */
+  HSP_REDISTRIBUTED = 1, /* with contact forces chosen by a QP */
+  HSP_LIMITED = 2,       /* the nearest within the limits */
+  HSP_RELAXED = 3,       /* the limits contradict each other; they are violated least */
+  HSP_BEYOND = 4,        /* a joint is beyond its range, or faster than its limit */
+  HSP_WRONG_STATE = -1,  /* t, q or v is not finite, or a quaternion in q has not norm 1 */
+  HSP_WRONG_CLOCK = -2,  /* t went back, or on by more than 100 periods, since the last step */
+  HSP_NOT_FINITE = -3,   /* the effort would not be finite */
+  HSP_BUSY = -4,         /* another thread uses this handle; tau is left as it is */
+  HSP_WRONG_NAME = -5,   /* there is no such input or output */
+  HSP_WRONG_SIZE = -6,   /* an input or output has another number of values */
+  HSP_WRONG_VALUE = -7,  /* a value is not finite, or outside of its bounds */
+  HSP_TOO_MANY = -8,     /* more than 8 ramps of one input at a time */
+  HSP_FAILED = -9        /* something else, which `hsp_last_error` says */
+} hsp_status;
+
+typedef struct hsp_controller hsp_controller;
+
+/* An input that `hsp_set` sets, or an output that `hsp_get` returns. */
+typedef struct hsp_port {
+  const char* name;    /* "tau", "hand.error" */
+  const char* unit;    /* "N*m or N" */
+  const char* meaning; /* a line of text */
+  size_t size;         /* how many numbers */
+  int is_input;        /* whether it can be set */
+} hsp_port;
+
+/* Open a controller that was frozen; NULL where it is none, was cut or changed, or is of another
+ * version or processor: `hsp_last_error(NULL)` says which. */
+HSP_API hsp_controller* hsp_open(const char* file) HSP_NOEXCEPT;
+HSP_API void hsp_close(hsp_controller* controller) HSP_NOEXCEPT;
+
+/* Sizes of q, and of v and tau; the period for which an effort is held [s]. */
+HSP_API size_t hsp_size_q(const hsp_controller* controller) HSP_NOEXCEPT;
+HSP_API size_t hsp_size_v(const hsp_controller* controller) HSP_NOEXCEPT;
+HSP_API double hsp_period(const hsp_controller* controller) HSP_NOEXCEPT;
+
+/* Compute the effort tau at a time t [s], a configuration q and a velocity v, which is sent now and
+ * held for a period. The clock may begin anywhere: times count from the first step. */
+HSP_API hsp_status hsp_step(hsp_controller* controller, double t, const double* q, const double* v,
+                            double* tau) HSP_NOEXCEPT;
+
+/* Begin anew: all memory is as in the file, inputs too. */
+HSP_API hsp_status hsp_restart(hsp_controller* controller) HSP_NOEXCEPT;
+
+/* Inputs and outputs, by number or by name; NULL where there is none. */
+HSP_API const hsp_port* hsp_port_at(const hsp_controller* controller, size_t number) HSP_NOEXCEPT;
+HSP_API const hsp_port* hsp_port_of(const hsp_controller* controller,
+                                    const char* name) HSP_NOEXCEPT;
+
+/* Let an input have other values from the next step on: at once, or by a smooth ramp of a duration
+ * [s], as `controller.at(t).ramp(duration)` does in Python. A ramp goes on from what is then in
+ * force, and may begin while another is under way. Before the first step both are at once. */
+HSP_API hsp_status hsp_set(hsp_controller* controller, const char* name, const double* values,
+                           size_t size) HSP_NOEXCEPT;
+HSP_API hsp_status hsp_ramp(hsp_controller* controller, const char* name, const double* values,
+                            size_t size, double duration) HSP_NOEXCEPT;
+
+/* Read an output, or an input as it is now. */
+HSP_API hsp_status hsp_get(hsp_controller* controller, const char* name, double* values,
+                           size_t size) HSP_NOEXCEPT;
+
+/* Why the last request of a handle was refused; of `hsp_open` in this thread for NULL. It is never
+ * NULL, and stays as it is until the next request. */
+HSP_API const char* hsp_last_error(const hsp_controller* controller) HSP_NOEXCEPT;
+
+/* A status in words. */
+HSP_API const char* hsp_status_text(hsp_status status) HSP_NOEXCEPT;
+
+/* What this library is: the version, and the processor that it was built for. */
+HSP_API const char* hsp_build(void) HSP_NOEXCEPT;
+
+#ifdef __cplusplus
+}
+#endif
+#endif

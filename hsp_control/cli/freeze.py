@@ -1,0 +1,51 @@
+"""``hsp freeze``: a controller for a program without Python."""
+
+import argparse
+
+from hsp_control.cli.consoles import out
+from hsp_control.cli.live_experiment import live_period
+from hsp_control.cli.loading import read
+from hsp_control.common.exceptions import ConfigError
+from hsp_control.config import Experiment
+from hsp_control.config.loaded_scenario import load_scenario
+from hsp_control.frozen import cmake_folder, include_folder, library
+from hsp_control.frozen import freeze as write
+
+_PLACES = {
+    "cmake_dir": cmake_folder,
+    "include_dir": include_folder,
+    "library": library,
+}
+
+
+def freeze(options: argparse.Namespace) -> int:
+    """Write a configuration's controller to a file, or say where the library is."""
+    for name, place in _PLACES.items():
+        if getattr(options, name):
+            print(place())
+            return 0
+    if not options.config:
+        raise ConfigError("hsp freeze needs a configuration, such as panda_limits")
+    loaded = load_scenario(read(options))
+    experiment, document = Experiment.of(loaded), loaded.document
+    if experiment.scenario.plan is not None:
+        raise document.error(
+            ("plan",),
+            "a plan is Python, which a frozen controller runs without",
+        )
+    if experiment.scenario.estimators:
+        raise document.error(
+            ("estimators",),
+            "estimators are Python, which a frozen controller runs without",
+        )
+    options.out.mkdir(parents=True, exist_ok=True)
+    with document.at():
+        file = write(
+            experiment.controller,
+            options.out / f"{experiment.name}.hsp",
+            compensation=experiment.scenario.compensation,
+            period=live_period(experiment),
+            start=experiment.q0,
+        )
+    out.print(f"Frozen: {file}", highlight=False)
+    return 0

@@ -1,0 +1,134 @@
+"""From a controller to a file that a program without Python runs."""
+
+import os
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from hsp_control import engine
+from hsp_control.common.arrays import Array
+from hsp_control.common.exceptions import FreezeError
+from hsp_control.control.actuation.actuation import DeliveredAlone
+from hsp_control.control.bound_step import BoundStep
+from hsp_control.control.compensation import Compensation
+from hsp_control.control.controller import Controller
+from hsp_control.declaration import within
+from hsp_control.engine import Move, Plan
+from hsp_control.engine.plans import OnlyIf, PartCalls
+from hsp_control.frozen.compensated_step import CompensatedStep
+from hsp_control.frozen.image import Image, Port
+from hsp_control.frozen.inputs import inputs_of
+from hsp_control.frozen.refusals import check_parts, check_steady
+
+
+def freeze(
+    controller: Controller,
+    path: str | os.PathLike[str],
+    *,
+    compensation: Compensation | None = None,
+    period: float = 0.001,
+    start: ArrayLike | None = None,
+) -> Path:
+    """Write a controller for a program without Python, which ``hsp_step.h`` runs.
+
+    Its step is `Controller.compute` followed by `Controller.applied`, or with
+    compensators `Command.effort`, to the last bit. The controller itself is not
+    changed, and its run is not continued: the file begins anew.
+
+    Args:
+        controller: The controller.
+        path: The file to write, such as ``panda.hsp``.
+        compensation: Compensators for what the model lacks; None: there are none.
+        period: How long each effort is held [s].
+        start: The configuration at which what is relative is placed, shape (nq,); by
+            default the controller's start, or else where its run began.
+
+    Returns:
+        The file.
+
+    Raises:
+        FreezeError: If a part of it cannot run without Python; the message has its key.
+    """
+    if not 0.0 < period < np.inf:
+        raise FreezeError(f"period is {period}; needs a positive number of seconds")
+    content = _image(controller.preview(), compensation, period, start).content()
+    file = Path(path)
+    file.write_bytes(content)
+    return file
+
+
+def _image(
+    own: Controller,
+    compensation: Compensation | None,
+    period: float,
+    start: ArrayLike | None,
+) -> Image:
+    """Return a step as one move, and what has a name outside of it.
+
+    Args:
+        own: A controller at the beginning of its run, which is used up.
+        compensation: As of `freeze`.
+        period: As of `freeze`.
+        start: As of `freeze`.
+    """
+    check_steady(own)
+    check_parts(own)
+    robot = own.robot
+    if compensation is not None:
+        with within("compensation"):
+            compensation.check(robot, own.tasks, own.contacts)
+    q = own._setup.start.state.q if start is None else robot.check_configuration(start)
+    own.compute(0.0, q, np.zeros(robot.nv))  # binds the step
+    own._limits.forget()
+    bound = own._run.bound
+    assert bound is not None  # it is steady
+    held, delivered = np.array([period]), DeliveredAlone.allocate(robot.nv)
+    sending = own._limits.applying_all(delivered.tau, delivered.a, held)
+    chain = None
+    if compensation is not None:
+        chain = CompensatedStep(own, bound, compensation, delivered, held, sending)
+    if chain is None or not chain.stages:
+        move = _bare(bound, delivered, sending)
+    else:
+        move = chain.move()
+    inputs = [*inputs_of(own, period)]
+    first = [call for each in inputs for call in each.calls]
+    values = move.values
+    origin = np.zeros(1)  # the first step's time is written there
+    calls = Plan([*first, *values["calls"].calls])
+    move = engine.Move(**values | {"calls": calls, "origin": origin})
+    ports = [*_ports(own, bound, delivered, held), *(each.port for each in inputs)]
+    read = Port("origin", "s", "what the clock read in the first step", origin)
+    return Image(move, [*ports, read])
+
+
+def _bare(bound: BoundStep, delivered: DeliveredAlone, sending: PartCalls) -> Move:
+    """Return a step that also decides what is delivered, and records that it is."""
+    state = bound.active._state
+    after = bound._actuation.calls_alone(delivered)
+    values, recorded = bound.move.values, OnlyIf(sending, delivered.delivered)
+    calls = [*values["calls"].calls, *state.plan([*after, recorded]).steps()]
+    return engine.Move(**values | {"calls": Plan(calls)})
+
+
+def _ports(
+    own: Controller, bound: BoundStep, delivered: DeliveredAlone, period: Array
+) -> Iterator[Port]:
+    """Yield what can be set, or read after a step."""
+    effort, rate = "N·m or N", "rad/s² or m/s²"
+    yield Port("tau", effort, "the effort that was delivered last", delivered.tau)
+    yield Port("acceleration", rate, "the acceleration that it gives", delivered.a)
+    yield Port("status", "-", "what became of the step", delivered.status)
+    yield Port("delivered", "-", "whether there is an effort", delivered.delivered)
+    yield Port("period", "s", "how long an effort is held", period)
+    damped = bound.active.resolution.outcome.damped_level
+    yield Port("damped_level", "-", "first level with a bounded inverse, or 0", damped)
+    rows = bound.active.rows
+    for task in own.tasks:
+        here, units = bound.active.task_rows[task.name], task.error_parts
+        unit = " and ".join(dict.fromkeys(each.unit for each in units))
+        rates = " and ".join(dict.fromkeys(each.rate_unit for each in units))
+        yield Port(f"{task.name}.error", unit, "e, reference - robot", rows.error[here])
+        yield Port(f"{task.name}.error_rate", rates, "e'", rows.error_rate[here])

@@ -1,0 +1,45 @@
+"""Where the library is that runs frozen controllers, its header, and what finds it."""
+
+import sys
+from pathlib import Path
+
+from hsp_control import engine
+from hsp_control.common.exceptions import FreezeError
+
+_ENGINE = Path(engine.__file__).parent
+_SOURCES = Path(__file__).parents[2] / "engine"
+
+
+def library() -> Path:
+    """Return the shared library hsp_step.
+
+    Raises:
+        FreezeError: If it was not built.
+    """
+    ending = "dylib" if sys.platform == "darwin" else "so"
+    return _there(_ENGINE / f"libhsp_step.{ending}")
+
+
+def include_folder() -> Path:
+    """Return the folder of ``hsp_step.h``."""
+    return _folder("include", "hsp_step.h")
+
+
+def cmake_folder() -> Path:
+    """Return the folder that CMake's ``find_package(hsp_step)`` is told of.
+
+    ``cmake -D hsp_step_DIR=$(hsp freeze --cmake-dir)``
+    """
+    return _folder("cmake", "hsp_step-config.cmake")
+
+
+def _folder(name: str, file: str) -> Path:
+    """Return a folder of the package, or of the checkout that it is run from."""
+    own = _ENGINE / name
+    return _there((own if own.is_dir() else _SOURCES / name) / file).parent
+
+
+def _there(path: Path) -> Path:
+    if not path.is_file():
+        raise FreezeError(f"{path} is missing: install the package anew")
+    return path

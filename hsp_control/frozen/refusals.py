@@ -1,0 +1,89 @@
+"""What of a controller cannot run without Python, and where it was declared."""
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from hsp_control.common.exceptions import FreezeError
+from hsp_control.control.controller import Controller
+from hsp_control.declaration import within
+from hsp_control.engine import PythonCall
+from hsp_control.engine.inspection import calls
+from hsp_control.engine.plans import PartCall, StepPlan, planned, supplied
+from hsp_control.frozen.image import refusal
+from hsp_control.law import FieldSample, MetricSample, TaskSample
+from hsp_control.null_space.fields.field import terms_of
+from hsp_control.null_space.fields.weight import Ramp, Weight
+from hsp_control.robot import RobotState
+
+Path = tuple[str | int, ...]
+
+
+def check_steady(own: Controller) -> None:
+    """Check that a controller has one stack at all times.
+
+    Raises:
+        FreezeError: If something changes over time, with its key.
+    """
+    setup = own._setup
+    if own.changes:
+        with within("changes"):
+            raise FreezeError(
+                "a frozen controller follows no time line: remove the changes, or "
+                "freeze the controller that they lead to"
+            )
+    for each in setup.tasks:
+        if not each.always:
+            with within("tasks", each.task.name, "schedule"):
+                raise FreezeError(
+                    "a frozen controller has the same tasks at all times; remove the "
+                    "schedule"
+                )
+    for contact in setup.contacts:
+        with within("contacts", contact.contact.name):
+            raise FreezeError(
+                "a frozen controller has no contacts yet: their forces are found in "
+                "Python"
+            )
+    if own.robot.unactuated:
+        with within("base"):
+            raise FreezeError("a frozen controller needs a robot with a fixed base")
+
+
+def check_parts(own: Controller) -> None:
+    """Check that all parts are the engine's.
+
+    Raises:
+        FreezeError: If one of them is Python, with its key.
+    """
+    state = RobotState(own.robot)
+    state.update(0.0, own._setup.start.state.q, np.zeros(own.robot.nv))
+    for path, plan in _plans_of(own, state):
+        for call in (each for step in plan.steps() for each in calls(step)):
+            if isinstance(call, PythonCall):
+                with within(*path):
+                    raise FreezeError(refusal(call))
+    limits = own.limits
+    for k, each in enumerate(() if limits is None else limits.barriers):
+        if not each.room(state):
+            with within("limits", "barriers", k):
+                raise FreezeError(f"{each!r:.200} computes its rows in Python")
+
+
+def _plans_of(own: Controller, state: RobotState) -> Iterator[tuple[Path, StepPlan]]:
+    """Yield the key of each part of the law, and its calls, of no further use."""
+    nv, form = own.robot.nv, own.metric.form
+    for task in own.tasks:
+        if task.followed is not None:
+            yield ("tasks", task.name, "trajectory"), supplied(task.followed)[1]
+        rows = TaskSample.allocate(task.rows, nv)
+        yield ("tasks", task.name), planned(task.calls(state, task.feedback(), rows))
+    metric, sample = MetricSample.allocate(nv), FieldSample.allocate(nv)
+    yield ("null_space", "metric"), planned(own.metric.calls(state, metric))
+    for k, term in enumerate(terms_of(own.field)):
+        path = "null_space", "fields", k
+        yield path, planned(term.calls(state, metric, form, sample))
+        known = type(term.weight) is Ramp
+        if isinstance(term.weight, Weight) and not (known or term.weight.constant):
+            weight = PartCall(term.weight.sample, state=state)
+            yield (*path, "weight"), planned([weight])

@@ -1,0 +1,146 @@
+"""Inputs of a frozen controller change as on a controller's time line."""
+
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+from frozen_library import (
+    LIB,
+    OK,
+    TOO_MANY,
+    WRONG_NAME,
+    WRONG_SIZE,
+    WRONG_VALUE,
+    Opened,
+)
+
+import hsp_control as hsp
+
+H = 0.001
+
+
+def pair(name: str, folder: Path) -> tuple[hsp.Controller, Opened]:
+    """Return a controller at the beginning of a run, and the same without Python."""
+    controller = hsp.load_experiment(name).controller
+    frozen = hsp.freeze(controller, folder / "frozen.hsp")
+    return controller.preview(), Opened(frozen)
+
+
+def run(
+    controller: hsp.Controller,
+    opened: Opened,
+    steps: range,
+    changes: dict[int, Callable[[float], object]],
+) -> None:
+    """Step both, and compare; changes are made after a step, with its time."""
+    q = controller._declared.start
+    assert q is not None
+    for k in steps:
+        t, v = k * H, 0.1 * np.ones(controller.robot.nv)
+        moved = q + 0.02 * np.sin(0.1 * k)
+        output = controller.compute(t, moved, v)
+        controller.applied(output.tau, H)
+        assert opened.step(t, moved, v) == output.status
+        np.testing.assert_array_equal(opened.tau, output.tau)
+        if k in changes:
+            changes[k](t)
+
+
+@pytest.mark.parametrize("ramp", [0.0, 0.02])
+def test_gains_and_the_null_space_gain(ramp: float, tmp_path: Path) -> None:
+    controller, opened = pair("panda_limits", tmp_path)
+    new = hsp.Gains(natural_frequency=14.0)
+    Kp, Kv = 14.0**2 * np.eye(3), 28.0 * np.eye(3)
+
+    def gains(t: float) -> None:
+        controller.at(t).ramp(ramp).gains("hand", new)
+        assert opened.ramp("hand.Kp", Kp, ramp) == OK
+        assert opened.ramp("hand.Kv", Kv, ramp) == OK
+
+    def null_space(value: float) -> Callable[[float], object]:
+        def change(t: float) -> None:
+            controller.at(t).ramp(ramp).null_space_gain(value)
+            assert opened.ramp("null_space_gain", value * np.eye(7), ramp) == OK
+
+        return change
+
+    # one begins while another is under way
+    changes = {5: gains, 10: null_space(4.0), 17: null_space(20.0)}
+    run(controller, opened, range(60), changes)
+    np.testing.assert_array_equal(opened.get("hand.Kp", 9), Kp.ravel())
+    np.testing.assert_array_equal(
+        opened.get("null_space_gain", 49).reshape(7, 7)[0, 0], 20
+    )
+
+
+def test_over_the_mass_matrix_it_is_a_number(tmp_path: Path) -> None:
+    controller, opened = pair("compliance/panda_joint_impedance", tmp_path)
+    port = opened.ports["null_space_gain"]
+    assert (port.size, port.is_input) == (1, 1)
+
+    def change(t: float) -> None:
+        controller.at(t).ramp(0.01).null_space_gain(3.0)
+        assert opened.ramp("null_space_gain", 3.0, 0.01) == OK
+
+    run(controller, opened, range(30), {4: change})
+    assert "hand.Kp" not in opened.ports
+
+
+def test_set_is_at_once_and_before_the_first_step_from_the_beginning(
+    tmp_path: Path,
+) -> None:
+    controller, opened = pair("panda_limits", tmp_path)
+    assert opened.ramp("hand.Kp", 50.0 * np.eye(3), 1.0) == OK
+    assert opened.set("null_space_gain", 3.0 * np.eye(7)) == OK
+    controller.at(-1.0).ramp(0.0).null_space_gain(3.0)
+    controller.at(-1.0).ramp(0.0).gains("hand", hsp.Gains(kp=50.0, kv=20.0))
+    run(controller, opened, range(10), {})
+    assert LIB.hsp_restart(opened.handle) == OK  # as in the file
+    other = hsp.load_experiment("panda_limits").controller.preview()
+    run(other, opened, range(10), {})
+
+
+@pytest.mark.parametrize(
+    ("name", "values", "duration", "status"),
+    [
+        ("hand.Kq", np.eye(3), 0.1, WRONG_NAME),
+        ("hand.error", np.zeros(3), 0.1, WRONG_NAME),  # an output
+        ("period", [0.002], 0.1, WRONG_NAME),
+        ("hand.Kp", np.eye(2), 0.1, WRONG_SIZE),
+        ("hand.Kp", np.nan * np.eye(3), 0.1, WRONG_VALUE),
+        ("hand.Kp", -np.eye(3), 0.1, WRONG_VALUE),
+        ("hand.Kp", np.ones((3, 3)) - np.eye(3), 0.1, WRONG_VALUE),
+        ("hand.Kp", 1e9 * np.eye(3), 0.1, WRONG_VALUE),
+        ("hand.Kv", 2001.0 * np.eye(3), 0.1, WRONG_VALUE),
+        ("null_space_gain", np.zeros((7, 7)), 0.1, WRONG_VALUE),
+        ("hand.Kp", np.eye(3), -0.1, WRONG_VALUE),
+        ("hand.Kp", np.eye(3), np.nan, WRONG_VALUE),
+        ("hand.Kp", np.eye(3), np.inf, WRONG_VALUE),
+    ],
+)
+def test_a_wrong_request_changes_nothing(
+    name: str, values: np.ndarray, duration: float, status: int, tmp_path: Path
+) -> None:
+    controller, opened = pair("panda_limits", tmp_path)
+    q = controller._declared.start
+    run(controller, opened, range(3), {})
+    assert opened.ramp(name, values, duration) == status
+    assert opened.error
+    assert q is not None
+    run(controller, opened, range(3, 6), {})
+
+
+def test_too_many_ramps_at_a_time(tmp_path: Path) -> None:
+    controller, opened = pair("panda_limits", tmp_path)
+    run(controller, opened, range(1), {})
+    for k in range(8):
+        assert opened.ramp("hand.Kv", (20.0 + k) * np.eye(3), 0.01) == OK
+    assert opened.ramp("hand.Kv", 30.0 * np.eye(3), 0.01) == TOO_MANY
+    assert "8 ramps" in opened.error
+    q = controller._declared.start
+    assert q is not None
+    for k in range(1, 12):
+        assert opened.step(k * H, q, np.zeros(7)) >= OK
+    np.testing.assert_array_equal(opened.get("hand.Kv", 9), 27.0 * np.eye(3).ravel())
+    assert opened.ramp("hand.Kv", 30.0 * np.eye(3), 0.01) == OK

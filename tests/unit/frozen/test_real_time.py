@@ -1,0 +1,40 @@
+"""A step of a frozen controller allocates nothing, and asks nothing of the system."""
+
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+from frozen_runs import compiled, random_states, simulated_states
+
+import hsp_control as hsp
+
+SEED = 61
+
+
+@pytest.mark.smoke
+@pytest.mark.skipif(sys.platform != "linux", reason="glibc's names, Linux' seccomp")
+@pytest.mark.parametrize("name", ["panda_obstacle", "panda_limits", "ur5_position"])
+def test_no_allocation_no_lock_no_system_call(name: str, tmp_path: Path) -> None:
+    program = compiled(Path(__file__).with_name("quiet.c"), tmp_path)
+    experiment = hsp.load_experiment(name)
+    frozen = hsp.freeze(experiment.controller, tmp_path / "frozen.hsp")
+    # where no limit is violated, and where some are, and contradict each other
+    calm = simulated_states(experiment, 0.1)
+    given = experiment.robot, experiment.q0, 100, SEED
+    wild = random_states(*given, away=0.5, speed=0.5)
+    wild[:, 0] += calm[-1, 0] + 0.001
+    states = np.concatenate([calm, wild])
+    file = tmp_path / "states"
+    file.write_bytes(states.tobytes())
+    command = [program, frozen, file, str(len(states)), "20"]
+    done = subprocess.run(command, capture_output=True, text=True, check=True)
+    steps, within, allocations, locks, *_ = (
+        int(word) for word in done.stdout.split() if word.isdigit()
+    )
+    assert steps == 20 * len(states)
+    assert 0 < within < steps
+    assert allocations == locks == 0
+    if "without system calls" not in done.stdout:
+        pytest.skip("allocations and locks counted; seccomp is not allowed here")
