@@ -9,7 +9,7 @@ from threading import Lock
 from typing import Any, NamedTuple
 
 from hsp_control.common.exceptions import StreamError
-from hsp_control.trajectories.streams.message import Message, Space, message_of
+from hsp_control.trajectories.streams.message import NO_TOOL, Message, Space, message_of
 
 _log = logging.getLogger(__name__)
 MOST = 5_000_000
@@ -204,4 +204,7 @@ class InboxReader:
                     f"a message has {array.shape[1]} numbers; this stream needs {width}"
                 )
                 return False
+        if message.axes == "tool" and not space.rotational:
+            self._inbox.reject(NO_TOOL)
+            return False
         return True
