@@ -1,7 +1,8 @@
 """The controller: from tasks, a null-space field and a metric to one effort."""
 
 import os
-from collections.abc import Callable, Collection, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from copy import deepcopy
 from math import isfinite
 from threading import RLock
@@ -21,9 +22,11 @@ from hsp_control.control.first_state import check_angles, warn_of_jump
 from hsp_control.control.mixture import AccelerationModifier
 from hsp_control.control.model_in_force import ModelInForce
 from hsp_control.control.output import ControlOutput, Diagnostics
+from hsp_control.declaration.nested import parts_within
 from hsp_control.engine import Dynamics, Plan
 from hsp_control.law import TaskSample
 from hsp_control.robot import RobotState
+from hsp_control.trajectories.streams.stream import Streamed, looking_ahead
 
 _MEMORY = 1.0
 """Changes that were complete this long ago are forgotten [s]; an integrator may ask for
@@ -160,9 +163,7 @@ class Controller(Composition):
         if opened:
             if run.now > opened[0].end + _MEMORY:
                 self._follow(self._time_line.settled_at(run.now - _MEMORY))
-            self._gains.write(t)
-            self._limits.write(t)
-            self._model.write(t)
+            self._write(t)
 
     def applied(self, tau: ArrayLike, period: float) -> None:
         """Store the effort that was sent to the robot.
@@ -341,11 +342,11 @@ class Controller(Composition):
         return plan
 
     def stack(self, state: RobotState) -> TaskSample:
-        """Return the rows of all active contacts and tasks at a state."""
-        with self._lock:
-            self._observe(state)
-            self._advance()
-            self._mixture.resolve(self._state.t)
+        """Return the rows of all active contacts and tasks at a state.
+
+        Nothing moves: the run goes on from its last step.
+        """
+        with self._lock, self._looking(state):
             return self.active_stack.rows
 
     @property
@@ -363,10 +364,54 @@ class Controller(Composition):
 
         The law makes the robot this first-order flow (docs/law.md, Equations (7) and
         (13) over a metric; Liégeois 1977). So it shows what a field will do, and a
-        start with this velocity has no transient.
+        start with this velocity has no transient. Nothing moves: the run goes on from
+        its last step.
         """
-        self.compute(t, q, np.zeros(self.robot.nv))
-        return self.active_stack.flow()
+        with self._lock, self._looking(t, q, np.zeros(self.robot.nv)):
+            return self.active_stack.flow()
+
+    @contextmanager
+    def _looking(
+        self,
+        t: float | RobotState,
+        q: ArrayLike | None = None,
+        v: ArrayLike | None = None,
+    ) -> Iterator[None]:
+        """Resolve the law at another state; afterwards the run goes on as before."""
+        state, begun, active = self._state, self._run.begun, self._mixture.active
+        here = state.t, state.q.copy(), state.v.copy()
+        if isinstance(t, RobotState) and (t is state.seen or t is state):
+            here = t.t, t.q.copy(), t.v.copy()
+        try:
+            self._observe(t, q, v)
+            if not begun:  # what is relative is placed here, and again when it begins
+                self._begin()
+            with looking_ahead(self._streams()):
+                self._write(state.t)
+                self._mixture.resolve(state.t)
+                yield
+        finally:
+            state.update(*here)
+            if begun:
+                self._write(state.t)
+                self._mixture.active = active or self._mixture.active
+            else:
+                self._run = PresentRun(state.robot.nv)
+
+    def _write(self, t: float) -> None:
+        """Write the gains, the limits and the model of a time."""
+        if self._time_line.open:
+            self._gains.write(t)
+            self._limits.write(t)
+            self._model.write(t)
+
+    def _streams(self) -> Iterator[Streamed]:
+        setup = self._setup
+        tasks = [each.task for each in setup.tasks]
+        fields = [each.field for each in setup.terms]
+        contacts = [each.contact for each in setup.contacts]
+        scene = [*setup.start.scene.values()]
+        return parts_within([*tasks, *fields, *contacts, *scene], Streamed)
 
     def preview(self) -> "Controller":
         """Return a copy at the beginning of a run: to look ahead, or at a log.

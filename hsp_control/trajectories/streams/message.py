@@ -2,6 +2,7 @@
 
 import json
 from collections.abc import Mapping
+from math import inf
 from typing import Any, Literal, NamedTuple, NoReturn
 
 import numpy as np
@@ -63,6 +64,7 @@ class Message(NamedTuple):
     velocities: Array | None
     chunk: bool = False  # whether they replace those that were to follow
     axes: Literal["world", "tool"] | None = None  # those of a velocity alone, if said
+    at: float = -inf  # when it is taken, by the controller's clock [s]; -inf: at once
 
     @property
     def size(self) -> int:
@@ -71,8 +73,10 @@ class Message(NamedTuple):
         return sum(each.size for each in found if each is not None)
 
     def to_dict(self) -> dict[str, Any]:
-        """Return what `message_of` reads."""
-        data: dict[str, Any] = {} if self.t is None else {"t": self.t}
+        """Return what `message_of` reads, and the time ``at`` of one that was taken."""
+        data: dict[str, Any] = {} if self.at == -inf else {"at": self.at}
+        if self.t is not None:
+            data["t"] = self.t
         for one, several in (("value", "values"), ("velocity", "velocities")):
             array = getattr(self, several)
             if array is not None and self.chunk:

@@ -11,13 +11,14 @@ from collections.abc import Sequence
 from copy import copy, deepcopy
 from itertools import groupby
 from math import inf
-from typing import NamedTuple, Protocol
+from typing import NamedTuple
 
 import numpy as np
 
 from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import StreamError
 from hsp_control.trajectories.streams.chart import Chart, State
+from hsp_control.trajectories.streams.inbox import Reader
 from hsp_control.trajectories.streams.message import Message
 from hsp_control.trajectories.streams.segments import (
     SAME,
@@ -211,16 +212,6 @@ class Policy(NamedTuple):
     axes: Axes
 
 
-class MessageSource(Protocol):
-    """What messages come from: an `Inbox`, or a recording."""
-
-    def take(self, t: float) -> Sequence[tuple[float, Message]]:
-        """Return the messages up to a time that were not taken, and their times [s]."""
-
-    def copy(self) -> "MessageSource":
-        """Return a source that goes on from here, without the other's knowledge."""
-
-
 class RunningStream:
     """The reference of one run."""
 
@@ -229,7 +220,7 @@ class RunningStream:
         chart: Chart,
         bounds: MotionBounds,
         policy: Policy,
-        source: MessageSource,
+        source: Reader,
         start: State,
     ) -> None:
         """Begin at rest."""
@@ -277,8 +268,8 @@ class RunningStream:
         if self._now == -inf:  # what is computed at the very start is not yet the run
             self._now = self._begin = t
             return
-        for at, group in groupby(self._source.take(t), key=lambda each: each[0]):
-            messages = [message for _, message in group]
+        for at, group in groupby(self._source.take(t), key=lambda each: each.at):
+            messages = [*group]
             surplus = max(len(messages) - _AT_ONCE, 0)
             self.taken += surplus
             self.waypoints.late += surplus

@@ -7,7 +7,7 @@ the state in which the piece before it ends.
 from abc import ABC, abstractmethod
 from itertools import pairwise
 from math import pi, sqrt
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 import ruckig
@@ -295,10 +295,10 @@ class Fastest(Segment):
         x += self._origin + elapsed * drift
         return State(x, rate + drift, acceleration, self.base)
 
-    def __reduce__(self) -> tuple[type["Fastest"], tuple[object, ...]]:
+    def __reduce__(self) -> tuple[type["Fastest"], tuple[object, ...], dict[str, Any]]:
         """Return how to make it again: Ruckig's motions cannot be pickled."""
         given = self.start, self.base, self._task, self._origin, self._bounds
-        return Fastest, given
+        return Fastest, given, {"end": self.end}  # which may be earlier: see `_meet`
 
 
 class Joiner:

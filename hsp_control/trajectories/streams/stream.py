@@ -1,6 +1,7 @@
 """References that are streamed while the robot moves: points, orientations, poses."""
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import KW_ONLY, replace
 from math import inf
 from pathlib import Path
@@ -28,6 +29,7 @@ from hsp_control.trajectories.orientation import (
 )
 from hsp_control.trajectories.pose import PoseSample, PoseTrajectory
 from hsp_control.trajectories.streams.chart import Chart, State
+from hsp_control.trajectories.streams.inbox import Reader
 from hsp_control.trajectories.streams.mailbox import (
     Mailbox,
     is_address,
@@ -36,11 +38,7 @@ from hsp_control.trajectories.streams.mailbox import (
     recorded,
 )
 from hsp_control.trajectories.streams.message import ORIENTATION, POSE, Space
-from hsp_control.trajectories.streams.running import (
-    MessageSource,
-    Policy,
-    RunningStream,
-)
+from hsp_control.trajectories.streams.running import Policy, RunningStream
 from hsp_control.trajectories.streams.segments import (
     MotionBounds,
     angular_bounds,
@@ -181,8 +179,17 @@ class Streamed(Remembering, error=TrajectoryError):
 
     @property
     def record(self) -> tuple[Mapping[str, Any], ...]:
-        """What the last run has taken, and when; see ``messages``."""
-        return tuple(self._mailbox.record.to_list())
+        """What the last run has taken, and when; see ``messages``.
+
+        Where no log is written, only the first messages.
+        """
+        reader = self._mailbox.reader
+        taken = reader.record if reader is not None else []
+        return tuple(each.to_dict() for each in taken)
+
+    def log(self) -> None:
+        """Record all that is taken from now on, up to five million numbers."""
+        self._mailbox.log()
 
     @property
     def last_rejection(self) -> str:
@@ -192,7 +199,8 @@ class Streamed(Remembering, error=TrajectoryError):
     @property
     def unrecorded(self) -> int:
         """How many messages of the last run the record had no room for."""
-        return self._mailbox.record.lost
+        reader = self._mailbox.reader
+        return reader.lost if reader is not None else 0
 
     def counts(self) -> dict[str, float]:
         """Return the time since the last message [s], and how many there were.
@@ -286,14 +294,15 @@ class Streamed(Remembering, error=TrajectoryError):
         source = self._opened(space)
         return RunningStream(chart, self._bounds(), policy, source, start)
 
-    def _opened(self, space: Space) -> MessageSource:
+    def _opened(self, space: Space) -> Reader:
         kept = not vars(self).get("_previews", False)
         messages: Sequence[Mapping[str, Any]] | None = self.messages
         if self.source is not None and not is_address(self.source):
             messages = read_recording(Path(self.source))
         if messages is not None:
-            return self._mailbox.recording(recorded(messages, space), kept=kept)
-        return self._mailbox.reader(space, kept=kept)
+            taken = recorded(messages, space)
+            return self._mailbox.recording(space, taken, kept=kept)
+        return self._mailbox.live(space, kept=kept)
 
     def __getstate__(self) -> dict[str, Any]:
         """Return the fields, and where the reference is in its run, if it runs."""
@@ -512,6 +521,24 @@ class StreamPose(Turning, PoseTrajectory, type="stream"):
         moving = linear_bounds(self.speed, self.acceleration, self.jerk, 3)
         turning = self._turning
         return MotionBounds(*map(np.concatenate, zip(moving, turning, strict=True)))
+
+
+@contextmanager
+def looking_ahead(streams: Iterable[Streamed]) -> Iterator[None]:
+    """Let streams be sampled at any time; then they go on as if they had not been."""
+    before = {id(each): (each, dict(vars(each))) for each in streams}
+    for stream, own in before.values():
+        vars(stream)["_previews"] = True  # a run that begins here takes nothing
+        if "_running" in own:
+            vars(stream)["_running"] = own["_running"].copy()
+    try:
+        yield
+    finally:
+        for stream, own in before.values():
+            for name in ("_running", "_previews"):
+                vars(stream).pop(name, None)
+                if name in own:
+                    vars(stream)[name] = own[name]
 
 
 def stream_for(followed: object, stream: Streamed) -> Any:
