@@ -181,9 +181,8 @@ class Velocities:
             if y @ y > _FAR * _FAR:
                 return None
             inverse = jlog3(y)
-            rate[n:] = inverse @ (
-                wanted[n:] if axes == "tool" else exp3(y).T @ wanted[n:]
-            )
+            turned = np.eye(3) if axes == "tool" else exp3(y).T
+            rate[n:] = inverse @ turned @ wanted[n:]
             acceleration[n:] = -inverse @ jexp3_dot(y, rate[n:]) @ rate[n:]
             before, x = x, moved + 0.5 * T * rate - T * T / 12.0 * acceleration
             if np.abs(x - before).max() < 1e-15:
