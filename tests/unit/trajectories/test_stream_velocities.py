@@ -83,8 +83,10 @@ def assert_integral(stream: Any, times: np.ndarray) -> None:
 @pytest.mark.parametrize("axes", AXES)
 def test_a_stick_that_is_held_moves_the_hand_at_its_velocity(axes: Any) -> None:
     stream = StreamPose(axes=axes).anchored(START)
-    samples = run(stream, 1.0, held(stream, TWIST, 100, 1000))
-    for sample in samples[202:]:  # ``delay`` after the first message
+    other = held(stream, 0.5 * np.roll(TWIST, 1), 0, 200)
+    stick = held(stream, TWIST, 200, 1000)
+    samples = run(stream, 1.0, lambda k: (other(k), stick(k)))
+    for sample in samples[302:]:  # ``delay`` after the first message
         # To rounding: the change ends with the velocity itself.
         assert np.abs(twist(sample, axes) - TWIST).max() < 1e-12
         assert np.abs(sample.orientation.angular_acceleration).max() < 1e-12
