@@ -13,7 +13,9 @@ import pinocchio as pin
 import pytest
 
 import hsp_control as hsp
+from hsp_control.declaration.nested import parts_within
 from hsp_control.tasks import RelativePose
+from hsp_control.trajectories import ComposedPose
 
 PERIOD = 2e-3
 PANDA = hsp.Robot.load("panda")
@@ -139,6 +141,46 @@ def test_copies_go_on_and_what_looks_ahead_moves_nothing(
         copy.applied(np.zeros(7), PERIOD)
     assert found == expected
     assert copied == expected
+
+
+def leaving() -> tuple[hsp.Controller, hsp.StreamPose]:
+    """Return a controller whose task leaves a stream from 0.3 s on, for two seconds."""
+    stream = hsp.StreamPose(delay=0.05, dead_man=1.0)
+    controller = hsp.Controller(PANDA, [hsp.FramePose(None, stream)], limits=None)
+    led(controller, stream, 0, 30)
+    controller.at(0.3).ramp(2.0).reference("end_effector", ComposedPose())
+    return controller, stream
+
+
+def led(
+    controller: hsp.Controller, stream: hsp.StreamPose, first: int, last: int
+) -> list[np.ndarray]:
+    """Return the efforts of steps of 10 ms, while the stream goes on."""
+    found = []
+    for k in range(first, last):
+        if k % 5 == 0:
+            turn = 0.2 * np.sin(k * np.ones(3))
+            stream.send(velocity=np.concatenate([0.1 * turn, turn]))
+        found.append(controller.compute(0.01 * k, Q, V).tau.copy())
+        controller.applied(np.zeros(7), 0.01)
+    return found
+
+
+def test_a_task_that_leaves_a_stream_goes_on_in_copies_and_beside_other_changes() -> (
+    None
+):
+    """A second later a stream knows where the change began, for who asks again."""
+    expected = np.array(led(*leaving(), 30, 250))
+    for k in (31, 180, 240):
+        controller, stream = leaving()
+        led(controller, stream, 30, k)
+        copy = pickle.loads(pickle.dumps(controller))
+        heard = next(parts_within(copy.tasks[0], hsp.StreamPose), stream)
+        np.testing.assert_array_equal(led(copy, heard, k, 250), expected[k - 30 :])
+        # The same gains again: all references are made anew, and (1 - s) Kp + s Kp.
+        controller.at(0.0).gains("end_effector", hsp.Gains(natural_frequency=10.0))
+        found = led(deepcopy(controller), stream, k, 250)
+        np.testing.assert_allclose(found, expected[k - 30 :], rtol=0, atol=1e-11)
 
 
 if __name__ == "__main__":

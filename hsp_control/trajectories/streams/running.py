@@ -237,6 +237,7 @@ class RunningStream:
         self._starts = [-inf]
         self.taken = self.refused = 0
         self.waypoints = Waypoints()
+        self._kept: dict[float, float] = {}
 
     @property
     def age(self) -> float:
@@ -255,9 +256,14 @@ class RunningStream:
         k = max(bisect_right(self._starts, t) - 1, 0)
         return self._segments[k].state(t)
 
+    def keep(self, since: float, until: float) -> None:
+        """Know the reference from a time on until a later one [s]."""
+        self._kept[since] = max(until, self._kept.get(since, -inf))
+
     def copy(self) -> "RunningStream":
         """Return one that goes on from here by itself."""
         other = copy(self)
+        other._kept = self._kept.copy()
         other._source = self._source.copy()
         other._segments, other._starts = self._segments.copy(), self._starts.copy()
         other.waypoints = self.waypoints.copy()
@@ -395,7 +401,13 @@ class RunningStream:
     def _forget(self, t: float) -> None:
         """Forget pieces and waypoints that lie far behind."""
         self.waypoints.forget(t)
-        gone = bisect_right(self._starts, t - _KEPT) - 1
+        oldest = t - _KEPT
+        for since, until in [*self._kept.items()]:
+            if until < oldest:
+                del self._kept[since]
+            else:
+                oldest = min(oldest, since)
+        gone = bisect_right(self._starts, oldest) - 1
         if gone > 0:
             del self._segments[:gone], self._starts[:gone]
             self._oldest = self._starts[0]
