@@ -40,6 +40,15 @@ class Layout(NamedTuple):
     bounds: Sequence[tuple[str, slice, Callable[[Array], float]]]
 
 
+class PlacedTask(NamedTuple):
+    """A task in a stack."""
+
+    planned: PlannedTask
+    name: str  # the task's own; while a newer one of the same name fades in, another
+    rows: slice
+    in_force: InForce
+
+
 class ActiveStack:
     """The law for one set of contacts and tasks, with rows in order of priority.
 
@@ -95,7 +104,8 @@ class ActiveStack:
         self.first_task_row = held + free
         tasks = [each for level in planned for each in level]
         below = {each.key for level in planned[1:] for each in level}
-        self.task_rows = _places([each.task for each in tasks], self.first_task_row)
+        self.placed = _placed(tasks, self.first_task_row, feedback)
+        self.task_rows = {each.name: each.rows for each in self.placed}
         bounds: list[tuple[str, slice, Callable[[Array], float]]] = []
         self.layout = Layout(len(self.rows.error), self.task_rows, bounds)
         self._parts: list[tuple[Task | Contact, TaskSample]] = []
@@ -106,13 +116,10 @@ class ActiveStack:
             self._parts.append((contact, sample))
             self._calls += contact.calls(state, sample)
             row += contact.rows
-        row = self.first_task_row
-        for each in tasks:
-            sample = self.rows.rows(row, row + each.task.rows)
+        for each, name, here, in_force in self.placed:
+            sample = self.rows.rows(here.start, here.stop)
             self._parts.append((each.task, sample))
-            in_force = feedback[each.key]
             self._calls += each.task.calls_in_force(state, in_force, sample)
-            here = slice(row, row + each.task.rows)
             asked = self.resolution.problem.asked[here]
             spring = impedance_of(each.task) is not None
             self.resolution.problem.springs[here] = spring
@@ -128,10 +135,10 @@ class ActiveStack:
                     pulls=pulls,
                 )
                 self._calls.append(call)
-                bounds.append((each.task.name, here, away))
+                bounds.append((name, here, away))
             elif len(in_force.feedback.largest):
                 away = partial(beyond_largest, largest=in_force.feedback.largest)
-                bounds.append((each.task.name, here, away))
+                bounds.append((name, here, away))
                 parts = each.task.error_parts
                 yields = [part.yields for part in parts for _ in range(part.size)]
                 self.resolution.problem.yields[here] = yields
@@ -150,7 +157,6 @@ class ActiveStack:
                     stretched=stretched,
                 )
                 self._calls.append(call)
-            row += each.task.rows
         # names of each level's tasks; ``contacts`` for those at the top
         self.level_names = [
             *(["contacts"] if first else []),
@@ -247,10 +253,9 @@ class ActiveStack:
         sizes = np.diff(law.ends, prepend=0).tolist()
         flow = Resolution(sizes, nv, form, np.eye(nv), law.threshold)
         flow.problem.task.jacobian[:] = self.rows.jacobian
-        for level in self.levels:
-            for task in level:
-                rate = task.reference_rate(state.read_only)
-                flow.problem.task.acceleration[self.task_rows[task.name]] = rate
+        for each in self.placed:
+            rate = each.planned.task.reference_rate(state.read_only)
+            flow.problem.task.acceleration[each.rows] = rate
         flow.problem.field.g[:] = law.problem.field.g
         flow.problem.metric.W[:], flow.problem.metric.L[:] = law.problem.metric[:2]
         state.run([flow.call(state.v)])
@@ -284,11 +289,27 @@ class ActiveStack:
         )
 
 
-def _places(parts: Sequence[Task] | Sequence[Contact], start: int) -> dict[str, slice]:
+def _placed(
+    tasks: Sequence[PlannedTask], start: int, feedback: Mapping[int, InForce]
+) -> list[PlacedTask]:
+    """Return tasks one below the other, from a row on."""
+    placed, row = list[PlacedTask](), start
+    for each in tasks:
+        name = each.task.name
+        newer = sum(one.task.name == name and one.key > each.key for one in tasks)
+        if newer:
+            name += " (old)" if newer == 1 else f" (old, {newer})"
+        rows = slice(row, row + each.task.rows)
+        placed.append(PlacedTask(each, name, rows, feedback[each.key]))
+        row = rows.stop
+    return placed
+
+
+def _places(contacts: Sequence[Contact], start: int) -> dict[str, slice]:
     places = {}
-    for part in parts:
-        places[part.name] = slice(start, start + part.rows)
-        start += part.rows
+    for contact in contacts:
+        places[contact.name] = slice(start, start + contact.rows)
+        start += contact.rows
     return places
 
 

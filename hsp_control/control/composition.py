@@ -21,7 +21,13 @@ from hsp_control.control.declared_rates import check_field, check_metric
 from hsp_control.control.gains_in_force import GainsInForce, check_held
 from hsp_control.control.mixture import Mixture
 from hsp_control.control.model_in_force import ModelInForce
-from hsp_control.control.setup import Base, DeclaredController, PlannedTerm, Setup
+from hsp_control.control.setup import (
+    Base,
+    DeclaredController,
+    PlannedTask,
+    PlannedTerm,
+    Setup,
+)
 from hsp_control.control.targets import RAMP, followed_stream, new_stream, target_of
 from hsp_control.declaration import within
 from hsp_control.geometry.scene import Obstacle, Scene, Start
@@ -173,13 +179,15 @@ class Composition:
         self._gains.plan(setup, t)
         self._limits.plan(setup.limits, t)
         self._model.plan(setup.payloads, setup.gravity, t)
+        settled.mixture.active = self._mixture.active
         self._mixture, self._settled_later = settled.mixture, None
         self._go_on(settled.step)
 
     def _go_on(self, step: BoundStep | None) -> None:
         """Make the next steps as one call, if there is one."""
         self._run.bound = step
-        self._mixture.active = None if step is None else step.active
+        if step is not None:
+            self._mixture.active = step.active
 
     @property
     def _latest(self) -> float:
@@ -357,9 +365,15 @@ class Composition:
     @property
     def levels(self) -> tuple[tuple[Task, ...], ...]:
         """The tasks that count now or fade, by level, the highest priority first."""
+        levels = self.planned_levels
+        return tuple(tuple(each.task for each in level) for level in levels)
+
+    @property
+    def planned_levels(self) -> tuple[tuple[PlannedTask, ...], ...]:
+        """The same tasks as they are planned, each with its key."""
         now = self._latest
         levels = [
-            tuple(each.task for each in level if each.presence.at(now) > 0.0)
+            tuple(each for each in level if each.presence.at(now) > 0.0)
             for level in self._mixture.levels
         ]
         return tuple(level for level in levels if level)

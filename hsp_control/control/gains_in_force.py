@@ -94,13 +94,13 @@ class GainsInForce:
 
     def delay(self, active: ActiveStack, t: float, period: float) -> None:
         """Let changes of impedances wait where they would add energy."""
-        for each in self._setup.tasks:
-            changes = each.key in self._waiting or changes_impedance(
-                each.task, each.gains
-            )
-            rows = active.task_rows.get(each.task.name)
-            if changes and rows is not None:
-                self._follow(each, active, rows, t, period)
+        planned = {each.key: each for each in self._setup.tasks}
+        for each in active.placed:
+            now = planned.get(each.planned.key)
+            if now is None:  # a change has ended it since
+                continue
+            if now.key in self._waiting or changes_impedance(now.task, now.gains):
+                self._follow(now, active, each.rows, t, period)
 
     def _follow(
         self,

@@ -75,7 +75,7 @@ class Mixture:
         self._gains, self._threshold = gains, threshold
         self._stacks: dict[_Counting, ActiveStack] = {}
         self._actuations: dict[tuple[ActiveStack, LimitSet], Actuation] = {}
-        self.field = setup.field
+        self.field, self.active = setup.field, None
         self._follow(setup)
 
     def following(self, setup: Setup) -> "Mixture":
@@ -110,7 +110,6 @@ class Mixture:
         # tasks of the first level with a bounded inverse in the last `resolve`, by
         # name; empty: none
         self.damped = ""
-        self.active = None
 
     def resolve(self, t: float) -> None:
         """Resolve the law for each set of tasks that counts."""

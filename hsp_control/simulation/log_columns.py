@@ -20,6 +20,7 @@ from hsp_control.robot import RobotState
 from hsp_control.simulation.journal import Shapes, joined, views, width
 from hsp_control.tasks import Task
 from hsp_control.tasks.compliant_task import impedance_of
+from hsp_control.tasks.impedance import parts_of
 from hsp_control.trajectories.streams.stream import Streamed
 
 MAX_SIZE = 2_000_000_000
@@ -127,31 +128,36 @@ class TaskColumns:
         self.logged: dict[str, Task] = {}
         self._levels: dict[str, int] = {}
         self._streams: dict[str, list[tuple[str, Streamed]]] = {}
-        self._names: dict[str, str] = {}  # in the log, of the tasks that there are
-        self._compliant: set[str] = set()  # of these, tasks with an impedance
-        self._known: list[int] = []
+        self._names: dict[int, str] = {}  # in the log, of the tasks there are, by key
+        self._known: list[tuple[int, int]] = []
         self.update()
 
     def update(self) -> None:
         """Add columns for the tasks that there are, if they are others."""
         # By identity: equal tasks of two runs may have streams in different states.
-        known = list(map(id, self._controller.tasks))
+        levels = self._controller.planned_levels
+        known = [(each.key, id(each.task)) for level in levels for each in level]
         if known == self._known:
             return
         self._known = known
-        self._names.clear()
-        self._compliant.clear()
+        there = {key for key, _ in known}
+        self._names = {key: name for key, name in self._names.items() if key in there}
         probe = _present_state(self._controller)
-        for level, tasks in enumerate(self._controller.levels):
-            for task in tasks:
-                name = self._names[task.name] = self._log_name(task)
+        for level, tasks in enumerate(levels):
+            for each in tasks:
+                task = each.task
+                name = self._names.get(each.key) or self._log_name(task)
+                self._names[each.key] = name
                 self.logged[name], self._levels[name] = task, level
                 self._add(name, task, len(task.measure(probe.read_only)[0]))
 
     def _log_name(self, task: Task) -> str:
-        """Return the task's name in the log."""
-        name, k = task.name, 2
-        while name in self.logged and task_meta(self.logged[name]) != task_meta(task):
+        """Return the name in the log of a task that comes."""
+        # It goes on with the columns of one that has gone, if they are the same.
+        name, k, taken = task.name, 2, {*self._names.values()}
+        while name in taken or (
+            name in self.logged and task_meta(self.logged[name]) != task_meta(task)
+        ):
             name, k = f"{task.name}_{k}", k + 1
         return name
 
@@ -172,7 +178,6 @@ class TaskColumns:
                 unit_of = "s" if what == "age" else "-"
                 column(f"{stream}.{what}", (), unit_of, meaning)
         if impedance_of(task) is not None:
-            self._compliant.add(task.name)
             column(f"{prefix}.stiffness", (m,), "N/m or N·m/rad", "diagonal of K")
         column(f"{prefix}.reference", (width,), unit, "desired value")
         column(f"{prefix}.actual", (width,), unit, "actual value")
@@ -191,19 +196,19 @@ class TaskColumns:
     def write_law(self, active: ActiveStack, output: ControlOutput) -> None:
         """Write what counts of the active tasks: far targets, and stiffnesses."""
         row, away = self._columns.row, output.bounded
-        for task in active.task_rows:
-            prefix = f"task.{self._names[task]}"
-            row[f"{prefix}.bounded"][...] = away.get(task, 0.0)
-            if task in self._compliant:
-                stiffness = np.diag(self._controller.stiffness(task))
-                row[f"{prefix}.stiffness"][:] = stiffness
+        for each in active.placed:
+            prefix = f"task.{self._names[each.planned.key]}"
+            row[f"{prefix}.bounded"][...] = away.get(each.name, 0.0)
+            if impedance_of(each.planned.task) is not None:
+                stiffness = parts_of(each.in_force.numbers).K
+                row[f"{prefix}.stiffness"][:] = np.diag(stiffness)
 
     def sources(self, active: ActiveStack, law: Record) -> Sources:
         """Yield what the law writes of the active tasks."""
-        for task, rows in active.task_rows.items():
-            prefix = f"task.{self._names[task]}"
-            yield f"{prefix}.error", law.task.error[rows]
-            yield f"{prefix}.error_rate", law.task.error_rate[rows]
+        for each in active.placed:
+            prefix = f"task.{self._names[each.planned.key]}"
+            yield f"{prefix}.error", law.task.error[each.rows]
+            yield f"{prefix}.error_rate", law.task.error_rate[each.rows]
 
     def meta(self) -> dict[str, Any]:
         """Return what the log says of all tasks that there have been, as JSON data."""

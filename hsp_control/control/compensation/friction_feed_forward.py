@@ -94,9 +94,8 @@ def desired_velocity(state: RobotState, active: ActiveStack) -> Array:
     rate_error = -task.jacobian @ v
     contact_rows = sum(contact.rows for contact in active.contacts)
     rate_error[contact_rows : active.first_task_row] = 0.0
-    for level in active.levels:
-        for each in level:
-            rate_error[active.task_rows[each.name]] += each.reference_rate(state)
+    for each in active.placed:
+        rate_error[each.rows] += each.planned.task.reference_rate(state)
     m, n = task.jacobian.shape
     if m > n:  # conflicting levels: least squares over all of them
         B = np.linalg.solve(metric.L, task.jacobian.T)

@@ -1,0 +1,94 @@
+"""Two tasks of one name, while one fades into the other: each has its own rows."""
+
+import numpy as np
+import pytest
+
+import hsp_control as hsp
+from hsp_control.common.arrays import Array
+from hsp_control.common.exceptions import ControllerError
+from hsp_control.tasks.impedance import parts_of
+
+H = 1e-3
+ROBOT = hsp.Robot.load("panda")
+REST = np.zeros(7)
+
+
+def point(offset: Array) -> hsp.FramePosition:
+    """Return a task of the name hand that holds the hand beside its place at home."""
+    here = ROBOT.state(0.0, ROBOT.home(), REST).position("panda_tcp")
+    target = hsp.Hold(here + offset)
+    return hsp.FramePosition("panda_tcp", target, axes="xyz", name="hand")
+
+
+OLD, NEW = np.array([0.02, 0.0, 0.0]), np.array([0.0, 0.03, 0.01])
+
+
+def changed() -> hsp.Controller:
+    """Return a controller that exchanges its hand, from 0.1 to 0.3 s."""
+    joints = [f"panda_joint{k}" for k in (1, 2, 3)]
+    old = hsp.JointPosture(ROBOT.home(), joints=joints, name="hand")
+    made = hsp.Controller(ROBOT, [old], limits=None)
+    made.at(0.1).ramp(0.2).remove("hand").add(point(NEW))
+    return made
+
+
+def test_each_has_its_rows_and_errors() -> None:
+    made = changed()
+    q = ROBOT.home() + 0.01 * np.arange(7.0)
+    made.compute(0.0, q, REST)
+    output = made.compute(0.2, q, REST)
+    assert list(made.task_rows) == ["hand (old)", "hand"]
+    assert made.task_rows["hand (old)"] == slice(0, 3)
+    assert made.task_rows["hand"] == slice(3, 6)
+    np.testing.assert_allclose(output.error("hand (old)"), [0.0, -0.01, -0.02])
+    state = ROBOT.state(0.2, q, REST)
+    expected = point(NEW).evaluate(state).error
+    np.testing.assert_allclose(output.error("hand"), expected, rtol=0, atol=1e-15)
+    output = made.compute(0.4, q, REST)
+    assert list(made.task_rows) == ["hand"]
+    np.testing.assert_allclose(output.error("hand"), expected, rtol=0, atol=1e-15)
+    with pytest.raises(ControllerError, match=r"no task 'hand \(old\)' counts now"):
+        output.error("hand (old)")
+
+
+def test_each_has_its_columns_in_the_log() -> None:
+    """Of the same kind, too: their errors are not one column."""
+    made = hsp.Controller(ROBOT, [point(OLD)], limits=None)
+    made.at(0.1).ramp(0.2).remove("hand").add(point(NEW))
+    log = hsp.simulate(
+        made, ROBOT.home(), duration=0.5, control_period=H, check_rate=False
+    )
+    old, new = log["task.hand.error"], log["task.hand_2.error"]
+    fading = (log.t > 0.1) & (log.t < 0.3)
+    np.testing.assert_allclose((new - old)[fading] - (NEW - OLD), 0.0, atol=1e-12)
+    assert np.isnan(new[log.t < 0.1]).all()
+    assert np.isnan(old[log.t > 0.301]).all()
+    assert np.isfinite(new[log.t > 0.301]).all()
+
+
+def test_one_that_comes_later_goes_on_with_the_columns() -> None:
+    made = hsp.Controller(ROBOT, [point(OLD)], limits=None)
+    made.at(0.1).ramp(0.05).remove("hand")
+    made.at(0.2).ramp(0.05).add(point(NEW))
+    log = hsp.simulate(
+        made, ROBOT.home(), duration=0.3, control_period=H, check_rate=False
+    )
+    assert "task.hand_2.error" not in log.columns
+    gone = np.isnan(log["task.hand.error"]).all(axis=1)
+    np.testing.assert_array_equal(gone, (log.t > 0.151) & (log.t <= 0.2))
+
+
+def test_impedances_of_one_name_wait_by_themselves() -> None:
+    """A stiffness that changes belongs to a task, not to a name."""
+    soft, hard = (hsp.Impedance(k, damping_ratio=0.7) for k in (200.0, 800.0))
+    at_home = point(np.zeros(3)).trajectory
+    first = hsp.FramePosition("panda_tcp", at_home, impedance=soft, name="hand")
+    second = hsp.FramePosition("panda_link4", impedance=soft, name="hand")
+    made = hsp.Controller(ROBOT, [first], limits=None)
+    made.at(0.05).ramp(0.2).impedance("hand", hard)
+    made.at(0.1).ramp(0.4).remove("hand").add(second)
+    for k in range(300):
+        made.applied(made.compute(k * H, ROBOT.home(), REST).tau, H)
+    placed = {each.name: each.in_force for each in made.active_stack.placed}
+    found = {name: parts_of(each.numbers).K[0, 0] for name, each in placed.items()}
+    assert found == {"hand (old)": 800.0, "hand": 200.0}
