@@ -55,6 +55,7 @@ def freeze(
         raise FreezeError(f"period is {period}; needs a positive number of seconds")
     content = _image(controller.preview(), compensation, period, start).content()
     file = Path(path)
+    file.parent.mkdir(parents=True, exist_ok=True)
     file.write_bytes(content)
     return file
 

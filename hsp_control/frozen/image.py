@@ -2,7 +2,7 @@
 
 A plan is calls on arrays of NumPy. Arrays that overlap are one block, so that what one
 call writes another one reads, and each block begins where it began to a processor's
-packets: the order of a sum, and so its last bit, follows from that. The
+packets: the order of a sum, and so its last bit, may follow from that. The
 kinds of calls are named, and their arguments by their members' names; nothing here is
 of one kind.
 
