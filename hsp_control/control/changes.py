@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from itertools import takewhile
 from typing import Self
 
@@ -170,7 +171,7 @@ class TimeLine:
                 later = placed[-1].apply(later)
         return cls(setup.start, tuple(made), setup, tuple(placed))
 
-    @property
+    @cached_property
     def setup(self) -> Setup:
         """The setup with all changes."""
         return _applied(self.open, self.settled)
@@ -186,7 +187,8 @@ class TimeLine:
     def settled_at(self, t: float) -> "TimeLine":
         """Return the time line for times from t [s] on, without what is over then."""
         done = list(takewhile(lambda each: each.end <= t, self.open))
-        settled = _applied(done, self.settled).settled(t)
+        over = len(done) == len(self.open)
+        settled = (self.setup if over else _applied(done, self.settled)).settled(t)
         return replace(self, settled=settled, open=self.open[len(done) :])
 
 

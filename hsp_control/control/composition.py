@@ -3,7 +3,7 @@
 from collections.abc import Iterable, Sequence
 from contextlib import AbstractContextManager
 from dataclasses import replace
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import pinocchio as pin
@@ -34,6 +34,10 @@ from hsp_control.tasks.compliant_task import impedance_of
 from hsp_control.tasks.feedback import Feedback
 from hsp_control.tasks.impedance import parts_of
 from hsp_control.trajectories.streams.stream import Streamed
+
+MEMORY = 1.0
+"""Changes that were complete this long ago are forgotten [s]; an integrator may ask for
+earlier times than the last one."""
 
 
 class Composition:
@@ -125,13 +129,56 @@ class Composition:
 
     def _follow(self, time_line: TimeLine) -> None:
         """Let the steps follow a time line."""
-        self._run.bound = None
-        self._time_line, self._setup = time_line, time_line.setup
-        exchanged = self._gains.plan(self._setup, self._latest)
-        self._limits.plan(self._setup.limits, self._latest)
-        setup = self._setup
-        self._model.plan(setup.payloads, setup.gravity, self._latest)
-        self._mixture.plan(self._setup, exchanged=exchanged)
+        setup, t = time_line.setup, self._latest
+        self._time_line, self._setup = time_line, setup
+        self._gains.plan(setup, t)
+        self._limits.plan(setup.limits, t)
+        self._model.plan(setup.payloads, setup.gravity, t)
+        self._mixture = self._mixture.following(setup)
+        self._settled_later: Settled | None = None
+        step = None
+        if self._run.begun:
+            self._bind_ahead()
+            step = self._mixture.bound_step(self._origin)
+        self._go_on(step)
+
+    def _write(self, t: float) -> None:
+        """Write the gains, the limits and the model of a time [s]."""
+        self._gains.write(t)
+        self._limits.write(t)
+        self._model.write(t)
+
+    def _bind_ahead(self) -> None:
+        """Bind what steps call until all changes are over, and then.
+
+        Not before the first state: it says which motions of a base contacts leave free.
+        """
+        time_line, mixture = self._time_line, self._mixture
+        if not mixture.steady:
+            mixture.prepare(self._setup.instants(self._latest))
+        if not time_line.open:
+            return
+        end = max(each.end for each in time_line.open)
+        over = time_line.settled_at(end)
+        following = mixture.following(over.setup)
+        following.prepare([end])
+        step = following.bound_step(self._origin)
+        self._settled_later = Settled(end + MEMORY, over, following, step)
+
+    def _settle(self, settled: "Settled") -> None:
+        """Go on without the changes that are over; all is bound."""
+        self._time_line, self._setup = settled.time_line, settled.time_line.setup
+        setup, t = self._setup, self._latest
+        self._gains.plan(setup, t)
+        self._limits.plan(setup.limits, t)
+        self._model.plan(setup.payloads, setup.gravity, t)
+        self._mixture, self._settled_later = settled.mixture, None
+        self._go_on(settled.step)
+
+    def _go_on(self, step: BoundStep | None) -> None:
+        """Make the next steps as one call, if there is one."""
+        self._run.bound = step
+        self._mixture.active = None if step is None else step.active
 
     @property
     def _latest(self) -> float:
@@ -211,15 +258,19 @@ class Composition:
             if self._run.begun:
                 change = replace(change, at=max(change.at, now))
                 here = self._here()
-            time_line = self._time_line.with_change(change, here)
+            known = self._time_line.settled_at(now - MEMORY)
+            time_line = known.with_change(change, here)
             if period := self._limits.sent.period:
                 state = (here or time_line.start).state
                 check_held(self._setup, time_line.setup, state, period)
             if self._run.begun:
                 self._check_terms(time_line.setup, self._setup.terms, self._state)
-            self._follow(time_line)
-            if self._run.begun:  # bind now, not in a step
-                self._mixture.prepare(self._mixture.stack_at(now))
+            before = self._time_line
+            try:
+                self._follow(time_line)
+            except BaseException:  # it cannot be bound: nothing of it stays
+                self._follow(before)
+                raise
 
     def check_derivatives(self, state: RobotState) -> None:
         """Check what somebody has written of the field and the metric, at a state.
@@ -417,6 +468,15 @@ class Composition:
         if saved["origin"] is not None:
             self._count_from(saved["origin"])
         self._limits.remember(saved["sent"])
+
+
+class Settled(NamedTuple):
+    """What a controller goes on with once all changes are over."""
+
+    at: float  # from when on [s]
+    time_line: TimeLine
+    mixture: Mixture
+    step: BoundStep | None
 
 
 class PresentRun:

@@ -5,6 +5,7 @@ from collections.abc import Callable, Collection, Mapping, Sequence
 from copy import deepcopy
 from math import isfinite
 from threading import RLock
+from time import perf_counter
 from typing import Any
 from weakref import WeakSet
 
@@ -24,10 +25,6 @@ from hsp_control.control.output import ControlOutput, Diagnostics
 from hsp_control.engine import Dynamics, Plan
 from hsp_control.law import TaskSample
 from hsp_control.robot import RobotState
-
-_MEMORY = 1.0
-"""Changes that were complete this long ago are forgotten [s]; an integrator may ask for
-earlier times than the last one."""
 
 
 class Controller(Composition):
@@ -108,7 +105,7 @@ class Controller(Composition):
                 delivered = mixture.deliver(modifier)  # within the limits
                 stack, damped = self.active_stack, mixture.damped
                 stack.check(delivered.effort)
-                run.bound = bound or mixture.bound_step(self._origin)
+                run.bound = run.bound or mixture.bound_step(self._origin)
             run.acceleration = delivered.acceleration
             if out is None:
                 out = ControlOutput()
@@ -159,6 +156,8 @@ class Controller(Composition):
             self._limits.remember(sent)
         self.check_derivatives(self._state)
         self._run.begun = True
+        self._write(self._state.t)  # what is bound is called once, at this state
+        self._bind_ahead()
 
     def _advance(self) -> None:
         """Write the gains and the limits of the time of the state."""
@@ -166,13 +165,11 @@ class Controller(Composition):
         if not run.begun:
             self._begin()
         run.now = max(run.now, t)
-        opened = self._time_line.open
-        if opened:
-            if run.now > opened[0].end + _MEMORY:
-                self._follow(self._time_line.settled_at(run.now - _MEMORY))
-            self._gains.write(t)
-            self._limits.write(t)
-            self._model.write(t)
+        if later := self._settled_later:
+            if run.now > later.at:
+                self._settle(later)
+                return
+            self._write(t)
 
     def applied(self, tau: ArrayLike, period: float) -> None:
         """Store the effort that was sent to the robot.
@@ -303,19 +300,26 @@ class Controller(Composition):
         state: RobotState,
         lifted: Collection[str] = (),
         without: Collection[str] = (),
-    ) -> None:
+    ) -> float:
         """Bind the law for some contacts and tasks now, instead of in a step.
 
-        A plan that switches contacts asks for each combination that it will use.
+        What schedules and changes say is bound by itself: in the first step, and when
+        they are made. A plan that switches contacts by events asks for each combination
+        that it will use.
 
         Args:
             state: A state in which the others are active.
             lifted: The names of the contacts that are not active.
             without: The names of the tasks that do not count.
+
+        Returns:
+            How long it took [s].
         """
+        begun = perf_counter()
         with self._lock:
-            self._observe(state)
-            self._mixture.prepare(self._mixture.stack_without(lifted, without))
+            self._state.update(state.t, state.q, state.v)
+            self._mixture.bind(self._mixture.stack_without(lifted, without))
+        return perf_counter() - begun
 
     @property
     def state(self) -> RobotState:

@@ -1,6 +1,14 @@
 """Steps while tasks and limits fade in and out: mixtures of what each set delivers."""
 
-from collections.abc import Callable, Collection, Sequence, Set
+from collections.abc import (
+    Callable,
+    Collection,
+    Iterable,
+    Iterator,
+    Sequence,
+    Set,
+)
+from copy import copy
 from itertools import pairwise
 
 import numpy as np
@@ -24,6 +32,11 @@ AccelerationModifier = Callable[
 stack, a). It returns the acceleration to deliver, shape (nv,), and an additional effort
 besides M a + N, shape (nv,), or None. While tasks fade it is called for each set of
 them, which counts by the stack's `share`."""
+
+
+_Counting = tuple[frozenset[int], frozenset[tuple[int, int]]]
+"""The contacts and the tasks that count, by identity: to compare their values would
+cost more than the step."""
 
 
 class Mixture:
@@ -60,38 +73,60 @@ class Mixture:
     ) -> None:
         self._state, self._base, self._limits = state, base, limits
         self._gains, self._threshold = gains, threshold
-        self._stacks: dict[tuple[frozenset[int], frozenset[int]], ActiveStack] = {}
+        self._stacks: dict[_Counting, ActiveStack] = {}
         self._actuations: dict[tuple[ActiveStack, LimitSet], Actuation] = {}
-        self._parts: list[ActiveStack] = []
-        # tasks of the first level with a bounded inverse in the last `resolve`, by
-        # name; empty: none
-        self.damped = ""
         self.field = setup.field
-        self.plan(setup, exchanged=False)
+        self._follow(setup)
 
-    def plan(self, setup: Setup, *, exchanged: bool) -> None:
-        """Follow a setup from now on; what stays the same is not bound again."""
+    def following(self, setup: Setup) -> "Mixture":
+        """Return the mixture of another setup; what stays the same is bound already."""
+        other = copy(self)
         field = setup.field
-        if exchanged or field != self.field:
-            self._stacks.clear()
-            self.field = field
+        if field != self.field:
+            other._stacks, other.field = {}, field
+        other._follow(setup)
+        return other
+
+    def _follow(self, setup: Setup) -> None:
         self._setup = setup
-        there = {id(each) for each in setup.contacts}
-        for key in [key for key in self._stacks if not key[0] <= there]:
-            del self._stacks[key]
-        alive = {*self._stacks.values()}, {*self._limits.all}
+        contacts = {id(each) for each in setup.contacts}
+        tasks = {(each.key, id(each.task)) for each in setup.tasks}
+        sets = {id(limits) for limits, _ in setup.limits.sets}
+        self._stacks = {
+            key: stack
+            for key, stack in self._stacks.items()
+            if key[0] <= contacts and key[1] <= tasks
+        }
+        alive = {*self._stacks.values()}
         self._actuations = {
             (stack, limits): each
             for (stack, limits), each in self._actuations.items()
-            if stack in alive[0] and limits in alive[1]
+            if stack in alive and id(limits.limits) in sets
         }
         self._fading = [each for each in setup.tasks if not each.always]
         self.levels = levels_of(setup.tasks, self._state.robot)
         self.steady = setup.steady and setup.end == -np.inf
+        self._parts: list[ActiveStack] = []
+        # tasks of the first level with a bounded inverse in the last `resolve`, by
+        # name; empty: none
+        self.damped = ""
         self.active = None
 
     def resolve(self, t: float) -> None:
         """Resolve the law for each set of tasks that counts."""
+        self._parts, self.damped = [], ""
+        for share, active in self._sets(t):
+            active.share = share
+            self._parts.append(active)
+            outcome = active.resolve(t)
+            if outcome is NOT_FINITE:
+                active.raise_not_finite()
+            if outcome is DAMPED and not self.damped:
+                self.damped = active.damped
+        self.active = active
+
+    def _sets(self, t: float) -> Iterator[tuple[float, ActiveStack]]:
+        """Yield the share of each set that counts at a time, and its stack."""
         tasks = [(each.weight(t), each) for each in self._fading]
         contacts = [(each.share(t), each) for each in self._setup.contacts]
         coming = sorted(
@@ -104,7 +139,6 @@ class Mixture:
             if share < 1.0 and each.active(t)  # also at the time when it begins
         }
         shares = [1.0, *(share for share, _ in coming), 0.0]
-        self._parts, self.damped = [], ""
         for k, (share, following) in enumerate(pairwise(shares)):
             if share == following:
                 continue
@@ -116,14 +150,7 @@ class Mixture:
                 for _, each in tasks
                 if each.weight_beyond(t, lifted) < 1.0 and id(each) not in on
             }
-            self.active = active = self._stack(standing, off)
-            active.share = share - following
-            self._parts.append(active)
-            outcome = active.resolve(t)
-            if outcome is NOT_FINITE:
-                active.raise_not_finite()
-            if outcome is DAMPED and not self.damped:
-                self.damped = active.damped
+            yield share - following, self._stack(standing, off)
 
     def deliver(self, modifier: AccelerationModifier | None) -> Delivered:
         """Return what is delivered of the law that was resolved last."""
@@ -156,19 +183,28 @@ class Mixture:
         return Delivered(effort, a, force, max(statuses), max(relaxations))
 
     def bound_step(self, origin: Array) -> BoundStep | None:
-        """Return the step that was made last as one call; None if it may change.
+        """Return a step as one call; None if it may change.
 
         ``origin``: what the clock of its calls reads at time 0, shape (1,) [s].
         """
-        if not self.steady or self.active is None:
+        if not self.steady:
             return None
-        ((limits, _),) = self._limits.sets
-        actuation = self.actuation(self.active, limits)
-        return BoundStep(self._state, self.active, actuation, self._limits, origin)
+        ((_, stack),) = self._sets(0.0)  # at any time
+        (limits,) = (
+            each for each in self._limits.all if each.limits is self._setup.limits.last
+        )
+        actuation = self.actuation(stack, limits)
+        return BoundStep(self._state, stack, actuation, self._limits, origin)
 
-    def prepare(self, stack: ActiveStack) -> None:
-        """Bind what a step with a stack calls, now instead of in the step."""
-        stack.calls  # noqa: B018 (bound, and kept)
+    def prepare(self, times: Iterable[float]) -> None:
+        """Bind what steps call at some times [s], now instead of in a step."""
+        for t in times:
+            for _, stack in self._sets(t):
+                self.bind(stack)
+
+    def bind(self, stack: ActiveStack) -> None:
+        """Bind what a step with a stack calls."""
+        stack.bind()
         for limits in self._limits.all:
             self.actuation(stack, limits)
 
@@ -179,11 +215,6 @@ class Mixture:
             found = Actuation(self._state, stack.resolution, stack.support, limits)
             self._actuations[stack, limits] = found
         return found
-
-    def stack_at(self, t: float, off: Set[int] = frozenset()) -> ActiveStack:
-        """Return the stack of the contacts active at a time, without some tasks."""
-        standing = [each for each in self._setup.contacts if each.active(t)]
-        return self._stack(standing, off)
 
     def stack_without(
         self, lifted: Collection[str], without: Collection[str]
@@ -196,20 +227,17 @@ class Mixture:
         return self._stack(standing, off)
 
     def _stack(self, standing: Sequence[PlannedContact], off: Set[int]) -> ActiveStack:
-        on = frozenset(each.key for each in self._setup.tasks if each.key not in off)
-        # By identity: to compare values would cost more than the step.
-        key = frozenset(map(id, standing)), on
+        on = (each for each in self._setup.tasks if each.key not in off)
+        tasks = frozenset((each.key, id(each.task)) for each in on)
+        key = frozenset(map(id, standing)), tasks
         if key not in self._stacks:
             levels = [
-                [each for each in level if each.key in on] for level in self.levels
+                [each for each in level if each.key not in off] for level in self.levels
             ]
             support = Support(standing, self._state, self._base)
             gains, metric = self._gains, self._setup.metric
             law = gains.feedback, metric, self.field, gains.null_space, self._threshold
-            stack = ActiveStack(self._state, support, levels, *law)
-            for limits in self._limits.all:
-                self.actuation(stack, limits)
-            self._stacks[key] = stack
+            self._stacks[key] = ActiveStack(self._state, support, levels, *law)
         return self._stacks[key]
 
 

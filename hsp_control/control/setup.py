@@ -1,8 +1,10 @@
 """What a controller is made of, how that evolves, and whether it fits together."""
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from copy import copy
 from dataclasses import dataclass, replace
+from itertools import pairwise
+from math import isfinite
 from pathlib import Path
 from typing import Any, Literal, TypeVar
 
@@ -44,7 +46,13 @@ from hsp_control.robot.state import as_given
 from hsp_control.tasks import Task
 from hsp_control.tasks.compliant_task import impedance_of
 from hsp_control.tasks.gains import as_gain, as_matrix
+from hsp_control.trajectories.schedule import Schedule
 from hsp_control.trajectories.streams.stream import Streamed
+
+_MOST = 500
+"""Events that are looked at: a schedule may repeat itself for hours."""
+_BETWEEN = 6
+"""Times that are looked at between two of them."""
 
 Base = Literal["flying", "driven"]
 """What else than contacts acts on a free-flyer root: nothing, or an outside device."""
@@ -254,6 +262,24 @@ class Setup:
         ]
         return max(self.limits.end, *(each.end for each in evolutions))
 
+    def instants(self, begin: float) -> Iterator[float]:
+        """Yield times from a beginning on at which the sets of what counts differ [s].
+
+        They are those at which a task or a contact may come or go, and some between
+        two of them: of several that fade at once, each may count most.
+        """
+        events = set[float]()
+        for task in self.tasks:
+            events |= _events(task.presence, task.task.schedule)
+        for contact in self.contacts:
+            events |= _events(contact.presence, contact.contact.schedule)
+        later = sorted(t for t in events if isfinite(t) and t > begin)
+        ordered = [begin, *later][:_MOST]
+        for one, following in pairwise(ordered):
+            for k in range(_BETWEEN):
+                yield one + k / _BETWEEN * (following - one)
+        yield ordered[-1]
+
     @property
     def steady(self) -> bool:
         """Whether tasks and contacts are the same at all times."""
@@ -315,6 +341,16 @@ class Setup:
             self.gravity.settled(t),
             tuple(each for each in payloads if each.share != ABSENT),
         )
+
+
+def _events(presence: Evolution[float], schedule: Schedule | None) -> set[float]:
+    """Return when something begins or ends to come or go [s]."""
+    changes = {t for step in presence.transitions for t in (step.start, step.end)}
+    if schedule is None:
+        return changes
+    windows, ramp = schedule.windows, schedule.ramp
+    begins = {t for start, _ in windows for t in (start, start + ramp)}
+    return changes | begins | {t for _, end in windows for t in (end - ramp, end)}
 
 
 Planned = TypeVar("Planned", PlannedTask, PlannedTerm, PlannedContact, PlannedPayload)

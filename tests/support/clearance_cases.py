@@ -8,6 +8,7 @@ import numpy as np
 import pinocchio as pin
 import pytest
 from oracles import slope
+from states import moved
 
 from hsp_control import Cost, Robot, engine
 from hsp_control.common.arrays import Array
@@ -77,8 +78,8 @@ def flowing(field: Cost, state: Any, step: float) -> Array:
     robot, q, v = state.robot, state.q.copy(), state.v.copy()
     return slope(
         lambda s: field.gradient(
-            robot.state(state.t + s, robot.integrate(q, s * v), v)
-        ),
+            moved(robot, state.t + s, robot.integrate(q, s * v), v)
+        ).copy(),
         step,
     )
 

@@ -5,12 +5,6 @@ from typing import TYPE_CHECKING
 from hsp_control.companions.shared import at_first_use
 
 if TYPE_CHECKING:  # for type checkers; a help text must not import what is slow
-    from .distributions import Choices as Choices
-    from .distributions import Distribution as Distribution
-    from .distributions import Integers as Integers
-    from .distributions import LogUniform as LogUniform
-    from .distributions import Normal as Normal
-    from .distributions import Uniform as Uniform
     from .figure import save_sweep_figure as save_sweep_figure
     from .figure import sweep_figure as sweep_figure
     from .results import Sweep as Sweep
@@ -21,7 +15,6 @@ if TYPE_CHECKING:  # for type checkers; a help text must not import what is slow
 __getattr__, __dir__ = at_first_use(
     __name__,
     {
-        "distributions": "Choices Distribution Integers LogUniform Normal Uniform",
         "figure": "save_sweep_figure sweep_figure",
         "results": "Sweep",
         "sensitivities": "Sensitivity sensitivity",

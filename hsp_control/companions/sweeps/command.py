@@ -3,11 +3,12 @@
 import argparse
 from pathlib import Path
 
-from hsp_control.cli.options import AddedCommand, add_configuration
+from hsp_control.cli.options import AddedCommand, add_configuration, add_import
 
 
 def _add_options(sweep: argparse.ArgumentParser) -> None:
     add_configuration(sweep)
+    add_import(sweep)
     sweep.add_argument(
         "--over",
         action="append",
@@ -30,12 +31,12 @@ def _add_options(sweep: argparse.ArgumentParser) -> None:
     sweep.add_argument(
         "--out",
         type=Path,
-        metavar="FILE",
-        help="a Parquet file; what is in it already is not computed again; default: "
-        "out/NAME-sweep.parquet",
+        metavar="FOLDER",
+        help="for Parquet files; what is in them already is not computed again; "
+        "default: out/NAME-sweep.parquet",
     )
     sweep.add_argument(
-        "--fresh", action="store_true", help="ignore what the file holds already"
+        "--fresh", action="store_true", help="remove what the folder has already"
     )
     sweep.add_argument(
         "--time-limit",
@@ -47,7 +48,13 @@ def _add_options(sweep: argparse.ArgumentParser) -> None:
         "--workers", type=int, metavar="N", help="processes; default: one per core"
     )
     sweep.add_argument(
-        "--plot", action="store_true", help="draw what was found, beside the file"
+        "--scheduler",
+        metavar="ADDRESS",
+        help="of a Dask scheduler, such as tcp://10.0.0.1:8786, whose workers compute; "
+        "default: workers on this computer",
+    )
+    sweep.add_argument(
+        "--plot", action="store_true", help="draw what was found, beside the folder"
     )
 
 

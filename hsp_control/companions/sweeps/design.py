@@ -10,6 +10,7 @@ import numpy as np
 from hsp_control.common.exceptions import SweepError
 from hsp_control.common.suggestions import did_you_mean, listing
 from hsp_control.companions.sweeps.factor import Factor
+from hsp_control.companions.sweeps.values import quantiles
 
 Design = Literal["grid", "random", "latin_hypercube", "sobol"]
 """All combinations; independent random values; values that cover each factor evenly;
@@ -60,25 +61,23 @@ def points(
         # Balanced only for powers of two: draw the next one and drop the rest.
         exponent = (samples - 1).bit_length()
         fractions = qmc.Sobol(dimension, rng=rng).random_base2(exponent)[:samples]
-    return [
-        tuple(
-            factor.distribution.quantile(float(fraction))
-            for factor, fraction in zip(factors, row, strict=True)
-        )
-        for row in fractions
+    columns = [
+        quantiles(factor.values, column)
+        for factor, column in zip(factors, fractions.T, strict=True)
     ]
+    return list(zip(*columns, strict=True))
 
 
 def _grid(factors: Sequence[Factor]) -> list[tuple[Any, ...]]:
-    lists = []
+    lists: list[Sequence[Any]] = []
     for factor in factors:
-        levels = factor.distribution.levels()
-        if levels is None:
+        if isinstance(factor.values, Sequence):
+            lists.append(factor.values)
+        else:
             raise SweepError(
                 f"{factor.origin}: a grid needs a list or a range with a count "
                 "(1:10:5); or give --samples"
             )
-        lists.append(levels)
     count = math.prod(map(len, lists))
     if count > MAX_RUNS:
         raise SweepError(f"the grid has {count} runs; at most {MAX_RUNS} are allowed")

@@ -1,6 +1,5 @@
 """A factor: one key path of a configuration, and its values."""
 
-import math
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from typing import Any
@@ -8,8 +7,7 @@ from typing import Any
 import numpy as np
 
 from hsp_control.common.exceptions import SweepError
-from hsp_control.companions.sweeps.distributions import Choices, Distribution
-from hsp_control.companions.sweeps.value_syntax import values
+from hsp_control.companions.sweeps.values import Values, is_distribution, parsed
 from hsp_control.declaration.located import split_assignment, written
 
 
@@ -19,11 +17,11 @@ class Factor:
 
     Attributes:
         keys: The parts of its key path, as text.
-        distribution: Its values.
+        values: Its values: a sequence of plain data, or a distribution.
     """
 
     keys: tuple[str, ...]
-    distribution: Distribution
+    values: Values
 
     @property
     def name(self) -> str:
@@ -37,12 +35,14 @@ class Factor:
 
     def description(self) -> dict[str, Any]:
         """Return the factor as JSON data."""
-        kind = type(self.distribution).__name__
-        numbers = {
-            name: str(value) if value in (-math.inf, math.inf) else value  # not in JSON
-            for name, value in vars(self.distribution).items()
-        }
-        return {"key": self.name, "type": kind, **numbers}
+        values: Any = self.values
+        if isinstance(values, range):
+            return {"key": self.name, "integers": [values[0], values[-1]]}
+        if not is_distribution(values):
+            return {"key": self.name, "values": list(values)}
+        numbers = {**dict(enumerate(values.args)), **values.kwds}
+        shown = {str(key): repr(float(number)) for key, number in numbers.items()}
+        return {"key": self.name, "distribution": values.dist.name, "numbers": shown}
 
 
 def factors(over: Mapping[str, Any] | Iterable[str]) -> tuple[Factor, ...]:
@@ -79,24 +79,28 @@ def _factor(key: str, spec: Any) -> Factor:
     if rest:
         raise SweepError(f"--over {key}: is not a key path such as null_space.gain")
     try:
-        return Factor(tuple(keys), _distribution(spec))
+        return Factor(tuple(keys), _values(spec))
     except SweepError as error:
         raise SweepError(f"--over {key}: {error}") from None
 
 
-def _distribution(spec: Any) -> Distribution:
-    if isinstance(spec, Distribution):
-        return spec
+def _values(spec: Any) -> Values:
     if isinstance(spec, str):
-        return values(spec)
+        return parsed(spec)
+    if is_distribution(spec):
+        return spec
     if isinstance(spec, np.ndarray):
         spec = spec.tolist()
     if not isinstance(spec, list | tuple | range):
         raise SweepError(
             f"{spec!r} is not valid; needs text such as '1:10:5', a list of values, or "
-            "a distribution"
+            "a distribution such as scipy.stats.norm(0, 0.1)"
         )
-    return Choices(tuple(_plain(value) for value in spec))
+    if not spec:
+        raise SweepError("the list of values is empty")
+    if isinstance(spec, range):
+        return spec
+    return tuple(_plain(value) for value in spec)
 
 
 def _plain(value: Any) -> Any:

@@ -15,12 +15,17 @@ from hsp_control.common.exceptions import PlotError
 from hsp_control.companions.plots import palette
 from hsp_control.companions.plots.curves import literal_text
 from hsp_control.companions.plots.figures import new_figure, save_figure, styled
-from hsp_control.companions.sweeps import Sensitivity, Sweep, sensitivity
-from hsp_control.companions.sweeps.sensitivities import has_order
+from hsp_control.companions.sweeps import Sensitivity, Sweep
+from hsp_control.companions.sweeps.sensitivities import (
+    MIN_RUNS,
+    has_order,
+    influences,
+)
 
 MAX_PARAMETERS, MAX_OUTCOMES = 8, 6
 _LOG_RATIO = 30.0  # largest over smallest value, above which an axis is logarithmic
 _BINS = 9  # bins of the median, if there are more values
+_TINT = "tint: share of variance explained; blue rises, orange falls, purple other"
 _GROWS, _FALLS, _EITHER = palette.ACTUAL, palette.DESIRED, palette.FIELD
 
 
@@ -37,10 +42,10 @@ def sweep_figure(sweep: Sweep, outcomes: Sequence[str] | None = None) -> Figure:
 
     A panel's tint shows the influence: blue if the result increases with the parameter,
     orange if it decreases, purple for other dependence; its strength is the share of
-    the variance of ranks. ``outcomes`` None: tracking, null space, distances and
-    effort.
+    the variance of ranks. Of few runs it has none. ``outcomes`` None: tracking, null
+    space, distances and effort.
     """
-    found = sensitivity(sweep, outcomes)
+    found = influences(sweep, outcomes)
     rows = range(min(len(found.outcomes), MAX_OUTCOMES))
     # If not all parameters fit, the most influential ones are shown.
     order = np.argsort(
@@ -100,7 +105,10 @@ def _draw_panel(axes: Axes, sweep: Sweep, found: Sensitivity, i: int, j: int) ->
             markersize=5.0,
             color=palette.OBSTACLE,
         )
-    _tint(axes, float(found.correlation[i, j]), float(found.share[i, j]), found.noise)
+    if found.runs >= MIN_RUNS:
+        _tint(
+            axes, float(found.correlation[i, j]), float(found.share[i, j]), found.noise
+        )
 
 
 def _tint(axes: Axes, correlation: float, share: float, noise: float) -> None:
@@ -144,12 +152,13 @@ def _is_logarithmic(sweep: Sweep, parameter: str) -> bool:
     """Return whether the values were chosen evenly on a logarithmic scale."""
     for factor in sweep.meta["identity"]["factors"]:
         if factor["key"] == parameter:
-            if factor["type"] == "Choices":
-                steps = np.diff(
-                    np.log(np.sort(np.array(factor["values"], dtype=float)))
-                )
-                return bool(len(steps) < 2 or np.ptp(steps) < 0.5 * steps.mean())
-            return bool(factor["type"] == "LogUniform")
+            if "values" not in factor:
+                return bool(factor.get("distribution") == "loguniform")
+            numbers = np.sort(np.array(factor["values"], dtype=float))
+            if numbers[0] <= 0.0 or len(numbers) < 3:
+                return False
+            steps = np.diff(np.log(numbers))
+            return bool(np.ptp(steps) < 0.5 * steps.mean())
     return False
 
 
@@ -192,7 +201,7 @@ def _add_title(figure: Figure, sweep: Sweep, found: Sensitivity) -> None:
         f"{len(sweep)} runs, {identity['design'].replace('_', ' ')}",
         f"seed {identity['seed']}",
         *([f"{failed} not completed (| at the lower edge)"] if failed else []),
-        "tint: share of variance explained; blue rises, orange falls, purple other",
+        *([_TINT] if found.runs >= MIN_RUNS else []),
         f"hsp_control {identity['versions']['hsp_control']}",
     ]
     figure.supxlabel(

@@ -2,17 +2,20 @@
 
 import hashlib
 import json
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
+from copy import deepcopy
 from dataclasses import dataclass
-from pathlib import Path
-from typing import Any
+from typing import Any, TypeAlias
 
 from hsp_control.common.exceptions import HspControlError
 from hsp_control.companions.sweeps.factor import Factor
 from hsp_control.config import Experiment
 from hsp_control.config.document import Document
 from hsp_control.config.experiment import build
+from hsp_control.robot import Robot
 from hsp_control.simulation.log_writer import versions
+
+Changes: TypeAlias = "Sequence[tuple[Sequence[str], Any, str]]"
 
 _TRIALS = 20  # if so many runs cannot be built, the sweep itself is wrong
 
@@ -22,49 +25,37 @@ class SweepPlan:
     """Every run of a sweep.
 
     Attributes:
-        name: Path of the configuration; relative paths in it begin at its folder.
-        data: The configuration, plain data.
+        base: The configuration, without what varies.
         factors: The varied parameters.
         design: See `hsp_control.companions.sweeps.design.Design`.
         samples: The requested number of runs; None for a grid.
         seed: Seed of the design.
         points: Each run's values, in the order of the factors.
-        time_limit: The longest computation of a run [s]; None: any.
     """
 
-    name: str
-    data: dict[str, Any]
+    base: Document
     factors: tuple[Factor, ...]
     design: str
     samples: int | None
     seed: int
     points: Sequence[tuple[Any, ...]]
-    time_limit: float | None = None
 
     def __len__(self) -> int:
         return len(self.points)
 
-    def task(self, run: int) -> str:
-        """Return all data that a worker needs for a run, as a JSON text."""
-        # Absolute, because a worker may have another working folder.
-        name = str(Path(self.name).resolve())
-        parts = {
-            "name": name,
-            "data": self.data,
-            "changes": self.changes(run),
-            "time_limit": self.time_limit,
-        }
-        return json.dumps(parts)
-
-    def changes(self, run: int) -> list[dict[str, Any]]:
-        """Return the values of a run and their key paths, for `insert`."""
+    def changes(self, run: int) -> Changes:
+        """Return the key paths and values of a run, and their place, for `changed`."""
         return [
-            {"keys": list(factor.keys), "value": value, "origin": factor.origin}
+            (factor.keys, value, factor.origin)
             for factor, value in zip(self.factors, self.points[run], strict=True)
         ]
 
-    def first_run(self) -> int:
-        """Return the first run that can be built.
+    def document(self, run: int) -> Document:
+        """Return the configuration of a run."""
+        return changed(self.base, self.changes(run))
+
+    def first_run(self) -> tuple[int, Experiment]:
+        """Return the first run that can be built, and its objects.
 
         A single run that cannot be built becomes a row with the reason. If none of the
         first runs can be built, the sweep itself is wrong.
@@ -72,46 +63,43 @@ class SweepPlan:
         first_error: HspControlError | None = None
         for run in range(min(len(self), _TRIALS)):
             try:
-                self.experiment(run)
+                return run, build(self.document(run))
             except HspControlError as error:
                 first_error = first_error or error
-            else:
-                return run
         assert first_error is not None
         raise first_error
 
-    def experiment(self, run: int) -> Experiment:
-        """Return a run's objects."""
-        return build(document(self.task(run)))
+    @property
+    def varies_robot(self) -> bool:
+        """Whether the runs have different robots."""
+        return any(factor.keys[0] == "robot" for factor in self.factors)
 
-    def identity(self, experiment: Experiment) -> dict[str, Any]:
+    def identity(self, robot: Robot) -> dict[str, Any]:
         """Return the data that must be equal for one sweep to continue another.
 
         They include the model, because a URDF may change under its name, and the
         versions of packages that the numbers depend on.
         """
-        model = experiment.robot.model.saveToString()
         identity = {
-            "configuration": self.data,
+            "configuration": self.base.to_dict(),
             "factors": [factor.description() for factor in self.factors],
             "design": self.design,
             "samples": self.samples,
             "seed": self.seed,
-            "model": hashlib.sha256(model.encode()).hexdigest(),
+            "model": fingerprint(robot),
             "versions": versions(),
         }
         return dict(json.loads(json.dumps(identity)))  # as read from files
 
 
-def document(task: str) -> Document:
-    """Return the configuration of a task: the plan's, with the run's values."""
-    parts = json.loads(task)
-    found = Document(parts["data"], {}, parts["name"])
-    insert(found, parts["changes"])
+def changed(base: Document, changes: Changes) -> Document:
+    """Return a configuration with other values at some key paths."""
+    found = deepcopy(base)
+    for keys, value, origin in changes:
+        found.assign(list(keys), value, origin)
     return found
 
 
-def insert(base: Document, changes: Iterable[dict[str, Any]]) -> None:
-    """Set a run's values in a configuration."""
-    for change in changes:
-        base.assign(change["keys"], change["value"], change["origin"])
+def fingerprint(robot: Robot) -> str:
+    """Return a text that is another one for another model."""
+    return hashlib.sha256(robot.model.saveToString().encode()).hexdigest()

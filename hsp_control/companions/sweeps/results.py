@@ -1,21 +1,20 @@
-"""A sweep: its parameters and metrics as named columns, and its file."""
+"""A sweep: its parameters and metrics as named columns."""
 
 import json
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from pathlib import Path
-from typing import Any, Self
+from typing import TYPE_CHECKING, Any, Self
 
 import numpy as np
 from numpy.typing import NDArray
 
 from hsp_control.common.exceptions import SweepError
 from hsp_control.common.suggestions import did_you_mean, listing
-from hsp_control.companions.sweeps.parquet import read_parquet, write_parquet
-from hsp_control.companions.sweeps.plan import SweepPlan, document
-from hsp_control.companions.sweeps.row import SweepRow
-from hsp_control.simulation.measures import Measure
+from hsp_control.companions.sweeps.plan import changed
+from hsp_control.config.document import Document
 
-FORMAT = "hsp_control sweep 1"
+if TYPE_CHECKING:
+    import pyarrow as pa
 
 Column = NDArray[Any]
 
@@ -40,47 +39,20 @@ class Sweep:
         self.meta = meta
 
     @classmethod
-    def collect(
-        cls,
-        plan: SweepPlan,
-        identity: dict[str, Any],
-        rows: Iterable[SweepRow],
-        described: Mapping[str, Measure],
-    ) -> Self:
-        """Return the sweep of a plan's finished runs, in the plan's order."""
-        ordered = sorted(rows, key=lambda row: row.run)
-        columns: dict[str, Column] = {
-            "run": np.array([row.run for row in ordered], dtype=np.int64),
-            "status": _texts([row.status for row in ordered]),
-            "message": _texts([row.message for row in ordered]),
-            "wall_time": np.array([row.wall_time for row in ordered]),
-        }
-        parameters = {}
-        for k, factor in enumerate(plan.factors):
-            # From all values of the plan, so that partial sweeps have the same type.
-            column = _parameter([point[k] for point in plan.points])
-            encoded = column is None
-            if column is None:
-                column = _texts([json.dumps(point[k]) for point in plan.points])
-            columns[factor.name] = column[columns["run"]]
-            parameters[factor.name] = {"keys": list(factor.keys), "json": encoded}
-        # In the order of runs; the order in which they finish varies.
-        measured = [name for row in ordered for name in row.metrics]
-        names = list(dict.fromkeys([*measured, *described]))
-        for name in names:
-            columns[name] = np.array([row.metrics.get(name, np.nan) for row in ordered])
-        meta = {
-            "format": FORMAT,
-            "name": plan.name,
-            "runs": len(plan),
-            "parameters": parameters,
-            "metrics": {
-                name: {"unit": described[name].unit, "meaning": described[name].meaning}
-                for name in names
-            },
-            "identity": identity,
-        }
-        return cls(columns, meta)
+    def of_table(cls, table: "pa.Table", meta: dict[str, Any]) -> Self:
+        """Return the sweep of a table of rows."""
+        return cls({name: _column(table[name]) for name in table.column_names}, meta)
+
+    @classmethod
+    def load(cls, path: str | Path) -> Self:
+        """Read the folder of a sweep, also of one that is running or was stopped.
+
+        Raises:
+            SweepError: If there is none, or pyarrow is missing.
+        """
+        from hsp_control.companions.sweeps.row_files import read_rows
+
+        return cls.of_table(*read_rows(Path(path)))
 
     def __getitem__(self, name: str) -> Column:
         try:
@@ -136,69 +108,15 @@ class Sweep:
         for name, parameter in self.meta["parameters"].items():
             value = self.columns[name][rows[0]]
             value = value.item() if isinstance(value, np.generic) else value
-            changes.append(
-                {
-                    "keys": parameter["keys"],
-                    "value": json.loads(value) if parameter["json"] else value,
-                    "origin": name,
-                }
-            )
-        data = self.meta["identity"]["configuration"]
-        task = {"name": self.meta["name"], "data": data, "changes": changes}
-        return document(json.dumps(task)).to_dict()
-
-    def rows(self) -> list[SweepRow]:
-        """Return the runs as rows, without the parameters, which are in the plan."""
-        names = self.metrics
-        return [
-            SweepRow(
-                int(self["run"][i]),
-                str(self["status"][i]),
-                str(self["message"][i]),
-                {n: float(self[n][i]) for n in names if not np.isnan(self[n][i])},
-                float(self["wall_time"][i]),
-            )
-            for i in range(len(self))
-        ]
-
-    def save(self, path: str | Path) -> Path:
-        """Write the sweep to one Parquet file.
-
-        Raises:
-            SweepError: If it cannot be written, or pyarrow is not installed.
-        """
-        return write_parquet(Path(path), self.columns, self.meta)
-
-    @classmethod
-    def load(cls, path: str | Path) -> Self:
-        """Read a sweep's file.
-
-        Raises:
-            SweepError: If the file is missing or not a sweep, or pyarrow is missing.
-        """
-        path = Path(path)
-        columns, meta = read_parquet(path)
-        if meta.get("format") != FORMAT:
-            raise SweepError(
-                f"{path}: its format is {meta.get('format')!r}; this version reads "
-                f"{FORMAT!r}"
-            )
-        return cls(columns, meta)
+            plain = json.loads(value) if parameter["json"] else value
+            changes.append((parameter["keys"], plain, name))
+        base = Document(self.meta["identity"]["configuration"], {}, self.meta["name"])
+        return changed(base, changes).to_dict()
 
 
-def _texts(values: list[str]) -> Column:
-    return np.array(values, dtype=object)
-
-
-def _parameter(values: list[Any]) -> Column | None:
-    """Return values as a column of one type; None if they have different types."""
-    kinds = {type(value) for value in values}
-    if kinds == {str}:
-        return _texts(values)
-    if kinds == {bool}:
-        return np.array(values)
-    if kinds == {int} and all(abs(value) < 2**63 for value in values):
-        return np.array(values, dtype=np.int64)
-    if kinds and kinds <= {int, float} and all(abs(value) < 2**53 for value in values):
-        return np.array(values, dtype=np.float64)
-    return None
+def _column(values: Any) -> Column:
+    array = values.to_numpy()
+    if array.dtype != object or not len(array):
+        return np.asarray(array)
+    filled = [np.nan if value is None else value for value in array]
+    return np.array(filled, dtype=object)

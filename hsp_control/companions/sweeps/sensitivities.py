@@ -4,7 +4,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.special import fdtrc
 
 from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import SweepError
@@ -71,6 +70,16 @@ def sensitivity(sweep: Sweep, outcomes: Sequence[str] | None = None) -> Sensitiv
     Raises:
         SweepError: If there is no such metric, or there are too few completed runs.
     """
+    runs = int(sweep.completed.sum())
+    if runs < MIN_RUNS:
+        raise SweepError(
+            f"{runs} runs were completed; sensitivities need at least {MIN_RUNS}"
+        )
+    return influences(sweep, outcomes)
+
+
+def influences(sweep: Sweep, outcomes: Sequence[str] | None = None) -> Sensitivity:
+    """Return the same of any number of runs: NaN and 0 where there are too few."""
     names = default_outcomes(sweep) if outcomes is None else list(outcomes)
     for name in names:
         if name not in sweep.metrics:
@@ -82,10 +91,6 @@ def sensitivity(sweep: Sweep, outcomes: Sequence[str] | None = None) -> Sensitiv
             raise SweepError(f"no completed run has the metric {name!r}")
     chosen = sweep.completed
     runs = int(chosen.sum())
-    if runs < MIN_RUNS:
-        raise SweepError(
-            f"{runs} runs were completed; sensitivities need at least {MIN_RUNS}"
-        )
     parameters = [p for p in sweep.parameters if len(set(sweep[p][chosen])) > 1]
     shape = (len(parameters), len(names))
     correlation, share = np.full(shape, np.nan), np.zeros(shape)
@@ -96,7 +101,7 @@ def sensitivity(sweep: Sweep, outcomes: Sequence[str] | None = None) -> Sensitiv
             known = np.isfinite(y)
             if known.sum() >= MIN_RUNS:
                 correlation[i, j], share[i, j] = _influence(x[known], y[known])
-    noise = 1.96 / np.sqrt(runs - 1)
+    noise = 1.96 / np.sqrt(max(runs - 1, 1))
     return Sensitivity(
         tuple(parameters), tuple(names), correlation, share, float(noise), runs
     )
@@ -109,43 +114,42 @@ def has_order(column: Column) -> bool:
 
 def _influence(x: Column, y: Array) -> tuple[float, float]:
     """Return rank correlation and explained share of one metric by one parameter."""
-    from scipy.stats import rankdata  # here, because this import is slow
+    from scipy import stats  # here, because this import is slow
 
-    rank = rankdata(y)
+    rank = stats.rankdata(y)
     if np.ptp(rank) == 0.0:
         return np.nan, 0.0
     if not has_order(x):
-        return np.nan, _explained(
-            np.unique(x.astype(str), return_inverse=True)[1], rank
-        )
-    order = rankdata(x)
+        kinds = np.unique(x.astype(str), return_inverse=True)[1]
+        return np.nan, _explained(kinds, rank)
+    order = stats.rankdata(x)
     if np.ptp(order) == 0.0:
         return np.nan, 0.0
-    levels = np.unique(order)
-    classes = np.searchsorted(levels, order)
+    levels, classes = np.unique(order, return_inverse=True)
     if len(levels) > _CLASSES:
         count = min(_CLASSES, max(2, len(x) // 5))
         classes = ((order - 1.0) * count / len(x)).astype(int)
-    return float(np.corrcoef(order, rank)[0, 1]), _explained(classes, rank)
+    return float(stats.spearmanr(x, y).statistic), _explained(classes, rank)
 
 
 def _explained(classes: Column, rank: Array) -> float:
     """Return ε² = 1 - (within-class variance)/(variance), both unbiased.
 
     The correlation ratio η² alone is too large for small classes. So the result is 0 if
-    an F test (here nearly the Kruskal-Wallis test) is not significant.
+    an analysis of variance (here nearly the Kruskal-Wallis test) finds nothing.
     """
-    count = np.bincount(classes)
-    means = np.bincount(classes, rank) / np.maximum(count, 1)
-    groups = int((count > 0).sum())
-    dofs = len(rank) - groups
-    if dofs < 1 or groups < 2:
+    from scipy import stats
+
+    groups = [rank[classes == each] for each in np.unique(classes)]
+    between, within = len(groups) - 1, len(rank) - len(groups)
+    if within < 1 or between < 1:
         return np.nan
-    within = float(((rank - means[classes]) ** 2).sum()) / dofs
-    between = float((count * (means - rank.mean()) ** 2).sum()) / (groups - 1)
-    if within > 0.0 and fdtrc(groups - 1, dofs, between / within) > CHANCE:
+    if all(np.ptp(group) == 0.0 for group in groups):  # an infinite F
+        return 1.0
+    F, chance = stats.f_oneway(*groups)
+    if chance > CHANCE:
         return 0.0
-    return max(0.0, 1.0 - within / float(np.var(rank, ddof=1)))
+    return max(0.0, 1.0 - (len(rank) - 1) / (between * float(F) + within))
 
 
 def _known(sweep: Sweep, name: str) -> bool:

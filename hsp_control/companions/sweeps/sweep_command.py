@@ -6,6 +6,7 @@ import sys
 from collections import Counter
 from pathlib import Path
 from time import perf_counter
+from typing import TYPE_CHECKING
 
 import numpy as np
 from rich.markup import escape
@@ -20,10 +21,13 @@ from rich.table import Table
 
 from hsp_control.cli.consoles import errors, out
 from hsp_control.cli.interrupts import INTERRUPTED
+from hsp_control.cli.loading import load
 from hsp_control.common.exceptions import SweepError
 from hsp_control.companions.sweeps import Sensitivity, Sweep, sensitivity
 from hsp_control.companions.sweeps import sweep as run_sweep
-from hsp_control.config import load_experiment
+
+if TYPE_CHECKING:
+    from distributed import Client
 
 _REASONS = 3  # printed for runs that did not complete
 _NUMBER = re.compile(r"-?[0-9][0-9.]*(e[-+]?[0-9]+)?")
@@ -31,12 +35,8 @@ _NUMBER = re.compile(r"-?[0-9][0-9.]*(e[-+]?[0-9]+)?")
 
 def sweep(options: argparse.Namespace) -> int:
     """Run a configuration many times and save it; return 2 if a run fails."""
-    if (
-        options.strict or options.allow
-    ):  # the runs use the same files as this experiment
-        load_experiment(
-            options.config, *options.overrides, strict=True, allow=options.allow
-        )
+    if options.strict or options.allow:
+        load(options)  # the runs use the same files
     file = options.out or Path("out") / f"{Path(options.config).stem}-sweep.parquet"
     start = perf_counter()
     with Progress(
@@ -63,9 +63,12 @@ def sweep(options: argparse.Namespace) -> int:
             seed=options.seed,
             out=file,
             overrides=options.overrides,
+            imports=options.imports,
+            scheduler=options.scheduler,
             workers=options.workers,
             fresh=options.fresh,
             time_limit=options.time_limit,
+            on_start=_tell_dashboard,
             on_progress=show,
         )
     _print_summary(swept, perf_counter() - start)
@@ -86,8 +89,12 @@ def sweep(options: argparse.Namespace) -> int:
     return 2 if failed else 0
 
 
+def _tell_dashboard(client: "Client") -> None:
+    errors.print(f"Dashboard: {client.dashboard_link}", highlight=False)
+
+
 def plot(options: argparse.Namespace) -> int:
-    """Print and draw the contents of a sweep's file."""
+    """Print and draw the contents of a sweep's folder."""
     for file in options.logs:
         swept = Sweep.load(file)
         _print_summary(swept, None)

@@ -1,24 +1,31 @@
 """Run one experiment many times."""
 
-import os
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import suppress
+from itertools import islice
 from os import PathLike
 from pathlib import Path
-from typing import Any
+from threading import Thread
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from hsp_control.common.exceptions import HspControlError, SweepError
+from hsp_control.common.exceptions import SweepError
 from hsp_control.companions.sweeps.design import chosen_design, points
 from hsp_control.companions.sweeps.factor import factors
-from hsp_control.companions.sweeps.local_workers import LocalWorkers
-from hsp_control.companions.sweeps.plan import SweepPlan, document, insert
+from hsp_control.companions.sweeps.plan import SweepPlan
 from hsp_control.companions.sweeps.results import Sweep
-from hsp_control.companions.sweeps.run_task import read_result
-from hsp_control.companions.sweeps.store import Store
 from hsp_control.config.document import read_document
-from hsp_control.config.experiment import build
+from hsp_control.declaration.imported import import_file
+
+if TYPE_CHECKING:
+    from distributed import Client
+
+    from hsp_control.companions.sweeps.one_run import Row
+    from hsp_control.companions.sweeps.row_files import RowFiles
+
+AT_ONCE = 1000
+"""Runs that the scheduler knows: 10^5 would take it a minute, and much memory."""
 
 
 def sweep(
@@ -30,9 +37,12 @@ def sweep(
     seed: int = 0,
     out: str | PathLike[str] | None = None,
     overrides: Iterable[str] = (),
+    imports: Iterable[str | PathLike[str]] = (),
+    scheduler: "str | Client | None" = None,
     workers: int | None = None,
     fresh: bool = False,
     time_limit: float | None = None,
+    on_start: "Callable[[Client], None] | None" = None,
     on_progress: Callable[[int, int, int], None] | None = None,
 ) -> Sweep:
     """Run an experiment many times with different values, and return the results.
@@ -44,109 +54,195 @@ def sweep(
         source: A configuration; see `hsp_control.load_experiment`.
         over: The varied parameters: key paths of the configuration and their values, as
             a mapping ``{"null_space.gain": "1:20:5"}`` or as texts ``key=values``.
-            Values are a text (see `value_syntax.values`), a sequence or
-            a `Distribution`.
+            Values are a text (see `values.parsed`), a sequence or a distribution such
+            as ``scipy.stats.norm(0.0, 0.1)``.
         samples: The number of runs; None: all combinations.
         design: ``grid``, ``random``, ``latin_hypercube`` or ``sobol``; None: the grid
             without ``samples``, Latin hypercube with them.
         seed: Seed of the design.
-        out: A Parquet file. Runs of the same sweep that it or its journal contains are
-            not computed again. None: nothing is written.
+        out: A folder for Parquet files, whose name ends with ``.parquet``. Runs of the
+            same sweep that are in it are not computed again. None: nothing is written.
         overrides: Values to change in all runs, each ``key.path=value``.
-        workers: The number of processes; None: one per core.
-        fresh: Start again, and overwrite ``out``.
-        time_limit: The longest computation of a run [s]; None: any. A run that takes
-            longer has the status ``timed out``, and is repeated when the sweep resumes.
+        imports: Python files to run first, here and in each worker, for the functions
+            and types that the configuration names. Those that declare types which this
+            process knows and the configuration names travel by themselves.
+        scheduler: The address of a Dask scheduler, such as ``tcp://10.0.0.1:8786``, or
+            a client of one; None: workers on this computer.
+        workers: The number of these; None: one per core.
+        fresh: Start again, and remove the rows in ``out``.
+        time_limit: The longest computation of a run [s], looked at when a row of its
+            log is due; None: any. A run that takes longer has the status ``timed out``,
+            and is repeated when the sweep resumes.
+        on_start: Called with Dask's client when there are workers.
         on_progress: Called with the number of runs that are done, of all runs, and of
             runs that are done but not completed.
 
     Returns:
-        The sweep. Ctrl-C ends it early; the sweep and its file then contain all rows
+        The sweep. Ctrl-C ends it early; the sweep and its folder then contain all rows
         computed so far, and `Sweep.complete` is False.
 
     Raises:
-        SweepError: If the sweep is not well defined, its file belongs to another sweep
-            or cannot be written, or no worker can be started.
-        LogError: If its journal cannot be written, or is no journal.
+        SweepError: If the sweep is not well defined, its folder has another one or
+            cannot be written, or there are no workers or they are not fit. Rows that
+            were computed are in the folder.
         HspControlError: If the configuration cannot be built with any of the first
             values. Single runs that cannot be built, diverge or crash are rows.
     """
+    _check_installed()
+    from hsp_control.companions.sweeps import luggage
+    from hsp_control.companions.sweeps.cluster import connected
+    from hsp_control.companions.sweeps.row_files import RowFiles
+
+    if luggage.reading:
+        raise luggage.SweepReachedError
     if time_limit is not None and not 0.0 < time_limit < np.inf:
         raise SweepError(f"time_limit is {time_limit} s; must be positive")
-    varied = factors(over)
-    form = chosen_design(design, samples)
-    base = read_document(source)
-    for assignment in overrides:
-        base.override(assignment)
-    plan = SweepPlan(
-        name=base.name,
-        data=base.to_dict(),
-        factors=varied,
-        design=form,
-        samples=samples,
-        seed=seed,
-        points=points(varied, form, samples, seed),
-        time_limit=time_limit,
-    )
-    try:
-        first = plan.first_run()
-    except HspControlError:
-        insert(base, plan.changes(0))
-        build(base)  # raises the same error, with the line of the file
-        raise
-    experiment = plan.experiment(first)
+    if workers is not None and workers < 1:
+        raise SweepError(f"{workers} workers; needs at least 1")
+    if workers is not None and scheduler is not None:
+        raise SweepError("a scheduler has workers of its own: give one of the two")
+    files = [Path(file) for file in imports]
+    for file in files:
+        import_file(file)
+    plan = _plan(source, over, overrides, design, samples, seed)
+    first, experiment = plan.first_run()
     if experiment.live_sources:
         raise SweepError(
             f"a stream hears {experiment.live_sources[0]}, which only one run can; "
             "sweep the log of a run, or give the stream a recording as its source"
         )
-    identity = plan.identity(experiment)
+    identity = plan.identity(experiment.robot)
     path = None if out is None else Path(out)
     if path is not None and path.suffix != ".parquet":
-        raise SweepError(f"{path}: the name of a sweep's file must end with .parquet")
-    count = _processors() if workers is None else workers
-    with LocalWorkers(count) as pool:
-        store = Store(plan, identity, path, fresh=fresh)
-        try:
-            with suppress(KeyboardInterrupt):
-                if store.pending:
-                    _rehearse(plan, first)
-                _run_pending(plan, store, pool, on_progress)
-        except BaseException:
-            store.close()
-            raise
-        return store.close()
+        raise SweepError(f"{path}: the name of a sweep's folder must end with .parquet")
+    packed = luggage.Luggage(plan, experiment.robot, identity, files)
+    rows = RowFiles(plan, identity, path, fresh=fresh)
+    tell = on_progress or (lambda *_: None)
+    try:
+        tell(len(rows.done), len(plan), rows.failures)
+        with suppress(KeyboardInterrupt):
+            if len(rows.done) < len(plan):
+                _rehearse(plan, first)
+                with connected(scheduler, workers) as client:
+                    if on_start is not None:
+                        on_start(client)
+                    for row in _computed(plan, packed, rows, client, time_limit):
+                        rows.add(row)
+                        tell(len(rows.done), len(plan), rows.failures)
+    finally:
+        rows.close()
+    return Sweep.of_table(rows.table, rows.meta)
 
 
-def _processors() -> int:
-    """Return how many processors this process may use."""
-    if hasattr(os, "sched_getaffinity"):
-        return len(os.sched_getaffinity(0))
-    return os.cpu_count() or 1  # macOS
+def _check_installed() -> None:
+    try:
+        import distributed  # noqa: F401
+        import pyarrow.parquet  # noqa: F401
+    except ImportError as error:
+        raise SweepError(
+            f"a sweep needs {error.name}: pip install 'hsp_control[sweeps]'"
+        ) from None
+
+
+def _plan(
+    source: str | PathLike[str] | dict[str, Any],
+    over: Mapping[str, Any] | Iterable[str],
+    overrides: Iterable[str],
+    design: str | None,
+    samples: int | None,
+    seed: int,
+) -> SweepPlan:
+    varied = factors(over)
+    form = chosen_design(design, samples)
+    base = read_document(source)
+    for assignment in overrides:
+        base.override(assignment)
+    return SweepPlan(
+        base=base,
+        factors=varied,
+        design=form,
+        samples=samples,
+        seed=seed,
+        points=points(varied, form, samples, seed),
+    )
 
 
 def _rehearse(plan: SweepPlan, run: int) -> None:
     """Simulate one log period of a run: a mistake is found before workers start."""
-    period = plan.experiment(run).scenario.simulation.log_period
-    short = document(plan.task(run))
-    short.assign(["simulation", "duration"], period, "")
-    with suppress(HspControlError):  # the row of that run will contain the error
-        if build(short).run().status == "interrupted":
-            raise KeyboardInterrupt
+    from hsp_control.companions.sweeps.one_run import computed
+    from hsp_control.config.experiment import build
+
+    document = plan.document(run)
+    period = build(document).scenario.simulation.log_period
+    document.assign(["simulation", "duration"], period, "")
+    row = computed(lambda _: build(document), run, (), None)
+    if row.status == "interrupted":
+        raise KeyboardInterrupt
 
 
-def _run_pending(
+def _computed(
     plan: SweepPlan,
-    store: Store,
-    pool: LocalWorkers,
-    on_progress: Callable[[int, int, int], None] | None,
-) -> None:
-    failures = sum(row.status != "completed" for row in store.rows.values())
-    if on_progress is not None:
-        on_progress(len(store.rows), len(plan), failures)
-    for run, text in pool.map((run, plan.task(run)) for run in store.pending):
-        row, found = read_result(run, text)
-        store.add(row, found)
-        failures += row.status != "completed"
-        if on_progress is not None:
-            on_progress(len(store.rows), len(plan), failures)
+    packed: Any,
+    rows: "RowFiles",
+    client: "Client",
+    time_limit: float | None,
+) -> "Iterator[Row]":
+    """Yield the rows of the runs that are left, as they end."""
+    from distributed import as_completed
+
+    from hsp_control.companions.sweeps.one_run import one_run
+
+    done = frozenset(rows.done)
+    left = (run for run in range(len(plan)) if run not in done)
+
+    def submitted(most: int) -> "list[Any]":
+        """Submit some of the runs that are left."""
+        return [
+            client.submit(
+                one_run, packed.name, run, plan.changes(run), time_limit,
+                key=(packed.name, run), pure=False,
+            )
+            for run in islice(left, most)
+        ]  # fmt: skip
+
+    client.register_plugin(packed, name=packed.name)
+    waiting = as_completed(
+        submitted(AT_ONCE), loop=client.loop, with_results=True, raise_errors=False
+    )
+    try:
+        for future, result in waiting:
+            yield _row(future, result)
+            waiting.update(submitted(1))
+    finally:
+        for future in list(waiting.futures):
+            future.release()
+        # A scheduler that is gone or stopped does not answer.
+        tidy = Thread(target=_tidy, args=(client, packed.name), daemon=True)
+        tidy.start()
+        tidy.join(5.0)
+
+
+def _tidy(client: "Client", luggage: str) -> None:
+    with suppress(Exception):
+        if client.status == "running":
+            client.unregister_worker_plugin(luggage)
+
+
+def _row(future: Any, result: Any) -> "Row":
+    from distributed import KilledWorker
+
+    from hsp_control.companions.sweeps.one_run import CRASHED, Row
+
+    if future.status == "finished":
+        row: Row = result
+        return row
+    if future.status in ("cancelled", "lost"):
+        raise SweepError("the scheduler is gone; the same command continues")
+    _, error, _ = result
+    if isinstance(error, KilledWorker):
+        died = error.allowed_failures + 1
+        reason = f"{died} workers died while they computed it (out of memory?)"
+        return Row(future.key[1], CRASHED, reason)
+    if isinstance(error, SweepError):
+        raise error
+    raise SweepError(f"a worker cannot compute runs: {type(error).__name__}: {error}")

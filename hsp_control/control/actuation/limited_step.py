@@ -189,11 +189,8 @@ class LimitedStep:
             end=end.copy(), lower=lower.copy(), upper=upper.copy()
         )
         soft = relaxed._replace(JT=zeros((0, 0)), own=alike, softness=self._softness)
-        memories = [Workspace.of(width, k) for _ in range(2)]
+        memories = [Workspace.of(width, k) for _ in range(3)]
         soft_memory = Workspace.of(width, k, soft=True)
-        # It begins with what is active where the violation is least: in this step, so
-        # that not even the last bit depends on steps before.
-        last_memory = Workspace.of(width, k)._replace(held=soft_memory.held)
 
         # What they read and write; the result is that of the last step
         self.result = Result(zeros(n), zeros(n), zeros(p))
@@ -225,12 +222,17 @@ class LimitedStep:
             )
 
         def optimum(
-            qp: QP, count: Indices, work: Workspace, reached: Status, became: QPOutcome
+            qp: QP,
+            count: Indices,
+            work: Workspace,
+            reached: Status,
+            became: QPOutcome,
+            warm: bool = True,
         ) -> PartCalls:
             solved = PartCall(
                 engine.SolveLimitedStep,
                 reached=int(reached),
-                warm=True,
+                warm=warm,
                 problem=qp,
                 moving=count,
                 x=x,
@@ -297,8 +299,12 @@ class LimitedStep:
             relaxation=self.relaxation,
         )
         # If rounding leaves no room within the relaxed limits, the result is what
-        # violates them least: nobody asks what became of the last QP.
-        last = optimum(relaxed, moving, last_memory, RELAXED, QPOutcome.allocate())
+        # violates them least: nobody asks what became of the last QP. There is so
+        # little room that sets of active constraints are equally good but for the last
+        # bits: it begins with none, lest these depend on steps before.
+        last = optimum(
+            relaxed, moving, memories[2], RELAXED, QPOutcome.allocate(), warm=False
+        )
         again = [root(standing=False), start, *last]
         loosened = OnlyIf(
             [copied, least, written(outcome), widened, *again], outcome.unsolved

@@ -10,8 +10,6 @@ import hsp_control as hsp
 from hsp_control.cli import main
 from hsp_control.common.exceptions import SweepError
 
-pytestmark = pytest.mark.process
-
 
 @pytest.mark.parametrize(("arguments", "message"), [
     ([], "nothing is varied; give --over"),
@@ -28,6 +26,9 @@ pytestmark = pytest.mark.process
     (["--over", "null_space.gain=1:2", "--samples", "0"], "0 samples"),
     (["--over", "null_space.gain=1:2", "--samples", "9", "--seed", "-1"], "seed is"),
     (["--over", "null_space.gain=1,2", "--workers", "0"], "0 workers"),
+    (["--over", "null_space.gain=1,2", "--workers", "2", "--scheduler", "tcp://x:1"],
+     "give one of the two"),
+    (["--over", "null_space.gain=1,2", "--import", "no.py"], "no.py: no such file"),
 ])  # fmt: skip
 def test_each_mistake_gets_one_message_and_status_2(
     arguments: list[str],
@@ -50,9 +51,10 @@ def test_an_unknown_configuration_or_place_is_refused(
     assert main(["sweep", "paper/4_moving", *over]) == 2
     assert "did you mean 'paper/4_moving_obstacle'?" in capsys.readouterr().err
     assert main(["sweep", MOVING, *over, "--out", "/proc/nowhere/x.parquet"]) == 2
-    assert "/proc/nowhere/x.parquet.journal: cannot" in capsys.readouterr().err
+    assert "/proc/nowhere/x.parquet: cannot be written" in capsys.readouterr().err
 
 
+@pytest.mark.process
 def test_the_command_tells_and_draws_what_it_found(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -70,6 +72,7 @@ def test_the_command_tells_and_draws_what_it_found(
     assert (tmp_path / "found-sensitivity.svg").is_file()
 
 
+@pytest.mark.process
 def test_reasons_that_differ_in_numbers_alone_are_told_once(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -88,13 +91,14 @@ def test_reasons_that_differ_in_numbers_alone_are_told_once(
     assert "No sensitivities: 1 runs were completed" in printed
 
 
-def test_without_pyarrow_the_message_says_what_to_install(
-    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+@pytest.mark.parametrize("package", ["pyarrow.parquet", "distributed"])
+def test_what_is_not_installed_is_said_first(
+    package: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setitem(sys.modules, "pyarrow.parquet", None)
-    with pytest.raises(SweepError, match=r"pip install 'hsp_control\[sweeps\]'"):
-        hsp.sweeps.sweep(MOVING, OVER, overrides=QUICK, out=tmp_path / "x.parquet")
-    assert len(hsp.sweeps.sweep(MOVING, {"null_space.gain": [3]}, overrides=QUICK)) == 1
+    monkeypatch.setitem(sys.modules, package, None)
+    message = rf"^a sweep needs {package}: pip install 'hsp_control\[sweeps\]'$"
+    with pytest.raises(SweepError, match=message):
+        hsp.sweeps.sweep(MOVING, OVER, overrides=QUICK)
 
 
 def test_a_mistake_in_the_file_is_told_with_its_line(

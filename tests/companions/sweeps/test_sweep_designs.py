@@ -7,18 +7,19 @@ from typing import Any
 import numpy as np
 import pytest
 from scipy import stats
+from scipy.special import ndtr, ndtri
 
 from hsp_control.common.exceptions import SweepError
 from hsp_control.companions import sweeps
-from hsp_control.companions.sweeps import Integers, LogUniform, Normal, Sweep, Uniform
+from hsp_control.companions.sweeps import Sweep
 from hsp_control.companions.sweeps.design import chosen_design, points
 from hsp_control.companions.sweeps.factor import factors
+from hsp_control.companions.sweeps.one_run import Row
 from hsp_control.companions.sweeps.plan import SweepPlan
-from hsp_control.companions.sweeps.row import SweepRow
-from hsp_control.companions.sweeps.value_syntax import values
+from hsp_control.companions.sweeps.row_files import RowFiles
+from hsp_control.companions.sweeps.values import is_distribution, parsed, quantiles
+from hsp_control.config.document import Document
 from hsp_control.simulation.measures import Measure
-
-pytestmark = pytest.mark.process
 
 # --- values and designs --------------------------------------------------------------
 
@@ -31,8 +32,8 @@ pytestmark = pytest.mark.process
     ("linear:1:9:5", (1, 3, 5, 7, 9)), ("log:1:100:3", (1.0, 10.0, 100.0)),
 ])  # fmt: skip
 def test_lists_and_ranges_as_they_are_spelled(text: str, levels: tuple) -> None:
-    found = values(text).levels()
-    assert found is not None
+    found = parsed(text)
+    assert isinstance(found, tuple)
     assert [type(value) for value in found] == [type(value) for value in levels]
     # To rounding: the ends of a range are exact, what is between need not be.
     if isinstance(levels[0], float):
@@ -42,17 +43,15 @@ def test_lists_and_ranges_as_they_are_spelled(text: str, levels: tuple) -> None:
         assert found == levels
 
 
-@pytest.mark.parametrize(("text", "distribution"), [
-    ("1:10", Uniform(1, 10)),
-    ("uniform:-1:1", Uniform(-1, 1)),
-    ("loguniform:0.1:10", LogUniform(0.1, 10)),
-    ("normal:0:0.1", Normal(0, 0.1)),
-    ("normal:1:0.1:0:2", Normal(1, 0.1, 0, 2)),
-    ("integers:0:99", Integers(0, 99)),
+@pytest.mark.parametrize(("text", "name"), [
+    ("1:10", "uniform"), ("uniform:-1:1", "uniform"),
+    ("loguniform:0.1:10", "loguniform"), ("normal:0:0.1", "norm"),
+    ("normal:1:0.1:0:2", "truncnorm"),
 ])  # fmt: skip
-def test_distributions_as_they_are_spelled(text: str, distribution: object) -> None:
-    assert values(text) == distribution
-    assert values(text).levels() is None
+def test_distributions_as_they_are_spelled(text: str, name: str) -> None:
+    found = parsed(text)
+    assert is_distribution(found)
+    assert found.dist.name == name
 
 
 @pytest.mark.parametrize(("text", "message"), [
@@ -65,41 +64,45 @@ def test_distributions_as_they_are_spelled(text: str, distribution: object) -> N
     ("uniform:1", "has 1 numbers; needs uniform:LOW:HIGH"),
     ("normal:0:0", "the deviation positive"),
     ("normal:0:1:2:1", "cut to 2 ... 1; low must be below high"),
-    ("normal:0:1:50:60", "has no values from 50 to 60"),
     ("integers:3:1", "no integers from 3 to 1"),
     ("integers:0:1.5", "'1.5' is not an integer"), ("[1, 2", "not a list"),
 ])  # fmt: skip
 def test_what_is_no_range_is_refused(text: str, message: str) -> None:
     with pytest.raises(SweepError, match=message.replace("?", r"\?")):
-        values(text)
+        parsed(text)
 
 
 def test_quantiles_are_those_of_the_distribution() -> None:
     fractions = np.linspace(0.0, 1.0, 101)[:-1]
     oracles = [
-        (Uniform(-1, 3), stats.uniform(-1, 4)),
-        (LogUniform(0.1, 50), stats.loguniform(0.1, 50)),
-        (Normal(2, 0.5), stats.norm(2, 0.5)),
-        (Normal(2, 0.5, 1.8, 4), stats.truncnorm(-0.4, 4, 2, 0.5)),
-    ]
-    for distribution, oracle in oracles:
-        ours = [distribution.quantile(float(u)) for u in fractions[1:]]
-        np.testing.assert_allclose(ours, oracle.ppf(fractions[1:]), rtol=1e-10)
-        assert math.isfinite(distribution.quantile(0.0))
-    drawn = [Integers(3, 7).quantile(float(u)) for u in fractions]
+        ("uniform:-1:3", lambda u: -1.0 + 4.0 * u),
+        ("loguniform:0.1:50", lambda u: 0.1 * 500.0**u),
+        ("normal:2:0.5", lambda u: 2.0 + 0.5 * ndtri(u)),
+        # Truncated: between the probabilities of its ends.
+        ("normal:2:0.5:1.8:4", lambda u: 2.0 + 0.5 * ndtri(
+            ndtr(-0.4) + u * (ndtr(4.0) - ndtr(-0.4)))),
+    ]  # fmt: skip
+    for text, oracle in oracles:
+        ours = quantiles(parsed(text), fractions)
+        np.testing.assert_allclose(ours[1:], oracle(fractions[1:]), rtol=1e-10)
+        assert math.isfinite(ours[0])
+        assert {type(value) for value in ours} == {float}
+    drawn = quantiles(parsed("integers:3:7"), fractions)
     assert np.unique(drawn, return_counts=True)[1].tolist() == [20] * 5
-    assert (min(drawn), max(drawn)) == (3, 7)
-    chosen = [values("a,b,c,d").quantile(float(u)) for u in fractions]
+    assert (min(drawn), max(drawn), type(drawn[0])) == (3, 7, int)
+    chosen = quantiles(parsed("a,b,c,d"), fractions)
     assert chosen == [letter for letter in "abcd" for _ in range(25)]
 
 
-def test_a_factor_is_described_in_json_and_says_which_bound_is_infinite() -> None:
-    (factor,) = factors({"a": "normal:0:0.1"})
+@pytest.mark.parametrize(("spec", "description"), [
+    ("1,2", {"values": [1, 2]}), ("integers:0:9", {"integers": [0, 9]}),
+    (stats.norm(0.0, scale=0.1),
+     {"distribution": "norm", "numbers": {"0": "0.0", "scale": "0.1"}}),
+])  # fmt: skip
+def test_a_factor_is_described_in_json(spec: Any, description: dict) -> None:
+    (factor,) = factors({"a": spec})
     found = json.loads(json.dumps(factor.description(), allow_nan=False))
-    bounds = {"low": "-inf", "high": "inf"}
-    assert found == {
-        "key": "a", "type": "Normal", "mean": 0, "deviation": 0.1, **bounds,
-    }  # fmt: skip
+    assert found == {"key": "a", **description}
 
 
 def test_a_grid_has_every_combination_in_order() -> None:
@@ -141,18 +144,24 @@ def test_a_seed_is_a_design(design: Any) -> None:
     assert len(points(over, design, 20, 5)) == 20
 
 
+def plan_of(over: dict[str, Any]) -> SweepPlan:
+    varied = factors(over)
+    base = Document({}, {}, "invented")
+    return SweepPlan(base, varied, "grid", None, 0, points(varied, "grid", None, 0))
+
+
 def test_rows_are_in_the_order_of_the_plan() -> None:
     """In whichever order they finish, and also if some are missing."""
-    varied = factors({"a": "10:30:3"})
-    plan = SweepPlan(
-        "invented", {}, varied, "grid", None, 0, points(varied, "grid", None, 0)
-    )
-    rows = [SweepRow(k, "completed", "", {"e": 0.5 * k}, 0.0) for k in (2, 0)]
-    found = Sweep.collect(plan, {}, rows, {"e": Measure(0.0, "m", "error")})
+    files = RowFiles(plan_of({"a": "10:30:3"}), {}, None, fresh=False)
+    for k in (2, 0):
+        files.add(Row(k, "completed", "", {"e": Measure(0.5 * k, "m", "error")}))
+        files.write()
+    found = Sweep.of_table(files.table, files.meta)
     assert found["run"].tolist() == [0, 2]
     assert found["a"].tolist() == [10, 30]
     assert found["e"].tolist() == [0.0, 1.0]
     assert not found.complete
+    assert found.meta["metrics"] == {"e": {"unit": "m", "meaning": "error"}}
 
 
 # --- sensitivity ---------------------------------------------------------------------
@@ -179,7 +188,7 @@ def invented(runs: int = 200) -> Sweep:
     columns["tracking.x.rms"][0] = 1e9  # it diverged: it must not count
     metrics = ["tracking.x.rms", "manipulability.min", "distance.y.min", "effort.max"]
     meta = {
-        "format": "hsp_control sweep 1",
+        "format": "hsp_control sweep 2",
         "name": "invented",
         "runs": runs,
         "parameters": {
@@ -256,3 +265,19 @@ def test_every_pair_has_its_panel_and_failures_are_shown() -> None:
     assert tints[0][2] > tints[0][0]  # grows: blue
     assert tints[4][0] > tints[4][2]  # falls: orange
     assert axes[2].get_title(loc="left") == "no influence"
+
+
+@pytest.mark.parametrize("runs", [2, 3])
+def test_two_or_three_values_give_a_figure_too(runs: int) -> None:
+    whole = invented()
+    few = {name: column[5 : 5 + runs] for name, column in whole.columns.items()}
+    figure = sweeps.sweep_figure(Sweep(few, whole.meta))
+    figure.canvas.draw()
+    first = figure.axes[0]
+    points, line = first.lines
+    assert len(points.get_xdata()) == len(line.get_xdata()) == runs
+    assert np.all(np.diff(line.get_ydata()) > 0.0)
+    # Of so few nothing is said to be an influence, nor to be none.
+    assert not any(each.get_title(loc="left") for each in figure.axes)
+    with pytest.raises(SweepError, match=f"{runs} runs were completed"):
+        sweeps.sensitivity(Sweep(few, whole.meta))

@@ -400,6 +400,8 @@ def test_it_is_looked_at_once_and_on_a_state_of_its_own() -> None:
     field = FunctionField(watched, rate_function=g_rate)
     one, plain = controller(field), controller(FunctionField(g, rate_function=g_rate))
     v = 0.1 * np.arange(7.0)
+    for each in (one, plain):
+        each.restart(origin=0.0)
     efforts = [one.compute(1.0 + 0.001 * k, HOME, v).tau.copy() for k in range(3)]
     for k, effort in enumerate(efforts):
         np.testing.assert_array_equal(

@@ -13,6 +13,7 @@ from qp_cases import (
     defect,
     degenerate,
     dense,
+    infeasible,
     packed,
 )
 
@@ -91,7 +92,58 @@ def test_a_warm_start_from_the_answer_takes_no_iteration(seed: int) -> None:
     assert again.iterations == 0
 
 
+def test_a_contradiction_that_stays_is_found_at_once() -> None:
+    """A warm start begins with what contradicted the last constraint, without it.
+
+    But where it held nearly dependent rows.
+    """
+    iterations = []
+    for seed in range(EACH):
+        case = infeasible(np.random.default_rng(seed))
+        work = Workspace.of(len(case.x0), len(case.A))
+        for _ in range(2):
+            found = answer(case, work=work)
+            assert found.code == INFEASIBLE
+        iterations.append(found.iterations)
+    assert np.mean(np.array(iterations) <= 1) > 0.8
+
+
 # --- soft constraints ----------------------------------------------------------------
+
+
+def with_slacks(case: Case, softness: Array) -> Case:
+    """Return the same problem with each slack as one more unknown, and hard rows."""
+    n, soft = len(case.x0), np.flatnonzero(softness)
+    JT = np.zeros((len(case.JT) + len(soft), n + len(soft)))
+    JT[: len(case.JT), :n] = case.JT
+    JT[len(case.JT) :, n:] = np.diag(softness[soft])
+    A = np.hstack([case.rows, np.eye(len(softness))[:, soft]])
+    free = np.full(n + len(soft), np.inf)
+    lower, upper = (
+        np.concatenate(x) for x in ((case.lower, -free), (case.upper, free))
+    )
+    x0 = np.concatenate([case.x0, np.zeros(len(soft))])
+    return Case(JT, A, lower, upper, 0, x0)
+
+
+@pytest.mark.parametrize("kind", ["dense", "degenerate", "infeasible", "uncoupled"])
+@given(seeds)
+def test_a_slack_is_one_more_unknown(kind: str, seed: int) -> None:
+    """The same x as DAQP's with all slacks; half of the constraints are soft.
+
+    Where the hard ones contradict each other both say so.
+    """
+    rng = np.random.default_rng(seed)
+    case = KINDS[kind](rng)._replace(equalities=0)
+    count = len(case.rows)
+    softness = 10.0 ** rng.uniform(-2.0, 0.0, count) * (rng.random(count) < 0.5)
+    found = answer(case, softness)
+    x = by_daqp(with_slacks(case, softness))
+    assert found.code == (INFEASIBLE if x is None else SOLVED)
+    if x is not None:
+        own = x[: len(case.x0)]
+        tolerance = 1e-7 * (1.0 + np.abs(own).max())
+        np.testing.assert_allclose(found.x, own, rtol=0, atol=tolerance)
 
 
 @given(seeds)

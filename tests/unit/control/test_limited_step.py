@@ -12,10 +12,12 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import hsp_control as hsp
+from hsp_control import engine
 from hsp_control.common.arrays import Array
 from hsp_control.constraints.limits import Scaled
 from hsp_control.control.actuation import Actuation, Delivered, Status
 from hsp_control.control.actuation.limited_step import Barriers
+from hsp_control.engine.inspection import calls
 
 seeds = st.integers(0, 2**32 - 1)
 
@@ -239,6 +241,30 @@ def test_one_native_call_is_the_same_as_its_parts(
         np.testing.assert_array_equal(once.tau, parts.tau)
         np.testing.assert_array_equal(once.acceleration, parts.acceleration)
     assert {Status.LIMITED, Status.RELAXED if strength < 0.5 else Status.EXACT} <= seen
+
+
+def test_a_relaxed_step_does_not_depend_on_steps_before() -> None:
+    """As if nothing had been active in their QPs: the same to the last bit."""
+    made, rng, relaxed = arm(0.1, 0.5), np.random.default_rng(0), 0
+    made.compute(0.3, panda().home(), np.zeros(7))
+    marks = [
+        call.values["work.held"]
+        for call in calls(made.step_plan)
+        if isinstance(call, engine.Call) and "work.held" in call.values
+    ]
+    assert len(marks) == 3
+    for _ in range(1000):
+        q = panda().home() + 0.3 * rng.standard_normal(7)
+        v = 2.0 * rng.standard_normal(7)
+        out = made.compute(0.3, q, v)
+        expected, relaxation = out.tau.copy(), out.relaxation
+        relaxed += out.status >= Status.RELAXED
+        for held in marks:
+            held[:] = 0
+        again = made.compute(0.3, q, v)
+        np.testing.assert_array_equal(again.tau, expected)
+        assert again.relaxation == relaxation
+    assert relaxed > 900
 
 
 def test_a_step_is_not_the_result_of_an_earlier_qp() -> None:

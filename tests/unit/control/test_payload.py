@@ -70,7 +70,7 @@ def test_terms_are_those_of_the_model_of_the_time(t: float) -> None:
     made, rng = controller(), np.random.default_rng(int(10 * t))
     q = start(panda())
     v = rng.normal(size=7)
-    output = made.compute(t, q, v)
+    output = made.compute(made.robot.state(t, q, v))
     model = loaded(smooth(t))
     data, state = model.createData(), made.state
     expected = pin.rnea(model, data, q, v, output.acceleration)

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from states import moved
 from task_cases import FRAMES, load, unit
 
 from hsp_control import (
@@ -196,7 +197,7 @@ def position_jacobian(robot: Robot, q: Array, frame: str) -> tuple[Array, Array]
     m = 2 if robot.name == "planar3r" else 3
 
     def J(step: Array) -> Array:
-        state = robot.state(0.0, robot.integrate(q, step), np.zeros(robot.nv))
+        state = moved(robot, 0.0, robot.integrate(q, step))
         return state.frame(frame).jacobian[:m].copy()
 
     steps = STEP * np.eye(robot.nv)

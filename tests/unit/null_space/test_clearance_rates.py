@@ -14,6 +14,7 @@ import pytest
 from clearance_cases import AIR, agree, barrier_at, flowing, load, turned
 from odd_robots import FACES, OCTAHEDRON, write_stl
 from oracles import gradient
+from states import moved
 
 from hsp_control import Controller, Cost, FramePosition, Gains, Obstacle, simulate
 from hsp_control.common.arrays import Array
@@ -81,7 +82,7 @@ def test_gradient_and_rate_for_every_shape(
         g, g_dot = field.gradient(state), field.gradient_rate(state)
 
         def value(x: Array, q: Array = q, v: Array = v) -> float:
-            return field.value(robot.state(0.7, robot.integrate(q, x), v))
+            return field.value(moved(robot, 0.7, robot.integrate(q, x), v))
 
         by_value = [gradient(value, robot.nv, h) for h in (1e-3, 5e-4)]
         by_flow = [flowing(field, state, h) for h in (1e-3, 5e-4)]

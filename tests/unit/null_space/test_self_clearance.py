@@ -9,6 +9,7 @@ import pinocchio as pin
 import pytest
 from clearance_cases import agree, flowing, load, still, turned
 from oracles import gradient
+from states import moved
 
 from hsp_control import Robot
 from hsp_control.common.arrays import Array
@@ -111,7 +112,7 @@ def test_each_robot_is_the_others_moving_obstacle() -> None:
         g, g_dot = field.gradient(state), field.gradient_rate(state)
 
         def value(x: Array, q: Array = q, v: Array = v) -> float:
-            return field.value(both.state(0.0, both.integrate(q, x), v))
+            return field.value(moved(both, 0.0, both.integrate(q, x), v))
 
         by_value = [gradient(value, 14, h) for h in (1e-3, 5e-4)]
         by_flow = [flowing(field, state, h) for h in (1e-3, 5e-4)]

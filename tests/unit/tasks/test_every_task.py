@@ -7,6 +7,7 @@ import pinocchio as pin
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from states import moved
 from task_cases import (
     GAINS,
     SECOND,
@@ -46,7 +47,7 @@ def test_the_rows_move_as_the_robot_does(case: Case) -> None:
 
         def jacobian(s: float, motion: Motion = motion, task: Task = task) -> Array:
             q = motion.configuration(s)
-            return task.evaluate(motion.robot.state(TIME + s, q, motion.v)).jacobian
+            return task.evaluate(moved(motion.robot, TIME + s, q, motion.v)).jacobian
 
         np.testing.assert_allclose(
             sample.jacobian_dot, motion.derivative(jacobian), rtol=0, atol=1e-10
@@ -113,7 +114,7 @@ def test_the_law_of_the_error(
 
     def reported(s: float) -> Array:
         # The error is a function of (t, q): any velocity will do.
-        state = robot.state(TIME + s, motion.configuration(s), motion.v)
+        state = moved(robot, TIME + s, motion.configuration(s), motion.v)
         return task.evaluate(state).error
 
     e = sample.error

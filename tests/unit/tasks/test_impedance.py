@@ -12,6 +12,7 @@ import numpy as np
 import pinocchio as pin
 import pytest
 from places import THOROUGH
+from states import moved
 from task_cases import (
     GAINS,
     SECOND,
@@ -93,10 +94,9 @@ def mass_matrix(robot: hsp.Robot, q: Array) -> Array:
 
 def errors(task: Any, motion: Motion) -> Callable[[float], Array]:
     """Return e(s) along a motion."""
-    robot, still = motion.robot, np.zeros(motion.robot.nv)
     return lambda s: (
         task.evaluate(
-            robot.state(TIME + s, motion.configuration(s), still),
+            moved(motion.robot, TIME + s, motion.configuration(s)),
             feedback=task.feedback(),
         ).error
     )
@@ -110,7 +110,7 @@ def inverse_inertia(task: Any, motion: Motion, s: float) -> tuple[Array, Array]:
         slide = Motion(robot, q, direction, np.zeros(robot.nv))
 
         def error(x: float, slide: Motion = slide) -> Array:
-            state = robot.state(TIME + s, slide.configuration(x), np.zeros(robot.nv))
+            state = moved(robot, TIME + s, slide.configuration(x))
             return task.evaluate(state, feedback=task.feedback()).error
 
         columns.append(-slide.derivative(error))

@@ -1,0 +1,130 @@
+"""What steps call is bound when a change is made, and not in a step."""
+
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+
+import numpy as np
+import pytest
+
+import hsp_control as hsp
+from hsp_control.common.arrays import Array
+from hsp_control.control.changes import Changes
+from hsp_control.robot import RobotState
+from hsp_control.trajectories import Schedule
+
+H, AT, RAMP = 1e-3, 0.02, 0.005
+ROBOT = hsp.Robot.load("panda")
+REST = np.zeros(7)
+BALL = hsp.Obstacle("ball", hsp.shapes.Sphere(0.05), hsp.Hold([0.6, 0.3, 0.4]))
+
+CHANGES: dict[str, Callable[[Changes], object]] = {
+    "gains": lambda at: at.gains("hand", hsp.Gains(natural_frequency=20.0)),
+    "K_N": lambda at: at.null_space_gain(5.0),
+    "weight": lambda at: at.weight("posture", 0.5),
+    "field": lambda at: at.field(hsp.TargetPosture(REST, name="other")),
+    "exchange": lambda at: at.exchange("posture", hsp.TargetPosture(REST)),
+    "add": lambda at: at.add(hsp.FrameOrientation(priority=2, name="turned")),
+    "remove": lambda at: at.remove("hand"),
+    "replace": lambda at: at.remove("hand").add(hsp.FramePosition(name="new")),
+    "reference": lambda at: at.reference("hand", hsp.Circle(0.05, 1.0)),
+    "limits": lambda at: at.limits(hsp.Limits(effort={"scale": 0.5})),
+    "no limits": lambda at: at.limits(None),
+    "obstacle": lambda at: at.obstacle("ball", hsp.Hold([0.5, 0.3, 0.4])),
+    "payload": lambda at: at.payload("panda_hand", 1.0),
+    "gravity": lambda at: at.gravity([0.0, 1.0, -9.7]),
+}
+
+
+def controller(*tasks: hsp.Task) -> hsp.Controller:
+    """Return one of a hand, a posture, and a ball that the arm keeps away from."""
+    hand = hsp.FramePosition(name="hand")
+    fields = hsp.TargetPosture("home", name="posture") + hsp.ObstacleClearance(["ball"])
+    return hsp.Controller(ROBOT, tasks or [hand], fields, scene=[BALL])
+
+
+def step(made: hsp.Controller, k: int) -> Array:
+    """Make the k-th step."""
+    tau = made.compute(k * H, ROBOT.home(), REST).tau
+    made.applied(tau, H)
+    return tau
+
+
+@contextmanager
+def nothing_bound(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
+    """Make every binding of calls an error."""
+
+    def refused(*_: object, **__: object) -> object:
+        raise AssertionError("calls are bound in a step")
+
+    with monkeypatch.context() as patched:
+        for name in ("plan", "bind_move"):
+            patched.setattr(RobotState, name, refused)
+        yield
+
+
+@pytest.mark.parametrize("kind", CHANGES)
+@pytest.mark.parametrize("begun", [True, False])
+def test_no_step_around_a_change_binds(
+    kind: str, begun: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The first one, those of its ramp, the one after it, and where it is folded."""
+    made = controller()
+    if begun:
+        step(made, 0)
+    CHANGES[kind](made.at(AT).ramp(RAMP))
+    step(made, 1)
+    with nothing_bound(monkeypatch):
+        for k in (*range(2, 40), *range(1010, 1060, 5)):
+            step(made, k)
+    made.at(2.0).null_space_gain(4.0)
+    assert len(made._time_line.open) == 1  # the other one is over, and forgotten
+
+
+def test_the_sets_of_overlapping_changes_are_all_bound(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """Also where the weight of one that comes passes that of one that goes."""
+    made = controller()
+    step(made, 0)
+    posture = hsp.JointPosture("start", joints=["panda_joint1"], priority=2)
+    made.at(0.010).ramp(0.020).remove("hand").add(posture)
+    made.at(0.015).ramp(0.008).add(hsp.FrameOrientation(priority=2, name="turned"))
+    made.at(0.018).ramp(0.004).limits(None).field(hsp.JointCentering())
+    with nothing_bound(monkeypatch):
+        for k in range(1, 60):
+            step(made, k)
+
+
+def test_changes_that_go_on_are_forgotten(monkeypatch: pytest.MonkeyPatch) -> None:
+    """One comes before the last one is forgotten: what is over goes when it comes."""
+    made = controller()
+    for k in range(0, 3000, 10):
+        if k % 100 == 0:
+            gains = hsp.Gains(natural_frequency=10.0 + k % 3)
+            made.at(k * H).ramp(0.05).gains("hand", gains)
+        step(made, k)
+    assert len(made._time_line.open) < 15
+    with nothing_bound(monkeypatch):
+        step(made, 3010)
+
+
+def test_a_schedule_is_bound_beforehand(monkeypatch: pytest.MonkeyPatch) -> None:
+    """All that is to come: in the first step."""
+    hand = hsp.FramePosition(name="hand")
+    schedule = Schedule([(0.01, 0.02), (0.03, 0.04)], ramp=0.004)
+    turned = hsp.FrameOrientation(schedule=schedule, priority=2, name="turned")
+    made = controller(hand, turned)
+    step(made, 0)
+    with nothing_bound(monkeypatch):
+        for k in range(1, 60):
+            step(made, k)
+
+
+def test_a_target_is_bound_when_it_is_set(monkeypatch: pytest.MonkeyPatch) -> None:
+    made = controller()
+    step(made, 0)
+    for k in range(1, 40):
+        if k % 10 == 1:
+            made.set_target("hand", [0.4, 0.1, 0.5])
+        with nothing_bound(monkeypatch):
+            step(made, k)
