@@ -17,6 +17,7 @@ import struct
 import zlib
 from bisect import bisect_right
 from collections.abc import Iterable, Mapping, Sequence
+from functools import partial
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -171,8 +172,19 @@ class _Memory:
 
 def refusal(item: object) -> str:
     """Return why an object cannot be saved."""
-    what = item.function if isinstance(item, PythonCall) else item
-    return f"{what!r:.200} is Python, which a frozen controller runs without"
+    what = _name(item.function) if isinstance(item, PythonCall) else repr(item)
+    return f"{what:.200} is Python, which a frozen controller runs without"
+
+
+def _name(function: Any) -> str:
+    """Return the name of a function, or of the class whose method it is."""
+    if isinstance(function, partial):
+        given = [*function.args, *function.keywords.values()]
+        function = next(filter(callable, given), function.func)
+    owner = getattr(function, "__self__", None)
+    if owner is not None:
+        return type(owner).__name__
+    return str(getattr(function, "__qualname__", repr(function)))
 
 
 def _arrays(item: object, seen: set[int]) -> Iterable[Any]:
