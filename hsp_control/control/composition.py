@@ -34,6 +34,7 @@ from hsp_control.tasks.compliant_task import impedance_of
 from hsp_control.tasks.feedback import Feedback
 from hsp_control.tasks.impedance import parts_of
 from hsp_control.trajectories.streams.stream import Streamed
+from hsp_control.trajectories.streams.velocities import Axes
 
 MEMORY = 1.0
 """Changes that were complete this long ago are forgotten [s]; an integrator may ask for
@@ -220,8 +221,9 @@ class Composition:
         Args:
             task: Name of the task.
             target: For a pose a pin.SE3, x, y, z and a quaternion (x, y, z, w), or a
-                matrix; for an orientation a quaternion or a matrix; else the numbers of
-                the task's trajectory [m, or the task's unit].
+                matrix; for an orientation a quaternion or a matrix; for a pointing task
+                also a direction, three numbers; else the numbers of the task's
+                trajectory [m, or the task's unit].
 
         Returns:
             The stream, which counts what it has taken.
@@ -231,17 +233,55 @@ class Composition:
                 target is of another kind.
             StreamError: If the target is not valid.
         """
-        present = self._setup.task(task).task
-        value = target_of(present, target)
+        value = target_of(self._followed(task), target, lambda: self._here().state)
+        return self._sent(task, value=value)
+
+    def set_velocity(
+        self, task: str, velocity: ArrayLike, axes: Axes = "world"
+    ) -> Streamed:
+        """Let a task move at a velocity from now on, as with a joystick.
+
+        ``controller.set_velocity("hand", twist, axes="tool")``, again and again: if no
+        other velocity or target comes for 0.2 s, it fades to zero. The reference is its
+        integral. As with `set_target`, a stream takes over from the task's trajectory;
+        a task that was given a stream goes on with that, and its ``dead_man``.
+
+        Args:
+            task: Name of the task.
+            velocity: For a pose the linear velocity and the angular one, shape (6,)
+                [m/s, rad/s]; for an orientation or a direction the angular one, (3,);
+                else those of the coordinates of the task's trajectory.
+            axes: ``world``, in a relative task those of its reference, or ``tool``,
+                the axes of the moving body.
+
+        Returns:
+            The stream, which counts what it has taken.
+
+        Raises:
+            ControllerError: If there is no such task, or it follows no trajectory.
+            StreamError: If the velocity is not valid.
+        """
+        return self._sent(task, velocity=velocity, axes=axes)
+
+    def _sent(self, task: str, **message: Any) -> Streamed:
+        """Send a message to a task's stream, which takes over if there is none yet."""
+        present = self._followed(task)
         stream = followed_stream(present, self._time_line.made)
         if stream is not None:
-            stream.send(value)
+            stream.send(**message)
             return stream
         stream = new_stream(present.followed)
-        stream.send(value)
+        stream.send(**message)
         reference: Any = stream
         self.at(self._state.t).ramp(RAMP).reference(task, reference)
         return stream
+
+    def _followed(self, task: str) -> Task:
+        """Return a task that follows a trajectory."""
+        present = self._setup.task(task).task
+        if present.followed is None:
+            raise ControllerError(f"task {task!r} follows no trajectory")
+        return present
 
     def change(self, change: Change) -> None:
         """Make a change; `at` is the shorter way.

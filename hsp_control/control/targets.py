@@ -1,6 +1,6 @@
 """Targets that one sets: a stream takes over from what a task follows."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
@@ -10,8 +10,10 @@ from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import ControllerError
 from hsp_control.control.change import AddTask, Change, ChangeReference
 from hsp_control.declaration.language import shortened
+from hsp_control.declaration.quantities import numbers
 from hsp_control.declaration.rotation import matrix_of
-from hsp_control.tasks import Task
+from hsp_control.robot import RobotState
+from hsp_control.tasks import Pointing, Task
 from hsp_control.trajectories import (
     Hold,
     OrientationTrajectory,
@@ -26,6 +28,8 @@ from hsp_control.trajectories.streams.stream import Streamed
 
 RAMP = 0.2
 """Time that a change takes which somebody makes by hand [s]."""
+DEAD_MAN = 0.2
+"""Time after which a velocity fades that is not repeated [s]."""
 DELAY = 0.03
 """Time to a target, if the bounds permit [s]: about two of a page's pictures."""
 MOVING: dict[str, Any] = {"speed": 0.5, "acceleration": 3.0, "jerk": 60.0}
@@ -41,7 +45,7 @@ TURNING: dict[str, Any] = {
 
 def new_stream(followed: object) -> Streamed:
     """Return a stream that can take over from a reference."""
-    how: dict[str, Any] = {"policy": "latest", "delay": DELAY}
+    how: dict[str, Any] = {"policy": "latest", "delay": DELAY, "dead_man": DEAD_MAN}
     if isinstance(followed, PoseTrajectory):
         return StreamPose(**MOVING, **TURNING, **how)
     if isinstance(followed, OrientationTrajectory):
@@ -62,13 +66,22 @@ def followed_stream(task: Task, changes: Sequence[Change]) -> Streamed | None:
     return followed
 
 
-def target_of(task: Task, value: object) -> Array:
+def target_of(task: Task, value: object, here: Callable[[], RobotState]) -> Array:
     """Return a target as the streams take it: numbers, quaternions (x, y, z, w).
 
+    Args:
+        task: The task.
+        value: The target.
+        here: Returns the present state, for the orientation nearest to it.
+
     Raises:
-        ControllerError: If it is none of the task, or the task follows nothing.
+        ControllerError: If it is none of the task.
     """
     followed = task.followed
+    if isinstance(task, Pointing):
+        direction = numbers(value)
+        if direction is not None and direction.shape == (3,) and direction.any():
+            return np.array(pin.Quaternion(task.facing(direction, here())).coeffs())
     if isinstance(followed, PoseTrajectory):
         needed = "a pin.SE3, x, y, z and a quaternion (x, y, z, w), or a 4 × 4 matrix"
         pose: Any = HoldPose.of_value(value)
@@ -80,9 +93,8 @@ def target_of(task: Task, value: object) -> Array:
         turned: Any = HoldOrientation.of_value(value)
         if turned is not None:
             return np.array(pin.Quaternion(matrix_of(turned.rotation)).coeffs())
-    elif followed is None:
-        raise ControllerError(f"task {task.name!r} follows no trajectory")
     else:
+        assert followed is not None
         needed = f"{followed.dimension} numbers"
         point = Hold.of_value(value)
         if point is not None and point.dimension == followed.dimension:

@@ -79,6 +79,7 @@ class LogWriter:
         self._controller, self._scene = controller, scene
         self._columns = columns = LogColumns(rows)
         self._settled: object = None
+        self._changes = -1  # how many there were when streams were looked for
         self._law: Record | None = None  # of the present row
         self._active: ActiveStack | None = None  # what `_sources` are of
         self._sources: list[tuple[str, Array]] = []  # what the law writes for columns
@@ -119,6 +120,7 @@ class LogWriter:
             column(prefix, (3,), "m", "position of its frame")
             column(f"{prefix}.quaternion", (4,), "-", "orientation (x, y, z, w)")
         columns.lay_out()
+        self._keep_messages()
         self._meta = dict(meta or {})
         self._robot_record = robot_record(robot)
         self._meshes = _meshes_of(scene)
@@ -153,6 +155,7 @@ class LogWriter:
             self._settled = settled
             self._tasks.update()
             self._terms.update()
+            self._keep_messages()
             columns.lay_out()
             self._active = None
         row = columns.row
@@ -308,6 +311,17 @@ class LogWriter:
             **self._meta,
             **meta,
         }
+
+    def _keep_messages(self) -> None:
+        """Let streams that came record all that they take: a log repeats it."""
+        changes = self._controller.changes
+        if self._changes == len(changes):
+            return
+        self._changes = len(changes)
+        planned = [] if self.plan is None else [self.plan.plan]
+        parts = [*self._controller.planned_tasks, *changes, *planned]
+        for stream in parts_within(parts, Streamed):
+            stream.log()
 
     def _came_during_run(self) -> dict[str, Any]:
         """Return changes that were made, and what streams have taken, as JSON data.

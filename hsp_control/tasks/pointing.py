@@ -77,6 +77,17 @@ class Pointing(FrameTask, type="pointing"):
         changes: dict[str, Any] = {"direction": None, "trajectory": trajectory}
         return replace(self, **changes)
 
+    def facing(self, direction: Array, here: RobotState) -> Array:
+        """Return the desired orientation for a direction, nearest to the frame's.
+
+        Args:
+            direction: The direction in the world, of any length but zero, shape (3,).
+            here: Where the frame is.
+        """
+        now = here.frame(self.frame_name).rotation @ self._turn
+        shortest = pin.Quaternion.FromTwoVectors(now[:, 2], direction)
+        return np.asarray(shortest.toRotationMatrix() @ now)
+
     def _placed_at(self, here: FrameKinematics) -> dict[str, Any]:
         if self.trajectory is None:
             return {}

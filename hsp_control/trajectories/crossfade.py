@@ -7,6 +7,7 @@ from numpy.typing import ArrayLike
 
 from hsp_control import engine
 from hsp_control.common.exceptions import TrajectoryError
+from hsp_control.declaration.nested import parts_within
 from hsp_control.declaration.quantities import NonNegative, Number
 from hsp_control.trajectories.blend import BlendOrientation
 from hsp_control.trajectories.orientation import (
@@ -14,6 +15,7 @@ from hsp_control.trajectories.orientation import (
     OrientationTrajectory,
 )
 from hsp_control.trajectories.pose import ComposedPose, PoseTrajectory
+from hsp_control.trajectories.streams.stream import Streamed
 from hsp_control.trajectories.trajectory import Trajectory, TrajectorySample
 
 AnyReference = Trajectory | OrientationTrajectory | PoseTrajectory
@@ -112,11 +114,29 @@ class CrossfadeOrientation(OrientationTrajectory, type="crossfade"):
     ) -> OrientationSample:
         """Return the orientation at time t; see `OrientationTrajectory.sample`."""
         out = self._output(out)
+        end = self.start_time + self.duration
+        if t >= end:  # a stream may know R_0 no more
+            return self.after.sample(t, out)
+        if self._streams:  # for copies, whose blend is another one
+            self.keep_start(end)
         if t < self.start_time:
             return self.before.sample(t, out)
-        if t >= self.start_time + self.duration:  # a stream may know R_0 no more
-            return self.after.sample(t, out)
         return self._blend.sample(t, out)
+
+    def keep_start(self, until: float) -> None:
+        """Let streams know until a time how R_0 was where the change began."""
+        for stream in self._streams:
+            stream.running.keep(self.start_time, until)
+        for earlier in self._earlier:
+            earlier.keep_start(until)
+
+    @cached_property
+    def _streams(self) -> tuple[Streamed, ...]:
+        return tuple(parts_within(self.before, Streamed))
+
+    @cached_property
+    def _earlier(self) -> tuple["CrossfadeOrientation", ...]:
+        return tuple(parts_within(self.before, CrossfadeOrientation))
 
     @cached_property
     def _blend(self) -> BlendOrientation:

@@ -12,6 +12,7 @@ import pytest
 import hsp_control as hsp
 from hsp_control.common.exceptions import AccessError, HspControlError
 from hsp_control.simulation.log_writer import LogWriter
+from hsp_control.trajectories.streams import inbox
 
 PERIOD = 1e-3
 PANDA = hsp.Robot.load("panda")
@@ -252,6 +253,33 @@ def test_any_task_changes_to_a_stream_in_yaml(
     assert run["stream.hand.taken"][-1] == 1
     again = hsp.load_experiment(run.save(tmp_path / "run.npz")).run()
     assert np.array_equal(run.q, again.q)
+
+
+def test_a_log_records_all_that_streams_take(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Without a log nothing would be recorded here, also of a stream that comes."""
+    monkeypatch.setattr(inbox, "BRIEF", 0)
+    stream = {"type": "stream", "messages": [{"at": 0.1, "value": [0.3, 0, 0.5]}]}
+    data = config({"type": "stream"})
+    data["tasks"]["hand"] = {"type": "frame_position", "trajectory": stream}
+    experiment = hsp.load_experiment(data)
+    controller = experiment.controller
+    later, rows = hsp.Stream(delay=0.05), iter(range(100))
+
+    def lead(_: LogWriter) -> None:
+        k = next(rows)
+        if k == 30:
+            controller.at(0.3).reference("hand", later)
+        elif k > 30:
+            later.send([0.4, 0.1, 0.5])
+
+    run = hsp.simulate(
+        controller, PANDA.home(), duration=0.6, control_period=PERIOD, on_row=lead
+    )
+    assert len(run.meta["streams"]["hand"][0]) == 1
+    assert "streams_lost" not in run.meta
+    assert run.meta["changes"][0]["trajectory"]["messages"]
 
 
 def test_a_stream_moves_no_obstacle() -> None:

@@ -1,9 +1,12 @@
-"""Targets on a topic of ROS 2: ``geometry_msgs/msg/PoseStamped``."""
+"""Targets on a topic of ROS 2: poses, or a joystick's twists.
 
-from collections.abc import Callable
+They are ``geometry_msgs/msg/PoseStamped`` and ``TwistStamped``.
+"""
+
+from collections.abc import Callable, Mapping
 from functools import partial
 from time import monotonic
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 from weakref import ref
 
 from hsp_control.common.exceptions import HardwareError, StreamError
@@ -14,8 +17,10 @@ from hsp_control.trajectories.streams.inbox import Inbox
 from hsp_control.trajectories.streams.message import Space
 
 if TYPE_CHECKING:
-    from hsp_control.companions.ros2.messages import PoseStamped
+    from hsp_control.companions.ros2.messages import PoseStamped, TwistStamped
     from hsp_control.companions.ros2.node import Subscription
+
+    AnyTarget = PoseStamped | TwistStamped
 
 _POLL = 0.2
 """How soon a listener notices that nobody needs it any more [s]."""
@@ -23,11 +28,19 @@ _WORLD = "world"
 
 
 def check_address(source: str) -> TopicAddress:
-    """Return what an address ``ros2://TOPIC?frame=NAME&domain=N`` says."""
+    """Return what an address ``ros2://TOPIC?type=twist&frame=NAME&domain=N`` says."""
     try:
-        return parse(source, ("frame",))
+        address = parse(source, ("type", "frame", "tool"))
     except HardwareError as error:
         raise StreamError(f"source is {source!r}: {error}") from None
+    kind = address.options.get("type", "pose")
+    if kind not in {"pose", "twist"}:
+        raise StreamError(
+            f"source is {source!r}: type is {kind!r}; needs pose or twist"
+        )
+    if kind == "pose" and "tool" in address.options:
+        raise StreamError(f"source is {source!r}: poses are in no tool's axes")
+    return address
 
 
 def is_local(source: str) -> bool:
@@ -38,58 +51,68 @@ def is_local(source: str) -> bool:
 def opened(source: str, space: Space) -> Callable[["ref[Inbox]"], None]:
     """Join the domain of an address; return what listens to its topic."""
     address = check_address(source)
+    twists = address.options.get("type") == "twist"
     if space.linear not in {0, 3} or not space.width:
-        raise StreamError(
-            f"{source} carries poses; this stream needs {space.width} numbers"
-        )
+        what, width = ("twists", space.rates) if twists else ("poses", space.width)
+        raise StreamError(f"{source} carries {what}; this stream needs {width} numbers")
     try:
         check_installed()
-        from hsp_control.companions.ros2.messages import PoseStamped
+        from hsp_control.companions.ros2.messages import PoseStamped, TwistStamped
         from hsp_control.companions.ros2.node import Node
 
-        subscription = Node(address.domain).subscription(address.name, PoseStamped)
+        kind: type[Any] = TwistStamped if twists else PoseStamped
+        subscription = Node(address.domain).subscription(address.name, kind)
     except HardwareError as error:
         raise StreamError(f"{source}: {error}") from error
-    frame = address.options.get("frame", _WORLD)
-    return partial(_listen, subscription, frame, space)
+    return partial(_listen, subscription, address.options, space)
 
 
 def _listen(
-    subscription: "Subscription[PoseStamped]",
-    frame: str,
+    subscription: "Subscription[Any]",
+    options: Mapping[str, str],
     space: Space,
     inbox: "ref[Inbox]",
 ) -> None:
-    """Put every pose into the inbox for as long as it is there."""
+    """Put every target into the inbox for as long as it is there."""
     while inbox() is not None:
         taken = subscription.take() if subscription.wait(_POLL) else []
         if there := inbox():
             now = monotonic()
             there.note_silence(now)
             for message, publisher in taken:
-                _put(there, message, f"publisher {publisher}", now, frame, space)
+                stamp = message.header.stamp.nanoseconds
+                try:
+                    data = _said(message, options, space)
+                    data["t"] = stamp / 1e9 if stamp else None  # without one: now
+                    there.receive(f"publisher {publisher}", now, data)
+                except StreamError as error:
+                    there.reject(str(error))
         del there
 
 
-def _put(
-    inbox: Inbox,
-    message: "PoseStamped",
-    publisher: str,
-    now: float,
-    frame: str,
-    space: Space,
-) -> None:
-    header, pose = message.header, message.pose
-    if header.frame_id not in {"", frame}:
-        inbox.reject(f"a pose is in the frame {header.frame_id!r:.40}; needs {frame!r}")
-        return
-    p, r = pose.position, pose.orientation
-    value = [p.x, p.y, p.z] if space.linear else []
-    if space.rotational:
-        value += [r.x, r.y, r.z, r.w]
-    stamp = header.stamp.nanoseconds
-    try:  # without a stamp: now
-        t = stamp / 1e9 if stamp else None
-        inbox.receive(publisher, now, {"value": value, "t": t})
-    except StreamError as error:
-        inbox.reject(str(error))
+def _said(
+    message: "AnyTarget", options: Mapping[str, str], space: Space
+) -> dict[str, Any]:
+    """Return what a message says to a stream; see `message_of`."""
+    named, frame = message.header.frame_id, options.get("frame", _WORLD)
+    if hasattr(message, "pose"):
+        _check_frame("a pose", named, [frame])
+        p, r = message.pose.position, message.pose.orientation
+        return {"value": _numbers([p.x, p.y, p.z], [r.x, r.y, r.z, r.w], space)}
+    tool = options.get("tool")
+    _check_frame("a twist", named, [frame] if tool is None else [frame, tool])
+    u, w = message.twist.linear, message.twist.angular
+    velocity = _numbers([u.x, u.y, u.z], [w.x, w.y, w.z], space)
+    axes = {"": None, frame: "world", tool: "tool"}[named]
+    return {"velocity": velocity, "axes": axes}
+
+
+def _check_frame(what: str, named: str, known: list[str]) -> None:
+    if named and named not in known:
+        needed = " or ".join(map(repr, known))
+        raise StreamError(f"{what} is in the frame {named!r:.40}; needs {needed}")
+
+
+def _numbers(linear: list[float], angular: list[float], space: Space) -> list[float]:
+    """Return what of a target belongs to a stream."""
+    return (linear if space.linear else []) + (angular if space.rotational else [])

@@ -1,43 +1,22 @@
-"""The messages that wait, who sends them, and those that were taken."""
+"""A queue of messages: those that somebody sends, or recorded ones; who takes them."""
 
 import logging
 import re
 from collections import deque
 from collections.abc import Iterable, Mapping
+from itertools import starmap
 from math import inf
 from threading import Lock
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, Self
 
 from hsp_control.common.exceptions import StreamError
-from hsp_control.trajectories.streams.message import Message, Space, message_of
+from hsp_control.trajectories.streams.message import NO_TOOL, Message, Space, message_of
 
 _log = logging.getLogger(__name__)
 MOST = 5_000_000
-"""Most numbers that are recorded: poses at 60 Hz for three hours, 0.1 GB."""
-
-
-class InboxRecord:
-    """Messages and the controller's times at which they were taken."""
-
-    def __init__(self) -> None:
-        """Begin without messages."""
-        self.lost = self._size = 0
-        self._entries: list[tuple[float, Message]] = []
-
-    def add(self, t: float, messages: Iterable[Message]) -> None:
-        """Record messages that are taken at a time [s], as long as there is room."""
-        for each in messages:
-            if self._size + each.size <= MOST:
-                self._entries.append((t, each))
-                self._size += each.size
-            else:
-                self.lost += 1
-
-    def to_list(self) -> list[dict[str, Any]]:
-        """Return the messages as `recorded` reads them."""
-        return [{"at": t, **each.to_dict()} for t, each in self._entries]
-
-
+"""Most numbers that a log records: poses at 60 Hz for three hours, 0.1 GB."""
+BRIEF = 20_000
+"""Most numbers that are recorded where nobody writes a log."""
 CAPACITY = 4096  # most messages that wait; where more come, the oldest are dropped
 _SILENCE = 2.0  # who sent several messages is heard alone until so long a silence [s]
 _JUMP = 1.0  # what a clock goes back, or ahead of ours, that is no delay [s]
@@ -53,7 +32,12 @@ class Received(NamedTuple):
 
 
 class Inbox:
-    """Messages of one source; each reader remembers the number of its last message."""
+    """A queue of messages; each reader remembers the number of its last one.
+
+    What `send`, a thread that listens or a topic of ROS 2 puts into it is there at
+    once, and the oldest are dropped where many wait. A recording is there from the
+    start, each message with its time.
+    """
 
     def __init__(self, space: Space, source: str = "") -> None:
         """Set what a value is, and the address that is heard; by default none is."""
@@ -67,6 +51,14 @@ class Inbox:
         self._sender, self._until = "", -inf  # who is heard alone, and until when
         self._seen: dict[str, float] = {}
         self._newest, self._behind = -inf, inf  # of its clock: its time, ours after it
+
+    @classmethod
+    def recorded(cls, space: Space, messages: Iterable[Message]) -> Self:
+        """Return a queue of recorded messages, in order of the times ``at``."""
+        inbox = cls(space)
+        inbox._waiting = deque(starmap(Received, enumerate(messages, 1)))
+        inbox.count = len(inbox._waiting)
+        return inbox
 
     @property
     def source(self) -> str:
@@ -134,6 +126,23 @@ class Inbox:
         if self._source and aloud:
             self._say(f"a message is dropped: {reason}")
 
+    def fits(self, message: Message) -> bool:
+        """Return whether a message that was sent before the size was known fits."""
+        space = self.space
+        for array, width in (
+            (message.values, space.width),
+            (message.velocities, space.rates),
+        ):
+            if array is not None and width is not None and array.shape[1] != width:
+                self.reject(
+                    f"a message has {array.shape[1]} numbers; this stream needs {width}"
+                )
+                return False
+        if message.axes == "tool" and not space.rotational:
+            self.reject(NO_TOOL)
+            return False
+        return True
+
     def _say(self, what: str) -> None:
         """Warn, once for all that differs in its numbers alone."""
         kind = _NUMBER.sub("", what)
@@ -141,67 +150,112 @@ class Inbox:
             self._said.add(kind)
             _log.warning("%s: %s", self._source, what)
 
-    def after(self, number: int, *, take: bool) -> list[Received]:
-        """Return the messages that wait, later than a number, in order of arrival."""
+    def after(self, number: int, *, take: bool, until: float = inf) -> list[Received]:
+        """Return the messages that wait, later than a number, in order of arrival.
+
+        Args:
+            number: The number of the last one that is known.
+            take: Whether they are nobody else's from now on who begins to read.
+            until: Only those whose time has come [s].
+        """
+        found = []
         with self._lock:
-            if take:
-                self.taken = self.count
-            return [each for each in self._waiting if each.number > number]
+            waiting = self._waiting
+            known = number - self.count + len(waiting)  # dropped ones have no number
+            for k in range(max(known, 0), len(waiting)):
+                if waiting[k].message.at > until:
+                    break
+                found.append(waiting[k])
+            if take and found:
+                self.taken = found[-1].number
+        return found
 
     def __getstate__(self) -> dict[str, Any]:
-        """Return no messages: a copy elsewhere hears what is sent there."""
-        return {"space": self.space, "count": self.count}
+        """Return what nobody took: a copy elsewhere hears later what is sent there."""
+        saved = {"space": self.space, "count": self.count, "taken": self.taken}
+        bounded = self._waiting.maxlen is not None
+        waiting = self.after(self.taken if bounded else 0, take=False)
+        return {**saved, "waiting": waiting, "bounded": bounded}
 
     def __setstate__(self, saved: dict[str, Any]) -> None:
-        """Begin without messages."""
+        """Begin with what waited."""
         self.__init__(saved["space"])  # type: ignore[misc]
-        self.count = self.taken = saved["count"]
+        self.count, self.taken = saved["count"], saved["taken"]
+        most = CAPACITY if saved["bounded"] else None
+        self._waiting = deque(saved["waiting"], maxlen=most)
 
 
-class InboxReader:
-    """A reader of an inbox in one run; it begins with what nobody took before."""
+class Reader:
+    """Takes messages for one run, and records them; it begins with what nobody took.
 
-    def __init__(self, inbox: Inbox, record: InboxRecord) -> None:
-        """Begin to read, and to record what is taken."""
-        self._inbox, self._record = inbox, record
+    Attributes:
+        record: The messages that were taken, with the times ``at`` when they were.
+        lost: How many more there were than are recorded.
+    """
+
+    def __init__(self, inbox: Inbox, *, aside: bool = False) -> None:
+        """Begin to read; ``aside``: what is taken waits for the others all the same."""
+        self._inbox, self._aside = inbox, aside
         self._number = inbox.taken
-        self._previews = False
+        self._missed: list[Received] = []
+        self.record: list[Message] = []
+        self.lost = self._recorded = 0
+        self.logged = False  # whether a log needs all of the record
 
-    def take(self, t: float) -> list[tuple[float, Message]]:
-        """Return what is there at a time [s] and was not taken, and this time.
+    def take(self, t: float) -> list[Message]:
+        """Return what is there at a time [s] and was not taken, with its time ``at``.
 
         Raises:
             StreamError: If nobody listens any more.
         """
-        if self._inbox.failure:
-            raise StreamError(
-                f"{self._inbox.source}: its thread has ended: {self._inbox.failure}"
-            )
-        if self._inbox.count == self._number:
+        inbox = self._inbox
+        if inbox.failure:
+            raise StreamError(f"{inbox.source}: its thread has ended: {inbox.failure}")
+        if inbox.count == self._number and not self._missed:
             return []
-        received = self._inbox.after(self._number, take=not self._previews)
+        received = inbox.after(self._number, take=not self._aside, until=t)
+        received, self._missed = self._missed + received, []
         if received:
             self._number = received[-1].number
-        messages = [each.message for each in received if self._fits(each.message)]
-        self._record.add(t, messages)
-        return [(t, each) for each in messages]
+        taken = [
+            each.message if each.message.at > -inf else each.message._replace(at=t)
+            for each in received
+            if inbox.fits(each.message)
+        ]
+        for each in taken:
+            self._add(each)
+        return taken
 
-    def copy(self) -> "InboxReader":
+    def copy(self) -> "Reader":
         """Return a reader that goes on from here, with a record of its own."""
-        other = InboxReader(self._inbox, InboxRecord())
-        other._number, other._previews = self._number, True
+        other = Reader(self._inbox, aside=True)
+        other._number, other._missed = self._number, self._missed.copy()
         return other
 
-    def _fits(self, message: Message) -> bool:
-        """Return whether a message that was sent before the size was known fits."""
-        space = self._inbox.space
-        for array, width in (
-            (message.values, space.width),
-            (message.velocities, space.rates),
-        ):
-            if array is not None and width is not None and array.shape[1] != width:
-                self._inbox.reject(
-                    f"a message has {array.shape[1]} numbers; this stream needs {width}"
-                )
-                return False
-        return True
+    def _add(self, message: Message) -> None:
+        """Record a message, as long as there is room."""
+        most = MOST if self.logged else min(BRIEF, MOST)
+        if self._recorded + message.size <= most:
+            self.record.append(message)
+            self._recorded += message.size
+        else:
+            self.lost += 1
+
+    def __getstate__(self) -> dict[str, Any]:
+        """Return what it reads, and what waits for it alone, but no record."""
+        inbox, number = self._inbox, self._number
+        waiting = inbox.after(number, take=False) if number < inbox.taken else []
+        missed = self._missed + [each for each in waiting if each.number <= inbox.taken]
+        return {
+            "inbox": inbox,
+            "aside": self._aside,
+            "number": max(number, inbox.taken) if missed else number,
+            "missed": missed,
+            "lost": self.lost + len(self.record),
+        }
+
+    def __setstate__(self, saved: dict[str, Any]) -> None:
+        """Go on, with a record that lacks what was taken before."""
+        self.__init__(saved["inbox"], aside=saved["aside"])  # type: ignore[misc]
+        self._number, self._missed = saved["number"], saved["missed"]
+        self.lost = saved["lost"]

@@ -1,6 +1,6 @@
 """Where a stream's messages come from: `send`, another process, or a recording."""
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from threading import Thread
 from typing import Any, Protocol
@@ -8,7 +8,7 @@ from weakref import WeakValueDictionary, ref
 
 from hsp_control.common.entry_points import entry_points
 from hsp_control.common.exceptions import StreamError
-from hsp_control.trajectories.streams.inbox import Inbox, InboxReader, InboxRecord
+from hsp_control.trajectories.streams.inbox import Inbox, Reader
 from hsp_control.trajectories.streams.message import Message, Space, message_of, parsed
 
 Listen = Callable[["ref[Inbox]"], None]
@@ -84,50 +84,21 @@ def kind_of(source: str) -> AddressKind:
 LARGEST_FILE = 100_000_000  # size of the largest recording that is read [bytes]
 
 
-class Recording:
-    """Recorded messages as a source; the same run takes them at the same times."""
-
-    def __init__(
-        self, entries: Iterable[tuple[float, Message]], record: InboxRecord
-    ) -> None:
-        """Begin at the first message, and record what is taken."""
-        self._entries, self._record = list(entries), record
-        self._next = 0
-
-    def take(self, t: float) -> list[tuple[float, Message]]:
-        """Return what was recorded up to a time and was not taken, and when [s]."""
-        begin = self._next
-        while self._next < len(self._entries) and self._entries[self._next][0] <= t:
-            self._next += 1
-        found = self._entries[begin : self._next]
-        for at, message in found:
-            self._record.add(at, (message,))
-        return found
-
-    def copy(self) -> "Recording":
-        """Return a source that goes on from here, with a record of its own."""
-        other = Recording(self._entries, InboxRecord())
-        other._next = self._next
-        return other
-
-
-def recorded(
-    data: Sequence[Mapping[str, Any]], space: Space
-) -> list[tuple[float, Message]]:
-    """Return the messages of a recording, and when they were taken [s]."""
-    entries: list[tuple[float, Message]] = []
+def recorded(data: Sequence[Mapping[str, Any]], space: Space) -> list[Message]:
+    """Return the messages of a recording, each with its time ``at``."""
+    messages: list[Message] = []
     for k, each in enumerate(data):
         try:
             if not isinstance(each, Mapping) or not _is_number(each.get("at")):
                 raise StreamError("it needs the time at which it is taken: at [s]")
             at = float(each["at"])
-            if entries and at < entries[-1][0]:
-                raise StreamError(f"at is {at:g}, earlier than {entries[-1][0]:g}")
+            if messages and at < messages[-1].at:
+                raise StreamError(f"at is {at:g}, earlier than {messages[-1].at:g}")
             rest = {key: value for key, value in each.items() if key != "at"}
-            entries.append((at, message_of(rest, space)))
+            messages.append(message_of(rest, space)._replace(at=at))
         except StreamError as error:
             raise StreamError(f"message {k} of the recording: {error}") from None
-    return entries
+    return messages
 
 
 def read_recording(path: Path) -> list[dict[str, Any]]:
@@ -159,13 +130,14 @@ def _is_number(value: object) -> bool:
 
 
 class Mailbox:
-    """The messages of one stream, whichever controller it was placed in."""
+    """What the values of one stream share: its messages, and what took them last."""
 
     def __init__(self, hears: str, space: Space) -> None:
         """Begin without messages."""
         self._hears = hears
         self.inbox = Inbox(space)
-        self.record = InboxRecord()
+        self.reader: Reader | None = None  # of the last run that was no preview
+        self._logged = False
 
     def put(self, **data: Any) -> None:
         """Add a message; see `message_of`."""
@@ -176,7 +148,13 @@ class Mailbox:
             )
         self.inbox.put(**data)
 
-    def reader(self, space: Space, *, kept: bool) -> InboxReader:
+    def log(self) -> None:
+        """Let all be recorded that is taken from now on."""
+        self._logged = True
+        if self.reader is not None:
+            self.reader.logged = True
+
+    def live(self, space: Space, *, kept: bool) -> Reader:
         """Return the reader of a new run; a source is opened here."""
         if is_address(self._hears):
             self.inbox = listening_inbox(self._hears, space)
@@ -186,16 +164,15 @@ class Mailbox:
                 f"{space.width} are needed"
             )
         self.inbox.space = space
-        if not kept:
-            return InboxReader(self.inbox, InboxRecord()).copy()
-        self.record = InboxRecord()
-        return InboxReader(self.inbox, self.record)
+        return self._begun(Reader(self.inbox, aside=not kept), kept)
 
     def recording(
-        self, entries: list[tuple[float, Message]], *, kept: bool
-    ) -> Recording:
-        """Return recorded messages, see `recorded`, as the source of a new run."""
-        if not kept:
-            return Recording(entries, InboxRecord())
-        self.record = InboxRecord()
-        return Recording(entries, self.record)
+        self, space: Space, messages: Sequence[Message], *, kept: bool
+    ) -> Reader:
+        """Return the reader of recorded messages, see `recorded`, in a new run."""
+        return self._begun(Reader(Inbox.recorded(space, messages), aside=True), kept)
+
+    def _begun(self, reader: Reader, kept: bool) -> Reader:
+        if kept:
+            self.reader, reader.logged = reader, self._logged
+        return reader

@@ -2,7 +2,8 @@
 
 import json
 from collections.abc import Mapping
-from typing import Any, NamedTuple, NoReturn
+from math import inf
+from typing import Any, Literal, NamedTuple, NoReturn
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -15,6 +16,7 @@ LARGEST = 1e6
 """Numbers beyond this are refused [m or rad]: they are mistakes, and would
 overflow."""
 LATEST = 1e12  # times beyond this are refused [s]; a clock of 1970 shows 2e9
+NO_TOOL = "axes is 'tool'; a stream without an orientation has no tool"
 _UNIT = 1e-3
 """Deviation of a quaternion's norm from 1 that counts as a sender's rounding."""
 
@@ -61,6 +63,8 @@ class Message(NamedTuple):
     # Their velocities, (k, rates), in world axes; None: unknown.
     velocities: Array | None
     chunk: bool = False  # whether they replace those that were to follow
+    axes: Literal["world", "tool"] | None = None  # those of a velocity alone, if said
+    at: float = -inf  # when it is taken, by the controller's clock [s]; -inf: at once
 
     @property
     def size(self) -> int:
@@ -69,8 +73,10 @@ class Message(NamedTuple):
         return sum(each.size for each in found if each is not None)
 
     def to_dict(self) -> dict[str, Any]:
-        """Return what `message_of` reads."""
-        data: dict[str, Any] = {} if self.t is None else {"t": self.t}
+        """Return what `message_of` reads, and the time ``at`` of one that was taken."""
+        data: dict[str, Any] = {} if self.at == -inf else {"at": self.at}
+        if self.t is not None:
+            data["t"] = self.t
         for one, several in (("value", "values"), ("velocity", "velocities")):
             array = getattr(self, several)
             if array is not None and self.chunk:
@@ -79,6 +85,8 @@ class Message(NamedTuple):
                 data[one] = array[0].tolist()
         if self.chunk:
             data["times"] = self.times.tolist()
+        if self.axes is not None:
+            data["axes"] = self.axes
         return data
 
 
@@ -94,12 +102,15 @@ def message_of(data: Any, space: Space) -> Message:
     _check_alternatives(given)
     t = None if "t" not in given else _clock(given["t"])
     values = _rows(given, "value", "values", space.width, space.words)
-    rates = "linear and angular velocities in world axes" if space.rotational else ""
+    rates = "linear and angular velocities" if space.rotational else ""
     velocities = _rows(given, "velocity", "velocities", space.rates, rates)
     if values is None:
         if velocities is None or len(velocities) != 1:
             raise StreamError("a message needs a value, values or one velocity")
-        return Message(t, np.zeros(1), None, velocities)
+        axes = _axes(given, space)
+        return Message(t, np.zeros(1), None, velocities, axes=axes)
+    if "axes" in given:
+        raise StreamError("axes are those of a velocity that is sent without a value")
     if velocities is not None and len(velocities) != len(values):
         raise StreamError(
             f"there are {len(velocities)} velocities for {len(values)} values"
@@ -116,7 +127,7 @@ def parsed(text: str | bytes) -> Any:
     return json.loads(text, parse_constant=_refuse_constant)
 
 
-_KEYS = ("value", "values", "times", "velocity", "velocities", "t")
+_KEYS = ("value", "values", "times", "velocity", "velocities", "axes", "t")
 
 
 def _check_alternatives(given: Mapping[str, Any]) -> None:
@@ -127,6 +138,16 @@ def _check_alternatives(given: Mapping[str, Any]) -> None:
         raise StreamError("values need times [s], one for each")
     if "times" in given and "values" not in given:
         raise StreamError("times need values, one for each")
+
+
+def _axes(given: Mapping[str, Any], space: Space) -> Literal["world", "tool"] | None:
+    """Return the axes of a velocity; None: those that its stream declares."""
+    axes: Any = given.get("axes")
+    if axes not in (None, "world", "tool"):
+        raise StreamError(f"axes is {_shown(axes)}; needs 'world' or 'tool'")
+    if axes == "tool" and space.linear is not None and not space.rotational:
+        raise StreamError(NO_TOOL)
+    return axes  # type: ignore[no-any-return]
 
 
 def _clock(value: Any) -> float:

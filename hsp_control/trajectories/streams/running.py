@@ -11,21 +11,24 @@ from collections.abc import Sequence
 from copy import copy, deepcopy
 from itertools import groupby
 from math import inf
-from typing import NamedTuple, Protocol
+from typing import NamedTuple
 
 import numpy as np
 
 from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import StreamError
 from hsp_control.trajectories.streams.chart import Chart, State
+from hsp_control.trajectories.streams.inbox import Reader
 from hsp_control.trajectories.streams.message import Message
 from hsp_control.trajectories.streams.segments import (
+    SAME,
     Coast,
     Goal,
     Joiner,
     MotionBounds,
     Segment,
 )
+from hsp_control.trajectories.streams.velocities import Axes, Command, Velocities
 
 _WINDOW = 2.0  # the sender's clock is compared with the controller's over this time [s]
 _NEW_CLOCK = 1.0  # a sender's time that jumps back by more shows another start [s]
@@ -192,7 +195,6 @@ def _nearest_parabola(tau: Array, x: Array) -> tuple[Array, ...]:
     return c[0], c[1] / scale, 2.0 * c[2] / scale**2
 
 
-_SAME = 1e-7  # states that differ by less are the same, in x, x' and x''
 _CONSIDERED = 256  # the reference joins one of the next waypoints, at most this many
 _AT_ONCE = 256  # of more messages that come at once the oldest do not count
 
@@ -206,16 +208,8 @@ class Policy(NamedTuple):
     extrapolation: float
     hold_after: float
     stop_after: float
-
-
-class MessageSource(Protocol):
-    """What messages come from: an `Inbox`, or a recording."""
-
-    def take(self, t: float) -> Sequence[tuple[float, Message]]:
-        """Return the messages up to a time that were not taken, and their times [s]."""
-
-    def copy(self) -> "MessageSource":
-        """Return a source that goes on from here, without the other's knowledge."""
+    dead_man: float
+    axes: Axes
 
 
 class RunningStream:
@@ -226,20 +220,24 @@ class RunningStream:
         chart: Chart,
         bounds: MotionBounds,
         policy: Policy,
-        source: MessageSource,
+        source: Reader,
         start: State,
     ) -> None:
         """Begin at rest."""
         self.chart, self._policy, self._source = chart, policy, source
         self._joiner = Joiner(bounds, chart.linear)
+        self._velocities = Velocities(chart, bounds)
         self._begin = self._now = self._oldest = -inf
         self._heard = -inf
         self._silent = False
-        self._command: Array | None = None
+        # the velocity that is commanded, until it fades, unless it is repeated
+        self._command: Command | None = None
+        self._fades_at = inf
         self._segments: list[Segment] = [Coast(0.0, inf, start)]
         self._starts = [-inf]
         self.taken = self.refused = 0
         self.waypoints = Waypoints()
+        self._kept: dict[float, float] = {}
 
     @property
     def age(self) -> float:
@@ -258,9 +256,14 @@ class RunningStream:
         k = max(bisect_right(self._starts, t) - 1, 0)
         return self._segments[k].state(t)
 
+    def keep(self, since: float, until: float) -> None:
+        """Know the reference from a time on until a later one [s]."""
+        self._kept[since] = max(until, self._kept.get(since, -inf))
+
     def copy(self) -> "RunningStream":
         """Return one that goes on from here by itself."""
         other = copy(self)
+        other._kept = self._kept.copy()
         other._source = self._source.copy()
         other._segments, other._starts = self._segments.copy(), self._starts.copy()
         other.waypoints = self.waypoints.copy()
@@ -271,8 +274,8 @@ class RunningStream:
         if self._now == -inf:  # what is computed at the very start is not yet the run
             self._now = self._begin = t
             return
-        for at, group in groupby(self._source.take(t), key=lambda each: each[0]):
-            messages = [message for _, message in group]
+        for at, group in groupby(self._source.take(t), key=lambda each: each.at):
+            messages = [*group]
             surplus = max(len(messages) - _AT_ONCE, 0)
             self.taken += surplus
             self.waypoints.late += surplus
@@ -288,8 +291,12 @@ class RunningStream:
     def _step(self, t: float, messages: Sequence[Message]) -> None:
         """Plan up to a time at which messages arrive."""
         self._now = t
-        while self._segments[-1].end <= t:
-            self._plan(self._segments[-1].end)
+        while (due := min(self._segments[-1].end, self._fades_at)) <= t:
+            if due == self._fades_at and self._command is not None:
+                still = np.zeros_like(self._command.velocity)
+                self._command = self._command._replace(velocity=still)
+                self._fades_at = inf
+            self._plan(due)
         changed = False
         for message in messages:
             changed = self._accept(message, t) or changed
@@ -305,10 +312,13 @@ class RunningStream:
         only_newest = policy.name == "latest"
         if not self.waypoints.add(message, t, policy.delay, only_newest):
             return False
-        self._command = None
+        before, self._command, self._fades_at = self._command, None, inf
         if message.values is None:
             assert message.velocities is not None
-            self._command = message.velocities[0]
+            axes = message.axes or policy.axes
+            self._command = Command(message.velocities[0], axes)
+            self._fades_at = t + policy.dead_man
+            return self._silent or not self._command.same(before)
         return True
 
     def _falls_silent(self) -> bool:
@@ -323,7 +333,7 @@ class RunningStream:
             following = self._next(t, state)
         except StreamError:  # so far away that no motion is found
             self.refused += 1
-            self._command = None
+            self._command, self._fades_at = None, inf
             self.waypoints.clear()
             following = self._to_rest(t, state)
         if self._segments[-1].start == t:  # replaced before anything could see it
@@ -336,7 +346,7 @@ class RunningStream:
         if self._silent:
             return self._to_rest(t, state)
         if self._command is not None:
-            return self._follow_command(t, state, self._command)
+            return self._velocities.follow(t, state, self._command, policy.delay)
         if not waypoints.times:
             return self._to_rest(t, state)
         used = waypoints.near(t, policy.smoothing, _CONSIDERED)
@@ -352,6 +362,8 @@ class RunningStream:
                 goal = goal.at_rest()  # no message shows how it goes on
             if (smooth := self._joiner.smooth(t, state, goal)) is not None:
                 return smooth
+        if (slower := self._velocities.slower(state)) is not None:
+            return self._velocities.follow(t, state, slower, policy.delay)
         goal = goals.passed(last, policy.smoothing)
         end = goal.time + (0.0 if self._ends_at_rest else policy.extrapolation)
         if goal.rate.any() and not self._ends_at_rest and t >= end:
@@ -381,30 +393,21 @@ class RunningStream:
         meeting.end = min(meeting.end, end)  # unless a message shows how it goes on
         return meeting
 
-    def _follow_command(self, t: float, state: State, command: Array) -> Segment:
-        """Return a piece that reaches or keeps a velocity in world axes."""
-        end, delay = self._heard + self._policy.extrapolation, self._policy.delay
-        if t >= end:
-            return self._to_rest(t, state)
-        here = self.chart.local_rate(state.x, command, state.base)
-        then = state.x + 0.5 * delay * (state.rate + here)
-        rate = self.chart.local_rate(then, command, state.base)
-        if np.abs(here - state.rate).max() < _SAME and _steady(state):
-            return Coast(t, end, state)
-        return self._joiner.to_velocity(t, state, rate, delay)
-
     def _to_rest(self, t: float, state: State) -> Segment:
         """Return a piece that brakes, or stays."""
-        if _steady(state) and np.abs(state.rate).max() < _SAME:
-            still = np.zeros_like(state.x)
-            return Coast(t, inf, State(state.x, still, still, state.base))
-        delay = self._policy.delay
-        return self._joiner.to_velocity(t, state, np.zeros_like(state.x), delay)
+        still = Command(np.zeros_like(state.x), "world")
+        return self._velocities.follow(t, state, still, self._policy.delay)
 
     def _forget(self, t: float) -> None:
         """Forget pieces and waypoints that lie far behind."""
         self.waypoints.forget(t)
-        gone = bisect_right(self._starts, t - _KEPT) - 1
+        oldest = t - _KEPT
+        for since, until in [*self._kept.items()]:
+            if until < oldest:
+                del self._kept[since]
+            else:
+                oldest = min(oldest, since)
+        gone = bisect_right(self._starts, oldest) - 1
         if gone > 0:
             del self._segments[:gone], self._starts[:gone]
             self._oldest = self._starts[0]
@@ -450,10 +453,10 @@ def _candidates(first: int, last: int) -> list[int]:
 
 
 def _steady(state: State) -> bool:
-    return bool(np.abs(state.acceleration).max() < _SAME)
+    return bool(np.abs(state.acceleration).max() < SAME)
 
 
 def _on_line(state: State, goal: Goal, t: float) -> bool:
     """Return whether a state moves with a goal already."""
     apart = np.abs(state.x - goal.at(t)).max(), np.abs(state.rate - goal.rate).max()
-    return max(apart) < _SAME and _steady(state)
+    return max(apart) < SAME and _steady(state)

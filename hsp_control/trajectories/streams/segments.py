@@ -7,7 +7,7 @@ the state in which the piece before it ends.
 from abc import ABC, abstractmethod
 from itertools import pairwise
 from math import pi, sqrt
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 import ruckig
@@ -40,7 +40,7 @@ class MotionBounds(NamedTuple):
         False too cautious.
         """
         T, scale = duration, 1.0
-        for matrix, bound in zip(_DERIVATIVES, self, strict=True):
+        for matrix, bound in zip(DERIVATIVES, self, strict=True):
             scale *= T
             if (np.abs(matrix @ ends).max(axis=0) > bound * scale).any():
                 return False
@@ -83,8 +83,12 @@ def angular_bounds(speed: float, acceleration: float, jerk: float) -> MotionBoun
             f"angular_jerk is {jerk:g}; with these bounds it must be greater than "
             f"{speed * curved + speed**3 / 6.0:.4g}"
         )
-    planned = 0.95 * speed, curved, turned
+    planned = PLANNED * speed, curved, turned
     return MotionBounds(*(np.full(3, each / sqrt(3.0)) for each in planned))
+
+
+PLANNED = 0.95
+"""Share of an angular speed up to which motions are planned; see `angular_bounds`."""
 
 
 def _bezier_points() -> Array:
@@ -127,10 +131,11 @@ def _derivatives() -> tuple[Array, ...]:
     return tuple(found)
 
 
-_DERIVATIVES = _derivatives()
+DERIVATIVES = _derivatives()
 
 
-_SHORTEST = 1e-3  # no motion between different states is shorter [s]
+SHORTEST = 1e-3  # no motion between different states is shorter [s]
+SAME = 1e-7  # states that differ by less are the same, in x, x' and x''
 
 
 class Goal(NamedTuple):
@@ -280,7 +285,7 @@ class Fastest(Segment):
         """Solve the task, whose frame is at ``origin`` at the start, shape (n,)."""
         self._task, self._origin, self._bounds = task, origin, bounds
         self._motion = task.solve(bounds)
-        duration = max(self._motion.duration, _SHORTEST)
+        duration = max(self._motion.duration, SHORTEST)
         super().__init__(start, start + duration, base)
 
     def state(self, t: float) -> State:
@@ -290,10 +295,10 @@ class Fastest(Segment):
         x += self._origin + elapsed * drift
         return State(x, rate + drift, acceleration, self.base)
 
-    def __reduce__(self) -> tuple[type["Fastest"], tuple[object, ...]]:
+    def __reduce__(self) -> tuple[type["Fastest"], tuple[object, ...], dict[str, Any]]:
         """Return how to make it again: Ruckig's motions cannot be pickled."""
         given = self.start, self.base, self._task, self._origin, self._bounds
-        return Fastest, given
+        return Fastest, given, {"end": self.end}  # which may be earlier: see `_meet`
 
 
 class Joiner:
@@ -307,7 +312,7 @@ class Joiner:
     def smooth(self, t: float, state: State, goal: Goal) -> QuinticSegment | None:
         """Return the quintic that reaches a goal in time, if the bounds permit."""
         T = goal.time - t
-        if T < _SHORTEST:
+        if T < SHORTEST:
             return None
         ends = np.stack(
             [
@@ -339,24 +344,3 @@ class Joiner:
             duration=0.0 if moves else max(goal.time - t, 0.0),
         )
         return Fastest(t, state.base, task, origin, self.bounds)
-
-    def to_velocity(self, t: float, state: State, rate: Array, delay: float) -> Segment:
-        """Return a change to another velocity, in ``delay`` [s] if bounds permit."""
-        # With this end the quintic is the quartic whose velocity is a cubic.
-        x = state.x + 0.5 * delay * (state.rate + rate)
-        x += delay * delay / 12.0 * state.acceleration
-        goal = Goal(t + delay, x, rate, self._zero)
-        if (smooth := self.smooth(t, state, goal)) is not None:
-            return smooth
-        speed = self.bounds.speed
-        task = FastestTask(
-            x=state.x,
-            rate=state.rate,
-            acceleration=state.acceleration,
-            target_rate=np.clip(rate, -speed, speed),
-            drift=self._zero,
-            positions=False,
-            together=len(rate),
-            duration=0.0,
-        )
-        return Fastest(t, state.base, task, self._zero, self.bounds)

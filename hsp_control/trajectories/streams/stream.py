@@ -28,6 +28,7 @@ from hsp_control.trajectories.orientation import (
 )
 from hsp_control.trajectories.pose import PoseSample, PoseTrajectory
 from hsp_control.trajectories.streams.chart import Chart, State
+from hsp_control.trajectories.streams.inbox import Reader
 from hsp_control.trajectories.streams.mailbox import (
     Mailbox,
     is_address,
@@ -36,16 +37,13 @@ from hsp_control.trajectories.streams.mailbox import (
     recorded,
 )
 from hsp_control.trajectories.streams.message import ORIENTATION, POSE, Space
-from hsp_control.trajectories.streams.running import (
-    MessageSource,
-    Policy,
-    RunningStream,
-)
+from hsp_control.trajectories.streams.running import Policy, RunningStream
 from hsp_control.trajectories.streams.segments import (
     MotionBounds,
     angular_bounds,
     linear_bounds,
 )
+from hsp_control.trajectories.streams.velocities import Axes
 from hsp_control.trajectories.trajectory import Trajectory, TrajectorySample
 
 
@@ -70,6 +68,10 @@ class Streamed(Remembering, error=TrajectoryError):
       is dragged.
     * ``extrapolate``: it goes on from the last one at the velocity that the waypoints
       show, for a time, and then comes to rest.
+
+    A velocity alone, as a joystick sends it, is reached within the bounds and kept; the
+    position is its integral. If no other message comes for ``dead_man``, it fades to
+    zero. One beyond the bounds keeps its direction.
 
     A value of a stream is shared: whoever has it may send, and each controller that
     follows it hears all.
@@ -96,6 +98,9 @@ class Streamed(Remembering, error=TrajectoryError):
     trackers. For ``interpolate`` and ``extrapolate``."""
     extrapolation: NonNegative = 0.1
     """How long the reference goes on at the last velocity [s]."""
+    dead_man: Positive | None = None
+    """Time after which a velocity that was sent alone fades to zero, unless another one
+    comes (a dead man's switch) [s]; by default ``extrapolation``."""
     hold_after: Positive | None = None
     """Time without a message after which the reference comes to rest [s]; never by
     default."""
@@ -104,6 +109,7 @@ class Streamed(Remembering, error=TrajectoryError):
     holds. Never by default."""
 
     space: ClassVar[Space]
+    axes: ClassVar[Axes] = "world"
 
     def __post_init__(self) -> None:
         """Check the source."""
@@ -120,6 +126,7 @@ class Streamed(Remembering, error=TrajectoryError):
         value: ArrayLike | pin.SE3 | None = None,
         *,
         velocity: ArrayLike | None = None,
+        axes: Axes | None = None,
         t: float | None = None,
     ) -> None:
         """Send a target, or a velocity; from any thread.
@@ -127,8 +134,10 @@ class Streamed(Remembering, error=TrajectoryError):
         Args:
             value: The target: n coordinates, a quaternion (x, y, z, w), or for a pose
                 x, y, z and a quaternion, or a pin.SE3; None: only the velocity counts.
-            velocity: The velocity at the target, or alone; angular velocities in world
-                axes [1/s].
+            velocity: The velocity at the target, in world axes; or alone, as a joystick
+                sends it: linear velocities, then angular ones [1/s].
+            axes: Those of a velocity alone: ``world``, or ``tool``, the axes of the
+                moving body; None: the stream's own.
             t: The target's time by the sender's clock [s]; None: now.
 
         Raises:
@@ -136,7 +145,7 @@ class Streamed(Remembering, error=TrajectoryError):
         """
         if isinstance(value, pin.SE3):
             value = pin.SE3ToXYZQUAT(value)
-        self._mailbox.put(value=value, velocity=velocity, t=t)
+        self._mailbox.put(value=value, velocity=velocity, axes=axes, t=t)
 
     def send_chunk(
         self,
@@ -169,8 +178,17 @@ class Streamed(Remembering, error=TrajectoryError):
 
     @property
     def record(self) -> tuple[Mapping[str, Any], ...]:
-        """What the last run has taken, and when; see ``messages``."""
-        return tuple(self._mailbox.record.to_list())
+        """What the last run has taken, and when; see ``messages``.
+
+        Where no log is written, only the first messages.
+        """
+        reader = self._mailbox.reader
+        taken = reader.record if reader is not None else []
+        return tuple(each.to_dict() for each in taken)
+
+    def log(self) -> None:
+        """Record all that is taken from now on, up to five million numbers."""
+        self._mailbox.log()
 
     @property
     def last_rejection(self) -> str:
@@ -180,7 +198,8 @@ class Streamed(Remembering, error=TrajectoryError):
     @property
     def unrecorded(self) -> int:
         """How many messages of the last run the record had no room for."""
-        return self._mailbox.record.lost
+        reader = self._mailbox.reader
+        return reader.lost if reader is not None else 0
 
     def counts(self) -> dict[str, float]:
         """Return the time since the last message [s], and how many there were.
@@ -268,18 +287,21 @@ class Streamed(Remembering, error=TrajectoryError):
             self.extrapolation,
             inf if self.hold_after is None else self.hold_after,
             inf if self.stop_after is None else self.stop_after,
+            self.extrapolation if self.dead_man is None else self.dead_man,
+            self.axes,
         )
         source = self._opened(space)
         return RunningStream(chart, self._bounds(), policy, source, start)
 
-    def _opened(self, space: Space) -> MessageSource:
+    def _opened(self, space: Space) -> Reader:
         kept = not vars(self).get("_previews", False)
         messages: Sequence[Mapping[str, Any]] | None = self.messages
         if self.source is not None and not is_address(self.source):
             messages = read_recording(Path(self.source))
         if messages is not None:
-            return self._mailbox.recording(recorded(messages, space), kept=kept)
-        return self._mailbox.reader(space, kept=kept)
+            taken = recorded(messages, space)
+            return self._mailbox.recording(space, taken, kept=kept)
+        return self._mailbox.live(space, kept=kept)
 
     def __getstate__(self) -> dict[str, Any]:
         """Return the fields, and where the reference is in its run, if it runs."""
@@ -379,6 +401,9 @@ class Turning(Streamed):
     """A stream with a rotation."""
 
     _: KW_ONLY
+    axes: Axes = "world"  # type: ignore[misc]  # a field, where there is a tool
+    """Axes of velocities that are sent alone and name none [-]: ``world``, in a
+    relative task those of its reference, or ``tool``, those of the moving body."""
     angular_speed: Positive = 2.5
     """Bound on |ω| [rad/s]."""
     angular_acceleration: Positive = 20.0

@@ -21,6 +21,9 @@ from hsp_control.companions.ros2.messages import (
     PoseStamped,
     Quaternion,
     Time,
+    Twist,
+    TwistStamped,
+    Vector3,
     ros_name,
 )
 from hsp_control.companions.ros2.node import Node
@@ -33,6 +36,7 @@ EXAMPLES = [
     Float64MultiArray(MultiArrayLayout(), [1.5, -2.5, 3.5]),
     Float64MultiArray(MultiArrayLayout([MultiArrayDimension("x", 2, 3)], 1), [1.0]),
     PoseStamped(HEADER, Pose(Point(1.0, 2.0, 3.0), Quaternion(0.0, 0.6, 0.0, 0.8))),
+    TwistStamped(HEADER, Twist(Vector3(0.1, 0.2, 0.3), Vector3(-1.0, 0.0, 2.0))),
 ]
 
 

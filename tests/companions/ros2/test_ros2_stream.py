@@ -18,6 +18,9 @@ from hsp_control.companions.ros2.messages import (
     PoseStamped,
     Quaternion,
     Time,
+    Twist,
+    TwistStamped,
+    Vector3,
 )
 from hsp_control.companions.ros2.node import Node, TopicPublisher
 from hsp_control.trajectories.streams.inbox import Inbox
@@ -37,11 +40,11 @@ def pose(
 
 
 def opened(
-    space: Space, options: str = ""
-) -> tuple[Inbox, TopicPublisher[PoseStamped]]:
+    space: Space, options: str = "", kind: Any = PoseStamped
+) -> tuple[Inbox, TopicPublisher[Any]]:
     topic, _, _ = fresh()
     inbox = listening_inbox(f"ros2:/{topic}?domain={DOMAIN}{options}", space)
-    publisher = Node(DOMAIN).publisher(topic, PoseStamped)
+    publisher = Node(DOMAIN).publisher(topic, kind)
     assert publisher.matched == 1
     return inbox, publisher
 
@@ -89,7 +92,31 @@ def test_wrong_poses_are_counted_and_dropped(
     until(lambda: inbox.count == 1)
 
 
+@pytest.mark.parametrize(("space", "velocity"), [
+    (POSE, [0.1, 0.2, 0.3, -1.0, 0.0, 2.0]),
+    (POSITION, [0.1, 0.2, 0.3]),
+    (ORIENTATION, [-1.0, 0.0, 2.0]),
+])  # fmt: skip
+def test_a_stream_takes_what_it_needs_of_a_twist(space: Space, velocity: Any) -> None:
+    inbox, publisher = opened(space, "&type=twist&tool=hand", TwistStamped)
+    twist = Twist(Vector3(0.1, 0.2, 0.3), Vector3(-1.0, 0.0, 2.0))
+    named = [("", None), ("world", "world"), *[("hand", "tool")] * space.rotational]
+    for k, (frame, axes) in enumerate(named):
+        publisher.send(TwistStamped(Header(Time.of(7_500_000_000), frame), twist))
+        until(lambda k=k: inbox.count == k + 1)
+        ((_, message),) = inbox.after(k, take=True)
+        assert message.velocities is not None
+        assert message.velocities.tolist() == [velocity]
+        assert (message.values, message.axes, message.t) == (None, axes, 7.5)
+    publisher.send(TwistStamped(Header(Time.of(0), "camera"), twist))
+    until(lambda: inbox.rejected == 1)
+    assert inbox.reason == ("a twist is in the frame 'camera'; needs 'world' or 'hand'")
+
+
 @pytest.mark.parametrize(("make", "message"), [
+    (lambda: StreamPose(source="ros2://a?type=twists"), "is 'twists'; needs pose or"),
+    (lambda: StreamPose(source="ros2://a?tool=hand"), "poses are in no tool's axes"),
+    (lambda: listening_inbox("ros2://a?type=twist", Space(7, False)), "carries twists"),
     (lambda: Stream(source="ros2://a b"), "'ros2://a b': 'a b' is no name"),
     (lambda: StreamPose(source="ros2://a?frames=b"), "'frames'; did you mean 'fra"),
     (lambda: listening_inbox("ros2://a", Space(7, False)), "needs 7 numbers"),

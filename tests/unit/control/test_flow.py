@@ -77,3 +77,34 @@ def test_robot_becomes_the_flow(kind: str) -> None:
     assert gaps[-1] < 1e-8
     # The flow itself is not at rest: the robot follows something that moves.
     assert np.abs(rollout.v[-1]).max() > 0.1
+
+
+def test_looking_ahead_moves_nothing() -> None:
+    """Neither the time, nor where the run begins, nor what is still to come."""
+    robot = hsp.Robot.load("panda")
+    q, v = robot.home(), np.zeros(7)
+    far = q + 0.2
+
+    def law() -> hsp.Controller:
+        circle = hsp.Circle(radius=0.05, angular_rate=1.0)
+        hand = hsp.FramePosition("panda_tcp", circle, name="hand")
+        controller = hsp.Controller(robot, [hand], hsp.JointCentering(), limits=None)
+        controller.at(0.5).gains("hand", hsp.Gains(natural_frequency=20.0))
+        return controller
+
+    def steps(controller: hsp.Controller, *, looking: bool) -> list[bytes]:
+        found = []
+        for k in range(30):
+            if looking:
+                controller.flow(10.0 + k, far)
+                controller.stack(robot.state(20.0 + k, far, v))
+            if looking and k:
+                assert controller.state.t == 0.05 * (k - 1)
+            if k == 3:
+                gains = hsp.Gains(natural_frequency=5.0)
+                controller.at(1.0).gains("hand", gains)
+                assert [each.at for each in controller.changes] == [0.5, 1.0]
+            found.append(controller.compute(0.05 * k, q, v).tau.tobytes())
+        return found
+
+    assert steps(law(), looking=True) == steps(law(), looking=False)

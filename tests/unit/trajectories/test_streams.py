@@ -2,6 +2,7 @@
 
 import copy
 import json
+import pickle
 from collections.abc import Callable
 from typing import Any
 
@@ -302,6 +303,17 @@ def test_a_record_that_is_full_says_how_much_it_lost(monkeypatch: Any) -> None:
     assert stream.counts()["taken"] == 5
 
 
+def test_little_is_recorded_where_nobody_writes_a_log(monkeypatch: Any) -> None:
+    monkeypatch.setattr(inbox, "BRIEF", 7)
+    for logged, kept in ((False, 3), (True, 5)):
+        stream = Stream([0.0])
+        if logged:
+            stream.log()
+        feed = at_times(*((0.1, lambda s=stream: s.send([0.1])) for _ in range(5)))
+        sampled(stream.anchored(None), 0.2, feed)
+        assert (len(stream.record), stream.unrecorded) == (kept, 5 - kept)
+
+
 def test_a_target_that_no_motion_reaches_is_refused_and_the_reference_rests() -> None:
     stream = Stream([0.0] * 3, speed=0.01).anchored(None)
     feed = at_times(
@@ -340,6 +352,47 @@ def test_a_copy_changes_nothing_for_the_original() -> None:
         return columns(sampled(stream, 2.0, feed))[0]
 
     assert np.array_equal(run(False), run(True))
+
+
+def state_of(stream: Any, t: float) -> bytes:
+    return b"".join(each.tobytes() for each in stream.sample(t))
+
+
+def test_a_pickle_brakes_where_its_original_does() -> None:
+    """A motion to a goal that moves ends before Ruckig's does, if no message comes."""
+    stream = Stream([0.0], policy="extrapolate", jerk=2.0, speed=5.0).anchored(None)
+    feed = at_times(
+        *((0.05 * k, lambda k=k: stream.send([0.02 * k], t=0.05 * k)) for k in range(9))
+    )
+    sampled(stream, 0.41, feed)
+    again = pickle.loads(pickle.dumps(stream))
+    for t in np.arange(0.41, 3.0, 0.05):
+        assert state_of(again, t) == state_of(stream, t)
+
+
+def test_a_pickle_takes_what_waits_and_not_what_was_taken() -> None:
+    stream = Stream([0.0]).anchored(None)
+    sampled(stream, 0.1, at_times((0.05, lambda: stream.send([0.1]))))
+    stream.send([0.2])
+    again, copied = pickle.loads(pickle.dumps(stream)), copy.deepcopy(stream)
+    for t in np.arange(0.11, 1.0, 0.01):
+        stream.sample(t)
+    # The original has taken it meanwhile; this copy has not yet.
+    behind = pickle.loads(pickle.dumps(copied))
+    for each in (again, behind):
+        each.sample(0.2)
+        assert each.sample(1.0).position[0] == pytest.approx(0.2, abs=1e-9)
+    assert [each.counts()["taken"] for each in (stream, again, behind)] == [2, 2, 2]
+
+
+def test_a_recording_goes_on_in_a_pickle() -> None:
+    messages = [{"at": 0.1 * k, "value": [0.01 * k]} for k in range(1, 9)]
+    stream = Stream([0.0], messages=messages).anchored(None)
+    sampled(stream, 0.45)
+    again = pickle.loads(pickle.dumps(stream))
+    for t in np.arange(0.46, 1.5, 0.02):
+        assert state_of(again, t) == state_of(stream, t)
+    assert again.counts() == stream.counts()
 
 
 # -- bad input ------------------------------------------------------------------------

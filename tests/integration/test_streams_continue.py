@@ -1,0 +1,192 @@
+"""A controller amid a stream: copies, pickles and previews go on, to the last bit."""
+
+import pickle
+import subprocess
+import sys
+from collections.abc import Sequence
+from copy import deepcopy
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pinocchio as pin
+import pytest
+
+import hsp_control as hsp
+from hsp_control.declaration.nested import parts_within
+from hsp_control.tasks import RelativePose
+from hsp_control.trajectories import ComposedPose
+
+PERIOD = 2e-3
+PANDA = hsp.Robot.load("panda")
+Q, V = PANDA.home(), np.zeros(7)
+POLICIES = ("latest", "interpolate", "extrapolate")
+KINDS = ("position", "orientation", "pose", "tool", "relative", "pointing", "joints")
+FIRST, LAST = 60, 130  # steps: it is copied after the first ones
+
+
+def law(kind: str, policy: Any) -> hsp.Controller:
+    """Return a controller with one task that a stream leads, ``hand``."""
+    how: dict[str, Any] = {"policy": policy, "smoothing": 0.03, "hold_after": 0.09}
+    pose = hsp.StreamPose(**how, axes="tool" if kind == "tool" else "world")
+    turn = hsp.StreamOrientation(**how, axes="tool")
+    point = hsp.Stream(**how)
+    tasks: dict[str, Any] = {
+        "position": lambda: hsp.FramePosition("panda_tcp", point, name="hand"),
+        "orientation": lambda: hsp.FrameOrientation("panda_tcp", turn, name="hand"),
+        "pose": lambda: hsp.FramePose("panda_tcp", pose, name="hand"),
+        "tool": lambda: hsp.FramePose("panda_tcp", pose, name="hand"),
+        "relative": lambda: RelativePose(
+            "panda_tcp", pose, reference="panda_link2", name="hand"
+        ),
+        "pointing": lambda: hsp.Pointing("panda_tcp", trajectory=turn, name="hand"),
+        "joints": lambda: hsp.JointPosture([0.0] * 7, displacement=point, name="hand"),
+    }
+    return hsp.Controller(PANDA, [tasks[kind]()], limits=None)
+
+
+def send(controller: hsp.Controller, kind: str, k: int) -> None:
+    """Send what comes before step k: targets, chunks, velocities, out of order."""
+    if k % 9:
+        return
+    task: Any = controller.tasks[0]
+    stream = task.displacement if kind == "joints" else task.trajectory
+    rng, t = np.random.default_rng(k), PERIOD * k - (0.03 if k % 4 == 0 else 0.0)
+    turns = kind not in ("position", "joints")
+    point = Q if kind == "joints" else np.array([0.3, 0.0, 0.5])
+    if kind in ("orientation", "pointing"):
+        point = np.zeros(0)
+
+    def near() -> np.ndarray:
+        turned = pin.Quaternion(pin.exp3(0.2 * rng.normal(size=3))).coeffs()
+        moved = point + 0.02 * rng.normal(size=len(point))
+        return np.concatenate([moved, turned]) if turns else moved
+
+    rates = 0.1 * rng.normal(size=len(point) + 3 * turns)
+    what = (k // 9) % 4
+    if what == 0:
+        stream.send(near(), t=t)
+    elif what == 1:
+        stream.send_chunk([near() for _ in range(4)], [0.02, 0.05, 0.09, 0.2], t=t)
+    elif what == 2:
+        stream.send(velocity=rates, t=t)
+    else:
+        stream.send(near(), velocity=rates, t=t)
+
+
+def steps(controller: hsp.Controller, kind: str, which: Sequence[int]) -> list[bytes]:
+    """Return the efforts of some steps, as bytes."""
+    found = []
+    for k in which:
+        send(controller, kind, k)
+        found.append(controller.compute(PERIOD * k, Q, V).tau.tobytes())
+        controller.applied(np.zeros(7), PERIOD)
+    return found
+
+
+def amid(kind: str, policy: str) -> hsp.Controller:
+    """Return a controller that has made some steps, and has a message to take."""
+    controller = law(kind, policy)
+    steps(controller, kind, range(FIRST))
+    task: Any = controller.tasks[0]
+    stream = task.displacement if kind == "joints" else task.trajectory
+    size = {"joints": 7, "pose": 6, "tool": 6, "relative": 6}.get(kind, 3)
+    stream.send(velocity=0.05 * np.ones(size))  # nobody has taken it yet
+    return controller
+
+
+@pytest.fixture(scope="module")
+def elsewhere(tmp_path_factory: pytest.TempPathFactory) -> dict[str, list[bytes]]:
+    """Return the efforts of pickles that go on in another process, by case."""
+    file = tmp_path_factory.mktemp("amid") / "controllers.pkl"
+    cases = {f"{k} {p}": pickle.dumps(amid(k, p)) for k in KINDS for p in POLICIES}
+    file.write_bytes(pickle.dumps(cases))
+    command = [sys.executable, __file__, str(file)]
+    done = subprocess.run(command, check=True, stdout=subprocess.PIPE)
+    found: dict[str, list[bytes]] = pickle.loads(done.stdout)
+    return found
+
+
+@pytest.mark.parametrize("policy", POLICIES)
+@pytest.mark.parametrize("kind", KINDS)
+def test_a_pickle_goes_on_elsewhere_to_the_last_bit(
+    elsewhere: dict[str, list[bytes]], kind: str, policy: str
+) -> None:
+    expected = steps(amid(kind, policy), kind, range(FIRST, LAST))
+    assert elsewhere[f"{kind} {policy}"] == expected
+    assert len(set(expected)) > 50  # it was moving
+
+
+@pytest.mark.parametrize("policy", POLICIES)
+@pytest.mark.parametrize("kind", KINDS)
+def test_copies_go_on_and_what_looks_ahead_moves_nothing(
+    kind: str, policy: str
+) -> None:
+    """The copy hears what the original does; both are asked in turn."""
+    expected = steps(amid(kind, policy), kind, range(FIRST, LAST))
+    controller = amid(kind, policy)
+    copy = deepcopy(controller)
+    found, copied = [], []
+    for k in range(FIRST, LAST):
+        if k % 20 == 5:
+            controller.flow(PERIOD * k + 0.5, Q)
+            controller.stack(PANDA.state(PERIOD * k + 1.0, Q, V))
+            preview = controller.preview()
+            for t in np.linspace(0.0, 2.0, 20):
+                preview.compute(t, Q, V)
+            deepcopy(controller).compute(PERIOD * k + 3.0, Q, V)
+            pickle.loads(pickle.dumps(controller)).compute(PERIOD * k + 3.0, Q, V)
+        found += steps(controller, kind, [k])
+        copied.append(copy.compute(PERIOD * k, Q, V).tau.tobytes())
+        copy.applied(np.zeros(7), PERIOD)
+    assert found == expected
+    assert copied == expected
+
+
+def leaving() -> tuple[hsp.Controller, hsp.StreamPose]:
+    """Return a controller whose task leaves a stream from 0.3 s on, for two seconds."""
+    stream = hsp.StreamPose(delay=0.05, dead_man=1.0)
+    controller = hsp.Controller(PANDA, [hsp.FramePose(None, stream)], limits=None)
+    led(controller, stream, 0, 30)
+    controller.at(0.3).ramp(2.0).reference("end_effector", ComposedPose())
+    return controller, stream
+
+
+def led(
+    controller: hsp.Controller, stream: hsp.StreamPose, first: int, last: int
+) -> list[np.ndarray]:
+    """Return the efforts of steps of 10 ms, while the stream goes on."""
+    found = []
+    for k in range(first, last):
+        if k % 5 == 0:
+            turn = 0.2 * np.sin(k * np.ones(3))
+            stream.send(velocity=np.concatenate([0.1 * turn, turn]))
+        found.append(controller.compute(0.01 * k, Q, V).tau.copy())
+        controller.applied(np.zeros(7), 0.01)
+    return found
+
+
+def test_a_task_that_leaves_a_stream_goes_on_in_copies_and_beside_other_changes() -> (
+    None
+):
+    """A second later a stream knows where the change began, for who asks again."""
+    expected = np.array(led(*leaving(), 30, 250))
+    for k in (31, 180, 240):
+        controller, stream = leaving()
+        led(controller, stream, 30, k)
+        copy = pickle.loads(pickle.dumps(controller))
+        heard = next(parts_within(copy.tasks[0], hsp.StreamPose), stream)
+        np.testing.assert_array_equal(led(copy, heard, k, 250), expected[k - 30 :])
+        # The same gains again: all references are made anew, and (1 - s) Kp + s Kp.
+        controller.at(0.0).gains("end_effector", hsp.Gains(natural_frequency=10.0))
+        found = led(deepcopy(controller), stream, k, 250)
+        np.testing.assert_allclose(found, expected[k - 30 :], rtol=0, atol=1e-11)
+
+
+if __name__ == "__main__":
+    cases = pickle.loads(Path(sys.argv[1]).read_bytes())
+    after = {
+        name: steps(pickle.loads(each), name.split()[0], range(FIRST, LAST))
+        for name, each in cases.items()
+    }
+    sys.stdout.buffer.write(pickle.dumps(after))
