@@ -25,7 +25,7 @@ struct Evolve {
   Scratch<'n'> factor;  // of such a matrix
 
   void check() const {
-    if (definite * definite != x.size() && definite != 0)
+    if (definite < 0 || (definite != 0 && definite * definite != x.size()))
       throw std::invalid_argument("definite is 0, or the size of a matrix of as many numbers as x");
   }
 

@@ -1,6 +1,6 @@
 """Close the loop of a simulated arm with a controller that runs without Python.
 
-    python start.py [CONFIG] [--duration S] [--out DIR]
+    python start.py [CONFIG] [--duration S] [--out DIR] [--set KEY=VALUE]
 
 It freezes a configuration, compiles `live.cpp`, starts the simulated robot of
 ``hsp live`` in one process and the C++ loop in another, and waits. Python is needed to
@@ -41,10 +41,11 @@ def main() -> int:
     parser = argparse.ArgumentParser(description=(__doc__ or "").split("\n")[0])
     parser.add_argument("config", nargs="?", default="panda_limits")
     parser.add_argument("--duration", type=float, default=10.0, metavar="S")
+    parser.add_argument("--set", action="append", default=[], metavar="KEY=VALUE")
     parser.add_argument("--out", type=Path, default=Path("out"), metavar="DIR")
     options = parser.parse_args()
     options.out.mkdir(parents=True, exist_ok=True)
-    experiment = hsp.load_experiment(options.config)
+    experiment = hsp.load_experiment(options.config, *options.set)
     frozen = hsp.freeze(
         experiment.controller,
         options.out / f"{experiment.name}.hsp",

@@ -38,7 +38,6 @@ def freeze(options: argparse.Namespace) -> int:
             ("estimators",),
             "estimators are Python, which a frozen controller runs without",
         )
-    options.out.mkdir(parents=True, exist_ok=True)
     with document.at():
         file = write(
             experiment.controller,

@@ -55,6 +55,7 @@ def freeze(
         raise FreezeError(f"period is {period}; needs a positive number of seconds")
     content = _image(controller.preview(), compensation, period, start).content()
     file = Path(path)
+    file.parent.mkdir(parents=True, exist_ok=True)
     file.write_bytes(content)
     return file
 
@@ -81,6 +82,7 @@ def _image(
             compensation.check(robot, own.tasks, own.contacts)
     q = own._setup.start.state.q if start is None else robot.check_configuration(start)
     own.compute(0.0, q, np.zeros(robot.nv))  # binds the step
+    own._state.mass_matrix  # noqa: B018 (of this state: the file does not depend on others)
     own._limits.forget()
     bound = own._run.bound
     assert bound is not None  # it is steady

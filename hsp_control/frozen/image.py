@@ -2,7 +2,7 @@
 
 A plan is calls on arrays of NumPy. Arrays that overlap are one block, so that what one
 call writes another one reads, and each block begins where it began to a processor's
-packets: the order of a sum, and so its last bit, follows from that. The
+packets: the order of a sum, and so its last bit, may follow from that. The
 kinds of calls are named, and their arguments by their members' names; nothing here is
 of one kind.
 
@@ -17,6 +17,7 @@ import struct
 import zlib
 from bisect import bisect_right
 from collections.abc import Iterable, Mapping, Sequence
+from functools import partial
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -171,8 +172,19 @@ class _Memory:
 
 def refusal(item: object) -> str:
     """Return why an object cannot be saved."""
-    what = item.function if isinstance(item, PythonCall) else item
-    return f"{what!r:.200} is Python, which a frozen controller runs without"
+    what = _name(item.function) if isinstance(item, PythonCall) else repr(item)
+    return f"{what:.200} is Python, which a frozen controller runs without"
+
+
+def _name(function: Any) -> str:
+    """Return the name of a function, or of the class whose method it is."""
+    if isinstance(function, partial):
+        given = [*function.args, *function.keywords.values()]
+        function = next(filter(callable, given), function.func)
+    owner = getattr(function, "__self__", None)
+    if owner is not None:
+        return type(owner).__name__
+    return str(getattr(function, "__qualname__", repr(function)))
 
 
 def _arrays(item: object, seen: set[int]) -> Iterable[Any]:

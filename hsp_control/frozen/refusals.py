@@ -29,8 +29,8 @@ def check_steady(own: Controller) -> None:
     if own.changes:
         with within("changes"):
             raise FreezeError(
-                "a frozen controller follows no time line: remove the changes, or "
-                "freeze the controller that they lead to"
+                "a frozen controller follows no time line: remove the changes; gains "
+                "and K_N are inputs, which hsp_ramp changes"
             )
     for each in setup.tasks:
         if not each.always:

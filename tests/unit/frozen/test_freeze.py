@@ -17,6 +17,7 @@ from frozen_runs import (
 
 import hsp_control as hsp
 from hsp_control.common.exceptions import EngineError, FreezeError
+from hsp_control.common.resources import bundled_configs
 from hsp_control.engine import own_kinds
 from hsp_control.engine.plans import PartCall
 from hsp_control.frozen import cmake_folder, include_folder, library
@@ -224,3 +225,30 @@ def test_rows_of_barriers_and_of_static_efforts(
         expected = computed(controller, states)
         assert len(set(expected[:, 0])) > 1
         np.testing.assert_array_equal(replayed(replay, frozen, states), expected)
+
+
+@pytest.mark.process
+def test_every_bundled_configuration(replay: Path, tmp_path: Path) -> None:
+    """Those that are frozen give the same bits; the others are refused with a key."""
+    refused = {}
+    for name in bundled_configs():
+        experiment = hsp.load_experiment(name)
+        controller = experiment.controller
+        try:
+            frozen = hsp.freeze(controller, tmp_path / "frozen.hsp")
+        except FreezeError as error:
+            refused[name] = error.path
+            continue
+        given = controller.robot, experiment.q0, 200, SEED
+        for states in (
+            simulated_states(experiment, 0.2),
+            random_states(*given, away=0.4, speed=0.5),
+        ):
+            np.testing.assert_array_equal(
+                replayed(replay, frozen, states), computed(controller, states), name
+            )
+    # what stands on contacts, walks, or changes while it runs
+    folders = {name.split("/")[0] for name in refused}
+    assert folders == {"compliance", "forces", "walking", "whole_body"}
+    assert len(refused) == 13
+    assert all(refused.values())
