@@ -4,14 +4,11 @@
 
 Runs the same sweep with one worker and with two, in turns, start of the workers
 included. By wall time the efficiency is T1/(2 T2). On a machine with other load this is
-meaningless: two processes do not get twice the processor time of one. Two factors do
-not depend on other load: the ratio of processor times, C1/C2, and the ratio B2/B1 of
-the fractions of time that workers spend in runs (not starting or waiting). Their
-product is the efficiency on an otherwise idle machine.
+meaningless: two processes do not get twice the processor time of one. B1 and B2 are the
+fractions of time that workers spend in runs, not starting or waiting.
 """
 
 import argparse
-import resource
 import statistics
 from time import perf_counter
 from typing import NamedTuple
@@ -20,16 +17,14 @@ from hsp_control.companions.sweeps import sweep
 
 
 class Cost(NamedTuple):
-    """Wall time [s] and processor time [s] of a sweep; fraction of time in runs."""
+    """Wall time [s] of a sweep; fraction of it in runs."""
 
     clock: float
-    processor: float
     busy: float
 
 
 def cost(samples: int, workers: int) -> Cost:
     """Run a sweep, and return its cost."""
-    before = resource.getrusage(resource.RUSAGE_CHILDREN)
     begin = perf_counter()
     found = sweep(
         "panda_limits",
@@ -39,10 +34,8 @@ def cost(samples: int, workers: int) -> Cost:
         workers=workers,
     )
     clock = perf_counter() - begin
-    after = resource.getrusage(resource.RUSAGE_CHILDREN)
     assert found.completed.all()
-    processor = after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
-    return Cost(clock, processor, float(found["wall_time"].sum()) / workers / clock)
+    return Cost(clock, float(found["wall_time"].sum()) / workers / clock)
 
 
 def main() -> None:
@@ -51,22 +44,18 @@ def main() -> None:
     parser.add_argument("--rounds", type=int, default=3)
     parser.add_argument("--samples", type=int, default=100)
     options = parser.parse_args()
-    cost(2, 1)  # compiles the kernels
-    print("| round | T1 | T2 | T1/(2 T2) | C1/C2 | B1 | B2 | idle machine |")
-    print("|--:|--:|--:|--:|--:|--:|--:|--:|")
+    print("| round | T1 | T2 | T1/(2 T2) | B1 | B2 |")
+    print("|--:|--:|--:|--:|--:|--:|")
     found = []
     for k in range(options.rounds):
         one, two = cost(options.samples, 1), cost(options.samples, 2)
-        clock, work = one.clock / two.clock / 2, one.processor / two.processor
-        own = work * two.busy / one.busy
-        found.append((clock, own))
+        found.append(one.clock / two.clock / 2)
         print(
-            f"| {k + 1} | {one.clock:.1f} s | {two.clock:.1f} s | {clock:.2f} | "
-            f"{work:.3f} | {one.busy:.3f} | {two.busy:.3f} | {own:.3f} |",
+            f"| {k + 1} | {one.clock:.1f} s | {two.clock:.1f} s | {found[-1]:.2f} | "
+            f"{one.busy:.3f} | {two.busy:.3f} |",
             flush=True,
         )
-    clock, own = (statistics.median(column) for column in zip(*found, strict=True))
-    print(f"| median | | | {clock:.2f} | | | | {own:.3f} |")
+    print(f"| median | | | {statistics.median(found):.2f} | | |")
 
 
 if __name__ == "__main__":

@@ -14,15 +14,17 @@ def no_garbage_collection() -> Iterator[None]:
 
     A collection takes milliseconds at an unknown time, and a control step creates no
     reference cycles. Existing objects are frozen: an explicit collection skips them.
+    Where some were frozen before, all stay so: none can be taken out alone.
     """
-    was_enabled = gc.isenabled()
+    was_enabled, were_frozen = gc.isenabled(), gc.get_freeze_count() > 0
     gc.collect()
     gc.freeze()
     gc.disable()
     try:
         yield
     finally:
-        gc.unfreeze()
+        if not were_frozen:
+            gc.unfreeze()
         if was_enabled:
             gc.enable()
 

@@ -88,7 +88,10 @@ def _own_workers(workers: int | None) -> "Iterator[Client]":
     }
     with dask.config.set(settings):
         cluster = LocalCluster(
-            n_workers=0, host="127.0.0.1", dashboard_address=":0", silence_logs=False
+            n_workers=0,
+            host="127.0.0.1",
+            dashboard_address="127.0.0.1:0",
+            silence_logs=False,
         )
     process = None
     try:

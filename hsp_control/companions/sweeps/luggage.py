@@ -14,6 +14,7 @@ from pathlib import Path
 from shutil import rmtree
 from threading import RLock
 from typing import Any
+from uuid import uuid4
 
 from distributed import WorkerPlugin
 
@@ -64,7 +65,7 @@ class Luggage(WorkerPlugin):  # type: ignore[misc]
         Raises:
             SweepError: If a type that the runs use has no file.
         """
-        self.name = f"{_PREFIX}{fingerprint(robot)[:8]}-{id(self):x}"
+        self.name = f"{_PREFIX}{uuid4().hex}"  # also of its keys on a shared scheduler
         self.versions = versions()
         self.files: dict[str, bytes] = {}
         named = {*_strings([plan.base.to_dict(), *(_listed(f) for f in plan.factors)])}

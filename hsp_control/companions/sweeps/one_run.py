@@ -1,7 +1,7 @@
 """One run, on a worker: plain data in, plain data out."""
 
 from collections.abc import Callable
-from time import perf_counter
+from time import perf_counter, sleep
 from typing import Any, NamedTuple
 
 from hsp_control.common.exceptions import HspControlError, SimulationError, SweepError
@@ -44,7 +44,10 @@ def one_run(luggage: str, run: int, changes: Changes, time_limit: float | None) 
     """
     from distributed import get_worker
 
-    return computed(get_worker().plugins[luggage].experiment, run, changes, time_limit)
+    plugins, end = get_worker().plugins, perf_counter() + 60.0
+    while luggage not in plugins and perf_counter() < end:
+        sleep(0.05)  # it comes on another way, perhaps later than the run
+    return computed(plugins[luggage].experiment, run, changes, time_limit)
 
 
 def computed(

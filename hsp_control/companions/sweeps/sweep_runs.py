@@ -21,6 +21,7 @@ from hsp_control.declaration.imported import import_file
 if TYPE_CHECKING:
     from distributed import Client
 
+    from hsp_control.companions.sweeps.luggage import Luggage
     from hsp_control.companions.sweeps.one_run import Row
     from hsp_control.companions.sweeps.row_files import RowFiles
 
@@ -182,7 +183,7 @@ def _rehearse(plan: SweepPlan, run: int) -> None:
 
 def _computed(
     plan: SweepPlan,
-    packed: Any,
+    packed: "Luggage",
     rows: "RowFiles",
     client: "Client",
     time_limit: float | None,
@@ -205,7 +206,7 @@ def _computed(
             for run in islice(left, most)
         ]  # fmt: skip
 
-    client.register_plugin(packed, name=packed.name)
+    _give(client, packed)
     waiting = as_completed(
         submitted(AT_ONCE), loop=client.loop, with_results=True, raise_errors=False
     )
@@ -220,6 +221,23 @@ def _computed(
         tidy = Thread(target=_tidy, args=(client, packed.name), daemon=True)
         tidy.start()
         tidy.join(5.0)
+
+
+def _give(client: "Client", packed: "Luggage") -> None:
+    """Give the luggage to all workers; one that is stopped gets it when it goes on."""
+    failed: list[Exception] = []
+
+    def give() -> None:
+        try:
+            client.register_plugin(packed, name=packed.name)
+        except Exception as error:
+            failed.append(error)
+
+    giving = Thread(target=give, daemon=True)
+    giving.start()
+    giving.join(10.0)
+    if failed:
+        raise SweepError(f"a worker cannot be prepared: {failed[0]}")
 
 
 def _tidy(client: "Client", luggage: str) -> None:

@@ -54,6 +54,11 @@ def test_the_collector_is_away_and_comes_back() -> None:
     assert gc.isenabled()
     with no_garbage_collection():
         assert not gc.isenabled()
+    frozen = gc.get_freeze_count()
+    assert frozen > 1000  # what the tests had frozen before is so still
+    gc.unfreeze()
+    with no_garbage_collection():
+        assert not gc.isenabled()
         assert gc.get_freeze_count() > 1000
     assert gc.isenabled()
     assert gc.get_freeze_count() == 0
@@ -67,6 +72,7 @@ def test_the_collector_is_away_and_comes_back() -> None:
         assert not gc.isenabled()
     finally:
         gc.enable()
+        gc.freeze()
 
 
 @pytest.mark.parametrize("config", ["paper/4_moving_obstacle", "iiwa_null_space"])
