@@ -164,8 +164,9 @@ def with_edit(edit: Edit | None, folder: Path) -> None:
 
 
 HEADER = (
-    "| constant | rests in I | in M(q) | latest rest [s] | change in 1 ms / limit, half "
-    "/ most | too far from the goal [mm], half / most | within 1 mm beside a field |\n"
+    "| constant | rests in I | in M(q) | latest rest [s] | change in 1 ms / limit, "
+    "half / most | too far from the goal [mm], half / most | within 1 mm beside a "
+    "field |\n"
     "|---|--:|--:|--:|--:|--:|--:|\n"
 )
 
