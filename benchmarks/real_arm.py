@@ -217,7 +217,8 @@ def main() -> None:
     )
     options = parser.parse_args()
     missing: dict[str, str] = {}
-    introduction = INTRODUCTION.format(seeds=options.seeds)
+    alone = f" --ours --seeds {options.seeds}" if options.ours else ""
+    introduction = INTRODUCTION.format(seeds=options.seeds, alone=alone)
     tables: dict[str, list[str]] = {kind: [] for kind in KINDS}
     ending: list[str] = []
 
@@ -295,7 +296,7 @@ HEADER = (
 INTRODUCTION = """\
 # Arms that are not their models
 
-Written by `.venv/bin/python benchmarks/real_arm.py`; do not edit.
+Written by `.venv/bin/python benchmarks/real_arm.py{alone}`; do not edit.
 
 A pose is held for 3 s, or the hand moves on a circle of 8 cm at 2 rad/s, at 1 kHz. No
 law knows what differs. Median / worst of {seeds} seeds: the pose's error at the end,
