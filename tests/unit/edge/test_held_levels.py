@@ -144,9 +144,10 @@ def test_what_a_level_asks_for_does_not_know_those_below(
     q, v = robot.home() + 0.3 * rng.standard_normal(7), 0.3 * rng.standard_normal(7)
     here = robot.state(0.0, q, v).position("panda_tcp")
     goal = here + (2.0 if far else 0.02) * rng.standard_normal(3)
+    error: Any = "robot" if far else "none"  # which bounds no inverse
     tasks = [
-        hsp.FramePosition("panda_tcp", hsp.Hold(goal)),
-        hsp.FrameOrientation("panda_tcp", priority=2),
+        hsp.FramePosition("panda_tcp", hsp.Hold(goal), largest_error=error),
+        hsp.FrameOrientation("panda_tcp", priority=2, largest_error=error),
     ]
     found = []
     for count in (1, 2):
@@ -154,6 +155,7 @@ def test_what_a_level_asks_for_does_not_know_those_below(
         made = hsp.Controller(robot, tasks[:count], metric=weight, start=robot.home())
         made.compute(0.0, q, v)
         law = made.active_stack.resolution
+        assert far or law.edge_level[0] == 0
         calls = [law.call(v, beside=True), law.self_motions(v)[0]]
         parted, (by_levels, _) = law.by_levels(v)
         planned([*calls, parted]).run(0.0)
