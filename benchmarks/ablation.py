@@ -1,18 +1,16 @@
-"""What each ingredient of the edge is for: the same cases without it.
+"""What each constant of the edge is for: the same cases with half, twice or none of it.
 
     .venv/bin/python benchmarks/ablation.py [--cases N] [--robots ROBOT ...] [NAME ...]
 
-An ingredient is left out of a copy of the package by replacing lines of it; a line that
-is not found ends the benchmark, so that what is left out is always a part of the code
-as it is. Constants are halved and doubled, too. Defaults only, at 1 and 5 ms: targets
-out of reach as in `edge.py`, hands on springs, two levels, pushes, a steady force, one
-axis or two, also without limits; of a planar arm, which has none, what it can have. For
-ingredients of the limits also the rollouts of `limit_robots.py`, and efforts bisected
-on the way to stretched postures where a limit binds. Writes the second table of
-benchmarks/results/edge.md.
+A constant is replaced in a copy of the package; a line that is not found ends the
+benchmark, so that what is replaced is always a constant of the law as it is. Targets
+out of reach with defaults only, the kinds of `edge_rest.py`, in the metrics I and M(q),
+at 10 ms, where a sampled loop bears least; and feasible tasks beside fields that push
+into limits. Writes the table of constants into benchmarks/results/edge.md.
 """
 
 import argparse
+import itertools
 import json
 import os
 import shutil
@@ -20,282 +18,208 @@ import subprocess
 import sys
 import tempfile
 import warnings
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from edge_cases import Arm, unit
-from edge_rest import IN_THE_PLANE, OUT, Case, case, is_planar, measure
-from limit_robots import roll_out
+from edge_rest import KINDS, Case, case, measure
 from marked_sections import RESULTS, replace_section
 
 import hsp_control as hsp
 from hsp_control.common.arrays import Array
+from hsp_control.common.exceptions import HspControlError
 
 ROOT = Path(__file__).resolve().parents[1]
-ROBOTS, PERIODS = ("panda", "ur5", "iiwa14"), (0.001, 0.005)
-KINDS = (*OUT, "push", "steady", "spring above", "just out", "axes", "unlimited")
+ROBOTS, PERIOD = ("panda", "iiwa14", "xarm7"), 0.01
+OF_ABLATION = ("position", "levels", "just out", "axes", "spring above", "mass")
 NEAREST = ("position", "levels", "just out")  # the hand's distance counts
-ROLLOUTS, WAYS, POINTS = 24, 6, 1000  # of a robot; of a way
+FIELDS = (300.0, 1e4)  # beside a step of 10 cm [rad/s]
+KEPT = 1e-3  # [m]
 
-_LIMITS = "constraints/limits/acceleration_bounds.py"
-_COST = "control/actuation/deviation_cost.py"
 _EDGE = "edge/threshold.py"
 _SHARES = "edge/shares.py"
 _TARGET = "edge/limited_target.py"
-_LEVELS = "edge/damped_levels.py"
-_SENT = "control/actuation/sent_effort.py"
-_MODEL = "robot/model.py"
+_HELD = "edge/held_levels.py"
 
 Edit = tuple[str, str, str]
-"""A file, a text in it, and what replaces it."""
+"""A file, a line's begin, and what replaces it."""
 
 
-def constant(file: str, line: str, *values: float) -> tuple[tuple[Edit, ...], ...]:
+def constant(file: str, line: str, **others: float) -> dict[str, Edit]:
     """Return the edits that give a constant other values.
 
     Args:
         file: Where it is.
         line: Its line's begin, with its value last.
-        *values: The others.
+        **others: The others, by what they are.
     """
     begin = line.rsplit(" ", 1)[0]
-    return tuple(((file, line, f"{begin} {value}"),) for value in values)
+    return {name: (file, line, f"{begin} {value}") for name, value in others.items()}
 
 
-_HALF_L, _TWICE_L, _NO_L = constant(_EDGE, "STIFFNESS = 200.0", 100.0, 400.0, 1e12)
-_HALF_B, _TWICE_B, _NO_B = constant(_EDGE, "BELOW = 40.0", 20.0, 80.0, 0.0)
-_HALF_T, _TWICE_T, _NO_T = constant(
-    _EDGE, "TURNING, QUICKEST = 50.0", 25.0, 100.0, 1e12
-)
-_HALF_N, _TWICE_N = constant(_SHARES, "NEAR = 0.1", 0.05, 0.2)
-
-INGREDIENTS: dict[str, tuple[Edit, ...]] = {
-    "nothing": (),
-    "bounded error": ((_MODEL, "return 0.35 * self.size, 1.25", "return 1e3, 1e3"),),
-    "bounded force of springs": (
-        (_MODEL, "return float(turns.max()) / lever, 0.5 * float(turns.max())",
-         "return np.inf, np.inf"),
+CONSTANTS: dict[str, dict[str, Edit]] = {
+    "L": constant(_EDGE, "STIFFNESS = 200.0", half=100.0, twice=400.0, none=1e12),
+    "less of L for one axis or two": {
+        "none": (
+            "tasks/feedback.py", "max(WHOLE + 1.0 - self.size, 1.0)", "1.0"
+        ),
+    },
+    "40 below a held level": constant(
+        _EDGE, "BELOW = 40.0", half=20.0, twice=80.0, none=0.0
     ),
-    "threshold that follows (L)": _NO_L,
-    "L: half of it": _HALF_L,
-    "L: twice": _TWICE_L,
-    "less of L for one axis or two": (
-        ("tasks/feedback.py", "max(WHOLE + 1.0 - self.size, 1.0)", "1.0"),
+    "50 1/s of a field": constant(
+        _EDGE, "TURNING, QUICKEST = 50.0", half=25.0, twice=100.0, none=1e12
     ),
-    "threshold of the field": _NO_T,
-    "50 1/s: half of it": _HALF_T,
-    "50 1/s: twice": _TWICE_T,
-    "7 rad/s: half of it": ((_EDGE, "QUICKEST = 50.0, 7.0", "QUICKEST = 50.0, 3.5"),),
-    "7 rad/s: twice": ((_EDGE, "QUICKEST = 50.0, 7.0", "QUICKEST = 50.0, 14.0"),),
-    "threshold below a held level": _NO_B,
-    "40: half of it": _HALF_B,
-    "40: twice": _TWICE_B,
-    "what those above it draw": (
-        (_LEVELS, "opposed[k] -= J[", "opposed[k] -= 0.0 * J["),
+    "7 rad/s of a field": {
+        "half": (_EDGE, "QUICKEST = 50.0, 7.0", "QUICKEST = 50.0, 3.5"),
+        "twice": (_EDGE, "QUICKEST = 50.0, 7.0", "QUICKEST = 50.0, 14.0"),
+    },
+    "σ_x, 0.1": constant(_SHARES, "NEAR = 0.1", half=0.05, twice=0.2),
+    "0.85 of ℓ": constant(_SHARES, "FAR = 0.85", less=0.7),
+    "K of what yields": constant(
+        _HELD, "STIFFEST = 1000.0", half=500.0, twice=2000.0, none=1e12
     ),
-    "how a null space turns": (
-        (_EDGE, "following.size / above))", "0.0 / above))"),
-    ),
-    "share: near": (
-        (_SHARES, "return float(smooth_share(2.0 - 2.0 *", "return float(0.0 * ("),
-    ),
-    "near, 0.1: half of it": _HALF_N,
-    "near, 0.1: twice": _TWICE_N,
-    "share: far": (
-        (_SHARES, "return float(smooth_share((most - FAR)", "return float(0.0 * (most"),
-    ),
-    "far, 0.85: 0.7": ((_SHARES, "FAR = 0.85", "FAR = 0.7"),),
-    "share: limits": (
-        (_TARGET, "change[i] = tasks * (", "change[i] = 0.0 * ("),
-    ),
-    "static effort": (
-        ("constraints/limits/limits.py", "_HELD = 0.95", "_HELD = 100.0"),
-    ),
-    "effort's rate": ((_MODEL, "_LEG_RATE = 11.0, 500.0", "_LEG_RATE = 1e9, 1e9"),),
-    "barrier of the speed knows the rate": (
-        (_LIMITS, "if gap > 0.0 and jerk < np.inf:", "if gap > np.inf:"),
-    ),
-    "steeper beyond the speed": ((_LIMITS, "_STEEPER = 4.0", "_STEEPER = 1.0"),),
-    "speed's margin of the error": (
-        (_LIMITS, "velocity[i] - error[i] /", "velocity[i] - 0.0 * error[i] /"),
-    ),
-    "position's drift": ((_LIMITS, "_SHIFT = 0.1", "_SHIFT = 0.0"),),
-    "steady force": (
-        (_SENT, "steady[i] = _shared(drift[i], present)", "steady[i] = 0.0"),
-    ),
-    "null space dearer with the error": (
-        (_COST, "_MOST = 1.0, 0.2, 0.1", "_MOST = 0.0, 0.0, 0.1"),
-    ),
-    "springs cost what is below them": (
-        (_COST, "(standing or not springs)", "(standing or True)"),
-    ),
-    "directions that levels share": (
-        (_COST, "count = _write_damped_level(directions)",
-         "count = _write_levels(directions, 1)\n"
-         "        _write_roots(directions, count)"),
-        (_COST, "count = _write_levels(directions, first_damped)",
-         "count = _write_levels(directions, directions.ends.shape[0])"),
-        (_COST, "        _write_shared(directions, count)", "        pass"),
+    "2, excess of the tasks": constant(
+        _TARGET, "LARGE = 2.0", half=1.0, twice=4.0, none=1e12
     ),
 }  # fmt: skip
+ROWS: dict[str, Edit | None] = {"as it is": None} | {
+    f"{name}: {how}": edit
+    for name, edits in CONSTANTS.items()
+    for how, edit in edits.items()
+}
 
 
-def cases(robots: list[str], kinds: list[str], count: int) -> list[Case]:
-    """Return ``count`` cases of a kind, robot and period; the same in every call."""
+def cases(robots: list[str], count: int) -> list[Case]:
+    """Return ``count`` cases of a kind and robot; the same in every call."""
     found = []
     for robot in robots:
         arm = Arm(robot)
-        for kind in kinds:
-            if is_planar(robot) and kind not in IN_THE_PLANE:
-                continue
-            for period in PERIODS:
-                key = [KINDS.index(kind), PERIODS.index(period)]
-                for seed in range(count):
-                    rng = np.random.default_rng([seed, *key])
-                    found.append(case(arm, kind, period, rng))
+        for kind in OF_ABLATION:
+            for seed in range(count):
+                rng = np.random.default_rng([seed, KINDS.index(kind)])
+                found.append(case(arm, kind, PERIOD, rng))
     return found
 
 
-def jump(name: str, seed: int) -> float:
-    """Return the largest jump of an effort [N·m] on the way to a stretched posture.
-
-    Joints have a largest acceleration, so that a limit binds; levels are one or two.
-    """
-    robot, rng = hsp.Robot.load(name), np.random.default_rng(seed)
-    (lower, upper), n = robot.position_limits(), robot.nv
-    begin = np.clip(robot.home() + rng.uniform(-1, 1, n), lower + 0.1, upper - 0.1)
-    way = np.clip(0.02 * rng.normal(size=n), lower + 0.01, upper - 0.01) - begin
-    here = robot.state(0.0, begin, np.zeros(n)).position(robot.end_effector)
-    goal = here + rng.uniform(0.3, 1.5) * unit(rng)
-    hands: list[hsp.Task] = [hsp.FramePosition(robot.end_effector, hsp.Hold(goal))]
-    if seed % 2:
-        hands.append(hsp.FrameOrientation(robot.end_effector, priority=2))
-    limits = hsp.Limits(acceleration=rng.uniform(2.0, 20.0), effort_rate="none")
-    made = hsp.Controller(robot, hands, limits=limits, start=begin)
-    v = 0.2 * rng.normal(size=n)
-
-    def effort(share: float) -> Array:
-        tau = made.compute(0.0, begin + share * way, v).tau.copy()
-        turned = np.linalg.norm(made.active_stack.rows.error[3:])
-        # At half a turn an orientation has two ways back.
-        return tau if turned < 3.1 else np.full(n, np.nan)
-
-    shares = np.linspace(0.0, 1.0, POINTS)
-    efforts = np.array([effort(share) for share in shares])
-    worst = int(np.nanargmax(np.abs(np.diff(efforts, axis=0)).max(axis=1)))
-    low, high = shares[worst : worst + 2]
-    for _ in range(20):
-        middle = 0.5 * (low + high)
-        parts = [effort(each) for each in (low, middle, high)]
-        first, second = np.abs(np.diff(parts, axis=0)).max(axis=1)
-        low, high = (low, middle) if first > second else (middle, high)
-    return float(max(first, second))
+def constant_field(g: Array, state: hsp.RobotState) -> Array:
+    """Return g."""
+    return g
 
 
-def measure_all(given: Path, results: Path, *, limits: bool) -> None:
-    """Measure the package that is found first; also what its limits do, or not."""
+def kept(name: str, size: float, seed: int) -> float:
+    """Return how far a hand ends from a target within reach beside a field [m]."""
+    arm, rng = Arm(name), np.random.default_rng([seed, round(size)])
+    robot, d, u = arm.robot, rng.normal(size=arm.robot.nv), unit(rng)
+    q0 = robot.home()
+    here = robot.state(0.0, q0, np.zeros(robot.nv)).position(arm.frame)
+    goal = hsp.trajectories.ComposedPose(hsp.Hold(here + 0.1 * u))
+    field = hsp.fields.FunctionField(
+        partial(constant_field, size * d / np.linalg.norm(d))
+    )
+    hand = hsp.FramePose(arm.frame, goal, name="hand")
+    made = hsp.Controller(robot, [hand], field, start=q0)
+    try:
+        run = hsp.simulate(
+            made, q0, duration=2.5, control_period=PERIOD, check_rate=False
+        )
+    except HspControlError:
+        return float("inf")
+    return float(np.linalg.norm(run["task.hand.error"][-1, :3]))
+
+
+def measure_all(given: Path, results: Path) -> None:
+    """Measure the package that is found first."""
     warnings.simplefilter("ignore")
     drawn = [Case(*each) for each in json.loads(given.read_text(encoding="utf-8"))]
-    robots = {name: hsp.Robot.load(name) for name in {case.robot for case in drawn}}
+    names = dict.fromkeys(case.robot for case in drawn)
+    robots = {name: hsp.Robot.load(name) for name in names}
+    mass = hsp.metrics.MassMatrixMetric()
+    of_first = sum(case.robot == drawn[0].robot for case in drawn)
+    seeds = range(2 * of_first // len(OF_ABLATION))
     found: dict[str, Any] = {
-        "runs": [measure(case, robots[case.robot]) for case in drawn]
+        "I": [measure(case, robots[case.robot]) for case in drawn],
+        "M": [measure(case, robots[case.robot], mass) for case in drawn],
+        "kept": [kept(*own) for own in itertools.product(names, FIELDS, seeds)],
     }
-    if limits:
-        found |= limited()
     results.write_text(json.dumps(found), encoding="utf-8")
 
 
-def limited() -> dict[str, Any]:
-    """Return what limits do in random rollouts, and where they bind."""
-    rolled = [roll_out((name, seed)) for name in ROBOTS for seed in range(ROLLOUTS)]
-    violated = np.sum([run.violated for run in rolled], axis=0)
-    return {
-        "steps": sum(len(run.status) for run in rolled),
-        "speed": int(violated[2]),
-        "position": int(violated[3]),
-        "jump": max(jump(name, seed) for name in ROBOTS for seed in range(WAYS)),
-    }
-
-
-def without(edits: tuple[Edit, ...], folder: Path) -> None:
-    """Write a copy of the package in which texts are replaced."""
+def with_edit(edit: Edit | None, folder: Path) -> None:
+    """Write a copy of the package in which a text is replaced."""
     shutil.rmtree(folder, ignore_errors=True)
     shutil.copytree(ROOT / "hsp_control", folder / "hsp_control")
     for data in ("robots", "configs"):
         (folder / data).symlink_to(ROOT / data)
-    for name, old, new in edits:
-        file = folder / "hsp_control" / name
-        text = file.read_text(encoding="utf-8")
-        if text.count(old) != 1:
-            raise SystemExit(f"{name} has {old!r} {text.count(old)} times, not once")
-        file.write_text(text.replace(old, new), encoding="utf-8")
+    if edit is None:
+        return
+    name, old, new = edit
+    file = folder / "hsp_control" / name
+    text = file.read_text(encoding="utf-8")
+    if text.count(old) != 1:
+        raise SystemExit(f"{name} has {old!r} {text.count(old)} times, not once")
+    file.write_text(text.replace(old, new), encoding="utf-8")
 
 
 HEADER = (
-    "| without | rests | change in 1 ms / limit, half / most | too far from the goal "
-    "[mm], half / most | F/k off by | joint beyond its range, pushed [rad] | steps "
-    "beyond a speed, a position | jump of an effort [N·m] |\n"
-    "|---|--:|--:|--:|--:|--:|--:|--:|\n"
+    "| constant | rests in I | in M(q) | latest rest [s] | change in 1 ms / limit, "
+    "half / most | too far from the goal [mm], half / most | within 1 mm beside a "
+    "field |\n"
+    "|---|--:|--:|--:|--:|--:|--:|\n"
 )
 
 
 def row(name: str, found: dict[str, Any]) -> str:
-    """Return the line of an ingredient."""
-    runs = found["runs"]
-    rest = [run["rests"] for run in runs]
+    """Return the line of a constant."""
+    runs = [*found["I"], *found["M"]]
+    rest = [
+        f"{sum(run['rests'] for run in found[metric])} of {len(found[metric])}"
+        for metric in ("I", "M")
+    ]
     change = [run["change"] for run in runs]
     away = [1e3 * run["away"] for run in runs if run["kind"] in NEAREST]
-    yields = [100.0 * run["yields"] for run in runs if run["yields"] is not None]
-    beyond = max(run["beyond"] for run in runs)
-    limits = "| |"
-    if "jump" in found:
-        violated = f"{found['speed']}, {found['position']} of {found['steps']}"
-        limits = f"| {violated} | {found['jump']:.2g}"
+    ends = found["kept"]
     return (
-        f"| {name} | {sum(rest)} of {len(rest)} | {np.median(change):.2g} / "
-        f"{max(change):.2g} | {np.median(away):.2g} / {max(away):.2g} | "
-        f"{max(yields, default=0.0):.2g} % | {max(beyond, 0.0):.2g} {limits} |\n"
+        f"| {name} | {' | '.join(rest)} | {max(run['still'] for run in runs):.1f} | "
+        f"{np.median(change):.2g} / {max(change):.2g} | {np.median(away):.2g} / "
+        f"{max(away):.2g} | {sum(end < KEPT for end in ends)} of {len(ends)} |\n"
     )
 
 
 def main() -> None:
     """Measure all copies, print the table and write it."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--cases", type=int, default=3, help="of a kind, robot, period")
-    parser.add_argument("--robots", nargs="+", default=[*ROBOTS, "planar3r"])
-    parser.add_argument("--kinds", nargs="+", default=list(KINDS))
+    parser.add_argument("--cases", type=int, default=3, help="of a kind and robot")
+    parser.add_argument("--robots", nargs="+", default=list(ROBOTS))
     parser.add_argument("--keep", type=Path, help="a folder of runs already made")
     parser.add_argument("--measure", nargs=2, type=Path, help=argparse.SUPPRESS)
-    parser.add_argument("--limits", action="store_true", help=argparse.SUPPRESS)
-    parser.add_argument("names", nargs="*", default=list(INGREDIENTS))
+    parser.add_argument("names", nargs="*", default=list(ROWS))
     options = parser.parse_args()
     if options.measure:
-        measure_all(*options.measure, limits=options.limits)
+        measure_all(*options.measure)
         return
     table = HEADER
     with tempfile.TemporaryDirectory() as temporary:
-        kept = (options.keep or Path(temporary)).resolve()
-        kept.mkdir(parents=True, exist_ok=True)
-        given = kept / "cases.json"
+        folder = (options.keep or Path(temporary)).resolve()
+        folder.mkdir(parents=True, exist_ok=True)
+        given = folder / "cases.json"
         if not given.exists():
-            made = cases(options.robots, options.kinds, options.cases)
+            made = cases(options.robots, options.cases)
             given.write_text(json.dumps(made), encoding="utf-8")
         for name in options.names:
-            results = kept / f"{name}.json"
+            results = folder / f"{name.replace('/', ' ')}.json"
             if not results.exists():
-                edits = INGREDIENTS[name]
-                without(edits, kept / "copy")
-                path = [str(kept / "copy"), str(Path(__file__).parent)]
+                with_edit(ROWS[name], folder / "copy")
+                path = [str(folder / "copy"), str(Path(__file__).parent)]
                 environment = {**os.environ, "PYTHONPATH": os.pathsep.join(path)}
                 command = [sys.executable, __file__, "--measure", given, results]
-                if all(file in (_LIMITS, _COST) for file, _, _ in edits):
-                    command.append("--limits")
                 subprocess.run(command, env=environment, check=True)
             line = row(name, json.loads(results.read_text(encoding="utf-8")))
             print(line, end="", flush=True)
             table += line
-    if options.names == list(INGREDIENTS):
+    if options.names == list(ROWS):
         replace_section(RESULTS / "edge.md", "ablation", table)
 
 

@@ -1,6 +1,7 @@
 """Hold and move a hand with arms that are not their models, beside other laws.
 
     .venv/bin/python benchmarks/real_arm.py [--seeds N] [--arms panda,ur5] [--out FILE]
+                                            [--ours]
 
 The same wrong arms for all: masses and inertias ±20 %, centres of mass ±10 mm; and "as
 real", with a load of 0.5 kg, rotors of 0.05 kg m² and friction that no model contains,
@@ -162,7 +163,7 @@ def measured(case: Case, plant: SampledPlant, compute: Compute) -> Run:
 
 
 def laws(
-    case: Case, kind: str, missing: dict[str, str]
+    case: Case, kind: str, missing: dict[str, str], *, alone: bool = False
 ) -> dict[str, Callable[[], Compute]]:
     """Return what makes each controller of a case."""
 
@@ -177,6 +178,8 @@ def laws(
     }
     if kind == "real":  # else the arms have no rotors
         found[ROTORS] = lambda: chain(Compensation(), rotors=GUESSED)
+    if alone:
+        return {name: make for name, make in found.items() if name in (OURS, ROTORS)}
     if case.robot.nq != case.robot.nv:  # peers subtract postures
         return found
     for module, name in PEERS.items():
@@ -209,9 +212,13 @@ def main() -> None:
     parser.add_argument("--seeds", type=int, default=4)
     parser.add_argument("--arms", default=",".join(ARMS | MORE_ARMS))
     parser.add_argument("--out", type=Path, default=PAGE)
+    parser.add_argument(
+        "--ours", action="store_true", help="this law with its defaults alone"
+    )
     options = parser.parse_args()
     missing: dict[str, str] = {}
-    introduction = INTRODUCTION.format(seeds=options.seeds)
+    alone = f" --ours --seeds {options.seeds}" if options.ours else ""
+    introduction = INTRODUCTION.format(seeds=options.seeds, alone=alone)
     tables: dict[str, list[str]] = {kind: [] for kind in KINDS}
     ending: list[str] = []
 
@@ -226,8 +233,10 @@ def main() -> None:
 
     for arm in options.arms.split(","):
         for kind in KINDS:
-            tables[kind] += rows(arm, kind, options.seeds, missing)
+            tables[kind] += rows(arm, kind, options.seeds, missing, options.ours)
         write()  # what there is
+    if options.ours:
+        return
     case = Case("panda", moves=False)
     ending += ["", "## The delay that is borne", "", BORNE, ""]
     ending += ["| law | Panda [ms] |", "|---|--:|"]
@@ -237,12 +246,16 @@ def main() -> None:
     print(f"Wrote {options.out}")
 
 
-def rows(arm: str, kind: str, seeds: int, missing: dict[str, str]) -> list[str]:
+def rows(
+    arm: str, kind: str, seeds: int, missing: dict[str, str], alone: bool
+) -> list[str]:
     """Return the lines of an arm."""
     runs: dict[str, list[list[Run]]] = {}
     for case in (Case(arm, moves=False), Case(arm, moves=True)):
         for name, make in track(
-            laws(case, kind, missing).items(), f"{arm}, {kind}", transient=True
+            laws(case, kind, missing, alone=alone).items(),
+            f"{arm}, {kind}",
+            transient=True,
         ):
             own = [
                 measured(case, wrong_arm(case, kind, seed), make())
@@ -283,7 +296,7 @@ HEADER = (
 INTRODUCTION = """\
 # Arms that are not their models
 
-Written by `.venv/bin/python benchmarks/real_arm.py`; do not edit.
+Written by `.venv/bin/python benchmarks/real_arm.py{alone}`; do not edit.
 
 A pose is held for 3 s, or the hand moves on a circle of 8 cm at 2 rad/s, at 1 kHz. No
 law knows what differs. Median / worst of {seeds} seeds: the pose's error at the end,

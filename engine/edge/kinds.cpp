@@ -1,4 +1,6 @@
 #include "../src/rooms.hpp"
+#include "by_levels.hpp"
+#include "held_levels.hpp"
 #include "limited_target.hpp"
 #include "parts.hpp"
 #include "resolve.hpp"
@@ -6,6 +8,7 @@
 
 namespace hsp {
 const Kind* const* edge_kinds() {
-  return kinds<Resolve, SelfMotions, LimitedTarget, WriteThresholds, ThresholdBelow, HowHeld>();
+  return kinds<Resolve, SelfMotions, ByLevels, HeldLevels, LimitedTarget, WriteThresholds,
+               ThresholdBelow, HowHeld>();
 }
 }  // namespace hsp

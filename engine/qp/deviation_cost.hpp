@@ -7,7 +7,8 @@
 // What is below a level costs a small part of what the level itself does, and the more of it the
 // larger the level's own error is: priorities are strict where the errors are small. With a fixed
 // tiny part, a hand that cannot reach its target would move the null space as far as limits permit
-// for the last bit of it, from one bound of the efforts to the other between two periods.
+// for the last bit of it, from one bound of the efforts to the other between two periods. It costs
+// more where a limit holds the level forever, see `edge/held_levels.hpp`.
 //
 // Springs do not come first: what is below a level of springs costs as much as it does. Over the
 // mass matrix, their metric, the deviation is then what Gauss's principle of least constraint
@@ -51,11 +52,12 @@ struct Directions {
   In<'n', 'n'> L;         // Cholesky factor of the metric
   std::int64_t form;      // metric's form
   Ints<'l'> ends;         // where each level's rows end
-  In<'m'> error;          // error e of all tasks
   Flags<'m'> springs;     // whether a row is that of a spring
+  In<'m'> error;          // error e of all tasks
   double size;            // robot's size [m]
   std::int64_t first;     // first level that may deviate: 1 below contacts, else 0
   double least;           // least cost of a level relative to the one above it
+  In<'l'> held;           // what is below each level costs at least, see `HeldLevels`
   In<'l'> thresholds;     // singular value below which a direction belongs to a level in part
   Factors<In> factors;
   Projectors<In> projectors;
@@ -114,13 +116,14 @@ struct Directions {
     for (Index k = 0; k < last; ++k) {
       costs.t[k] = log_cost;
       const Index rows = ends[k] - start;
+      const bool is_spring = springs.segment(start, rows).all();
       const double of_error = k < last - 1 ? below_level : below_last;
       const double length = error.segment(start, rows).norm();
       // Whoever stands keeps the balance at any cost.
-      const double below = standing ? 0.0 : of_error * length / size;
-      const bool is_spring = springs.segment(start, rows).all();
+      const double far = std::min(of_error * length / size, most);
+      const double below = standing ? 0.0 : std::max(far, held[k]);
       if (k >= first && (standing || !is_spring))
-        log_cost += std::log(std::min(std::max(below, least), most));
+        log_cost += std::log(std::clamp(below, least, 1.0));
       start = ends[k];
     }
     // Nothing but contacts: the null space is cheap.

@@ -151,6 +151,38 @@ class Resolution:
         )
         return call, written
 
+    def by_levels(self, v: Array) -> tuple[PartCall, tuple[Array, Factors]]:
+        """Return the call that writes what levels contribute, after `self_motions`.
+
+        Args:
+            v: Velocity, shape (nv,).
+
+        Returns:
+            The call, and what it writes: what the first k levels make of a_damped for
+            each level k but the last, and all that the tasks make of a, shape (levels,
+            nv); orthonormal rows Q = X J L⁻ᵀ of the stack, X lower triangular.
+        """
+        task, m = self.problem.task, len(self.problem.asked)
+        made = np.zeros((len(self.ends), len(v)))
+        factors = Factors(np.zeros((m, len(v))), np.zeros((m, m)))
+        call = PartCall(
+            engine.ByLevels,
+            J=task.jacobian,
+            J_dot=task.jacobian_dot,
+            a_x=task.acceleration,
+            L=self.problem.metric.L,
+            form=self.form,
+            v=v,
+            projectors=self.projectors,
+            ends=self.ends,
+            edge_level=self.edge_level,
+            a=self.acceleration,
+            self_motion=self._self_motions[0],
+            by_levels=made,
+            factors=factors,
+        )
+        return call, (made, factors)
+
     def diagnosis(self, first: int) -> tuple[PartCall, Array, Array]:
         """Return a call that finds how near the law is to singular and to rest.
 

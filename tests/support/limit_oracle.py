@@ -42,13 +42,16 @@ def stacked(*rows: Rows) -> Rows:
     return Rows(*(np.concatenate(parts) for parts in zip(*rows, strict=True)))
 
 
-def level_costs(resolution: Resolution, supported: bool, size: float) -> Array:
+def level_costs(
+    resolution: Resolution, supported: bool, size: float, held: Array
+) -> Array:
     """Return ρ of each level, then of the null space, shape (levels + 1,).
 
     What is below a level costs a part of the level's error over the robot's size, but
-    no more than a tenth and no less than priorities need; on contacts the least,
-    whatever the error. Contacts cost as much as the level below them, and so do springs
-    where there are none.
+    no more than a tenth and no less than priorities need; and what limits ask for,
+    ``held``, if that is more, but no more than the level itself. On contacts it is the
+    least, whatever the error. Contacts cost as much as the level below them, and so do
+    springs where there are none.
     """
     count = len(resolution.ends) - supported
     least = 1e-6 ** (1.0 / max(count, 1))
@@ -56,8 +59,8 @@ def level_costs(resolution: Resolution, supported: bool, size: float) -> Array:
     for k, end in enumerate(resolution.ends):
         error = np.linalg.norm(resolution.problem.task.error[start:end])
         of_error = 0.2 if k == len(resolution.ends) - 1 else 1.0
-        below = 0.0 if supported else of_error * error / size
-        below = np.clip(below, least, 0.1)
+        below = max(min(of_error * error / size, 0.1), held[k])
+        below = np.clip(0.0 if supported else below, least, 1.0)
         springs = resolution.problem.springs[start:end].all() and not supported
         equal = springs or (supported and k == 0)
         costs.append(costs[-1] * (1.0 if equal else below))
@@ -65,14 +68,16 @@ def level_costs(resolution: Resolution, supported: bool, size: float) -> Array:
     return np.array(costs)
 
 
-def deviation_cost(resolution: Resolution, supported: bool, size: float) -> Array:
+def deviation_cost(
+    resolution: Resolution, supported: bool, size: float, held: Array
+) -> Array:
     """Return H, shape (nv, nv), also where levels share directions.
 
     log H = Σ log ρ_k (P_{k-1} - P_k), with P_k from the spectra of the levels.
     """
     J, L = resolution.problem.task.jacobian, resolution.problem.metric.L
     whitened, n = np.linalg.solve(L, J.T).T, len(L)
-    logs = np.log(level_costs(resolution, supported, size))
+    logs = np.log(level_costs(resolution, supported, size, held))
     P, T, start = np.eye(n), np.zeros((n, n)), 0
     for k, end in enumerate(resolution.ends):
         B, floor = whitened[start:end], resolution.thresholds[k] ** 2
@@ -106,6 +111,7 @@ def limited_step(
     base: NDArray[np.int64],
     weight: float,
     size: float,
+    costs: Array,
 ) -> Step:
     """Return the QP of efforts within bounds, motion within bounds, and cones.
 
@@ -120,10 +126,11 @@ def limited_step(
         base: Degrees of freedom without a motor.
         weight: The robot's weight [N].
         size: The robot's size [m].
+        costs: What is below each level costs at least, shape (levels,).
     """
     n, p = len(a), support.size
     H = np.zeros((n + p, n + p))
-    H[:n, :n] = deviation_cost(resolution, p > 0, size)
+    H[:n, :n] = deviation_cost(resolution, p > 0, size, costs)
     cost = _FORCE_COST / np.maximum(support.inverse_cost, 1e-6)
     H[range(n, n + p), range(n, n + p)] = cost
     f = np.zeros(n + p)

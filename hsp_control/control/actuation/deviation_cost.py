@@ -33,6 +33,7 @@ class Levels(NamedTuple):
     size: float  # robot's size [m]
     first: int  # first level that may deviate: 1 below contacts, else 0
     least: float  # least cost of a level relative to the one above it
+    held: Array  # what is below each level costs at least, see `held_levels`, (levels,)
     # singular value of each level below which a direction belongs to it in part, shape
     # (levels,)
     thresholds: Array
@@ -42,7 +43,9 @@ class Levels(NamedTuple):
     alone: bool  # see `Resolution`
 
     @classmethod
-    def of(cls, resolution: Resolution, supported: bool, size: float) -> Self:
+    def of(
+        cls, resolution: Resolution, supported: bool, size: float, held: Array
+    ) -> Self:
         """Return those of a law; ``supported``: its first level is that of contacts."""
         levels = len(resolution.ends) - supported
         problem = resolution.problem
@@ -56,6 +59,7 @@ class Levels(NamedTuple):
             size,
             int(supported),
             _LEAST ** (1.0 / max(levels, 1)),
+            held,
             resolution.thresholds,
             resolution.factors,
             resolution.projectors,

@@ -33,6 +33,7 @@ from hsp_control.control.actuation.deviation_cost import (
 from hsp_control.control.actuation.dual_active_set import QP, Workspace
 from hsp_control.control.actuation.support import Support
 from hsp_control.edge import Resolution
+from hsp_control.edge.held_levels import held_levels
 from hsp_control.edge.limited_target import (
     Barred,
     Parts,
@@ -136,6 +137,32 @@ Barriers = Mapping[str, tuple[Array, Array]]
 """Rows A a ≥ b by kind, ``barriers`` or ``holding``: A, shape (k, nv), and b, (k,)."""
 
 
+def _at_the_edge(
+    state: RobotState,
+    resolution: Resolution,
+    wanted: Wanted,
+    within: Within,
+    permitted: Permitted,
+    barred: Barred,
+) -> tuple[PartCalls, Array]:
+    """Return what writes what a step comes near to, and what yielding costs there."""
+    law, damped = resolution.acceleration, resolution.edge.damped
+    taken, (self_motions, brakings) = resolution.self_motions(state.v)
+    parted, (by_levels, factors) = resolution.by_levels(state.v)
+    holding, held = held_levels(
+        *wanted,
+        resolution,
+        by_levels,
+        factors,
+        within,
+        permitted.effort,
+        barred,
+    )
+    parts = Parts(law, damped, *self_motions, *brakings)
+    target = limited_target(*wanted, parts, within, permitted, barred)
+    return [taken, parted, holding, target], held
+
+
 class LimitedStep:
     """The QP of one set of contacts and one stack of tasks, and what relaxes it."""
 
@@ -200,7 +227,6 @@ class LimitedStep:
         cost = support.inverse_cost, support.weight
         forces = Forces(support.map, first, *edges, *cost)
         places = Places(np.array([*base, *limited], dtype=np.int64), len(base))
-        levels = Levels.of(resolution, p > 0, state.robot.size or 1.0)
         directions = Directions.of(n)
         x, moving, none = zeros(width), np.zeros(1, np.int64), np.zeros(1, np.int64)
         self._outcome = outcome
@@ -252,14 +278,15 @@ class LimitedStep:
             )
 
         rows: list[AnyCall] = [*state.inertia.calls, resolution.damped_beside(state.v)]
+        # What yielding costs at least; with a floating base priorities are strict.
+        self.held = zeros(len(resolution.ends))
         if permitted is not None:
-            kept, edge = slice(barriers, contacts), resolution.edge
-            law = resolution.acceleration, edge.damped
-            own, (self_motions, brakings) = resolution.self_motions(state.v)
-            parts = Parts(*law, *self_motions, *brakings)
+            kept = slice(barriers, contacts)
             barred = Barred(A[kept], lower[kept])
-            target = *wanted, parts, Within(*bounds[:2]), permitted, barred
-            rows += own, limited_target(*target)
+            given = state, resolution, wanted, Within(*bounds[:2]), permitted, barred
+            target, self.held = _at_the_edge(*given)
+            rows += target
+        levels = Levels.of(resolution, p > 0, state.robot.size or 1.0, self.held)
         rows.append(
             PartCall(engine.LimitedRows, **around, A=A, lower=lower, upper=upper)
         )

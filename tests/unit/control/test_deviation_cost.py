@@ -44,9 +44,12 @@ METRICS: dict[str, hsp.metrics.Metric] = {
 }
 
 
-def inverse_cost(resolution: Resolution) -> Array:
+def inverse_cost(resolution: Resolution, held: Array) -> Array:
     """Return J Jᵀ, which is to be H⁻¹."""
-    levels, directions = Levels.of(resolution, False, panda().size), Directions.of(7)
+    levels, directions = (
+        Levels.of(resolution, False, panda().size, held),
+        Directions.of(7),
+    )
     JT, moving = np.zeros((7, 7)), np.zeros(1, dtype=np.int64)
     calls = [
         write_directions(levels, directions),
@@ -96,8 +99,9 @@ def test_levels_share_directions_as_the_law_does(
         controller = computed(threshold, "robot")
     resolution = controller.active_stack.resolution
     planned([resolution.damped_beside(state.v)]).run(0.0)  # as where a limit binds
-    H = limit_oracle.deviation_cost(resolution, False, robot.size)
-    np.testing.assert_allclose(inverse_cost(resolution) @ H, np.eye(7), atol=1e-5)
+    held = 10.0 ** rng.uniform(-7.0, 1.0, size=levels)  # from strict to as dear
+    H = limit_oracle.deviation_cost(resolution, False, robot.size, held)
+    np.testing.assert_allclose(inverse_cost(resolution, held) @ H, np.eye(7), atol=1e-5)
 
 
 FIELD = 0.01 * hsp.JointCentering()
@@ -177,7 +181,7 @@ def test_efforts_are_continuous_near_a_straight_elbow(
         worst = int(np.nanargmax(changes))
         assert changes[worst] < 40.0
         low, high = angles[worst : worst + 2]
-        for _ in range(8):
+        for _ in range(12):
             middle = 0.5 * (low + high)
             parts = [effort(each) for each in (low, middle, high)]
             first, second = np.abs(np.diff(parts, axis=0)).max(axis=1)

@@ -112,6 +112,8 @@ def test_it_is_the_optimum(name: str, spread: float, seed: int) -> None:
     stack, state = made.active_stack, made.state
     weight, bounds = stack.support.weight, actuation_of(made)._limits.bounds
     wanted = actuation_of(made)._wanted.acceleration  # see `limited_target`
+    made_by = actuation_of(made)._qp
+    assert made_by is not None
     qp = limit_oracle.limited_step(
         state.mass_matrix,
         wanted,
@@ -123,6 +125,7 @@ def test_it_is_the_optimum(name: str, spread: float, seed: int) -> None:
         stack.support.base,
         weight,
         made.robot.size,
+        made_by.held,
     )
     x = np.concatenate([a - wanted, forces / weight])
     scale = np.linalg.norm(qp.rows.A, axis=1) * (1.0 + np.abs(x).max())

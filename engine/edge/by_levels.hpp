@@ -1,0 +1,68 @@
+// What the first levels make of the law, where a limit binds.
+#pragma once
+#include "resolve.hpp"
+
+namespace hsp {
+
+struct ByLevels {
+  static constexpr const char* doc =
+      "Write what the first k levels make of a_damped for each level k but the last, and all that "
+      "the tasks make of a, after `SelfMotions`.";
+  In<'m', 'n'> J, J_dot;
+  In<'m'> a_x;
+  In<'n', 'n'> L;
+  int form;
+  In<'n'> v;
+  Projectors<In> projectors;  // of the levels, if the damped law bounds an inverse
+  Ints<'l'> ends;             // where each level's rows end
+  Ints<1> edge_level;
+  In<'n'> a, self_motion;  // φ_N of it
+  Out<'l', 'n'> by_levels;
+  Factors<Out> factors;  // Q = X J L⁻ᵀ, with orthonormal rows, and X lower triangular
+  Scratch<'m', 'n'> B;
+  Scratch<'m'> missing, part;
+  Scratch<'n'> sum, level;
+
+  void check() const { check_ends("ends", ends, J.rows()); }
+  void operator()() {
+    const Index last = ends.size() - 1;
+    if (last < 0) return;
+    whiten(J, L, form, B);
+    orthonormalise_rows(B, factors.Q, factors.X);
+    if (last > 0) {
+      missing = a_x;
+      missing.noalias() -= J_dot * v;
+      edge_level[0] == 0 ? write_exact(last) : write_damped(last);
+    }
+    by_levels.row(last) = (a - self_motion).transpose();
+  }
+
+ private:
+  // X is lower triangular: the first k levels of the exact law are those of the law that has no
+  // others.
+  void write_exact(Index last) {
+    part.noalias() = factors.X * missing;
+    sum.setZero();
+    for (Index k = 0, start = 0; k < last; start = ends[k++]) {
+      const Index rows = ends[k] - start;
+      sum.noalias() += factors.Q.middleRows(start, rows).transpose() * part.segment(start, rows);
+      level = sum;
+      if (form != IDENTITY) solve_lower_transposed(L, level);
+      by_levels.row(k) = level.transpose();
+    }
+  }
+
+  void write_damped(Index last) {
+    sum.setZero();
+    for (Index k = 0, start = 0; k < last; start = ends[k++]) {
+      const Index rows = ends[k] - start;
+      auto rest = missing.segment(start, rows), row = part.head(rows);
+      rest.noalias() -= J.middleRows(start, rows) * sum;
+      add_level(projectors.QJ.middleCols(start, rows),
+                projectors.G_inverse.block(start, start, rows, rows), rest, row, sum);
+      by_levels.row(k) = sum.transpose();
+    }
+  }
+};
+
+}  // namespace hsp

@@ -1,0 +1,132 @@
+// What yielding costs where limits hold the tasks, level by level.
+//
+// Where a limit binds, the step deviates from what is wanted by δ, and what is below a level yields
+// before it does (`qp/deviation_cost.hpp`). Let c δ ≥ x be the limit, in whitened coordinates with
+// |c| = 1, n the length of the part of c that is left to what is below, and ρ what that costs.
+// Below the level δ has the length
+//
+//   x n/(n² + ρ (1 - n²)),
+//
+// whose slope in n is at most x/(n² + ρ): n turns with the posture, and δ with it. A task that
+// cannot be met asks for x forever. So ρ has to follow x as ε follows f (`threshold.hpp`), unless
+// what is below can give x easily:
+//
+//   ρ = max_c (A/K - n²),      A = x max_j ‖L⁻¹e_j‖
+//
+// with A the most that x may make of a joint's acceleration. Of a direction of the singular value
+// s below its threshold ε a level has the share 1 - (1 - s²/ε²)², as of the law.
+#pragma once
+#include <hsp/linalg.hpp>
+#include <hsp/records.hpp>
+
+#include "../law/law.hpp"
+
+namespace hsp {
+
+struct HeldLevels {
+  static constexpr const char* doc =
+      "Write what is below each level costs at least, relative to it, for what the first levels "
+      "ask for beyond limits; no more counts than all of a is beyond them.";
+  In<'n', 'n'> M, L;
+  int form;
+  In<'n'> a;               // what is wanted
+  In<'n'> effort;          // M a + N, and what compensators add
+  In<'n'> law;             // of it the law's
+  In<'l', 'n'> by_levels;  // what the first k levels make of the law
+  Factors<In> factors;     // Q = X J L⁻ᵀ, orthonormal rows, X lower triangular
+  Ints<'l'> ends;          // where each level's rows end
+  In<'l'> thresholds;      // ε of each level
+  struct {
+    In<'n'> lower, upper;
+  } bounds;           // on a
+  In<'n'> permitted;  // efforts; inf where there is no limit
+  struct {
+    In<'k', 'w'> A;  // the first n columns count
+    In<'k'> lower;   // for a deviation δ from a: A δ ≥ lower
+  } barred;
+  double stiffest;  // K: the most that δ may change with its direction [1/s²]
+  Out<'l'> held;
+  Scratch<'n'> change, effort_change, row;
+  Scratch<'m'> share;
+
+  void check() const {
+    check_ends("ends", ends, factors.Q.rows());
+    check_at_least("the columns of barred.A", barred.A.cols(), a.size());
+  }
+  void operator()() {
+    write_shares();
+    double longest = 0.0;
+    for (Index i = 0; i < a.size(); ++i) longest = std::max(longest, length_of_joint(i));
+    for (Index k = 0; k < held.size(); ++k) {
+      change = by_levels.row(k).transpose() - law;
+      effort_change.noalias() = M * change;
+      held[k] = cost(ends[k], longest / stiffest);
+    }
+  }
+
+ private:
+  // What each row's level has of its direction.
+  void write_shares() {
+    for (Index k = 0, r = 0; k < ends.size(); ++k)
+      for (; r < ends[k]; ++r) {
+        const double inverse = factors.X(r, r);  // of what the rows before leave of a row
+        const double s = inverse > 0.0 ? 1.0 / (inverse * thresholds[k]) : 0.0;
+        const double left = std::max(1.0 - s * s, 0.0);
+        share[r] = 1.0 - left * left;
+      }
+  }
+
+  // The largest of A/K - n² of all limits, 0 if there is none; `rows` belong to the levels.
+  double cost(Index rows, double scale) {
+    double most = 0.0;
+    const auto consider = [&](double excess) {  // of the limit in `row`
+      const double length = row.norm();
+      double owned = 0.0;
+      for (Index r = 0; r < rows; ++r) {
+        const double part = factors.Q.row(r).dot(row.transpose()) / length;
+        owned += share[r] * part * part;
+      }
+      most = std::max(most, scale * excess / length - (1.0 - owned));
+    };
+    for (Index i = 0; i < a.size(); ++i) {
+      const double x = a[i], dx = change[i];
+      const double above = std::min(x, x + dx) - bounds.upper[i];
+      const double below = bounds.lower[i] - std::max(x, x + dx);
+      if (above > 0.0 || below > 0.0) {
+        length_of_joint(i);
+        consider(std::max(above, below));
+      }
+      const double force = effort[i], df = effort_change[i];
+      const double push = std::min(force, force + df) - permitted[i];
+      const double pull = -permitted[i] - std::max(force, force + df);
+      if (push > 0.0 || pull > 0.0) {
+        whiten_row(M.col(i));
+        consider(std::max(push, pull));
+      }
+    }
+    for (Index r = 0; r < barred.lower.size(); ++r) {
+      const auto own = barred.A.row(r).head(a.size()).transpose();
+      const double missing = barred.lower[r] - std::max(own.dot(change), 0.0);
+      if (missing > 0.0) {
+        whiten_row(own);
+        consider(missing);
+      }
+    }
+    return most;
+  }
+
+  double length_of_joint(Index i) {
+    row.setZero();
+    row[i] = 1.0;
+    if (form != IDENTITY) solve_lower(L, row);
+    return row.norm();
+  }
+
+  // L⁻¹c
+  template <class C> void whiten_row(const C& c) {
+    row = c;
+    if (form != IDENTITY) solve_lower(L, row);
+  }
+};
+
+}  // namespace hsp

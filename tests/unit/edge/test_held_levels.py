@@ -1,0 +1,212 @@
+"""How hard limits hold the levels, beside plain formulas."""
+
+from typing import Any, NamedTuple
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from task_cases import load
+
+import hsp_control as hsp
+from hsp_control.common.arrays import Array
+from hsp_control.control.actuation.deviation_cost import (
+    Directions,
+    Levels,
+    write_directions,
+    write_inverse_root,
+)
+from hsp_control.edge.held_levels import STIFFEST, held_levels
+from hsp_control.edge.limited_target import Barred, Within
+from hsp_control.edge.step import Factors, Projectors
+from hsp_control.engine.plans import planned
+from hsp_control.law import CONSTANT, IDENTITY
+
+NV, ENDS = 5, (1, 3)
+seeds = st.integers(0, 2**32 - 1)
+
+
+class Law(NamedTuple):
+    """What of a resolved law counts."""
+
+    problem: Any
+    acceleration: Array
+    form: int
+    ends: Array
+    thresholds: Array
+
+
+class Metric(NamedTuple):
+    """Of a metric its factor."""
+
+    L: Array
+
+
+class Problem(NamedTuple):
+    """Of a problem its metric."""
+
+    metric: Metric
+
+
+def drawn(seed: int, size: float, L: Array | None = None) -> dict[str, Any]:
+    """Return a random request of a size, with limits of some 10."""
+    rng = np.random.default_rng(seed)
+    root, other = rng.normal(size=(2, NV, NV))
+    M, W = root @ root.T + np.eye(NV), other @ other.T + 0.1 * np.eye(NV)
+    L = np.linalg.cholesky(W) if L is None else L
+    law, more = size * rng.normal(size=(2, NV))
+    a, away = law + 0.1 * more, 10.0 * rng.uniform(0.1, 1.0, size=(2, NV))
+    B = np.linalg.solve(L, rng.normal(size=(NV, ENDS[-1]))).T
+    triangle: Array = np.linalg.inv(np.linalg.cholesky(B @ B.T)).astype(np.float64)
+    thresholds = rng.uniform(0.1, 3.0, size=len(ENDS))
+    ends = np.array(ENDS)
+    return {
+        "M": M,
+        "a": a,
+        "effort": M @ a + rng.normal(size=NV),
+        "resolution": Law(Problem(Metric(L)), law, CONSTANT, ends, thresholds),
+        "by_levels": size * rng.normal(size=(len(ENDS), NV)),
+        "factors": Factors(triangle @ B, triangle),
+        "bounds": Within(-away[0], away[1]),
+        "permitted": 10.0 * rng.uniform(0.5, 2.0, size=NV),
+        "barred": Barred(rng.normal(size=(2, NV)), -rng.uniform(1.0, 10.0, size=2)),
+    }
+
+
+def excesses(given: dict[str, Any], change: Array) -> Array:
+    """Return how far a + change is beyond each limit."""
+    a, effort = given["a"] + change, given["effort"] + given["M"] @ change
+    missing = given["barred"].lower - given["barred"].A @ change
+    bounds, permitted = given["bounds"], given["permitted"]
+    return np.concatenate(
+        [a - bounds.upper, bounds.lower - a, effort - permitted, -effort - permitted,
+         missing]
+    )  # fmt: skip
+
+
+def costs(given: dict[str, Any]) -> list[float]:
+    """Return the largest A/K - n² of each level, as the page has it."""
+    law = given["resolution"]
+    L_inverse = np.linalg.inv(law.problem.metric.L)
+    joint = np.linalg.norm(L_inverse, axis=0).max()
+    E, M = np.eye(NV), given["M"]
+    rows = np.vstack([E, E, M, M, given["barred"].A]) @ L_inverse.T
+    length = np.linalg.norm(rows, axis=1)
+    parts = (rows @ given["factors"].Q.T / length[:, None]) ** 2
+    left = 1.0 / np.diag(given["factors"].X)  # what those before leave of each row
+    found, start, of_level = [], 0, np.zeros(len(left))
+    for k, end in enumerate(ENDS):
+        s = np.minimum(left[start:end] / law.thresholds[k], 1.0)
+        of_level[start:end] = 1.0 - (1.0 - s**2) ** 2
+        own = excesses(given, given["by_levels"][k] - law.acceleration)
+        x = np.minimum(own, excesses(given, np.zeros(NV)))
+        n_square = 1.0 - parts[:, :end] @ of_level[:end]
+        cost = joint * x / length / 1000.0 - n_square
+        found.append(max(0.0, *cost[x > 0.0], 0.0))
+        start = end
+    return found
+
+
+@given(seeds, st.floats(10.0, 1e6))
+def test_it_is_the_plain_formula(seed: int, size: float) -> None:
+    """What each level asks for beyond a limit, less what is below can give of it."""
+    asked = drawn(seed, size)
+    call, held = held_levels(**asked)
+    planned([call]).run(0.0)
+    np.testing.assert_allclose(held, costs(asked), rtol=1e-9, atol=1e-12 * size)
+
+
+@given(seeds)
+def test_the_identity_is_a_metric_as_others(seed: int) -> None:
+    """Whether it is known to be the identity, or given as a matrix."""
+    found = []
+    for form in (IDENTITY, CONSTANT):
+        asked = drawn(seed, 1e5, np.eye(NV))
+        asked["resolution"] = asked["resolution"]._replace(form=form)
+        call, held = held_levels(**asked)
+        planned([call]).run(0.0)
+        found.append(held)
+    np.testing.assert_allclose(found[0], found[1], rtol=1e-12)
+
+
+@pytest.mark.parametrize("far", [False, True])
+@pytest.mark.parametrize("metric", ["identity", "mass"])
+@given(seeds)
+@settings(max_examples=10, deadline=None)
+def test_what_a_level_asks_for_does_not_know_those_below(
+    metric: str, far: bool, seed: int
+) -> None:
+    """What the first level makes of a is the law of a controller without the others.
+
+    With a target out of reach that is the damped law's.
+    """
+    robot, rng = load("panda"), np.random.default_rng(seed)
+    q, v = robot.home() + 0.3 * rng.standard_normal(7), 0.3 * rng.standard_normal(7)
+    here = robot.state(0.0, q, v).position("panda_tcp")
+    goal = here + (2.0 if far else 0.02) * rng.standard_normal(3)
+    error: Any = "robot" if far else "none"  # which bounds no inverse
+    tasks = [
+        hsp.FramePosition("panda_tcp", hsp.Hold(goal), largest_error=error),
+        hsp.FrameOrientation("panda_tcp", priority=2, largest_error=error),
+    ]
+    found = []
+    for count in (1, 2):
+        weight = hsp.metrics.MassMatrixMetric() if metric == "mass" else None
+        made = hsp.Controller(robot, tasks[:count], metric=weight, start=robot.home())
+        made.compute(0.0, q, v)
+        law = made.active_stack.resolution
+        assert far or law.edge_level[0] == 0
+        calls = [law.call(v, beside=True), law.self_motions(v)[0]]
+        parted, (by_levels, _) = law.by_levels(v)
+        planned([*calls, parted]).run(0.0)
+        found.append(by_levels[0].copy())
+        if count == 1 and far and law.edge_level[0]:
+            found[0] = law.edge.damped - law.self_motions(v)[1][0][1]
+    np.testing.assert_allclose(found[1], found[0], rtol=1e-7, atol=1e-7)
+
+
+@given(st.floats(0.0, 2.0 * np.pi), st.floats(-3.0, 5.0))
+def test_a_deviation_turns_no_faster_than_a_period_bears(
+    angle: float, exponent: float
+) -> None:
+    """A task along one direction of a plane asks one joint for x beyond its limit.
+
+    The nearest step, δ = H⁻¹c x/(cᵀH⁻¹c), turns with the direction by K at most for
+    each radian, however large x is; with a cost of 1e-6 it would by 1e6 x.
+    """
+    x = 10.0**exponent
+
+    def deviation(angle: float) -> Array:
+        row = np.array([[np.cos(angle), np.sin(angle)]])
+        factors, ends, epsilon = (
+            Factors(row, np.eye(1)),
+            np.array([1]),
+            np.full(1, 1e-3),
+        )
+        metric, nothing = Problem(Metric(np.eye(2))), np.zeros(2)
+        law: Any = Law(metric, nothing, IDENTITY, ends, epsilon)
+        holding, held = held_levels(
+            np.eye(2), nothing, nothing, law, np.zeros((1, 2)), factors,
+            Within(np.array([-np.inf, -np.inf]), np.array([-x, np.inf])),
+            np.full(2, np.inf), Barred(np.zeros((0, 2)), np.zeros(0)),
+        )  # fmt: skip
+        directions = Directions.of(2)
+        levels = Levels(
+            jacobian=row, L=np.eye(2), form=IDENTITY, ends=ends,
+            error=np.zeros(1), springs=np.zeros(1, dtype=np.bool_), size=1.0,
+            first=0, least=1e-6, held=held,
+            thresholds=epsilon, factors=factors,
+            projectors=Projectors.allocate(1, 2),
+            edge_level=np.zeros(1, dtype=np.int64), alone=True,
+        )  # fmt: skip
+        JT, moving = np.zeros((2, 2)), np.zeros(1, dtype=np.int64)
+        written = write_directions(levels, directions)
+        root = write_inverse_root(levels, directions, False, JT, moving)
+        planned([holding, written, root]).run(0.0)
+        inverse = JT.T @ JT
+        return np.asarray(inverse[0] * x / inverse[0, 0])
+
+    h = 1e-6
+    turned = (deviation(angle + h) - deviation(angle - h)) / (2.0 * h)
+    # 1e-3 for the difference's own error; rounding makes 1e-10 of x.
+    assert np.linalg.norm(turned) <= STIFFEST * (1.0 + 1e-3) + 1e-9 * x
