@@ -40,7 +40,7 @@ class Loop:
         self._start = experiment.q0, experiment.v0
         self.restart()
 
-    def restart(self, *, origin: float | None = None) -> None:
+    def restart(self) -> None:
         """Return to the start."""
         self.periods = 0
         self._q, self._v = (part.copy() for part in self._start)

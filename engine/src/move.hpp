@@ -26,7 +26,8 @@ struct Move {
   }
   double operator()(double t) { return calls->run(t); }
 
-  // Copy q, v and the time since the origin, and make the calls; nothing, if not all are finite or a norm is wrong.
+  // Copy q, v and the time since the origin, and make the calls; nothing, if not all are finite or
+  // a norm is wrong.
   template <class Q, class V> std::optional<double> to(double t, const Q& q_in, const V& v_in) {
     if (!is_valid(t, q_in, v_in)) return std::nullopt;
     time[0] = t - origin[0];
