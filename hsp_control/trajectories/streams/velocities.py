@@ -95,18 +95,6 @@ class Velocities:
         quintic = QuinticSegment(t, t + T, state.base, ends)
         return ToolChange(quintic, state, self._chart) if tool and n else quintic
 
-    def slower(self, state: State) -> Command | None:
-        """Return a slower angular velocity, if a state is too fast for Ruckig's box."""
-        n = self._chart.linear
-        if not self._chart.rotational or np.abs(state.rate[n:]).max() <= (
-            _OUTSIDE * self._ball[0]
-        ):
-            return None
-        velocity = state.rate.copy()
-        omega = state.base @ state.rate[n:]
-        velocity[n:] = omega * _INSIDE * self._ball[0] / np.linalg.norm(omega)
-        return Command(velocity, "world")
-
     def _within(self, velocity: Array) -> Array:
         """Return a velocity in its own direction, but not beyond the bounds."""
         n, wanted = self._chart.linear, velocity.astype(float)
@@ -236,9 +224,6 @@ _TRIES, _LONGER = 8, 1.25
 """How often a longer cubic is tried, and how much longer: up to five times."""
 _REPEATED = 40  # a change that turns by a radian needs some fifteen
 _FAR = 2.0  # a change that turns by more is not made steady at its end [rad]
-_OUTSIDE, _INSIDE = 0.66, 0.5
-"""Shares of the angular speed: a component beyond the first is outside of Ruckig's box
-(1/√3), so far that the length of ω may grow beyond its bound before it is inside."""
 
 
 def _in_tool_axes(state: State, n: int) -> State:
