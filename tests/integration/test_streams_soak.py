@@ -1,6 +1,6 @@
 """Thousands of targets leave a controller as it was: its memory, its pickle, its words.
 
-A million were sent once, in a script: nothing grew either.
+Half a million were sent once, in a script: nothing grew either.
 """
 
 import gc

@@ -172,10 +172,15 @@ class Inbox:
 
     def __getstate__(self) -> dict[str, Any]:
         """Return what nobody took: a copy elsewhere hears later what is sent there."""
-        saved = {"space": self.space, "count": self.count, "taken": self.taken}
-        bounded = self._waiting.maxlen is not None
-        waiting = self.after(self.taken if bounded else 0, take=False)
-        return {**saved, "waiting": waiting, "bounded": bounded}
+        taken, bounded = self.taken, self._waiting.maxlen is not None
+        waiting = self.after(taken if bounded else 0, take=False)
+        return {
+            "space": self.space,
+            "count": waiting[-1].number if waiting else taken,  # another may come now
+            "taken": taken,
+            "waiting": waiting,
+            "bounded": bounded,
+        }
 
     def __setstate__(self, saved: dict[str, Any]) -> None:
         """Begin with what waited."""

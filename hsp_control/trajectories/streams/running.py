@@ -362,8 +362,6 @@ class RunningStream:
                 goal = goal.at_rest()  # no message shows how it goes on
             if (smooth := self._joiner.smooth(t, state, goal)) is not None:
                 return smooth
-        if (slower := self._velocities.slower(state)) is not None:
-            return self._velocities.follow(t, state, slower, policy.delay)
         goal = goals.passed(last, policy.smoothing)
         end = goal.time + (0.0 if self._ends_at_rest else policy.extrapolation)
         if goal.rate.any() and not self._ends_at_rest and t >= end:

@@ -2,7 +2,8 @@
 
 A velocity changes along a cubic, so that all its components keep their ratio from one
 steady velocity to another: a hand leaves its straight line or its screw for no moment.
-Where no cubic keeps the bounds, Ruckig brakes first what is too fast.
+Where no cubic keeps the bounds, what still accelerates is brought to a steady velocity
+first; in world axes, at last, Ruckig finds a way.
 
 In world axes the coordinates are those of `Chart`. In the tool's axes the linear ones
 are u with x' = R u instead, and x is the integral of R u: exact where the twist is
@@ -93,18 +94,6 @@ class Velocities:
             return self._fastest(t, state, wanted)
         quintic = QuinticSegment(t, t + T, state.base, ends)
         return ToolChange(quintic, state, self._chart) if tool and n else quintic
-
-    def slower(self, state: State) -> Command | None:
-        """Return a slower angular velocity, if a state is too fast for Ruckig's box."""
-        n = self._chart.linear
-        if not self._chart.rotational or np.abs(state.rate[n:]).max() <= (
-            _OUTSIDE * self._ball[0]
-        ):
-            return None
-        velocity = state.rate.copy()
-        omega = state.base @ state.rate[n:]
-        velocity[n:] = omega * _INSIDE * self._ball[0] / np.linalg.norm(omega)
-        return Command(velocity, "world")
 
     def _within(self, velocity: Array) -> Array:
         """Return a velocity in its own direction, but not beyond the bounds."""
@@ -235,9 +224,6 @@ _TRIES, _LONGER = 8, 1.25
 """How often a longer cubic is tried, and how much longer: up to five times."""
 _REPEATED = 40  # a change that turns by a radian needs some fifteen
 _FAR = 2.0  # a change that turns by more is not made steady at its end [rad]
-_OUTSIDE, _INSIDE = 0.66, 0.5
-"""Shares of the angular speed: a component beyond the first is outside of Ruckig's box
-(1/√3), so far that the length of ω may grow beyond its bound before it is inside."""
 
 
 def _in_tool_axes(state: State, n: int) -> State:
@@ -302,7 +288,9 @@ class ToolChange(ToolMotion):
     def __init__(self, inner: Segment, state: State, chart: Chart) -> None:
         """Integrate the velocity over all of the piece."""
         super().__init__(inner, state, chart)
-        panels = ceil((inner.end - inner.start) / _PANEL)
+        ends = inner.state(inner.start).rate[3:], inner.state(inner.end).rate[3:]
+        fastest = max(map(np.linalg.norm, ends))
+        panels = ceil(fastest * (inner.end - inner.start) / _TURN) or 1
         self._width = (inner.end - inner.start) / panels
         self._begins, self._integrals = [self._begin], []
         for k in range(panels):
@@ -324,8 +312,8 @@ class ToolChange(ToolMotion):
         return np.asarray(self._begins[k] + powers @ self._integrals[k])
 
 
-_PANEL = 0.1
-"""A panel is not longer [s]: at 3 rad/s its polynomial of degree 11 is off by 1e-16."""
+_TURN = 0.2
+"""In no panel does the body turn farther [rad]: x is off is off by 1e-12 of the way."""
 _DEGREE = 11
 _POINTS = np.cos(np.pi * (np.arange(_DEGREE + 1) + 0.5) / (_DEGREE + 1))
 _POWERS = np.arange(_DEGREE + 2)

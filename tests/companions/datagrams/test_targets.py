@@ -8,6 +8,7 @@ from collections.abc import Callable, Iterator
 from typing import Any
 
 import numpy as np
+import pinocchio as pin
 import pytest
 from places import ROOT
 
@@ -245,3 +246,24 @@ def test_a_clock_that_jumps_is_said_once(
         inbox.receive("two", 110.0 + 0.05 * k, {"value": [0.0], "t": 0.05 * k})
     assert [each.removeprefix("ros2://goal: the sender's clock ")
             for each in caplog.messages] == said  # fmt: skip
+
+
+def test_a_joystick_s_velocities_name_their_axes(
+    port: int, sender: socket.socket
+) -> None:
+    stream = hsp.StreamPose(
+        [0.0] * 3, [1.0, 0.0, 0.0], source=f"udp://127.0.0.1:{port}"
+    ).anchored(pin.SE3.Identity())
+    stream.sample(0.0)
+    inbox = stream._mailbox.inbox
+    twist = [0.1, 0.0, 0.0, 0.0, 0.0, 0.4]
+    for axes in ("tool", "hand"):
+        data = json.dumps({"velocity": twist, "axes": axes}).encode()
+        sender.sendto(data, ("127.0.0.1", port))
+    wait_until(lambda: inbox.count + inbox.rejected == 2)
+    assert inbox.reason == "axes is 'hand'; needs 'world' or 'tool'"
+    stream.sample(0.01)
+    found = stream.sample(0.11)  # it was taken 0.1 s ago
+    assert found.orientation.rotation.T @ found.position.velocity == pytest.approx(
+        twist[:3], abs=1e-9
+    )

@@ -178,6 +178,41 @@ def test_a_velocity_beyond_the_bounds_keeps_its_direction(axes: Any) -> None:
     assert np.allclose(last.velocity, [0.5, 2.0, 0.05], rtol=0, atol=1e-12)
 
 
+@pytest.mark.parametrize("axes", AXES)
+def test_a_stick_that_is_turned_back_amid_a_change_keeps_the_bounds(axes: Any) -> None:
+    """No cubic does: what still accelerates is brought to a steady velocity first."""
+    most = 0.0
+    for late in range(10, 150, 10):
+        stream = StreamPose(dead_man=9.0, delay=0.0, axes=axes).anchored(START)
+        twists = {5: [0.5, 0.2, 0, 0, 0, 0.5], 5 + late: [-0.5, 0.5, 0.3, 0.5, 0, -0.5]}
+        feed = lambda k, s=stream, w=twists: k in w and s.send(velocity=w[k])  # noqa: E731
+        found = np.array([twist(each, axes) for each in run(stream, 0.6, feed)])
+        most = max(most, np.abs(found[:, :3]).max())
+        assert np.abs(found[-1] - twists[5 + late]).max() < 1e-12
+    assert most <= stream.speed + 1e-9
+
+
+def test_a_spin_that_is_followed_by_a_target_keeps_its_bound() -> None:
+    """A component of ω may be √3 times Ruckig's bound on it, and is brought back."""
+    rng = np.random.default_rng(1)
+    for axis in np.eye(3):
+        stream = StreamPose(dead_man=9.0, delay=0.02).anchored(START)
+        goal = START * pin.exp6(np.concatenate([np.zeros(3), rng.normal(size=3)]))
+        spin = np.concatenate([np.zeros(3), 3.0 * axis])
+
+        def feed(k: int, s: Any = stream, w: Any = spin, to: Any = goal) -> None:
+            if k == 5:
+                s.send(velocity=w)
+            elif k == 350:
+                s.send(to)
+
+        samples = run(stream, 3.0, feed)
+        omega = [each.orientation.angular_velocity for each in samples]
+        assert 2.3 < np.linalg.norm(omega, axis=1).max() <= stream.angular_speed
+        away = goal.actInv(pose(samples[-1]))
+        assert np.abs(away.np - np.eye(4)).max() < 1e-7
+
+
 @settings(max_examples=25, deadline=None)
 @given(st.integers(0, 2**32 - 1), st.floats(0.0, 0.3))
 def test_bounds_hold_in_the_axes_of_the_command(seed: int, delay: float) -> None:
