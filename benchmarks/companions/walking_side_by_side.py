@@ -30,7 +30,7 @@ import numpy as np
 sys.path.append(str(Path(__file__).parents[1]))
 from marked_sections import RESULTS, replace_section
 from timing import Compute
-from walking import PUSH, WALK
+from walking import PUSH, WALKS
 
 from hsp_control import Experiment, RobotState, load_experiment
 from hsp_control.common.arrays import Array
@@ -331,13 +331,13 @@ def main() -> None:
         overrides = [f"{key}={value}" for key, value in (COMMON | values).items()]
         text += f"**{name.capitalize()}**\n\n{HEADER}"
         for controller, make in makes.items():
-            experiment = load_experiment(WALK, *overrides)
+            experiment = load_experiment(WALKS["talos"], *overrides)
             text += row(controller, close_loop(experiment, make(experiment)))
             print(text.splitlines()[-1], flush=True)
         text += "\n"
     walked = CASES["walks, 0.35 m/s"] | {"plan.steps": 4, "simulation.duration": 5}
     overrides = [f"{key}={value}" for key, value in (COMMON | walked).items()]
-    table = timing_table(times(load_experiment(WALK, *overrides), makes))
+    table = timing_table(times(load_experiment(WALKS["talos"], *overrides), makes))
     text += (
         f"{table}\nAll at the same states of one run, in turn, through Python with the "
         "references; medians and quartiles over the steps.\n"

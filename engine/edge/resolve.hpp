@@ -41,6 +41,7 @@ struct Resolve {
     LevelMemory levels;
     Scratch<'m', 'n'> B, turned;
     Scratch<'m', 'm'> square;
+    SymmetricSpectrum spectrum;
     void prepare(const Sizes& size) {
       law.prepare(size);
       damped.prepare(size);
@@ -48,6 +49,7 @@ struct Resolve {
       B.prepare(size);
       turned.prepare(size);
       square.prepare(size);
+      spectrum = SymmetricSpectrum(size('m'));
     }
   } memory;
 
@@ -108,8 +110,8 @@ struct Resolve {
     const double far = far_share(rows.stretched, following.far);
     if (far == 1.0) return far;
     const auto& J = law.task.jacobian;
-    return std::max(far,
-                    near_share(J, following.near, least, memory.turned, edge.X, memory.square));
+    return std::max(far, near_share(J, following.near, least, memory.turned, edge.X, memory.square,
+                                    memory.spectrum));
   }
 
   // All tasks at once. Their level counts as bounded, by `exact_inverse`, also where rounding makes

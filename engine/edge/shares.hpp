@@ -27,17 +27,13 @@ inline double smooth_share(double x) {
 }
 
 // How near a singular posture is, from 0 to 1. `edge` is σ_x [m]; no exact law is asked for below
-// twice ε_0. What is written besides is used.
+// twice ε_0. What is written besides is used. The share is 1 long before rounding shows in σ.
 template <class J, class B, class X, class S>
-double near_share(const J& jacobian, double edge, double least, B& rows, X& factor, S& square) {
+double near_share(const J& jacobian, double edge, double least, B& rows, X& factor, S& square,
+                  SymmetricSpectrum& spectrum) {
   const double middle = std::max(edge, 2.0 * least);
   if (exact_inverse(jacobian, middle, rows, factor, square)) return 0.0;
-  rows = jacobian;
-  Matrix none;
-  orthogonalise_rows(rows, none);
-  const double smallest =
-      rows.rows() ? rows.rowwise().norm().minCoeff() : std::numeric_limits<double>::infinity();
-  return smooth_share(2.0 - 2.0 * smallest / middle);
+  return smooth_share(2.0 - 2.0 * smallest_singular_value(factor, square, spectrum) / middle);
 }
 
 // How far an error is, from 0 to 1; `stretched` is |e|/ℓ of each row.

@@ -142,6 +142,19 @@ template <class X> double smallest_singular_value_bound(const X& factor) {
   return 1.0 / std::sqrt(std::sqrt(square));
 }
 
+// Eigenvalues of a symmetric matrix; its memory is that of a size.
+using SymmetricSpectrum = Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd>;
+
+// The smallest singular value s of B, by X of Q = X B: 1/s² is the largest eigenvalue of X Xᵀ, and
+// more accurate than all others. `square` is used. Rounding in X is that of s, ε‖B‖.
+template <class X, class S>
+double smallest_singular_value(const X& factor, S& square, SymmetricSpectrum& spectrum) {
+  if ((factor.diagonal().array() == 0.0).any()) return 0.0;  // a row became zero
+  square.noalias() = factor.lazyProduct(factor.transpose());
+  spectrum.compute(square, Eigen::EigenvaluesOnly);
+  return 1.0 / std::sqrt(spectrum.eigenvalues().maxCoeff());
+}
+
 // Overwrite Y (m, n) with U Y, whose rows are orthogonal; U (m, m) is orthogonal, and is not
 // written if it has no rows.
 //
