@@ -426,7 +426,7 @@ def test_what_python_shows_of_a_part() -> None:
         "    label: What it is called, on one line [-]."
     )
     assert TypeAdapter(Ball).json_schema()["description"] == "A round one."
-    assert len(str(inspect.signature(StreamPose))) < 600
+    assert len(str(inspect.signature(StreamPose))) < 650
     assert "policy: How waypoints are followed." in str(StreamPose.__doc__)
 
 

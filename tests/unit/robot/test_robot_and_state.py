@@ -53,6 +53,8 @@ def test_update_moves_all_of_it_and_shows_the_memory_itself(
 ) -> None:
     """In any order with `compute` of numbers: q, v, t and terms belong together."""
     law, fresh = controller(), controller()
+    for each in (law, fresh):
+        each.restart(origin=0.0)
     state, known = law.state, states(5)
     for k, given_state in steps:
         t, q, v = known[k]
