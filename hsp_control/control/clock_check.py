@@ -34,6 +34,15 @@ class ClockCheck:
                 "compute(t, q, v) what the clock reads, which may begin anywhere"
             )
 
+    def change(self, at: float, now: float) -> None:
+        """Look at the time of a change that is made now [s]."""
+        if at - now > _LATE:
+            self._tell(
+                f"a change at t = {at:.10g} s begins in {(at - now) / 86400.0:.0f} "
+                "days: times count from the first step; for now it is "
+                "at(controller.state.t)"
+            )
+
     def look(self, t: float, period: float, stamp: int) -> None:
         """Look at the time of a step [s], and the period for which it is held [s].
 

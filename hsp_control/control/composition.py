@@ -136,18 +136,22 @@ class Composition:
 
     def _follow(self, time_line: TimeLine) -> None:
         """Let the steps follow a time line."""
-        setup, t = time_line.setup, self._latest
-        self._time_line, self._setup = time_line, setup
-        self._gains.plan(setup, t)
-        self._limits.plan(setup.limits, t)
-        self._model.plan(setup.payloads, setup.gravity, t)
-        self._mixture = self._mixture.following(setup)
+        self._plan(time_line)
+        self._mixture = self._mixture.following(self._setup)
         self._settled_later: Settled | None = None
         step = None
         if self._run.begun:
             self._bind_ahead()
             step = self._mixture.bound_step(self._origin)
         self._go_on(step)
+
+    def _plan(self, time_line: TimeLine) -> None:
+        """Let gains, limits and model follow a time line."""
+        setup, t = time_line.setup, self._latest
+        self._time_line, self._setup = time_line, setup
+        self._gains.plan(setup, t)
+        self._limits.plan(setup.limits, t)
+        self._model.plan(setup.payloads, setup.gravity, t)
 
     def _write(self, t: float) -> None:
         """Write the gains, the limits and the model of a time [s]."""
@@ -174,11 +178,7 @@ class Composition:
 
     def _settle(self, settled: "Settled") -> None:
         """Go on without the changes that are over; all is bound."""
-        self._time_line, self._setup = settled.time_line, settled.time_line.setup
-        setup, t = self._setup, self._latest
-        self._gains.plan(setup, t)
-        self._limits.plan(setup.limits, t)
-        self._model.plan(setup.payloads, setup.gravity, t)
+        self._plan(settled.time_line)
         settled.mixture.active = self._mixture.active
         self._mixture, self._settled_later = settled.mixture, None
         self._go_on(settled.step)
@@ -303,6 +303,7 @@ class Composition:
         """
         with self._lock:
             here, now = None, self._latest
+            self._run.clock.change(change.at, max(now, 0.0))
             if self._run.begun:
                 change = replace(change, at=max(change.at, now))
                 here = self._here()
@@ -516,9 +517,9 @@ class Composition:
         self._declared = saved["declared"]
         self._allocate(())
         self._run.begun, self._run.now = saved["begun"], saved["now"]
+        self._state.update(*saved["at"])  # where the law is bound
         self._follow(saved["time_line"])
         self._gains.remember(saved["gains"])
-        self._state.update(*saved["at"])
         if saved["origin"] is not None:
             self._count_from(saved["origin"])
         self._limits.remember(saved["sent"])

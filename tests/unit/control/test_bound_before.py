@@ -1,5 +1,6 @@
 """What steps call is bound when a change is made, and not in a step."""
 
+import pickle
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 
@@ -128,3 +129,24 @@ def test_a_target_is_bound_when_it_is_set(monkeypatch: pytest.MonkeyPatch) -> No
             made.set_target("hand", [0.4, 0.1, 0.5])
         with nothing_bound(monkeypatch):
             step(made, k)
+
+
+def test_a_pickle_of_a_standing_robot_goes_on() -> None:
+    """The law is bound where the robot is: elsewhere contacts leave other motions."""
+    pytest.importorskip("example_robot_data")
+    robot = hsp.Robot.load("solo12")
+    feet = [name for name in robot.frame_names if name.endswith("_FOOT")]
+    made = hsp.Controller(
+        robot,
+        [hsp.FramePose("base_link", name="trunk")],
+        contacts=[hsp.contacts.PointContact(foot) for foot in feet],
+        changes=[hsp.changes.ChangeContact(feet[0], False, at=0.01, ramp=0.02)],
+    )
+    q, v = robot.home(), 0.01 * np.ones(robot.nv)
+    made.applied(made.compute(0.0, q, v).tau, H)
+    again = pickle.loads(pickle.dumps(made))
+    for k in range(1, 60):
+        found = [each.compute(k * H, q, v).tau for each in (made, again)]
+        np.testing.assert_array_equal(*found)
+        for each, tau in zip((made, again), found, strict=True):
+            each.applied(tau, H)

@@ -56,6 +56,19 @@ def test_a_state_with_the_time_of_a_clock_is_said() -> None:
         controller.compute(state)
 
 
+def test_a_change_at_the_time_of_a_clock_is_said() -> None:
+    """It would never begin; a state at rest for a day is no clock."""
+    robot = hsp.Robot.load("panda")
+    controller = hsp.Controller(robot, [hsp.FramePosition(name="hand")])
+    controller.compute(1.76e9, robot.home(), np.zeros(7))
+    with warnings.catch_warnings():
+        warnings.simplefilter("error", ClockWarning)
+        controller.at(86400.0).null_space_gain(5.0)
+    message = r"at t = 1760000001 s begins in 20370 days: times count from the first"
+    with pytest.warns(ClockWarning, match=message):
+        controller.at(1.76e9 + 1.0).null_space_gain(5.0)
+
+
 def test_what_happens_to_a_loop_is_no_wrong_clock() -> None:
     """Steps that are late, made twice, or after a pause; and a start at any time."""
     rng = np.random.default_rng(0)
