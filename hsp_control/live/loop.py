@@ -1,10 +1,8 @@
 """A live loop: check, bind and allocate; then read, send, and stop safely."""
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
-from itertools import islice
-from math import inf
 from pathlib import Path
 from time import monotonic
 from typing import Any
@@ -13,14 +11,13 @@ import numpy as np
 import pinocchio as pin
 
 from hsp_control.common.arrays import Array
-from hsp_control.common.exceptions import FallError, HspControlError, LiveError
+from hsp_control.common.exceptions import FallError, LiveError
 from hsp_control.control.compensation import Command, Compensation
 from hsp_control.control.controller import Controller
 from hsp_control.control.estimator import Estimator
 from hsp_control.control.falling import FallDetector
 from hsp_control.control.first_state import warn_of_slow_efforts
 from hsp_control.control.plan import Plan
-from hsp_control.declaration.nested import parts_within
 from hsp_control.geometry.scene import Scene
 from hsp_control.live.effort_limiter import EffortLimiter
 from hsp_control.live.hardware import Hardware, described
@@ -39,7 +36,6 @@ from hsp_control.live.state_reader import StateReader
 from hsp_control.robot import RobotState
 from hsp_control.simulation.control_chain import ControlChain, EffortSource
 from hsp_control.simulation.plants import is_exact
-from hsp_control.trajectories.schedule import Schedule
 
 _WARM_UP = 20
 """Steps before real-time operation: they bind calls and touch all memory."""
@@ -148,7 +144,6 @@ def run_loop(
                 safe_stop.effort(reader.state)
                 limiter.reset(first.q)
             end = np.inf if duration is None else start_time + duration - 0.5 * period
-            rehearse(controller, start_time, end, first.q, first.v)
             warn_of_slow_efforts(robot, first.q, limits)
             shown = scene or controller.scene
             loop_log = LoopLog(log, log_period, chain, shown, dict(meta or {}))
@@ -197,40 +192,6 @@ def _check(period: float, duration: float | None, log_period: float) -> None:
         raise LiveError(
             f"log_period is {log_period:g} s; must be a period, {period:g} s, or longer"
         )
-
-
-_MOST = 200
-"""Most instants that are rehearsed: a schedule may repeat itself for hours."""
-
-
-def rehearse(
-    controller: Controller, start: float, end: float, q: Array, v: Array
-) -> None:
-    """Evaluate a copy of a controller wherever its tasks or contacts change."""
-    # Their native calls are compiled then, not in the loop: a robot waits no seconds.
-    times = sorted({t for t in _instants(controller) if start < t <= end and t < inf})
-    if not times:
-        return
-    preview = controller.preview()
-    for t in islice(times, _MOST):
-        with suppress(HspControlError):  # the robot will be elsewhere then
-            preview.compute(t, q, v)
-
-
-def _instants(controller: Controller) -> Iterator[float]:
-    """Yield when sets of tasks and contacts begin: amid ramps, and after them [s]."""
-    declared = controller.tasks, controller.contacts, controller.changes
-    for schedule in parts_within(declared, Schedule):
-        for begin, end in schedule.windows:
-            yield begin
-            yield begin + 0.5 * schedule.ramp
-            yield begin + schedule.ramp
-            yield end - 0.5 * schedule.ramp
-            yield end
-    for change in controller.changes:
-        yield change.at
-        yield change.at + 0.5 * change.ramp
-        yield change.end
 
 
 def _called(request: BaseException) -> str:

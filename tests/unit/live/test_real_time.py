@@ -1,53 +1,14 @@
-"""What a loop in real time needs: a rehearsal, priority, no collector."""
+"""What a loop in real time needs: priority, no collector."""
 
 import gc
 import os
-from math import inf
 from typing import Any
 
-import numpy as np
 import pytest
 
 import hsp_control as hsp
 from hsp_control.common.exceptions import SimulationError
-from hsp_control.live import loop
-from hsp_control.live.loop import rehearse
 from hsp_control.live.real_time import no_garbage_collection, real_time_priority
-
-CONFIG = {
-    "robot": {"name": "panda"},
-    "tasks": {"tip": {"type": "frame_position"}, "turn": {"type": "frame_orientation",
-        "schedule": {"intervals": [[1.0, 2.0]], "ramp": 0.2}}},
-    "changes": [{"type": "null_space_gain", "at": 5.0, "gain": 3.0}],
-}  # fmt: skip
-LATER = 0.1, 1.1, 1.5, 1.9, 3.0, 5.1, 6.0
-
-
-def test_it_evaluates_a_copy_within_the_loop_and_no_more_often_than_allowed(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    experiment = hsp.load_experiment(CONFIG)
-    controller, q, v = experiment.controller, experiment.q0, experiment.v0
-    controller.compute(0.0, q, v)
-    times: list[float] = []
-    compute = type(controller).compute
-
-    def noted(self: Any, t: float, *state: Any) -> Any:
-        assert self is not controller
-        times.append(t)
-        return compute(self, t, *state)
-
-    monkeypatch.setattr(type(controller), "compute", noted)
-    rehearse(controller, 1.0, 5.0, q, v)
-    assert np.allclose(times, [1.1, 1.2, 1.9, 2.0, 5.0], rtol=0.0, atol=1e-12)
-    assert controller.state.t == 0.0
-    times.clear()
-    monkeypatch.setattr(loop, "_MOST", 2)
-    rehearse(controller, 1.0, 5.0, q, v)
-    assert len(times) == 2
-    times.clear()
-    rehearse(controller, 7.0, inf, q, v)
-    assert times == []
 
 
 def test_the_collector_is_away_and_comes_back() -> None:
