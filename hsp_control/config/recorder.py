@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from hsp_control.common.exceptions import HspControlError, LogError
+from hsp_control.common.keywords import suggesting
 from hsp_control.config.document import Document
 from hsp_control.config.experiment import controller_data
 from hsp_control.config.loaded_scenario import load_scenario
@@ -40,6 +41,7 @@ class Recorder:
         path: The log's file; None: it is only in memory once the recorder is closed.
     """
 
+    @suggesting
     def __init__(
         self,
         controller: Controller,

@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike
 
 from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import ControllerError, ImmutableError
+from hsp_control.common.keywords import suggesting
 from hsp_control.constraints.contacts import Contact
 from hsp_control.constraints.limits import Limits, RobotLimits
 from hsp_control.control.actuation.limits_in_force import LimitsInForce
@@ -52,6 +53,7 @@ class Composition:
 
     _lock: AbstractContextManager[None]  # held while something is computed
 
+    @suggesting
     def __init__(
         self,
         robot: Robot,

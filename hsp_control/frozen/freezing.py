@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike
 from hsp_control import engine
 from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import FreezeError
+from hsp_control.common.keywords import suggesting
 from hsp_control.control.actuation.actuation import DeliveredAlone
 from hsp_control.control.bound_step import BoundStep
 from hsp_control.control.compensation import Compensation
@@ -23,6 +24,7 @@ from hsp_control.frozen.inputs import inputs_of
 from hsp_control.frozen.refusals import check_parts, check_steady
 
 
+@suggesting
 def freeze(
     controller: Controller,
     path: str | os.PathLike[str],

@@ -15,6 +15,7 @@ from collections.abc import Mapping
 import numpy as np
 
 from hsp_control.common.arrays import Array
+from hsp_control.common.keywords import suggesting
 from hsp_control.control.active_stack import ActiveStack
 from hsp_control.control.compensation.compensation import Compensation
 from hsp_control.control.compensation.momentum_observer import RunningObserver
@@ -46,6 +47,7 @@ class Command:
     state: RobotState
     output: ControlOutput
 
+    @suggesting
     def __init__(
         self, controller: Controller, compensation: Compensation | None = None
     ) -> None:

@@ -1,5 +1,10 @@
 """Check which name is suggested for one that does not exist."""
 
+import inspect
+
+import pytest
+
+import hsp_control as hsp
 from hsp_control.common.suggestions import did_you_mean, nearest
 
 
@@ -11,3 +16,20 @@ def test_the_nearest_name_is_suggested() -> None:
     assert did_you_mean("xyz", frames) == ""
     assert nearest("", frames) is None
     assert nearest("a", []) is None
+
+
+def test_an_unknown_argument_is_named_with_the_nearest_one() -> None:
+    """Of the controller, and of what is made of it; their signatures stay."""
+    with pytest.raises(TypeError) as caught:
+        hsp.Controller(nullspace_gain=3)  # type: ignore[call-arg]
+    assert str(caught.value).startswith(
+        "Controller: unknown argument 'nullspace_gain'; did you mean "
+        "'null_space_gain'? (allowed: robot, tasks, field, null_space_gain, "
+    )
+    with pytest.raises(
+        TypeError, match=r"^Recorder: unknown argument 'log_perod'; did"
+    ):
+        hsp.Recorder(None, log_perod=1)  # type: ignore[call-arg]
+    with pytest.raises(TypeError, match="missing 1 required positional argument"):
+        hsp.Controller(None)  # type: ignore[call-arg]
+    assert "robot" in inspect.signature(hsp.Controller).parameters

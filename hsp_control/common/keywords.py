@@ -1,0 +1,40 @@
+"""Unknown keyword arguments of what users call: refused with the nearest name."""
+
+from collections.abc import Callable
+from functools import wraps
+from inspect import Parameter, signature
+from typing import ParamSpec, TypeVar
+
+from hsp_control.common.suggestions import did_you_mean, listing
+
+_Given = ParamSpec("_Given")
+_Result = TypeVar("_Result")
+
+
+def suggesting(function: Callable[_Given, _Result]) -> Callable[_Given, _Result]:
+    """Let a function, or a class's ``__init__``, say which argument was meant.
+
+    As the arguments of parts do; Python itself names only the wrong one, in a
+    TypeError, which this is as well.
+    """
+    named = Parameter.POSITIONAL_OR_KEYWORD, Parameter.KEYWORD_ONLY
+    names = [
+        each.name
+        for each in signature(function).parameters.values()
+        if each.kind in named and each.name != "self"
+    ]
+
+    @wraps(function)
+    def called(*args: _Given.args, **given: _Given.kwargs) -> _Result:
+        for name in given:
+            if name not in names:
+                what = function.__name__
+                if what == "__init__":
+                    what = type(args[0]).__name__
+                raise TypeError(
+                    f"{what}: unknown argument {name!r}{did_you_mean(name, names)} "
+                    f"(allowed: {listing(names, limit=20)})"
+                )
+        return function(*args, **given)
+
+    return called
