@@ -26,9 +26,7 @@ def test_an_unknown_argument_is_named_with_the_nearest_one() -> None:
         "Controller: unknown argument 'nullspace_gain'; did you mean "
         "'null_space_gain'? (allowed: robot, tasks, field, null_space_gain, "
     )
-    with pytest.raises(
-        TypeError, match=r"^Recorder: unknown argument 'log_perod'; did"
-    ):
+    with pytest.raises(TypeError, match=r"^Recorder: unknown argument 'log_perod'"):
         hsp.Recorder(None, log_perod=1)  # type: ignore[call-arg]
     with pytest.raises(TypeError, match="missing 1 required positional argument"):
         hsp.Controller(None)  # type: ignore[call-arg]
