@@ -1,7 +1,7 @@
 // A Franka arm's 1 kHz callback without Python. IT HAS NOT RUN ON AN ARM: read it, run the file
 // against the simulated robot first (`live.cpp`), and keep a hand on the stop.
 //
-//   c++ -std=c++20 franka.cpp -I"$(hsp freeze --include-dir)" "$(hsp freeze --library)" -lfranka
+//   c++ -std=c++20 franka.cpp $(hsp freeze --flags) -lfranka
 //   ./a.out HOST CONTROLLER DURATION
 //
 // The arm adds gravity itself, so tau - g(q) is sent; and it limits rates itself, too.

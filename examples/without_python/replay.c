@@ -1,6 +1,6 @@
 /* Replay recorded states through a frozen controller, and print the efforts.
  *
- *   cc replay.c -I"$(hsp freeze --include-dir)" "$(hsp freeze --library)" -o replay
+ *   cc replay.c $(hsp freeze --flags) -o replay
  *   ./replay panda.hsp < states.txt > efforts.txt
  *
  * A line of states.txt is t, q and v; a line of what is printed is the status and tau. */

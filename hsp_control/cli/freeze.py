@@ -8,21 +8,17 @@ from hsp_control.cli.loading import read
 from hsp_control.common.exceptions import ConfigError
 from hsp_control.config import Experiment
 from hsp_control.config.loaded_scenario import load_scenario
-from hsp_control.frozen import cmake_folder, include_folder, library
+from hsp_control.frozen import cmake_folder, compiler_flags
 from hsp_control.frozen import freeze as write
 
-_PLACES = {
-    "cmake_dir": cmake_folder,
-    "include_dir": include_folder,
-    "library": library,
-}
+_BUILDING = {"cmake_dir": cmake_folder, "flags": compiler_flags}
 
 
 def freeze(options: argparse.Namespace) -> int:
     """Write a configuration's controller to a file, or say where the library is."""
-    for name, place in _PLACES.items():
+    for name, answer in _BUILDING.items():
         if getattr(options, name):
-            print(place())
+            print(answer())
             return 0
     if not options.config:
         raise ConfigError("hsp freeze needs a configuration, such as panda_limits")

@@ -183,8 +183,7 @@ def add_freeze(freeze: argparse.ArgumentParser) -> None:
     where = freeze.add_mutually_exclusive_group()
     for name, what in (
         ("--cmake-dir", "the folder that CMake's find_package(hsp_step) needs"),
-        ("--include-dir", "the folder of hsp_step.h"),
-        ("--library", "the library to link to"),
+        ("--flags", "what cc needs for hsp_step.h and its library"),
     ):
         where.add_argument(name, action="store_true", help=f"print {what}, and end")
 

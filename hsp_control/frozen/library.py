@@ -25,6 +25,17 @@ def include_folder() -> Path:
     return _folder("include", "hsp_step.h")
 
 
+def compiler_flags() -> str:
+    """Return what a compiler needs to build a program that steps, for a shell.
+
+    ``cc loop.c $(hsp freeze --flags)``: the header's folder, the library, and where the
+    program finds it when it runs, as ``pkg-config`` would print them.
+    """
+    own = library()
+    flags = f"-I{include_folder()}", str(own), f"-Wl,-rpath,{own.parent}"
+    return " ".join(flags)
+
+
 def cmake_folder() -> Path:
     """Return the folder that CMake's ``find_package(hsp_step)`` is told of.
 

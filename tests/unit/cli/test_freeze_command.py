@@ -1,13 +1,17 @@
 """``hsp freeze``: a configuration's controller for a program without Python."""
 
 import re
+import shutil
+import subprocess
+import sys
 from pathlib import Path
 
+import numpy as np
 import pytest
 from frozen_library import Opened
 
 from hsp_control.cli import main
-from hsp_control.frozen import cmake_folder, include_folder, library
+from hsp_control.frozen import cmake_folder, compiler_flags
 
 
 def test_a_configuration_is_frozen(
@@ -41,8 +45,7 @@ def test_what_cannot_be_frozen_is_refused_with_its_place(
     ("option", "place"),
     [
         ("--cmake-dir", cmake_folder),
-        ("--include-dir", include_folder),
-        ("--library", library),
+        ("--flags", compiler_flags),
     ],
 )
 def test_where_the_library_is(
@@ -50,6 +53,31 @@ def test_where_the_library_is(
 ) -> None:
     assert main(["freeze", option]) == 0
     assert capsys.readouterr().out.strip() == str(place())  # type: ignore[operator]
+
+
+PAGE = Path(__file__).parents[3] / "docs/how_to/without_python.md"
+
+
+@pytest.mark.smoke
+def test_the_page_is_a_program_that_runs(tmp_path: Path) -> None:
+    """Its first commands and its C, in a shell, in an empty folder."""
+    if not shutil.which("cc"):
+        pytest.skip("there is no C compiler")
+    blocks = re.findall(r"```(sh|c)\n(.*?)```", PAGE.read_text("utf-8"), re.DOTALL)
+    frozen, program, built = (text for _, text in blocks[:3])
+    (tmp_path / "loop.c").write_text(program, "utf-8")
+    hsp = f'hsp() {{ {sys.executable} -m hsp_control "$@"; }}\n'
+    script = hsp + frozen + built + "./loop\n"
+    run = subprocess.run(
+        ["bash", "-euc", script],
+        cwd=tmp_path,
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert run.returncode == 0, run.stderr
+    assert np.isfinite(float(run.stdout.splitlines()[-1]))
+    assert not run.stderr
 
 
 def test_nothing_to_freeze(capsys: pytest.CaptureFixture[str]) -> None:
