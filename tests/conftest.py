@@ -39,6 +39,11 @@ def pytest_collection_finish() -> None:
     gc.freeze()
 
 
+def pytest_sessionfinish() -> None:
+    """Show the collector all of it again: what an end leaves is said as leaked."""
+    gc.unfreeze()
+
+
 SYSTEM = Path(__file__).parent / "system"
 
 
