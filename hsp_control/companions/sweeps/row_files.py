@@ -134,7 +134,8 @@ class RowFiles:
     def write(self) -> None:
         """Write the rows that are in memory alone."""
         if self._new:
-            table = self._as_table(self._new)
+            # In the order of runs: in which order they ended must not matter.
+            table = self._as_table(sorted(self._new, key=lambda row: row.run))
             if self._folder is not None:
                 self._put(table)
             self.table = _joined([self.table, table])

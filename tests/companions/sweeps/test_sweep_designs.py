@@ -2,6 +2,7 @@
 
 import json
 import math
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -162,6 +163,20 @@ def test_rows_are_in_the_order_of_the_plan() -> None:
     assert found["e"].tolist() == [0.0, 1.0]
     assert not found.complete
     assert found.meta["metrics"] == {"e": {"unit": "m", "meaning": "error"}}
+
+
+def test_a_file_is_in_the_order_of_the_plan(tmp_path: Path) -> None:
+    """What other tools read is the same bytes, in whichever order runs end."""
+    for name, order in (("one", (0, 1, 2)), ("other", (2, 0, 1))):
+        files = RowFiles(plan_of({"a": "10:30:3"}), {}, tmp_path / name, fresh=False)
+        for k in order:
+            files.add(Row(k, "completed", "", {"e": Measure(0.5 * k, "m", "error")}))
+        files.close()
+    one, other = (
+        [file.read_bytes() for file in (tmp_path / name).iterdir()]
+        for name in ("one", "other")
+    )
+    assert one == other
 
 
 # --- sensitivity ---------------------------------------------------------------------
