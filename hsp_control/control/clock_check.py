@@ -40,7 +40,8 @@ class ClockCheck:
             self._tell(
                 f"a change at t = {at:.10g} s begins in {(at - now) / 86400.0:.0f} "
                 "days: times count from the first step; for now it is "
-                "at(controller.state.t)"
+                "at(controller.state.t)",
+                of=6,  # whoever calls a method of `Controller.at`
             )
 
     def look(self, t: float, period: float, stamp: int) -> None:
@@ -73,9 +74,10 @@ class ClockCheck:
         if self._count == (_STILL if kind == "still" else _FEW):
             self._tell(_MESSAGES[kind].format(t=t, passed=passed, period=held))
 
-    def _tell(self, message: str) -> None:
+    def _tell(self, message: str, of: int = 4) -> None:
+        """Warn of the line of a caller, so many calls away."""
         self._told = True
-        warnings.warn(message, ClockWarning, stacklevel=4)
+        warnings.warn(message, ClockWarning, stacklevel=of)
 
 
 _UNIT = (

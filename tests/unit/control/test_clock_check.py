@@ -65,8 +65,9 @@ def test_a_change_at_the_time_of_a_clock_is_said() -> None:
         warnings.simplefilter("error", ClockWarning)
         controller.at(86400.0).null_space_gain(5.0)
     message = r"at t = 1760000001 s begins in 20370 days: times count from the first"
-    with pytest.warns(ClockWarning, match=message):
+    with pytest.warns(ClockWarning, match=message) as caught:
         controller.at(1.76e9 + 1.0).null_space_gain(5.0)
+    assert caught[0].filename == __file__
 
 
 def test_what_happens_to_a_loop_is_no_wrong_clock() -> None:
