@@ -8,7 +8,7 @@ import subprocess
 import sys
 import time
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any
 
@@ -282,18 +282,24 @@ def test_a_dead_scheduler_keeps_the_rows_and_the_same_command_ends_it(
     finish(out, Sweep.load(out), whole, scheduler)
 
 
+def running(word: str, parent: psutil.Process) -> list[psutil.Process]:
+    """Return the children that were called with a word; not those that have ended."""
+    found = []
+    for child in parent.children():
+        with suppress(psutil.NoSuchProcess):  # also nobody has asked how it ended
+            if word in " ".join(child.cmdline()):
+                found.append(child)
+    return found
+
+
 def test_a_killed_worker_is_replaced(whole: Sweep) -> None:
     killed: list[int] = []
 
     def kill(done: int, total: int, failures: int) -> None:
         """After the first rows, the process that computes."""
         if done in (2, 9):
-            (nanny,) = (
-                p for p in psutil.Process().children() if "--nworkers" in p.cmdline()
-            )
-            each = [
-                p for p in nanny.children() if "spawn_main" in " ".join(p.cmdline())
-            ]
+            (nanny,) = running("--nworkers", psutil.Process())
+            each = running("spawn_main", nanny)
             each[-1].kill()
             killed.append(done)
 
