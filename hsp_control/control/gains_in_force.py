@@ -51,12 +51,9 @@ class GainsInForce:
         self._tasks: dict[int, Task] = {}
         self._waiting: dict[int, Array] = {}
 
-    def plan(self, setup: Setup, t: float) -> bool:
+    def plan(self, setup: Setup, t: float) -> None:
         """Follow a setup from now on; t is the present time [s]."""
         tasks = {each.key: each.task for each in setup.tasks}
-        exchanged = any(
-            self._tasks.get(key, task) is not task for key, task in tasks.items()
-        )
         known = {id(task): self.feedback[key] for key, task in self._tasks.items()}
         self.feedback = {
             key: known.get(id(task)) or self._feedback_of(key, task)
@@ -68,7 +65,6 @@ class GainsInForce:
         )
         self._written: set[int] = set()
         self.write(t)
-        return exchanged
 
     def _feedback_of(self, key: int, task: Task) -> InForce:
         """Return the feedback of a task that is new, or follows a new trajectory."""
