@@ -105,7 +105,8 @@ class Controller(Composition):
                 delivered = mixture.deliver(modifier)  # within the limits
                 stack, damped = self.active_stack, mixture.damped
                 stack.check(delivered.effort)
-                run.bound = run.bound or mixture.bound_step(self._origin)
+                if run.bound is None and self._settled_later is None:
+                    run.bound = mixture.bound_step(self._origin)
             run.acceleration = delivered.acceleration
             if out is None:
                 out = ControlOutput()
@@ -152,7 +153,7 @@ class Controller(Composition):
         if self._declared.start is None:
             here = self._here()._replace(scene=self._declared.scene)
             sent = self._limits.sent.memory()
-            self._compose(here, self._time_line.made)
+            self._compose(here, self._time_line.declared)
             self._limits.remember(sent)
         self.check_derivatives(self._state)
         self._run.begun = True
@@ -273,7 +274,8 @@ class Controller(Composition):
     def restart(self, *, origin: float | None = None) -> None:
         """Begin anew: forget the last effort, the offsets of tasks, and where it began.
 
-        Changes that were made stay on the time line.
+        Changes that were declared, or made before the run's first step, come again; so
+        does one that was made after its last step, which no step has seen.
 
         Args:
             origin: What the clock of `compute` reads at time 0, from which references,
@@ -287,13 +289,15 @@ class Controller(Composition):
         with self._lock:
             self._limits.forget()
             self._gains.forget()
+            line, (at, unseen) = self._time_line, self._run.unseen
+            changes = (*line.declared, *(unseen if at == self._latest else ()))
             self._run = PresentRun(self._declared.robot.nv)
             if origin is not None:
                 self._count_from(origin)
             self._mixture.active = None  # the next step places what is relative
-            made = self._time_line.made
-            if made or any(each.task.remembers for each in self._setup.tasks):
-                self._compose(self._time_line.start, made)
+            remembers = any(each.task.remembers for each in self._setup.tasks)
+            if changes or line.count or remembers:
+                self._compose(line.start, changes)
 
     def prepare(
         self,
@@ -416,15 +420,21 @@ class Controller(Composition):
         """Return a copy of the same robot object."""
         return deepcopy(self, {id(self._declared.robot): self._declared.robot})
 
-    def preview(self) -> "Controller":
+    def preview(self, changes: Sequence[Change] | None = None) -> "Controller":
         """Return a copy at the beginning of a run: to look ahead, or at a log.
 
         It is of the same robot object, and counts times from 0. What its streams hear
         counts for it alone.
+
+        Args:
+            changes: All changes of the run, such as those of a log; None: those that
+                come in every run.
         """
         other = self._copy()
         other._declared = other._declared.preview()
         other.restart(origin=0.0)
+        if changes is not None:
+            other._compose(other._time_line.start, changes)
         return other
 
 

@@ -126,6 +126,8 @@ class TaskColumns:
         self._controller, self._columns = controller, columns
         # all tasks that there have been, by their names in the log
         self.logged: dict[str, Task] = {}
+        # the streams that each had when it came; those of changes are the changes'
+        self.streamed: dict[str, list[Streamed]] = {}
         self._levels: dict[str, int] = {}
         self._streams: dict[str, list[tuple[str, Streamed]]] = {}
         self._names: dict[int, str] = {}  # in the log, of the tasks there are, by key
@@ -149,6 +151,7 @@ class TaskColumns:
                 name = self._names.get(each.key) or self._log_name(task)
                 self._names[each.key] = name
                 self.logged[name], self._levels[name] = task, level
+                self.streamed.setdefault(name, [*parts_within(task, Streamed)])
                 self._add(name, task, len(task.measure(probe.read_only)[0]))
 
     def _log_name(self, task: Task) -> str:

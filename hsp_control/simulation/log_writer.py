@@ -14,6 +14,7 @@ from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import ConfigError
 from hsp_control.common.version import __version__
 from hsp_control.control.active_stack import ActiveStack
+from hsp_control.control.change import Change
 from hsp_control.control.controller import Controller
 from hsp_control.control.measurement import LogChannel
 from hsp_control.control.output import ControlOutput
@@ -79,7 +80,7 @@ class LogWriter:
         self._controller, self._scene = controller, scene
         self._columns = columns = LogColumns(rows)
         self._settled: object = None
-        self._changes = -1  # how many there were when streams were looked for
+        self._made: dict[int, Change] = {}  # all changes of the run, by identity
         self._law: Record | None = None  # of the present row
         self._active: ActiveStack | None = None  # what `_sources` are of
         self._sources: list[tuple[str, Array]] = []  # what the law writes for columns
@@ -120,7 +121,7 @@ class LogWriter:
             column(prefix, (3,), "m", "position of its frame")
             column(f"{prefix}.quaternion", (4,), "-", "orientation (x, y, z, w)")
         columns.lay_out()
-        self._keep_messages()
+        self._let_streams_record()
         self._meta = dict(meta or {})
         self._robot_record = robot_record(robot)
         self._meshes = _meshes_of(scene)
@@ -313,47 +314,54 @@ class LogWriter:
         }
 
     def _keep_messages(self) -> None:
-        """Let streams that came record all that they take: a log repeats it."""
-        changes = self._controller.changes
-        if self._changes == len(changes):
+        """Keep changes, which a controller forgets; let streams record all they take.
+
+        A log repeats both.
+        """
+        there = {id(each): each for each in self._controller.changes}
+        if self._made and there.keys() <= self._made.keys():
             return
-        self._changes = len(changes)
+        self._made |= there
+        self._let_streams_record()
+
+    def _let_streams_record(self) -> None:
+        controller = self._controller
         planned = [] if self.plan is None else [self.plan.plan]
-        parts = [*self._controller.planned_tasks, *changes, *planned]
+        parts = [*controller.planned_tasks, *controller.changes, *planned]
         for stream in parts_within(parts, Streamed):
             stream.log()
+
+    def _changes(self) -> dict[str, Any]:
+        """Return the changes that were made, their streams as they were recorded."""
+        self._keep_messages()
+        missing = self._controller._changes_made - len(self._made)
+        if missing > 0:
+            lost = f"{missing} were over before the next row was written"
+            return {"changes": None, "changes_lost": lost}
+        try:
+            changes = [
+                plain_data(with_parts_replaced(change, Streamed, _as_recorded))
+                for change in sorted(self._made.values(), key=lambda each: each.at)
+            ]
+        except ConfigError as error:
+            return {"changes": None, "changes_lost": str(error)}
+        return {"changes": changes}
 
     def _came_during_run(self) -> dict[str, Any]:
         """Return changes that were made, and what streams have taken, as JSON data.
 
         With them, a run can be repeated from its log.
         """
-        streams = {
-            name: list(parts_within(task, Streamed))
-            for name, task in self._tasks.logged.items()
-            if task.remembers
-        }
+        streams = {name: each for name, each in self._tasks.streamed.items() if each}
         heard = {name: [list(s.record) for s in each] for name, each in streams.items()}
         lost = sum(s.unrecorded for each in streams.values() for s in each)
-        found = _changes(self._controller) | ({"streams": heard} if heard else {})
+        found = self._changes() | ({"streams": heard} if heard else {})
         if self.plan is not None:
             planned = list(parts_within(self.plan.plan, Streamed))
             lost += sum(stream.unrecorded for stream in planned)
             if planned:
                 found["plan_streams"] = [list(stream.record) for stream in planned]
         return found | ({"streams_lost": lost} if lost else {})
-
-
-def _changes(controller: Controller) -> dict[str, Any]:
-    """Return the changes that were made, their streams as they were recorded."""
-    try:
-        changes = [
-            plain_data(with_parts_replaced(change, Streamed, _as_recorded))
-            for change in controller.changes
-        ]
-    except ConfigError as error:
-        return {"changes": None, "changes_lost": str(error)}
-    return {"changes": changes}
 
 
 def _as_recorded(stream: Streamed) -> Streamed:

@@ -4,9 +4,11 @@ from collections.abc import Iterator
 from typing import TypeVar
 
 import numpy as np
+from pydantic import TypeAdapter
 
 from hsp_control.common.arrays import Array
 from hsp_control.companions.plots.log_series import held_period
+from hsp_control.control.changes import Change
 from hsp_control.control.controller import Controller
 from hsp_control.law import MetricSample
 from hsp_control.null_space.fields import NullSpaceField
@@ -27,11 +29,18 @@ def acts(term: NullSpaceField) -> bool:
     return not (isinstance(term.weight, int | float) and term.weight == 0.0)
 
 
-def from_the_start(controller: Controller) -> Controller:
+def from_the_start(controller: Controller, run: Rollout) -> Controller:
     """Return the controller as it is before a run; its changes are all ahead."""
-    if not controller.changes and not any(t.remembers for t in controller.tasks):
+    changes = changes_of(run)
+    if not changes and not any(t.remembers for t in controller.tasks):
         return controller
-    return controller.preview()
+    return controller.preview(changes)
+
+
+def changes_of(run: Rollout) -> tuple[Change, ...]:
+    """Return the changes of a run, which its controller has forgotten."""
+    data = run.meta.get("changes") or ()
+    return TypeAdapter(tuple[Change, ...]).validate_python(data)
 
 
 def null_space_projector(controller: Controller, state: RobotState) -> Array:
@@ -71,7 +80,7 @@ def expected_floor(rollout: Rollout, controller: Controller | None) -> Array | N
     if not rollout.meta.get("controls_null_space", True):
         return None
     robot, K_N = controller.robot, np.asarray(gain, float)
-    if controller.contacts or robot.unactuated or controller.changes:
+    if controller.contacts or robot.unactuated or changes_of(rollout):
         return None
     if K_N.shape != (robot.nv, robot.nv) or rollout.tau.shape[1] != robot.nv:
         return None

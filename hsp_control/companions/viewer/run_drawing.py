@@ -51,7 +51,7 @@ def all_layers(
         "contacts": contacts(robot, motion, f"{root}/contacts"),
     }
     if controller is not None:
-        controller = from_the_start(controller)
+        controller = from_the_start(controller, motion.rows)
         shown, ink = logged_shapes(motion.rows), line_color(dark=dark)
         layers |= {
             "influence": influence(controller.field, shown, f"{root}/influence"),
