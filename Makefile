@@ -95,7 +95,7 @@ bench: $(STAMP) $(ENGINE) ## compare with other controllers, in .venv-peers
 	@if ! .venv-peers/bin/python -m pip --version > /dev/null 2>&1; then \
 	  echo "Creating .venv-peers ..."; $(call new-venv,$(BIN)/python,.venv-peers); \
 	fi
-	@.venv-peers/bin/python benchmarks/install_peers.py
+	@.venv-peers/bin/python benchmarks/shared/install_peers.py
 	@.venv-peers/bin/python -W "ignore:to-Python converter" benchmarks/side_by_side.py
 	@.venv-peers/bin/python -W "ignore:to-Python converter" \
 	  benchmarks/whole_body_side_by_side.py

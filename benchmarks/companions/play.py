@@ -24,8 +24,8 @@ from hsp_control.companions.viewer.transport import PageServer
 
 sys.path.append(str(Path(__file__).parents[1]))
 sys.path.append(str(Path(__file__).parents[2] / "tests/companions/support"))
-from marked_sections import RESULTS, replace_section
 from pages import Steering
+from shared.marked_sections import RESULTS, replace_section
 
 CONFIGURATIONS = ("panda_obstacle", "dual_panda", "whole_body/talos_circle")
 WINDOW, ROUNDS = 5.0, 3  # each condition is measured so long, so often [s]

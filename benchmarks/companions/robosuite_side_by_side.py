@@ -23,7 +23,7 @@ import pinocchio as pin
 import robosuite
 
 sys.path.append(str(Path(__file__).parents[1]))
-from marked_sections import RESULTS, replace_section
+from shared.marked_sections import RESULTS, replace_section
 
 import hsp_control.companions.simulators.robosuite  # noqa: F401  it registers HSP_POSE
 from hsp_control.common.arrays import Array

@@ -28,8 +28,8 @@ from typing import Any
 import numpy as np
 
 sys.path.append(str(Path(__file__).parents[1]))
-from marked_sections import RESULTS, replace_section
-from timing import Compute
+from shared.marked_sections import RESULTS, replace_section
+from shared.timing import Compute
 from walking import PUSH, WALKS
 
 from hsp_control import Experiment, RobotState, load_experiment
@@ -73,7 +73,7 @@ def controllers() -> dict[str, Make]:
     """Return functions that make the controllers, by name."""
     made: dict[str, Make] = {LAW: this_law}
     try:
-        peer: Any = importlib.import_module("controllers.walking_tsid")
+        peer: Any = importlib.import_module("shared.controllers.walking_tsid")
     except ImportError as error:
         print(f"TSID is not installed ({error}): make bench")
         return made
