@@ -65,8 +65,9 @@ test: $(STAMP) $(ENGINE) ## run the tests, those of calls with Eigen's assertion
 test-system: $(STAMP) $(ENGINE) ## run those of browsers, notebooks, processes and whole walks
 	@$(BIN)/python -m pytest $(SPREAD) -m system $(ARGS)
 
-thorough: sanitize ## run the tests with more seeds, and every configuration's page
+thorough: sanitize ## run the tests with more seeds, every configuration's page, some mutants
 	@HSP_THOROUGH=1 $(BIN)/python -m pytest $(SPREAD) $(ARGS)
+	@$(BIN)/python tools/mutants.py
 
 # What a library of the engine is built with, and the tests whose calls it then makes.
 CALLS := tests/unit/engine tests/unit/law tests/unit/edge tests/unit/tasks tests/unit/null_space \
@@ -106,7 +107,7 @@ bench: $(STAMP) $(ENGINE) ## compare with other controllers, in .venv-peers
 fuzz: $(STAMP) $(ENGINE) ## random states, mutated files, faults, soak: hours
 	@PYTHONPATH=tests nice $(BIN)/python -m campaigns $(ARGS)
 
-mutants: $(STAMP) $(ENGINE) ## break the code on purpose, report what no test notices
+mutants: $(STAMP) $(ENGINE) ## break the code at random, say what share the tests notice
 	@$(BIN)/python tools/mutants.py $(ARGS)
 
 wheel: $(STAMP) $(ENGINE) ## build the wheel into dist/
