@@ -163,8 +163,8 @@ def _of_line(code: str, line: str) -> Iterator[tuple[int, str, str]]:
             if new and new.count("(") == new.count(")") + old.count("("):
                 yield found.start(), old, new
             elif old == "if (" and (end := _closing(code, found.end())):
-                new = f"if (!({line[found.end() : end - 1]}))"
-                yield found.start(), line[found.start() : end], new
+                negated = f"if (!({line[found.end() : end - 1]}))"
+                yield found.start(), line[found.start() : end], negated
             elif old == " = " and re.fullmatch(r"\s*[\w.\[\]()]+ = .*;\s*", code):
                 begin = len(code) - len(code.lstrip())  # one line, and no declaration
                 yield begin, line[begin : len(code.rstrip())], ";"
