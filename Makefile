@@ -10,6 +10,7 @@ SHELL := bash
 export OPENBLAS_NUM_THREADS := 1# the matrices are small: more threads only wait
 export PIP_DISABLE_PIP_VERSION_CHECK := 1
 export PIP_CONSTRAINT := constraints.txt
+export UV_CONSTRAINT := constraints.txt
 export PIP_BUILD_CONSTRAINT := constraints.txt
 
 BIN := .venv/bin
@@ -153,8 +154,9 @@ docs: $(STAMP) $(ENGINE) ## build the site into docs/_build/html, with its repla
 	@$(BIN)/sphinx-build -q -W --keep-going -b html docs docs/_build/html
 	@echo "The site is docs/_build/html/index.html"
 
-links: $(STAMP) $(ENGINE) ## ask every other site that the documents link to (needs a network)
-	@$(BIN)/python tools/links.py
+links: $(STAMP) $(ENGINE) ## ask every other site that the site's pages link to (needs a network)
+	@$(BIN)/python tools/replays.py
+	@$(BIN)/sphinx-build -q -b linkcheck docs docs/_build/links
 
 ##@ Keep
 figures: $(STAMP) $(ENGINE) ## draw the documents' figures anew, into docs/figures
@@ -196,8 +198,8 @@ clean: ## remove caches, builds and the demo's output; .venv stays
 # constraints.txt is newer than the stamp. What the engine is built with is installed
 # first: so it is built there, and again only where a source of it has changed.
 $(USE): pyproject.toml constraints.txt
-	@echo "Installing hsp_control and robots' meshes into .venv (1.3 GB, once) ..."
-	@$(call install,.[export$(,)robots])
+	@echo "Installing hsp_control into .venv (0.9 GB, once) ..."
+	@$(call install,.[export])
 	@touch $@ $(ENGINE)
 
 $(STAMP): pyproject.toml constraints.txt
@@ -206,11 +208,19 @@ $(STAMP): pyproject.toml constraints.txt
 	@touch $(USE) $@ $(ENGINE)
 
 , := ,
-# $(call install,.[extra,...]): this checkout with its extras.
+# $(call install,.[extra,...]): this checkout with its extras, by uv where it is there, else
+# by pip. An environment that is broken is made anew.
 define install
-$(find-python); "$$python" tools/install.py .venv $$("$$python" hatch_build.py needs); \
-env -u PIP_BUILD_CONSTRAINT \
-  "$$python" tools/install.py .venv --no-build-isolation --editable '$(1)'
+$(find-python); \
+if command -v uv > /dev/null; then \
+  $(BIN)/python -c '' 2> /dev/null || uv venv --quiet --clear --seed --python "$$python" .venv; \
+  install="uv pip install --quiet --python $(BIN)/python"; \
+else \
+  $(BIN)/python -m pip --version > /dev/null 2>&1 || { $(call new-venv,"$$python",.venv); }; \
+  install="env -u PIP_BUILD_CONSTRAINT $(BIN)/python -m pip install --quiet"; \
+fi; \
+$$install $$("$$python" hatch_build.py needs); \
+$$install --no-build-isolation --editable '$(1)'
 endef
 
 $(ENGINE): $(USE) hatch_build.py engine/CMakeLists.txt $(shell find engine -name '*.?pp')

@@ -5,12 +5,9 @@ import re
 from pathlib import Path
 
 from bundled import configurations_page, franka_errors_page, robots_page
-from commands import commands_page
 from names import names_page, namespace_pages
 from sphinx.application import Sphinx
 from yaml_keys import yaml_page
-
-from hsp_control.cli.options import command_line
 
 SCHEMA = "../configs/hsp_control.schema.json"
 RESULTS = "../benchmarks/results"
@@ -22,7 +19,6 @@ def write(app: Sphinx) -> None:
     folder.mkdir(parents=True, exist_ok=True)
     pages = {
         "names": names_page(),
-        "commands": commands_page(command_line()),
         "configurations": configurations_page(),
         "robots": robots_page(),
         "franka_errors": franka_errors_page(),
