@@ -58,9 +58,7 @@ quick: $(STAMP) $(ENGINE) ## what to run after every edit: a minute of CPU
 
 # Each process begins with its own files, and takes tests of another one when it has none.
 SPREAD := -n $(WORKERS) --dist worksteal
-test: $(STAMP) $(ENGINE) ## run the tests, those of calls with Eigen's assertions first
-	@if [ -z '$(ARGS)' ]; then HSP_ENGINE=$$($(BIN)/python hatch_build.py Debug) \
-	  $(BIN)/python -m pytest $(SPREAD) tests/unit/engine tests/unit/law -m "not process"; fi
+test: $(STAMP) $(ENGINE) ## run the tests, but for those of test-system
 	@$(BIN)/python -m pytest $(SPREAD) -m "not system" $(ARGS)
 
 test-system: $(STAMP) $(ENGINE) ## run those of browsers, notebooks, processes and whole walks
@@ -71,7 +69,7 @@ thorough: sanitize ## run the tests with more seeds, every configuration's page,
 	@$(BIN)/python tools/mutants.py
 
 # What a library of the engine is built with, and the tests whose calls it then makes.
-CALLS := tests/unit/engine tests/unit/law tests/unit/edge tests/unit/tasks tests/unit/null_space \
+CALLS ?= tests/unit/engine tests/unit/law tests/unit/edge tests/unit/tasks tests/unit/null_space \
   tests/unit/constraints tests/unit/trajectories tests/unit/geometry tests/unit/robot \
   tests/unit/control -m "not system and not process"
 assertions: $(STAMP) $(ENGINE) ## those of the engine, with Eigen's assertions and no allocation
