@@ -17,7 +17,6 @@ from typing import Any
 from unittest.mock import patch
 
 import nbformat
-from nbmake.nb_run import NotebookRun
 from PIL import Image
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -49,6 +48,8 @@ def executed(notebook: Any, folder: Path) -> Any:
     Raises:
         RuntimeError: If a cell raises, or takes too long.
     """
+    from nbmake.nb_run import NotebookRun  # tests that only read notebooks need it not
+
     file = folder / "notebook.ipynb"
     nbformat.write(notebook, file)
     beside = str(Path(sys.executable).parent)  # where `hsp` is
