@@ -1,13 +1,13 @@
 """robosuite's OSC_POSE and this law's HSP_POSE in robosuite's own environment.
 
     make sims    # makes .venv-sims
-    .venv-sims/bin/python benchmarks/companions/robosuite_side_by_side.py
+    .venv-sims/bin/python benchmarks/companions/simulators/robosuite_side_by_side.py
 
 A Panda in the environment Lift, 500 steps of the simulation a second, goals as absolute
 poses. Circle: 0.1 m at 2 rad/s, turning by ±0.3 rad about the vertical, five turns. Set
 point: 5 cm aside, 5 cm up and 0.2 rad, at once. Both controllers have the gains of
 OSC_POSE (kp = 150, critically damped), and its attraction to the first posture. Writes
-a table into benchmarks/results/simulators.md.
+a table into benchmarks/companions/simulators/results.md.
 """
 
 import logging
@@ -22,8 +22,8 @@ import numpy as np
 import pinocchio as pin
 import robosuite
 
-sys.path.append(str(Path(__file__).parents[1]))
-from shared.marked_sections import RESULTS, replace_section
+sys.path.append(str(Path(__file__).parents[2]))
+from shared.marked_sections import replace_section
 
 import hsp_control.companions.simulators.robosuite  # noqa: F401  it registers HSP_POSE
 from hsp_control.common.arrays import Array
@@ -282,7 +282,7 @@ def main() -> None:
             print(row, end="", flush=True)
             lines.append(row)
         section = f"robosuite_side_by_side.py, {name}"
-        replace_section(RESULTS / "simulators.md", section, "".join(lines))
+        replace_section(Path(__file__).with_name("results.md"), section, "".join(lines))
 
 
 if __name__ == "__main__":

@@ -1,6 +1,7 @@
-"""Other bipeds walk by the same plan, with its defaults: how fast, and how well.
+r"""Other bipeds walk by the same plan, with its defaults: how fast, and how well.
 
-    python benchmarks/companions/walking_bipeds.py [--unitree FOLDER] [part of a name]
+    python benchmarks/companions/walking/walking_bipeds.py \
+        [--unitree FOLDER] [part of a name]
 
 Prints one line for each robot and speed: six steps on MuJoCo at 1 kHz, and a second of
 standing. Nothing is tuned: a robot has its joints bent a little, soles as large as its

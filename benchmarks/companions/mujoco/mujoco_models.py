@@ -1,10 +1,11 @@
-"""Compare robots made of MuJoCo's models with MuJoCo, for every MJCF of many packages.
+r"""Compare robots made of MuJoCo's models with MuJoCo, for every MJCF of many packages.
 
-    .venv/bin/python benchmarks/companions/mujoco_models.py [--folder NAME=PATH ...]
+    .venv/bin/python benchmarks/companions/mujoco/mujoco_models.py \
+        [--folder NAME=PATH ...]
 
 Downloads the packages, without what they depend on, into a temporary folder; or takes
 the MJCF files of a folder. Every file that MuJoCo compiles and that has a joint is made
-a robot as a whole. Writes results/mujoco_models.csv and a section of results/mujoco.md.
+a robot as a whole. Writes mujoco_models.csv and a section of results.md.
 """
 
 import argparse
@@ -24,10 +25,10 @@ from rich.progress import track
 
 from hsp_control import HspControlError, Robot
 
-ROOT = Path(__file__).resolve().parents[2]
+ROOT = Path(__file__).resolve().parents[3]
 sys.path[:0] = [str(ROOT / "tests" / "support"), str(ROOT / "benchmarks")]
 from mujoco_oracle import Differences, differences  # noqa: E402
-from shared.marked_sections import RESULTS, replace_section  # noqa: E402
+from shared.marked_sections import replace_section  # noqa: E402
 
 PACKAGES = (
     "brax",
@@ -42,7 +43,7 @@ PACKAGES = (
 )
 STATES = 3
 TOLERANCE = 1e-12
-CSV = RESULTS / "mujoco_models.csv"
+CSV = Path(__file__).with_name("mujoco_models.csv")
 
 
 class Row(NamedTuple):
@@ -80,8 +81,12 @@ def main() -> None:
             counts[name] = version, len(files), len(own)
             rows += own
     write_csv(rows)
-    replace_section(RESULTS / "mujoco.md", "mujoco_models", "\n" + table(rows, counts))
-    print(f"Wrote {CSV} and results/mujoco.md")
+    replace_section(
+        Path(__file__).with_name("results.md"),
+        "mujoco_models",
+        "\n" + table(rows, counts),
+    )
+    print(f"Wrote {CSV} and results.md")
 
 
 def downloaded(package: str, folder: Path) -> tuple[str, Path]:

@@ -1,10 +1,11 @@
 """How well the loop of `hsp play` keeps pace while pages draw.
 
-    .venv/bin/python benchmarks/companions/play.py
+    .venv/bin/python benchmarks/companions/play/play.py
 
 A row is due every 10 ms of real time. For each configuration the same session goes on
 without a page, with a page in a browser that draws by software, and with one that takes
-a single message and no more, in turns. Writes a table into benchmarks/results/play.md.
+a single message and no more, in turns. Writes a table into
+results.md, beside it.
 """
 
 import sys
@@ -22,10 +23,10 @@ from hsp_control.companions.play.playable import playable
 from hsp_control.companions.viewer import Viewer
 from hsp_control.companions.viewer.transport import PageServer
 
-sys.path.append(str(Path(__file__).parents[1]))
-sys.path.append(str(Path(__file__).parents[2] / "tests/companions/support"))
+sys.path.append(str(Path(__file__).parents[2]))
+sys.path.append(str(Path(__file__).parents[3] / "tests/companions/support"))
 from pages import Steering
-from shared.marked_sections import RESULTS, replace_section
+from shared.marked_sections import replace_section
 
 CONFIGURATIONS = ("panda_obstacle", "dual_panda", "whole_body/talos_circle")
 WINDOW, ROUNDS = 5.0, 3  # each condition is measured so long, so often [s]
@@ -111,4 +112,4 @@ def lines() -> Iterator[str]:
 if __name__ == "__main__":
     text = "\n".join(lines())
     print(text)
-    replace_section(RESULTS / "play.md", "play", f"{text}\n")
+    replace_section(Path(__file__).with_name("results.md"), "play", f"{text}\n")

@@ -1,6 +1,7 @@
-"""Eight quadrupeds trot and crawl on MuJoCo, with one set of parameters.
+r"""Eight quadrupeds trot and crawl on MuJoCo, with one set of parameters.
 
-    python benchmarks/companions/trotting.py [--estimated] [--case WORD] [robot ...]
+    python benchmarks/companions/walking/trotting.py \
+        [--estimated] [--case WORD] [robot ...]
 
 Prints one line for each robot and case: whether it stood at the end, how far it came,
 its mean speed while it trotted at full speed, the share of steps that a limit changed,

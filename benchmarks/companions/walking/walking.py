@@ -1,6 +1,7 @@
-"""Talos walks on MuJoCo: far, fast, turning, pushed, with other masses and friction.
+r"""Talos walks on MuJoCo: far, fast, turning, pushed, with other masses and friction.
 
-    python benchmarks/companions/walking.py [--estimated] [--robot g1] [WORD ...]
+    python benchmarks/companions/walking/walking.py \
+        [--estimated] [--robot g1] [WORD ...]
 
 Prints one line for each case: whether it stood at the end, how far it came, and how
 well the plan was followed; with words only those whose names contain one. Each case is

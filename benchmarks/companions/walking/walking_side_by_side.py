@@ -1,11 +1,11 @@
 """Compare this law with TSID while Talos stands and walks under the same plan.
 
-    .venv-peers/bin/python benchmarks/companions/walking_side_by_side.py
+    .venv-peers/bin/python benchmarks/companions/walking/walking_side_by_side.py
 
 Both stand in the same closed loop on MuJoCo: the plan gets the measurement of the
 period, writes references and switches contacts, and the controller follows. Times of a
 step are taken in one run, of all controllers in turn at each of its states. Writes a
-section of benchmarks/results/walking.md.
+section of benchmarks/companions/walking/results.md.
 """
 
 # ruff: noqa: E402
@@ -27,8 +27,8 @@ from typing import Any
 
 import numpy as np
 
-sys.path.append(str(Path(__file__).parents[1]))
-from shared.marked_sections import RESULTS, replace_section
+sys.path.append(str(Path(__file__).parents[2]))
+from shared.marked_sections import replace_section
 from shared.timing import Compute
 from walking import PUSH, WALKS
 
@@ -39,7 +39,7 @@ from hsp_control.control.measurement import Measurement
 from hsp_control.simulation.plants import SampledPlant
 
 PERIOD = 1e-3
-SECTION = "benchmarks/companions/walking_side_by_side.py"
+SECTION = "benchmarks/companions/walking/walking_side_by_side.py"
 LAW = "this law"
 WEIGHTS = (1e-2, 1e-3)  # of TSID's posture
 FELL = 20.0  # joint speed at which a run is over [rad/s]
@@ -344,7 +344,7 @@ def main() -> None:
     )
     print(table)
     if not options.dry:
-        replace_section(RESULTS / "walking.md", SECTION, text)
+        replace_section(Path(__file__).with_name("results.md"), SECTION, text)
 
 
 if __name__ == "__main__":
