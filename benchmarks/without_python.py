@@ -3,7 +3,8 @@
     .venv/bin/python benchmarks/without_python.py [CONFIG ...] [--turns N]
 
 A step is `compute` and `applied`; a turn is 100,000 of them along the first ten seconds
-of the run. The efforts are the same to the last bit.
+of the run. The efforts are the same to the last bit. Writes
+benchmarks/results/without_python.md.
 """
 
 import argparse
@@ -16,6 +17,7 @@ from time import perf_counter_ns
 
 import numpy as np
 from numpy.typing import NDArray
+from shared.marked_sections import RESULTS, replace_section
 
 import hsp_control as hsp
 from hsp_control.frozen import include_folder, library
@@ -55,7 +57,7 @@ def times_in_python(experiment: hsp.Experiment, states: Rows) -> Rows:
 
 
 def main() -> None:
-    """Print a table."""
+    """Measure, print the table and write it."""
     parser = argparse.ArgumentParser()
     parser.add_argument(
         "configs", nargs="*", default=["panda_limits", "panda_obstacle"]
@@ -71,8 +73,9 @@ def main() -> None:
         source = Path(__file__).with_suffix(".c")
         flags = ["-O2", f"-I{include_folder()}", str(own), f"-Wl,-rpath,{own.parent}"]
         subprocess.run([compiler, source, *flags, "-o", program], check=True)
-        print(
-            "| configuration | in | p50 us | p99.9 | largest |\n|---|---|--:|--:|--:|"
+        table = (
+            "| configuration | in | median [µs] | 99.9 % | largest |\n"
+            "|---|---|--:|--:|--:|\n"
         )
         for name in options.configs:
             experiment = hsp.load_experiment(name)
@@ -87,7 +90,9 @@ def main() -> None:
                 times["Python"].append(times_in_python(experiment, states))
             for where, each in times.items():
                 p50, p999, most = np.quantile(np.concatenate(each), [0.5, 0.999, 1.0])
-                print(f"| {name} | {where} | {p50:.1f} | {p999:.1f} | {most:.0f} |")
+                table += f"| {name} | {where} | {p50:.1f} | {p999:.1f} | {most:.0f} |\n"
+    print(table)
+    replace_section(RESULTS / "without_python.md", "without_python", table)
 
 
 if __name__ == "__main__":

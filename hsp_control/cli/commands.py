@@ -9,7 +9,7 @@ from collections.abc import Callable
 from dataclasses import asdict
 from hashlib import sha256
 from pathlib import Path
-from typing import Protocol
+from typing import Any, Protocol
 
 import numpy as np
 from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn, track
@@ -189,9 +189,16 @@ def robots(options: argparse.Namespace) -> int:
 
 
 def schema(options: argparse.Namespace) -> int:
-    """Print the JSON Schema."""
-    print(json.dumps(json_schema(), indent=2, ensure_ascii=False))
+    """Print the JSON Schema, one definition a line."""
+    whole = json_schema()
+    definitions = [f"{_compact(k)}:{_compact(v)}" for k, v in whole["$defs"].items()]
+    rest = _compact({name: part for name, part in whole.items() if name != "$defs"})
+    print(rest[:-1] + ',"$defs":{\n' + ",\n".join(definitions) + "\n}}")
     return 0
+
+
+def _compact(value: Any) -> str:
+    return json.dumps(value, ensure_ascii=False, separators=(",", ":"))
 
 
 def _run_with_progress(
