@@ -22,7 +22,7 @@ from hsp_control.cli.consoles import message_of
 from hsp_control.cli.consoles import out as _out
 from hsp_control.cli.interrupts import INTERRUPTED, DeferredInterrupt
 from hsp_control.cli.loading import read
-from hsp_control.cli.run_summary import Stopwatch, summary
+from hsp_control.cli.stopwatch import Stopwatch
 from hsp_control.common.exceptions import LogError, SimulationError
 from hsp_control.config import Experiment, json_schema
 from hsp_control.config.loaded_scenario import LoadedScenario, load_scenario
@@ -31,6 +31,7 @@ from hsp_control.robot.description.sources import example_robots
 from hsp_control.simulation import Rollout
 from hsp_control.simulation.log_writer import LogWriter
 from hsp_control.simulation.measures import measures
+from hsp_control.simulation.run_summary import summary_rows
 
 
 class _Shown(Protocol):
@@ -138,8 +139,8 @@ def _run_and_save(
 
 def _tell(rollout: Rollout, log: Path, stopwatch: Stopwatch) -> None:
     """Print what a run did, as a table."""
-    table = summary(rollout)
-    for line in stopwatch.table_rows(rollout):
+    table = Table(show_header=False, box=None, pad_edge=False)
+    for line in [*summary_rows(rollout), *stopwatch.table_rows(rollout)]:
         table.add_row(*line)
     _out.print(table)
     _out.print(f"Log: {log}")

@@ -113,6 +113,8 @@ class Controller(Composition):
                 out.write(tau, memory, delivered, stack, damped)
             else:
                 out.overwrite(delivered, stack, damped)
+            if self._limits.measured:
+                out.keep_distances(self._limits.measured)
             return out
 
     def _observe(

@@ -182,7 +182,8 @@ def _center_of(meta: Mapping[str, Any], name: str) -> str:
 def _edge(meta: Mapping[str, Any], name: str) -> tuple[float | None, str]:
     center = _center_of(meta, name)
     if not center:
-        return 0.0, ""
+        kept = meta.get("columns", {}).get(f"distance.{name}", {}).get("minimum", 0.0)
+        return float(kept), f"limit {kept:g} m" if kept else ""
     about = meta.get("obstacles", {}).get(center, {})
     # Only a ball has its surface at one distance from its centre.
     if about.get("shape") != "Sphere" or about.get("radius") is None:

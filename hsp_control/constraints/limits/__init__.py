@@ -7,6 +7,7 @@ from .barriers import MinimumDistance as MinimumDistance
 from .barriers import ObstacleDistance as ObstacleDistance
 from .barriers import SelfDistance as SelfDistance
 from .barriers import StaticEffort as StaticEffort
+from .barriers import barrier_names as barrier_names
 from .joint_numbers import ByJoint as ByJoint
 from .joint_numbers import PositionRange as PositionRange
 from .joint_numbers import PositionsByJoint as PositionsByJoint
