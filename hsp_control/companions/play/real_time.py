@@ -13,10 +13,10 @@ from typing import Any
 from hsp_control.cli.consoles import out
 from hsp_control.cli.loading import run_imports
 from hsp_control.common.exceptions import HspControlError
-from hsp_control.companions.play.picture import FRAME, Picture
 from hsp_control.companions.play.playable import playable_document
 from hsp_control.companions.play.session import Session
 from hsp_control.companions.viewer import Viewer
+from hsp_control.companions.viewer.live_picture import FRAME, Picture
 from hsp_control.companions.viewer.pages import (
     OpeningPage,
     draw_before,

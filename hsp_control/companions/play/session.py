@@ -101,6 +101,16 @@ class Session:
         self.reset()
 
     @property
+    def robot(self) -> Robot:
+        """The robot."""
+        return self.experiment.robot
+
+    @property
+    def title(self) -> str:
+        """The title of the scene."""
+        return self.experiment.scenario.title or self.robot.name
+
+    @property
     def t(self) -> float:
         """The time of the present row [s]."""
         return self.controller.state.t

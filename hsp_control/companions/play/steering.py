@@ -27,8 +27,8 @@ from hsp_control.companions.play.live_loop import (
     SteeredLoop,
     channel_pair,
 )
-from hsp_control.companions.play.picture import FRAME, Picture
 from hsp_control.companions.viewer import Viewer
+from hsp_control.companions.viewer.live_picture import FRAME, Picture
 from hsp_control.companions.viewer.pages import (
     OpeningPage,
     draw_before,

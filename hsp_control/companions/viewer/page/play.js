@@ -27,6 +27,7 @@ class Play {
     this.setup = setup;
     this.hand.end(true);
     document.body.classList.toggle("live-loop", !this.simulated);
+    document.body.classList.toggle("watched-loop", loop === "watched");
     if (loop === "held") this.holdKey ??= new PlayHold(this);
     this.touched.clear();
     this.force = null;
