@@ -67,7 +67,7 @@ _SHOWN = re.compile(r"\s*(title|description|view)\b")
 
 def file_name(words: str) -> str:
     """Return words as the name of a file; what is too long ends in its hash."""
-    name = re.sub(r"[\s/\\]+", "_", words)
+    name = re.sub(r"[\s/\\]+", "_", re.sub(r"[,;+]\s*", "-", words))
     if len(name) <= _LONGEST:
         return name
     return f"{name[: _LONGEST - 9]}-{sha256(words.encode()).hexdigest()[:8]}"
@@ -80,7 +80,7 @@ def _log_of(source: Path, options: argparse.Namespace) -> Path:
     """
     changed = [each for each in options.overrides if not _SHOWN.match(each)]
     folder: Path = options.out
-    log = folder / f"{file_name(','.join([source.stem, *changed]))}.npz"
+    log = folder / f"{file_name('-'.join([source.stem, *changed]))}.npz"
     if log.exists() and source.exists() and log.samefile(source):
         return log.with_stem(f"{log.stem}-again")
     return log

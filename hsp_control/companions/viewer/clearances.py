@@ -7,9 +7,9 @@ from typing import NamedTuple
 import numpy as np
 
 from hsp_control.common.arrays import Array
+from hsp_control.companions.plots.analysis import acts, terms_of_type
 from hsp_control.companions.plots.palette import COLLISION, OBSTACLE, SERIES, fractions
 from hsp_control.companions.viewer import threejs
-from hsp_control.companions.viewer.analysis import acts, terms_of_type
 from hsp_control.companions.viewer.arrows import bar_tracks, unit_bar
 from hsp_control.companions.viewer.commands import (
     Json,
