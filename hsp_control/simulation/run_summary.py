@@ -79,6 +79,18 @@ def damped_rows(rollout: Log) -> int:
     return 0 if known is None else int((known > 0.0).sum())
 
 
+def damped_words(rollout: Log) -> str:
+    """Return what to say of a run that was damped most of the time; else nothing."""
+    rows = damped_rows(rollout)
+    if 2 * rows <= len(rollout):
+        return ""
+    text = f"the law was damped in {rows} of {len(rollout)} rows, and not exact there"
+    for each in unreached(rollout.columns, rollout.meta["tasks"]):
+        if words := each.words(-1):
+            text += f"; task {each.task!r}: {words}"
+    return text
+
+
 def summary_text(rollout: Log) -> str:
     """Return the table of `summary_rows` as lines of text."""
     rows = [*summary_rows(rollout)]

@@ -15,6 +15,7 @@ from .joint_numbers import Scaled as Scaled
 from .limits import Limits as Limits
 from .limits import LimitsOrNone as LimitsOrNone
 from .limits import RobotLimits as RobotLimits
+from .limits import in_degrees as in_degrees
 from .limits import own_limits as own_limits
 
 __dir__ = own_names(__name__)

@@ -4,7 +4,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from drawn_logs import planar
+from drawn_logs import legend_texts, planar
 from matplotlib.figure import Figure
 
 import hsp_control as hsp
@@ -72,12 +72,12 @@ def test_the_floor_of_a_held_effort_is_drawn_where_the_exponential_is() -> None:
     gain, short = "null_space.gain=10", "simulation.duration=0.5"
     run = hsp.load_experiment("panda_obstacle", gain, short).run()
     figure = plots.diagnostics_figure(run, panels=["null_space"])
-    words = [text.get_text() for text in figure.axes[0].get_legend().get_texts()]
+    words = legend_texts(figure.axes[0])
     assert "expected floor of the held effort" in words
     run.meta["config"]["simulation"]["control_period"] = None
     other = hsp.Rollout(run.columns, run.meta)
     figure = plots.diagnostics_figure(other, panels=["null_space"])
-    words = [text.get_text() for text in figure.axes[0].get_legend().get_texts()]
+    words = legend_texts(figure.axes[0])
     assert "expected floor of the held effort" not in words
 
 
