@@ -97,6 +97,8 @@ def column_unit(rollout: Log, name: str) -> str:
 
 # --- targets that are far away or out of reach ---------------------------------------
 
+PULL_COLUMN, PULLED = "pull.force", 1.0
+"""Column of the force by which somebody pulls at a link, and what counts of it [N]."""
 FAR, OUT = "target far away", "target out of reach"
 """What is said of them, whoever says it."""
 REACHED = 0.01
@@ -149,6 +151,7 @@ def unreached(
     held = (columns.get("damped", none) > 0.0) | (
         columns.get("status", none) >= LIMITED
     )
+    held &= ~(columns.get(PULL_COLUMN, none) > PULLED)  # else it is held away by a hand
     for task, described in tasks.items():
         if f"task.{task}.error" not in columns:
             continue

@@ -1,6 +1,7 @@
 """The page of what goes on now: the scene, its handles, its knobs and its plots."""
 
 import operator
+import re
 from collections.abc import Iterator, Mapping
 from typing import Any, NamedTuple, Protocol
 
@@ -28,7 +29,7 @@ from hsp_control.null_space.fields.field import terms_of
 from hsp_control.null_space.fields.weight import sample_weight
 from hsp_control.robot import Robot
 from hsp_control.simulation import Rollout
-from hsp_control.simulation.measures import unreached
+from hsp_control.simulation.measures import PULL_COLUMN, PULLED, REACHED, unreached
 
 FRAME = 1.0 / 30.0  # time between two pictures [s]
 _FIELD_LAYERS = ("influence", "distances", "capsules")
@@ -193,6 +194,7 @@ class Picture:
             _told("state", **moving, message=text, level=level),
             _told("values", values=handles.settings),
             self._force(),
+            *self._joints(),
             *samples,
         ]
 
@@ -249,8 +251,28 @@ class Picture:
             obstacles=[grip.describe(state) for grip in handles.obstacles.values()],
             controls=[knob.describe() for knob in handles.knobs.values()],
             plots=plots,
+            joints=joint_names(self._motion().rows) if self._meta["limits"] else [],
             pull=session.pushes is not None,
             loop=session.kind,
+        )
+
+    def _joints(self) -> Iterator[PageCommand]:
+        """Yield where the joints are within their limits, each number over its limit.
+
+        Positions from 0 to 1 within the range, speeds and efforts from -1 to 1; null
+        where there is no limit.
+        """
+        limits, recorder = self._meta["limits"], self._session.recorder
+        if not limits:
+            return
+        row = recorder.rows(recorder.count - 1)
+        ends = {name: np.array(each, dtype=float) for name, each in limits.items()}
+        span = ends["upper"] - ends["lower"]
+        yield _told(
+            "joints",
+            q=_shares((row["joint_positions"][0] - ends["lower"]) / span),
+            v=_shares(row["v"][0] / ends["velocity"]),
+            tau=_shares(row["tau"][0] / ends["effort"]),
         )
 
     def _force(self) -> PageCommand:
@@ -269,6 +291,12 @@ class Picture:
         rows, self._sent = recorder.rows(self._sent), recorder.count
         away = unreached(rows, self._meta["tasks"], self._moved)
         self._away = {task.task: words for task in away if (words := task.words(-1))}
+        pull = self._session.pull()
+        if pull is not None and pull[2] > PULLED:
+            held = f"held away by {pull[2]:.0f} N"
+            self._away = {
+                name: held for name in self._meta["tasks"] if _off(rows, name)
+            }
         times = rows["t"]
         self._batch += 1
         values = np.column_stack(
@@ -290,6 +318,17 @@ def _told(name: str, **fields: Any) -> PageCommand:
     return page_command(kind, PLAY, name, **fields)
 
 
+def _shares(values: Array) -> list[float | None]:
+    """Return numbers for a page; None where there is none."""
+    return [round(float(x), 4) if np.isfinite(x) else None for x in values]
+
+
+def _off(rows: dict[str, Array], task: str) -> bool:
+    """Return whether a task's error is worth a word in the last row."""
+    error = rows.get(f"task.{task}.error")
+    return error is not None and bool(np.linalg.norm(error[-1]) > REACHED)
+
+
 def _values(rows: dict[str, Array], curve: Curve) -> Array:
     """Return the values of a curve, shape (N,); NaN where there is none."""
     column = rows.get(curve.column)
@@ -309,7 +348,7 @@ def _plots(session: Shown) -> Iterator[LivePlot]:
     if meta["controls_null_space"]:
         norm = Curve("‖e_N‖", "null_space_norm")
         unit = ", ".join(f"{unit}/s" for unit in units)
-        note = "Of the free joints' motion; K_N makes it decay."
+        note = "Of the free joints' motion; decays with K_N where nothing binds."
         yield LivePlot("Null-space error ‖e_N‖", note, unit, True, [norm])
     names = [name for name in rows if name.startswith("distance.")]
     if names:
@@ -321,6 +360,18 @@ def _plots(session: Shown) -> Iterator[LivePlot]:
     if len(dofs) <= _JOINTS:
         curves = [Curve(n, "tau", slice(k, k + 1)) for k, n in enumerate(dofs)]
     yield LivePlot("Efforts τ", "Of the motors.", "N·m", False, curves)
+    curves = [Curve("‖v‖", "v", slice(0, len(dofs)))]
+    if len(dofs) <= _JOINTS:
+        curves = [Curve(n, "v", slice(k, k + 1)) for k, n in enumerate(dofs)]
+    unit = ", ".join(f"{unit}/s" for unit in units)
+    yield LivePlot("Speeds v", "Of the joints.", unit, False, curves)
+    contacts = re.compile(r"contact\.(.+)\.force")
+    found = filter(None, map(contacts.fullmatch, rows))
+    curves = [Curve(f"contact {each[1]}", each[0], slice(0, 3)) for each in found]
+    if PULL_COLUMN in rows:
+        curves.append(Curve("your pull", PULL_COLUMN))
+    if curves:
+        yield LivePlot("Forces", "On the robot, their size.", "N", False, curves)
     errors: dict[str, list[Curve]] = {}
     for task, about in meta["tasks"].items():
         first = 0
