@@ -67,13 +67,18 @@ class Recorder:
         where = Path(self._folder.name) / "log" if self._folder else Path(str(path))
         self._journal = where.with_suffix(".journal")
         self._controller, self._period = controller, log_period
-        self._config, self._lost = _config_of(controller)
+        self._config, self._lost = declaration_of(controller)
         self._begun = self._last = self._due = -inf
         self._held = 0.0  # time between the first two outputs [s]
         meta = {"name": where.stem, "config": self._config, "config_lost": self._lost}
         scene = controller.scene
         self._writer = LogWriter(controller, scene, 0, path=self._journal, meta=meta)
         self._rollout: Rollout | None = None
+
+    @property
+    def journal(self) -> Path:
+        """The file that has each row at once, until the recorder is closed."""
+        return self._journal
 
     def record(self, output: ControlOutput, tau: ArrayLike | None = None) -> None:
         """Write a row for the controller's last output, if one is due.
@@ -178,7 +183,7 @@ class Recorder:
                 self._folder.cleanup()
 
 
-def _config_of(controller: Controller) -> tuple[dict[str, Any] | None, str]:
+def declaration_of(controller: Controller) -> tuple[dict[str, Any] | None, str]:
     """Return the configuration of a controller as data; or None, and why."""
     own = controller._declared
     try:

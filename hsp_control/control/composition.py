@@ -19,6 +19,7 @@ from hsp_control.control.bound_step import BoundStep
 from hsp_control.control.changes import Change, Changes, TimeLine
 from hsp_control.control.clock_check import ClockCheck
 from hsp_control.control.declared_rates import check_field, check_metric
+from hsp_control.control.first_state import warn_of_far_target
 from hsp_control.control.gains_in_force import GainsInForce, check_held
 from hsp_control.control.mixture import Mixture
 from hsp_control.control.model_in_force import ModelInForce
@@ -246,7 +247,10 @@ class Composition:
                 target is of another kind.
             StreamError: If the target is not valid.
         """
-        value = target_of(self._followed(task), target, lambda: self._here().state)
+        followed = self._followed(task)
+        value = target_of(followed, target, lambda: self._here().state)
+        if not np.abs(value).max() < self._declared.robot.size:  # else it is in reach
+            warn_of_far_target(self._here().state, followed, value)
         return self._sent(task, value=value)
 
     def set_velocity(

@@ -18,7 +18,11 @@ from hsp_control.control.active_stack import ActiveStack
 from hsp_control.control.bound_step import FreeStep
 from hsp_control.control.changes import Change
 from hsp_control.control.composition import Composition, PresentRun
-from hsp_control.control.first_state import check_angles, warn_of_jump
+from hsp_control.control.first_state import (
+    check_angles,
+    warn_of_far_targets,
+    warn_of_jump,
+)
 from hsp_control.control.mixture import AccelerationModifier
 from hsp_control.control.model_in_force import ModelInForce
 from hsp_control.control.output import ControlOutput, Diagnostics
@@ -114,6 +118,8 @@ class Controller(Composition):
                 out.write(tau, memory, delivered, stack, damped)
             else:
                 out.overwrite(delivered, stack, damped)
+            if self._limits.measured:
+                out.keep_distances(self._limits.measured)
             return out
 
     def _observe(
@@ -155,6 +161,7 @@ class Controller(Composition):
             sent = self._limits.sent.memory()
             self._compose(here, self._time_line.declared)
             self._limits.remember(sent)
+        warn_of_far_targets(self._state, self.planned_tasks)
         self.check_derivatives(self._state)
         self._run.begun = True
         self._write(self._state.t)  # what is bound is called once, at this state

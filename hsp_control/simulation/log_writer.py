@@ -31,6 +31,7 @@ from hsp_control.robot.recorded import robot_record
 from hsp_control.simulation.journal import JournalWriter
 from hsp_control.simulation.limit_excess import VELOCITY, LimitExcess
 from hsp_control.simulation.log_columns import (
+    BarrierColumns,
     ContactColumns,
     LogColumns,
     TaskColumns,
@@ -116,6 +117,7 @@ class LogWriter:
         self._frames, self._parents = _skeleton(robot, controller)
         column("skeleton", (len(self._parents), 3), "m", "joints and task frames")
         self._terms = TermColumns(controller, columns)
+        self._barriers = BarrierColumns(controller, columns)
         for obstacle in scene.values():
             prefix = f"obstacle.{obstacle.name}"
             column(prefix, (3,), "m", "position of its frame")
@@ -156,6 +158,8 @@ class LogWriter:
             self._settled = settled
             self._tasks.update()
             self._terms.update()
+            if settled is not None:  # while one fades into another, both keep
+                self._barriers.update()
             self._keep_messages()
             columns.lay_out()
             self._active = None
@@ -217,6 +221,7 @@ class LogWriter:
         row["relaxation"][...] = output.relaxation
         self._contacts.write(state.t, output)
         self._terms.write(state)
+        self._barriers.write(state)
 
     def _find_sources(
         self, active: ActiveStack, law: Record

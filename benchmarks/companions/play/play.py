@@ -18,9 +18,10 @@ from typing import Any
 import numpy as np
 
 from hsp_control.companions.film.chromium import headless_browser
-from hsp_control.companions.play import Picture, Session, play
+from hsp_control.companions.play import Session, play
 from hsp_control.companions.play.playable import playable
 from hsp_control.companions.viewer import Viewer
+from hsp_control.companions.viewer.live_picture import Picture
 from hsp_control.companions.viewer.transport import PageServer
 
 sys.path.append(str(Path(__file__).parents[2]))

@@ -13,10 +13,11 @@ from typing import Any
 from hsp_control.cli.consoles import out
 from hsp_control.cli.loading import run_imports
 from hsp_control.common.exceptions import HspControlError
-from hsp_control.companions.play.picture import FRAME, Picture
+from hsp_control.companions.play.one_page import OnePage
 from hsp_control.companions.play.playable import playable_document
 from hsp_control.companions.play.session import Session
 from hsp_control.companions.viewer import Viewer
+from hsp_control.companions.viewer.live_picture import FRAME, Picture
 from hsp_control.companions.viewer.pages import (
     OpeningPage,
     draw_before,
@@ -38,6 +39,7 @@ def play(
     messages: Callable[[], Iterable[Mapping[str, Any]]],
     save: Callable[[], str],
     *,
+    one_page: OnePage | None = None,
     end: Callable[[], bool] = lambda: False,
 ) -> None:
     """Let a session go on in real time until it ends; pages never hold it up."""
@@ -61,6 +63,12 @@ def play(
                 case {"do": "save"}:
                     session.handles.say(save())
                     due = monotonic()
+                case {"do": "page"} if one_page is not None:
+                    try:
+                        session.handles.say(one_page.begin())
+                    except HspControlError as error:
+                        session.handles.say(str(error), warning=True)
+                    due = monotonic()
                 case _:
                     session.receive(message)
         now = monotonic()
@@ -77,6 +85,8 @@ def play(
             rate = max(session.t - marked_at, 0.0) / (now - marked)
             marked, marked_at = now, session.t
         if now - drawn >= FRAME:
+            if one_page is not None and (told := one_page.done()):
+                session.handles.say(told)
             picture.draw(running=running and not session.over, rate=rate)
             drawn = now
         wait = due if running and not session.over else drawn + FRAME
@@ -122,9 +132,13 @@ def play_command(options: argparse.Namespace) -> int:
             except HspControlError as error:
                 return str(error)
 
+        one_page = OnePage(
+            lambda: session.rollout().save(log), log.with_suffix(".html")
+        )
+        stack.callback(one_page.close)
         with suppress(KeyboardInterrupt):
             out.print("Ctrl-C ends it and saves the log.")
-            play(session, picture, server.messages, save)
+            play(session, picture, server.messages, save, one_page=one_page)
         out.print(f"Log: {session.rollout().save(log)}")
         if session.over:  # and was not reset
             print(f"hsp: {session.over.partition('; reset')[0]}", file=sys.stderr)

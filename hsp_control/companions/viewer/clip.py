@@ -7,8 +7,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hsp_control.companions.plots import palette
+from hsp_control.companions.plots.analysis import acts, from_the_start
 from hsp_control.companions.plots.log_series import spans_of
-from hsp_control.companions.viewer.analysis import acts, from_the_start
 from hsp_control.companions.viewer.commands import (
     CLIP,
     Json,

@@ -6,7 +6,7 @@ import numpy as np
 
 from hsp_control.common.arrays import Array
 from hsp_control.companions.plots import palette
-from hsp_control.companions.viewer.analysis import from_the_start
+from hsp_control.companions.plots.analysis import from_the_start
 from hsp_control.companions.viewer.arrows import contacts, ellipsoid, self_motion
 from hsp_control.companions.viewer.clearances import capsules, distances, influence
 from hsp_control.companions.viewer.clip import Band, Clip

@@ -276,6 +276,15 @@ class MinimumDistance(Barrier):
             )
 
 
+def barrier_names(barriers: Sequence[Barrier]) -> list[str]:
+    """Return what a log calls barriers: their types, several of one type numbered."""
+    types = [each.yaml_type or type(each).__name__ for each in barriers]
+    return [
+        name if types.count(name) == 1 else f"{name}_{k}"
+        for k, name in enumerate(types)
+    ]
+
+
 class _Elsewhere:
     """Distances where a displacement leads, at a later time."""
 

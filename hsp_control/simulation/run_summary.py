@@ -1,21 +1,22 @@
-"""What a run did: its tasks, what limits did to it, its speed, the size of its log."""
+"""What a run did, in words: its tasks, what limits did to it, where it was damped."""
 
-from collections.abc import Iterator
-from time import perf_counter
+from collections.abc import Iterator, Mapping
 
 import numpy as np
-from rich.table import Table
 
 from hsp_control.control.compensation.momentum_observer import LARGE_SHARE
-from hsp_control.simulation import Rollout
 from hsp_control.simulation.limit_excess import POSITION, VELOCITY
+from hsp_control.simulation.log import Log
 from hsp_control.simulation.measures import (
     FAR,
     OUT,
+    Measure,
+    distances,
     effort_units,
     forces_kept,
+    measure_name,
+    measures,
     rate_unit,
-    rows_compare,
     task_errors,
     unreached,
 )
@@ -26,62 +27,100 @@ GIVEN_UP = 0.01
 """Share of a commanded force from which on its plan does not keep it."""
 
 
-def summary(rollout: Rollout) -> Table:
-    """Return what a run did, as a table."""
-    table = Table(show_header=False, box=None, pad_edge=False)
-    table.add_row(
-        "run", f"{len(rollout)} rows to t = {rollout.t[-1]:g} s, {rollout.status}"
-    )
+def summary_rows(rollout: Log) -> Iterator[tuple[str, str]]:
+    """Yield what a run did, as rows of a table: a name and a text.
+
+    An empty name continues the row before.
+    """
+    if not len(rollout):
+        yield "run", f"no rows, {rollout.status}"
+        return
+    found = measures(rollout)
+    yield "run", f"{len(rollout)} rows to t = {rollout.t[-1]:g} s, {rollout.status}"
     if observed := rollout.meta.get("momentum_observer"):
-        table.add_row("momentum observer", observed)
+        yield "momentum observer", observed
         for row in unexplained_rows(rollout):
-            table.add_row("", row)
+            yield "", row
+    yield from _task_rows(rollout, found)
+    yield from force_rows(rollout)
+    first, last = rollout["null_space_norm"][0], found["null_space_error.end"]
+    yield (
+        "null space",
+        f"|e_N| {first:.3g} {last.unit} at the start, {_text(last)} at the end",
+    )
+    if beyond := beyond_limits(rollout):
+        yield "", beyond
+    if "singular_value.min" in found:
+        smallest = f"smallest singular value {found['singular_value.min'].value:.3g}"
+        least = found["manipulability.min"].value
+        if np.isfinite(least):
+            yield "det(J W⁻¹ Jᵀ)", f"minimum {least:.4g}, {smallest}"
+        else:  # determinants of different sizes do not compare
+            yield "J L⁻ᵀ", smallest
+    for name in distances(rollout):
+        text = f"minimum {found[f'distance.{name}.min'].value:.3g} m"
+        least = rollout.meta["columns"][f"distance.{name}"].get("minimum")
+        kept = "" if least is None else f", to be at least {least:g} m"
+        words = name.replace("_", " ")
+        words = words if words.endswith("distance") else f"distance {words}"
+        yield words, text + kept
+    largest = found["effort.max"].value
+    dof = np.nanargmax(np.nanmax(np.abs(rollout.tau), axis=0))
+    yield "effort", f"largest {largest:.3g} {effort_units(rollout)[dof]}"
+    for text in limit_rows(rollout):
+        yield "limits", text
+    if damped := damped_rows(rollout):
+        yield "singular", f"{damped} rows: the law was damped there, not exact"
+
+
+def damped_rows(rollout: Log) -> int:
+    """Return in how many rows the law was damped at a singularity."""
+    known = rollout.columns.get("damped")
+    return 0 if known is None else int((known > 0.0).sum())
+
+
+def damped_words(rollout: Log) -> str:
+    """Return what to say of a run that was damped most of the time; else nothing."""
+    rows = damped_rows(rollout)
+    if 2 * rows <= len(rollout):
+        return ""
+    text = f"the law was damped in {rows} of {len(rollout)} rows, and not exact there"
+    for each in unreached(rollout.columns, rollout.meta["tasks"]):
+        if words := each.words(-1):
+            text += f"; task {each.task!r}: {words}"
+    return text
+
+
+def summary_text(rollout: Log) -> str:
+    """Return the table of `summary_rows` as lines of text."""
+    rows = [*summary_rows(rollout)]
+    width = max(len(name) for name, _ in rows)
+    return "\n".join(f"{name:{width}}  {text}" for name, text in rows)
+
+
+def _task_rows(rollout: Log, found: Mapping[str, Measure]) -> Iterator[tuple[str, str]]:
+    """Yield how well each task was tracked, and in which rows its target was not."""
     tasks = rollout.meta["tasks"]
     away = {each.task: each for each in unreached(rollout.columns, tasks)}
     for k, task in enumerate(tasks):
         for part in (each for each in task_errors(rollout) if each.task == k):
-            tracked = part.norm[np.isfinite(part.norm)]  # it may be off for a while
-            if not len(tracked):
-                table.add_row(f"task {part.label}", "was never active")
-                continue
-            rms, last, unit = np.sqrt(np.mean(tracked**2)), tracked[-1], part.unit
-            table.add_row(
-                f"task {part.label}",
-                f"|e| rms {rms:.3g} {unit}, at the end {last:.3g} {unit}",
-            )
+            rms, last = (found[f"{measure_name(part)}.{of}"] for of in ("rms", "end"))
+            text = f"|e| rms {_text(rms)}, at the end {_text(last)}"
+            active = np.isfinite(part.norm).any()
+            yield f"task {part.label}", text if active else "was never active"
         for words, rows in ((FAR, away[task].far), (OUT, away[task].out > 0.0)):
             if count := int(rows.sum()):
                 text = f"{count} rows: {words}"
                 if words == OUT and rows[-1]:
                     text += f", {away[task].length(-1)} at the end"
-                table.add_row("", text)
-    for contact, text in force_rows(rollout):
-        table.add_row(contact, text)
-    norm, unit = rollout["null_space_norm"], rate_unit(rollout)
-    table.add_row(
-        "null space",
-        f"|e_N| {norm[0]:.3g} {unit} at the start, {norm[-1]:.3g} {unit} at the end",
-    )
-    if beyond := beyond_limits(rollout):
-        table.add_row("", beyond)
-    values = rollout["singular_values"]
-    smallest = f"smallest singular value {np.nanmin(values, initial=np.inf):.3g}"
-    if values.size and rows_compare(rollout):
-        least = f"minimum {np.nanmin(rollout['manipulability']):.4g}, {smallest}"
-        table.add_row("det(J W⁻¹ Jᵀ)", least)
-    elif values.size:  # determinants of different sizes do not compare
-        table.add_row("J L⁻ᵀ", smallest)
-    largest = np.abs(rollout.tau).max(axis=0)
-    unit = effort_units(rollout)[largest.argmax()]
-    table.add_row("effort", f"largest {largest.max():.3g} {unit}")
-    for row in limit_rows(rollout):
-        table.add_row("limits", row)
-    if damped := int((rollout["damped"] > 0.0).sum()):
-        table.add_row("singular", f"{damped} rows: the law was damped there, not exact")
-    return table
+                yield "", text
 
 
-def beyond_limits(rollout: Rollout) -> str:
+def _text(measure: Measure) -> str:
+    return f"{measure.value:.3g} {measure.unit}"
+
+
+def beyond_limits(rollout: Log) -> str:
     """Return that a field asks for more than limits give, if it does at the end."""
     last = slice(-max(len(rollout) // 10, 1), None)
     asked = np.linalg.norm(rollout["field.g"][-1])
@@ -96,7 +135,7 @@ def beyond_limits(rollout: Rollout) -> str:
     )
 
 
-def force_rows(rollout: Rollout) -> Iterator[tuple[str, str]]:
+def force_rows(rollout: Log) -> Iterator[tuple[str, str]]:
     """Yield what became of commanded forces, as rows of the table."""
     for contact, wanted, planned, actual, lost in forces_kept(rollout):
         missed = np.sqrt(np.mean((actual - wanted) ** 2))
@@ -110,7 +149,7 @@ def force_rows(rollout: Rollout) -> Iterator[tuple[str, str]]:
             yield "", f"{lost} rows: contact lost"
 
 
-def unexplained_rows(rollout: Rollout) -> Iterator[str]:
+def unexplained_rows(rollout: Log) -> Iterator[str]:
     """Yield what an observer found that the model does not explain, one sentence."""
     found = rollout.columns.get("observer.disturbance")
     if found is None:
@@ -134,7 +173,7 @@ def unexplained_rows(rollout: Rollout) -> Iterator[str]:
                 yield "the model has no rotors: robot: motor_inertia adds them"
 
 
-def limit_rows(rollout: Rollout) -> Iterator[str]:
+def limit_rows(rollout: Log) -> Iterator[str]:
     """Yield one sentence each; none where no limit was active and no joint beyond."""
     if POSITION not in rollout.columns:
         return
@@ -153,7 +192,7 @@ def limit_rows(rollout: Rollout) -> Iterator[str]:
     yield from excess_rows(rollout)
 
 
-def excess_rows(rollout: Rollout) -> Iterator[str]:
+def excess_rows(rollout: Log) -> Iterator[str]:
     """Yield where the robot was beyond its limits, a sentence each."""
     if POSITION not in rollout.columns:
         return
@@ -167,37 +206,3 @@ def excess_rows(rollout: Rollout) -> Iterator[str]:
                 f"{names[dof]} is {excess[row, dof]:.3g} {unit} beyond its {of} limit "
                 f"at {rollout.t[row]:g} s ({rows} rows): more than the model expected"
             )
-
-
-class Stopwatch:
-    """Measures the wall time from the first row on."""
-
-    def __init__(self) -> None:
-        self._first: float | None = None
-        self._last = 0.0
-
-    def lap(self) -> None:
-        """Record the time of a row."""
-        self._last = perf_counter()
-        if self._first is None:
-            self._first = self._last
-
-    def table_rows(self, rollout: Rollout) -> list[tuple[str, str]]:
-        """Return speed and size as rows of a table: name and text."""
-        rows = len(rollout)
-        size = sum(column.nbytes for column in rollout.columns.values())
-        found = [
-            ("log", f"{size / rows:.0f} bytes per row, {size / 1e6:.2g} MB in memory")
-        ]
-        took = 0.0 if self._first is None else self._last - self._first
-        if rows > 1 and took > 0.0:
-            simulated = float(rollout.t[-1] - rollout.t[0])
-            found.insert(
-                0,
-                (
-                    "speed",
-                    f"{simulated / took:.3g} times real time ({simulated:g} s in "
-                    f"{took:.2g} s, logging included)",
-                ),
-            )
-        return found

@@ -1,19 +1,23 @@
-"""Quantities of a controller that the view draws: field terms, projector, floor."""
+"""Quantities of a controller that are drawn: field terms, projector, floor."""
 
 from collections.abc import Iterator
 from typing import TypeVar
+from weakref import WeakKeyDictionary
 
 import numpy as np
 from pydantic import TypeAdapter
 
 from hsp_control.common.arrays import Array
 from hsp_control.companions.plots.log_series import held_period
+from hsp_control.config.logged_run import logged_controller
 from hsp_control.control.changes import Change
 from hsp_control.control.controller import Controller
 from hsp_control.law import MetricSample
 from hsp_control.null_space.fields import NullSpaceField
 from hsp_control.null_space.fields.field import terms_of
 from hsp_control.robot import RobotState
+from hsp_control.robot.description.access import only_within
+from hsp_control.robot.description.sources import packaged_folders
 from hsp_control.simulation import Rollout
 
 _Term = TypeVar("_Term", bound=NullSpaceField)
@@ -55,6 +59,21 @@ def null_space_projector(controller: Controller, state: RobotState) -> Array:
     B = np.linalg.solve(metric.L, J.T).T
     projector = np.eye(nv) - np.linalg.pinv(B, rcond=1e-9) @ B
     return np.asarray(np.linalg.solve(metric.L.T, projector @ metric.L.T))
+
+
+_floors: "WeakKeyDictionary[Rollout, Array | None]" = WeakKeyDictionary()
+
+
+def floor_of(rollout: Rollout) -> Array | None:
+    """Return `expected_floor` for a log alone, whose controller is rebuilt; found once.
+
+    A log may come from anybody: only packaged files are read.
+    """
+    if rollout not in _floors:
+        packaged = only_within(packaged_folders())
+        controller = logged_controller(rollout, packaged)
+        _floors[rollout] = expected_floor(rollout, controller)
+    return _floors[rollout]
 
 
 _COARSEST = 1.0
