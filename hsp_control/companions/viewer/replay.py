@@ -188,6 +188,7 @@ def _document(rollout: Rollout, access: Access) -> Document:
     document = Document(rollout.config, {}, "the log's configuration")
     document.access = access
     document.recorded_robot = usable_record(rollout.meta)
+    document.recorded_code = rollout.meta.get("imported") or {}
     return document
 
 
