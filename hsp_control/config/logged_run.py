@@ -24,6 +24,7 @@ def logged_document(rollout: Rollout, access: Access = ANYWHERE) -> Document:
     document = Document(rollout.config, {}, "the log's configuration")
     document.access = access
     document.recorded_robot = usable_record(rollout.meta)
+    document.recorded_code = rollout.meta.get("imported") or {}
     return document
 
 

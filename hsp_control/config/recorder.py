@@ -14,6 +14,7 @@ from hsp_control.common.keywords import suggesting
 from hsp_control.config.document import Document
 from hsp_control.config.experiment import controller_data
 from hsp_control.config.loaded_scenario import load_scenario
+from hsp_control.config.own_code import own_modules
 from hsp_control.control.controller import Controller
 from hsp_control.control.output import ControlOutput
 from hsp_control.declaration.language import check_kind
@@ -193,6 +194,7 @@ def declaration_of(controller: Controller) -> tuple[dict[str, Any] | None, str]:
         )
         scenario = load_scenario(Document(data, {}, "recorded")).scenario
         config: dict[str, Any] = plain_data(scenario, defaults=True)
+        config["imports"] = list(dict.fromkeys(own_modules(scenario)))
     except HspControlError as error:
         return None, str(error)
     return config, ""

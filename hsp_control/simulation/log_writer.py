@@ -19,6 +19,7 @@ from hsp_control.control.controller import Controller
 from hsp_control.control.measurement import LogChannel
 from hsp_control.control.output import ControlOutput
 from hsp_control.control.plan import RunningPlan
+from hsp_control.declaration.imported import fingerprints
 from hsp_control.declaration.nested import parts_within, with_parts_replaced
 from hsp_control.declaration.plain_data import plain_data
 from hsp_control.geometry.scene import Obstacle, Scene
@@ -314,8 +315,9 @@ class LogWriter:
             "obstacles": {o.name: _obstacle_meta(o) for o in self._scene.values()},
             **({"obstacle_meshes": self._meshes} if self._meshes else {}),
             "versions": versions(),
-            **self._meta,
-            **meta,
+            **(given := {**self._meta, **meta}),
+            # Whoever reads the log runs this code only if it is the same.
+            "imported": fingerprints((given.get("config") or {}).get("imports") or ()),
         }
 
     def _keep_messages(self) -> None:

@@ -11,7 +11,7 @@ from types import FrameType
 from typing import Any
 
 from hsp_control.cli.consoles import out
-from hsp_control.cli.loading import run_imports
+from hsp_control.cli.loading import own_code
 from hsp_control.common.exceptions import HspControlError
 from hsp_control.companions.play.one_page import OnePage
 from hsp_control.companions.play.playable import playable_document
@@ -26,6 +26,7 @@ from hsp_control.companions.viewer.pages import (
 from hsp_control.companions.viewer.transport import PageServer
 from hsp_control.config import Experiment
 from hsp_control.config.loaded_scenario import load_scenario
+from hsp_control.config.own_code import add_imports
 
 BEHIND = 0.1
 """A session that is later than this goes on from now: it is slower than real time [s].
@@ -105,13 +106,14 @@ def play_command(options: argparse.Namespace) -> int:
             options,
             lambda url: out.print(f"Play: {url}", soft_wrap=True),
         )
-        run_imports(options)
+        imports = own_code(options)
         document = playable_document(
             options.config,
             *options.overrides,
             strict=options.strict or bool(options.allow),
             allow=options.allow,
         )
+        add_imports(document, imports)
         loaded = load_scenario(document)
         view = loaded.scenario.view.all_fields()
         viewer = Viewer(loaded.robot, transport=server, **view)

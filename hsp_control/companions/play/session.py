@@ -211,7 +211,8 @@ class Session:
         experiment = self.experiment
         config = experiment.config
         if config is not None:
-            config["simulation"]["duration"] = max(self.t, self.row)
+            whole = int(self.t / self.row + 1e-6)  # Ctrl-C may come amid a row
+            config["simulation"]["duration"] = max(whole, 1) * self.row
         lost = {"changes_lost": self._unrepeatable} if self._unrepeatable else {}
         return self.recorder.rollout(
             "completed",

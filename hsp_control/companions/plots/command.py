@@ -4,7 +4,7 @@ import argparse
 import re
 from pathlib import Path
 
-from hsp_control.cli.options import AddedCommand
+from hsp_control.cli.options import AddedCommand, add_import
 
 
 def _add_options(plot: argparse.ArgumentParser) -> None:
@@ -56,17 +56,21 @@ def _add_options(plot: argparse.ArgumentParser) -> None:
         action="store_true",
         help="draw joint angles, not absolute ones, where the robot has both",
     )
+    add_import(plot)
+    plot.set_defaults(strict=False, allow=[])
 
 
 def _plot(options: argparse.Namespace) -> int:
     """Draw the figures of logs, or of a file whose ending a companion knows."""
     from hsp_control.cli.commands import file_name
     from hsp_control.cli.consoles import out, working
+    from hsp_control.cli.loading import run_imports
     from hsp_control.common.entry_points import entry_points
     from hsp_control.common.exceptions import PlotError
     from hsp_control.companions import plots
     from hsp_control.simulation import Rollout
 
+    run_imports(options)
     first = options.logs[0]
     others = entry_points("plots")
     if other := others.get(first.suffix.removeprefix(".")):

@@ -18,10 +18,10 @@ from hsp_control.declaration import Part
 from hsp_control.declaration.quantities import Names, NonNegative, Number
 from hsp_control.engine.plans import OnlyIf, PartCall, PartCalls, says
 from hsp_control.geometry.scene import Start
-from hsp_control.null_space.differences import gradient
 from hsp_control.null_space.fields import Clearance, ObstacleClearance, SelfClearance
 from hsp_control.null_space.fields.clearance import ObstacleOrName
 from hsp_control.robot import RobotState
+from hsp_control.robot.differences import gradient
 from hsp_control.robot.gravity import Gravity
 
 _SPAN = 3e-3

@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 
 from hsp_control.common.arrays import Array
-from hsp_control.robot import RobotState
+from hsp_control.robot.state import RobotState
 
 GRADIENT_STEP = 1e-3
 """Step h of `gradient` [rad or m]; truncation and rounding errors are about equal."""
