@@ -82,14 +82,10 @@ def _image(
     if compensation is not None:
         with within("compensation"):
             compensation.check(robot, own.tasks, own.contacts)
-    q = own._setup.start.state.q if start is None else robot.check_configuration(start)
-    own.compute(0.0, q, np.zeros(robot.nv))  # binds the step
-    own._state.mass_matrix  # noqa: B018 (of this state: the file does not depend on others)
-    own._limits.forget()
-    bound = own._run.bound
+    bound = own.step_alone(None if start is None else robot.check_configuration(start))
     assert bound is not None  # it is steady
     held, delivered = np.array([period]), DeliveredAlone.allocate(robot.nv)
-    sending = own._limits.applying_all(delivered.tau, delivered.a, held)
+    sending = bound.limits.applying_all(delivered.tau, delivered.a, held)
     chain = None
     if compensation is not None:
         chain = CompensatedStep(own, bound, compensation, delivered, held, sending)
@@ -97,7 +93,7 @@ def _image(
         move = _bare(bound, delivered, sending)
     else:
         move = chain.move()
-    inputs = [*inputs_of(own, period)]
+    inputs = [*inputs_of(own, bound, period)]
     first = [call for each in inputs for call in each.calls]
     values = move.values
     origin = np.zeros(1)  # the first step's time is written there
@@ -110,8 +106,8 @@ def _image(
 
 def _bare(bound: BoundStep, delivered: DeliveredAlone, sending: PartCalls) -> Move:
     """Return a step that also decides what is delivered, and records that it is."""
-    state = bound.active._state
-    after = bound._actuation.calls_alone(delivered)
+    state = bound.state
+    after = bound.actuation.calls_alone(delivered)
     values, recorded = bound.move.values, OnlyIf(sending, delivered.delivered)
     calls = [*values["calls"].calls, *state.plan([*after, recorded]).steps()]
     return engine.Move(**values | {"calls": Plan(calls)})

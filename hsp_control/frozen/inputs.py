@@ -11,6 +11,7 @@ import numpy as np
 
 from hsp_control import engine
 from hsp_control.common.arrays import Array
+from hsp_control.control.bound_step import BoundStep
 from hsp_control.control.controller import Controller
 from hsp_control.declaration.quantities import LARGEST
 from hsp_control.engine import Call
@@ -29,7 +30,7 @@ class Input(NamedTuple):
     calls: tuple[Call, ...]
 
 
-def inputs_of(own: Controller, period: float) -> Iterator[Input]:
+def inputs_of(own: Controller, bound: BoundStep, period: float) -> Iterator[Input]:
     """Yield the inputs of a controller whose efforts are held for a period [s]."""
     for task in own.tasks:
         if impedance_of(task) is not None:
@@ -44,7 +45,8 @@ def inputs_of(own: Controller, period: float) -> Iterator[Input]:
         yield _matrix(f"{task.name}.Kp", "1/s²", meaning, Kp, most)
         meaning, most = "damping of the error equation", 2.0 / period
         yield _matrix(f"{task.name}.Kv", "1/s", meaning, Kv, most)
-    K_N, meaning = own._gains.null_space, "K_N, rate of the null-space error"
+    K_N = bound.active.resolution.problem.gain
+    meaning = "K_N, rate of the null-space error"
     name, most = "null_space_gain", min(2.0 / period, LARGEST)
     if own.metric.form != VARYING:
         yield _matrix(name, "1/s", meaning, K_N, most)

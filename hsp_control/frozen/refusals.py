@@ -25,7 +25,7 @@ def check_steady(own: Controller) -> None:
     Raises:
         FreezeError: If something changes over time, with its key.
     """
-    setup = own._setup
+    setup = own.setup
     if own.changes:
         with within("changes"):
             raise FreezeError(
@@ -57,7 +57,7 @@ def check_parts(own: Controller) -> None:
         FreezeError: If one of them is Python, with its key.
     """
     state = RobotState(own.robot)
-    state.update(0.0, own._setup.start.state.q, np.zeros(own.robot.nv))
+    state.update(0.0, own.setup.start.state.q, np.zeros(own.robot.nv))
     for path, plan in _plans_of(own, state):
         for call in (each for step in plan.steps() for each in calls(step)):
             if isinstance(call, PythonCall):
