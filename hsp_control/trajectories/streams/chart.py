@@ -45,15 +45,10 @@ class Chart:
         """Return the same state in the chart in which its rotation vector is zero."""
         if not self.rotational:
             return state
-        n = self.linear
-        sample = OrientationSample.allocate()
-        self.write_orientation(state, sample)
-        x, rate = state.x.copy(), state.rate.copy()
-        acceleration = state.acceleration.copy()
-        x[n:] = 0.0
-        R, omega, omega_dot = sample
-        rate[n:], acceleration[n:] = R.T @ omega, R.T @ omega_dot
-        return State(x, rate, acceleration, R)
+        found = State(*np.zeros((3, self.size)), np.eye(3))
+        given = {"linear": self.linear, "state": vars(state), "out": vars(found)}
+        engine.RebasedState(**given)()
+        return found
 
     def write_orientation(self, state: State, out: OrientationSample) -> None:
         """Write R, ω and ω' of a state, in world axes."""
