@@ -185,22 +185,30 @@ void FrozenPlan::read_port(Bytes& bytes) {
   port.unit = bytes.text();
   port.meaning = bytes.text();
   port.entry = bytes.number<char>();
-  const bool is_input = bytes.number<char>() == 'i';
+  const char role = bytes.number<char>();
   const Field field{.rank = 1};
   if (port.entry != 'd' && port.entry != 'i') throw std::runtime_error("a port is of no type");
   const Argument array = read_array(bytes, field);
   port.size = array.shape[0];
   port.data = array.data;
-  port.input = nullptr;
-  if (is_input) {
-    const Object& evolving = object(bytes.number<std::uint32_t>());
-    if (!evolving.call || &evolving.call->kind != &kind_of<Evolve>())
-      throw std::runtime_error("an input is none");
-    port.input = static_cast<Evolve*>(evolving.call->self());
-    if (port.input->x.size() != port.size || port.entry != 'd')
-      throw std::runtime_error("an input has another size");
-  }
+  if (role == 'i') port.input = &input<Evolve>(bytes);
+  else if (role == 't') port.target = &input<StreamAlone>(bytes);
+  else if (role == 'v') port.velocity = &input<StreamAlone>(bytes);
+  else if (role != 'o') throw std::runtime_error("a port has no role");
+  const Index size = port.input      ? port.input->x.size()
+                     : port.target   ? port.target->sent_target.size()
+                     : port.velocity ? port.velocity->sent_velocity.size()
+                                     : port.size;
+  if (size != port.size || (port.is_input() && port.entry != 'd'))
+    throw std::runtime_error("an input has another size");
   ports_.push_back(std::move(port));
+}
+
+template <class Kind> Kind& FrozenPlan::input(Bytes& bytes) const {
+  const Object& found = object(bytes.number<std::uint32_t>());
+  if (!found.call || &found.call->kind != &kind_of<Kind>())
+    throw std::runtime_error("an input is none");
+  return *static_cast<Kind*>(found.call->self());
 }
 
 const FrozenPlan::Object& FrozenPlan::object(std::uint32_t index) const {

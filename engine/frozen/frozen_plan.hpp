@@ -9,6 +9,7 @@
 #include "../src/call.hpp"
 #include "../src/move.hpp"
 #include "../src/plan.hpp"
+#include "../streams/stream_alone.hpp"
 #include "bytes.hpp"
 #include "evolve.hpp"
 
@@ -20,7 +21,10 @@ struct Port {
   char entry;  // 'd' or 'i'
   std::int64_t size;
   void* data;
-  Evolve* input;  // what changes it; null if it is an output
+  // What takes what is set; all are null of an output.
+  Evolve* input = nullptr;
+  StreamAlone *target = nullptr, *velocity = nullptr;
+  bool is_input() const { return input || target || velocity; }
 };
 
 class FrozenPlan {
@@ -62,6 +66,7 @@ class FrozenPlan {
   void read_port(Bytes& bytes);
   Argument read_argument(Bytes& bytes, const Kind& kind, const Field& field);
   Argument read_array(Bytes& bytes, const Field& field);
+  template <class Kind> Kind& input(Bytes& bytes) const;
   const Object& object(std::uint32_t index) const;
   void* shared(std::uint32_t index, std::string_view type) const;
 

@@ -34,7 +34,7 @@ struct hsp_controller {
         origin(plan.array<double>("origin", 1)) {
     for (const Port& each : plan.ports())
       ports.push_back({each.name.c_str(), each.unit.c_str(), each.meaning.c_str(),
-                       static_cast<std::size_t>(each.size), each.input != nullptr});
+                       static_cast<std::size_t>(each.size), each.is_input()});
   }
 
   FrozenPlan plan;
@@ -90,10 +90,14 @@ hsp_status step(hsp_controller& of, double t, const double* q, const double* v, 
 hsp_status change(hsp_controller& of, const char* name, const double* values, std::size_t size,
                   double duration) {
   const Port* port = name ? of.plan.port(name) : nullptr;
-  if (!port || !port->input) return HSP_WRONG_NAME;
+  if (!port || !port->is_input()) return HSP_WRONG_NAME;
   if (static_cast<std::size_t>(port->size) != size) return HSP_WRONG_SIZE;
   if (!values || !(duration >= 0.0 && duration < infinite)) return HSP_WRONG_VALUE;
   const Eigen::Map<const hsp::Vector> wanted(values, port->size);
+  // A target has bounds of its own motion: no ramp.
+  if (!port->input && duration > 0.0) return HSP_WRONG_VALUE;
+  if (port->target) return port->target->send_target(wanted) ? HSP_OK : HSP_WRONG_VALUE;
+  if (port->velocity) return port->velocity->send_velocity(wanted) ? HSP_OK : HSP_WRONG_VALUE;
   if (!port->input->permits(wanted)) return HSP_WRONG_VALUE;
   // Before the first step it is so from the beginning.
   const double now = of.last ? of.plan.move().time[0] : -infinite;
@@ -127,8 +131,8 @@ const char* sentence(hsp_status status) {
     case HSP_WRONG_SIZE:
       return "the input or output has another number of values, see hsp_port_of";
     case HSP_WRONG_VALUE:
-      return "a pointer is null, or a value is not finite, out of bounds, or a gain that is not "
-             "positive definite";
+      return "a pointer is null, or a value is not finite, out of bounds, a gain that is not "
+             "positive definite, a quaternion that has not norm 1, or a ramp of a target";
     case HSP_TOO_MANY:
       return "the input still follows 8 ramps, which is the most";
     case HSP_FAILED:

@@ -45,7 +45,7 @@ class Piece {
 
   Piece(double* numbers, Index n) : numbers_(numbers), n_(n) {}
 
-  double& form() { return numbers_[0]; }
+  bool is(PieceForm form) const { return numbers_[0] == static_cast<double>(form); }
   double& start() { return numbers_[1]; }
   double& end() { return numbers_[2]; }  // what follows may begin earlier
   double& duration() { return numbers_[3]; }

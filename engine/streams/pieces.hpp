@@ -47,7 +47,7 @@ struct PlannerMemory {
 };
 
 inline void check_linear(double linear, Index n) {
-  if (linear != n && linear != n - 3)
+  if (n < 1 || (linear != n && (n < 3 || linear != n - 3)))
     throw std::invalid_argument("linear needs n, or n - 3 where a rotation follows");
 }
 

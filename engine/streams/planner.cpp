@@ -83,31 +83,24 @@ void Piece::state(double t, OwnState& out) {
   const double elapsed = t - start();
   const auto rows = body();
   out.base = base();
-  switch (static_cast<PieceForm>(static_cast<int>(form()))) {
-    case PieceForm::COAST:
-      out.rate = rows.row(1).transpose();
-      out.x = rows.row(0).transpose();
-      // not where it never ends: 0 times infinity is none
-      if (elapsed != 0.0) out.x += elapsed * out.rate;
-      out.acceleration.setZero();
-      return;
-    case PieceForm::QUINTIC: {
-      Sample sample{out.x, out.rate, out.acceleration};
-      polynomial(elapsed / duration(), duration(), rows.topRows<6>(), sample);
-      return;
+  if (is(PieceForm::COAST)) {
+    out.rate = rows.row(1).transpose();
+    out.x = rows.row(0).transpose() + elapsed * out.rate;
+    out.acceleration.setZero();
+  } else if (is(PieceForm::QUINTIC)) {
+    Sample sample{out.x, out.rate, out.acceleration};
+    polynomial(elapsed / duration(), duration(), rows.topRows<6>(), sample);
+  } else {
+    for (Index i = 0; i < n_; ++i) {
+      Index k = phases - 1;
+      while (k > 0 && !(rows(2 + 5 * k, i) <= elapsed)) --k;
+      const Index row = 2 + 5 * k;
+      const double s = std::max(elapsed - rows(row, i), 0.0), x = rows(row + 1, i),
+                   v = rows(row + 2, i), a = rows(row + 3, i), j = rows(row + 4, i);
+      out.x[i] = x + s * (v + s * (0.5 * a + s * j / 6.0)) + (rows(0, i) + elapsed * rows(1, i));
+      out.rate[i] = v + s * (a + 0.5 * s * j) + rows(1, i);
+      out.acceleration[i] = a + s * j;
     }
-    case PieceForm::FASTEST:
-      for (Index i = 0; i < n_; ++i) {
-        Index k = phases - 1;
-        while (k > 0 && !(rows(2 + 5 * k, i) <= elapsed)) --k;
-        const Index row = 2 + 5 * k;
-        const double s = std::max(elapsed - rows(row, i), 0.0), x = rows(row + 1, i),
-                     v = rows(row + 2, i), a = rows(row + 3, i), j = rows(row + 4, i);
-        out.x[i] = x + s * (v + s * (0.5 * a + s * j / 6.0)) + (rows(0, i) + elapsed * rows(1, i));
-        out.rate[i] = v + s * (a + 0.5 * s * j) + rows(1, i);
-        out.acceleration[i] = a + s * j;
-      }
-      return;
   }
 }
 

@@ -350,11 +350,18 @@ class Controller(Composition):
             raise ControllerError("nothing has been computed yet")
         return active
 
+    def without_python(self) -> "Controller":
+        """Return a preview whose streams hear what a program sends, and no Python."""
+        other = self.preview()
+        other._declared = other._declared.without_python()
+        other._compose(other._time_line.start, other._time_line.made)
+        return other
+
     def step_alone(self, q: ArrayLike | None = None) -> BoundStep | None:
         """Return a step at the beginning of a run, for who makes it without Python.
 
-        What is relative is placed there. The controller is used up: `preview` makes one
-        for this.
+        What is relative is placed there. The controller is used up: `without_python`
+        makes one for this.
 
         Args:
             q: Where the robot rests, shape (nq,); None: where the controller starts.

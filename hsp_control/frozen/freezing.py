@@ -20,8 +20,8 @@ from hsp_control.engine import Move, Plan
 from hsp_control.engine.plans import OnlyIf, PartCalls
 from hsp_control.frozen.compensated_step import CompensatedStep
 from hsp_control.frozen.image import Image, Port
-from hsp_control.frozen.inputs import inputs_of
-from hsp_control.frozen.refusals import check_parts, check_steady
+from hsp_control.frozen.inputs import inputs_of, streams_of, targets_of
+from hsp_control.frozen.refusals import check_parts, check_steady, check_streams
 
 
 @suggesting
@@ -55,7 +55,7 @@ def freeze(
     """
     if not 0.0 < period < np.inf:
         raise FreezeError(f"period is {period}; needs a positive number of seconds")
-    content = _image(controller.preview(), compensation, period, start).content()
+    content = _image(controller.without_python(), compensation, period, start).content()
     file = Path(path)
     file.parent.mkdir(parents=True, exist_ok=True)
     file.write_bytes(content)
@@ -77,6 +77,7 @@ def _image(
         start: As of `freeze`.
     """
     check_steady(own)
+    check_streams(own)
     check_parts(own)
     robot = own.robot
     if compensation is not None:
@@ -84,6 +85,9 @@ def _image(
             compensation.check(robot, own.tasks, own.contacts)
     bound = own.step_alone(None if start is None else robot.check_configuration(start))
     assert bound is not None  # it is steady
+    streams = streams_of(own)
+    for stream in streams.values():
+        stream.forget()  # the step that has bound all
     held, delivered = np.array([period]), DeliveredAlone.allocate(robot.nv)
     sending = bound.limits.applying_all(delivered.tau, delivered.a, held)
     chain = None
@@ -99,7 +103,11 @@ def _image(
     origin = np.zeros(1)  # the first step's time is written there
     calls = Plan([*first, *values["calls"].calls])
     move = engine.Move(**values | {"calls": calls, "origin": origin})
-    ports = [*_ports(own, bound, delivered, held), *(each.port for each in inputs)]
+    ports: list[Port] = [
+        *_ports(own, bound, delivered, held),
+        *(each.port for each in inputs),
+    ]
+    ports += targets_of(own, streams)
     read = Port("origin", "s", "what the clock read in the first step", origin)
     return Image(move, [*ports, read])
 

@@ -32,6 +32,10 @@ _PACKET = 16
 of it."""
 
 
+RAMPED, TARGET, VELOCITY = b"i", b"t", b"v"
+"""What is set: a value that may ramp, or what a stream follows."""
+
+
 class Port(NamedTuple):
     """An array of the plan that has a name outside of it."""
 
@@ -39,7 +43,9 @@ class Port(NamedTuple):
     unit: str
     meaning: str
     array: Any  # float64 or int64, contiguous
-    input: Call | None = None  # what changes it, of the kind Evolve; None: an output
+    # what takes what is set, of the kind Evolve or StreamAlone; None: an output
+    input: Call | None = None
+    role: bytes = RAMPED
 
 
 class Image:
@@ -121,7 +127,7 @@ class Image:
     def _port(self, port: Port) -> bytes:
         texts = _text(port.name) + _text(port.unit) + _text(port.meaning)
         letters = b"d" if port.array.dtype == np.float64 else b"i"
-        letters += b"o" if port.input is None else b"i"
+        letters += b"o" if port.input is None else port.role
         place = struct.pack("=qQ", port.array.size, self._memory.place(port.array))
         if port.input is not None:
             place += struct.pack("=I", self._number(port.input))

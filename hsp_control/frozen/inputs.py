@@ -1,10 +1,10 @@
-"""What a program sets while a frozen controller runs: gains, and K_N.
+"""What a program sets while a frozen controller runs: gains, K_N, and targets.
 
-Each is as on a controller's time line: it crossfades to a new value, and goes on from
+Gains are as on a controller's time line: they crossfade to a new value, and go on from
 what is then in force; see `Evolution`, and ``engine/frozen/evolve.hpp``.
 """
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from typing import NamedTuple
 
 import numpy as np
@@ -13,11 +13,14 @@ from hsp_control import engine
 from hsp_control.common.arrays import Array
 from hsp_control.control.bound_step import BoundStep
 from hsp_control.control.controller import Controller
+from hsp_control.declaration.nested import parts_within
 from hsp_control.declaration.quantities import LARGEST
 from hsp_control.engine import Call
-from hsp_control.frozen.image import Port
+from hsp_control.frozen.image import TARGET, VELOCITY, Port
 from hsp_control.law import VARYING
 from hsp_control.tasks.compliant_task import impedance_of
+from hsp_control.trajectories.streams.alone import StreamAlone
+from hsp_control.trajectories.streams.stream import Streamed
 
 _MOST = 8
 """How many ramps of one input may be under way."""
@@ -55,6 +58,34 @@ def inputs_of(own: Controller, bound: BoundStep, period: float) -> Iterator[Inpu
     evolve = _evolving(k, np.nextafter(0.0, 1.0), most, 0)
     port = Port(name, "1/s", meaning, k, evolve)
     yield Input(port, (evolve, engine.ScaledIdentity(k=k, out=K_N)))
+
+
+def streams_of(own: Controller) -> dict[str, StreamAlone]:
+    """Return the streams of a controller without Python, by the tasks' names."""
+    found = {}
+    for task in own.tasks:
+        for stream in parts_within(task, Streamed):
+            found[task.name] = stream.alone
+    return found
+
+
+def targets_of(own: Controller, streams: Mapping[str, StreamAlone]) -> Iterator[Port]:
+    """Yield the targets and velocities that a program sends.
+
+    They count from the next step on: the newest one, as of a stream's ``latest``.
+    """
+    for task in own.tasks:
+        if task.name not in streams:
+            continue
+        stream = streams[task.name]
+        turns = len(stream.target) > len(stream.velocity)
+        unit = "m or the task's, and a quaternion x, y, z, w" if turns else "the task's"
+        meaning = "where the reference goes, and rests"
+        at = f"{task.name}.target"
+        yield Port(at, unit, meaning, stream.target, stream.call, TARGET)
+        meaning = "how it moves until it fades: linear, then angular, in world axes"
+        at = f"{task.name}.velocity"
+        yield Port(at, "1/s", meaning, stream.velocity, stream.call, VELOCITY)
 
 
 def _matrix(name: str, unit: str, meaning: str, own: Array, most: float) -> Input:

@@ -9,6 +9,8 @@ that continues in another chart is C². Wherever |y| < 3π/2, measured in world 
 (`tests/unit/trajectories/test_streams.py` compares with 10⁵ random motions).
 """
 
+from typing import Self
+
 import numpy as np
 
 from hsp_control import engine
@@ -25,6 +27,11 @@ class State:
         """Keep the arrays."""
         self.x, self.rate, self.acceleration = x, rate, acceleration
         self.base = base
+
+    @classmethod
+    def allocate(cls, n: int) -> Self:
+        """Return a state of zeros with n coordinates."""
+        return cls(np.zeros(n), np.zeros(n), np.zeros(n), np.eye(3))
 
 
 class Chart:
@@ -45,7 +52,7 @@ class Chart:
         """Return the same state in the chart in which its rotation vector is zero."""
         if not self.rotational:
             return state
-        found = State(*np.zeros((3, self.size)), np.eye(3))
+        found = State.allocate(self.size)
         given = {"linear": self.linear, "state": vars(state), "out": vars(found)}
         engine.RebasedState(**given)()
         return found

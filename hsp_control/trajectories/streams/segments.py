@@ -118,7 +118,7 @@ class Piece(Segment):
         super().__init__(float(numbers[1]), float(numbers[2]), base)
         n = (len(numbers) - _HEAD) // _ROWS
         self.numbers = numbers
-        self._found = State(*np.zeros((3, n)), np.eye(3))
+        self._found = State.allocate(n)
         self._state = engine.PieceState(piece=numbers, out=vars(self._found))
 
     def state(self, t: float) -> State:
