@@ -194,10 +194,17 @@ void FrozenPlan::read_port(Bytes& bytes) {
   if (role == 'i') port.input = &input<Evolve>(bytes);
   else if (role == 't') port.target = &input<StreamAlone>(bytes);
   else if (role == 'v') port.velocity = &input<StreamAlone>(bytes);
-  else if (role != 'o') throw std::runtime_error("a port has no role");
+  else if (role == 'p') {
+    port.payloads = &input<Payloads>(bytes);
+    const double* first = port.payloads->asked.data();
+    port.frame = (static_cast<double*>(port.data) - first) / 10;
+    if (port.data < first || port.frame >= port.payloads->asked.rows())
+      throw std::runtime_error("a payload is of no frame");
+  } else if (role != 'o') throw std::runtime_error("a port has no role");
   const Index size = port.input      ? port.input->x.size()
                      : port.target   ? port.target->sent_target.size()
                      : port.velocity ? port.velocity->sent_velocity.size()
+                     : port.payloads ? 10
                                      : port.size;
   if (size != port.size || (port.is_input() && port.entry != 'd'))
     throw std::runtime_error("an input has another size");

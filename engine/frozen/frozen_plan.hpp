@@ -12,6 +12,7 @@
 #include "../streams/stream_alone.hpp"
 #include "bytes.hpp"
 #include "evolve.hpp"
+#include "payloads.hpp"
 
 namespace hsp::frozen {
 
@@ -24,7 +25,9 @@ struct Port {
   // What takes what is set; all are null of an output.
   Evolve* input = nullptr;
   StreamAlone *target = nullptr, *velocity = nullptr;
-  bool is_input() const { return input || target || velocity; }
+  Payloads* payloads = nullptr;
+  Index frame = 0;  // of a payload
+  bool is_input() const { return input || target || velocity || payloads; }
 };
 
 class FrozenPlan {

@@ -94,14 +94,19 @@ hsp_status change(hsp_controller& of, const char* name, const double* values, st
   if (static_cast<std::size_t>(port->size) != size) return HSP_WRONG_SIZE;
   if (!values || !(duration >= 0.0 && duration < infinite)) return HSP_WRONG_VALUE;
   const Eigen::Map<const hsp::Vector> wanted(values, port->size);
+  // Before the first step it is so from the beginning.
+  const double now = of.last ? of.plan.move().time[0] : -infinite;
+  const double ramp = of.last ? duration : 0.0;
+  if (port->payloads) {
+    if (!port->payloads->permits(wanted)) return HSP_WRONG_VALUE;
+    return port->payloads->then(port->frame, now, ramp, wanted) ? HSP_OK : HSP_TOO_MANY;
+  }
   // A target has bounds of its own motion: no ramp.
   if (!port->input && duration > 0.0) return HSP_WRONG_VALUE;
   if (port->target) return port->target->send_target(wanted) ? HSP_OK : HSP_WRONG_VALUE;
   if (port->velocity) return port->velocity->send_velocity(wanted) ? HSP_OK : HSP_WRONG_VALUE;
   if (!port->input->permits(wanted)) return HSP_WRONG_VALUE;
-  // Before the first step it is so from the beginning.
-  const double now = of.last ? of.plan.move().time[0] : -infinite;
-  return port->input->then(now, of.last ? duration : 0.0, wanted) ? HSP_OK : HSP_TOO_MANY;
+  return port->input->then(now, ramp, wanted) ? HSP_OK : HSP_TOO_MANY;
 }
 
 const char* sentence(hsp_status status) {
@@ -132,7 +137,9 @@ const char* sentence(hsp_status status) {
       return "the input or output has another number of values, see hsp_port_of";
     case HSP_WRONG_VALUE:
       return "a pointer is null, or a value is not finite, out of bounds, a gain that is not "
-             "positive definite, a quaternion that has not norm 1, or a ramp of a target";
+             "positive definite, a quaternion that has not norm 1, an inertia of no body, or a "
+             "ramp of "
+             "a target";
     case HSP_TOO_MANY:
       return "the input still follows 8 ramps, which is the most";
     case HSP_FAILED:

@@ -2,9 +2,11 @@
 #include "deliver.hpp"
 #include "evolve.hpp"
 #include "offset_effort.hpp"
+#include "payloads.hpp"
 
 namespace hsp {
 const Kind* const* frozen_kinds() {
-  return kinds<Deliver, OffsetEffort, Subtract, HasMoved, Evolve, ScaledIdentity>();
+  return kinds<Deliver, OffsetEffort, Subtract, HasMoved, Evolve, ScaledIdentity, BodyInJoint,
+               Payloads>();
 }
 }  // namespace hsp

@@ -41,6 +41,7 @@ def freeze(options: argparse.Namespace) -> int:
             compensation=experiment.scenario.compensation,
             period=live_period(experiment),
             start=experiment.q0,
+            payloads=options.payload,
         )
     out.print(f"Frozen: {file}", highlight=False)
     return 0

@@ -1,7 +1,7 @@
 """From a controller to a file that a program without Python runs."""
 
 import os
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -20,7 +20,7 @@ from hsp_control.engine import Move, Plan
 from hsp_control.engine.plans import OnlyIf, PartCalls
 from hsp_control.frozen.compensated_step import CompensatedStep
 from hsp_control.frozen.image import Image, Port
-from hsp_control.frozen.inputs import inputs_of, streams_of, targets_of
+from hsp_control.frozen.inputs import inputs_of, model_inputs, streams_of, targets_of
 from hsp_control.frozen.refusals import check_parts, check_steady, check_streams
 
 
@@ -32,6 +32,7 @@ def freeze(
     compensation: Compensation | None = None,
     period: float = 0.001,
     start: ArrayLike | None = None,
+    payloads: Sequence[str] | None = None,
 ) -> Path:
     """Write a controller for a program without Python, which ``hsp_step.h`` runs.
 
@@ -46,6 +47,8 @@ def freeze(
         period: How long each effort is held [s].
         start: The configuration at which what is relative is placed, shape (nq,); by
             default the controller's start, or else where its run began.
+        payloads: Frames that may carry something, which is an input of each; None:
+            those of the tasks.
 
     Returns:
         The file.
@@ -55,7 +58,9 @@ def freeze(
     """
     if not 0.0 < period < np.inf:
         raise FreezeError(f"period is {period}; needs a positive number of seconds")
-    content = _image(controller.without_python(), compensation, period, start).content()
+    content = _image(
+        controller.without_python(), compensation, period, start, payloads
+    ).content()
     file = Path(path)
     file.parent.mkdir(parents=True, exist_ok=True)
     file.write_bytes(content)
@@ -67,6 +72,7 @@ def _image(
     compensation: Compensation | None,
     period: float,
     start: ArrayLike | None,
+    payloads: Sequence[str] | None,
 ) -> Image:
     """Return a step as one move, and what has a name outside of it.
 
@@ -75,6 +81,7 @@ def _image(
         compensation: As of `freeze`.
         period: As of `freeze`.
         start: As of `freeze`.
+        payloads: As of `freeze`.
     """
     check_steady(own)
     check_streams(own)
@@ -98,6 +105,7 @@ def _image(
     else:
         move = chain.move()
     inputs = [*inputs_of(own, bound, period)]
+    inputs += model_inputs(own, bound, payloads)
     first = [call for each in inputs for call in each.calls]
     values = move.values
     origin = np.zeros(1)  # the first step's time is written there

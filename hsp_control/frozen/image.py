@@ -32,8 +32,8 @@ _PACKET = 16
 of it."""
 
 
-RAMPED, TARGET, VELOCITY = b"i", b"t", b"v"
-"""What is set: a value that may ramp, or what a stream follows."""
+RAMPED, TARGET, VELOCITY, PAYLOAD = b"i", b"t", b"v", b"p"
+"""What is set: a value that may ramp, what a stream follows, or what is carried."""
 
 
 class Port(NamedTuple):
@@ -43,7 +43,8 @@ class Port(NamedTuple):
     unit: str
     meaning: str
     array: Any  # float64 or int64, contiguous
-    # what takes what is set, of the kind Evolve or StreamAlone; None: an output
+    # what takes what is set, of the kind Evolve, StreamAlone or
+    # Payloads; None: an output
     input: Call | None = None
     role: bytes = RAMPED
 
