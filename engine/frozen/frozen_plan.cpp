@@ -102,6 +102,9 @@ FrozenPlan::FrozenPlan(const std::string& file) {
   read_memory(bytes);
   for (auto n = bytes.count(); n > 0; --n) read_object(bytes);
   move_ = shared(bytes.number<std::uint32_t>(), Move::type_name);
+  stop_ = shared(bytes.number<std::uint32_t>(), Move::type_name);
+  if (stop().q.size() != move().q.size() || stop().v.size() != move().v.size())
+    throw std::runtime_error("its stop is of another robot");
   for (auto n = bytes.count(); n > 0; --n) read_port(bytes);
 }
 

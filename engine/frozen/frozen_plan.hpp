@@ -38,6 +38,7 @@ class FrozenPlan {
 
   void restart() { std::memcpy(arena_.get(), initial_.data(), initial_.size()); }
   Move& move() const { return *static_cast<Move*>(move_); }
+  Move& stop() const { return *static_cast<Move*>(stop_); }  // instead of it
   const std::vector<Port>& ports() const { return ports_; }
   // Null if there is none.
   const Port* port(std::string_view name) const;
@@ -77,7 +78,7 @@ class FrozenPlan {
   std::string initial_;  // the arena as it was in the file
   std::vector<Object> objects_;
   std::vector<Port> ports_;
-  void* move_ = nullptr;
+  void *move_ = nullptr, *stop_ = nullptr;
 };
 
 }  // namespace hsp::frozen

@@ -3,10 +3,11 @@
 #include "evolve.hpp"
 #include "offset_effort.hpp"
 #include "payloads.hpp"
+#include "safe_stop.hpp"
 
 namespace hsp {
 const Kind* const* frozen_kinds() {
   return kinds<Deliver, OffsetEffort, Subtract, HasMoved, Evolve, ScaledIdentity, BodyInJoint,
-               Payloads>();
+               Payloads, SafeStop>();
 }
 }  // namespace hsp

@@ -18,6 +18,7 @@ from hsp_control.control.controller import Controller
 from hsp_control.declaration import within
 from hsp_control.engine import Move, Plan
 from hsp_control.engine.plans import OnlyIf, PartCalls
+from hsp_control.frozen.braking import LIKE_LIVE, StopGains, stopping
 from hsp_control.frozen.compensated_step import CompensatedStep
 from hsp_control.frozen.image import Image, Port
 from hsp_control.frozen.inputs import inputs_of, model_inputs, streams_of, targets_of
@@ -33,6 +34,7 @@ def freeze(
     period: float = 0.001,
     start: ArrayLike | None = None,
     payloads: Sequence[str] | None = None,
+    stop: StopGains = LIKE_LIVE,
 ) -> Path:
     """Write a controller for a program without Python, which ``hsp_step.h`` runs.
 
@@ -49,6 +51,7 @@ def freeze(
             default the controller's start, or else where its run began.
         payloads: Frames that may carry something, which is an input of each; None:
             those of the tasks.
+        stop: How ``hsp_stop`` brakes the robot, and then holds it.
 
     Returns:
         The file.
@@ -58,12 +61,11 @@ def freeze(
     """
     if not 0.0 < period < np.inf:
         raise FreezeError(f"period is {period}; needs a positive number of seconds")
-    content = _image(
-        controller.without_python(), compensation, period, start, payloads
-    ).content()
+    own = controller.without_python()
+    image = _image(own, compensation, period, start, payloads, stop)
     file = Path(path)
     file.parent.mkdir(parents=True, exist_ok=True)
-    file.write_bytes(content)
+    file.write_bytes(image.content())
     return file
 
 
@@ -73,6 +75,7 @@ def _image(
     period: float,
     start: ArrayLike | None,
     payloads: Sequence[str] | None,
+    stop: StopGains,
 ) -> Image:
     """Return a step as one move, and what has a name outside of it.
 
@@ -82,6 +85,7 @@ def _image(
         period: As of `freeze`.
         start: As of `freeze`.
         payloads: As of `freeze`.
+        stop: As of `freeze`.
     """
     check_steady(own)
     check_streams(own)
@@ -117,7 +121,8 @@ def _image(
     ]
     ports += targets_of(own, streams)
     read = Port("origin", "s", "what the clock read in the first step", origin)
-    return Image(move, [*ports, read])
+    stopped, said = stopping(own, bound, stop, held, origin, first)
+    return Image(move, [*ports, *said, read], stopped)
 
 
 def _bare(bound: BoundStep, delivered: DeliveredAlone, sending: PartCalls) -> Move:

@@ -8,7 +8,8 @@ of one kind.
 
 ``engine/frozen/frozen_plan.cpp`` reads what `Image.content` returns:
 
-    magic, CRC-32 of the rest, the engine's build, memory, objects, the move, ports
+    magic, CRC-32 of the rest, the engine's build, memory, objects, the move, the stop,
+    ports
 
 Numbers are those of this computer, which another one refuses.
 """
@@ -52,8 +53,8 @@ class Port(NamedTuple):
 class Image:
     """A plan, its memory, and the names of some of its arrays."""
 
-    def __init__(self, move: Move, ports: Sequence[Port]) -> None:
-        """Collect what a move makes.
+    def __init__(self, move: Move, ports: Sequence[Port], stop: Move) -> None:
+        """Collect what a move makes, and what stops the robot instead.
 
         Raises:
             FreezeError: If a function of Python is among it.
@@ -61,9 +62,11 @@ class Image:
         self._objects: list[bytes] = []
         self._found: dict[int, int] = {}  # the number of an object, by its identity
         self._kept: list[object] = []  # whose identities these are
-        arrays = [*_arrays(move, set()), *(port.array for port in ports)]
+        seen: set[int] = set()
+        moves = *_arrays(move, seen), *_arrays(stop, seen)
+        arrays = [*moves, *(port.array for port in ports)]
         self._memory = _Memory(arrays)
-        self._move = self._number(move)
+        self._move, self._stop = self._number(move), self._number(stop)
         self._ports = [self._port(port) for port in ports]
 
     def content(self) -> bytes:
@@ -76,7 +79,7 @@ class Image:
                 memory,
                 _count(self._objects),
                 *self._objects,
-                struct.pack("=I", self._move),
+                struct.pack("=2I", self._move, self._stop),
                 _count(self._ports),
                 *self._ports,
             ]
