@@ -102,6 +102,9 @@ FrozenPlan::FrozenPlan(const std::string& file) {
   read_memory(bytes);
   for (auto n = bytes.count(); n > 0; --n) read_object(bytes);
   move_ = shared(bytes.number<std::uint32_t>(), Move::type_name);
+  stop_ = shared(bytes.number<std::uint32_t>(), Move::type_name);
+  if (stop().q.size() != move().q.size() || stop().v.size() != move().v.size())
+    throw std::runtime_error("its stop is of another robot");
   for (auto n = bytes.count(); n > 0; --n) read_port(bytes);
 }
 
@@ -185,22 +188,37 @@ void FrozenPlan::read_port(Bytes& bytes) {
   port.unit = bytes.text();
   port.meaning = bytes.text();
   port.entry = bytes.number<char>();
-  const bool is_input = bytes.number<char>() == 'i';
+  const char role = bytes.number<char>();
   const Field field{.rank = 1};
   if (port.entry != 'd' && port.entry != 'i') throw std::runtime_error("a port is of no type");
   const Argument array = read_array(bytes, field);
   port.size = array.shape[0];
   port.data = array.data;
-  port.input = nullptr;
-  if (is_input) {
-    const Object& evolving = object(bytes.number<std::uint32_t>());
-    if (!evolving.call || &evolving.call->kind != &kind_of<Evolve>())
-      throw std::runtime_error("an input is none");
-    port.input = static_cast<Evolve*>(evolving.call->self());
-    if (port.input->x.size() != port.size || port.entry != 'd')
-      throw std::runtime_error("an input has another size");
-  }
+  if (role == 'i') port.input = &input<Evolve>(bytes);
+  else if (role == 't') port.target = &input<StreamAlone>(bytes);
+  else if (role == 'v') port.velocity = &input<StreamAlone>(bytes);
+  else if (role == 'p') {
+    port.payloads = &input<Payloads>(bytes);
+    const double* first = port.payloads->asked.data();
+    port.frame = (static_cast<double*>(port.data) - first) / 10;
+    if (port.data < first || port.frame >= port.payloads->asked.rows())
+      throw std::runtime_error("a payload is of no frame");
+  } else if (role != 'o') throw std::runtime_error("a port has no role");
+  const Index size = port.input      ? port.input->x.size()
+                     : port.target   ? port.target->sent_target.size()
+                     : port.velocity ? port.velocity->sent_velocity.size()
+                     : port.payloads ? 10
+                                     : port.size;
+  if (size != port.size || (port.is_input() && port.entry != 'd'))
+    throw std::runtime_error("an input has another size");
   ports_.push_back(std::move(port));
+}
+
+template <class Kind> Kind& FrozenPlan::input(Bytes& bytes) const {
+  const Object& found = object(bytes.number<std::uint32_t>());
+  if (!found.call || &found.call->kind != &kind_of<Kind>())
+    throw std::runtime_error("an input is none");
+  return *static_cast<Kind*>(found.call->self());
 }
 
 const FrozenPlan::Object& FrozenPlan::object(std::uint32_t index) const {

@@ -9,8 +9,10 @@
 #include "../src/call.hpp"
 #include "../src/move.hpp"
 #include "../src/plan.hpp"
+#include "../streams/stream_alone.hpp"
 #include "bytes.hpp"
 #include "evolve.hpp"
+#include "payloads.hpp"
 
 namespace hsp::frozen {
 
@@ -20,7 +22,12 @@ struct Port {
   char entry;  // 'd' or 'i'
   std::int64_t size;
   void* data;
-  Evolve* input;  // what changes it; null if it is an output
+  // What takes what is set; all are null of an output.
+  Evolve* input = nullptr;
+  StreamAlone *target = nullptr, *velocity = nullptr;
+  Payloads* payloads = nullptr;
+  Index frame = 0;  // of a payload
+  bool is_input() const { return input || target || velocity || payloads; }
 };
 
 class FrozenPlan {
@@ -31,6 +38,7 @@ class FrozenPlan {
 
   void restart() { std::memcpy(arena_.get(), initial_.data(), initial_.size()); }
   Move& move() const { return *static_cast<Move*>(move_); }
+  Move& stop() const { return *static_cast<Move*>(stop_); }  // instead of it
   const std::vector<Port>& ports() const { return ports_; }
   // Null if there is none.
   const Port* port(std::string_view name) const;
@@ -62,6 +70,7 @@ class FrozenPlan {
   void read_port(Bytes& bytes);
   Argument read_argument(Bytes& bytes, const Kind& kind, const Field& field);
   Argument read_array(Bytes& bytes, const Field& field);
+  template <class Kind> Kind& input(Bytes& bytes) const;
   const Object& object(std::uint32_t index) const;
   void* shared(std::uint32_t index, std::string_view type) const;
 
@@ -69,7 +78,7 @@ class FrozenPlan {
   std::string initial_;  // the arena as it was in the file
   std::vector<Object> objects_;
   std::vector<Port> ports_;
-  void* move_ = nullptr;
+  void *move_ = nullptr, *stop_ = nullptr;
 };
 
 }  // namespace hsp::frozen

@@ -31,19 +31,24 @@ struct hsp_controller {
         status(plan.array<std::int64_t>("status", 1)),
         delivered(plan.array<std::int64_t>("delivered", 1)),
         period(plan.array<double>("period", 1)),
-        origin(plan.array<double>("origin", 1)) {
+        origin(plan.array<double>("origin", 1)),
+        stop_tau(plan.array<double>("stop.tau", plan.move().v.size())),
+        holding(plan.array<std::int64_t>("stop.holding", 1)) {
     for (const Port& each : plan.ports())
       ports.push_back({each.name.c_str(), each.unit.c_str(), each.meaning.c_str(),
-                       static_cast<std::size_t>(each.size), each.input != nullptr});
+                       static_cast<std::size_t>(each.size), each.is_input()});
   }
 
   FrozenPlan plan;
   std::vector<hsp_port> ports;
-  const double* tau;
+  double* tau;
   const std::int64_t *status, *delivered;
   const double* period;
-  double* origin;                          // what the clock reads at time 0 [s]
-  std::optional<double> last;              // time of the last step [s]
+  double* origin;              // what the clock reads at time 0 [s]
+  std::optional<double> last;  // time of the last step [s]
+  const double* stop_tau;
+  const std::int64_t* holding;
+  bool stopping = false;
   std::atomic<hsp_status> error = HSP_OK;  // of the last request
   char failure[512] = "";                  // what an exception said
   std::atomic_flag busy = ATOMIC_FLAG_INIT;
@@ -80,8 +85,26 @@ hsp_status moved(hsp_controller& of, double t, const double* q, const double* v)
   return *of.delivered ? static_cast<hsp_status>(*of.status) : HSP_NOT_FINITE;
 }
 
-hsp_status step(hsp_controller& of, double t, const double* q, const double* v, double* tau) {
-  const hsp_status status = moved(of, t, q, v);
+// Brake, or hold: the effort, or the last one, is then `of.tau`. No clock is wrong here.
+hsp_status stopped(hsp_controller& of, double t, const double* q, const double* v) {
+  hsp::Move& stop = of.plan.stop();
+  const Eigen::Map<const hsp::Vector> q_in(q, stop.q.size()), v_in(v, stop.v.size());
+  of.stopping = true;
+  if (!std::isfinite(t)) return HSP_WRONG_STATE;
+  if (!of.last) *of.origin = t;
+  if (!stop.to(t, q_in, v_in)) return HSP_WRONG_STATE;
+  of.last = t;
+  const Eigen::Map<const hsp::Vector> found(of.stop_tau, v_in.size());
+  if (!found.allFinite()) return HSP_NOT_FINITE;
+  Eigen::Map<hsp::Vector>(of.tau, v_in.size()) = found;
+  return *of.holding ? HSP_HOLDING : HSP_BRAKING;
+}
+
+hsp_status step(hsp_controller& of, double t, const double* q, const double* v, double* tau,
+                bool stops) {
+  const hsp_status status = stops         ? stopped(of, t, q, v)
+                            : of.stopping ? HSP_STOPPED
+                                          : moved(of, t, q, v);
   for (Index i = 0; i < of.plan.move().v.size(); ++i) tau[i] = of.tau[i];
   return status;
 }
@@ -90,14 +113,23 @@ hsp_status step(hsp_controller& of, double t, const double* q, const double* v, 
 hsp_status change(hsp_controller& of, const char* name, const double* values, std::size_t size,
                   double duration) {
   const Port* port = name ? of.plan.port(name) : nullptr;
-  if (!port || !port->input) return HSP_WRONG_NAME;
+  if (!port || !port->is_input()) return HSP_WRONG_NAME;
   if (static_cast<std::size_t>(port->size) != size) return HSP_WRONG_SIZE;
   if (!values || !(duration >= 0.0 && duration < infinite)) return HSP_WRONG_VALUE;
   const Eigen::Map<const hsp::Vector> wanted(values, port->size);
-  if (!port->input->permits(wanted)) return HSP_WRONG_VALUE;
   // Before the first step it is so from the beginning.
   const double now = of.last ? of.plan.move().time[0] : -infinite;
-  return port->input->then(now, of.last ? duration : 0.0, wanted) ? HSP_OK : HSP_TOO_MANY;
+  const double ramp = of.last ? duration : 0.0;
+  if (port->payloads) {
+    if (!port->payloads->permits(wanted)) return HSP_WRONG_VALUE;
+    return port->payloads->then(port->frame, now, ramp, wanted) ? HSP_OK : HSP_TOO_MANY;
+  }
+  // A target has bounds of its own motion: no ramp.
+  if (!port->input && duration > 0.0) return HSP_WRONG_VALUE;
+  if (port->target) return port->target->send_target(wanted) ? HSP_OK : HSP_WRONG_VALUE;
+  if (port->velocity) return port->velocity->send_velocity(wanted) ? HSP_OK : HSP_WRONG_VALUE;
+  if (!port->input->permits(wanted)) return HSP_WRONG_VALUE;
+  return port->input->then(now, ramp, wanted) ? HSP_OK : HSP_TOO_MANY;
 }
 
 const char* sentence(hsp_status status) {
@@ -113,6 +145,12 @@ const char* sentence(hsp_status status) {
              "possible";
     case HSP_BEYOND:
       return "a joint is beyond its range, or faster than its limit";
+    case HSP_BRAKING:
+      return "the robot is braked";
+    case HSP_HOLDING:
+      return "the robot is held where it came to rest";
+    case HSP_STOPPED:
+      return "the robot is being stopped: call hsp_stop, or hsp_restart for a new run";
     case HSP_WRONG_STATE:
       return "t, q or v is not finite, or a quaternion or (cos, sin) pair in q has not norm 1";
     case HSP_WRONG_CLOCK:
@@ -127,8 +165,10 @@ const char* sentence(hsp_status status) {
     case HSP_WRONG_SIZE:
       return "the input or output has another number of values, see hsp_port_of";
     case HSP_WRONG_VALUE:
-      return "a pointer is null, or a value is not finite, out of bounds, or a gain that is not "
-             "positive definite";
+      return "a pointer is null, or a value is not finite, out of bounds, a gain that is not "
+             "positive definite, a quaternion that has not norm 1, an inertia of no body, or a "
+             "ramp of "
+             "a target";
     case HSP_TOO_MANY:
       return "the input still follows 8 ramps, which is the most";
     case HSP_FAILED:
@@ -172,7 +212,14 @@ double hsp_period(const hsp_controller* controller) noexcept {
 hsp_status hsp_step(hsp_controller* controller, double t, const double* q, const double* v,
                     double* tau) noexcept {
   return made(controller, [&](hsp_controller& of) {
-    return q && v && tau ? step(of, t, q, v, tau) : HSP_WRONG_VALUE;
+    return q && v && tau ? step(of, t, q, v, tau, false) : HSP_WRONG_VALUE;
+  });
+}
+
+hsp_status hsp_stop(hsp_controller* controller, double t, const double* q, const double* v,
+                    double* tau) noexcept {
+  return made(controller, [&](hsp_controller& of) {
+    return q && v && tau ? step(of, t, q, v, tau, true) : HSP_WRONG_VALUE;
   });
 }
 
@@ -180,6 +227,7 @@ hsp_status hsp_restart(hsp_controller* controller) noexcept {
   return made(controller, [](hsp_controller& of) {
     of.plan.restart();
     of.last.reset();
+    of.stopping = false;
     return HSP_OK;
   });
 }

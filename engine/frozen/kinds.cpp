@@ -2,9 +2,12 @@
 #include "deliver.hpp"
 #include "evolve.hpp"
 #include "offset_effort.hpp"
+#include "payloads.hpp"
+#include "safe_stop.hpp"
 
 namespace hsp {
 const Kind* const* frozen_kinds() {
-  return kinds<Deliver, OffsetEffort, Subtract, HasMoved, Evolve, ScaledIdentity>();
+  return kinds<Deliver, OffsetEffort, Subtract, HasMoved, Evolve, ScaledIdentity, BodyInJoint,
+               Payloads, SafeStop>();
 }
 }  // namespace hsp

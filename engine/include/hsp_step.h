@@ -3,13 +3,14 @@
  *   hsp_controller* arm = hsp_open("panda.hsp");
  *   if (!arm) fail(hsp_last_error(NULL));
  *   while (running) {                                 // at the control period
- *     hsp_status status = hsp_step(arm, t, q, v, tau);
+ *     hsp_status status = stopping ? hsp_stop(arm, t, q, v, tau) : hsp_step(arm, t, q, v, tau);
  *     if (status < 0) warn(hsp_last_error(arm));      // tau is the last one delivered
+ *     stopping |= status < 0;                         // brake from the next state on
  *     send(tau);
  *   }
  *   hsp_close(arm);
  *
- * The effort is that of the controller in Python, to the last bit. `hsp_step`, `hsp_set`,
+ * The effort is that of the controller in Python, to the last bit. `hsp_step`, `hsp_stop`, `hsp_set`,
  * `hsp_ramp`, `hsp_get` and `hsp_restart` allocate nothing, take no lock and make no system call.
  * A handle belongs to one thread at a time; different handles do not know of each other.
  *
@@ -40,6 +41,8 @@ typedef enum hsp_status {
   HSP_LIMITED = 2,       /* the nearest within the limits */
   HSP_RELAXED = 3,       /* the limits contradict each other; they are violated least */
   HSP_BEYOND = 4,        /* a joint is beyond its range, or faster than its limit */
+  HSP_BRAKING = 5,       /* of hsp_stop: it brakes */
+  HSP_HOLDING = 6,       /* of hsp_stop: it holds the robot where it came to rest */
   HSP_WRONG_STATE = -1,  /* t, q or v is not finite, or a quaternion in q has not norm 1 */
   HSP_WRONG_CLOCK = -2,  /* t went back, or on by more than 100 periods, since the last step */
   HSP_NOT_FINITE = -3,   /* the effort would not be finite */
@@ -48,7 +51,8 @@ typedef enum hsp_status {
   HSP_WRONG_SIZE = -6,   /* an input or output has another number of values */
   HSP_WRONG_VALUE = -7,  /* a value is not finite, or outside of its bounds */
   HSP_TOO_MANY = -8,     /* more than 8 ramps of one input at a time */
-  HSP_FAILED = -9        /* something else, which `hsp_last_error` says */
+  HSP_FAILED = -9,       /* something else, which `hsp_last_error` says */
+  HSP_STOPPED = -10      /* hsp_stop has begun: no more steps until hsp_restart */
 } hsp_status;
 
 typedef struct hsp_controller hsp_controller;
@@ -75,6 +79,13 @@ HSP_API double hsp_period(const hsp_controller* controller) HSP_NOEXCEPT;
 /* Compute the effort tau at a time t [s], a configuration q and a velocity v, which is sent now and
  * held for a period. The clock may begin anywhere: times count from the first step. */
 HSP_API hsp_status hsp_step(hsp_controller* controller, double t, const double* q, const double* v,
+                            double* tau) HSP_NOEXCEPT;
+
+/* Stop the robot: call it each period instead of hsp_step, once a step is refused or the run is to
+ * end. It brakes all joints alike, tau = g(q) - s k M(q) v, until they are slow, and then holds them,
+ * as `hsp live` does; the law, its limits and its clock are not asked. Efforts keep their limits, but
+ * not those on their rate. What frames carry counts. hsp_step is refused from then on. */
+HSP_API hsp_status hsp_stop(hsp_controller* controller, double t, const double* q, const double* v,
                             double* tau) HSP_NOEXCEPT;
 
 /* Begin anew: all memory is as in the file, inputs too. */

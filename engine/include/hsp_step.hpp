@@ -26,6 +26,11 @@ class FrozenController {
     const bool fits = q.size() == size_q() && v.size() == size_v() && tau.size() == size_v();
     return fits ? hsp_step(handle_.get(), t, q.data(), v.data(), tau.data()) : HSP_WRONG_SIZE;
   }
+  hsp_status stop(double t, std::span<const double> q, std::span<const double> v,
+                  std::span<double> tau) noexcept {
+    const bool fits = q.size() == size_q() && v.size() == size_v() && tau.size() == size_v();
+    return fits ? hsp_stop(handle_.get(), t, q.data(), v.data(), tau.data()) : HSP_WRONG_SIZE;
+  }
   hsp_status restart() noexcept { return hsp_restart(handle_.get()); }
   hsp_status set(const char* name, std::span<const double> values) noexcept {
     return hsp_set(handle_.get(), name, values.data(), values.size());

@@ -21,6 +21,7 @@ const Kind* const* plan_kinds();
 const Kind* const* qp_kinds();
 const Kind* const* robot_kinds();
 const Kind* const* simulation_kinds();
+const Kind* const* stream_kinds();
 const Kind* const* task_kinds();
 const Kind* const* trajectory_kinds();
 
@@ -29,11 +30,10 @@ const Kind* const* library_kinds(const std::string& path);
 
 inline std::vector<const Kind* const*> rooms() {
   return {
-      plan_kinds(),       compensation_kinds(), contact_kinds(), dynamics_kinds(),
-      edge_kinds(),       field_kinds(),        frozen_kinds(),  geometry_kinds(),
-      integrator_kinds(), law_kinds(),          limit_kinds(),   linalg_kinds(),
-      metric_kinds(),     qp_kinds(),           robot_kinds(),   simulation_kinds(),
-      task_kinds(),       trajectory_kinds(),
+      plan_kinds(),       compensation_kinds(), contact_kinds(),  dynamics_kinds(),   edge_kinds(),
+      field_kinds(),      frozen_kinds(),       geometry_kinds(), integrator_kinds(), law_kinds(),
+      limit_kinds(),      linalg_kinds(),       metric_kinds(),   qp_kinds(),         robot_kinds(),
+      simulation_kinds(), stream_kinds(),       task_kinds(),     trajectory_kinds(),
   };
 }
 

@@ -122,18 +122,22 @@ int run(char** arguments) {
   std::vector<double> q(controller.size_q()), v(controller.size_v()), tau(v.size());
   std::vector<double> times;  // that steps took [us]
   times.reserve(static_cast<std::size_t>(2.0 * duration / controller.period()) + 10000);
-  long refused = 0;
+  long refused = 0, held = 0;
   Head state;
-  do {
+  for (bool stopping = false; held < 200;) {
     if (!robot.receive(state, q, v)) throw std::runtime_error("no state arrives");
     if (state.phase > running) throw std::runtime_error("the robot has stopped by itself");
     const std::int64_t begin = nanoseconds();
-    const hsp_status status = controller.step(state.t, q, v, tau);
+    const hsp_status status =
+        stopping ? controller.stop(state.t, q, v, tau) : controller.step(state.t, q, v, tau);
     if (times.size() < times.capacity()) times.push_back(1e-3 * (nanoseconds() - begin));
     if (status < 0 && refused++ == 0)
       std::fprintf(stderr, "live: t = %g s: %s\n", state.t, controller.last_error());
     robot.send(EFFORT, tau);
-  } while (state.t < duration);
+    // Once a step is refused, or at the end: brake, and hold for 200 periods.
+    stopping = stopping || status < 0 || state.t >= duration;
+    held += status == HSP_HOLDING;
+  }
   for (int i = 0; i < 3; ++i) robot.send(BYE);  // one may be lost
   std::sort(times.begin(), times.end());
   const auto part = [&](double x) {

@@ -18,7 +18,7 @@ from pathlib import Path
 import hsp_control as hsp
 from hsp_control.cli.live_experiment import live_period
 from hsp_control.cli.robot_process import RobotProcess
-from hsp_control.frozen import include_folder, library
+from hsp_control.frozen import compiler_flags
 
 HERE = Path(__file__).parent
 
@@ -29,9 +29,9 @@ def compiled(source: Path, folder: Path) -> Path:
     compiler = shlex.split(os.environ.get("CXX") or found or "")
     if not compiler:
         sys.exit("start.py: no C++ compiler is there: install one, or name it in CXX")
-    program, own = folder / source.stem, library()
-    flags = ["-std=c++20", "-O2", f"-I{include_folder()}", f"-Wl,-rpath,{own.parent}"]
-    command = [*compiler, str(source), *flags, str(own), "-o", str(program)]
+    program = folder / source.stem
+    flags = ["-std=c++20", "-O2", *shlex.split(compiler_flags())]
+    command = [*compiler, str(source), *flags, "-o", str(program)]
     subprocess.run(command, check=True)
     return program
 

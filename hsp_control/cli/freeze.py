@@ -10,6 +10,7 @@ from hsp_control.config import Experiment
 from hsp_control.config.loaded_scenario import load_scenario
 from hsp_control.frozen import cmake_folder, compiler_flags
 from hsp_control.frozen import freeze as write
+from hsp_control.frozen.braking import StopGains
 
 _BUILDING = {"cmake_dir": cmake_folder, "flags": compiler_flags}
 
@@ -34,6 +35,7 @@ def freeze(options: argparse.Namespace) -> int:
             ("estimators",),
             "estimators are Python, which a frozen controller runs without",
         )
+    stop = experiment.scenario.live.stop
     with document.at():
         file = write(
             experiment.controller,
@@ -41,6 +43,8 @@ def freeze(options: argparse.Namespace) -> int:
             compensation=experiment.scenario.compensation,
             period=live_period(experiment),
             start=experiment.q0,
+            payloads=options.payload,
+            stop=StopGains(*(getattr(stop, name) for name in StopGains._fields)),
         )
     out.print(f"Frozen: {file}", highlight=False)
     return 0

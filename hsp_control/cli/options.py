@@ -180,6 +180,12 @@ def add_freeze(freeze: argparse.ArgumentParser) -> None:
     freeze.add_argument(
         "--out", type=Path, default=Path("out"), metavar="DIR", help="default: out"
     )
+    freeze.add_argument(
+        "--payload",
+        action="append",
+        metavar="FRAME",
+        help="a frame that may carry something (by default those of the tasks)",
+    )
     where = freeze.add_mutually_exclusive_group()
     for name, what in (
         ("--cmake-dir", "the folder that CMake's find_package(hsp_step) needs"),

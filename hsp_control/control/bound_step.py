@@ -37,7 +37,7 @@ class BoundStep:
         self._move = self.move.__call__  # bound once: half the time of a look-up
         self._own = actuation.own  # what is delivered of the law's own acceleration
         self._nearest, self._is_nearest = actuation.nearest, actuation.is_nearest
-        self._state, self._actuation, self._limits = state, actuation, limits
+        self.state, self.actuation, self.limits = state, actuation, limits
         self._law_outcome = active.resolution.outcome
         self._limits_outcome = actuation.outcome
 
@@ -50,7 +50,7 @@ class BoundStep:
         """
         plain = self._move(t, q, v)
         if plain is None:  # refused: lists, for example, or what is not valid
-            plain = self._state.advance(self.move, t, q, v)
+            plain = self.state.advance(self.move, t, q, v)
         self.damped = ""
         if plain and self.direct:
             return self._own
@@ -63,7 +63,7 @@ class BoundStep:
             self.damped = active.damped
         if self.direct and not (limits.violated.item() or limits.beyond.item()):
             return self._own
-        delivered = self._actuation.delivered(active.acceleration)
+        delivered = self.actuation.delivered(active.acceleration)
         status = delivered.status
         if status is RELAXED or status is BEYOND:
             active.check(delivered.effort)  # the engine has looked at all others
@@ -74,9 +74,9 @@ class BoundStep:
         """What the engine's loop calls instead; None if more is needed than that."""
         if self.active.streamed or not self.direct:
             return None
-        sending = self._limits.applying(self.active.acceleration)
+        sending = self.limits.applying(self.active.acceleration)
         law, limits = self._law_outcome, self._limits_outcome
-        return FreeStep(self.move, law, limits, self._state.effort, sending)
+        return FreeStep(self.move, law, limits, self.state.effort, sending)
 
 
 class FreeStep(NamedTuple):

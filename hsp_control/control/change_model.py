@@ -5,6 +5,7 @@ from typing import Self
 
 import numpy as np
 
+from hsp_control import engine
 from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import ControllerError
 from hsp_control.control.change import Change
@@ -74,14 +75,17 @@ class ChangePayload(Change, type="payload"):
                     f"{robot.name} has a free-flyer root, on whose balance a payload "
                     "counts, too; needs a robot with a fixed base"
                 )
-        R = frame.placement.rotation
-        inertia = R @ self._moments() @ R.T
-        return CarriedBody(
-            int(frame.parentJoint),
-            float(self.mass),
-            tuple(frame.placement.act(np.asarray(self.center, dtype=float)).tolist()),
-            tuple(inertia.ravel().tolist()),
-        )
+        center, inertia = np.zeros(3), np.zeros((3, 3))
+        engine.BodyInJoint(
+            rotation=np.ascontiguousarray(frame.placement.rotation),
+            position=frame.placement.translation.copy(),
+            center=np.asarray(self.center, dtype=float),
+            inertia=np.ascontiguousarray(self._moments()),
+            center_out=center,
+            inertia_out=inertia,
+        )()
+        moved = tuple(center.tolist()), tuple(inertia.ravel().tolist())
+        return CarriedBody(int(frame.parentJoint), float(self.mass), *moved)
 
     def _moments(self) -> Array:
         """Return the inertia about the centre, in the frame's axes, (3, 3)."""

@@ -365,6 +365,11 @@ class Composition:
         return self._declared.robot
 
     @property
+    def setup(self) -> Setup:
+        """All parts, placed, and when they count: what a step is bound for."""
+        return self._setup
+
+    @property
     def tasks(self) -> tuple[Task, ...]:
         """The tasks that count now or fade, placed, the highest priority first."""
         return tuple(task for level in self.levels for task in level)

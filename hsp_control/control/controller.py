@@ -15,7 +15,7 @@ from numpy.typing import ArrayLike
 from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import ControllerError, NonFiniteError
 from hsp_control.control.active_stack import ActiveStack
-from hsp_control.control.bound_step import FreeStep
+from hsp_control.control.bound_step import BoundStep, FreeStep
 from hsp_control.control.changes import Change
 from hsp_control.control.composition import Composition, PresentRun
 from hsp_control.control.first_state import (
@@ -360,6 +360,31 @@ class Controller(Composition):
         if active is None:
             raise ControllerError("nothing has been computed yet")
         return active
+
+    def without_python(self) -> "Controller":
+        """Return a preview whose streams hear what a program sends, and no Python."""
+        other = self.preview()
+        other._declared = other._declared.without_python()
+        other._compose(other._time_line.start, other._time_line.made)
+        return other
+
+    def step_alone(self, q: ArrayLike | None = None) -> BoundStep | None:
+        """Return a step at the beginning of a run, for who makes it without Python.
+
+        What is relative is placed there. The controller is used up: `without_python`
+        makes one for this.
+
+        Args:
+            q: Where the robot rests, shape (nq,); None: where the controller starts.
+
+        Returns:
+            The step, which has its parts; None if it is not the same at all times.
+        """
+        start = self._setup.start.state.q if q is None else q
+        self.compute(0.0, start, np.zeros(self.robot.nv))
+        self._state.mass_matrix  # noqa: B018 (of this state: nothing of others is left)
+        self._limits.forget()
+        return self._run.bound
 
     @property
     def step_plan(self) -> Plan:

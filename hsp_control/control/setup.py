@@ -1,6 +1,6 @@
 """What a controller is made of, how that evolves, and whether it fits together."""
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from copy import copy
 from dataclasses import dataclass, replace
 from itertools import pairwise
@@ -513,9 +513,18 @@ class DeclaredController:
 
     def preview(self) -> "DeclaredController":
         """Return the same parts with streams that begin anew."""
+        return self._with_streams(Streamed.preview)
+
+    def without_python(self) -> "DeclaredController":
+        """Return the same parts with streams that a program feeds."""
+        return self._with_streams(Streamed.without_python)
+
+    def _with_streams(
+        self, change: Callable[[Streamed], Streamed]
+    ) -> "DeclaredController":
         other = copy(self)
         other.tasks = tuple(
-            with_parts_replaced(task, Streamed, Streamed.preview) for task in self.tasks
+            with_parts_replaced(task, Streamed, change) for task in self.tasks
         )
         return other
 

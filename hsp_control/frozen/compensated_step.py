@@ -53,10 +53,10 @@ class CompensatedStep:
         Raises:
             FreezeError: If a compensator takes Python.
         """
-        state: RobotState = bound.active._state
+        state: RobotState = bound.state
         self._state, self._bound = state, bound
         self._delivered, self._sending = delivered, sending
-        nv, limits = own.robot.nv, own._limits
+        nv, limits = own.robot.nv, bound.limits
         caused = np.zeros(nv) if own.limits is None else limits.sent.held.disturbance
         self._measured = np.zeros(1), state.q.copy(), np.zeros(nv)
         self._shared = Alone(
@@ -105,7 +105,7 @@ class CompensatedStep:
             _copy(law, shared.a),
             _copy(nothing, shared.effort),
             *_all(each.act for each in self.stages),
-            *bound._actuation.calls_with_offset(*given),
+            *bound.actuation.calls_with_offset(*given),
         ]
         finish = [
             *self._sending,

@@ -1,7 +1,7 @@
 """From a controller to a file that a program without Python runs."""
 
 import os
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -18,10 +18,11 @@ from hsp_control.control.controller import Controller
 from hsp_control.declaration import within
 from hsp_control.engine import Move, Plan
 from hsp_control.engine.plans import OnlyIf, PartCalls
+from hsp_control.frozen.braking import LIKE_LIVE, StopGains, stopping
 from hsp_control.frozen.compensated_step import CompensatedStep
 from hsp_control.frozen.image import Image, Port
-from hsp_control.frozen.inputs import inputs_of
-from hsp_control.frozen.refusals import check_parts, check_steady
+from hsp_control.frozen.inputs import inputs_of, model_inputs, streams_of, targets_of
+from hsp_control.frozen.refusals import check_parts, check_steady, check_streams
 
 
 @suggesting
@@ -32,6 +33,8 @@ def freeze(
     compensation: Compensation | None = None,
     period: float = 0.001,
     start: ArrayLike | None = None,
+    payloads: Sequence[str] | None = None,
+    stop: StopGains = LIKE_LIVE,
 ) -> Path:
     """Write a controller for a program without Python, which ``hsp_step.h`` runs.
 
@@ -46,6 +49,9 @@ def freeze(
         period: How long each effort is held [s].
         start: The configuration at which what is relative is placed, shape (nq,); by
             default the controller's start, or else where its run began.
+        payloads: Frames that may carry something, which is an input of each; None:
+            those of the tasks.
+        stop: How ``hsp_stop`` brakes the robot, and then holds it.
 
     Returns:
         The file.
@@ -55,10 +61,11 @@ def freeze(
     """
     if not 0.0 < period < np.inf:
         raise FreezeError(f"period is {period}; needs a positive number of seconds")
-    content = _image(controller.preview(), compensation, period, start).content()
+    own = controller.without_python()
+    image = _image(own, compensation, period, start, payloads, stop)
     file = Path(path)
     file.parent.mkdir(parents=True, exist_ok=True)
-    file.write_bytes(content)
+    file.write_bytes(image.content())
     return file
 
 
@@ -67,6 +74,8 @@ def _image(
     compensation: Compensation | None,
     period: float,
     start: ArrayLike | None,
+    payloads: Sequence[str] | None,
+    stop: StopGains,
 ) -> Image:
     """Return a step as one move, and what has a name outside of it.
 
@@ -75,21 +84,23 @@ def _image(
         compensation: As of `freeze`.
         period: As of `freeze`.
         start: As of `freeze`.
+        payloads: As of `freeze`.
+        stop: As of `freeze`.
     """
     check_steady(own)
+    check_streams(own)
     check_parts(own)
     robot = own.robot
     if compensation is not None:
         with within("compensation"):
             compensation.check(robot, own.tasks, own.contacts)
-    q = own._setup.start.state.q if start is None else robot.check_configuration(start)
-    own.compute(0.0, q, np.zeros(robot.nv))  # binds the step
-    own._state.mass_matrix  # noqa: B018 (of this state: the file does not depend on others)
-    own._limits.forget()
-    bound = own._run.bound
+    bound = own.step_alone(None if start is None else robot.check_configuration(start))
     assert bound is not None  # it is steady
+    streams = streams_of(own)
+    for stream in streams.values():
+        stream.forget()  # the step that has bound all
     held, delivered = np.array([period]), DeliveredAlone.allocate(robot.nv)
-    sending = own._limits.applying_all(delivered.tau, delivered.a, held)
+    sending = bound.limits.applying_all(delivered.tau, delivered.a, held)
     chain = None
     if compensation is not None:
         chain = CompensatedStep(own, bound, compensation, delivered, held, sending)
@@ -97,21 +108,27 @@ def _image(
         move = _bare(bound, delivered, sending)
     else:
         move = chain.move()
-    inputs = [*inputs_of(own, period)]
+    inputs = [*inputs_of(own, bound, period)]
+    inputs += model_inputs(own, bound, payloads)
     first = [call for each in inputs for call in each.calls]
     values = move.values
     origin = np.zeros(1)  # the first step's time is written there
     calls = Plan([*first, *values["calls"].calls])
     move = engine.Move(**values | {"calls": calls, "origin": origin})
-    ports = [*_ports(own, bound, delivered, held), *(each.port for each in inputs)]
+    ports: list[Port] = [
+        *_ports(own, bound, delivered, held),
+        *(each.port for each in inputs),
+    ]
+    ports += targets_of(own, streams)
     read = Port("origin", "s", "what the clock read in the first step", origin)
-    return Image(move, [*ports, read])
+    stopped, said = stopping(own, bound, stop, held, origin, first)
+    return Image(move, [*ports, *said, read], stopped)
 
 
 def _bare(bound: BoundStep, delivered: DeliveredAlone, sending: PartCalls) -> Move:
     """Return a step that also decides what is delivered, and records that it is."""
-    state = bound.active._state
-    after = bound._actuation.calls_alone(delivered)
+    state = bound.state
+    after = bound.actuation.calls_alone(delivered)
     values, recorded = bound.move.values, OnlyIf(sending, delivered.delivered)
     calls = [*values["calls"].calls, *state.plan([*after, recorded]).steps()]
     return engine.Move(**values | {"calls": Plan(calls)})

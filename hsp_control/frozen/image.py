@@ -8,7 +8,8 @@ of one kind.
 
 ``engine/frozen/frozen_plan.cpp`` reads what `Image.content` returns:
 
-    magic, CRC-32 of the rest, the engine's build, memory, objects, the move, ports
+    magic, CRC-32 of the rest, the engine's build, memory, objects, the move, the stop,
+    ports
 
 Numbers are those of this computer, which another one refuses.
 """
@@ -32,6 +33,10 @@ _PACKET = 16
 of it."""
 
 
+RAMPED, TARGET, VELOCITY, PAYLOAD = b"i", b"t", b"v", b"p"
+"""What is set: a value that may ramp, what a stream follows, or what is carried."""
+
+
 class Port(NamedTuple):
     """An array of the plan that has a name outside of it."""
 
@@ -39,14 +44,17 @@ class Port(NamedTuple):
     unit: str
     meaning: str
     array: Any  # float64 or int64, contiguous
-    input: Call | None = None  # what changes it, of the kind Evolve; None: an output
+    # what takes what is set, of the kind Evolve, StreamAlone or
+    # Payloads; None: an output
+    input: Call | None = None
+    role: bytes = RAMPED
 
 
 class Image:
     """A plan, its memory, and the names of some of its arrays."""
 
-    def __init__(self, move: Move, ports: Sequence[Port]) -> None:
-        """Collect what a move makes.
+    def __init__(self, move: Move, ports: Sequence[Port], stop: Move) -> None:
+        """Collect what a move makes, and what stops the robot instead.
 
         Raises:
             FreezeError: If a function of Python is among it.
@@ -54,9 +62,11 @@ class Image:
         self._objects: list[bytes] = []
         self._found: dict[int, int] = {}  # the number of an object, by its identity
         self._kept: list[object] = []  # whose identities these are
-        arrays = [*_arrays(move, set()), *(port.array for port in ports)]
+        seen: set[int] = set()
+        moves = *_arrays(move, seen), *_arrays(stop, seen)
+        arrays = [*moves, *(port.array for port in ports)]
         self._memory = _Memory(arrays)
-        self._move = self._number(move)
+        self._move, self._stop = self._number(move), self._number(stop)
         self._ports = [self._port(port) for port in ports]
 
     def content(self) -> bytes:
@@ -69,7 +79,7 @@ class Image:
                 memory,
                 _count(self._objects),
                 *self._objects,
-                struct.pack("=I", self._move),
+                struct.pack("=2I", self._move, self._stop),
                 _count(self._ports),
                 *self._ports,
             ]
@@ -121,7 +131,7 @@ class Image:
     def _port(self, port: Port) -> bytes:
         texts = _text(port.name) + _text(port.unit) + _text(port.meaning)
         letters = b"d" if port.array.dtype == np.float64 else b"i"
-        letters += b"o" if port.input is None else b"i"
+        letters += b"o" if port.input is None else port.role
         place = struct.pack("=qQ", port.array.size, self._memory.place(port.array))
         if port.input is not None:
             place += struct.pack("=I", self._number(port.input))

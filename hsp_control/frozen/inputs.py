@@ -1,22 +1,29 @@
-"""What a program sets while a frozen controller runs: gains, and K_N.
+"""What a program sets while a frozen controller runs: gains, K_N, and targets.
 
-Each is as on a controller's time line: it crossfades to a new value, and goes on from
+Gains are as on a controller's time line: they crossfade to a new value, and go on from
 what is then in force; see `Evolution`, and ``engine/frozen/evolve.hpp``.
 """
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping, Sequence
 from typing import NamedTuple
 
 import numpy as np
 
 from hsp_control import engine
 from hsp_control.common.arrays import Array
+from hsp_control.common.exceptions import FreezeError
+from hsp_control.control.bound_step import BoundStep
+from hsp_control.control.change_model import MOST_GRAVITY
 from hsp_control.control.controller import Controller
+from hsp_control.declaration import within
+from hsp_control.declaration.nested import parts_within
 from hsp_control.declaration.quantities import LARGEST
 from hsp_control.engine import Call
-from hsp_control.frozen.image import Port
+from hsp_control.frozen.image import PAYLOAD, TARGET, VELOCITY, Port
 from hsp_control.law import VARYING
 from hsp_control.tasks.compliant_task import impedance_of
+from hsp_control.trajectories.streams.alone import StreamAlone
+from hsp_control.trajectories.streams.stream import Streamed
 
 _MOST = 8
 """How many ramps of one input may be under way."""
@@ -29,7 +36,7 @@ class Input(NamedTuple):
     calls: tuple[Call, ...]
 
 
-def inputs_of(own: Controller, period: float) -> Iterator[Input]:
+def inputs_of(own: Controller, bound: BoundStep, period: float) -> Iterator[Input]:
     """Yield the inputs of a controller whose efforts are held for a period [s]."""
     for task in own.tasks:
         if impedance_of(task) is not None:
@@ -44,7 +51,8 @@ def inputs_of(own: Controller, period: float) -> Iterator[Input]:
         yield _matrix(f"{task.name}.Kp", "1/s²", meaning, Kp, most)
         meaning, most = "damping of the error equation", 2.0 / period
         yield _matrix(f"{task.name}.Kv", "1/s", meaning, Kv, most)
-    K_N, meaning = own._gains.null_space, "K_N, rate of the null-space error"
+    K_N = bound.active.resolution.problem.gain
+    meaning = "K_N, rate of the null-space error"
     name, most = "null_space_gain", min(2.0 / period, LARGEST)
     if own.metric.form != VARYING:
         yield _matrix(name, "1/s", meaning, K_N, most)
@@ -53,6 +61,92 @@ def inputs_of(own: Controller, period: float) -> Iterator[Input]:
     evolve = _evolving(k, np.nextafter(0.0, 1.0), most, 0)
     port = Port(name, "1/s", meaning, k, evolve)
     yield Input(port, (evolve, engine.ScaledIdentity(k=k, out=K_N)))
+
+
+def model_inputs(
+    own: Controller, bound: BoundStep, carrying: Sequence[str] | None
+) -> Iterator[Input]:
+    """Yield gravity, and what frames carry.
+
+    Args:
+        own: The controller.
+        bound: Its step.
+        carrying: The frames; None: those of the tasks that are not fixed to the world.
+
+    Raises:
+        FreezeError: If one of the frames is fixed to the world.
+    """
+    dynamics, gravity = bound.state.dynamics, np.array(own.robot.model.gravity.linear)
+    own_gravity, change = gravity.copy(), np.zeros(3)
+    evolve = _evolving(gravity, -MOST_GRAVITY, MOST_GRAVITY, 0)
+    calls = (
+        evolve,
+        engine.Copy(x=gravity, out=change),
+        engine.Subtract(x=own_gravity, out=change),
+        engine.ChangeGravity(dynamics=dynamics, change=change),
+    )
+    port = Port("gravity", "m/s²", "gravity in the world", gravity, evolve)
+    yield Input(port, calls)
+    places, robot = {}, own.robot
+    of_tasks = (getattr(task, "frame", None) for task in own.tasks)
+    named = [each for each in of_tasks if isinstance(each, str)]
+    for name in named if carrying is None else carrying:
+        with within("payloads"):
+            frame = robot.model.frames[robot.frame_id(name)]
+            if frame.parentJoint > 0:
+                places[name] = frame
+            elif carrying is not None:
+                raise FreezeError(f"{name!r} is fixed to the world")
+    if not places:
+        return
+    asked, frames = np.zeros((len(places), 10)), [*places.values()]
+    payloads = engine.Payloads(
+        dynamics=dynamics,
+        joints=np.array([each.parentJoint for each in frames], dtype=np.int64),
+        rotations=np.array([each.placement.rotation for each in frames]),
+        positions=np.array([each.placement.translation for each in frames]),
+        asked=asked,
+        count=np.zeros(1, dtype=np.int64),
+        frames=np.zeros(_MOST, dtype=np.int64),
+        masses=np.zeros(_MOST),
+        centers=np.zeros((_MOST, 3)),
+        inertias=np.zeros((_MOST, 9)),
+        changes=np.zeros(_MOST, dtype=np.int64),
+        starts=np.zeros((_MOST, _MOST)),
+        ramps=np.zeros((_MOST, _MOST)),
+    )
+    unit, meaning = "kg, m, kg·m²", "mass, centre, inertia (xx xy xz yy yz zz)"
+    for k, name in enumerate(places):
+        port = Port(f"{name}.payload", unit, meaning, asked[k], payloads, PAYLOAD)
+        yield Input(port, (payloads,) if k == 0 else ())
+
+
+def streams_of(own: Controller) -> dict[str, StreamAlone]:
+    """Return the streams of a controller without Python, by the tasks' names."""
+    found = {}
+    for task in own.tasks:
+        for stream in parts_within(task, Streamed):
+            found[task.name] = stream.alone
+    return found
+
+
+def targets_of(own: Controller, streams: Mapping[str, StreamAlone]) -> Iterator[Port]:
+    """Yield the targets and velocities that a program sends.
+
+    They count from the next step on: the newest one, as of a stream's ``latest``.
+    """
+    for task in own.tasks:
+        if task.name not in streams:
+            continue
+        stream = streams[task.name]
+        turns = len(stream.target) > len(stream.velocity)
+        unit = "m or the task's, and a quaternion x, y, z, w" if turns else "the task's"
+        meaning = "where the reference goes, and rests"
+        at = f"{task.name}.target"
+        yield Port(at, unit, meaning, stream.target, stream.call, TARGET)
+        meaning = "how it moves until it fades: linear, then angular, in world axes"
+        at = f"{task.name}.velocity"
+        yield Port(at, "1/s", meaning, stream.velocity, stream.call, VELOCITY)
 
 
 def _matrix(name: str, unit: str, meaning: str, own: Array, most: float) -> Input:

@@ -1,5 +1,6 @@
 """Where the library is that runs frozen controllers, its header, and what finds it."""
 
+import shlex
 import sys
 from pathlib import Path
 
@@ -33,7 +34,7 @@ def compiler_flags() -> str:
     """
     own = library()
     flags = f"-I{include_folder()}", str(own), f"-Wl,-rpath,{own.parent}"
-    return " ".join(flags)
+    return shlex.join(flags)
 
 
 def cmake_folder() -> Path:

@@ -7,6 +7,7 @@ import numpy as np
 from hsp_control.common.exceptions import FreezeError
 from hsp_control.control.controller import Controller
 from hsp_control.declaration import within
+from hsp_control.declaration.nested import parts_within
 from hsp_control.engine import PythonCall
 from hsp_control.engine.inspection import calls
 from hsp_control.engine.plans import PartCall, StepPlan, planned, supplied
@@ -15,6 +16,7 @@ from hsp_control.law import FieldSample, MetricSample, TaskSample
 from hsp_control.null_space.fields.field import terms_of
 from hsp_control.null_space.fields.weight import Ramp, Weight
 from hsp_control.robot import RobotState
+from hsp_control.trajectories.streams.stream import Streamed
 
 Path = tuple[str | int, ...]
 
@@ -25,7 +27,7 @@ def check_steady(own: Controller) -> None:
     Raises:
         FreezeError: If something changes over time, with its key.
     """
-    setup = own._setup
+    setup = own.setup
     if own.changes:
         with within("changes"):
             raise FreezeError(
@@ -50,6 +52,30 @@ def check_steady(own: Controller) -> None:
             raise FreezeError("a frozen controller needs a robot with a fixed base")
 
 
+def check_streams(own: Controller) -> None:
+    """Check that streams are of the kind that a program can feed.
+
+    Raises:
+        FreezeError: If one is not, with its key.
+    """
+    for task in own.tasks:
+        for stream in parts_within(task, Streamed):
+            asked = {
+                "policy": stream.policy == "latest" or "only 'latest' can",
+                "source": stream.source is None or "the program sets targets instead",
+                "messages": stream.messages is None or "a recording is Python's",
+                "axes": stream.axes == "world" or "velocities are in world axes",
+                "stop_after": stream.stop_after is None
+                or "the program stops the robot; hold_after brings it to rest",
+            }
+            for name, reason in asked.items():
+                if reason is not True:
+                    with within("tasks", task.name, "trajectory", name):
+                        raise FreezeError(
+                            f"{getattr(stream, name)!r:.60} cannot be frozen: {reason}"
+                        )
+
+
 def check_parts(own: Controller) -> None:
     """Check that all parts are the engine's.
 
@@ -57,7 +83,7 @@ def check_parts(own: Controller) -> None:
         FreezeError: If one of them is Python, with its key.
     """
     state = RobotState(own.robot)
-    state.update(0.0, own._setup.start.state.q, np.zeros(own.robot.nv))
+    state.update(0.0, own.setup.start.state.q, np.zeros(own.robot.nv))
     for path, plan in _plans_of(own, state):
         for call in (each for step in plan.steps() for each in calls(step)):
             if isinstance(call, PythonCall):

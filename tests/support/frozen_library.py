@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from hsp_control.frozen import library
 
+BRAKING, HOLDING, STOPPED = 5, 6, -10
 OK, WRONG_STATE, WRONG_CLOCK, NOT_FINITE, BUSY = 0, -1, -2, -3, -4
 WRONG_NAME, WRONG_SIZE, WRONG_VALUE, TOO_MANY = -5, -6, -7, -8
 _HEADER = 8 + 4
@@ -39,6 +40,7 @@ def _loaded() -> Any:
         ("hsp_size_v", size, handle),
         ("hsp_period", number, handle),
         ("hsp_step", ctypes.c_int, handle, number, numbers, numbers, numbers),
+        ("hsp_stop", ctypes.c_int, handle, number, numbers, numbers, numbers),
         ("hsp_restart", ctypes.c_int, handle),
         ("hsp_port_at", ctypes.POINTER(PortOfC), handle, size),
         ("hsp_port_of", ctypes.POINTER(PortOfC), handle, text),
@@ -77,6 +79,11 @@ class Opened:
         q_in, v_in = np.array(q, dtype=float), np.array(v, dtype=float)
         given = pointer(q_in), pointer(v_in), pointer(self.tau)
         return int(LIB.hsp_step(self.handle, t, *given))
+
+    def stop(self, t: float, q: ArrayLike, v: ArrayLike) -> int:
+        q_in, v_in = np.array(q, dtype=float), np.array(v, dtype=float)
+        given = pointer(q_in), pointer(v_in), pointer(self.tau)
+        return int(LIB.hsp_stop(self.handle, t, *given))
 
     def get(self, name: str, size: int) -> NDArray[np.float64]:
         values = np.zeros(size)

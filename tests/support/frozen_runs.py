@@ -11,7 +11,7 @@ import pytest
 from numpy.typing import NDArray
 
 import hsp_control as hsp
-from hsp_control.frozen import include_folder, library
+from hsp_control.frozen import compiler_flags
 
 ROOT = Path(__file__).parents[2]
 EXAMPLE = ROOT / "examples/without_python"
@@ -26,9 +26,9 @@ def compiled(source: Path, folder: Path, *flags: str, language: str = "c") -> Pa
     if not variable and not found:
         pytest.skip(f"no compiler for {source.name}: none of {', '.join(names)}")
     compiler = shlex.split(variable or str(found))
-    own, program = library(), folder / source.stem
+    program = folder / source.stem
     command = [*compiler, "-O1", "-Wall", "-Wextra", "-Werror", str(source), *flags]
-    command += [f"-I{include_folder()}", str(own), f"-Wl,-rpath,{own.parent}"]
+    command += shlex.split(compiler_flags())
     subprocess.run([*command, "-o", str(program)], check=True)
     return program
 

@@ -9,6 +9,8 @@ that continues in another chart is C². Wherever |y| < 3π/2, measured in world 
 (`tests/unit/trajectories/test_streams.py` compares with 10⁵ random motions).
 """
 
+from typing import Self
+
 import numpy as np
 
 from hsp_control import engine
@@ -25,6 +27,11 @@ class State:
         """Keep the arrays."""
         self.x, self.rate, self.acceleration = x, rate, acceleration
         self.base = base
+
+    @classmethod
+    def allocate(cls, n: int) -> Self:
+        """Return a state of zeros with n coordinates."""
+        return cls(np.zeros(n), np.zeros(n), np.zeros(n), np.eye(3))
 
 
 class Chart:
@@ -45,15 +52,10 @@ class Chart:
         """Return the same state in the chart in which its rotation vector is zero."""
         if not self.rotational:
             return state
-        n = self.linear
-        sample = OrientationSample.allocate()
-        self.write_orientation(state, sample)
-        x, rate = state.x.copy(), state.rate.copy()
-        acceleration = state.acceleration.copy()
-        x[n:] = 0.0
-        R, omega, omega_dot = sample
-        rate[n:], acceleration[n:] = R.T @ omega, R.T @ omega_dot
-        return State(x, rate, acceleration, R)
+        found = State.allocate(self.size)
+        given = {"linear": self.linear, "state": vars(state), "out": vars(found)}
+        engine.RebasedState(**given)()
+        return found
 
     def write_orientation(self, state: State, out: OrientationSample) -> None:
         """Write R, ω and ω' of a state, in world axes."""

@@ -22,11 +22,11 @@ from hsp_control.trajectories.streams.inbox import Reader
 from hsp_control.trajectories.streams.message import Message
 from hsp_control.trajectories.streams.segments import (
     SAME,
-    Coast,
     Goal,
     Joiner,
     MotionBounds,
     Segment,
+    coast,
 )
 from hsp_control.trajectories.streams.velocities import Axes, Command, Velocities
 
@@ -233,7 +233,7 @@ class RunningStream:
         # the velocity that is commanded, until it fades, unless it is repeated
         self._command: Command | None = None
         self._fades_at = inf
-        self._segments: list[Segment] = [Coast(0.0, inf, start)]
+        self._segments: list[Segment] = [coast(0.0, inf, start)]
         self._starts = [-inf]
         self.taken = self.refused = 0
         self.waypoints = Waypoints()
@@ -353,6 +353,9 @@ class RunningStream:
             return self._velocities.follow(t, state, self._command, policy.delay)
         if not waypoints.times:
             return self._to_rest(t, state)
+        if len(waypoints.times) == 1 and self._ends_at_rest:
+            to = waypoints.values[0], waypoints.times[0], policy.delay
+            return self._joiner.to_target(t, state, *to)
         used = waypoints.near(t, policy.smoothing, _CONSIDERED)
         first = used.start
         values = np.array(waypoints.values[used])
@@ -385,7 +388,7 @@ class RunningStream:
     def _meet(self, t: float, state: State, goal: Goal, end: float) -> Segment:
         """Return a piece that meets a goal that moves, in ``delay`` or later."""
         if _on_line(state, goal, t):
-            return Coast(t, end, state)
+            return coast(t, end, state)
         soon = t + self._policy.delay
         if soon <= end:
             met = goal._replace(time=soon, x=goal.at(soon))

@@ -22,11 +22,13 @@ from hsp_control.declaration.quantities import (
     Vector3,
 )
 from hsp_control.declaration.rotation import Rotation, matrix_of
+from hsp_control.engine.plans import PartCalls
 from hsp_control.trajectories.orientation import (
     OrientationSample,
     OrientationTrajectory,
 )
 from hsp_control.trajectories.pose import PoseSample, PoseTrajectory
+from hsp_control.trajectories.streams.alone import StreamAlone
 from hsp_control.trajectories.streams.chart import Chart, State
 from hsp_control.trajectories.streams.inbox import Reader
 from hsp_control.trajectories.streams.mailbox import (
@@ -244,7 +246,8 @@ class Streamed(Remembering, error=TrajectoryError):
     def _shared(self, other: Self) -> Self:
         """Return another value of the same stream, which hears what this one hears."""
         vars(other)["_mailbox"] = self._mailbox
-        vars(other)["_previews"] = vars(self).get("_previews", False)
+        for name in ("_previews", "_is_alone"):
+            vars(other)[name] = vars(self).get(name, False)
         return other
 
     def _placed(self, placed: Self) -> Self:
@@ -276,11 +279,36 @@ class Streamed(Remembering, error=TrajectoryError):
         running: RunningStream = vars(self)["_running"]
         return running
 
-    def _begin(self) -> RunningStream:
-        start, rotational = self._start(), self.space.rotational
-        space = Space(len(start.x) - 3 * rotational, rotational)
-        chart = Chart(len(start.x) - 3 * rotational, rotational)
-        policy = Policy(
+    def without_python(self) -> Self:
+        """Return a stream that hears only what a program sends; see `StreamAlone`."""
+        copy = self.preview()
+        vars(copy)["_is_alone"] = True
+        return copy
+
+    @property
+    def alone(self) -> StreamAlone:
+        """What computes it without Python."""
+        if "_alone" not in vars(self):
+            start = self._start()
+            given = self._chart(start), self._bounds(), self._how, start
+            vars(self)["_alone"] = StreamAlone(*given)
+        alone: StreamAlone = vars(self)["_alone"]
+        return alone
+
+    def calls(self, out: Any) -> PartCalls:
+        """Return the calls that write a sample; see `Trajectory.calls`."""
+        if vars(self).get("_is_alone", False):
+            return self.alone.calls(out)
+        calls: PartCalls = super().calls(out)  # type: ignore[misc]
+        return calls
+
+    def _chart(self, start: State) -> Chart:
+        rotational = self.space.rotational
+        return Chart(len(start.x) - 3 * rotational, rotational)
+
+    @property
+    def _how(self) -> Policy:
+        return Policy(
             self.policy,
             self.delay,
             self.smoothing,
@@ -290,8 +318,12 @@ class Streamed(Remembering, error=TrajectoryError):
             self.extrapolation if self.dead_man is None else self.dead_man,
             self.axes,
         )
-        source = self._opened(space)
-        return RunningStream(chart, self._bounds(), policy, source, start)
+
+    def _begin(self) -> RunningStream:
+        start = self._start()
+        chart = self._chart(start)
+        source = self._opened(Space(chart.linear, chart.rotational))
+        return RunningStream(chart, self._bounds(), self._how, source, start)
 
     def _opened(self, space: Space) -> Reader:
         kept = not vars(self).get("_previews", False)

@@ -1,4 +1,5 @@
-/* Step a frozen controller at states of a file, again and again, and say what it did besides:
+/* Step a frozen controller at states of a file, again and again, send to the inputs that are named,
+ * and say what it did besides:
  * allocations and locks are counted, and a system call ends the process, if the kernel lets us ask
  * for that (seccomp). */
 #define _GNU_SOURCE
@@ -36,8 +37,17 @@ int pthread_mutex_lock(pthread_mutex_t* mutex) {
 }
 int pthread_mutex_unlock(pthread_mutex_t* mutex) { return (void)mutex, 0; }
 
+/* Send an input what it was last, and a bit more or less. */
+static void send(hsp_controller* controller, const char* name, long k) {
+  double values[16];
+  const hsp_port* port = hsp_port_of(controller, name);
+  if (!port || port->size > 16 || hsp_get(controller, name, values, port->size)) return;
+  values[k % 3] += k % 2 ? 0.3 : -0.3;
+  hsp_set(controller, name, values, port->size);
+}
+
 int main(int argc, char** argv) {
-  hsp_controller* controller = argc == 5 ? hsp_open(argv[1]) : NULL;
+  hsp_controller* controller = argc >= 5 ? hsp_open(argv[1]) : NULL;
   if (!controller) return 2;
   const size_t nq = hsp_size_q(controller), nv = hsp_size_v(controller), width = 1 + nq + nv;
   const long count = atol(argv[3]), repeats = atol(argv[4]);
@@ -53,6 +63,7 @@ int main(int argc, char** argv) {
     hsp_restart(controller);
     for (long i = 0; i < count; ++i) {
       const double* x = states + i * width;
+      if (argc > 5 && i % 7 == 3) send(controller, argv[5 + i % (argc - 5)], i);
       hsp_status status = hsp_step(controller, x[0], x + 1, x + 1 + nq, tau);
       delivered += status >= 0;
       others += status > 0;

@@ -1,6 +1,6 @@
 """Inputs of a frozen controller change as on a controller's time line."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -16,14 +16,17 @@ from frozen_library import (
 )
 
 import hsp_control as hsp
+from hsp_control.common.exceptions import FreezeError
 
 H = 0.001
 
 
-def pair(name: str, folder: Path) -> tuple[hsp.Controller, Opened]:
+def pair(
+    name: str, folder: Path, payloads: Sequence[str] | None = None
+) -> tuple[hsp.Controller, Opened]:
     """Return a controller at the beginning of a run, and the same without Python."""
     controller = hsp.load_experiment(name).controller
-    frozen = hsp.freeze(controller, folder / "frozen.hsp")
+    frozen = hsp.freeze(controller, folder / "frozen.hsp", payloads=payloads)
     return controller.preview(), Opened(frozen)
 
 
@@ -144,3 +147,111 @@ def test_too_many_ramps_at_a_time(tmp_path: Path) -> None:
         assert opened.step(k * H, q, np.zeros(7)) >= OK
     np.testing.assert_array_equal(opened.get("hand.Kv", 9), 27.0 * np.eye(3).ravel())
     assert opened.ramp("hand.Kv", 30.0 * np.eye(3), 0.01) == OK
+
+
+def said(mass: float, center: list[float], moments: list[float]) -> np.ndarray:
+    """Return a payload as a program says it, of moments about the frame's axes."""
+    a, b, c = moments
+    return np.array([mass, *center, a, 0.0, 0.0, b, 0.0, c])
+
+
+@pytest.mark.parametrize("name", ["panda_limits", "compliance/panda_joint_impedance"])
+@pytest.mark.parametrize("ramp", [0.0, 0.02])
+def test_payloads_are_taken_up_and_put_down(
+    name: str, ramp: float, tmp_path: Path
+) -> None:
+    frame = "panda_link6"
+    controller, opened = pair(name, tmp_path, [frame])
+
+    def carry(
+        mass: float, center: list[float], moments: list[float]
+    ) -> Callable[[float], None]:
+        def change(t: float) -> None:
+            controller.at(t).ramp(ramp).payload(frame, mass, center, moments)
+            body = said(mass, center, moments)
+            assert opened.ramp(f"{frame}.payload", body, ramp) == OK
+
+        return change
+
+    heavy = carry(2.0, [0.01, -0.02, 0.1], [0.01, 0.012, 0.009])
+    light = carry(0.3, [0.0, 0.01, 0.05], [0.0, 0.0, 0.0])
+    nothing = carry(0.0, [0.0, 0.0, 0.0], [0.0, 0.0, 0.0])
+    # also while another is taken up, twice the same, and none after none
+    changes = {
+        3: heavy,
+        8: light,
+        12: light,
+        20: nothing,
+        22: heavy,
+        60: nothing,
+        90: nothing,
+        93: light,
+    }
+    run(controller, opened, range(130), changes)
+
+
+@pytest.mark.parametrize("ramp", [0.0, 0.02])
+def test_gravity(ramp: float, tmp_path: Path) -> None:
+    controller, opened = pair("panda_limits", tmp_path)
+
+    def tilt(gravity: list[float]) -> Callable[[float], None]:
+        def change(t: float) -> None:
+            controller.at(t).ramp(ramp).gravity(gravity)
+            assert opened.ramp("gravity", gravity, ramp) == OK
+
+        return change
+
+    changes = {4: tilt([1.0, 0.5, -9.6]), 15: tilt([0.0, 0.0, -1.62])}
+    run(controller, opened, range(60), changes)
+    assert LIB.hsp_restart(opened.handle) == OK  # the model is that of the file, too
+    other = hsp.load_experiment("panda_limits").controller.preview()
+    run(other, opened, range(5), {})
+
+
+def test_a_new_run_carries_nothing(tmp_path: Path) -> None:
+    controller, opened = pair("panda_limits", tmp_path)
+    body = said(1.0, [0.0, 0.0, 0.1], [0.0, 0.0, 0.0])
+    frame = next(at for at in opened.ports if at.endswith(".payload"))
+    assert opened.set(frame, body) == OK  # before the first step: from the beginning
+    controller.at(-1.0).ramp(0.0).payload(frame.split(".")[0], 1.0, [0.0, 0.0, 0.1])
+    run(controller, opened, range(5), {})
+    assert LIB.hsp_restart(opened.handle) == OK
+    other = hsp.load_experiment("panda_limits").controller.preview()
+    run(other, opened, range(5), {})
+
+
+@pytest.mark.parametrize(
+    ("mass", "moments"),
+    [
+        (-1.0, [0.0, 0.0, 0.0]),
+        (np.nan, [0.0, 0.0, 0.0]),
+        (1.0, [0.1, 0.1, 0.3]),  # more about one axis than about both others
+        (1.0, [-0.1, 0.1, 0.1]),
+        (0.0, [0.1, 0.1, 0.1]),  # without mass
+    ],
+)
+def test_what_is_no_body_is_refused(
+    mass: float, moments: list[float], tmp_path: Path
+) -> None:
+    _, opened = pair("panda_limits", tmp_path)
+    frame = next(at for at in opened.ports if at.endswith(".payload"))
+    body = said(mass, [0.0, 0.0, 0.1], moments)
+    assert opened.set(frame, body) == WRONG_VALUE
+    assert opened.set("gravity", [0.0, 0.0, -981.0]) == WRONG_VALUE
+
+
+def test_only_what_moves_carries(tmp_path: Path) -> None:
+    controller, opened = pair("panda_limits", tmp_path)
+    assert "panda_tcp.payload" in opened.ports
+    with pytest.raises(FreezeError, match=r"^payloads: .* is fixed to the world"):
+        hsp.freeze(controller, tmp_path / "other.hsp", payloads=["panda_link0"])
+
+
+def test_too_many_payloads_at_a_time(tmp_path: Path) -> None:
+    controller, opened = pair("panda_limits", tmp_path)
+    frame = next(at for at in opened.ports if at.endswith(".payload"))
+    body = said(1.0, [0.0, 0.0, 0.1], [0.0, 0.0, 0.0])
+    run(controller, opened, range(1), {})
+    for _ in range(8):
+        assert opened.ramp(frame, body, 0.1) == OK
+    assert opened.ramp(frame, body, 0.1) == TOO_MANY

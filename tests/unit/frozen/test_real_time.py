@@ -9,6 +9,7 @@ import pytest
 from frozen_runs import compiled, random_states, simulated_states
 
 import hsp_control as hsp
+from hsp_control.trajectories import StreamPose
 
 SEED = 61
 
@@ -17,9 +18,26 @@ SEED = 61
 @pytest.mark.skipif(sys.platform != "linux", reason="glibc's names, Linux' seccomp")
 @pytest.mark.parametrize("name", ["panda_obstacle", "panda_limits", "ur5_position"])
 def test_no_allocation_no_lock_no_system_call(name: str, tmp_path: Path) -> None:
-    program = compiled(Path(__file__).with_name("quiet.c"), tmp_path)
     experiment = hsp.load_experiment(name)
-    frozen = hsp.freeze(experiment.controller, tmp_path / "frozen.hsp")
+    check_quiet(experiment, experiment.controller, tmp_path)
+
+
+@pytest.mark.smoke
+@pytest.mark.skipif(sys.platform != "linux", reason="glibc's names, Linux' seccomp")
+def test_targets_are_planned_for_without_any(tmp_path: Path) -> None:
+    experiment = hsp.load_experiment("panda_obstacle")
+    stream = StreamPose(policy="latest", delay=0.03, dead_man=0.02)
+    hand = hsp.FramePose("panda_tcp", stream, name="hand")
+    start = experiment.q0
+    controller = hsp.Controller(experiment.robot, [hand], start=start)
+    check_quiet(experiment, controller, tmp_path, "hand.target", "hand.velocity")
+
+
+def check_quiet(
+    experiment: hsp.Experiment, controller: hsp.Controller, tmp_path: Path, *sent: str
+) -> None:
+    program = compiled(Path(__file__).with_name("quiet.c"), tmp_path)
+    frozen = hsp.freeze(controller, tmp_path / "frozen.hsp")
     # where no limit is violated, and where some are, and contradict each other
     calm = simulated_states(experiment, 0.1)
     given = experiment.robot, experiment.q0, 100, SEED
@@ -28,7 +46,7 @@ def test_no_allocation_no_lock_no_system_call(name: str, tmp_path: Path) -> None
     states = np.concatenate([calm, wild])
     file = tmp_path / "states"
     file.write_bytes(states.tobytes())
-    command = [program, frozen, file, str(len(states)), "20"]
+    command = [program, frozen, file, str(len(states)), "20", *sent]
     done = subprocess.run(command, capture_output=True, text=True, check=True)
     steps, within, allocations, locks, *_ = (
         int(word) for word in done.stdout.split() if word.isdigit()

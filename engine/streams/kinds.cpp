@@ -1,0 +1,9 @@
+#include "../src/rooms.hpp"
+#include "stream_alone.hpp"
+
+namespace hsp {
+const Kind* const* stream_kinds() {
+  return kinds<PieceState, RebasedState, SmoothPiece, FastestPiece, TargetPiece, VelocityPiece,
+               StreamAlone>();
+}
+}  // namespace hsp

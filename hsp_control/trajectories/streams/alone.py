@@ -1,0 +1,85 @@
+"""A stream without Python: what a program sends to a frozen controller."""
+
+from typing import Any
+
+import numpy as np
+import pinocchio as pin
+
+from hsp_control import engine
+from hsp_control.common.arrays import Array
+from hsp_control.engine.plans import TIME, PartCall, PartCalls
+from hsp_control.trajectories.orientation import OrientationSample
+from hsp_control.trajectories.pose import PoseSample
+from hsp_control.trajectories.streams.chart import Chart, State
+from hsp_control.trajectories.streams.running import Policy
+from hsp_control.trajectories.streams.segments import MotionBounds, coast
+from hsp_control.trajectories.trajectory import TrajectorySample
+
+
+class StreamAlone:
+    """What `RunningStream` does with the newest target or velocity, as calls.
+
+    Attributes:
+        target: What is sent next, the start at first: linear coordinates, then perhaps
+            a quaternion (x, y, z, w).
+        velocity: The velocity that is sent next, linear, then angular.
+        call: What takes them, of the kind StreamAlone.
+    """
+
+    def __init__(
+        self, chart: Chart, bounds: MotionBounds, policy: Policy, start: State
+    ) -> None:
+        """Begin at rest."""
+        n, linear = chart.size, chart.linear
+        self._chart = chart
+        self._state = vars(State.allocate(n))
+        value: Array = start.x[:linear]
+        if chart.rotational:
+            value = np.append(value, pin.Quaternion(start.base).coeffs())
+        self.target, self.velocity = value.copy(), np.zeros(n)
+        integers = ("follows", "silent", "sent", "differs")
+        self._memory: dict[str, Any] = {
+            "piece": coast(0.0, np.inf, start).numbers,
+            "target": value.copy(),
+            "velocity": np.zeros(n),
+            "now": np.full(1, -np.inf),
+            "begun": np.full(1, -np.inf),
+            "heard": np.full(1, -np.inf),
+            "fades_at": np.full(1, np.inf),
+            "target_time": np.zeros(1),
+            "sent_target": self.target,
+            "sent_velocity": self.velocity,
+            **{name: np.zeros(1, dtype=np.int64) for name in integers},
+        }
+        self._first = {name: array.copy() for name, array in self._memory.items()}
+        self._arguments: dict[str, Any] = {
+            "linear": linear,
+            "delay": policy.delay,
+            "dead_man": policy.dead_man,
+            "hold_after": policy.hold_after,
+            "bounds": bounds,
+            "out": self._state,
+            **self._memory,
+        }
+        self.call = engine.StreamAlone(**self._arguments)
+
+    def forget(self) -> None:
+        """Begin anew."""
+        for name, array in self._memory.items():
+            array[:] = self._first[name]
+
+    def calls(self, out: Any) -> PartCalls:
+        """Return the calls that write a sample, of whatever the stream moves."""
+        calls = [PartCall(engine.StreamAlone, t=TIME, **self._arguments)]
+        n = self._chart.linear
+        parts = out if isinstance(out, PoseSample) else (out,)
+        state = [self._state[name] for name in ("x", "rate", "acceleration")]
+        for part in parts:
+            if isinstance(part, TrajectorySample):
+                for own, other in zip(state, part, strict=True):
+                    calls.append(PartCall(engine.Copy, x=own[:n], out=other, t=TIME))
+            elif isinstance(part, OrientationSample):
+                y = TrajectorySample(*(own[n:] for own in state))
+                given = {"base": self._state["base"], "y": y, "out": part}
+                calls.append(PartCall(engine.OrientationOfChart, t=TIME, **given))
+        return calls

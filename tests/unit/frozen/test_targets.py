@@ -1,0 +1,190 @@
+"""Targets that a program sets move the reference as a stream's do in Python."""
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pinocchio as pin
+import pytest
+from frozen_library import LIB, OK, WRONG_NAME, WRONG_SIZE, WRONG_VALUE, Opened
+
+import hsp_control as hsp
+from hsp_control.common.exceptions import FreezeError
+from hsp_control.trajectories import Stream, StreamOrientation, StreamPose
+
+SEED = 61
+H = 0.001
+HOW: dict[str, Any] = {"policy": "latest", "delay": 0.03}
+ROBOT = hsp.Robot.load("panda")
+Q = ROBOT.home()
+_AT = ROBOT.state(0.0, Q, np.zeros(7)).frame("panda_tcp")
+START = pin.SE3(_AT.rotation, _AT.position)
+
+
+def tasks(kind: str) -> list[hsp.Task]:
+    """Return one task, whose reference is streamed."""
+    if kind == "pose":
+        return [hsp.FramePose("panda_tcp", StreamPose(**HOW), name="hand")]
+    if kind == "falls silent":
+        how = {**HOW, "hold_after": 0.02}
+        return [hsp.FramePose("panda_tcp", StreamPose(**how), name="hand")]
+    if kind == "position":
+        return [hsp.FramePosition("panda_tcp", Stream(**HOW), name="hand")]
+    turn = StreamOrientation(**HOW)
+    return [hsp.FrameOrientation("panda_tcp", turn, name="hand")]
+
+
+KINDS = "pose", "falls silent", "position", "orientation"
+
+
+class Pair:
+    """A controller in Python, and the same without, at the beginning of a run."""
+
+    def __init__(self, kind: str, folder: Path) -> None:
+        given = tasks(kind)
+        self.controller = hsp.Controller(ROBOT, given, hsp.JointCentering(), start=Q)
+        self.opened = Opened(hsp.freeze(self.controller, folder / "frozen.hsp"))
+        followed: Any = self.controller.tasks[0].followed
+        self.stream: Any = followed
+        self.k = 0
+
+    def target(self, value: np.ndarray) -> None:
+        self.stream.send(value)
+        assert self.opened.set("hand.target", value) == OK
+
+    def velocity(self, value: np.ndarray) -> None:
+        self.stream.send(velocity=value)
+        assert self.opened.set("hand.velocity", value) == OK
+
+    def steps(self, count: int) -> np.ndarray:
+        """Step both, compare the bits, and return the errors of the task."""
+        found = []
+        for _ in range(count):
+            t, self.k = self.k * H, self.k + 1
+            output = self.controller.compute(t, Q, np.zeros(7))
+            self.controller.applied(output.tau, H)
+            assert self.opened.step(t, Q, np.zeros(7)) == output.status
+            np.testing.assert_array_equal(self.opened.tau, output.tau)
+            found.append(self.controller.active_stack.rows.error.copy())
+        return np.array(found)
+
+
+def random_target(kind: str, rng: np.random.Generator, far: float) -> np.ndarray:
+    moved = START * pin.exp6(pin.Motion(rng.uniform(-far, far, 6)))
+    value = pin.SE3ToXYZQUAT(moved)
+    value[3:] *= 1.0 + 1e-5 * rng.normal()  # a sender's rounding
+    return {"position": value[:3], "orientation": value[3:]}.get(kind, value)
+
+
+@pytest.mark.smoke
+@pytest.mark.parametrize("kind", KINDS)
+def test_targets_and_velocities_whenever_they_come(kind: str, tmp_path: Path) -> None:
+    rng, pair = np.random.default_rng(SEED), Pair(kind, tmp_path)
+    rates = len(
+        pair.opened.get("hand.velocity", pair.opened.ports["hand.velocity"].size)
+    )
+    pair.target(random_target(kind, rng, 0.1))  # before the first step
+    for far in (1e-4, 0.02, 0.3, 1.0):  # in time, and as fast as it may
+        for _ in range(12):
+            for _ in range(rng.integers(3)):  # none, one, or two between two steps
+                if rng.random() < 0.5:
+                    pair.target(random_target(kind, rng, far))
+                else:
+                    pair.velocity(rng.normal(0.0, far, rates))
+            pair.steps(int(rng.integers(1, 40)))
+
+
+def test_a_velocity_that_is_repeated_fades_when_it_is_not(tmp_path: Path) -> None:
+    pair = Pair("pose", tmp_path)
+    pair.steps(2)
+    for _ in range(10):
+        pair.velocity(np.array([0.1, 0.0, 0.0, 0.0, 0.3, 0.0]))
+        pair.steps(20)
+    errors = pair.steps(400)
+    np.testing.assert_array_equal(errors[-1], errors[-100])
+    assert errors[-1, 0] > 0.015  # 0.1 m/s for 0.2 s, and on for what fades
+
+
+def test_a_target_is_reached_at_rest(tmp_path: Path) -> None:
+    pair = Pair("pose", tmp_path)
+    goal = pin.SE3(START.rotation, START.translation + np.array([0.05, -0.1, 0.02]))
+    pair.steps(1)
+    pair.target(pin.SE3ToXYZQUAT(goal))
+    errors = pair.steps(1200)
+    np.testing.assert_allclose(errors[-1, :3], [0.05, -0.1, 0.02], atol=1e-12)
+
+
+def test_a_new_run_begins_anew(tmp_path: Path) -> None:
+    pair = Pair("position", tmp_path)
+    pair.steps(2)
+    pair.target(START.translation + 0.1)
+    first = pair.steps(50)
+    assert LIB.hsp_restart(pair.opened.handle) == OK
+    pair.controller.restart()
+    pair.stream, pair.k = pair.controller.tasks[0].followed, 0
+    pair.steps(2)
+    pair.target(START.translation + 0.1)
+    np.testing.assert_array_equal(pair.steps(50), first)
+
+
+@pytest.mark.parametrize(
+    ("name", "values", "duration", "status"),
+    [
+        ("hand.target", [0.5, 0.0, 0.5, 0.0, 0.0, 0.0, 1.1], 0.0, WRONG_VALUE),
+        ("hand.target", [0.5, 0.0, np.nan, 0.0, 0.0, 0.0, 1.0], 0.0, WRONG_VALUE),
+        ("hand.target", [0.5, 0.0, 2e6, 0.0, 0.0, 0.0, 1.0], 0.0, WRONG_VALUE),
+        ("hand.target", [0.5, 0.0, 0.5, 0.0, 0.0, 0.0, 1.0], 0.1, WRONG_VALUE),
+        ("hand.target", [0.5, 0.0, 0.5], 0.0, WRONG_SIZE),
+        ("hand.velocity", [np.inf, 0.0, 0.0, 0.0, 0.0, 0.0], 0.0, WRONG_VALUE),
+        ("hand.velocity", np.zeros(7), 0.0, WRONG_SIZE),
+        ("elbow.target", np.zeros(7), 0.0, WRONG_NAME),
+    ],
+)
+def test_a_wrong_target_changes_nothing(
+    name: str, values: Any, duration: float, status: int, tmp_path: Path
+) -> None:
+    pair = Pair("pose", tmp_path)
+    pair.steps(3)
+    assert pair.opened.ramp(name, values, duration) == status
+    assert pair.opened.error
+    pair.steps(5)
+
+
+def test_a_target_that_no_motion_reaches(tmp_path: Path) -> None:
+    """Python's stream rests, and counts it; so does the frozen one."""
+    pair = Pair("position", tmp_path)
+    pair.steps(2)
+    pair.target(np.array([9e5, 0.0, 0.0]))
+    pair.steps(60)
+    assert pair.stream.counts()["rejected"] == 1
+
+
+@pytest.mark.parametrize(
+    ("stream", "key"),
+    [
+        (StreamPose(policy="interpolate"), "policy"),
+        (StreamPose(policy="extrapolate"), "policy"),
+        (StreamPose(source="udp://127.0.0.1:9", **HOW), "source"),
+        (StreamPose(messages=[], **HOW), "messages"),
+        (StreamPose(stop_after=1.0, **HOW), "stop_after"),
+        (StreamPose(axes="tool", **HOW), "axes"),
+    ],
+)
+def test_what_a_program_cannot_feed_is_refused(
+    stream: Any, key: str, tmp_path: Path
+) -> None:
+    hand = hsp.FramePose("panda_tcp", stream, name="hand")
+    controller = hsp.Controller(ROBOT, [hand], start=Q)
+    with pytest.raises(FreezeError, match=rf"^tasks\.hand\.trajectory\.{key}: "):
+        hsp.freeze(controller, tmp_path / "frozen.hsp")
+
+
+def test_a_stream_is_not_taken_from_who_has_it(tmp_path: Path) -> None:
+    """Freezing takes no message, and what was sent before does not cross."""
+    pair = Pair("position", tmp_path)
+    pair.stream.send(START.translation + 0.1)
+    before = hsp.freeze(pair.controller, tmp_path / "first.hsp").read_bytes()
+    assert before == (tmp_path / "frozen.hsp").read_bytes()
+    pair.steps(1)
+    assert pair.opened.set("hand.target", START.translation + 0.1) == OK
+    pair.steps(20)
