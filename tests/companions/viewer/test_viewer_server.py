@@ -1,6 +1,7 @@
 """Check the view's server: to this machine alone, and it leaves nothing behind."""
 
 import asyncio
+import gzip
 import hmac
 import socket
 import subprocess
@@ -32,6 +33,7 @@ from hsp_control.companions.viewer.commands import (
     LatestCommands,
     PageCommand,
     key_of,
+    page_command,
 )
 from hsp_control.companions.viewer.transport import PageServer, page_key
 from hsp_control.geometry import Scene
@@ -293,6 +295,31 @@ def test_a_page_that_lost_its_program_keeps_its_key(
     ]
     assert "fetch(`alive?question=" in asks
     assert "fetch(location" not in asks
+
+
+def test_meshes_come_compressed_to_pages_that_say_so(steered: PageServer) -> None:
+    text = " ".join(map(str, range(100_000)))
+    steered.send([page_command("nothing", "/mesh", "object", text=text)])
+    assert steered.url is not None
+    plain, packed = (
+        asyncio.run(largest_message(steered.url + more)) for more in ("", "&gzip=1")
+    )
+    assert len(packed) < 0.5 * len(plain)
+    assert text.encode() in plain
+    assert text.encode() in gzip.decompress(packed)
+
+
+async def largest_message(url: str) -> bytes:
+    """The largest of the messages that build the scene."""
+    connection = await websocket_connect(scene_request(url))
+    largest = b""
+    while len(largest) < 50_000:
+        message = await connection.read_message()
+        assert isinstance(message, bytes)
+        largest = max(largest, message, key=len)
+        await connection.write_message("taken")
+    connection.close()
+    return largest
 
 
 def test_hardware_gets_a_key_that_no_earlier_page_has() -> None:

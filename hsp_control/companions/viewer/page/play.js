@@ -58,6 +58,11 @@ class Play {
     legend.keepClosed = true;  // what is in the picture is to be touched
     legend.setOpen(false);
     this.panel.setOpen(!this.panel.narrow.matches);
+    // A page whose address has "full" draws fully all the same: for pictures.
+    if (isSoftware() && !new URLSearchParams(location.search).has("full")) {
+      drawLightly();
+      this.bar.say("This browser draws without a graphics card: the picture is a light one.");
+    }
     refit();  // there is no legend to make room for
   }
 

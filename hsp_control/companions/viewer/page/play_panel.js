@@ -22,6 +22,12 @@ class PlayBar {
     onPress(film, () => { film.ariaPressed = camera.film(); });
   }
 
+  // Say something for a while, unless the program has something to say.
+  say(words) {
+    this.status.textContent = words;
+    this.timer = setTimeout(() => { this.status.textContent = ""; }, 8000);
+  }
+
   showState({t, running, rate, message, level}) {
     this.clock.textContent = `${t.toFixed(2)} s`;
     this.rate.replaceChildren(...running
@@ -29,7 +35,7 @@ class PlayBar {
       : [this.play.simulated ? "paused" : "stopped"]);
     const ariaLabel = running ? "Pause" : "Go";
     Object.assign(this.toggle, {ariaLabel, title: `${ariaLabel} (space)`});
-    if (this.told !== message) {
+    if ((this.told ?? "") !== message) {
       this.told = this.status.textContent = message;
       clearTimeout(this.timer);
       // What was done is said for a while; what is wrong stays.
