@@ -318,7 +318,10 @@ async def largest_message(url: str) -> bytes:
         assert isinstance(message, bytes)
         largest = max(largest, message, key=len)
         await connection.write_message("taken")
+    protocol = connection.protocol
     connection.close()
+    if protocol is not None and protocol.stream is not None:
+        protocol.stream.close()  # the event loop ends before the server could confirm
     return largest
 
 

@@ -144,7 +144,7 @@ function connect() {
       socket.send("taken");  // flow control: the server sends the next message after it
     };
     // The meshes come compressed: 0x1F 0x8B begins no other message.
-    if (bytes[0] === 0x1F && bytes[1] === 0x8B) unzipped(bytes).then(take); else take(bytes);
+    if (bytes[0] === 0x1F && bytes[1] === 0x8B) inflated(bytes).then(take); else take(bytes);
   };
   socket.onclose = () => {
     document.body.classList.add("lost");
@@ -153,7 +153,7 @@ function connect() {
   };
 }
 
-async function unzipped(bytes) {
+async function inflated(bytes) {
   const stream = new Blob([bytes]).stream().pipeThrough(new DecompressionStream("gzip"));
   return new Uint8Array(await new Response(stream).arrayBuffer());
 }
