@@ -467,6 +467,7 @@ def test_bars_show_joints_against_their_limits(page: Any) -> None:
 
 def test_the_slider_looks_back(page: Any) -> None:
     node = "viewer.scene_tree.find(['seen']).object"
+    page.evaluate(f"{node}.name = 'seen'")  # what is not in the scene is ignored
     for k in range(5):
         track = {"path": "/seen", "property": "position", "values": [0.1 * k, 0, 0]}
         track |= {"times": [0.0]}
