@@ -475,7 +475,7 @@ def test_a_browser_is_opened_only_where_there_is_one(
     monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
 ) -> None:
     url, opened = "http://127.0.0.1:7000/", threading.Event()
-    monkeypatch.setattr(transport.webbrowser, "open", lambda url, new: opened.set())
+    monkeypatch.setattr(transport, "_open", lambda url: opened.set())
     monkeypatch.setattr(transport.sys, "platform", "linux")
     for name in ("DISPLAY", "WAYLAND_DISPLAY", "BROWSER"):
         monkeypatch.delenv(name, raising=False)

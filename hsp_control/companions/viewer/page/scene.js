@@ -85,9 +85,10 @@ function simplify(object) {
   if (!object.material) return;
   const simple = (one) => {
     if (!one.isMeshStandardMaterial) return one;
-    const {color, map, opacity, transparent, side, depthTest, depthWrite, emissive} = one;
+    const {color, map, opacity, transparent, side, depthTest, depthWrite} = one;
+    const {emissive, emissiveIntensity} = one;
     return new MeshCat.THREE.MeshLambertMaterial(
-      {color, map, opacity, transparent, side, depthTest, depthWrite, emissive});
+      {color, map, opacity, transparent, side, depthTest, depthWrite, emissive, emissiveIntensity});
   };
   object.material = Array.isArray(object.material)
     ? object.material.map(simple) : simple(object.material);
