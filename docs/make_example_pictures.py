@@ -28,7 +28,7 @@ RUNS = {  # example: its log, and the moment [s]
     "two_arms.yaml": ("two_arms", 3.0),
     "own_cost.py": ("own_cost_function", 2.9),
     "own_cost.yaml": ("own_cost", 1.2),
-    "moving_obstacle.yaml": ("moving_obstacle", 1.5),
+    "moving_obstacle.yaml": ("moving_obstacle", 2.2),
     "keep_out.yaml": ("keep_out", 1.6),
     "loop_500hz.py": ("loop_500hz", 1.7),
     "watch_a_loop.py": ("watch_a_loop", 2.5),
@@ -65,10 +65,12 @@ def photograph(name: str, folder: Path, file: Path) -> None:
     """Run an example, and show its log at a moment."""
     log, moment = RUNS[name]
     if name == "franka_arm.py":
-        words = ["franka-box", "panda_obstacle", "--lockstep"]
+        words = ["hsp_control", "franka-box", "panda_obstacle", "--lockstep"]
         box = subprocess.Popen(
-            [sys.executable, "-m", "hsp_control", *words], cwd=folder
+            [sys.executable, "-u", "-m", *words], cwd=folder, stdout=subprocess.PIPE
         )
+        assert box.stdout is not None
+        box.stdout.readline()  # it listens
         try:
             run_python(name, folder, "127.0.0.1")
         finally:

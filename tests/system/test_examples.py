@@ -1,10 +1,8 @@
 """Every example runs as it stands, in a copy of its folder, and the page shows it."""
 
 import json
-import os
 import re
 import shutil
-import subprocess
 import sys
 from importlib.util import find_spec
 from pathlib import Path
@@ -13,6 +11,7 @@ import numpy as np
 import pytest
 from page_runner import Running, Shell
 from places import ROOT
+from typing_commands import hsp, typed
 
 from hsp_control import Rollout
 
@@ -38,21 +37,6 @@ def folder(tmp_path: Path) -> Path:
     return copy
 
 
-def typed(folder: Path, *command: str) -> str:
-    hidden = {"DISPLAY", "WAYLAND_DISPLAY", "BROWSER"}
-    done = subprocess.run(
-        command, cwd=folder, text=True, check=False, timeout=250,
-        env={key: value for key, value in os.environ.items() if key not in hidden},
-        stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.STDOUT,
-    )  # fmt: skip
-    assert done.returncode == 0, done.stdout
-    return done.stdout
-
-
-def hsp(folder: Path, *words: str) -> str:
-    return typed(folder, sys.executable, "-m", "hsp_control", *words)
-
-
 def skip_without(name: str) -> None:
     if name in NEEDS and find_spec(NEEDS[name]) is None:
         pytest.skip(f"{name} needs {NEEDS[name]}")
@@ -61,7 +45,7 @@ def skip_without(name: str) -> None:
 @pytest.mark.parametrize("name", [each for each in SCRIPTS if "franka" not in each])
 def test_a_script_runs(name: str, folder: Path) -> None:
     skip_without(name)
-    printed = typed(folder, sys.executable, name)
+    printed = typed([sys.executable, name], folder)
     assert printed
     logs = sorted((folder / "out").glob("*.npz")) if (folder / "out").exists() else []
     for log in logs:
@@ -69,23 +53,23 @@ def test_a_script_runs(name: str, folder: Path) -> None:
         assert run.status == "completed"
         if run.t[-1] > 1.0:
             assert np.isfinite(run.tau).all()
-        hsp(folder, "view", str(log), "--no-browser")
+        hsp(f"view {log} --no-browser", folder)
 
 
 @pytest.mark.parametrize("name", CONFIGURATIONS)
 def test_a_configuration_runs(name: str, folder: Path) -> None:
     skip_without(name)
-    printed = hsp(folder, "run", name)
+    printed = hsp(f"run {name}", folder)
     assert "completed" in printed
     (log,) = (folder / "out").glob("*.npz")
-    hsp(folder, "view", str(log), "--no-browser")
+    hsp(f"view {log} --no-browser", folder)
 
 
 def test_a_franka_s_box_is_moved(folder: Path) -> None:
     skip_without("franka_arm.py")
     with Shell(folder) as shell:
         box: Running = shell._start("hsp franka-box panda_obstacle --lockstep", "box")
-        printed = typed(folder, sys.executable, "franka_arm.py", "127.0.0.1")
+        printed = typed([sys.executable, "franka_arm.py", "127.0.0.1"], folder)
         box.end()
     assert printed.startswith("completed")
 
@@ -95,7 +79,7 @@ def test_the_lesson_s_cells_run(folder: Path) -> None:
     assert not any(cell.get("outputs") for cell in cells)
     code = ["".join(each["source"]) for each in cells if each["cell_type"] == "code"]
     (folder / "lesson.py").write_text("\n".join(code))
-    printed = typed(folder, sys.executable, "lesson.py")
+    printed = typed([sys.executable, "lesson.py"], folder)
     *_, slow, quick = printed.splitlines()
     for line in (slow, quick):
         _, measured, predicted = map(float, line.split())
