@@ -23,6 +23,7 @@ int main(int argc, char** argv) {
   if (!states || !tau || !times || !file) return 2;
   if (fread(states, sizeof(double), count * width, file) != count * width) return 2;
   for (size_t k = 0; k < repeats; ++k) {
+    nanosleep(&(struct timespec){.tv_nsec = 20000000}, NULL); /* see without_python.py */
     hsp_restart(controller);
     for (size_t i = 0; i < count; ++i) {
       const double* x = states + i * width;

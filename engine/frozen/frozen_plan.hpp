@@ -38,7 +38,8 @@ class FrozenPlan {
 
   void restart() { std::memcpy(arena_.get(), initial_.data(), initial_.size()); }
   Move& move() const { return *static_cast<Move*>(move_); }
-  Move& stop() const { return *static_cast<Move*>(stop_); }  // instead of it
+  // What brakes instead of it; itself where nothing does.
+  Move& stop() const { return *static_cast<Move*>(stop_); }
   const std::vector<Port>& ports() const { return ports_; }
   // Null if there is none.
   const Port* port(std::string_view name) const;

@@ -32,8 +32,11 @@ struct hsp_controller {
         delivered(plan.array<std::int64_t>("delivered", 1)),
         period(plan.array<double>("period", 1)),
         origin(plan.array<double>("origin", 1)),
-        stop_tau(plan.array<double>("stop.tau", plan.move().v.size())),
-        holding(plan.array<std::int64_t>("stop.holding", 1)) {
+        stops(&plan.stop() != &plan.move()) {
+    if (stops) {
+      stop_tau = plan.array<double>("stop.tau", plan.move().v.size());
+      holding = plan.array<std::int64_t>("stop.holding", 1);
+    }
     for (const Port& each : plan.ports())
       ports.push_back({each.name.c_str(), each.unit.c_str(), each.meaning.c_str(),
                        static_cast<std::size_t>(each.size), each.is_input()});
@@ -46,8 +49,9 @@ struct hsp_controller {
   const double* period;
   double* origin;              // what the clock reads at time 0 [s]
   std::optional<double> last;  // time of the last step [s]
-  const double* stop_tau;
-  const std::int64_t* holding;
+  const bool stops;            // whether hsp_stop brakes
+  const double* stop_tau = nullptr;
+  const std::int64_t* holding = nullptr;
   bool stopping = false;
   std::atomic<hsp_status> error = HSP_OK;  // of the last request
   char failure[512] = "";                  // what an exception said
@@ -87,6 +91,7 @@ hsp_status moved(hsp_controller& of, double t, const double* q, const double* v)
 
 // Brake, or hold: the effort, or the last one, is then `of.tau`. No clock is wrong here.
 hsp_status stopped(hsp_controller& of, double t, const double* q, const double* v) {
+  if (!of.stops) throw std::runtime_error("a robot on feet is not stopped here");
   hsp::Move& stop = of.plan.stop();
   const Eigen::Map<const hsp::Vector> q_in(q, stop.q.size()), v_in(v, stop.v.size());
   of.stopping = true;

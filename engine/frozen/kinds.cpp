@@ -7,7 +7,7 @@
 
 namespace hsp {
 const Kind* const* frozen_kinds() {
-  return kinds<Deliver, OffsetEffort, Subtract, HasMoved, Evolve, ScaledIdentity, BodyInJoint,
-               Payloads, SafeStop>();
+  return kinds<Deliver, ForcesWithin, DeliverWithForces, OffsetEffort, Subtract, HasMoved, Evolve,
+               ScaledIdentity, BodyInJoint, Payloads, SafeStop>();
 }
 }  // namespace hsp

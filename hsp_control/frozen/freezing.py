@@ -22,7 +22,12 @@ from hsp_control.frozen.braking import LIKE_LIVE, StopGains, stopping
 from hsp_control.frozen.compensated_step import CompensatedStep
 from hsp_control.frozen.image import Image, Port
 from hsp_control.frozen.inputs import inputs_of, model_inputs, streams_of, targets_of
-from hsp_control.frozen.refusals import check_parts, check_steady, check_streams
+from hsp_control.frozen.refusals import (
+    check_parts,
+    check_stack,
+    check_steady,
+    check_streams,
+)
 
 
 @suggesting
@@ -104,6 +109,7 @@ def _image(
     chain = None
     if compensation is not None:
         chain = CompensatedStep(own, bound, compensation, delivered, held, sending)
+    check_stack(own, bound, chain is not None and bool(chain.stages))
     if chain is None or not chain.stages:
         move = _bare(bound, delivered, sending)
     else:
@@ -121,6 +127,8 @@ def _image(
     ]
     ports += targets_of(own, streams)
     read = Port("origin", "s", "what the clock read in the first step", origin)
+    if robot.unactuated:  # feet would have to hold it
+        return Image(move, [*ports, read], None)
     stopped, said = stopping(own, bound, stop, held, origin, first)
     return Image(move, [*ports, *said, read], stopped)
 

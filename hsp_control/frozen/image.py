@@ -53,7 +53,7 @@ class Port(NamedTuple):
 class Image:
     """A plan, its memory, and the names of some of its arrays."""
 
-    def __init__(self, move: Move, ports: Sequence[Port], stop: Move) -> None:
+    def __init__(self, move: Move, ports: Sequence[Port], stop: Move | None) -> None:
         """Collect what a move makes, and what stops the robot instead.
 
         Raises:
@@ -63,10 +63,11 @@ class Image:
         self._found: dict[int, int] = {}  # the number of an object, by its identity
         self._kept: list[object] = []  # whose identities these are
         seen: set[int] = set()
-        moves = *_arrays(move, seen), *_arrays(stop, seen)
+        moves = *_arrays(move, seen), *_arrays(stop, seen)  # None has none
         arrays = [*moves, *(port.array for port in ports)]
         self._memory = _Memory(arrays)
-        self._move, self._stop = self._number(move), self._number(stop)
+        self._move = self._number(move)
+        self._stop = self._move if stop is None else self._number(stop)
         self._ports = [self._port(port) for port in ports]
 
     def content(self) -> bytes:

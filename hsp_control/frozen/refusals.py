@@ -5,6 +5,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from hsp_control.common.exceptions import FreezeError
+from hsp_control.control.bound_step import BoundStep
 from hsp_control.control.controller import Controller
 from hsp_control.declaration import within
 from hsp_control.declaration.nested import parts_within
@@ -41,15 +42,39 @@ def check_steady(own: Controller) -> None:
                     "a frozen controller has the same tasks at all times; remove the "
                     "schedule"
                 )
-    for contact in setup.contacts:
-        with within("contacts", contact.contact.name):
+    for one in setup.contacts:
+        contact = one.contact
+        reasons = {
+            "schedule": one.always or "a frozen controller stands on the same feet",
+            "force": contact.force is None or "a commanded force is Python's",
+        }
+        for name, reason in reasons.items():
+            if reason is not True:
+                with within("contacts", contact.name, name):
+                    raise FreezeError(reason)
+
+
+def check_stack(own: Controller, bound: BoundStep, compensators: bool) -> None:
+    """Check what a step has bound: that contacts hold all of the base.
+
+    Args:
+        own: The controller.
+        bound: Its step.
+        compensators: Whether there are any.
+
+    Raises:
+        FreezeError: If they do not, or compensators would need to know the forces.
+    """
+    active = bound.active
+    if active.first_task_row > sum(contact.rows for contact in active.contacts):
+        with within("contacts" if active.contacts else "base"):
             raise FreezeError(
-                "a frozen controller has no contacts yet: their forces are found in "
-                "Python"
+                "motions of the base that nothing drives are found in Python: they "
+                "need contacts that hold all of the base"
             )
-    if own.robot.unactuated:
-        with within("base"):
-            raise FreezeError("a frozen controller needs a robot with a fixed base")
+    if compensators and not bound.direct and active.contacts:
+        with within("compensation"):
+            raise FreezeError("compensators are frozen without contacts only")
 
 
 def check_streams(own: Controller) -> None:

@@ -12,7 +12,7 @@ from hsp_control.frozen import library
 
 BRAKING, HOLDING, STOPPED = 5, 6, -10
 OK, WRONG_STATE, WRONG_CLOCK, NOT_FINITE, BUSY = 0, -1, -2, -3, -4
-WRONG_NAME, WRONG_SIZE, WRONG_VALUE, TOO_MANY = -5, -6, -7, -8
+WRONG_NAME, WRONG_SIZE, WRONG_VALUE, TOO_MANY, FAILED = -5, -6, -7, -8, -9
 _HEADER = 8 + 4
 """Bytes before what the checksum is of."""
 

@@ -215,17 +215,61 @@ class Actuation:
     def calls_alone(self, delivered: "DeliveredAlone") -> PartCalls:
         """Return the calls that follow `calls` where no Python looks at a step.
 
-        They do what `delivered` does, where the effort is `direct`.
+        They do what `delivered` does.
 
         Args:
             delivered: Where they write what is delivered.
         """
+        if not self.direct:
+            return self._calls_with_forces(delivered)
         qp, calls = self._qp, list[AnyCall]()
         if "barriers" in self._rows:  # which `calls` leaves to Python
             keep = PartCall(engine.Copy, x=self._state.effort, out=self._wanted.effort)
             qp, calls = self._whole_step([keep])
         own = self._law.acceleration, self._state.effort
         return [*calls, self._delivering(qp, *own, delivered)]
+
+    def _calls_with_forces(self, delivered: "DeliveredAlone") -> PartCalls:
+        """Return those of `calls_alone` where contacts carry, the same at all times."""
+        wanted, support, bounds = self._wanted, self._support, self._limits.bounds
+        exact, redistribute, nearest = np.zeros((3, 1), dtype=np.int64)
+        keep = PartCall(engine.Copy, x=self._state.effort, out=wanted.effort)
+        decide = PartCall(
+            engine.ForcesWithin,
+            limits=self.outcome,
+            cone=support.cone,
+            forces=support.forces,
+            lower=support.lower,
+            upper=support.upper,
+            tau=self._tau,
+            tau_lower=bounds.tau_lower,
+            tau_upper=bounds.tau_upper,
+            exact=exact,
+            redistribute=redistribute,
+            nearest=nearest,
+        )
+        qp = self._limited_step(sum(len(each.least) for each in self._rows.values()))
+        deliver = PartCall(
+            engine.DeliverWithForces,
+            law=self._law.outcome,
+            limits=self.outcome,
+            qp=self._qp_outcome,
+            exact=exact,
+            redistribute=redistribute,
+            acceleration=self._law.acceleration,
+            effort=self._tau,
+            nearest_acceleration=qp.result.acceleration,
+            nearest_effort=qp.result.effort,
+            base=support.base,
+            lower=bounds.tau_lower,
+            upper=bounds.tau_upper,
+            redistributed=int(Status.REDISTRIBUTED),
+            relaxed=int(Status.RELAXED),
+            beyond=int(BEYOND),
+            **delivered._asdict(),
+        )
+        solved = qp.solved_if(redistribute, nearest, self._rows)
+        return [keep, *support.calls(wanted.effort), decide, *solved, deliver]
 
     def calls_with_offset(
         self, a: Array, offset: Array, delivered: "DeliveredAlone"
@@ -362,8 +406,7 @@ class Actuation:
         status, relaxation = self._qp.solve(redistribute, barriers)
         if status is None:  # the solver failed: the efforts stay within their limits
             support, bounds = self._support, self._limits.bounds
-            tau = self._wanted.effort - support.map @ support.forces
-            tau = np.clip(tau, bounds.tau_lower, bounds.tau_upper)
+            tau = np.clip(self._tau, bounds.tau_lower, bounds.tau_upper)
             tau[support.base] = 0.0
             return Delivered(tau, a, support.forces, Status.RELAXED, np.inf)
         tau, acceleration, forces = self._qp.result

@@ -337,14 +337,15 @@ class LimitedStep:
             [copied, least, written(outcome), widened, *again], outcome.unsolved
         )
         self._nearest = [*rows, *closest, loosened]
+        self._redistributed: PartCalls = self._nearest
         self._find_nearest = self._find_forces = state.plan(self._nearest).call()
         if p > 0:
             begun = begin_with(1.0, redistributed.own)
             forces_alone = redistributed, none, memories[1]
             at_once = optimum(*forces_alone, Status.REDISTRIBUTED, outcome)
             otherwise = OnlyIf([*closest, loosened], outcome.unsolved)
-            calls = [*rows, begun, *at_once, otherwise]
-            self._find_forces = state.plan(calls).call()
+            self._redistributed = [*rows, begun, *at_once, otherwise]
+            self._find_forces = state.plan(self._redistributed).call()
 
     def nearest_if(
         self, condition: Indices, before: PartCalls, rows: Mapping[str, BarrierRows]
@@ -356,13 +357,33 @@ class LimitedStep:
             before: Calls that are made first.
             rows: All rows of barriers, by kind.
         """
+        return OnlyIf([*before, *self._placing(rows), *self._nearest], condition)
+
+    def solved_if(
+        self, redistribute: Indices, nearest: Indices, rows: Mapping[str, BarrierRows]
+    ) -> PartCalls:
+        """Return the calls that do what `solve` does, where one of these is not 0.
+
+        Args:
+            redistribute: Whether other forces may do, shape (1,).
+            nearest: Whether the acceleration has to change, shape (1,).
+            rows: All rows of barriers, by kind.
+        """
+        placed = self._placing(rows)
+        return [
+            OnlyIf([*placed, *self._redistributed], redistribute),
+            OnlyIf([*placed, *self._nearest], nearest),
+        ]
+
+    def _placing(self, rows: Mapping[str, BarrierRows]) -> list[PartCall]:
+        """Return the calls that write all rows of barriers into the QP."""
         placed, r = list[PartCall](), self._barriers
         for kind, each in rows.items():
             own = slice(r, r + len(each.least))
             placed.append(self._placed(each, own))
             self._softness[own] = _SOFTNESS[kind]
             r = own.stop
-        return OnlyIf([*before, *placed, *self._nearest], condition)
+        return placed
 
     def _placed(self, rows: BarrierRows, own: slice) -> PartCall:
         """Return the call that writes rows of barriers into the QP."""

@@ -12,7 +12,7 @@ from hsp_control.constraints.contacts import Contact, SlidingContact
 from hsp_control.constraints.contacts.contact import NORMAL, WRENCH, shares
 from hsp_control.control.evolution import PlannedContact
 from hsp_control.edge import Resolution
-from hsp_control.engine.plans import PartCall
+from hsp_control.engine.plans import AnyCall, PartCall, PartCalls
 from hsp_control.robot import Robot, RobotState
 from hsp_control.trajectories import TrajectorySample
 
@@ -96,7 +96,10 @@ class Support:
     @cached_property
     def _write_maps(self) -> Callable[[], object]:
         """The call that writes the map and the positions."""
-        calls = []
+        return self._state.plan(self._maps()).call()
+
+    def _maps(self) -> list[AnyCall]:
+        calls: list[AnyCall] = []
         for contact, where in zip(self.contacts, self.points, strict=True):
             frame = self._state.frame(contact.frame)
             call = PartCall(
@@ -110,7 +113,20 @@ class Support:
                 out=self.map,
             )
             calls.append(call)
-        return self._state.plan(calls).call()
+        return calls
+
+    def calls(self, wanted: Array) -> PartCalls:
+        """Return the calls of contacts that always count, and command no force.
+
+        They do what `update` and `minimum_norm_forces` do.
+
+        Args:
+            wanted: The effort without contact forces, shape (nv,) [N·m or N].
+        """
+        assert not self._scheduled
+        assert not self._commanded
+        copy = PartCall(engine.Copy, x=wanted, out=self._wanted)
+        return [*self._maps(), copy, self._solution()]
 
     def minimum_norm_forces(self, wanted: Array) -> Array:
         """Return the forces of minimum Σ (f - f_ref)²/e, and write `tau`."""
@@ -120,7 +136,10 @@ class Support:
 
     @cached_property
     def _solve(self) -> Callable[[], object]:
-        call = PartCall(
+        return self._state.plan([self._solution()]).call()
+
+    def _solution(self) -> PartCall:
+        return PartCall(
             engine.MinimumNormForces,
             F=self.map,
             base=self.base,
@@ -130,7 +149,6 @@ class Support:
             forces=self.forces,
             tau=self.tau,
         )
-        return self._state.plan([call]).call()
 
     @cached_property
     def permits(self) -> Callable[[], float]:

@@ -247,8 +247,8 @@ def test_every_bundled_configuration(replay: Path, tmp_path: Path) -> None:
             np.testing.assert_array_equal(
                 replayed(replay, frozen, states), computed(controller, states), name
             )
-    # what stands on contacts, walks, or changes while it runs
+    # what presses, walks, or changes while it runs
     folders = {name.split("/")[0] for name in refused}
     assert folders == {"compliance", "forces", "walking", "whole_body"}
-    assert len(refused) == 13
+    assert len(refused) == 10
     assert all(refused.values())
