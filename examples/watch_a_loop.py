@@ -14,17 +14,14 @@ controller = hsp.Controller(robot, [hand], hsp.JointCentering(), null_space_gain
 
 model, data = robot.model, robot.model.createData()  # your robot, instead
 q, v = robot.home(), np.zeros(robot.nv)
-with hsp.viewer.Viewer(robot) as viewer:
-    print(f"Open {viewer.url}")
-    with hsp.Recorder(controller, "out/watch_a_loop.npz") as recorder:
-        begin = time.monotonic()
-        for k in range(round(DURATION / PERIOD)):
-            output = controller.compute(k * PERIOD, q, v)
-            recorder.record(output)
-            if k % 17 == 0:  # thirty times a second
-                viewer.show(q)
-            v = v + PERIOD * pin.aba(model, data, q, v, output.tau)
-            q = pin.integrate(model, q, PERIOD * v)
-            time.sleep(max(begin + k * PERIOD - time.monotonic(), 0.0))
-    viewer.play(recorder.rollout, controller=controller)  # and once more, with plots
+recorder = hsp.Recorder(controller, "out/watch_a_loop.npz")
+with recorder, hsp.viewer.watch(recorder) as page:  # or watch(controller)
+    print(f"Open {page.url}")
+    begin = time.monotonic()
+    for k in range(round(DURATION / PERIOD)):
+        output = controller.compute(k * PERIOD, q, v)
+        recorder.record(output)
+        v = v + PERIOD * pin.aba(model, data, q, v, output.tau)
+        q = pin.integrate(model, q, PERIOD * v)
+        time.sleep(max(begin + k * PERIOD - time.monotonic(), 0.0))
 print(recorder.rollout)
