@@ -10,6 +10,7 @@ SHELL := bash
 export OPENBLAS_NUM_THREADS := 1# the matrices are small: more threads only wait
 export PIP_DISABLE_PIP_VERSION_CHECK := 1
 export PIP_CONSTRAINT := constraints.txt
+export UV_CONSTRAINT := constraints.txt
 export PIP_BUILD_CONSTRAINT := constraints.txt
 
 BIN := .venv/bin
@@ -57,19 +58,18 @@ quick: $(STAMP) $(ENGINE) ## what to run after every edit: a minute of CPU
 
 # Each process begins with its own files, and takes tests of another one when it has none.
 SPREAD := -n $(WORKERS) --dist worksteal
-test: $(STAMP) $(ENGINE) ## run the tests, those of calls with Eigen's assertions first
-	@if [ -z '$(ARGS)' ]; then HSP_ENGINE=$$($(BIN)/python hatch_build.py Debug) \
-	  $(BIN)/python -m pytest $(SPREAD) tests/unit/engine tests/unit/law -m "not process"; fi
+test: $(STAMP) $(ENGINE) ## run the tests, but for those of test-system
 	@$(BIN)/python -m pytest $(SPREAD) -m "not system" $(ARGS)
 
 test-system: $(STAMP) $(ENGINE) ## run those of browsers, notebooks, processes and whole walks
 	@$(BIN)/python -m pytest $(SPREAD) -m system $(ARGS)
 
-thorough: sanitize ## run the tests with more seeds, and every configuration's page
+thorough: sanitize ## run the tests with more seeds, every configuration's page, some mutants
 	@HSP_THOROUGH=1 $(BIN)/python -m pytest $(SPREAD) $(ARGS)
+	@$(BIN)/python tools/mutants.py
 
 # What a library of the engine is built with, and the tests whose calls it then makes.
-CALLS := tests/unit/engine tests/unit/law tests/unit/edge tests/unit/tasks tests/unit/null_space \
+CALLS ?= tests/unit/engine tests/unit/law tests/unit/edge tests/unit/tasks tests/unit/null_space \
   tests/unit/constraints tests/unit/trajectories tests/unit/geometry tests/unit/robot \
   tests/unit/control -m "not system and not process"
 assertions: $(STAMP) $(ENGINE) ## those of the engine, with Eigen's assertions and no allocation
@@ -95,18 +95,18 @@ bench: $(STAMP) $(ENGINE) ## compare with other controllers, in .venv-peers
 	@if ! .venv-peers/bin/python -m pip --version > /dev/null 2>&1; then \
 	  echo "Creating .venv-peers ..."; $(call new-venv,$(BIN)/python,.venv-peers); \
 	fi
-	@.venv-peers/bin/python benchmarks/install_peers.py
+	@.venv-peers/bin/python benchmarks/shared/install_peers.py
 	@.venv-peers/bin/python -W "ignore:to-Python converter" benchmarks/side_by_side.py
 	@.venv-peers/bin/python -W "ignore:to-Python converter" \
 	  benchmarks/whole_body_side_by_side.py
-	@.venv-peers/bin/python -W "ignore:to-Python converter" benchmarks/companions/walking_side_by_side.py
+	@.venv-peers/bin/python -W "ignore:to-Python converter" benchmarks/companions/walking/walking_side_by_side.py
 	@.venv-peers/bin/python -W "ignore:to-Python converter" benchmarks/limit_side_by_side.py
 	@.venv-peers/bin/python -W "ignore:to-Python converter" benchmarks/scaling.py
 
 fuzz: $(STAMP) $(ENGINE) ## random states, mutated files, faults, soak: hours
 	@PYTHONPATH=tests nice $(BIN)/python -m campaigns $(ARGS)
 
-mutants: $(STAMP) $(ENGINE) ## break the code on purpose, report what no test notices
+mutants: $(STAMP) $(ENGINE) ## break the code at random, say what share the tests notice
 	@$(BIN)/python tools/mutants.py $(ARGS)
 
 wheel: $(STAMP) $(ENGINE) ## build the wheel into dist/
@@ -152,8 +152,9 @@ docs: $(STAMP) $(ENGINE) ## build the site into docs/_build/html, with its repla
 	@$(BIN)/sphinx-build -q -W --keep-going -b html docs docs/_build/html
 	@echo "The site is docs/_build/html/index.html"
 
-links: $(STAMP) $(ENGINE) ## ask every other site that the documents link to (needs a network)
-	@$(BIN)/python tools/links.py
+links: $(STAMP) $(ENGINE) ## ask every other site that the site's pages link to (needs a network)
+	@$(BIN)/python tools/replays.py
+	@$(BIN)/sphinx-build -q -b linkcheck docs docs/_build/links
 
 ##@ Keep
 figures: $(STAMP) $(ENGINE) ## draw the documents' figures anew, into docs/figures
@@ -195,8 +196,8 @@ clean: ## remove caches, builds and the demo's output; .venv stays
 # constraints.txt is newer than the stamp. What the engine is built with is installed
 # first: so it is built there, and again only where a source of it has changed.
 $(USE): pyproject.toml constraints.txt
-	@echo "Installing hsp_control and robots' meshes into .venv (1.3 GB, once) ..."
-	@$(call install,.[export$(,)robots])
+	@echo "Installing hsp_control into .venv (0.9 GB, once) ..."
+	@$(call install,.[export])
 	@touch $@ $(ENGINE)
 
 $(STAMP): pyproject.toml constraints.txt
@@ -205,11 +206,19 @@ $(STAMP): pyproject.toml constraints.txt
 	@touch $(USE) $@ $(ENGINE)
 
 , := ,
-# $(call install,.[extra,...]): this checkout with its extras.
+# $(call install,.[extra,...]): this checkout with its extras, by uv where it is there, else
+# by pip. An environment that is broken is made anew.
 define install
-$(find-python); "$$python" tools/install.py .venv $$("$$python" hatch_build.py needs); \
-env -u PIP_BUILD_CONSTRAINT \
-  "$$python" tools/install.py .venv --no-build-isolation --editable '$(1)'
+$(find-python); \
+if command -v uv > /dev/null; then \
+  $(BIN)/python -c '' 2> /dev/null || uv venv --quiet --clear --seed --python "$$python" .venv; \
+  install="uv pip install --quiet --python $(BIN)/python"; \
+else \
+  $(BIN)/python -m pip --version > /dev/null 2>&1 || { $(call new-venv,"$$python",.venv); }; \
+  install="env -u PIP_BUILD_CONSTRAINT $(BIN)/python -m pip install --quiet"; \
+fi; \
+$$install $$("$$python" hatch_build.py needs); \
+$$install --no-build-isolation --editable '$(1)'
 endef
 
 $(ENGINE): $(USE) hatch_build.py engine/CMakeLists.txt $(shell find engine -name '*.?pp')

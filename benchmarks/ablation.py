@@ -23,9 +23,9 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from edge_cases import Arm, unit
 from edge_rest import KINDS, Case, case, measure
-from marked_sections import RESULTS, replace_section
+from shared.edge_cases import Arm, unit
+from shared.marked_sections import RESULTS, replace_section
 
 import hsp_control as hsp
 from hsp_control.common.arrays import Array

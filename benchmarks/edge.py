@@ -2,13 +2,13 @@
 
     .venv-peers/bin/python benchmarks/edge.py [--old CHECKOUT] [ROBOT ...]
 
-The cases of `edge_cases.py`, the same for all laws; each law in a process of its own,
-one after another (`edge_loop.py`). The other laws are in `controllers`, with the gains
-that their projects ship for an arm like a Panda; pink and TSID are their own packages,
-and are left out where they are not installed. ``--python LAW=PYTHON`` runs a law in
-another environment, which needs Pinocchio and the law's package only. ``--old`` is a
-checkout of an earlier version of this package. Writes tables into
-docs/measurements.md and benchmarks/results/edge.md.
+The cases of `shared/edge_cases.py`, the same for all laws; each law in a process of its
+own, one after another (`shared/edge_loop.py`). The other laws are in
+`shared/controllers`, with the gains that their projects ship for an arm like a Panda;
+pink and TSID are their own packages, and are left out where they are not installed.
+``--python LAW=PYTHON`` runs a law in another environment, which needs Pinocchio and the
+law's package only. ``--old`` is a checkout of an earlier version of this package.
+Writes tables into docs/measurements.md and benchmarks/results/edge.md.
 """
 
 import argparse
@@ -22,9 +22,9 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from edge_cases import cases
-from edge_loop import LAWS
-from marked_sections import RESULTS, replace_section
+from shared.edge_cases import cases
+from shared.edge_loop import LAWS
+from shared.marked_sections import RESULTS, replace_section
 
 ROBOTS = ("panda", "ur5", "iiwa14", "xarm7")
 OUT_OF_REACH = ("position", "pose", "stream")
@@ -54,9 +54,9 @@ def measured(law: str, given: Path, python: str, old: str | None) -> tuple[str, 
         if old is None:
             return NAMES[law].format("earlier"), "no checkout: --old"
         environment["PYTHONPATH"] = str(Path(old).resolve())
-    command = [python, "-W", "ignore", str(HERE / "edge_loop.py"), given, law, results]
+    command = [python, "-W", "ignore", "-m", "shared.edge_loop", given, law, results]
     done = subprocess.run(
-        command, env=environment, check=False, text=True,
+        command, cwd=HERE, env=environment, check=False, text=True,
         stdout=subprocess.DEVNULL, stderr=subprocess.PIPE,
     )  # fmt: skip
     if done.returncode:

@@ -18,8 +18,8 @@ from typing import Any, NamedTuple, cast
 
 import numpy as np
 import pinocchio as pin
-from edge_cases import BEYOND, STEP, Arm, unit
-from marked_sections import RESULTS, replace_section
+from shared.edge_cases import BEYOND, STEP, Arm, unit
+from shared.marked_sections import RESULTS, replace_section
 
 import hsp_control as hsp
 from hsp_control.common.arrays import Array

@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 import mujoco
 import numpy as np
-from marked_sections import RESULTS, replace_section
+from shared.marked_sections import RESULTS, replace_section
 
 import hsp_control as hsp
 from hsp_control.common.arrays import Array

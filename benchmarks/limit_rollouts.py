@@ -1,20 +1,20 @@
-"""Count limit violations in 1000 rollouts of an arm and in pushes on legged robots.
+"""Count violations of limits: rollouts of a Panda, of ten arms, of wrong ones; pushes.
 
-    .venv/bin/python benchmarks/limit_rollouts.py [--rollouts N] [--pushes N]
+    .venv/bin/python benchmarks/limit_rollouts.py [--count N] [PART ...]
 
-All numbers are computed from the log: positions, velocities and efforts of every
-period, and the differences of efforts. The tables are written into results/limits.md.
+Each part is a section of results/limits.md; without a name all run, hours. Numbers are
+computed from the log: positions, velocities and efforts of every period, and the
+differences of efforts.
 """
 
 import argparse
-from collections.abc import Callable, Iterable
-from concurrent.futures import ProcessPoolExecutor
 from functools import cache
-from typing import Any, NamedTuple, TypeVar
+from typing import NamedTuple
 
 import numpy as np
-from marked_sections import RESULTS, replace_section
-from rich.progress import track
+from shared import limit_pushes, limit_robots, limits_on_wrong_arms
+from shared.marked_sections import RESULTS, replace_section
+from shared.rollouts import PERIODS, ROUNDING, STEP, beyond, run_parallel
 
 import hsp_control as hsp
 from hsp_control.common.arrays import Array
@@ -22,14 +22,7 @@ from hsp_control.constraints.limits import RobotLimits, own_limits
 from hsp_control.control.actuation import Status
 from hsp_control.robot.integrators import Rk4
 
-T = TypeVar("T")
-STEP = 1e-3  # of the integrator [s]
-PERIODS = (1e-3, 2e-3, 5e-3, 10e-3)  # for which an effort is held [s]
-ROUNDING = 1e-9  # excess over a limit that is not counted as a violation
 EXCESS = ("effort [N·m]", "effort rate [N·m/s]", "velocity [rad/s]", "position [rad]")
-
-
-# ------------------------------------------------------------------------ the arm
 
 
 class Arm(NamedTuple):
@@ -118,21 +111,6 @@ def roll_out(item: tuple[float, int]) -> Arm:
     )
 
 
-def beyond(
-    rollout: hsp.Rollout, limits: RobotLimits, period: float
-) -> tuple[Array, ...]:
-    """Return by how much each limit is exceeded, step by step and joint by joint."""
-    # Whatever is at -1: joints without a single coordinate have no limits.
-    q = rollout["q"][:, limits.robot.dof_indices]
-    v, tau = rollout["v"], rollout["tau"]
-    return (
-        np.abs(tau) - limits.effort,
-        np.abs(np.diff(tau, axis=0)) / period - limits.effort_rate,
-        np.abs(v) - limits.velocity,
-        np.maximum(q - limits.upper, limits.lower - q),
-    )
-
-
 def limit_ratios(
     rollout: hsp.Rollout, limits: RobotLimits, period: float
 ) -> tuple[Array, ...]:
@@ -174,199 +152,48 @@ def arm_table(runs: dict[float, list[Arm]]) -> str:
     return lines
 
 
-# ---------------------------------------------------------------------- the legs
-
-
-class Legs(NamedTuple):
-    """A legged robot and how it is pushed.
-
-    Attributes:
-        name: The bundled configuration.
-        overrides: Changes of the configuration.
-        frame: The frame that is pushed.
-        body: The task whose last three rows are the orientation of the trunk.
-        force_ratio: Force over weight.
-        ground: Friction coefficient of the plant's ground.
-    """
-
-    name: str
-    overrides: tuple[str, ...]
-    frame: str
-    body: str
-    force_ratio: float
-    ground: float
-
-
-STANDING = ("tasks.center_of_mass.trajectory={type: hold}",)
-LEGS = (
-    Legs("talos_circle", STANDING, "base_link", "trunk", 0.2, 0.7),
-    Legs("solo12_trunk", (), "base_link", "trunk", 0.2, 0.8),
-)
-START, PUSHED, DURATION = 1.0, 0.1, 4.0  # [s]
-
-
-class Pushed(NamedTuple):
-    """Measurements of a pushed run.
-
-    Attributes:
-        fell: Whether the trunk sank by 10 cm, tilted by 30°, or the run ended early.
-        sunk: How far the root sank below its start [m].
-        tilted: Largest error of the trunk's orientation [rad].
-        moved: Largest error of the first task [m].
-        planned: Largest used fraction of a friction cone, of the controller's forces.
-        simulated: The same, of the engine's forces.
-        pulls: Number of steps at which a force of the controller pulls.
-        relaxed: Number of steps at which limits contradicted each other.
-        rows: Number of steps.
-        after: Error of the first task in the last 0.2 s [m].
-    """
-
-    fell: bool
-    sunk: float
-    tilted: float
-    moved: float
-    planned: float
-    simulated: float
-    pulls: int
-    relaxed: int
-    rows: int
-    after: float
-
-
-@cache
-def weight(name: str) -> float:
-    """Return a configuration's robot's weight [N]."""
-    model = hsp.load_experiment(f"whole_body/{name}").robot.model
-    return 9.81 * float(sum(inertia.mass for inertia in model.inertias))
-
-
-def push(legs: Legs, seed: int) -> Pushed:
-    """Run with a push in a random horizontal direction, and measure it."""
-    heading = np.random.default_rng(seed).uniform(0.0, 2.0 * np.pi)
-    force = legs.force_ratio * weight(legs.name)
-    setting: dict[str, Any] = {
-        "frame": legs.frame,
-        "force": [force * float(np.cos(heading)), force * float(np.sin(heading)), 0.0],
-        "start": START,
-        "duration": PUSHED,
-    }
-    rollout = hsp.load_experiment(
-        f"whole_body/{legs.name}",
-        *legs.overrides,
-        f"plant.pushes=[{setting}]",
-        f"simulation.duration={DURATION}",
-        f"simulation.log_period={STEP}",
-    ).run()
-    columns = rollout.columns
-    names = [c.split(".")[1] for c in columns if c.endswith("friction_used")]
-    forces = [
-        c for c in columns if c.startswith("plant.contact.") and c[-6:] == ".force"
-    ]
-    first = next(iter(rollout.meta["tasks"]))
-    moved = np.linalg.norm(rollout[f"task.{first}.error"][:, :3], axis=1)
-    tilted = np.linalg.norm(rollout[f"task.{legs.body}.error"][:, -3:], axis=1).max()
-    height = rollout["q"][:, 2]
-    sunk = float(height[0] - height.min())
-    completed = rollout.meta["status"] == "completed"
-    return Pushed(
-        fell=not completed or sunk > 0.1 or tilted > np.pi / 6.0,
-        sunk=sunk,
-        tilted=float(tilted),
-        moved=float(moved.max()),
-        planned=max(
-            float(np.nanmax(rollout[f"contact.{n}.friction_used"])) for n in names
-        ),
-        simulated=max(cone_used(rollout[c], legs.ground) for c in forces),
-        pulls=sum(
-            int((rollout[f"contact.{n}.force"][:, 2] < 0.0).sum()) for n in names
-        ),
-        relaxed=int((rollout["status"] == Status.RELAXED).sum()),
-        rows=len(rollout),
-        after=float(moved[-200:].max()),
-    )
-
-
-def cone_used(force: Array, friction: float) -> float:
-    """Return the largest used fraction of a cone while in contact (> 1 N) [-]."""
-    contact = force[:, 2] > 1.0
-    slope = np.linalg.norm(force[contact, :2], axis=1) / force[contact, 2]
-    return float(slope.max(initial=0.0)) / friction
-
-
-def leg_table(runs: dict[Legs, list[Pushed]]) -> str:
-    """Return the table of all pushes."""
-    lines = (
-        "| robot | push | falls | worst error of the first task [mm], and at the end | "
-        "worst tilt [°] | friction used: controller, engine | pulling forces | relaxed "
-        "steps |\n|---|---|--:|--:|--:|--:|--:|--:|\n"
-    )
-    for legs, pushed in runs.items():
-        force = legs.force_ratio * weight(legs.name)
-        rows = sum(each.rows for each in pushed)
-        lines += (
-            f"| `{legs.name}` | {force:.0f} N for {PUSHED:g} s | "
-            f"{sum(each.fell for each in pushed)} of {len(pushed)} | "
-            f"{1e3 * max(each.moved for each in pushed):.2g}, "
-            f"{1e3 * max(each.after for each in pushed):.2g} | "
-            f"{np.rad2deg(max(each.tilted for each in pushed)):.2g} | "
-            f"{100 * max(each.planned for each in pushed):.1f} %, "
-            f"{100 * max(each.simulated for each in pushed):.1f} % | "
-            f"{sum(each.pulls for each in pushed)} | "
-            f"{sum(each.relaxed for each in pushed)} of {rows} |\n"
+def table(count: int) -> str:
+    """Run so many rollouts at each period, and return the table."""
+    runs = {
+        period: run_parallel(
+            roll_out,
+            ((period, seed) for seed in range(count)),
+            f"arm, {1e3 * period:g} ms",
         )
-    return lines
+        for period in PERIODS
+    }
+    for period, arms in runs.items():
+        for seed, run in enumerate(arms):
+            if run.violated.any():
+                print(f"{period} s, seed {seed}: {run}")
+    return arm_table(runs)
 
 
 # --------------------------------------------------------------------------- main
 
-
-def run_parallel(work: Callable[[Any], T], items: Iterable[Any], what: str) -> list[T]:
-    """Return ``work(item)`` for every item, computed by two processes."""
-    items = list(items)
-    with ProcessPoolExecutor(2) as pool:
-        done = pool.map(work, items, chunksize=max(1, min(10, len(items) // 4)))
-        return list(track(done, what, total=len(items), transient=True))
-
-
-def push_of(item: tuple[Legs, int]) -> Pushed:
-    """Call `push` with one argument, as a process pool does."""
-    return push(*item)
+PARTS = {
+    "limit_rollouts": (table, 1000),
+    "limit_robots": (limit_robots.table, 96),
+    "pushes": (limit_pushes.table, 20),
+    "wrong_arms": (limits_on_wrong_arms.table, 40),
+}
+"""What makes each section of the page, and of how many cases of a kind."""
 
 
 def main() -> None:
-    """Run everything and write the tables."""
+    """Run the parts and write their tables."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--rollouts", type=int, default=1000)
-    parser.add_argument("--pushes", type=int, default=20)
-    parser.add_argument("--dry", action="store_true", help="print, write nothing")
+    parser.add_argument("parts", nargs="*", metavar="PART", default=[*PARTS])
+    parser.add_argument(
+        "--count", type=int, help="of cases, for a look: writes nothing"
+    )
     options = parser.parse_args()
-    tables = {}
-    if options.rollouts:
-        runs = {
-            period: run_parallel(
-                roll_out,
-                ((period, seed) for seed in range(options.rollouts)),
-                f"arm, {1e3 * period:g} ms",
-            )
-            for period in PERIODS
-        }
-        tables["limit_rollouts"] = arm_table(runs)
-        for period, arms in runs.items():
-            for seed, run in enumerate(arms):
-                if run.violated.any():
-                    print(f"{period} s, seed {seed}: {run}")
-    if options.pushes:
-        pushed = {
-            legs: run_parallel(
-                push_of, ((legs, k) for k in range(options.pushes)), legs.name
-            )
-            for legs in LEGS
-        }
-        tables["pushes"] = leg_table(pushed)
-    for name, table in tables.items():
-        print(table)
-        if not options.dry:
-            replace_section(RESULTS / "limits.md", name, "\n" + table + "\n")
+    for name in options.parts:
+        make, count = PARTS[name]
+        text = make(options.count or count)
+        print(text)
+        if not options.count:
+            replace_section(RESULTS / "limits.md", name, f"\n{text}\n")
 
 
 if __name__ == "__main__":

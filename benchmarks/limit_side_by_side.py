@@ -19,13 +19,12 @@ import argparse
 from collections.abc import Callable
 from typing import NamedTuple
 
-import beside_tsid
-import many_tasks
 import numpy as np
 import whole_body_side_by_side as whole_body
-from marked_sections import FIGURES, RESULTS, replace_section
 from matplotlib.figure import Figure
-from standing import TALOS, Standing
+from shared import beside_tsid, many_tasks
+from shared.marked_sections import FIGURES, RESULTS, replace_section
+from shared.standing import TALOS, Standing
 
 import hsp_control as hsp
 from hsp_control.common.arrays import Array
@@ -300,7 +299,7 @@ def cost_of_standing(strength: float, status: Status, what: str) -> str:
     Along its own run: on MuJoCo with all of its efforts, else on ideal contacts, until
     it falls.
     """
-    from controllers.standing_tsid import make
+    from shared.controllers.standing_tsid import make
 
     case = Standing(TALOS)
     weaken(case.robot, strength)

@@ -184,7 +184,7 @@ def laws(
         return found
     for module, name in PEERS.items():
         try:
-            peer = importlib.import_module(f"controllers.{module}")
+            peer = importlib.import_module(f"shared.controllers.{module}")
         except ImportError as error:
             missing[name] = str(error)
             continue

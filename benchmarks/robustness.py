@@ -2,11 +2,11 @@
 
     .venv/bin/python benchmarks/robustness.py [--fresh] [--tables]
 
-Runs the motion of results/plants.md with the nominal model, on Pinocchio's plant and on
+Runs one motion with the nominal model, on Pinocchio's plant and on
 MuJoCo's. Writes results/robustness.csv, and from it the tables of
 results/robustness.md. Runs that are in the CSV are not repeated, so that the script can
 be stopped and continued; ``--fresh`` deletes the CSV, ``--tables`` only
-writes the page. Takes half an hour on two cores.
+writes the page and its figure. Takes half an hour on two cores.
 """
 
 import csv
@@ -19,10 +19,10 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from iiwa_inertias import write_urdf
-from imperfect_plants import SETTLED, configuration
-from marked_sections import RESULTS, replace_section
 from rich.progress import track
+from shared.iiwa_inertias import write_urdf
+from shared.marked_sections import RESULTS, replace_section
+from shared.robustness_figure import draw_figure
 
 from hsp_control import load_experiment
 from hsp_control.control.compensation import Command
@@ -33,6 +33,7 @@ from hsp_control.simulation.plants import (
 )
 
 PROCESSES = 3
+SETTLED = 1.5  # the transient of the start is over [s]
 CSV = RESULTS / "robustness.csv"
 HANDS = {"panda": "panda_tcp", "iiwa14": "iiwa_link_ee"}
 ENGINES = {"rigid_body": "Pinocchio", "mujoco": "MuJoCo"}
@@ -187,6 +188,43 @@ def experiment(job: Job, folder: Path) -> dict[str, Any]:
     config["compensation"] = {"momentum_observer": None, **(compensation or {})}
     config["limits"] = {"effort_rate": "none"}
     return config
+
+
+def configuration(robot: str, hand: str, plant: dict[str, Any]) -> dict[str, Any]:
+    """Return the configuration of the motion on a plant."""
+    if "payload" in plant:
+        plant = {**plant, "payload": {**plant["payload"], "frame": hand}}
+    circle = {
+        "type": "circle",
+        "origin": "start",
+        "center": [0.0, 0.0, 0.0],
+        "radius": 0.1,
+        "angular_rate": 2.0,
+        "normal": [0.0, 0.0, 1.0],
+    }
+    task = {
+        "type": "frame_position",
+        "frame": hand,
+        "trajectory": circle,
+        "gains": {"natural_frequency": 20.0},
+        "blend": 1.0,
+    }
+    return {
+        "robot": {"name": robot},
+        "tasks": {"hand": task},
+        "null_space": {
+            "gain": 10.0,
+            "fields": [{"type": "joint_centering", "weight": 2.0}],
+        },
+        "plant": plant,
+        "compensation": {"momentum_observer": None},
+        "simulation": {
+            "duration": 4.0,
+            "control_period": 0.001,
+            "log_period": 0.001,
+            "integrator": {"type": "rk4", "step": 0.001},
+        },
+    }
 
 
 def measured(config: dict[str, Any]) -> tuple[float, float, float]:
@@ -345,7 +383,11 @@ def main() -> None:
     if "--tables" not in sys.argv:
         run_all()
     replace_section(RESULTS / "robustness.md", "tables", tables())
-    print("Run benchmarks/robustness_figure.py to draw the figure again")
+    shown = {
+        robot: [row.name for row in ROWS if row.robot in (None, robot)]
+        for robot in HANDS
+    }
+    draw_figure(means(), shown, [*COLUMNS])
     print(f"Wrote {CSV} and results/robustness.md")
 
 

@@ -16,10 +16,10 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
-from marked_sections import FIGURES, RESULTS
 from matplotlib.ticker import MaxNLocator
 from scipy.optimize import curve_fit
-from timing import Compute, State, step_times
+from shared.marked_sections import FIGURES, RESULTS
+from shared.timing import Compute, State, step_times
 
 import hsp_control as hsp
 from hsp_control.common.arrays import Array

@@ -21,16 +21,16 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
-import beside_tsid
 import numpy as np
 import pinocchio as pin
-from cases import FRAME, Case
-from controllers import operational_space, this_law
-from many_tasks import humanoid, two_arms
-from marked_sections import RESULTS
-from steps_in_cpp import StepsInCpp
-from timing import Compute, State, ratios, spread, step_times
-from tsid_in_cpp import CppSteps
+from shared import beside_tsid
+from shared.cases import FRAME, Case
+from shared.controllers import operational_space, this_law
+from shared.many_tasks import humanoid, two_arms
+from shared.marked_sections import RESULTS
+from shared.steps_in_cpp import StepsInCpp
+from shared.timing import Compute, State, ratios, spread, step_times
+from shared.tsid_in_cpp import CppSteps
 
 import hsp_control as hsp
 from hsp_control.common.arrays import Array
@@ -121,7 +121,7 @@ def _pinocchio_calls(case: Case) -> Compute:
 
 def _module(name: str, missing: dict[str, str]) -> Any:
     try:
-        return importlib.import_module(f"controllers.{name}")
+        return importlib.import_module(f"shared.controllers.{name}")
     except ImportError as error:
         peer = name.removesuffix("_peer")
         record = Path(sys.prefix) / "peers.json"
@@ -235,7 +235,7 @@ def near_and_far(case: Case, say: Callable[[str], None]) -> str:
         The rows.
     """
     law = _this_law(case, name="obstacle")
-    peer = importlib.import_module("controllers.tsid_peer").make(case)
+    peer = importlib.import_module("shared.controllers.tsid_peer").make(case)
     states = close_loop(case, this_law.make).states
     probe = hsp.RobotState(case.robot)
     near = np.array(
@@ -287,7 +287,7 @@ def placo_row(
     with tempfile.TemporaryDirectory() as folder:
         file = Path(folder) / "case.npz"
         case.save(file, path)
-        script = ROOT / "benchmarks" / "placo_side.py"
+        script = ROOT / "benchmarks" / "shared" / "placo_side.py"
         done = subprocess.run(
             [str(python), str(script), str(file), str(rounds), str(block)],
             capture_output=True,

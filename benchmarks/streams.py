@@ -13,7 +13,7 @@ from collections.abc import Callable, Iterator
 from typing import Any, NamedTuple
 
 import numpy as np
-from marked_sections import RESULTS, replace_section
+from shared.marked_sections import RESULTS, replace_section
 
 import hsp_control as hsp
 from hsp_control.common.arrays import Array

@@ -25,11 +25,11 @@ from pathlib import Path
 from time import perf_counter_ns
 from typing import Any
 
-import beside_tsid
 import numpy as np
-from marked_sections import RESULTS
-from standing import COM, G1, HAND, PERIOD, TALOS, TRUNK, Body, Engine, Standing
-from timing import Compute, State, ratios, spread, step_times
+from shared import beside_tsid
+from shared.marked_sections import RESULTS
+from shared.standing import COM, G1, HAND, PERIOD, TALOS, TRUNK, Body, Engine, Standing
+from shared.timing import Compute, State, ratios, spread, step_times
 
 import hsp_control as hsp
 from hsp_control.common.arrays import Array
@@ -47,7 +47,7 @@ def controllers() -> dict[str, Callable[[Standing], Made]]:
     """Return functions that make the controllers, by name."""
     made: dict[str, Callable[[Standing], Made]] = {LAW: this_law}
     try:
-        peer: Any = importlib.import_module("controllers.standing_tsid")
+        peer: Any = importlib.import_module("shared.controllers.standing_tsid")
     except ImportError as error:
         print(f"TSID is not installed ({error}): make bench")
         return made

@@ -5,7 +5,8 @@
 A step is `compute` and `applied`; a turn is 100,000 of them along the first ten seconds
 of the run, ten turns are a million. The efforts are the same to the last bit. ``pose``
 is the Panda of `side_by_side.py`; in .venv-peers TSID in C++ computes its steps, too,
-with its references made before. ``--fifo`` gives all real-time priority.
+with its references made before. ``--fifo`` gives all real-time priority. Writes
+benchmarks/results/without_python.md.
 """
 
 import argparse
@@ -21,9 +22,10 @@ from time import perf_counter_ns, sleep
 from typing import Any
 
 import numpy as np
-from cases import Case
-from controllers import this_law
 from numpy.typing import NDArray
+from shared.cases import Case
+from shared.controllers import this_law
+from shared.marked_sections import RESULTS, replace_section
 
 import hsp_control as hsp
 from hsp_control.frozen import compiler_flags
@@ -88,8 +90,8 @@ def in_c(controller: hsp.Controller, states: Rows, program: Path) -> Turn:
 def tsid_in_cpp(case: Case, states: Rows) -> Turn | None:
     """Return turns of TSID, if it is there."""
     try:
-        from controllers import tsid_peer
-        from tsid_in_cpp import CppSteps
+        from shared.controllers import tsid_peer
+        from shared.tsid_in_cpp import CppSteps
 
         peer = tsid_peer.make(case)
     except (ImportError, AttributeError):
@@ -110,7 +112,7 @@ def tsid_in_cpp(case: Case, states: Rows) -> Turn | None:
 
 
 def main() -> None:
-    """Print a table."""
+    """Measure, print the table and write it."""
     parser = argparse.ArgumentParser()
     parser.add_argument(
         "configs", nargs="*", default=["pose", "panda_limits", "panda_obstacle"]
@@ -122,8 +124,10 @@ def main() -> None:
     if compiler is None:
         sys.exit("no C compiler is there")
     load = os.getloadavg()[0]
-    print(f"load {load:.1f} on {os.cpu_count()} cores, priority {options.fifo}\n")
-    print("| steps | in | p50 us | p99.9 | largest |\n|---|---|--:|--:|--:|")
+    table = (
+        f"A load of {load:.1f} on {os.cpu_count()} cores, {options.turns} turns.\n\n"
+        "| steps | in | median [µs] | 99.9 % | largest |\n|---|---|--:|--:|--:|\n"
+    )
     with tempfile.TemporaryDirectory() as folder:
         program = Path(folder) / "steps"
         flags = ["-O2", *shlex.split(compiler_flags()), "-o", program]
@@ -152,7 +156,10 @@ def main() -> None:
                             times.setdefault(where, []).append(turn())
             for where, each in times.items():
                 p50, p999, most = np.quantile(np.concatenate(each), [0.5, 0.999, 1.0])
-                print(f"| {name} | {where} | {p50:.1f} | {p999:.1f} | {most:.0f} |")
+                table += f"| {name} | {where} | {p50:.1f} | {p999:.1f} | {most:.0f} |\n"
+    print(table)
+    section = "fifo" if options.fifo else "usual"
+    replace_section(RESULTS / "without_python.md", section, table)
 
 
 if __name__ == "__main__":

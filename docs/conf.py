@@ -17,19 +17,18 @@ extensions = [
     "sphinx.ext.autodoc",
     "sphinx.ext.viewcode",
     "sphinx_copybutton",
+    "sphinxarg.ext",
     "plain_docstrings",  # from here on: docs/_site
     "mathml",
     "reference",
     "replays",
-    "search_words",
     "lecture",
 ]
 exclude_patterns = ["_build", "_site", "lecture"]
 smartquotes = False  # a prime is a rate
 default_role = "py:obj"  # a name in backticks is a link wherever it is one of ours
 
-# `sphinx-build -b linkcheck docs out/links` asks the sites' pages, too, with anchors;
-# `make links` needs no build, and reads README and notebooks as well.
+# `make links` asks other sites.
 linkcheck_ignore = [r"https?://(localhost|127\.|10\.|172\.16\.|192\.168\.)"]
 linkcheck_anchors_ignore_for_url = [r"https://github\.com/"]
 linkcheck_timeout = 20
@@ -43,6 +42,7 @@ myst_enable_extensions = [
     "colon_fence",
 ]
 myst_heading_anchors = 4
+myst_ref_domains = ["std", "py"]  # not that of sphinx-argparse, which knows no "any"
 myst_dmath_double_inline = True
 
 add_module_names = False
@@ -56,6 +56,7 @@ html_theme = "pydata_sphinx_theme"
 html_title = f"hsp_control {release}"
 html_static_path = ["_static"]
 html_css_files = ["site.css"]
+html_search_scorer = str(Path(__file__).parent / "_static" / "scorer.js")
 html_show_sourcelink = False
 html_copy_source = False
 html_theme_options = {

@@ -10,9 +10,11 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 import hsp_control as hsp
+from hsp_control.common.arrays import Array
 from hsp_control.companions.plots import chosen_rows, new_figure, paper_figure, styled
 from hsp_control.companions.plots.palette import DESIRED, INK, SERIES
 from hsp_control.companions.sweeps import sweep_figure
+from hsp_control.control.actuation import Status
 from hsp_control.null_space import metrics
 from hsp_control.null_space.fields import FunctionField
 from hsp_control.robot.integrators import Dop853, Rk4
@@ -100,6 +102,7 @@ def main() -> None:
         left, right = figure.subplots(1, 2)
         draw_walk(left, right)
         figure.savefig(FOLDER / "walking.png", dpi=110)
+        draw_weak_arm()
     draw_sweep()
     for file in sorted(FOLDER.glob("*.png")):
         print(f"Figure: {file.relative_to(FOLDER.parents[1])}")
@@ -130,6 +133,55 @@ def draw_sweep() -> None:
         sweep_figure(found, outcomes).savefig(
             FOLDER / "sweep_panda_obstacle.png", dpi=110
         )
+
+
+def draw_weak_arm() -> None:
+    """Draw Talos with a weak arm, with `static_effort` and without it."""
+    name = "whole_body/talos_weak_arm"
+    runs = {
+        "with static_effort": hsp.load_experiment(name).run(),
+        "without": hsp.load_experiment(name, "limits.static_effort=null").run(),
+    }
+    shown, (limits, names) = runs["with static_effort"], weak_arm_limits(name)
+    figure = new_figure(8.4, 7.6)
+    efforts, hand, mass, speed, status = figure.subplots(
+        5, 1, sharex=True, height_ratios=(1.0, 1.0, 1.0, 1.0, 0.18)
+    )
+    dashes = ("-", "--", ":")
+    for color, dash, joint in zip(SERIES, dashes, (2, 4, 5), strict=False):
+        column = names.index(f"arm_right_{joint}_joint")
+        used = 100.0 * np.abs(shown["tau"][:, column]) / limits[column]
+        style = {"color": color, "ls": dash, "lw": 1.6, "label": f"arm_right_{joint}"}
+        efforts.plot(shown.t, used, **style)
+    efforts.axhline(100, color=INK, lw=1.0, label="limit")
+    efforts.set(ylabel="effort\n[% of limit]", ylim=(0.0, 108.0))
+    efforts.set_title("(a)  Efforts of the weak arm, with static_effort")
+    hand.set_title("(b)  With static_effort, and without")
+    for color, dash, (label, run) in zip(SERIES, dashes, runs.items(), strict=False):
+        style = {"color": color, "ls": dash, "lw": 1.6, "label": label}
+        for axes, task in ((hand, "hand"), (mass, "center_of_mass")):
+            error = np.linalg.norm(run[f"task.{task}.error"], axis=1)
+            axes.semilogy(run.t, 1e3 * error + 1e-3, **style)
+        speed.plot(run.t, np.abs(run["v"][:, 6:]).max(axis=1), **style)
+    hand.set(ylabel="hand error\n[mm]", ylim=(1e-2, None))
+    mass.set(ylabel="centre of mass\nerror [mm]", ylim=(1e-2, None))
+    speed.set_ylabel("fastest joint\n[rad/s]")
+    for axes, columns in ((efforts, 4), (hand, 2)):
+        axes.legend(loc="lower right", bbox_to_anchor=(1.0, 1.02), ncols=columns)
+    limited = shown["status"] >= Status.LIMITED
+    status.fill_between(shown.t, 0.0, 1.0, where=limited, color=INK, alpha=0.45, lw=0)
+    status.set(ylim=(0.0, 1.0), yticks=[], xlabel="time [s]")
+    status.set_ylabel("limited", rotation=0, ha="right", va="center")
+    status.grid(visible=False)
+    figure.align_ylabels([efforts, hand, mass, speed])
+    figure.savefig(FOLDER / "weak_arm.png", dpi=120)
+
+
+def weak_arm_limits(name: str) -> tuple[Array, list[str]]:
+    """Return the limits of a configuration's efforts and the names of its joints."""
+    experiment = hsp.load_experiment(name)
+    assert experiment.controller.limits is not None
+    return experiment.controller.limits.effort, list(experiment.robot.dof_names)
 
 
 def draw_walk(left: Axes, right: Axes) -> None:

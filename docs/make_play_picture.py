@@ -7,9 +7,10 @@ import numpy as np
 from PIL import Image
 
 from hsp_control.companions.film.chromium import headless_browser
-from hsp_control.companions.play import Picture, Session
+from hsp_control.companions.play import Session
 from hsp_control.companions.play.playable import playable
 from hsp_control.companions.viewer import Viewer
+from hsp_control.companions.viewer.live_picture import Picture
 from hsp_control.companions.viewer.transport import PageServer
 
 FILE = Path(__file__).parent / "figures" / "play.webp"

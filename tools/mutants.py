@@ -1,93 +1,80 @@
 """Break the code on purpose, and see whether a test notices: ``make mutants``.
 
-Every mutant is one edit in one named place, and the tests that should go red. A mutant
-that survives is a claim that nobody checks. ``tests/unit/test_mutants.py`` checks that
-every edit still fits the code.
+A mutant is one edit: of an operator, a number, a condition or a statement, drawn at
+random (`mutations.py`). The tests of its room are asked first, then the fast ones of
+all rooms. A mutant that survives is a claim that nobody checks, or an edit that changes
+nothing, such as of a bound that is never reached.
 
-    python tools/mutants.py                    all of them
-    python tools/mutants.py law gain           those whose name contains a word
-    python tools/mutants.py --list
+    python tools/mutants.py                          twenty, half of them in the engine
+    python tools/mutants.py engine/law hsp_control/control --count 50
+    python tools/mutants.py --since main             in what changed since
+    python tools/mutants.py --seed 7                 the same again
 """
 
 import argparse
 import os
+import random
 import resource
 import shutil
 import signal
 import subprocess
 import sys
 import tempfile
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
 from time import perf_counter
 from typing import NamedTuple
 
+from mutations import Edit, edits
+
 ROOT = Path(__file__).resolve().parents[1]
-COPIED = (
-    *("hsp_control", "tests", "robots", "configs", "docs", "pyproject.toml"),
-    *("engine", "hatch_build.py"),
-)
+CODE = ("hsp_control", "engine")
+COPIED = (*CODE, "tests", "robots", "configs", "docs", "pyproject.toml")
 TESTS_FAILED = 1
 """The exit status of pytest when tests ran and one failed."""
 LONGEST, MEMORY = 900.0, 16 << 30
 """What the tests of one mutant may take: time [s], and memory that they ask for [B]."""
+FAST = ("tests/unit", "-m", "not slow and not process and not browser")
+"""What is asked when the tests of a room notice nothing: those of `make quick`."""
+ROOMS = {
+    "dynamics": ("robot", "tasks"),
+    "compensation": ("simulation", "control"),
+    "contacts": ("constraints", "control"),
+    "fields": ("null_space",),
+    "integrators": ("robot", "simulation"),
+    "limits": ("control", "constraints"),
+    "linalg": ("engine", "law"),
+    "metrics": ("null_space",),
+    "qp": ("control",),
+    "src": ("engine",),
+    "include": ("frozen", "engine"),
+}
+"""The tests of a room of the engine that has no tests of its own name."""
 
 
 class Mutant(NamedTuple):
-    """One edit that makes the code wrong and keeps it running.
+    """An edit of a file: what makes the code wrong, most likely.
 
     Attributes:
-        name: What is wrong then.
-        file: The edited file, from the checkout's folder.
-        old: The text that is replaced; it stands in the file once.
-        new: What replaces it.
-        tests: Arguments of pytest: the tests that should go red.
+        file: The file, from the checkout's folder.
+        edit: What is replaced there.
+        tests: Arguments of pytest: the tests of its room.
     """
 
-    name: str
     file: str
-    old: str
-    new: str
-    tests: str
+    edit: Edit
+    tests: tuple[str, ...]
 
-
-def read(text: str) -> tuple[Mutant, ...]:
-    """Return the mutants of a text.
-
-    A line ``@ file | tests`` says where what follows is and who should see it: the name
-    of each mutant, with the word for pytest's -k if any, and its edit: ``old => new``,
-    indented, or as in a diff.
-    """
-    found: list[tuple[str, str, dict[str, list[str]], str]] = []
-    file = tests = ""
-    for line in text.strip().splitlines():
-        if line.startswith("@"):
-            file, tests = line[2:].split(" | ")
-        elif line.startswith(("-", "+")):
-            found[-1][2][line[0]].append(line[1:])
-        elif line.startswith("  "):
-            old, new = line[2:].split(" => ")
-            found[-1][2].update({"-": [old], "+": [new]})
-        elif not line.startswith("#"):
-            name, _, word = line.partition(" | ")
-            chosen = f"tests/{tests} -k {word}" if word else f"tests/{tests}"
-            path = file if file.startswith("engine/") else f"hsp_control/{file}"
-            found.append((name, path, {"-": [], "+": []}, chosen))
-    return tuple(
-        Mutant(name, file, "\n".join(edit["-"]), "\n".join(edit["+"]), chosen)
-        for name, file, edit, chosen in found
-    )
-
-
-MUTANTS = read((Path(__file__).parent / "mutants.txt").read_text(encoding="utf-8"))
-"""All of them, from the lowest room to the highest."""
+    def __str__(self) -> str:
+        """Return where it is and what it does."""
+        return f"{self.file}:{self.edit.line}  {self.edit}"
 
 
 class Verdict(NamedTuple):
-    """What became of one mutant.
+    """What became of a mutant.
 
     Attributes:
-        word: ``caught``, ``SURVIVED`` or ``BROKEN`` (no test ran).
+        word: ``caught``, ``SURVIVED``, ``void``: it does not compile, or no test ran.
         detail: The first test that failed, or the end of what was printed.
     """
 
@@ -95,64 +82,114 @@ class Verdict(NamedTuple):
     detail: str
 
 
+def tests_of(file: str) -> tuple[str, ...]:
+    """Return the tests of a file's room; those of all rooms if it has none."""
+    _, room, *rest = file.split("/")
+    if room == "companions":
+        named = [f"tests/companions/{rest[0]}"]
+    else:
+        named = [f"tests/unit/{each}" for each in ROOMS.get(room, (room,))]
+    there = tuple(each for each in named if (ROOT / each).is_dir())
+    return (*there, "-m", "not system") if there else FAST
+
+
+def sources(place: str, since: str | None) -> list[str]:
+    """Return the files to break: below a place, and changed since a commit if given."""
+    command = ["git", "ls-files", place]
+    if since:
+        command = ["git", "diff", "--name-only", "--diff-filter=d", since, "--", place]
+    listed = subprocess.run(
+        command, cwd=ROOT, capture_output=True, text=True, check=True
+    ).stdout.split()
+    return [
+        file
+        for file in listed
+        if file.startswith(CODE) and file.endswith((".py", ".hpp", ".cpp"))
+    ]
+
+
+def drawn(files: Iterable[str], count: int, seed: int) -> list[Mutant]:
+    """Return so many random mutants of files; all edits of all are equally likely."""
+    everything = [
+        (file, edit)
+        for file in files
+        for edit in edits(file, (ROOT / file).read_text(encoding="utf-8"))
+    ]
+    chosen = random.Random(seed).sample(everything, min(count, len(everything)))
+    return [Mutant(file, edit, tests_of(file)) for file, edit in sorted(chosen)]
+
+
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Try mutants; return 0 if all were caught."""
+    """Try mutants and print the share that was caught; return 0 if any was tried."""
     parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
-    parser.add_argument("words", nargs="*", help="parts of names; default: all")
-    parser.add_argument("--list", action="store_true", help="print the names")
+    parser.add_argument("places", nargs="*", default=[*CODE], help="files and folders")
+    parser.add_argument("--count", type=int, default=20)
+    parser.add_argument("--seed", type=int, default=random.randrange(10**6))
+    parser.add_argument("--since", metavar="COMMIT", help="only files changed since it")
+    parser.add_argument("--list", action="store_true", help="print them, try none")
     options = parser.parse_args(arguments)
-    chosen = [
+    mutants = [
         mutant
-        for mutant in MUTANTS
-        if not options.words or any(word in mutant.name for word in options.words)
+        for place in options.places  # as many of each
+        for mutant in drawn(
+            sources(place, options.since),
+            options.count // len(options.places),
+            options.seed,
+        )
     ]
     if options.list:
-        print(*(mutant.name for mutant in chosen), sep="\n")
+        print(*mutants, sep="\n")
         return 0
+    print(f"{len(mutants)} mutants, --seed {options.seed}", flush=True)
     with tempfile.TemporaryDirectory() as folder:
         copy = Path(folder) / "checkout"
         copy.mkdir()
-        for name in COPIED:
-            source = ROOT / name
-            if source.is_dir():
-                shutil.copytree(source, copy / name)
-            else:
-                shutil.copy(source, copy / name)
-        not_caught = [name for name, word in tried(copy, chosen) if word != "caught"]
-    print(f"{len(chosen) - len(not_caught)} of {len(chosen)} caught")
-    if not_caught:
-        print("not caught:", *not_caught, sep="\n  ")
-    return 1 if not_caught else 0
+        for name in (*COPIED, "hatch_build.py"):
+            (shutil.copytree if (ROOT / name).is_dir() else shutil.copy)(
+                ROOT / name, copy / name
+            )
+        found = list(tried(copy, mutants))
+    caught = sum(verdict.word == "caught" for _, verdict in found)
+    tests = sum(verdict.word != "void" for _, verdict in found)
+    share = 100.0 * caught / max(tests, 1)
+    print(f"{caught} of {tests} caught, {share:.0f} % (--seed {options.seed})")
+    for mutant, verdict in found:
+        if verdict.word == "SURVIVED":
+            print(f"  {mutant}")
+    return 0 if tests else 1
 
 
-def tried(copy: Path, mutants: Sequence[Mutant]) -> Iterator[tuple[str, str]]:
-    """Try each mutant in a copy of the checkout; yield its name and the verdict."""
-    sound: dict[str, Verdict] = {}
+def tried(copy: Path, mutants: Sequence[Mutant]) -> Iterator[tuple[Mutant, Verdict]]:
+    """Try each mutant in a copy of the checkout; yield it and what became of it."""
+    sound: dict[tuple[str, ...], Verdict] = {}
     for number, mutant in enumerate(mutants, start=1):
+        start = perf_counter()
         if mutant.tests not in sound:
             sound[mutant.tests] = run(copy, mutant.tests)
         file = copy / mutant.file
         text = file.read_text(encoding="utf-8")
-        file.write_text(mutated(mutant, text), encoding="utf-8")
-        start = perf_counter()
-        compiles = rebuilt(copy, mutant)
-        verdict = run(copy, mutant.tests)
+        file.write_text(mutant.edit.applied(text), encoding="utf-8")
+        verdict = Verdict("void", "it does not compile")
+        if rebuilt(copy, mutant):
+            verdict = run(copy, mutant.tests)
+            if verdict.word == "SURVIVED" and mutant.tests != FAST:
+                verdict = run(copy, FAST)
         file.write_text(text, encoding="utf-8")
-        rebuilt(copy, mutant)
-        if not compiles:
-            verdict = Verdict("BROKEN", "it does not compile")
         if sound[mutant.tests].word != "SURVIVED":
-            verdict = Verdict("BROKEN", "its tests do not pass without the edit")
+            verdict = Verdict("void", "its tests do not pass without the edit")
         print(
-            f"{number:3d}/{len(mutants)} {verdict.word:9} {mutant.name:44} "
+            f"{number:3d}/{len(mutants)} {verdict.word:9} {mutant} "
             f"{perf_counter() - start:4.0f} s  {verdict.detail}",
             flush=True,
         )
-        yield mutant.name, verdict.word
+        yield mutant, verdict
 
 
 def rebuilt(copy: Path, mutant: Mutant) -> bool:
-    """Build the engine anew if the mutant is in it; return whether it compiles."""
+    """Build the engine anew if the mutant is in it; return whether it compiles.
+
+    What the mutant before it had broken is built with it.
+    """
     if not mutant.file.startswith("engine/"):
         return True
     made = subprocess.run(
@@ -161,24 +198,12 @@ def rebuilt(copy: Path, mutant: Mutant) -> bool:
     return made.returncode == 0
 
 
-def mutated(mutant: Mutant, text: str) -> str:
-    """Return the text with the mutant's edit.
-
-    Raises:
-        ValueError: If the edit does not fit just one place.
-    """
-    count = text.count(mutant.old)
-    if count != 1:
-        raise ValueError(f"{mutant.name}: {count} places in {mutant.file} fit; needs 1")
-    return text.replace(mutant.old, mutant.new)
-
-
-def run(copy: Path, tests: str) -> Verdict:
+def run(copy: Path, tests: Sequence[str]) -> Verdict:
     """Run tests in a copy of the checkout until one fails, or all are too long."""
     started = subprocess.Popen(
         [
             *(sys.executable, "-m", "pytest", "-x", "-q", "-p", "no:randomly"),
-            *("-p", "no:cacheprovider", "--tb=no", *tests.split()),
+            *("-p", "no:cacheprovider", "--tb=no", *tests),
         ],
         cwd=copy,
         env=os.environ | {"PYTHONPATH": str(copy)},
@@ -199,7 +224,10 @@ def run(copy: Path, tests: str) -> Verdict:
     if started.returncode == TESTS_FAILED:
         failed = [line for line in lines if line.startswith(("FAILED", "ERROR"))]
         return Verdict("caught", failed[0].split(" - ")[0] if failed else "")
-    word = "SURVIVED" if started.returncode == 0 else "BROKEN"
+    if started.returncode == 0:
+        return Verdict("SURVIVED", lines[-1] if lines else "")
+    # Status 2: what the tests import does not run any more.
+    word = "caught" if started.returncode == 2 else "void"
     return Verdict(word, lines[-1] if lines else "")
 
 

@@ -14,11 +14,10 @@ import tempfile
 from io import BytesIO
 from pathlib import Path
 from typing import Any
+from unittest.mock import patch
 
 import nbformat
-from nbclient import NotebookClient
 from PIL import Image
-from traitlets.config import Config
 
 ROOT = Path(__file__).resolve().parents[1]
 FOLDER = ROOT / "notebooks"
@@ -38,32 +37,35 @@ def main() -> None:
             print(f"{path.name} ...", flush=True)
             notebook = nbformat.read(path, as_version=4)
             with tempfile.TemporaryDirectory() as folder:
-                execute(notebook, Path(folder))
+                notebook = executed(notebook, Path(folder))
                 keep_small(notebook, folder)
             nbformat.write(notebook, path)
 
 
-def execute(notebook: Any, folder: Path) -> None:
-    """Run all cells in a folder; the kernel listens on files, no port is opened."""
+def executed(notebook: Any, folder: Path) -> Any:
+    """Return a notebook with all its cells run in a folder.
+
+    Raises:
+        RuntimeError: If a cell raises, or takes too long.
+    """
+    from nbmake.nb_run import NotebookRun  # tests that only read notebooks need it not
+
+    file = folder / "notebook.ipynb"
+    nbformat.write(notebook, file)
     beside = str(Path(sys.executable).parent)  # where `hsp` is
-    environment = os.environ | {
+    environment = {
         "PATH": os.pathsep.join([beside, os.environ["PATH"]]),
         "PYTHONPATH": str(ROOT),
         "MPLBACKEND": "module://matplotlib_inline.backend_inline",
         "IPYTHONDIR": str(folder / "ipython"),
     }
-    with tempfile.TemporaryDirectory() as sockets:  # whose names may not be long
-        config = Config()
-        config.KernelManager.transport = "ipc"
-        config.KernelManager.ip = str(Path(sockets) / "kernel")
-        NotebookClient(
-            notebook,
-            timeout=CELL_TIME,
-            startup_timeout=60,
-            kernel_name="python3",
-            resources={"metadata": {"path": str(folder)}},
-            config=config,
-        ).execute(env=environment)
+    with patch.dict(os.environ, environment):
+        found = NotebookRun(file, CELL_TIME).execute()
+    if found.error is not None:
+        raise RuntimeError(
+            f"cell {found.error.failing_cell_index}: {found.error.trace}"
+        )
+    return found.nb
 
 
 def keep_small(notebook: Any, folder: str) -> None:

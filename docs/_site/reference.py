@@ -5,15 +5,12 @@ import re
 from pathlib import Path
 
 from bundled import configurations_page, franka_errors_page, robots_page
-from commands import commands_page
 from names import names_page, namespace_pages
 from sphinx.application import Sphinx
 from yaml_keys import yaml_page
 
-from hsp_control.cli.options import command_line
-
 SCHEMA = "../configs/hsp_control.schema.json"
-RESULTS = "../benchmarks/results"
+BENCHMARKS = "../benchmarks"
 
 
 def write(app: Sphinx) -> None:
@@ -22,16 +19,17 @@ def write(app: Sphinx) -> None:
     folder.mkdir(parents=True, exist_ok=True)
     pages = {
         "names": names_page(),
-        "commands": commands_page(command_line()),
         "configurations": configurations_page(),
         "robots": robots_page(),
         "franka_errors": franka_errors_page(),
         "yaml": yaml_page(json.loads((Path(app.srcdir) / SCHEMA).read_text())),
         **{f"hsp.{name}": page for name, page in namespace_pages()},
     }
-    for file in (Path(app.srcdir) / RESULTS).glob("*.md"):  # so that pages link to them
-        text = file.read_text(encoding="utf-8")
-        pages[f"results/{file.stem}"] = text.replace("](../../docs/", "](/")
+    benchmarks = Path(app.srcdir) / BENCHMARKS
+    for file in benchmarks.glob("results/*.md"):  # so that pages link to them
+        pages[f"results/{file.stem}"] = _page(file)
+    for file in benchmarks.glob("companions/*/results.md"):
+        pages[f"results/{file.parent.name}"] = _page(file)
     (folder / "results").mkdir(exist_ok=True)
     for name, page in pages.items():
         path = folder / f"{name}.md"
@@ -39,10 +37,19 @@ def write(app: Sphinx) -> None:
             path.write_text(page)
 
 
+def _page(results: Path) -> str:
+    """Return tables as a page, whose links to pages of the site are absolute."""
+    return re.sub(r"\]\((?:\.\./)+docs/", "](/", results.read_text(encoding="utf-8"))
+
+
 def _here(app: Sphinx, name: str, source: list[str]) -> None:
     """Let links to tables of benchmarks lead to their pages in the site."""
-    pattern = r"\]\((?:\.\./)+benchmarks/results/(\w+\.md)"
-    source[0] = re.sub(pattern, r"](/reference/generated/results/\1", source[0])
+    pattern = r"\]\((?:\.\./)+benchmarks/(?:results/(\w+)|companions/(\w+)/results)\.md"
+    source[0] = re.sub(
+        pattern,
+        lambda found: f"](/reference/generated/results/{found[1] or found[2]}.md",
+        source[0],
+    )
 
 
 def setup(app: Sphinx) -> dict[str, bool]:

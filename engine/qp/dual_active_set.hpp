@@ -99,8 +99,8 @@ class DualActiveSet {
                  // was seen with hard constraints
   };
 
-  // Limit on iterations, per constraint. Random QPs need 3 at most, see benchmarks/qp.py; Talos
-  // with all efforts at their limits 5.
+  // Limit on iterations, per constraint. Random QPs need 3 at most, Talos with all
+  // efforts at their limits 5.
   static constexpr Index most_iterations = 10;
 
   DualActiveSet(const QP& qp, Index moving, InOut<'n'>& x, ActiveSet& set, ActiveSetMemory& memory)

@@ -9,6 +9,9 @@ namespace hsp {
 // linear rows also lose (angular rows of J_r) × d:
 //
 //   J = R_rᵀ K,    J' = R_rᵀ(K' - w_r × K)    since (R_rᵀ)' = -R_rᵀ[w_r]×.
+//
+// What J v lacks, where the frames move in their joints, is R_rᵀ y, with the rate R_rᵀ(y' - w_r ×
+// y): y = y_f - y_r, whose linear part also loses (angular part of y_r) × d.
 struct RelativeKinematics {
   static constexpr const char* doc = "The motion of a frame relative to another, in its axes.";
   FrameMotion<In> frame, reference;
@@ -35,6 +38,16 @@ struct RelativeKinematics {
     out.rotation = R_r_T * frame.rotation;
     out.position = R_r_T * d;
     out.velocity << R_r_T * (d_dot - w_r.cross(d)), R_r_T * (frame.velocity.tail<3>() - w_r);
+
+    const Vector3 u = reference.own_velocity.tail<3>();
+    const Vector3 u_dot = reference.own_acceleration.tail<3>();
+    Vector6 y = frame.own_velocity - reference.own_velocity;
+    Vector6 y_dot = frame.own_acceleration - reference.own_acceleration;
+    y.head<3>() -= u.cross(d);
+    y_dot.head<3>() -= u_dot.cross(d) + u.cross(d_dot) + w_r.cross(y.head<3>());
+    y_dot.tail<3>() -= w_r.cross(y.tail<3>());
+    turn(R_r_T, y, out.own_velocity);
+    turn(R_r_T, y_dot, out.own_acceleration);
   }
 
  private:

@@ -89,6 +89,8 @@ struct TrackDirection {
              tangent.dot(2.0 * n_dot[2] / s * n_dot - n_ddot_free);
     };
     out.acceleration << -along(1), along(0);
+    // (c J_w v)' of a frame that turns in its joint
+    out.acceleration -= c * frame.own_acceleration.tail<3>() + c_dot * frame.own_velocity.tail<3>();
   }
 };
 

@@ -9,7 +9,8 @@
 //
 //   w' = R w̃' - w × w_d + w_d'.
 //
-// The feedback says e'' = -Kv e' - Kp e, exactly, up to an angle of π.
+// The feedback says e'' = -Kv e' - Kp e, exactly, up to an angle of π. Of these accelerations the
+// joints make what the frame does not by its own motion in its joint; see FrameMotion.
 #pragma once
 #include <hsp/rotations.hpp>
 
@@ -54,6 +55,7 @@ struct TrackOrientation {
     Vector3 y_ddot = Vector3::Zero();
     feedback.add_to(y_ddot, out.error, out.error_rate);
     out.acceleration = relative.acceleration(y_ddot, desired);
+    out.acceleration -= frame.own_acceleration.tail<3>();
   }
 };
 
@@ -62,7 +64,7 @@ struct TrackOrientation {
 //
 //   e' = R_dᵀ (ε' - w_d × ε),    e'' = R_dᵀ (ε'' - 2 w_d × ε' - w_d' × ε + w_d × (w_d × ε)),
 //
-// J = R_dᵀ J_x and J v = R_dᵀ x'.
+// J = R_dᵀ J_x and J v = R_dᵀ x', but for the frame's own motion in its joint.
 struct TrackPose {
   static constexpr const char* doc =
       "e = (x_d - x, -log(R_dᵀ R)) of a frame; gains may couple position and orientation.";
@@ -75,7 +77,7 @@ struct TrackPose {
   void operator()() {
     const auto& [x_d, R_d] = desired;
     const RelativeRotation relative(frame, R_d);
-    const Vector3 x_dot = frame.velocity.head<3>();
+    const Vector3 x_dot = frame.velocity.head<3>(), own = frame.own_velocity.head<3>();
     const Vector3 away = x_d.position - frame.position, rate = x_d.velocity - x_dot;
     const Vector3 w_d = R_d.angular_velocity;
     out.jacobian = frame.jacobian;
@@ -84,16 +86,19 @@ struct TrackPose {
     out.error_rate << rate, -relative.y_dot;
     if (turning) turn(frame.jacobian.topRows<3>(), away, rate);
 
-    Eigen::Matrix<double, 6, 1> wanted = Eigen::Matrix<double, 6, 1>::Zero();  // -e''
+    Vector6 wanted = Vector6::Zero();  // -e''
     feedback.add_to(wanted, out.error, out.error_rate);
-    Vector3 x_ddot = x_d.acceleration + wanted.head<3>();
+    const Vector3 own_dot = frame.own_acceleration.head<3>();
+    Vector3 x_ddot = x_d.acceleration + wanted.head<3>() - own_dot;
     if (turning) {
-      x_ddot = x_d.acceleration + R_d.rotation * wanted.head<3>();
+      x_ddot = x_d.acceleration + R_d.rotation * wanted.head<3>() - own_dot;
       x_ddot += w_d.cross(w_d.cross(away)) - 2.0 * w_d.cross(rate);
       x_ddot -= R_d.angular_acceleration.cross(away);
-      x_ddot = R_d.rotation.transpose() * (x_ddot - w_d.cross(x_dot)).eval();  // (R_dᵀ x')'
+      // (R_dᵀ J_x v)'
+      x_ddot = R_d.rotation.transpose() * (x_ddot - w_d.cross(x_dot - own)).eval();
     }
     out.acceleration << x_ddot, relative.acceleration(wanted.tail<3>(), R_d);
+    out.acceleration.tail<3>() -= frame.own_acceleration.tail<3>();
   }
 
  private:

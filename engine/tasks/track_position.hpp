@@ -28,6 +28,7 @@ struct TrackAxes {
       out.error_rate[k] = desired.velocity[k] - point.velocity[i];
     }
     out.acceleration = desired.acceleration;
+    for (Index k = 0; k < axes.size(); ++k) out.acceleration[k] -= point.own_acceleration[axes[k]];
     feedback.add_to(out.acceleration, out.error, out.error_rate);
   }
 };

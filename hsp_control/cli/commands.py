@@ -9,7 +9,7 @@ from collections.abc import Callable
 from dataclasses import asdict
 from hashlib import sha256
 from pathlib import Path
-from typing import Protocol
+from typing import Any, Protocol
 
 import numpy as np
 from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn, track
@@ -22,7 +22,7 @@ from hsp_control.cli.consoles import message_of
 from hsp_control.cli.consoles import out as _out
 from hsp_control.cli.interrupts import INTERRUPTED, DeferredInterrupt
 from hsp_control.cli.loading import read
-from hsp_control.cli.run_summary import Stopwatch, summary
+from hsp_control.cli.stopwatch import Stopwatch
 from hsp_control.common.exceptions import LogError, SimulationError
 from hsp_control.config import Experiment, json_schema
 from hsp_control.config.loaded_scenario import LoadedScenario, load_scenario
@@ -31,6 +31,7 @@ from hsp_control.robot.description.sources import example_robots
 from hsp_control.simulation import Rollout
 from hsp_control.simulation.log_writer import LogWriter
 from hsp_control.simulation.measures import measures
+from hsp_control.simulation.run_summary import summary_rows
 
 
 class _Shown(Protocol):
@@ -66,7 +67,7 @@ _SHOWN = re.compile(r"\s*(title|description|view)\b")
 
 def file_name(words: str) -> str:
     """Return words as the name of a file; what is too long ends in its hash."""
-    name = re.sub(r"[\s/\\]+", "_", words)
+    name = re.sub(r"[\s/\\]+", "_", re.sub(r"[,;+]\s*", "-", words))
     if len(name) <= _LONGEST:
         return name
     return f"{name[: _LONGEST - 9]}-{sha256(words.encode()).hexdigest()[:8]}"
@@ -79,7 +80,7 @@ def _log_of(source: Path, options: argparse.Namespace) -> Path:
     """
     changed = [each for each in options.overrides if not _SHOWN.match(each)]
     folder: Path = options.out
-    log = folder / f"{file_name(','.join([source.stem, *changed]))}.npz"
+    log = folder / f"{file_name('-'.join([source.stem, *changed]))}.npz"
     if log.exists() and source.exists() and log.samefile(source):
         return log.with_stem(f"{log.stem}-again")
     return log
@@ -138,8 +139,8 @@ def _run_and_save(
 
 def _tell(rollout: Rollout, log: Path, stopwatch: Stopwatch) -> None:
     """Print what a run did, as a table."""
-    table = summary(rollout)
-    for line in stopwatch.table_rows(rollout):
+    table = Table(show_header=False, box=None, pad_edge=False)
+    for line in [*summary_rows(rollout), *stopwatch.table_rows(rollout)]:
         table.add_row(*line)
     _out.print(table)
     _out.print(f"Log: {log}")
@@ -189,9 +190,16 @@ def robots(options: argparse.Namespace) -> int:
 
 
 def schema(options: argparse.Namespace) -> int:
-    """Print the JSON Schema."""
-    print(json.dumps(json_schema(), indent=2, ensure_ascii=False))
+    """Print the JSON Schema, one definition a line."""
+    whole = json_schema()
+    definitions = [f"{_compact(k)}:{_compact(v)}" for k, v in whole["$defs"].items()]
+    rest = _compact({name: part for name, part in whole.items() if name != "$defs"})
+    print(rest[:-1] + ',"$defs":{\n' + ",\n".join(definitions) + "\n}}")
     return 0
+
+
+def _compact(value: Any) -> str:
+    return json.dumps(value, ensure_ascii=False, separators=(",", ":"))
 
 
 def _run_with_progress(

@@ -11,6 +11,7 @@ from rich.markup import escape
 from rich.progress import Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
 
 from hsp_control.control.first_state import StartWarning
+from hsp_control.simulation.simulate import RunWarning
 
 _LONGEST = 1500
 
@@ -48,6 +49,7 @@ def warnings_printed() -> Iterator[None]:
     """Print warnings of this package as lines on standard error, each one once."""
     with warnings.catch_warnings():
         warnings.simplefilter("always", StartWarning)
+        warnings.simplefilter("always", RunWarning)
         show_other, printed = warnings.showwarning, set[str]()
 
         def show(
@@ -58,7 +60,7 @@ def warnings_printed() -> Iterator[None]:
             file: TextIO | None = None,
             line: str | None = None,
         ) -> None:
-            if not issubclass(category, StartWarning):
+            if not issubclass(category, StartWarning | RunWarning):
                 show_other(message, category, filename, lineno, file, line)
             elif str(message) not in printed:
                 printed.add(str(message))

@@ -19,7 +19,6 @@ from hsp_control.cli.live_experiment import (
 )
 from hsp_control.cli.loading import read
 from hsp_control.cli.robot_process import RobotProcess
-from hsp_control.cli.run_summary import excess_rows, unexplained_rows
 from hsp_control.common.exceptions import LiveError, LogError
 from hsp_control.config import Experiment
 from hsp_control.config.loaded_scenario import load_scenario
@@ -38,6 +37,7 @@ from hsp_control.live import (
 from hsp_control.live.hardware import AdaptingHardware, LocatedHardware
 from hsp_control.live.operator_requests import stop_signals
 from hsp_control.simulation import Rollout
+from hsp_control.simulation.run_summary import excess_rows, unexplained_rows
 
 _DRY_RUN = 0.5  # duration of the run before, in which all is done once [s]
 _DRY_RUN_OF_A_PLAN = 3.0  # the same with a plan, which has to come to its steps [s]

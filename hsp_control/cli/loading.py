@@ -7,7 +7,8 @@ from hsp_control.common.exceptions import AccessError
 from hsp_control.config import Experiment
 from hsp_control.config.document import Document, read_document
 from hsp_control.config.experiment import build
-from hsp_control.declaration.imported import import_file
+from hsp_control.config.own_code import add_imports
+from hsp_control.declaration.imported import import_code
 from hsp_control.robot.description.access import ANYWHERE, Access, only_within
 from hsp_control.robot.description.sources import is_path
 
@@ -20,21 +21,28 @@ def load(options: argparse.Namespace, *overrides: str) -> Experiment:
 def read(options: argparse.Namespace, *overrides: str) -> Document:
     """Return a command's configuration; for the arguments see `load`."""
     strict = options.strict or bool(options.allow)
-    run_imports(options)
+    imports = own_code(options)
     document = read_document(options.config, strict=strict, allow=options.allow)
+    add_imports(document, imports)
     for assignment in (*options.overrides, *overrides):
         document.override(assignment)
     return document
 
 
-def run_imports(options: argparse.Namespace) -> None:
-    """Run the files of ``--import``, which strict reading does not admit."""
-    for file in getattr(options, "imports", ()):
+def own_code(options: argparse.Namespace) -> list[str]:
+    """Return what ``--import`` names, which strict reading does not admit."""
+    for name in options.imports:
         if options.strict or options.allow:
             raise AccessError(
-                f"--import {file} runs code, which --strict and --allow do not admit"
+                f"--import {name} runs code, which --strict and --allow do not admit"
             )
-        import_file(file)
+    return list(options.imports)
+
+
+def run_imports(options: argparse.Namespace) -> None:
+    """Import what ``--import`` names, for a command without a configuration."""
+    for name in own_code(options):
+        import_code(name)
 
 
 def robot_access(name: str, options: argparse.Namespace) -> Access:

@@ -246,15 +246,14 @@ def add_strict(parser: argparse.ArgumentParser) -> None:
 
 
 def add_import(parser: argparse.ArgumentParser) -> None:
-    """Add which Python files are run first."""
+    """Add which Python code is imported first."""
     parser.add_argument(
         "--import",
         action="append",
         default=[],
-        type=Path,
         dest="imports",
-        metavar="FILE.py",
-        help="run this Python file first, whose functions and types the configuration "
+        metavar="FILE.py|MODULE",
+        help="import this Python code first, whose functions and types a configuration "
         "may name: it may do anything, so none with --strict; may be repeated",
     )
 

@@ -88,6 +88,9 @@ class Document:
         self.packages: frozenset[str] | None = None
         # what a log says of its robot, unless another one is chosen; see `recorded`
         self.recorded_robot: Any = None
+        # of a log: what the code that it imports was, by name, as SHA-256
+        self.recorded_code: dict[str, str] | None = None
+        self.given_code: frozenset[str] = frozenset()  # what the user named, too
         self._data = deepcopy(data)
         self._origins: dict[KeyPath, Mark | str] = dict(marks)
         self._written = bool(marks)  # as a text, not in Python
@@ -291,6 +294,7 @@ def _read(source: str | PathLike[str] | dict[str, Any], strict: bool) -> Documen
         )
         document = Document(config | {"changes": made}, {}, str(path))
         document.recorded_robot = usable_record(run.meta)
+        document.recorded_code = run.meta.get("imported") or {}
         return document
     known = bundled_configs()
     if path.suffix in {".yaml", ".yml"} or is_file(path):

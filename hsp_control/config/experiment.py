@@ -21,6 +21,7 @@ from hsp_control.common.exceptions import (
 )
 from hsp_control.config.document import Document, read_document
 from hsp_control.config.loaded_scenario import LoadedScenario, load_scenario
+from hsp_control.config.own_code import own_modules
 from hsp_control.config.scenario import Scenario, ViewSettings
 from hsp_control.constraints.contacts import Contact
 from hsp_control.constraints.limits import Limits
@@ -293,7 +294,13 @@ class Experiment:
             config: dict[str, Any] = plain_data(self.scenario, defaults=True)
         except ConfigError:
             return None
-        return config
+        return config | {"imports": self._imports}
+
+    @property
+    def _imports(self) -> list[str]:
+        """Code that declares types of this experiment, for who reads it elsewhere."""
+        own = [*self.scenario.imports, *own_modules(self.scenario)]
+        return list(dict.fromkeys(own))
 
     def to_yaml(self) -> str:
         """Return the configuration as YAML; `load_experiment` builds the same from it.
@@ -302,8 +309,11 @@ class Experiment:
             ConfigError: If a part is not data: a Python function, or a class that has
                 no YAML type.
         """
+        data: dict[str, Any] = plain_data(self.scenario)
+        if self._imports:
+            data["imports"] = self._imports
         text: str = yaml.safe_dump(
-            plain_data(self.scenario),
+            data,
             sort_keys=False,
             allow_unicode=True,
             default_flow_style=None,

@@ -12,6 +12,7 @@ from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import HspControlError
 from hsp_control.common.suggestions import did_you_mean
 from hsp_control.config.document import Document
+from hsp_control.config.own_code import located_imports, run_imports
 from hsp_control.config.scenario import Scenario
 from hsp_control.config.streams import with_messages
 from hsp_control.declaration import Part, within
@@ -52,6 +53,7 @@ def load_scenario(document: Document) -> LoadedScenario:
             "nothing given; write none for no limits, or remove the key to keep the "
             "robot's own",
         )
+    run_imports(document)
     scenario = validate(document, Scenario)
     if "tasks" not in document.to_dict() and scenario.plan is None:
         raise document.error(
@@ -60,7 +62,11 @@ def load_scenario(document: Document) -> LoadedScenario:
             "compensation and the field alone",
         )
     folder = Path(document.name).resolve().parent
-    scenario = replace(scenario, robot=scenario.robot.located(folder))
+    scenario = replace(
+        scenario,
+        robot=scenario.robot.located(folder),
+        imports=located_imports(scenario.imports, folder),
+    )
     with document.at():
         scenario = with_messages(scenario, folder, document.access)
     robot = load_robot(document, scenario)

@@ -14,6 +14,7 @@ from hsp_control.common.keywords import suggesting
 from hsp_control.config.document import Document
 from hsp_control.config.experiment import controller_data
 from hsp_control.config.loaded_scenario import load_scenario
+from hsp_control.config.own_code import own_modules
 from hsp_control.control.controller import Controller
 from hsp_control.control.output import ControlOutput
 from hsp_control.declaration.language import check_kind
@@ -67,13 +68,18 @@ class Recorder:
         where = Path(self._folder.name) / "log" if self._folder else Path(str(path))
         self._journal = where.with_suffix(".journal")
         self._controller, self._period = controller, log_period
-        self._config, self._lost = _config_of(controller)
+        self._config, self._lost = declaration_of(controller)
         self._begun = self._last = self._due = -inf
         self._held = 0.0  # time between the first two outputs [s]
         meta = {"name": where.stem, "config": self._config, "config_lost": self._lost}
         scene = controller.scene
         self._writer = LogWriter(controller, scene, 0, path=self._journal, meta=meta)
         self._rollout: Rollout | None = None
+
+    @property
+    def journal(self) -> Path:
+        """The file that has each row at once, until the recorder is closed."""
+        return self._journal
 
     def record(self, output: ControlOutput, tau: ArrayLike | None = None) -> None:
         """Write a row for the controller's last output, if one is due.
@@ -178,7 +184,7 @@ class Recorder:
                 self._folder.cleanup()
 
 
-def _config_of(controller: Controller) -> tuple[dict[str, Any] | None, str]:
+def declaration_of(controller: Controller) -> tuple[dict[str, Any] | None, str]:
     """Return the configuration of a controller as data; or None, and why."""
     own = controller._declared
     try:
@@ -188,6 +194,7 @@ def _config_of(controller: Controller) -> tuple[dict[str, Any] | None, str]:
         )
         scenario = load_scenario(Document(data, {}, "recorded")).scenario
         config: dict[str, Any] = plain_data(scenario, defaults=True)
+        config["imports"] = list(dict.fromkeys(own_modules(scenario)))
     except HspControlError as error:
         return None, str(error)
     return config, ""

@@ -150,6 +150,10 @@ class Scenario(Part, error=ConfigError):
     """One line that says what the configuration shows; the title of its plots."""
     description: str = ""
     """A longer description, for readers."""
+    imports: Annotated[Sequence[str], Field(max_length=100), AfterValidator(tuple)] = ()
+    """Python code of your own with the types and functions that the configuration
+    names: files, such as ``parts.py`` beside it, and modules that Python can import,
+    such as ``my_package.parts``."""
     robot: RobotDescription
     """The robot that is controlled."""
     start: StartOrAuto = InitialState()

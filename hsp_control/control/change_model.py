@@ -1,4 +1,4 @@
-"""The changes of a robot's model: of what it carries, and of gravity."""
+"""The changes of a robot's model: of what it carries, its tools, and gravity."""
 
 from dataclasses import replace
 from typing import Self
@@ -12,10 +12,14 @@ from hsp_control.control.change import Change
 from hsp_control.control.evolution import ABSENT
 from hsp_control.control.model_in_force import CarriedBody, PlannedPayload
 from hsp_control.control.setup import Setup
+from hsp_control.control.tools_in_force import PlannedTool
 from hsp_control.declaration import within
 from hsp_control.declaration.quantities import NonNegative, Semidefinite, Vector3
+from hsp_control.declaration.rotation import Rotation
 from hsp_control.geometry.scene import Start
 from hsp_control.robot import Robot
+from hsp_control.trajectories import PoseTrajectory, crossfade
+from hsp_control.trajectories.pose import HoldPose
 
 MOST_GRAVITY = 300.0
 """Largest gravity, ten times that of Jupiter: more is in other units [m/s²]."""
@@ -107,6 +111,47 @@ class ChangePayload(Change, type="payload"):
             if self.mass == 0.0 and principal[2] > 0.0:
                 raise ControllerError("is that of a body without mass; give its mass")
         return moments
+
+
+class ChangeTool(Change, type="tool"):
+    """A frame goes elsewhere in its link, as when a tool is taken up or put down.
+
+    All tasks and fields of the frame follow it: their errors obey their equations while
+    it moves, and the hand moves so that the new tip goes where the old one was to be.
+    What is fixed to the link, such as its capsules and its payload, stays.
+    """
+
+    frame: str
+    """Name of the frame, such as that of the hand."""
+    position: Vector3 = (0.0, 0.0, 0.0)
+    """Where it goes, in its axes as the model has it [m]: the tip of the tool."""
+    rotation: Rotation = (0.0, 0.0, 0.0)
+    """Its orientation there: roll, pitch and yaw [rad], a quaternion or a matrix."""
+
+    def placed(self, start: Start, setup: Setup) -> Self:
+        """Return the change, checked where the robot is."""
+        with within("frame"):
+            start.state.robot.frame_id(self.frame)
+            for each in setup.contacts:
+                if self.frame == each.contact.frame:
+                    raise ControllerError(
+                        f"{self.frame!r} is the frame of contact {each.contact.name!r},"
+                        " which does not move in its link; give the tool another frame"
+                    )
+        return self
+
+    def apply(self, setup: Setup) -> Setup:
+        """Return the setup with the tool; see `Change.apply`."""
+        there = {each.frame: each.placement for each in setup.tools}
+        old = there.get(self.frame, _AS_IN_THE_MODEL)
+        new = HoldPose(self.position, self.rotation)
+        placement = crossfade(old, new, start_time=self.at, duration=self.ramp)
+        assert isinstance(placement, PoseTrajectory)
+        others = (each for each in setup.tools if each.frame != self.frame)
+        return replace(setup, tools=(*others, PlannedTool(self.frame, placement)))
+
+
+_AS_IN_THE_MODEL = HoldPose((0.0, 0.0, 0.0), (0.0, 0.0, 0.0))
 
 
 class ChangeGravity(Change, type="gravity"):

@@ -27,7 +27,7 @@ from hsp_control.control.change import (
     MoveObstacle,
     RemoveTask,
 )
-from hsp_control.control.change_model import ChangeGravity, ChangePayload
+from hsp_control.control.change_model import ChangeGravity, ChangePayload, ChangeTool
 from hsp_control.control.setup import Setup
 from hsp_control.declaration import within
 from hsp_control.declaration.quantities import Gain
@@ -50,6 +50,7 @@ __all__ = [
     "ChangeNullSpaceGain",
     "ChangePayload",
     "ChangeReference",
+    "ChangeTool",
     "ChangeWeight",
     "Changes",
     "ExchangeField",
@@ -141,6 +142,16 @@ class Changes:
         at, ramp = self._at, self._ramp
         return self._do(ChangePayload(frame, mass, center, inertia, at=at, ramp=ramp))
 
+    def tool(
+        self,
+        frame: str,
+        position: ArrayLike = (0.0, 0.0, 0.0),
+        rotation: ArrayLike = (0.0, 0.0, 0.0),
+    ) -> Self:
+        """Let a frame be another tool's, or as in the model again; see `ChangeTool`."""
+        at, ramp = self._at, self._ramp
+        return self._do(ChangeTool(frame, position, rotation, at=at, ramp=ramp))
+
     def gravity(self, gravity: ArrayLike) -> Self:
         """Change gravity in the world [m/s²]; see `ChangeGravity`."""
         return self._do(ChangeGravity(gravity, at=self._at, ramp=self._ramp))
@@ -155,10 +166,11 @@ class TimeLine:
     """What counts at each time."""
 
     start: Start  # where the parts were placed
-    # all changes: those made while running placed, others as they were given
-    made: tuple[Change, ...]
+    declared: tuple[Change, ...]  # those of every run, as they were given
     settled: Setup  # setup with all changes that are over
     open: tuple[Change, ...]  # changes that are not, placed, in order of time
+    made: tuple[Change, ...] = ()  # those of `open` that were made during the run
+    count: int = 0  # how many were
 
     @classmethod
     def of(cls, setup: Setup, made: Sequence[Change]) -> "TimeLine":
@@ -171,6 +183,11 @@ class TimeLine:
                 later = placed[-1].apply(later)
         return cls(setup.start, tuple(made), setup, tuple(placed))
 
+    @property
+    def known(self) -> tuple[Change, ...]:
+        """Those of every run, and those made during this one that are not over."""
+        return tuple(sorted((*self.declared, *self.made), key=lambda each: each.at))
+
     @cached_property
     def setup(self) -> Setup:
         """The setup with all changes."""
@@ -181,15 +198,21 @@ class TimeLine:
         earlier = [each for each in self.open if each.at <= change.at]
         placed = change.placed(here or self.start, _applied(earlier, self.settled))
         opened = sorted((*self.open, placed), key=lambda each: each.at)
-        made = (*self.made, change if here is None else placed)
-        return replace(self, made=made, open=tuple(opened))
+        if here is None:
+            declared = (*self.declared, change)
+            return replace(self, declared=declared, open=tuple(opened))
+        made, count = (*self.made, placed), self.count + 1
+        return replace(self, made=made, count=count, open=tuple(opened))
 
     def settled_at(self, t: float) -> "TimeLine":
         """Return the time line for times from t [s] on, without what is over then."""
         done = list(takewhile(lambda each: each.end <= t, self.open))
         over = len(done) == len(self.open)
         settled = (self.setup if over else _applied(done, self.settled)).settled(t)
-        return replace(self, settled=settled, open=self.open[len(done) :])
+        gone = {id(each) for each in done}
+        made = tuple(each for each in self.made if id(each) not in gone)
+        opened = self.open[len(done) :]
+        return replace(self, settled=settled, open=opened, made=made)
 
 
 def _applied(changes: Iterable[Change], setup: Setup) -> Setup:

@@ -19,6 +19,7 @@ from hsp_control.control.bound_step import BoundStep
 from hsp_control.control.changes import Change, Changes, TimeLine
 from hsp_control.control.clock_check import ClockCheck
 from hsp_control.control.declared_rates import check_field, check_metric
+from hsp_control.control.first_state import warn_of_far_target
 from hsp_control.control.gains_in_force import GainsInForce, check_held
 from hsp_control.control.mixture import Mixture
 from hsp_control.control.model_in_force import ModelInForce
@@ -30,6 +31,7 @@ from hsp_control.control.setup import (
     Setup,
 )
 from hsp_control.control.targets import RAMP, followed_stream, new_stream, target_of
+from hsp_control.control.tools_in_force import ToolsInForce
 from hsp_control.declaration import within
 from hsp_control.geometry.scene import Obstacle, Scene, Start
 from hsp_control.null_space.fields import NullSpaceField
@@ -116,6 +118,7 @@ class Composition:
         self._state = RobotState(robot)
         self._gains = GainsInForce(robot.nv)
         self._model = ModelInForce(robot, [self._state.dynamics])
+        self._tools = ToolsInForce(self._state)
         self._run = PresentRun(self._declared.robot.nv)
         self._origin: Array = np.zeros(1)  # `PresentRun.origin`, for calls [s]
         self._clocked = self._state.bind_move(origin=self._origin)
@@ -144,22 +147,25 @@ class Composition:
         step = None
         if self._run.begun:
             self._bind_ahead()
-            step = self._mixture.bound_step(self._origin)
+            if self._settled_later is None:  # else each step looks whether it is time
+                step = self._mixture.bound_step(self._origin)
         self._go_on(step)
 
     def _plan(self, time_line: TimeLine) -> None:
-        """Let gains, limits and model follow a time line."""
+        """Let gains, limits, model and tools follow a time line."""
         setup, t = time_line.setup, self._latest
         self._time_line, self._setup = time_line, setup
         self._gains.plan(setup, t)
         self._limits.plan(setup.limits, t)
         self._model.plan(setup.payloads, setup.gravity, t)
+        self._tools.plan(setup.tools, t)
 
     def _write(self, t: float) -> None:
-        """Write the gains, the limits and the model of a time [s]."""
+        """Write the gains, the limits, the model and the tools of a time [s]."""
         self._gains.write(t)
         self._limits.write(t)
         self._model.write(t)
+        self._tools.write(t)
 
     def _bind_ahead(self) -> None:
         """Bind what steps call until all changes are over, and then.
@@ -167,7 +173,7 @@ class Composition:
         Not before the first state: it says which motions of a base contacts leave free.
         """
         time_line, mixture = self._time_line, self._mixture
-        if not mixture.steady:
+        if time_line.open or not mixture.steady:
             mixture.prepare(self._setup.instants(self._latest))
         if not time_line.open:
             return
@@ -203,9 +209,7 @@ class Composition:
 
     def _here(self) -> Start:
         """Return where the robot was at the last step."""
-        state = self._state
-        here = self._declared.robot.state(state.t, state.q, state.v)
-        return Start(here, self._setup.start.scene)
+        return Start(self._state.snapshot(), self._setup.start.scene)
 
     # -- changes while running --------------------------------------------------------
 
@@ -243,7 +247,10 @@ class Composition:
                 target is of another kind.
             StreamError: If the target is not valid.
         """
-        value = target_of(self._followed(task), target, lambda: self._here().state)
+        followed = self._followed(task)
+        value = target_of(followed, target, lambda: self._here().state)
+        if not np.abs(value).max() < self._declared.robot.size:  # else it is in reach
+            warn_of_far_target(self._here().state, followed, value)
         return self._sent(task, value=value)
 
     def set_velocity(
@@ -276,7 +283,7 @@ class Composition:
     def _sent(self, task: str, **message: Any) -> Streamed:
         """Send a message to a task's stream, which takes over if there is none yet."""
         present = self._followed(task)
-        stream = followed_stream(present, self._time_line.made)
+        stream = followed_stream(present)
         if stream is not None:
             stream.send(**message)
             return stream
@@ -304,7 +311,7 @@ class Composition:
             HspControlError: If its parts do not fit the robot.
         """
         with self._lock:
-            here, now = None, self._latest
+            here, now, given = None, self._latest, change
             self._run.clock.change(change.at, max(now, 0.0))
             if self._run.begun:
                 change = replace(change, at=max(change.at, now))
@@ -322,6 +329,8 @@ class Composition:
             except BaseException:  # it cannot be bound: nothing of it stays
                 self._follow(before)
                 raise
+            if self._run.begun:
+                self._run.made_at(now, given)
 
     def check_derivatives(self, state: RobotState) -> None:
         """Check what somebody has written of the field and the metric, at a state.
@@ -428,8 +437,18 @@ class Composition:
 
     @property
     def changes(self) -> tuple[Change, ...]:
-        """All changes that were made, in order of their times."""
-        return tuple(sorted(self._time_line.made, key=lambda each: each.at))
+        """The changes of every run, and those made during this one, by their times.
+
+        Those that were made before the first step, or when the controller was built,
+        come in every run. One that is made during a run is forgotten once it is over; a
+        log contains all.
+        """
+        return self._time_line.known
+
+    @property
+    def _changes_made(self) -> int:
+        """How many changes there have been: those of every run, and of this one."""
+        return len(self._time_line.declared) + self._time_line.count
 
     def feedback(self, task: str) -> Feedback:
         """Return a task's gains and offset in force; compensators write the offset.
@@ -545,15 +564,22 @@ class PresentRun:
     """What a controller knows of the present run."""
 
     # Not on the controller itself, whose own attributes cost 0.4 µs to set.
-    __slots__ = ("acceleration", "begun", "bound", "clock", "now", "origin")
+    __slots__ = ("acceleration", "begun", "bound", "clock", "now", "origin", "unseen")
 
     def __init__(self, nv: int) -> None:
         # reading of the clock at time 0 [s]; None: that of the first step
         self.origin: float | None = None
         self.acceleration = np.zeros(nv)  # what the last step delivered
         self.begun, self.now = False, -np.inf  # latest time of a step [s]
+        # changes as they were given that no step has seen, and the time of the last one
+        self.unseen: tuple[float, tuple[Change, ...]] = (-np.inf, ())
         self.bound: BoundStep | None = None  # the step, while nothing changes
         self.clock = ClockCheck()
+
+    def made_at(self, now: float, change: Change) -> None:
+        """Note a change that is made after a step at a time [s]."""
+        before = self.unseen[1] if self.unseen[0] == now else ()
+        self.unseen = now, (*before, change)
 
 
 _INSTEAD = {

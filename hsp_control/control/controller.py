@@ -18,7 +18,11 @@ from hsp_control.control.active_stack import ActiveStack
 from hsp_control.control.bound_step import BoundStep, FreeStep
 from hsp_control.control.changes import Change
 from hsp_control.control.composition import Composition, PresentRun
-from hsp_control.control.first_state import check_angles, warn_of_jump
+from hsp_control.control.first_state import (
+    check_angles,
+    warn_of_far_targets,
+    warn_of_jump,
+)
 from hsp_control.control.mixture import AccelerationModifier
 from hsp_control.control.model_in_force import ModelInForce
 from hsp_control.control.output import ControlOutput, Diagnostics
@@ -105,7 +109,8 @@ class Controller(Composition):
                 delivered = mixture.deliver(modifier)  # within the limits
                 stack, damped = self.active_stack, mixture.damped
                 stack.check(delivered.effort)
-                run.bound = run.bound or mixture.bound_step(self._origin)
+                if run.bound is None and self._settled_later is None:
+                    run.bound = mixture.bound_step(self._origin)
             run.acceleration = delivered.acceleration
             if out is None:
                 out = ControlOutput()
@@ -113,6 +118,8 @@ class Controller(Composition):
                 out.write(tau, memory, delivered, stack, damped)
             else:
                 out.overwrite(delivered, stack, damped)
+            if self._limits.measured:
+                out.keep_distances(self._limits.measured)
             return out
 
     def _observe(
@@ -152,8 +159,9 @@ class Controller(Composition):
         if self._declared.start is None:
             here = self._here()._replace(scene=self._declared.scene)
             sent = self._limits.sent.memory()
-            self._compose(here, self._time_line.made)
+            self._compose(here, self._time_line.declared)
             self._limits.remember(sent)
+        warn_of_far_targets(self._state, self.planned_tasks)
         self.check_derivatives(self._state)
         self._run.begun = True
         self._write(self._state.t)  # what is bound is called once, at this state
@@ -273,7 +281,8 @@ class Controller(Composition):
     def restart(self, *, origin: float | None = None) -> None:
         """Begin anew: forget the last effort, the offsets of tasks, and where it began.
 
-        Changes that were made stay on the time line.
+        Changes that were declared, or made before the run's first step, come again; so
+        does one that was made after its last step, which no step has seen.
 
         Args:
             origin: What the clock of `compute` reads at time 0, from which references,
@@ -287,13 +296,15 @@ class Controller(Composition):
         with self._lock:
             self._limits.forget()
             self._gains.forget()
+            line, (at, unseen) = self._time_line, self._run.unseen
+            changes = (*line.declared, *(unseen if at == self._latest else ()))
             self._run = PresentRun(self._declared.robot.nv)
             if origin is not None:
                 self._count_from(origin)
             self._mixture.active = None  # the next step places what is relative
-            made = self._time_line.made
-            if made or any(each.task.remembers for each in self._setup.tasks):
-                self._compose(self._time_line.start, made)
+            remembers = any(each.task.remembers for each in self._setup.tasks)
+            if changes or line.count or remembers:
+                self._compose(line.start, changes)
 
     def prepare(
         self,
@@ -354,7 +365,7 @@ class Controller(Composition):
         """Return a preview whose streams hear what a program sends, and no Python."""
         other = self.preview()
         other._declared = other._declared.without_python()
-        other._compose(other._time_line.start, other._time_line.made)
+        other._compose(other._time_line.start, other._time_line.declared)
         return other
 
     def step_alone(self, q: ArrayLike | None = None) -> BoundStep | None:
@@ -441,15 +452,21 @@ class Controller(Composition):
         """Return a copy of the same robot object."""
         return deepcopy(self, {id(self._declared.robot): self._declared.robot})
 
-    def preview(self) -> "Controller":
+    def preview(self, changes: Sequence[Change] | None = None) -> "Controller":
         """Return a copy at the beginning of a run: to look ahead, or at a log.
 
         It is of the same robot object, and counts times from 0. What its streams hear
         counts for it alone.
+
+        Args:
+            changes: All changes of the run, such as those of a log; None: those that
+                come in every run.
         """
         other = self._copy()
         other._declared = other._declared.preview()
         other.restart(origin=0.0)
+        if changes is not None:
+            other._compose(other._time_line.start, changes)
         return other
 
 

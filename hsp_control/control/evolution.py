@@ -1,7 +1,7 @@
 """Values, contacts and limits as functions of time."""
 
 from bisect import insort
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Generic, TypeVar
 
 import numpy as np
@@ -11,6 +11,7 @@ from hsp_control.constraints.contacts import Contact
 from hsp_control.constraints.limits import RobotLimits
 from hsp_control.null_space.fields.weight import Weight
 from hsp_control.robot import RobotState
+from hsp_control.trajectories.crossfade import settled
 from hsp_control.trajectories.schedule import smooth_step
 
 Value = TypeVar("Value", float, Array)
@@ -201,5 +202,14 @@ class PlannedLimits:
 
     def settled(self, t: float) -> "PlannedLimits":
         """Return the limits for times from t on: complete changes are folded."""
-        folded = [(each, share.settled(t)) for each, share in self.sets]
+        folded = [(_settled(each, t), share.settled(t)) for each, share in self.sets]
         return PlannedLimits(tuple(pair for pair in folded if pair[1] != ABSENT))
+
+
+def _settled(limits: RobotLimits | None, t: float) -> RobotLimits | None:
+    """Return limits whose obstacles move as they do from a time on [s]."""
+    if limits is None:
+        return None
+    barriers = settled(limits.barriers, t)
+    same = barriers is limits.barriers
+    return limits if same else replace(limits, barriers=barriers)

@@ -1,20 +1,25 @@
 """What is looked at where a run begins, and not in its steps."""
 
 import warnings
+from collections.abc import Iterable
 
 import numpy as np
 
 from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import ConfigurationError
-from hsp_control.constraints.limits import RobotLimits
+from hsp_control.constraints.limits import RobotLimits, in_degrees
 from hsp_control.declaration.language import spoken
+from hsp_control.declaration.nested import parts_within
 from hsp_control.engine import Dynamics
-from hsp_control.robot import Robot
+from hsp_control.robot import Robot, RobotState
+from hsp_control.tasks import FramePose, FramePosition, Task
+from hsp_control.tasks.frame_position import axis_indices
+from hsp_control.trajectories import Blend
 
-FAR = 2.0
-"""An angle this many times its joint's range from the middle is no angle in rad."""
-NEAR = 1.0
-"""Nearer than this it is not degrees, however small the range [rad]."""
+REACHES = 2.0
+"""A target this many times the robot's reach away from its frame is a mistake."""
+MILLIMETRES = 100.0
+"""From this many times on it is in mm."""
 JUMP = 0.1
 """Of a joint's effort limit: by more than this the first effort should not jump."""
 
@@ -29,18 +34,61 @@ class StartWarning(UserWarning):
 
 def check_angles(robot: Robot, q: Array) -> None:
     """Check that no angle is so far beyond its joint's range that it is in degrees."""
-    # Joints without limits, continuous ones and sliding ones are not looked at.
     lower, upper = robot.position_limits()
     angles = robot.joint_positions(q)
     for name, unit, low, high, angle in zip(
         robot.dof_names, robot.units, lower, upper, angles, strict=True
     ):
-        away = abs(angle - 0.5 * (low + high)) if np.isfinite(high - low) else 0.0
-        if unit == "rad" and away > max(FAR * (high - low), NEAR):
+        if in_degrees(unit, low, high, angle):
             raise ConfigurationError(
                 f"joint {name!r} is at {angle:.6g} rad, but its range is from {low:g} "
                 f"to {high:g} rad: degrees? Angles are in rad"
             )
+
+
+def warn_of_far_targets(state: RobotState, tasks: Iterable[Task]) -> None:
+    """Warn of targets that are so far away that the robot cannot be meant to go there.
+
+    Looked at where a run begins: positions and poses of frames, at the end of the blend
+    that leads to them, of a robot on a fixed base. A target that is set while it runs
+    is looked at then; see `warn_of_far_target`.
+    """
+    for task in tasks:
+        if isinstance(task, FramePose | FramePosition) and not task.remembers:
+            blends = parts_within([task.followed], Blend)
+            t = max([state.t, *(each.start_time + each.duration for each in blends)])
+            if isinstance(task, FramePose):
+                target = task.followed.sample(t).position.position
+            else:
+                target = task.trajectory.sample(t).position
+            warn_of_far_target(state, task, target, of=6)  # who calls `compute`
+
+
+def warn_of_far_target(
+    state: RobotState, task: Task, target: Array, *, of: int = 3
+) -> None:
+    """Warn if a target, shape (3,) or of the tracked axes [m], is far out of reach.
+
+    The warning names the line of a caller, ``of`` calls away.
+    """
+    robot = state.robot
+    if robot.unactuated or not isinstance(task, FramePose | FramePosition):
+        return
+    rows = np.arange(3)
+    if isinstance(task, FramePosition):
+        rows = axis_indices(task.axes)
+    here, reach = state.position(task.frame_name)[rows], robot.size
+    away = float(np.linalg.norm(target[: len(rows)] - here))
+    if not reach or away <= REACHES * reach:
+        return
+    in_mm = away > MILLIMETRES * reach
+    why = "millimetres? Lengths are in m" if in_mm else "it goes as near as it can"
+    warnings.warn(
+        f"the target of task {task.name!r} is {away:.4g} m away from "
+        f"{task.frame_name!r}, but the robot reaches {reach:.2g} m: {why}",
+        StartWarning,
+        stacklevel=of,
+    )
 
 
 def warn_of_jump(

@@ -189,9 +189,9 @@ class Mixture:
         if not self.steady:
             return None
         ((_, stack),) = self._sets(0.0)  # at any time
-        (limits,) = (
-            each for each in self._limits.all if each.limits is self._setup.limits.last
-        )
+        last = self._setup.limits.last
+        # Several sets may be None, one after another.
+        limits = next(each for each in self._limits.all if each.limits is last)
         actuation = self.actuation(stack, limits)
         return BoundStep(self._state, stack, actuation, self._limits, origin)
 

@@ -1,5 +1,6 @@
 """What a controller returns: an effort, and everything that explains it."""
 
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -35,6 +36,7 @@ class ControlOutput:
 
     __slots__ = (
         "_acceleration",
+        "_distances",
         "_layout",
         "_memory",
         "_views",
@@ -52,6 +54,7 @@ class ControlOutput:
     relaxation: float
     # Bytes are made faster than arrays, and most are never looked at.
     _acceleration: bytes | None  # None: the law's own
+    _distances: Sequence[tuple[str, bytes]]  # of each barrier, of all its pairs
     _layout: Layout  # of the memory
     _memory: Array | bytes  # see `ActiveStack.memory`
     _views: Record | None  # of the memory, once they were asked for
@@ -73,7 +76,7 @@ class ControlOutput:
         _, a, forces, self.status, self.relaxation = delivered
         self.tau, self._memory, self._views = tau, memory, None
         self._acceleration = None if a is stack.acceleration else a.tobytes()
-        self._layout, self.damped = stack.layout, damped
+        self._layout, self.damped, self._distances = stack.layout, damped, ()
         self.forces = forces.copy() if stack.has_forces else forces
 
     def overwrite(self, delivered: Delivered, stack: ActiveStack, damped: str) -> None:
@@ -90,6 +93,19 @@ class ControlOutput:
             own[:], views = memory, self._views
         self.write(self.tau, own, delivered, stack, damped)
         self._views = views
+
+    def keep_distances(self, measured: Sequence[tuple[str, Array]]) -> None:
+        """Keep what the step measured, by the names of the barriers."""
+        self._distances = [(name, found.tobytes()) for name, found in measured]
+
+    @property
+    def distances(self) -> dict[str, float]:
+        """The smallest distance that each barrier measured [m], by its name.
+
+        The names are those of the types, such as ``obstacle_distance``; of one type
+        they are numbered. The distance of shapes that overlap is negative.
+        """
+        return {n: float(np.frombuffer(d).min()) for n, d in self._distances}
 
     @property
     def acceleration(self) -> Array:
@@ -156,6 +172,8 @@ class ControlOutput:
         notes = [
             f"|{name}| = {np.linalg.norm(each):.3g}" for name, each in sizes.items()
         ]
+        for name, distance in self.distances.items():
+            notes.append(f"{name} = {distance:.3g} m")
         if self.damped:
             notes.append(f"damped: {self.damped}")
         tau = np.round(self.tau, 3).tolist()

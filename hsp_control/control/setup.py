@@ -31,6 +31,7 @@ from hsp_control.control.evolution import (
     PlannedLimits,
 )
 from hsp_control.control.model_in_force import PlannedPayload
+from hsp_control.control.tools_in_force import PlannedTool
 from hsp_control.declaration import Part, within
 from hsp_control.declaration.language import check_kind, shortened
 from hsp_control.declaration.nested import parts_within, with_parts_replaced
@@ -46,6 +47,7 @@ from hsp_control.robot.state import as_given
 from hsp_control.tasks import Task
 from hsp_control.tasks.compliant_task import impedance_of
 from hsp_control.tasks.gains import as_gain, as_matrix
+from hsp_control.trajectories.crossfade import settled
 from hsp_control.trajectories.schedule import Schedule
 from hsp_control.trajectories.streams.stream import Streamed
 
@@ -239,6 +241,7 @@ class Setup:
     count: int  # how many tasks there have ever been; the next one has this key
     gravity: Evolution[Array]  # in the world, shape (3,) [m/s²]
     payloads: tuple[PlannedPayload, ...] = ()
+    tools: tuple[PlannedTool, ...] = ()
 
     @property
     def field(self) -> NullSpaceField:
@@ -316,21 +319,35 @@ class Setup:
         """Return the setup for times from t on: complete changes are folded."""
         tasks = [
             _changed(
-                each, presence=each.presence.settled(t), gains=each.gains.settled(t)
+                each,
+                task=settled(each.task, t),
+                presence=each.presence.settled(t),
+                gains=each.gains.settled(t),
             )
             for each in self.tasks
         ]
         terms = [
-            _changed(each, presence=each.presence.settled(t)) for each in self.terms
+            _changed(
+                each, field=settled(each.field, t), presence=each.presence.settled(t)
+            )
+            for each in self.terms
         ]
         contacts = [
-            _changed(each, presence=each.presence.settled(t)) for each in self.contacts
+            _changed(
+                each,
+                contact=settled(each.contact, t),
+                presence=each.presence.settled(t),
+            )
+            for each in self.contacts
+        ]
+        tools = [
+            _changed(each, placement=settled(each.placement, t)) for each in self.tools
         ]
         payloads = [
             _changed(each, share=each.share.settled(t)) for each in self.payloads
         ]
         return Setup(
-            self.start,
+            self.start._replace(scene=settled(self.start.scene, t)),
             self.metric,
             tuple(each for each in tasks if each.presence != ABSENT),
             tuple(each for each in terms if each.presence != ABSENT),
@@ -340,6 +357,7 @@ class Setup:
             self.count,
             self.gravity.settled(t),
             tuple(each for each in payloads if each.share != ABSENT),
+            tuple(tools),
         )
 
 
@@ -353,7 +371,9 @@ def _events(presence: Evolution[float], schedule: Schedule | None) -> set[float]
     return changes | begins | {t for _, end in windows for t in (end - ramp, end)}
 
 
-Planned = TypeVar("Planned", PlannedTask, PlannedTerm, PlannedContact, PlannedPayload)
+Planned = TypeVar(
+    "Planned", PlannedTask, PlannedTerm, PlannedContact, PlannedPayload, PlannedTool
+)
 
 
 def _found(kind: str, name: str, there: Mapping[str, Planned]) -> Planned:

@@ -1,6 +1,6 @@
 """Targets that one sets: a stream takes over from what a task follows."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -8,7 +8,6 @@ import pinocchio as pin
 
 from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import ControllerError
-from hsp_control.control.change import AddTask, Change, ChangeReference
 from hsp_control.declaration.language import shortened
 from hsp_control.declaration.quantities import numbers
 from hsp_control.declaration.rotation import matrix_of
@@ -22,6 +21,7 @@ from hsp_control.trajectories import (
     StreamOrientation,
     StreamPose,
 )
+from hsp_control.trajectories.crossfade import settled
 from hsp_control.trajectories.hold import HoldOrientation
 from hsp_control.trajectories.pose import HoldPose
 from hsp_control.trajectories.streams.stream import Streamed
@@ -53,14 +53,9 @@ def new_stream(followed: object) -> Streamed:
     return Stream(**MOVING, **how)
 
 
-def followed_stream(task: Task, changes: Sequence[Change]) -> Streamed | None:
+def followed_stream(task: Task) -> Streamed | None:
     """Return the stream that a task follows after all changes, if `send` feeds it."""
-    followed: object = task.followed
-    for change in sorted(changes, key=lambda each: each.at):
-        if isinstance(change, ChangeReference) and change.task == task.name:
-            followed = change.trajectory
-        elif isinstance(change, AddTask) and change.task.name == task.name:
-            followed = task.followed
+    followed: object = settled(task.followed, np.inf)
     if not isinstance(followed, Streamed) or followed.source or followed.messages:
         return None
     return followed

@@ -1,10 +1,14 @@
-"""Python functions that YAML names: those of a file that `import_file` has run."""
+"""Python code of a user's own, whose functions and types YAML can name."""
 
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
+from hashlib import sha256
+from importlib import import_module
+from importlib.machinery import PathFinder
 from importlib.util import module_from_spec, spec_from_file_location
 from inspect import isfunction
 from pathlib import Path
+from types import ModuleType
 from typing import Any
 
 from pydantic import BeforeValidator, WithJsonSchema
@@ -42,6 +46,68 @@ def import_file(path: Path | str) -> None:
     except Exception as error:
         del sys.modules[path.stem]
         raise ConfigError(f"{path}: {type(error).__name__}: {error}") from error
+    _take_functions(module)
+
+
+def import_code(name: str) -> None:
+    """Run a Python file, or import an installed module, unless it is known already.
+
+    Args:
+        name: The path of a ``.py`` file, or a module such as ``my_package.parts``.
+
+    Raises:
+        ConfigError: If there is no such code, or it raises an error.
+    """
+    if not is_file_name(name):
+        try:
+            _take_functions(import_module(name))
+        except Exception as error:
+            hint = f" (for a file, write {name}.py)" if isinstance(
+                error, ModuleNotFoundError
+            ) else ""  # fmt: skip
+            raise ConfigError(
+                f"the module {name!r} cannot be imported: "
+                f"{type(error).__name__}: {error}{hint}"
+            ) from error
+        return
+    path = Path(name)
+    for known in (sys.modules.get(path.stem), sys.modules.get("__main__")):
+        file = getattr(known, "__file__", None)
+        if known is not None and file and path.exists() and path.samefile(file):
+            _take_functions(known)
+            return
+    import_file(path)
+
+
+def is_file_name(name: str) -> bool:
+    """Return whether code is named by its file, and not as a module."""
+    return name.endswith(".py") or "/" in name
+
+
+def fingerprints(names: Iterable[str]) -> dict[str, str]:
+    """Return the SHA-256 of the file of each named code; nothing is run."""
+    found = {name: _file_of(name) for name in names}
+    return {
+        name: sha256(file.read_bytes()).hexdigest()
+        for name, file in found.items()
+        if file is not None and file.is_file()
+    }
+
+
+def _file_of(name: str) -> Path | None:
+    """Return the file of code; the packages around a module are not imported."""
+    if is_file_name(name):
+        return Path(name)
+    where, origin, parts = None, None, name.split(".")
+    for k in range(len(parts)):
+        spec = PathFinder.find_spec(".".join(parts[: k + 1]), where)
+        if spec is None:
+            return None
+        where, origin = spec.submodule_search_locations, spec.origin
+    return None if origin is None else Path(origin)
+
+
+def _take_functions(module: ModuleType) -> None:
     found = vars(module).items()
     _functions.update((name, each) for name, each in found if isfunction(each))
 

@@ -85,4 +85,6 @@ class CentroidalMotion:
     def supplied(self) -> tuple[PointMotion, PartCalls]:
         """Return the centre's motion as an argument of a call; see `planned`."""
         J, J_dot = self.jacobian, self.jacobian_dot
-        return PointMotion(J, J_dot, self.position, self.velocity), self.calls
+        # Its own motion, while a payload comes or goes, is none that the law follows.
+        motion = PointMotion(J, J_dot, self.position, self.velocity, np.zeros(3))
+        return motion, self.calls

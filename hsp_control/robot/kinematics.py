@@ -23,13 +23,16 @@ class FrameMotion(NamedTuple):
     jacobian_dot: Array  # J' = dJ/dt along v, exact, shape (6, nv)
     rotation: Array  # rotation matrix from the frame's axes, shape (3, 3)
     position: Array  # the frame's origin [m], shape (3,)
-    velocity: Array  # J v, shape (6,) [m/s, rad/s]
+    velocity: Array  # of the origin, and angular, shape (6,) [m/s, rad/s]
+    # velocity - J v, and its rate: zero but for a frame that moves in its joint, (6,)
+    own_velocity: Array
+    own_acceleration: Array
 
     @classmethod
     def allocate(cls, nv: int) -> "FrameMotion":
         """Return zeros."""
         matrices = np.zeros((6, nv)), np.zeros((6, nv)), np.zeros((3, 3))
-        return cls(*matrices, np.zeros(3), np.zeros(6))
+        return cls(*matrices, np.zeros(3), *np.zeros((3, 6)))
 
 
 class WorldKinematics(NamedTuple):
@@ -62,7 +65,25 @@ class PointMotion(NamedTuple):
     jacobian: Array  # shape (3, nv)
     jacobian_dot: Array  # shape (3, nv)
     position: Array  # shape (3,) [m]
-    velocity: Array  # J v, shape (3,) [m/s]
+    velocity: Array  # shape (3,) [m/s]
+    own_acceleration: Array  # shape (3,) [m/s²]; see `FrameMotion`
+
+
+class LocalMotion(NamedTuple):
+    """A frame's motion in the joint that carries it, in the axes of the joint."""
+
+    R_local: Array  # rotation of the frame in the joint, shape (3, 3)
+    p_local: Array  # origin of the frame in the joint [m], shape (3,)
+    p_local_dot: Array  # its velocity [m/s]
+    p_local_ddot: Array  # its acceleration [m/s²]
+    w_local: Array  # angular velocity [rad/s]
+    w_local_dot: Array  # angular acceleration [rad/s²]
+
+    @classmethod
+    def fixed(cls, placement: pin.SE3) -> "LocalMotion":
+        """Return that of a frame that does not move in its joint."""
+        R = np.ascontiguousarray(placement.rotation)
+        return cls(R, placement.translation.copy(), *np.zeros((4, 3)))
 
 
 class _ParentJoint(NamedTuple):
@@ -72,8 +93,12 @@ class _ParentJoint(NamedTuple):
     J_world_dot: Array  # its rate
     R_joint: Array  # rotation of the joint, shape (3, 3)
     p_joint: Array  # origin of the joint [m], shape (3,)
-    R_local: Array  # rotation of the frame in the joint, shape (3, 3)
-    p_local: Array  # origin of the frame in the joint [m], shape (3,)
+    R_local: Array  # those of a `LocalMotion`
+    p_local: Array
+    p_local_dot: Array
+    p_local_ddot: Array
+    w_local: Array
+    w_local_dot: Array
     columns: Indices  # the columns of J_world that move the joint
     dofs: Indices  # the indices in v of these columns
 
@@ -85,48 +110,64 @@ class FrameKinematics:
 
     Attributes:
         calls: Bring the attributes below up to date, if they are not.
-        motion: The first five of them, as a record.
+        motion: All but the drift, as a record.
         rotation: Rotation matrix from frame axes to world axes, shape (3, 3).
         position: The frame's origin in the world [m], shape (3,).
         jacobian: J, where J v = (velocity of the origin, angular velocity), shape
             (6, nv).
         jacobian_dot: J' = dJ/dt along v, exact, shape (6, nv).
-        velocity: J v, shape (6,) [m/s, rad/s].
-        drift: J' v, shape (6,) [m/s², rad/s²]: the classical acceleration for v' = 0.
+        velocity: J v, shape (6,) [m/s, rad/s]; while a change moves the frame in its
+            joint plus ``own_velocity``.
+        own_velocity: What that motion adds to J v, shape (6,).
+        own_acceleration: What it adds to J v' + J' v, shape (6,) [m/s², rad/s²].
+        drift: The classical acceleration for v' = 0, shape (6,) [m/s², rad/s²]: J' v.
     """
 
     __slots__ = (
+        "_computed",
         "calls",
         "drift",
         "jacobian",
         "jacobian_dot",
         "motion",
+        "own_acceleration",
+        "own_velocity",
         "position",
         "rotation",
         "velocity",
     )
+    jacobian: Array
+    jacobian_dot: Array
+    rotation: Array
+    position: Array
+    velocity: Array
+    own_velocity: Array
+    own_acceleration: Array
 
     def __init__(
-        self, model: pin.Model, world: WorldKinematics, stamp: Indices, index: int
+        self,
+        model: pin.Model,
+        world: WorldKinematics,
+        stamp: Indices,
+        joint: int,
+        local: LocalMotion,
     ) -> None:
-        frame = model.frames[index]
         self.motion = motion = FrameMotion.allocate(model.nv)
-        self.jacobian, self.jacobian_dot = motion.jacobian, motion.jacobian_dot
-        self.rotation, self.position = motion.rotation, motion.position
-        self.velocity = motion.velocity
+        for name, array in zip(FrameMotion._fields, motion, strict=True):
+            setattr(self, name, array)
         self.drift: Array = np.zeros(6)
+        self._computed = np.array([-1])
         carrier = _ParentJoint(
             world.jacobian,
             world.jacobian_dot,
-            *world.joint(frame.parentJoint),
-            np.ascontiguousarray(frame.placement.rotation),
-            frame.placement.translation.copy(),
-            *joint_support(model, frame.parentJoint),
+            *world.joint(joint),
+            *local,
+            *joint_support(model, joint),
         )
         call = PartCall(
             engine.FrameKinematics,
             stamp=stamp,
-            computed=np.array([-1]),
+            computed=self._computed,
             carrier=carrier,
             v=world.v,
             motion=motion,
@@ -141,6 +182,10 @@ class FrameKinematics:
                 "that was there; copy it, and change the copy"
             )
         super().__setattr__(name, value)
+
+    def forget(self) -> None:
+        """Compute it anew, also for the present state."""
+        self._computed[0] = -1
 
     def supplied(self) -> tuple[FrameMotion, PartCalls]:
         """Return the motion as an argument of a call; see `planned`."""
@@ -160,8 +205,10 @@ class FramePoint:
 
     def supplied(self) -> tuple[PointMotion, PartCalls]:
         """Return the origin's motion as an argument of a call; see `planned`."""
-        (J, J_dot, _, p, velocity), calls = self._frame.supplied()
-        return PointMotion(J[:3], J_dot[:3], p, velocity[:3]), calls
+        motion, calls = self._frame.supplied()
+        J, J_dot = motion.jacobian[:3], motion.jacobian_dot[:3]
+        velocity, acceleration = motion.velocity[:3], motion.own_acceleration[:3]
+        return PointMotion(J, J_dot, motion.position, velocity, acceleration), calls
 
 
 class ShownFrame(FrameKinematics):

@@ -7,6 +7,7 @@ geometry, and the viewer.
 """
 
 from collections.abc import Callable, Sequence
+from copy import deepcopy
 from typing import TYPE_CHECKING, Annotated, Any, Literal, Self, TypeVar
 
 import numpy as np
@@ -31,6 +32,7 @@ from hsp_control.engine.plans import (
 from hsp_control.robot.inertia import CentroidalMotion, inertia_terms
 from hsp_control.robot.kinematics import (
     FrameKinematics,
+    LocalMotion,
     ShownFrame,
     Term,
     WorldKinematics,
@@ -66,13 +68,20 @@ class RobotState:
         effort: What `inverse_dynamics` wrote last, shape (nv,) [N·m or N].
     """
 
-    def __init__(self, robot: "Robot", dynamics: Dynamics | None = None) -> None:
+    def __init__(
+        self,
+        robot: "Robot",
+        dynamics: Dynamics | None = None,
+        local: dict[str, LocalMotion] | None = None,
+    ) -> None:
         """Allocate the memory; call `update` before using any term.
 
         Args:
             robot: The robot.
             dynamics: Those of another state, which may carry something; None: the
                 robot's own.
+            local: Frames of another state that changes have moved in their joints;
+                None: all are where the model has them.
         """
         self.robot = robot
         self.time: Array = np.zeros(1)
@@ -92,6 +101,7 @@ class RobotState:
         self._seen: RobotState | None = None
         self._read_only: RobotState | None = None
         self.dynamics: Dynamics = dynamics or robot.dynamics()
+        self._local: dict[str, LocalMotion] = {} if local is None else local
         self._shown_data: tuple[pin.Data, int] | None = None
         self._at: dict[str, Any] = {"dynamics": self.dynamics, "q": self.q, "v": self.v}
         self.world = WorldKinematics.allocate(robot.model, self.v)
@@ -220,12 +230,35 @@ class RobotState:
         """
         found = self._frames.get(name)
         if found is None:
-            index, model = self.robot.frame_id(name), self.robot.model
-            frame = FrameKinematics(model, self.world, self.stamp_array, index)
+            joint, local = self._joint_of(name), self._local_of(name)
+            around = self.world, self.stamp_array
+            frame = FrameKinematics(self.robot.model, *around, joint, local)
             self._frames[name] = found = frame, self._bound(*frame.calls)
         frame, compute = found
         compute()
         return frame
+
+    def _joint_of(self, frame: str) -> int:
+        model = self.robot.model
+        return int(model.frames[self.robot.frame_id(frame)].parentJoint)
+
+    def _local_of(self, frame: str) -> LocalMotion:
+        found = self._local.get(frame)
+        if found is None:
+            placement = self.robot.model.frames[self.robot.frame_id(frame)].placement
+            self._local[frame] = found = LocalMotion.fixed(placement)
+        return found
+
+    def move_frame(self, frame: str, motion: LocalMotion) -> None:
+        """Let a frame be elsewhere in its joint than in the model, or move there.
+
+        Raises:
+            FrameNotFoundError: If the robot has no such frame.
+        """
+        for own, given in zip(self._local_of(frame), motion, strict=True):
+            own[:] = given
+        if frame in self._frames:
+            self._frames[frame][0].forget()
 
     def position(self, frame: str) -> Array:
         """Return the origin of a frame in the world [m], shape (3,)."""
@@ -319,10 +352,16 @@ class RobotState:
         return memory, lambda: calls.run(self.t)
 
     def __getstate__(self) -> dict[str, Any]:
-        return {"robot": self.robot, "t": self.t, "q": self.q, "v": self.v}
+        return {
+            "robot": self.robot,
+            "local": self._local,
+            "t": self.t,
+            "q": self.q,
+            "v": self.v,
+        }
 
     def __setstate__(self, state: dict[str, Any]) -> None:
-        self.__init__(state["robot"])  # type: ignore[misc]
+        self.__init__(state["robot"], None, state["local"])  # type: ignore[misc]
         self.update(state["t"], state["q"], state["v"])
 
     def displaced(self, dt: float, displacement: Array) -> "RobotState":
@@ -342,8 +381,17 @@ class RobotState:
     def companion(self) -> "RobotState":
         """The state that `displaced` moves: this robot at other places."""
         if self._displaced is None:
-            self._displaced = RobotState(self.robot, self.dynamics)
+            self._displaced = self.another()
         return self._displaced
+
+    def another(self) -> "RobotState":
+        """Return a state of the same robot, with what it carries and its tools."""
+        return RobotState(self.robot, self.dynamics, self._local)
+
+    def snapshot(self) -> "RobotState":
+        """Return a state that stays as this one is now; it carries no payload."""
+        other = RobotState(self.robot, None, deepcopy(self._local))
+        return other.update(self.t, self.q, self.v)
 
     def ahead(self, dt: float) -> "RobotState":
         """Return the companion state at (t + dt, q ⊕ v dt), see `displaced`; dt [s]."""
@@ -374,7 +422,8 @@ class SeenState(RobotState):
         return self
 
     def __reduce__(self) -> tuple[Any, ...]:
-        return _copy, (self.robot, self.t, np.array(self.q), np.array(self.v))
+        at = self.t, np.array(self.q), np.array(self.v)
+        return _copy, (self.robot, self._own._local, *at)
 
 
 def as_given(part: object, state: RobotState) -> RobotState:
@@ -445,9 +494,11 @@ def _fits(data: pin.Data, world: WorldKinematics) -> bool:
     return sizes == (world.jacobian.size,) * 2 + (len(world.placements),)
 
 
-def _copy(robot: "Robot", t: float, q: Array, v: Array) -> RobotState:
+def _copy(
+    robot: "Robot", local: dict[str, LocalMotion], t: float, q: Array, v: Array
+) -> RobotState:
     """Return a state of its own: what a copy, or a pickle, is."""
-    return RobotState(robot).update(t, q, v)
+    return RobotState(robot, None, deepcopy(local)).update(t, q, v)
 
 
 Posture = Annotated[Literal["start", "home"] | Vector, "posture"]

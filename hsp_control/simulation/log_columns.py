@@ -1,12 +1,18 @@
 """The columns of a log: what is written of tasks, fields and contacts in each row."""
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
 import numpy as np
 
 from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import SimulationError
+from hsp_control.constraints.limits import (
+    Barrier,
+    MinimumDistance,
+    RobotLimits,
+    barrier_names,
+)
 from hsp_control.control.active_stack import ActiveStack
 from hsp_control.control.controller import Controller
 from hsp_control.control.measurement import LogChannel
@@ -126,6 +132,8 @@ class TaskColumns:
         self._controller, self._columns = controller, columns
         # all tasks that there have been, by their names in the log
         self.logged: dict[str, Task] = {}
+        # the streams that each had when it came; those of changes are the changes'
+        self.streamed: dict[str, list[Streamed]] = {}
         self._levels: dict[str, int] = {}
         self._streams: dict[str, list[tuple[str, Streamed]]] = {}
         self._names: dict[int, str] = {}  # in the log, of the tasks there are, by key
@@ -149,6 +157,7 @@ class TaskColumns:
                 name = self._names.get(each.key) or self._log_name(task)
                 self._names[each.key] = name
                 self.logged[name], self._levels[name] = task, level
+                self.streamed.setdefault(name, [*parts_within(task, Streamed)])
                 self._add(name, task, len(task.measure(probe.read_only)[0]))
 
     def _log_name(self, task: Task) -> str:
@@ -289,6 +298,44 @@ def logged_terms(controller: Controller) -> dict[str, NullSpaceField]:
     return {
         name if names.count(name) == 1 else f"{name}_{k}": term
         for k, (name, term) in enumerate(zip(names, terms, strict=True))
+    }
+
+
+class BarrierColumns:
+    """The columns of the barriers that limits keep; those that go keep theirs."""
+
+    def __init__(self, controller: Controller, columns: LogColumns) -> None:
+        self._controller, self._columns = controller, columns
+        self._limits: RobotLimits | None = None
+        self._barriers: dict[str, Barrier] = {}
+        self.update()
+
+    def update(self) -> None:
+        """Add columns for the barriers that there are, if they are others."""
+        limits = self._controller.limits
+        if limits is self._limits:
+            return
+        self._limits = limits
+        self._barriers = logged_barriers(() if limits is None else limits.barriers)
+        for name, each in self._barriers.items():
+            least = {"minimum": each.minimum}
+            if isinstance(each, MinimumDistance):
+                self._columns.add(name, (), "m", "minimum distance", **least)
+            else:
+                self._columns.add(name, (), "-", "smallest value", **least)
+
+    def write(self, state: RobotState) -> None:
+        """Write the smallest value of each."""
+        row = self._columns.row
+        for name, each in self._barriers.items():
+            row[name][...] = np.min(each.values(state.read_only))
+
+
+def logged_barriers(barriers: Sequence[Barrier]) -> dict[str, Barrier]:
+    """Return barriers by their columns, such as ``distance.self_distance``."""
+    return {
+        f"{'distance' if isinstance(each, MinimumDistance) else 'barrier'}.{name}": each
+        for name, each in zip(barrier_names(barriers), barriers, strict=True)
     }
 
 

@@ -14,10 +14,12 @@ from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import ConfigError
 from hsp_control.common.version import __version__
 from hsp_control.control.active_stack import ActiveStack
+from hsp_control.control.change import Change
 from hsp_control.control.controller import Controller
 from hsp_control.control.measurement import LogChannel
 from hsp_control.control.output import ControlOutput
 from hsp_control.control.plan import RunningPlan
+from hsp_control.declaration.imported import fingerprints
 from hsp_control.declaration.nested import parts_within, with_parts_replaced
 from hsp_control.declaration.plain_data import plain_data
 from hsp_control.geometry.scene import Obstacle, Scene
@@ -30,6 +32,7 @@ from hsp_control.robot.recorded import robot_record
 from hsp_control.simulation.journal import JournalWriter
 from hsp_control.simulation.limit_excess import VELOCITY, LimitExcess
 from hsp_control.simulation.log_columns import (
+    BarrierColumns,
     ContactColumns,
     LogColumns,
     TaskColumns,
@@ -79,7 +82,7 @@ class LogWriter:
         self._controller, self._scene = controller, scene
         self._columns = columns = LogColumns(rows)
         self._settled: object = None
-        self._changes = -1  # how many there were when streams were looked for
+        self._made: dict[int, Change] = {}  # all changes of the run, by identity
         self._law: Record | None = None  # of the present row
         self._active: ActiveStack | None = None  # what `_sources` are of
         self._sources: list[tuple[str, Array]] = []  # what the law writes for columns
@@ -115,12 +118,13 @@ class LogWriter:
         self._frames, self._parents = _skeleton(robot, controller)
         column("skeleton", (len(self._parents), 3), "m", "joints and task frames")
         self._terms = TermColumns(controller, columns)
+        self._barriers = BarrierColumns(controller, columns)
         for obstacle in scene.values():
             prefix = f"obstacle.{obstacle.name}"
             column(prefix, (3,), "m", "position of its frame")
             column(f"{prefix}.quaternion", (4,), "-", "orientation (x, y, z, w)")
         columns.lay_out()
-        self._keep_messages()
+        self._let_streams_record()
         self._meta = dict(meta or {})
         self._robot_record = robot_record(robot)
         self._meshes = _meshes_of(scene)
@@ -155,6 +159,8 @@ class LogWriter:
             self._settled = settled
             self._tasks.update()
             self._terms.update()
+            if settled is not None:  # while one fades into another, both keep
+                self._barriers.update()
             self._keep_messages()
             columns.lay_out()
             self._active = None
@@ -216,6 +222,7 @@ class LogWriter:
         row["relaxation"][...] = output.relaxation
         self._contacts.write(state.t, output)
         self._terms.write(state)
+        self._barriers.write(state)
 
     def _find_sources(
         self, active: ActiveStack, law: Record
@@ -308,52 +315,60 @@ class LogWriter:
             "obstacles": {o.name: _obstacle_meta(o) for o in self._scene.values()},
             **({"obstacle_meshes": self._meshes} if self._meshes else {}),
             "versions": versions(),
-            **self._meta,
-            **meta,
+            **(given := {**self._meta, **meta}),
+            # Whoever reads the log runs this code only if it is the same.
+            "imported": fingerprints((given.get("config") or {}).get("imports") or ()),
         }
 
     def _keep_messages(self) -> None:
-        """Let streams that came record all that they take: a log repeats it."""
-        changes = self._controller.changes
-        if self._changes == len(changes):
+        """Keep changes, which a controller forgets; let streams record all they take.
+
+        A log repeats both.
+        """
+        there = {id(each): each for each in self._controller.changes}
+        if self._made and there.keys() <= self._made.keys():
             return
-        self._changes = len(changes)
+        self._made |= there
+        self._let_streams_record()
+
+    def _let_streams_record(self) -> None:
+        controller = self._controller
         planned = [] if self.plan is None else [self.plan.plan]
-        parts = [*self._controller.planned_tasks, *changes, *planned]
+        parts = [*controller.planned_tasks, *controller.changes, *planned]
         for stream in parts_within(parts, Streamed):
             stream.log()
+
+    def _changes(self) -> dict[str, Any]:
+        """Return the changes that were made, their streams as they were recorded."""
+        self._keep_messages()
+        missing = self._controller._changes_made - len(self._made)
+        if missing > 0:
+            lost = f"{missing} were over before the next row was written"
+            return {"changes": None, "changes_lost": lost}
+        try:
+            changes = [
+                plain_data(with_parts_replaced(change, Streamed, _as_recorded))
+                for change in sorted(self._made.values(), key=lambda each: each.at)
+            ]
+        except ConfigError as error:
+            return {"changes": None, "changes_lost": str(error)}
+        return {"changes": changes}
 
     def _came_during_run(self) -> dict[str, Any]:
         """Return changes that were made, and what streams have taken, as JSON data.
 
         With them, a run can be repeated from its log.
         """
-        streams = {
-            name: list(parts_within(task, Streamed))
-            for name, task in self._tasks.logged.items()
-            if task.remembers
-        }
+        streams = {name: each for name, each in self._tasks.streamed.items() if each}
         heard = {name: [list(s.record) for s in each] for name, each in streams.items()}
         lost = sum(s.unrecorded for each in streams.values() for s in each)
-        found = _changes(self._controller) | ({"streams": heard} if heard else {})
+        found = self._changes() | ({"streams": heard} if heard else {})
         if self.plan is not None:
             planned = list(parts_within(self.plan.plan, Streamed))
             lost += sum(stream.unrecorded for stream in planned)
             if planned:
                 found["plan_streams"] = [list(stream.record) for stream in planned]
         return found | ({"streams_lost": lost} if lost else {})
-
-
-def _changes(controller: Controller) -> dict[str, Any]:
-    """Return the changes that were made, their streams as they were recorded."""
-    try:
-        changes = [
-            plain_data(with_parts_replaced(change, Streamed, _as_recorded))
-            for change in controller.changes
-        ]
-    except ConfigError as error:
-        return {"changes": None, "changes_lost": str(error)}
-    return {"changes": changes}
 
 
 def _as_recorded(stream: Streamed) -> Streamed:

@@ -7,8 +7,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hsp_control.common.arrays import Array
-from hsp_control.simulation import Rollout
 from hsp_control.simulation.limit_excess import POSITION, VELOCITY
+from hsp_control.simulation.log import Log
 
 _EFFORT_UNITS = {"rad": "N·m", "m": "N"}
 
@@ -24,12 +24,12 @@ class LoggedErrorPart(NamedTuple):
     norm: Array  # the components' Euclidean norm at every row, shape (N,)
 
 
-def task_names(rollout: Rollout) -> list[str]:
+def task_names(rollout: Log) -> list[str]:
     """Return the tasks' names in the controller's order."""
     return list(rollout.meta.get("tasks", {}))
 
 
-def task_errors(rollout: Rollout) -> list[LoggedErrorPart]:
+def task_errors(rollout: Log) -> list[LoggedErrorPart]:
     """Return the norms of all tasks' errors, with metres and radians separate."""
     found = []
     for index, name in enumerate(task_names(rollout)):
@@ -47,34 +47,34 @@ def task_errors(rollout: Rollout) -> list[LoggedErrorPart]:
     return found
 
 
-def position_units(rollout: Rollout) -> list[str]:
+def position_units(rollout: Log) -> list[str]:
     """Return the unit of each dof's position: ``rad`` or ``m``."""
     return list(map(str, rollout.meta["robot"]["units"]))
 
 
-def position_unit(rollout: Rollout) -> str:
+def position_unit(rollout: Log) -> str:
     """Return the unit of all joints' positions: ``rad``, ``m`` or ``rad, m``."""
     return ", ".join(dict.fromkeys(position_units(rollout)))
 
 
-def rate_unit(rollout: Rollout) -> str:
+def rate_unit(rollout: Log) -> str:
     """Return the unit of a norm of joint rates: ``rad/s``, ``m/s``, ``(rad, m)/s``."""
     unit = position_unit(rollout)
     return f"({unit})/s" if " " in unit else f"{unit}/s"
 
 
-def effort_units(rollout: Rollout) -> list[str]:
+def effort_units(rollout: Log) -> list[str]:
     """Return the unit of each dof's effort: ``N·m`` or ``N``."""
     return [_EFFORT_UNITS.get(unit, "–") for unit in position_units(rollout)]
 
 
-def effort_unit(rollout: Rollout) -> str:
+def effort_unit(rollout: Log) -> str:
     """Return the unit of all efforts: ``N·m``, ``N``, or as the log has it."""
     unit = position_unit(rollout)
     return _EFFORT_UNITS.get(unit) or column_unit(rollout, "tau")
 
 
-def rows_compare(rollout: Rollout) -> bool:
+def rows_compare(rollout: Log) -> bool:
     """Return whether the tasks' rows are as many all the time.
 
     Between determinants of different sizes there is nothing to compare.
@@ -83,13 +83,13 @@ def rows_compare(rollout: Rollout) -> bool:
     return len(np.unique(sizes)) == 1
 
 
-def distances(rollout: Rollout) -> list[str]:
-    """Return the names of the fields whose minimum distance is in the log."""
+def distances(rollout: Log) -> list[str]:
+    """Return the names of the fields and barriers whose distance is in the log."""
     names = (name for name in rollout.columns if name.startswith("distance."))
     return [name.removeprefix("distance.") for name in names]
 
 
-def column_unit(rollout: Rollout, name: str) -> str:
+def column_unit(rollout: Log, name: str) -> str:
     """Return the unit of a column in the log; a dash if it has none."""
     unit = str(rollout.meta.get("columns", {}).get(name, {}).get("unit", "-"))
     return "–" if unit == "-" else unit
@@ -97,6 +97,8 @@ def column_unit(rollout: Rollout, name: str) -> str:
 
 # --- targets that are far away or out of reach ---------------------------------------
 
+PULL_COLUMN, PULLED = "pull.force", 1.0
+"""Column of the force by which somebody pulls at a link, and what counts of it [N]."""
 FAR, OUT = "target far away", "target out of reach"
 """What is said of them, whoever says it."""
 REACHED = 0.01
@@ -149,6 +151,7 @@ def unreached(
     held = (columns.get("damped", none) > 0.0) | (
         columns.get("status", none) >= LIMITED
     )
+    held &= ~(columns.get(PULL_COLUMN, none) > PULLED)  # else it is held away by a hand
     for task, described in tasks.items():
         if f"task.{task}.error" not in columns:
             continue
@@ -184,7 +187,7 @@ class ForceKept(NamedTuple):
     lost: int  # in how many rows nothing is touched any more
 
 
-def forces_kept(rollout: Rollout) -> Iterator[ForceKept]:
+def forces_kept(rollout: Log) -> Iterator[ForceKept]:
     """Yield how the contacts with a commanded force keep it."""
     columns = rollout.columns
     for column, about in rollout.meta["columns"].items():
@@ -224,11 +227,12 @@ class Measure(NamedTuple):
     meaning: str
 
 
-def measures(rollout: Rollout) -> dict[str, Measure]:
+def measures(rollout: Log) -> dict[str, Measure]:
     """Return the metrics of a run, by the names of a sweep's columns.
 
     For a run that ended early they are computed until its end; ``simulated_time`` is
-    the time until then.
+    the time until then. A task that was never active, or what a log does not have, is
+    NaN.
     """
     if not len(rollout):
         return {}
@@ -238,37 +242,68 @@ def measures(rollout: Rollout) -> dict[str, Measure]:
         found[name] = Measure(float(value), unit, meaning)
 
     for part in task_errors(rollout):
-        name = f"tracking.{part.label.replace(' ', '.')}"
-        what, norm = f"error of {part.label}", part.norm
-        add(f"{name}.rms", _rms(norm), part.unit, f"rms {what}")
-        add(f"{name}.max", norm.max(), part.unit, f"largest {what}")
-        add(f"{name}.end", norm[-1], part.unit, f"{what} at the end")
+        name = measure_name(part)
+        what, active = f"error of {part.label}", part.norm[np.isfinite(part.norm)]
+        add(f"{name}.rms", _rms(active), part.unit, f"rms {what}")
+        add(f"{name}.max", _largest(active), part.unit, f"largest {what}")
+        last = active[-1] if len(active) else np.nan
+        add(f"{name}.end", last, part.unit, f"{what} at the end")
     e_N, unit = rollout["null_space_norm"], column_unit(rollout, "null_space_norm")
     add("null_space_error.rms", _rms(e_N), unit, "rms null-space error")
-    add("null_space_error.max", e_N.max(), unit, "largest null-space error")
+    add("null_space_error.max", _largest(e_N), unit, "largest null-space error")
     add("null_space_error.end", e_N[-1], unit, "null-space error at the end")
-    least, values = rollout["manipulability"].min(), rollout["singular_values"]
+    values = rollout["singular_values"]
     if values.size:
+        # Determinants of different sizes do not compare.
+        alike = rows_compare(rollout)
+        least = _smallest(rollout["manipulability"]) if alike else np.nan
         add("manipulability.min", least, "–", "minimum det(J W⁻¹ Jᵀ)")
-        add("singular_value.min", values.min(), "–", "smallest singular value")
-    damped = rollout["damped"].mean()
+        add("singular_value.min", _smallest(values), "–", "smallest singular value")
+    damped = float(np.mean(rollout["damped"] > 0.0))
     add("damped.fraction", damped, "–", "fraction of time near a singularity")
     for field in distances(rollout):
         name, meaning = f"distance.{field}", f"minimum distance of {field}"
-        add(f"{name}.min", rollout[name].min(), "m", meaning)
+        add(f"{name}.min", _smallest(rollout[name]), "m", meaning)
+    for name in (each for each in rollout.columns if each.startswith("barrier.")):
+        meaning = f"smallest value of {name.removeprefix('barrier.')}"
+        add(f"{name}.min", _smallest(rollout[name]), "–", meaning)
     tau, unit = rollout.tau, effort_unit(rollout)
-    add("effort.max", np.abs(tau).max(), unit, "largest effort")
+    add("effort.max", _largest(np.abs(tau)), unit, "largest effort")
     rms = _rms(np.linalg.norm(tau, axis=1))
     add("effort.rms", rms, unit, "rms effort of all joints")
-    speed, unit = np.abs(rollout.v).max(), column_unit(rollout, "v")
+    speed, unit = _largest(np.abs(rollout.v)), column_unit(rollout, "v")
     add("speed.max", speed, unit, "largest joint speed")
     for name, of in ((POSITION, "position"), (VELOCITY, "speed")):
         if name in rollout.columns:
-            most, unit = np.nan_to_num(rollout[name]).max(), column_unit(rollout, name)
+            most, unit = _largest(rollout[name]), column_unit(rollout, name)
             add(f"{name}.max", most, unit, f"farthest beyond a {of} limit")
     add("simulated_time", rollout.t[-1] - rollout.t[0], "s", "simulated time")
     return found
 
 
+def measure_name(part: LoggedErrorPart) -> str:
+    """Return how the names of a task's measures begin."""
+    return f"tracking.{part.label.replace(' ', '.')}"
+
+
+# A task, a contact or an obstacle may come or go during a run: then its numbers are
+# those of the rows in which it was there, and NaN if there are none.
+
+
+def _known(values: Array) -> Array:
+    return values[~np.isnan(values)]
+
+
 def _rms(values: Array) -> float:
-    return float(np.sqrt(np.mean(values**2)))
+    known = _known(values)
+    return float(np.sqrt(np.mean(known**2))) if known.size else np.nan
+
+
+def _smallest(values: Array) -> float:
+    known = _known(values)
+    return float(known.min()) if known.size else np.nan
+
+
+def _largest(values: Array) -> float:
+    known = _known(values)
+    return float(known.max()) if known.size else np.nan

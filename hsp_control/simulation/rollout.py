@@ -20,6 +20,7 @@ from hsp_control.declaration.language import spoken
 from hsp_control.robot import Robot, RobotState
 from hsp_control.simulation.journal import KILLED, JournalReader, is_journal
 from hsp_control.simulation.log_shapes import WrongColumnError, check_columns
+from hsp_control.simulation.run_summary import damped_rows, summary_text
 
 LARGEST = 20_000_000_000
 """Most bytes of a log that is read."""
@@ -66,7 +67,14 @@ class Rollout:
         span = f"{self.t[0]:g} to {self.t[-1]:g} s" if len(self) else "empty"
         about = self.meta.get("robot", {}).get("name", "?")
         tasks = ", ".join(self.meta.get("tasks", {}))
-        return f"Rollout({about}: {tasks}; {len(self)} rows, {span}, {self.status})"
+        how = self.status
+        if damped := damped_rows(self):
+            how += f", damped in {damped} rows"
+        return f"Rollout({about}: {tasks}; {len(self)} rows, {span}, {how})"
+
+    def __str__(self) -> str:
+        """Return the table that ``hsp run`` prints."""
+        return summary_text(self)
 
     @property
     def t(self) -> Array:

@@ -48,6 +48,7 @@ from hsp_control.simulation.plants import (
     is_exact,
 )
 from hsp_control.simulation.rollout import Rollout
+from hsp_control.simulation.run_summary import damped_words
 
 LOG_PERIOD = 0.01
 """Time between two rows where nothing else is said [s]."""
@@ -239,7 +240,14 @@ def simulate(
     finally:
         with suppress(LogError):  # all rows are in memory, too
             writer.end(status, message)
-    return writer.rollout(status, message)
+    rollout = writer.rollout(status, message)
+    if damped := damped_words(rollout):
+        warnings.warn(damped, RunWarning, stacklevel=2)
+    return rollout
+
+
+class RunWarning(RuntimeWarning):
+    """A run was not what the law promises, most of the time."""
 
 
 def _no_period(who_needs: str) -> SimulationError:

@@ -10,6 +10,7 @@ from .feedback import Feedback as Feedback
 from .frame_pose import FrameOrientation as FrameOrientation
 from .frame_pose import FramePose as FramePose
 from .frame_position import FramePosition as FramePosition
+from .function_task import FunctionTask as FunctionTask
 from .gains import Gains as Gains
 from .impedance import Impedance as Impedance
 from .joint_posture import JointPosture as JointPosture

@@ -13,7 +13,7 @@ from hsp_control.declaration import AnyOf
 from hsp_control.engine.plans import PartCall
 from hsp_control.engine.rotations import quaternion_from_rotation
 from hsp_control.robot import RobotState
-from hsp_control.robot.kinematics import FrameKinematics
+from hsp_control.robot.kinematics import FrameKinematics, FrameMotion
 from hsp_control.tasks.compliant_task import CompliantTask, Rotating
 from hsp_control.tasks.feedback import ErrorPart
 from hsp_control.tasks.frame_task import (
@@ -71,9 +71,10 @@ class FrameOrientation(
         return Rotating(0, motion.rotation, motion.velocity[3:])
 
     def reference_rate(self, state: RobotState) -> Array:
-        """Return the desired angular velocity w_d in world axes, shape (3,) [rad/s]."""
-        turning: Array = self._reference_at(state).angular_velocity.copy()
-        return turning
+        """Return w_d, less what turns the frame in its joint, shape (3,) [rad/s]."""
+        own = state.frame(self.frame_name).own_velocity[3:]
+        rate: Array = self._reference_at(state).angular_velocity - own
+        return rate
 
     def measure(self, state: RobotState) -> tuple[Array, Array]:
         """Return desired and actual orientation, quaternions (x, y, z, w)."""
@@ -111,21 +112,26 @@ class PoseTask(TrackingTask):
         return trajectory
 
     @abstractmethod
-    def actual(self, state: RobotState) -> tuple[Array, Array]:
-        """Return the actual position (3,) [m] and rotation (3, 3)."""
+    def moving(self, state: RobotState) -> FrameMotion:
+        """Return the motion of the frame in the reference's axes."""
 
     def reference_rate(self, state: RobotState) -> Array:
-        """Return x_d' and w_d in the reference's axes, shape (6,) [m/s, rad/s]."""
+        """Return x_d' and w_d in the reference's axes, shape (6,) [m/s, rad/s].
+
+        Less what moves the frame in its joint.
+        """
         sample = self._reference_at(state)
         velocity, turning = sample.position.velocity, sample.orientation
-        return np.concatenate([velocity, turning.angular_velocity])
+        rate = np.concatenate([velocity, turning.angular_velocity])
+        return np.asarray(rate - self.moving(state).own_velocity)
 
     def measure(self, state: RobotState) -> tuple[Array, Array]:
         """Return desired and actual pose: x, y, z [m], quaternion (x, y, z, w)."""
-        sample, (position, rotation) = self._reference_at(state), self.actual(state)
+        sample, here = self._reference_at(state), self.moving(state)
         desired, actual = np.empty((2, 7))
-        desired[:3], actual[:3] = sample.position.position, position
-        desired[3:], actual[3:] = _quaternions(sample.orientation.rotation, rotation)
+        desired[:3], actual[:3] = sample.position.position, here.position
+        turned = sample.orientation.rotation
+        desired[3:], actual[3:] = _quaternions(turned, here.rotation)
         return desired, actual
 
 
@@ -176,7 +182,6 @@ class FramePose(FrameTask, PoseTask, CompliantTask, type="frame_pose"):
         motion = state.frame(self.frame_name).motion
         return Rotating(3, motion.rotation, motion.velocity[3:])
 
-    def actual(self, state: RobotState) -> tuple[Array, Array]:
-        """Return position and rotation of the frame in the world."""
-        frame = state.frame(self.frame_name)
-        return frame.position, frame.rotation
+    def moving(self, state: RobotState) -> FrameMotion:
+        """Return the motion of the frame in the world."""
+        return state.frame(self.frame_name).motion

@@ -54,9 +54,10 @@ class FramePosition(FrameTask, TrackingTask, CompliantTask, type="frame_position
         )
 
     def reference_rate(self, state: RobotState) -> Array:
-        """Return x_d', shape (m,) [m/s]."""
-        velocity: Array = self._reference_at(state).velocity.copy()
-        return velocity
+        """Return x_d', less what moves the frame in its joint, shape (m,) [m/s]."""
+        own = state.frame(self.frame_name).own_velocity[axis_indices(self.axes)]
+        rate: Array = self._reference_at(state).velocity - own
+        return rate
 
     def measure(self, state: RobotState) -> tuple[Array, Array]:
         """Return x_d and x along the tracked axes, shape (m,) each [m]."""

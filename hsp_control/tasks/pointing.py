@@ -131,9 +131,13 @@ class Pointing(FrameTask, type="pointing"):
         )
 
     def reference_rate(self, state: RobotState) -> Array:
-        """Return the part of w_d perpendicular to the axis, shape (2,) [rad/s]."""
-        w_d = self._desired.sample(state.t).angular_velocity
-        return self._normals @ state.frame(self.frame_name).rotation.T @ w_d
+        """Return the part of w_d perpendicular to the axis, shape (2,) [rad/s].
+
+        Less what turns the frame in its joint.
+        """
+        frame, w_d = state.frame(self.frame_name), self._desired.sample(state.t)
+        rate = w_d.angular_velocity - frame.own_velocity[3:]
+        return self._normals @ frame.rotation.T @ rate
 
     def measure(self, state: RobotState) -> tuple[Array, Array]:
         """Return desired and actual direction, unit vectors in the world, (3,) each."""

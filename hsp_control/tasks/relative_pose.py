@@ -6,7 +6,6 @@ from typing import Self
 import pinocchio as pin
 
 from hsp_control import engine
-from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import TaskError
 from hsp_control.declaration import within
 from hsp_control.engine.plans import CallOutput, PartCall
@@ -74,11 +73,11 @@ class RelativePose(PoseTask, type="relative_pose"):
             engine.TrackPose, frame=relative, desired=self.followed, turning=False
         )
 
-    def actual(self, state: RobotState) -> tuple[Array, Array]:
-        """Return position and rotation of the frame in the reference."""
+    def moving(self, state: RobotState) -> FrameMotion:
+        """Return the motion of the frame in the reference."""
         frame, reference = state.frame(self.frame_name), state.frame(self.reference)
         relative = FrameMotion.allocate(state.robot.nv)
         engine.RelativeKinematics(
             frame=frame.motion, reference=reference.motion, out=relative
         )()
-        return relative.position, relative.rotation
+        return relative

@@ -1,13 +1,14 @@
 """A smooth change from one reference to another, both of which may move."""
 
-from dataclasses import KW_ONLY
+from dataclasses import KW_ONLY, replace
 from functools import cached_property
+from typing import Any, TypeVar
 
 from numpy.typing import ArrayLike
 
 from hsp_control import engine
 from hsp_control.common.exceptions import TrajectoryError
-from hsp_control.declaration.nested import parts_within
+from hsp_control.declaration.nested import parts_within, with_parts_replaced
 from hsp_control.declaration.quantities import NonNegative, Number
 from hsp_control.trajectories.blend import BlendOrientation
 from hsp_control.trajectories.orientation import (
@@ -209,6 +210,42 @@ def crossfade(
         f"{type(before).__name__} cannot change into {type(after).__name__}: one is a "
         "point, an orientation or a pose, and the other is not"
     )
+
+
+Kind = TypeVar("Kind")
+
+
+def settled(part: Kind, t: float) -> Kind:
+    """Return a part, or several, for times from t [s] on: what is over is left out.
+
+    A reference that has changed is then the new one: it grows with no change.
+    """
+    kinds: Any = (Crossfade, CrossfadeOrientation, ComposedPose)
+    found: Kind = with_parts_replaced(part, kinds, lambda each: _settled(each, t))
+    return found
+
+
+def _settled(part: Crossfade | CrossfadeOrientation | ComposedPose, t: float) -> Any:
+    fields: dict[str, Any] = part.all_fields()
+    if isinstance(part, ComposedPose):
+        x, R = _last(part.position, t), _last(part.orientation, t)
+        of_pose = isinstance(x, PositionOf) and isinstance(R, OrientationOf)
+        if of_pose and x.pose is R.pose:
+            return settled(x.pose, t)
+    elif (last := _last(part, t)) is not part:
+        return settled(last, t)
+    changed = {name: settled(each, t) for name, each in fields.items()}
+    same = all(changed[name] is each for name, each in fields.items())
+    return part if same else replace(part, **changed)
+
+
+def _last(reference: Any, t: float) -> Any:
+    """Return what a reference has changed into, if all of that is over at a time."""
+    while isinstance(reference, Crossfade | CrossfadeOrientation):
+        if reference.start_time + reference.duration > t:
+            break
+        reference = reference.after
+    return reference
 
 
 def _parts(pose: PoseTrajectory) -> ComposedPose:

@@ -1,7 +1,6 @@
 """The bundled configurations make their points: with the field, and not without it.
 
-Whole runs, but at 250 Hz and logged every 20 ms, so that all of them take seconds. The
-figures of the runs as they are written stand in benchmarks/results/configurations.md.
+Whole runs, but at 250 Hz and logged every 20 ms, so that all of them take seconds.
 """
 
 import json

@@ -70,7 +70,7 @@ def test_it_runs_plots_and_exports(installed: Path, tmp_path: Path) -> None:
     short = ["--set", "simulation.duration=0.3"]
     ran = hsp(installed, "run", DEMO, "--out", ".", *short, where=tmp_path)
     assert ran.returncode == 0, ran.stderr
-    log = "demo,simulation.duration=0.3.npz"
+    log = "demo-simulation.duration=0.3.npz"
     for words in (
         ["plot", log],
         ["export", log, "--html", "demo.html"],

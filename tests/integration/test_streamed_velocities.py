@@ -126,7 +126,7 @@ def test_a_velocity_is_set_at_any_time(axes: Any) -> None:
         log_period=1e-3,
         on_row=until(30.0, lead),
     )
-    assert len(controller.changes) == 1
+    assert len(run.meta["changes"]) == 1
     frame = PANDA.state(2.0, run.q[-1], run.v[-1]).frame("panda_tcp")
     axes_of = frame.rotation if axes == "tool" else np.eye(3)
     linear, angular = axes_of.T @ frame.velocity[:3], axes_of.T @ frame.velocity[3:]

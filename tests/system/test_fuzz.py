@@ -97,7 +97,7 @@ def test_a_run_that_cannot_be_saved_is_saved_elsewhere(
     from hsp_control.cli import main
 
     (tmp_path / "out").mkdir()
-    name = "2_rest,simulation.duration=0.02.npz"
+    name = "2_rest-simulation.duration=0.02.npz"
     (tmp_path / "out" / f".{name}.part").symlink_to("/dev/full")
     monkeypatch.setattr(tempfile, "tempdir", str(tmp_path))
     short = ["--set", "simulation.duration=0.02"]

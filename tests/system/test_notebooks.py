@@ -151,8 +151,7 @@ def test_a_notebook_runs_and_keeps_its_promises(name: str, tmp_path: Path) -> No
     One test, so that two workers do not run the same notebook.
     """
     stored = read(name)
-    notebook = with_answers(stored)
-    tool.execute(notebook, tmp_path)
+    notebook = tool.executed(with_answers(stored), tmp_path)
     for out in outputs(notebook):
         if out.output_type == "stream":
             assert out.name == "stdout", f"{name} wrote to stderr: {out.text}"

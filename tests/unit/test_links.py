@@ -1,64 +1,56 @@
-"""`make links`: what it finds in a document, and what it says of an address."""
+"""No document of this checkout links to a file that is not there.
 
-import runpy
-import threading
-from collections.abc import Iterator
-from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
+Links between the pages of the site are checked when it is built, those to other sites
+by `make links`: this is for README, notebooks and what else stands outside of docs.
+"""
+
+import json
+import re
 from pathlib import Path
 
 import pytest
 from places import ROOT
 
-tool = runpy.run_path(str(ROOT / "tools" / "links.py"))
-
-ANSWERS = {"/page": 200, "/moved": 301, "/gone": 404, "/for-persons": 403, "/post": 200}
-
-
-class Site(BaseHTTPRequestHandler):
-    """A site with a page of each kind."""
-
-    def do_HEAD(self) -> None:
-        self.send_response(405 if self.path == "/post" else ANSWERS[self.path])
-        self.send_header("Location", "/page")
-        self.end_headers()
-
-    def do_GET(self) -> None:
-        self.send_response(ANSWERS[self.path])
-        self.end_headers()
-
-    def log_message(self, format: str, *args: object) -> None:
-        """Say nothing."""
+PATTERNS = ("*.md", "*/*.md", "robots/*/*.md", "docs/**/*.md", "notebooks/*.ipynb")
+BUILT = ("_build", "generated")
+LINK = re.compile(r"\]\(([^)\s]+)\)|^\[[^\]]+\]: (\S+)|<img src=\"([^\"]+)\"", re.M)
+CODE = re.compile(r"^(```|~~~|::::?).*?^\1|`[^`\n]+`", re.M | re.S)
+DOCUMENTS = [
+    file
+    for pattern in PATTERNS
+    for file in sorted(ROOT.glob(pattern))
+    if not set(file.relative_to(ROOT).parts) & set(BUILT)
+    and not file.relative_to(ROOT).parts[0].startswith(".")
+]
 
 
-@pytest.fixture
-def site() -> Iterator[str]:
-    server = ThreadingHTTPServer(("127.0.0.1", 0), Site)
-    thread = threading.Thread(target=server.serve_forever, daemon=True)
-    thread.start()
-    yield f"http://127.0.0.1:{server.server_port}"
-    server.shutdown()
-    thread.join()
-    server.server_close()
+def missing(text: str, folder: Path) -> list[str]:
+    """Return the links of a Markdown text to files that are not there."""
+    found = (next(filter(None, each)) for each in LINK.findall(CODE.sub("", text)))
+    paths = {link.partition("#")[0] for link in found if ":" not in link}
+    return sorted(
+        path
+        for path in paths
+        if path and "/generated/" not in path and not (folder / path).exists()
+    )
 
 
-def test_no_document_links_to_a_file_that_is_not_there() -> None:
-    found = [link for file in tool["documents"]() for link in tool["links"](file)]
-    files = {link.file for link in found}
-    assert {"README.md", "docs/law.md", "docs/how_to/tune_gains.md"} <= files
-    assert list(tool["missing"](found)) == []
+@pytest.mark.parametrize(
+    "file", DOCUMENTS, ids=lambda file: str(file.relative_to(ROOT))
+)
+def test_no_document_links_to_a_file_that_is_not_there(file: Path) -> None:
+    text = file.read_text(encoding="utf-8")
+    if file.suffix == ".ipynb":
+        cells = [cell for cell in json.loads(text)["cells"] if "outputs" not in cell]
+        text = "\n\n".join("".join(cell["source"]) for cell in cells)
+    assert missing(text, file.parent) == []
 
 
-def test_a_missing_file_is_told_with_its_document(tmp_path: Path) -> None:
-    page = tmp_path / "page.md"
+def test_a_missing_file_is_told(tmp_path: Path) -> None:
     (tmp_path / "there.md").touch()
-    page.write_text(
-        "[a](there.md#part) [b](gone.md) ![c](gone.png) [d](#here)\n"
+    text = (
+        "[a](there.md#part) [b](gone.md) ![c](gone.png) [d](#here) [x](https://a.b/c)\n"
         "`[code](no.md)`\n\n```\n[fenced](no.md)\n```\n\n"
         "[e]: other.md\nthe clock [s]: when it is told\n"
     )
-    told = tool["missing"](tool["links"](page))
-    assert [line.split(": ", 1)[1] for line in told] == [
-        "gone.md: there is no such file",
-        "other.md: there is no such file",
-        "gone.png: there is no such file",
-    ]
+    assert missing(text, tmp_path) == ["gone.md", "gone.png", "other.md"]

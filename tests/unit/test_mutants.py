@@ -1,41 +1,93 @@
-"""The mutants fit the code, and their runner says truly what became of each."""
+"""Mutants are made of any code, and their runner says truly what became of each."""
 
 from pathlib import Path
 
 import mutants
 import pytest
-from mutants import MUTANTS, Mutant
+from mutants import Mutant, Verdict
+from mutations import Edit, edits
 from places import ROOT
 
-HERE = [  # without those of companions that were taken away
-    each
-    for each in MUTANTS
-    if all(
-        "companions/" not in file or (ROOT / file).parent.is_dir()
-        for file in (each.file, each.tests)
-    )
-]
-every_mutant = pytest.mark.parametrize("mutant", HERE, ids=lambda m: m.name)
+PYTHON = '''def limited(x: float = 0.5, low: float = -1.0) -> float:
+    """Not 1 < 2."""
+    if x < low or not x:
+        raise ValueError(f"{x + 1} is too low")
+    check(x)
+    return (x * 2.0) if x is low else x
+'''
+CPP = """// a + b
+double limited(double x) {
+  const double low = std::min(x, 0.5);  // x < 1.0
+  if (x < low && here(x)) out[0] = x + low;
+  y.row(1) = "a + b";
+}
+"""
+OF_PYTHON = {
+    "0.5 => 1.0", "-1.0 => (1.0)", "1.0 => 2.0", "not x => (x)",
+    "x < low => (x <= low)",
+    "x < low or not x => (x < low and (not x))", "check(x) => pass", "2.0 => 4.0",
+    "x * 2.0 => (x / 2.0)", "x is low => (x is not low)",
+    "(x * 2.0) if x is low else x => (x * 2.0 if not x is low else x)",
+}  # fmt: skip
+OF_CPP = {
+    "std::min( => std::max(", "0.5 => 1.0", "< => <=", "&& => ||", "+ => -",
+    "if (x < low && here(x)) => if (!(x < low && here(x)))",
+    'y.row(1) = "a + b"; => ;',
+}  # fmt: skip
 
-# --- the list ------------------------------------------------------------------------
+
+@pytest.mark.parametrize(
+    ("file", "text", "expected"),
+    [("a.py", PYTHON, OF_PYTHON), ("a.hpp", CPP, OF_CPP)],
+    ids=["Python", "C++"],
+)
+def test_edits_are_of_what_runs_and_of_nothing_that_speaks(
+    file: str, text: str, expected: set[str]
+) -> None:
+    found = list(edits(file, text))
+    assert {str(edit) for edit in found} == expected
+    for edit in found:
+        changed = edit.applied(text).splitlines()
+        assert text.splitlines()[edit.line - 1] != changed[edit.line - 1]
 
 
-@every_mutant
-def test_the_edit_fits_one_place_and_is_still_python(mutant: Mutant) -> None:
-    text = (ROOT / mutant.file).read_text(encoding="utf-8")
-    changed = mutants.mutated(mutant, text)
-    assert changed != text
-    if mutant.file.endswith(".py"):
-        compile(changed, mutant.file, "exec")
+@pytest.mark.parametrize(
+    "file", ["hsp_control/control/mixture.py", "engine/law/law.hpp"]
+)
+def test_files_of_the_house_have_edits_and_python_compiles_with_each(file: str) -> None:
+    text = (ROOT / file).read_text(encoding="utf-8")
+    found = list(edits(file, text))
+    assert len(found) > 20
+    if file.endswith(".py"):
+        for edit in found:
+            compile(edit.applied(text), file, "exec")
 
 
-@every_mutant
-def test_the_tests_that_should_see_it_exist(mutant: Mutant) -> None:
-    """Files that exist; with -k, a word of one test's or parameter's name in them."""
-    files, _, word = mutant.tests.partition(" -k ")
-    assert files
-    assert all((ROOT / file).is_file() for file in files.split())
-    assert " " not in word
+def test_an_edit_is_of_the_text_that_it_was_made_for() -> None:
+    (edit,) = edits("a.py", "a + b\n")
+    with pytest.raises(ValueError, match=r"line 1 is not 'a \+ b'"):
+        edit.applied("a - b\n")
+
+
+@pytest.mark.parametrize(
+    ("file", "first"),
+    [
+        ("hsp_control/control/mixture.py", "tests/unit/control"),
+        ("engine/fields/barrier.hpp", "tests/unit/null_space"),
+        ("hsp_control/companions/walking/walk.py", "tests/companions/walking"),
+        ("hsp_control/__init__.py", "tests/unit"),
+    ],
+)
+def test_the_tests_of_a_room_are_asked_first(file: str, first: str) -> None:
+    if (ROOT / first).is_dir():  # companions may have been taken away
+        assert mutants.tests_of(file)[0] == first
+
+
+def test_the_same_seed_draws_the_same_mutants() -> None:
+    files = ["hsp_control/control/mixture.py", "engine/law/law.hpp"]
+    once, again, other = (mutants.drawn(files, 5, seed) for seed in (1, 1, 2))
+    assert once == again
+    assert once != other
 
 
 # --- the runner ----------------------------------------------------------------------
@@ -47,22 +99,20 @@ TESTS = """from code_under_test import area
 def test_area():
     assert area(2.0, 3.0) == 6.0
 """
-CAUGHT, SURVIVING, BREAKING, ELSEWHERE = (
-    Mutant(name, "code_under_test.py", old, new, tests)
-    for name, old, new, tests in (
-        ("half an area", "a * b", "0.5 * a * b", "test_area.py"),
-        ("another sum", "a + b", "a - b", "test_area.py"),
-        ("a test that is not there", "a * b", "a / b", "test_area.py -k volume"),
-        ("code that is not there", "a ** b", "a * b", "test_area.py"),
-    )
-)
+
+
+def mutant(old: str, new: str, tests: str) -> Mutant:
+    """Return an edit of that code."""
+    edit = Edit(1, CODE.index(old), old, new)
+    return Mutant("code_under_test.py", edit, tuple(tests.split()))
 
 
 @pytest.fixture
-def checkout(tmp_path: Path) -> Path:
-    """Return a folder with one function and one test."""
+def checkout(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """Return a folder with one function and one test, which is the fast one, too."""
     (tmp_path / "code_under_test.py").write_text(CODE)
     (tmp_path / "test_area.py").write_text(TESTS)
+    monkeypatch.setattr(mutants, "FAST", ("test_area.py",))
     return tmp_path
 
 
@@ -71,27 +121,28 @@ def test_the_runner_tells_who_was_caught(
     checkout: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     """Each is tried alone, and the code is afterwards what it was."""
-    found = list(mutants.tried(checkout, [CAUGHT, SURVIVING, BREAKING]))
-    assert found == [
-        ("half an area", "caught"),
-        ("another sum", "SURVIVED"),
-        ("a test that is not there", "BROKEN"),
+    tests = "test_area.py"
+    tried = [
+        mutant("a * b", "0.5 * a * b", tests),
+        mutant("a + b", "a - b", tests),
+        mutant("a * b", "a / b", "test_area.py -k volume"),
     ]
+    found = [verdict.word for _, verdict in mutants.tried(checkout, tried)]
+    assert found == ["caught", "SURVIVED", "void"]
     first, second, third = capsys.readouterr().out.splitlines()
     assert first.split()[:2] == ["1/3", "caught"]
     assert first.endswith("FAILED test_area.py::test_area")
     assert "SURVIVED" in second
-    assert "BROKEN" in third
+    assert "void" in third
     assert (checkout / "code_under_test.py").read_text() == CODE
 
 
 @pytest.mark.process
-def test_tests_that_fail_anyway_catch_nothing(
-    checkout: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_tests_that_fail_anyway_catch_nothing(checkout: Path) -> None:
     (checkout / "test_area.py").write_text(TESTS.replace("6.0", "7.0"))
-    assert list(mutants.tried(checkout, [CAUGHT])) == [("half an area", "BROKEN")]
-    assert "do not pass without the edit" in capsys.readouterr().out
+    edit = mutant("a * b", "0.5 * a * b", "test_area.py")
+    ((_, verdict),) = mutants.tried(checkout, [edit])
+    assert verdict == ("void", "its tests do not pass without the edit")
 
 
 @pytest.mark.process
@@ -107,4 +158,4 @@ def test_what_never_ends_or_eats_the_memory_is_caught(
 ) -> None:
     monkeypatch.setattr(mutants, "LONGEST", 5.0)
     (checkout / "code_under_test.py").write_text(f"def area(a, b):\n    {wrong}\n")
-    assert mutants.run(checkout, "test_area.py") == ("caught", detail)
+    assert mutants.run(checkout, ["test_area.py"]) == Verdict("caught", detail)

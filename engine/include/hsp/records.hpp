@@ -45,13 +45,17 @@ template <template <int...> class As> struct FrameMotion {
   As<6, 'n'> jacobian, jacobian_dot;
   As<3, 3> rotation;
   As<3> position;
-  As<6> velocity;  // J v
+  As<6> velocity;  // of the origin, and angular
+  // By how much the velocity is not J v, and its rate: the acceleration beyond J a + J'v. Zero but
+  // for a frame that moves in its joint, as while a tool is exchanged.
+  As<6> own_velocity, own_acceleration;
 };
 
 // A point: the part of a frame's motion that does not turn.
 template <template <int...> class As> struct PointMotion {
   As<3, 'n'> jacobian, jacobian_dot;
   As<3> position, velocity;
+  As<3> own_acceleration;  // see FrameMotion
 };
 
 }  // namespace hsp

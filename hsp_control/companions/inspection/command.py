@@ -3,7 +3,7 @@
 import argparse
 from pathlib import Path
 
-from hsp_control.cli.options import AddedCommand, add_strict, complete
+from hsp_control.cli.options import AddedCommand, add_import, add_strict, complete
 from hsp_control.common.resources import bundled_robots
 
 
@@ -22,6 +22,7 @@ def _add_options(inspect: argparse.ArgumentParser) -> None:
         help="write a URDF whose inertias are the nearest that a body can have",
     )
     inspect.add_argument("--json", action="store_true", help="print JSON")
+    add_import(inspect)
     add_strict(inspect)
 
 

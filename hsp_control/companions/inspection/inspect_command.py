@@ -11,7 +11,7 @@ from pathlib import Path
 from xml.etree import ElementTree
 
 from hsp_control.cli.consoles import out, working
-from hsp_control.cli.loading import robot_access
+from hsp_control.cli.loading import robot_access, run_imports
 from hsp_control.common.exceptions import ModelError
 from hsp_control.companions.inspection.findings import Inspection
 from hsp_control.companions.inspection.findings import inspect as inspect_robot
@@ -28,6 +28,7 @@ _SHOWN = 12
 
 def inspect(options: argparse.Namespace) -> int:
     """Print what is odd about a robot; return 2 if it does not load."""
+    run_imports(options)
     arguments, access = _arguments(options.args), robot_access(options.robot, options)
     given = "mjcf" if _is_mjcf(Path(options.robot)) else "name"
     description = RobotDescription(**{given: options.robot}, xacro_args=arguments)

@@ -5,10 +5,9 @@ from typing import TYPE_CHECKING
 from hsp_control.companions.shared import at_first_use
 
 if TYPE_CHECKING:  # for type checkers; a help text must not import what is slow
-    from .picture import Picture as Picture
     from .real_time import play as play
     from .session import Session as Session
 
 __getattr__, __dir__ = at_first_use(
-    __name__, {"picture": "Picture", "real_time": "play", "session": "Session"}
+    __name__, {"real_time": "play", "session": "Session"}
 )

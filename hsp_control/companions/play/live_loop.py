@@ -15,6 +15,7 @@ from hsp_control.config import Experiment
 from hsp_control.control.controller import Controller
 from hsp_control.control.targets import RAMP
 from hsp_control.live import OperatorRequests
+from hsp_control.robot import Robot
 from hsp_control.simulation.journal import JournalReader
 from hsp_control.simulation.log_writer import LogWriter
 
@@ -214,6 +215,16 @@ class Mirror:
         self.over = ""
         self._journal = JournalReader(journal, most=_KEPT)
         self._channel = channel
+
+    @property
+    def robot(self) -> Robot:
+        """The robot."""
+        return self.experiment.robot
+
+    @property
+    def title(self) -> str:
+        """The title of the scene."""
+        return self.experiment.scenario.title or self.robot.name
 
     @property
     def t(self) -> float:

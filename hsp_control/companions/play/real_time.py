@@ -11,12 +11,13 @@ from types import FrameType
 from typing import Any
 
 from hsp_control.cli.consoles import out
-from hsp_control.cli.loading import run_imports
+from hsp_control.cli.loading import own_code
 from hsp_control.common.exceptions import HspControlError
-from hsp_control.companions.play.picture import FRAME, Picture
+from hsp_control.companions.play.one_page import OnePage
 from hsp_control.companions.play.playable import playable_document
 from hsp_control.companions.play.session import Session
 from hsp_control.companions.viewer import Viewer
+from hsp_control.companions.viewer.live_picture import FRAME, Picture
 from hsp_control.companions.viewer.pages import (
     OpeningPage,
     draw_before,
@@ -25,6 +26,7 @@ from hsp_control.companions.viewer.pages import (
 from hsp_control.companions.viewer.transport import PageServer
 from hsp_control.config import Experiment
 from hsp_control.config.loaded_scenario import load_scenario
+from hsp_control.config.own_code import add_imports
 
 BEHIND = 0.1
 """A session that is later than this goes on from now: it is slower than real time [s].
@@ -38,6 +40,7 @@ def play(
     messages: Callable[[], Iterable[Mapping[str, Any]]],
     save: Callable[[], str],
     *,
+    one_page: OnePage | None = None,
     end: Callable[[], bool] = lambda: False,
 ) -> None:
     """Let a session go on in real time until it ends; pages never hold it up."""
@@ -61,6 +64,12 @@ def play(
                 case {"do": "save"}:
                     session.handles.say(save())
                     due = monotonic()
+                case {"do": "page"} if one_page is not None:
+                    try:
+                        session.handles.say(one_page.begin())
+                    except HspControlError as error:
+                        session.handles.say(str(error), warning=True)
+                    due = monotonic()
                 case _:
                     session.receive(message)
         now = monotonic()
@@ -77,6 +86,8 @@ def play(
             rate = max(session.t - marked_at, 0.0) / (now - marked)
             marked, marked_at = now, session.t
         if now - drawn >= FRAME:
+            if one_page is not None and (told := one_page.done()):
+                session.handles.say(told)
             picture.draw(running=running and not session.over, rate=rate)
             drawn = now
         wait = due if running and not session.over else drawn + FRAME
@@ -95,13 +106,14 @@ def play_command(options: argparse.Namespace) -> int:
             options,
             lambda url: out.print(f"Play: {url}", soft_wrap=True),
         )
-        run_imports(options)
+        imports = own_code(options)
         document = playable_document(
             options.config,
             *options.overrides,
             strict=options.strict or bool(options.allow),
             allow=options.allow,
         )
+        add_imports(document, imports)
         loaded = load_scenario(document)
         view = loaded.scenario.view.all_fields()
         viewer = Viewer(loaded.robot, transport=server, **view)
@@ -122,9 +134,13 @@ def play_command(options: argparse.Namespace) -> int:
             except HspControlError as error:
                 return str(error)
 
+        one_page = OnePage(
+            lambda: session.rollout().save(log), log.with_suffix(".html")
+        )
+        stack.callback(one_page.close)
         with suppress(KeyboardInterrupt):
             out.print("Ctrl-C ends it and saves the log.")
-            play(session, picture, server.messages, save)
+            play(session, picture, server.messages, save, one_page=one_page)
         out.print(f"Log: {session.rollout().save(log)}")
         if session.over:  # and was not reset
             print(f"hsp: {session.over.partition('; reset')[0]}", file=sys.stderr)

@@ -18,6 +18,7 @@ from hsp_control.companions.viewer.commands import path_element
 from hsp_control.config import Experiment
 from hsp_control.control.changes import Changes
 from hsp_control.control.controller import Controller
+from hsp_control.control.measurement import LogChannel
 from hsp_control.live.hardware import described
 from hsp_control.live.simulated_robot import sampled
 from hsp_control.robot import Robot
@@ -25,6 +26,7 @@ from hsp_control.simulation import Rollout
 from hsp_control.simulation.control_chain import ControlChain
 from hsp_control.simulation.log_writer import LogWriter
 from hsp_control.simulation.loops import Instant, sampled_loop
+from hsp_control.simulation.measures import PULL_COLUMN
 from hsp_control.simulation.plants import Plant
 from hsp_control.simulation.plants.push import Pushes, Spring
 
@@ -101,6 +103,16 @@ class Session:
         self.reset()
 
     @property
+    def robot(self) -> Robot:
+        """The robot."""
+        return self.experiment.robot
+
+    @property
+    def title(self) -> str:
+        """The title of the scene."""
+        return self.experiment.scenario.title or self.robot.name
+
+    @property
     def t(self) -> float:
         """The time of the present row [s]."""
         return self.controller.state.t
@@ -119,7 +131,10 @@ class Session:
                 return
             state, output, tau, own = instant
             others = self._plant.log_channels(state.t, state.q, state.v, tau)
-            self.recorder.record(state, output, tau, {**own, **others})
+            pulled = self.pull()
+            force = LogChannel(0.0 if pulled is None else pulled[2], "N", "of a hand")
+            channels = {**own, **others, PULL_COLUMN: force}
+            self.recorder.record(state, output, tau, channels)
         except (KeyboardInterrupt, SystemExit):
             raise
         except BaseException as error:  # a user's task or field may raise anything
@@ -196,7 +211,8 @@ class Session:
         experiment = self.experiment
         config = experiment.config
         if config is not None:
-            config["simulation"]["duration"] = max(self.t, self.row)
+            whole = int(self.t / self.row + 1e-6)  # Ctrl-C may come amid a row
+            config["simulation"]["duration"] = max(whole, 1) * self.row
         lost = {"changes_lost": self._unrepeatable} if self._unrepeatable else {}
         return self.recorder.rollout(
             "completed",

@@ -27,8 +27,8 @@ from hsp_control.companions.play.live_loop import (
     SteeredLoop,
     channel_pair,
 )
-from hsp_control.companions.play.picture import FRAME, Picture
 from hsp_control.companions.viewer import Viewer
+from hsp_control.companions.viewer.live_picture import FRAME, Picture
 from hsp_control.companions.viewer.pages import (
     OpeningPage,
     draw_before,
@@ -219,7 +219,8 @@ def main() -> int:
 
 
 def _run(settings: dict[str, Any]) -> None:
-    server = PageServer(settings["port"], host=settings["host"], steerable=True)
+    port, host, held = (settings[name] for name in ("port", "host", "held"))
+    server = PageServer(port, host=host, steerable=True, fresh=held)
     try:
         print(server.url, flush=True)
         draw_empty(server, "")
@@ -238,7 +239,7 @@ def _run(settings: dict[str, Any]) -> None:
                     assert viewer is not None
                     experiment = load_experiment(config)
                     channel = Channel(socket.socket(fileno=settings["channel"]))
-                    journal, held = Path(file), settings["held"]
+                    journal = Path(file)
                     mirror = Mirror(experiment, period, journal, channel, held=held)
                     picture = Picture(mirror, viewer)
                     _show(mirror, picture, server)

@@ -5,6 +5,7 @@ from typing import TYPE_CHECKING
 from hsp_control.companions.shared import at_first_use
 
 if TYPE_CHECKING:  # for type checkers; a help text must not import what is slow
+    from .curves import draw_decay as draw_decay
     from .curves import draw_determinant as draw_determinant
     from .curves import draw_distances as draw_distances
     from .curves import draw_efforts as draw_efforts
@@ -16,6 +17,7 @@ if TYPE_CHECKING:  # for type checkers; a help text must not import what is slow
     from .curves import draw_speeds as draw_speeds
     from .curves import draw_task_errors as draw_task_errors
     from .figures import diagnostics_figure as diagnostics_figure
+    from .figures import differing as differing
     from .figures import new_figure as new_figure
     from .figures import paper_figure as paper_figure
     from .figures import save_figure as save_figure
@@ -32,13 +34,13 @@ __getattr__, __dir__ = at_first_use(
     __name__,
     {
         "curves": (
-            "draw_determinant draw_distances draw_efforts draw_field_terms "
+            "draw_decay draw_determinant draw_distances draw_efforts draw_field_terms "
             "draw_field_value draw_joint_positions draw_null_space_error "
             "draw_singular_values draw_speeds draw_task_errors"
         ),
         "figures": (
-            "diagnostics_figure new_figure paper_figure save_figure save_figures "
-            "styled use_style"
+            "diagnostics_figure differing new_figure paper_figure save_figure "
+            "save_figures styled use_style"
         ),
         "frames": "draw_frame draw_frames draw_superimposed",
         "log_series": "chosen_rows",

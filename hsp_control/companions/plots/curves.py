@@ -4,12 +4,15 @@ from collections.abc import Sequence
 
 import numpy as np
 from matplotlib.axes import Axes
+from matplotlib.mathtext import MathTextParser
 from matplotlib.transforms import ScaledTranslation
 
 from hsp_control.common.arrays import Array
 from hsp_control.companions.plots import palette
+from hsp_control.companions.plots.analysis import floor_of
 from hsp_control.companions.plots.log_series import (
     MAX_NAMED,
+    decay_power,
     field_terms,
     held_period,
     joint_names,
@@ -30,6 +33,7 @@ from hsp_control.simulation.measures import (
     task_errors,
 )
 
+_WIDE = 5.0  # width of a figure [inches]
 _HANDLE, _GAP, _LETTER = 2.2, 1.3, 0.55
 """Widths in a legend over its font size: handle, gap of columns, mean letter."""
 
@@ -58,6 +62,17 @@ def note(axes: Axes, text: str) -> None:
     axes.plot([], [], linestyle="none", label=text)
 
 
+def math_text(name: str) -> str:
+    """Return a name in which ``$K_N$`` is mathematics, if that can be drawn."""
+    if name.count("$") and not name.count("$") % 2:
+        try:
+            MathTextParser("path").parse(name)
+        except ValueError:
+            return literal_text(name)
+        return f" {name}" if name.startswith("_") else name
+    return literal_text(name)
+
+
 def literal_text(name: str) -> str:
     """Return a text that matplotlib shows as it is, also with $ or a leading _."""
     shown = name.replace("$", r"\$")
@@ -68,7 +83,9 @@ def _fitting(axes: Axes, labels: Sequence[str]) -> int:
     """Return how many columns fit below the axes; entries run down the columns."""
     figure = axes.get_figure(root=True)
     assert figure is not None
-    width = axes.get_window_extent().width / figure.dpi * 72.0 / 8.0 * 1.1
+    # The layout comes later: a narrow figure leaves less beside the labels.
+    share = 1.1 if figure.get_figwidth() > _WIDE else 0.9
+    width = axes.get_window_extent().width / figure.dpi * 72.0 / 8.0 * share
     for columns in range(len(labels), 1, -1):
         rows = -(-len(labels) // columns)
         wide = sum(
@@ -319,12 +336,60 @@ def draw_null_space_error(axes: Axes, rollout: Rollout) -> None:
         marker=point_marker(t),
         label=r"actual $\Vert e_N \Vert_W$",
     )
+    if decay.slow is not None and (floor := floor_of(rollout)) is not None:
+        axes.fill_between(
+            t,
+            np.maximum(floor, 1e-300),
+            1e-300,
+            color=palette.MUTED,
+            alpha=0.22,
+            linewidth=0.0,
+            zorder=0.5,
+            label="expected floor of the held effort",
+        )
     if decay.why_not:
         note(axes, decay.why_not)
     if period := held_period(rollout):
         note(axes, f"effort held for {1e3 * period:g} ms")
     log_scale(axes, norm, top=1e-6)
     finish(axes, rollout, rf"$\Vert e_N \Vert_W$ [{rate_unit(rollout)}]")
+
+
+def draw_decay(axes: Axes, rollout: Rollout) -> None:
+    """Draw -V' beside what it is by the law, e_NᵀW K_N e_N, with a logarithmic axis.
+
+    V = ½ e_NᵀW e_N is that of the log's rows, and V' = V (ln V)' by differences of
+    them: exact where V decays exponentially.
+    """
+    t, power = rollout.t, decay_power(rollout)
+    V = 0.5 * rollout["null_space_norm"] ** 2
+    known = V > 0.0
+    fall = np.full(len(t), np.nan)
+    if known.sum() > 1:
+        fall[known] = -V[known] * np.gradient(np.log(V[known]), t[known])
+    if power is not None:
+        axes.plot(
+            t,
+            np.where(power > 0.0, power, np.nan),
+            color=palette.INK,
+            linewidth=1.2,
+            linestyle=(0, (4, 3)),
+            zorder=2.5,
+            label=r"law: $e_N^{\mathsf{T}} W K_N e_N$",
+        )
+    else:
+        note(axes, "no prediction: $K_N$ or $W$ not in the log")
+    axes.plot(
+        t,
+        np.where(fall > 0.0, fall, np.nan),
+        color=palette.FIELD,
+        marker=point_marker(t),
+        label=r"actual $-\dot V$, differences of the rows",
+    )
+    shown = fall[np.isfinite(fall)] if power is None else power
+    log_scale(axes, shown[shown > 0.0], top=1e-12)
+    unit = rate_unit(rollout)
+    finish(axes, rollout, rf"$-\dot V$ [{unit.removesuffix('/s')}²/s³]")
 
 
 def draw_field_value(axes: Axes, rollout: Rollout) -> None:

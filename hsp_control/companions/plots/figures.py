@@ -132,19 +132,50 @@ def paper_figure(
     frames: int = 8,
     times: Sequence[float] | None = None,
     title: str | None = None,
+    width: str | float | None = None,
 ) -> Figure:
-    """Return the paper's five panels: path, joints, determinant, frames twice."""
+    """Return the paper's five panels: path, joints, determinant, frames twice.
+
+    Args:
+        rollout: The run.
+        absolute: Whether angles of joints are absolute where the robot has such.
+        frames: How many frames are drawn, evenly over the run.
+        times: Their times instead [s].
+        title: The heading; None: as the log says.
+        width: The width for a paper, such as ``84mm``, or in metres: without heading
+            and foot, and below 150 mm with the panels one below the other.
+
+    Raises:
+        PlotError: If the log has no rows, or no frame is requested.
+    """
     _check(rollout)
     rows = log_series.chosen_rows(rollout, frames, times)
     if not rows:
         raise PlotError("no frame is requested; needs at least 1")
+    wide = 11.0 if width is None else _inches(width)
+    narrow = wide < _NARROW
     with styled():
-        figure = new_figure(11.0, 7.6)
-        _add_title(figure, rollout, title)
-        halves = figure.subfigures(2, 1, squeeze=False, height_ratios=(1.0, 1.05))
-        upper, lower = halves.ravel()
-        grid = upper.add_gridspec(1, 3, width_ratios=(0.85, 1.0, 1.0))
-        a, b, c = (upper.add_subplot(grid[k]) for k in range(3))
+        strip_of = (wide, 0.75 * wide) if narrow else (0.62 * wide, 0.245 * wide)
+        columns = columns_for(rollout, len(rows), *strip_of)
+        if narrow:
+            # One below the other: a, b, c, then d and e.
+            named = len(log_series.lively(rollout.tau))  # in the legend of b
+            lines = 0.14 * named if named > 3 else 0.0
+            b_high = 0.85 * wide + lines
+            high = [0.9 * wide, b_high, 0.75 * wide, 0.85 * wide, 0.9 * wide]
+            figure = new_figure(wide, sum(high))
+            parts = figure.subfigures(5, 1, squeeze=False, height_ratios=high).ravel()
+            a, b, c = (part.add_subplot() for part in parts[:3])
+            strip, together = parts[3:]
+        else:
+            figure = new_figure(wide, 0.69 * wide)
+            halves = figure.subfigures(2, 1, squeeze=False, height_ratios=(1.0, 1.05))
+            upper, lower = halves.ravel()
+            grid = upper.add_gridspec(1, 3, width_ratios=(0.85, 1.0, 1.0))
+            a, b, c = (upper.add_subplot(grid[k]) for k in range(3))
+            strip, together = lower.subfigures(1, 2, width_ratios=(1.9, 1.0))
+        if width is None:
+            _add_title(figure, rollout, title)
         draw_end_effector(a, rollout)
         a.set_anchor("NW")
         curves.draw_joint_positions(b, rollout, absolute=absolute)
@@ -152,10 +183,8 @@ def paper_figure(
             "determinant" if measures.rows_compare(rollout) else "singular_values"
         ]
         third(c, rollout)
-        strip, together = lower.subfigures(1, 2, width_ratios=(1.9, 1.0))
-        columns = columns_for(rollout, len(rows), 6.8, 2.7)
         cells = strip.subplots(-(-len(rows) // columns), columns, squeeze=False)
-        draw_frames(cells.ravel().tolist(), rollout, rows)
+        draw_frames(cells.ravel().tolist(), rollout, rows, short=narrow)
         for cell in cells.ravel():
             cell.label_outer()
         strip.suptitle("(d)  Selected frames", **_HEADING)
@@ -173,6 +202,7 @@ def paper_figure(
 PANELS: dict[str, tuple[Callable[[Axes, Rollout], None], str]] = {
     "errors": (curves.draw_task_errors, "Task error"),
     "null_space": (curves.draw_null_space_error, "Null-space error"),
+    "decay": (curves.draw_decay, "Decay of V"),
     "field": (curves.draw_field_value, "Null-space field"),
     "efforts": (curves.draw_efforts, "Efforts"),
     "singular_values": (curves.draw_singular_values, "Singular values"),
@@ -183,6 +213,7 @@ PANELS: dict[str, tuple[Callable[[Axes, Rollout], None], str]] = {
     "speeds": (curves.draw_speeds, "Joint speeds"),
 }
 """The panels of `diagnostics_figure`, by name: what draws each, and its title."""
+_NARROW = 5.9  # width of a figure below which its panels are one below the other [in]
 _SHAPE = 0.72, 0.55  # height of a panel over its width, and its legend's [inches]
 _LOG_DASHES: tuple[Any, ...] = ("-", (0, (6, 1.5)), "-.", ":")
 """Of the first log, the second and so on."""
@@ -216,7 +247,8 @@ def diagnostics_figure(
         _check(each)
     chosen = _chosen_panels(runs, panels)
     if width is None:
-        columns = -(-len(chosen) // (1 if len(chosen) <= 3 else 2))
+        many = 3 if len(chosen) > 8 else -(-len(chosen) // 2)
+        columns = len(chosen) if len(chosen) <= 3 else many
         wide, more = 3.6 * columns, 0.6
     else:
         wide, more = _inches(width), 0.0
@@ -230,7 +262,7 @@ def diagnostics_figure(
         if others:
             figure.suptitle("")  # the names of the logs stand there
             own = [f"{k} {run.meta.get('name', '')}" for k, run in enumerate(runs, 1)]
-            _name_logs(figure, names or own)
+            _name_logs(figure, names or differing(own))
         axes = figure.subplots(rows, columns, squeeze=False).ravel().tolist()
         for one, name in zip(axes, chosen, strict=False):
             draw = PANELS[name][0]
@@ -269,13 +301,13 @@ def _draw_together(
     """Draw runs in one panel: one or two curves by colour, more of them by dashes."""
     spans, count = [], 0
     for number, run in enumerate(runs):
-        known: set[Artist] = {*axes.lines, *axes.patches}
+        known: set[Artist] = {*axes.lines, *axes.patches, *axes.collections}
         axes.autoscale(axis="y")
         draw(axes, run)
         spans.append((*axes.get_xlim(), *axes.get_ylim()))
         if len(runs) == 1:
             return
-        for artist in (*axes.lines, *axes.patches):
+        for artist in (*axes.lines, *axes.patches, *axes.collections):
             if number and artist not in known:
                 artist.set_label("_")  # the first log's legend is that of all
         lines = [line for line in axes.lines if line not in known]
@@ -287,7 +319,7 @@ def _draw_together(
         count = count or len(thick)
         for line in lines:
             if count <= 2 and line.get_linewidth() > _REFERENCE:
-                line.set(color=palette.series(number))
+                line.set(color=palette.run(number))
             if count != 2 and line in thick:
                 line.set(linestyle=_LOG_DASHES[number % 4])
     left, right, low, high = zip(*spans, strict=True)
@@ -297,15 +329,10 @@ def _draw_together(
 
 
 def _name_logs(figure: Figure, names: Sequence[str]) -> None:
-    """Add a legend that names the logs, above the panels, by what they do not share."""
-    words = [name.split(",") for name in names]
-    shared = sum(accumulate((len({*w}) == 1 for w in zip(*words, strict=False)), min))
-    names = [",".join(each[shared:] or each) for each in words]
+    """Add a legend that names the logs, above the panels."""
     samples = [
-        Line2D(
-            [], [], color=palette.series(k), linestyle=_LOG_DASHES[k % 4], label=name
-        )
-        for k, name in enumerate(map(curves.literal_text, names))
+        Line2D([], [], color=palette.run(k), linestyle=_LOG_DASHES[k % 4], label=name)
+        for k, name in enumerate(map(curves.math_text, names))
     ]
     long = sum(map(len, names)) > 14 * figure.get_figwidth()
     figure.legend(
@@ -320,7 +347,7 @@ def _letter_titles(
     axes: list[Axes], titles: list[str], pad: float | None = None
 ) -> None:
     y = None if pad is None else 1.0  # None: each title moves above its own ticks
-    for letter, one, title in zip("abcdefgh", axes, titles, strict=False):
+    for letter, one, title in zip("abcdefghijkl", axes, titles, strict=False):
         one.set_title(f"({letter})  {title}", y=y, pad=pad)
 
 
@@ -350,6 +377,17 @@ def _check(rollout: Rollout) -> None:
         raise PlotError(f"the log has no rows to draw ({rollout.status})")
 
 
+def differing(names: Sequence[str]) -> list[str]:
+    """Return names without the settings that all of them begin with.
+
+    ``panda-duration=4-gain=2`` and ``panda-duration=4-gain=8`` differ by ``gain=2`` and
+    ``gain=8``.
+    """
+    words = [name.split("-") for name in names]
+    shared = sum(accumulate((len({*w}) == 1 for w in zip(*words, strict=False)), min))
+    return ["-".join(each[shared:] or each) for each in words]
+
+
 _INCHES = {"mm": 1.0 / 25.4, "cm": 1.0 / 2.54, "in": 1.0}
 
 
@@ -372,10 +410,12 @@ def save_figures(
     formats: Sequence[str] = ("png",),
     *,
     absolute: bool = True,
+    width: str | float | None = None,
+    times: Sequence[float] | None = None,
 ) -> list[Path]:
     """Write ``<stem>-paper`` and ``<stem>-diagnostics`` in every format."""
-    paper = paper_figure(rollout, absolute=absolute)
-    diagnostics = diagnostics_figure(rollout)
+    paper = paper_figure(rollout, absolute=absolute, width=width, times=times)
+    diagnostics = diagnostics_figure(rollout, width=width)
     return [
         *save_figure(paper, Path(folder) / f"{stem}-paper", formats),
         *save_figure(diagnostics, Path(folder) / f"{stem}-diagnostics", formats),

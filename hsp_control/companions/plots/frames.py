@@ -48,14 +48,26 @@ def draw_frame(axes: Axes, rollout: Rollout, row: int, *, key: bool = True) -> N
     )
 
 
-def draw_frames(axes: Sequence[Axes], rollout: Rollout, rows: Sequence[int]) -> None:
-    """Draw numbered frames side by side; unused axes are switched off."""
+def draw_frames(
+    axes: Sequence[Axes],
+    rollout: Rollout,
+    rows: Sequence[int],
+    *,
+    short: bool = False,
+) -> None:
+    """Draw numbered frames side by side; unused axes are switched off.
+
+    ``short``: titles have the number and the time alone, where there is little space.
+    """
     for place, one in enumerate(axes):
         if place < len(rows):
             draw_frame(one, rollout, rows[place], key=False)
             # Before the time: at the right it would look like the next frame's.
-            number = rf"$\mathbf{{{place + 1}}}$   {one.get_title(loc='left')}"
-            one.set_title(number, fontsize=8.5, fontweight="normal", pad=3.0)
+            title = one.get_title(loc="left")
+            title = title.removeprefix("t = ") if short else f" {title}"
+            number = rf"$\mathbf{{{place + 1}}}$  {title}"
+            size = 7.5 if short else 8.5
+            one.set_title(number, fontsize=size, fontweight="normal", pad=3.0)
         else:
             one.set_axis_off()
 

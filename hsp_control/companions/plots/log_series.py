@@ -75,6 +75,18 @@ def joint_positions(rollout: Rollout, *, absolute: bool = True) -> tuple[Array, 
     return positions, "joint position"
 
 
+def decay_power(rollout: Rollout) -> Array | None:
+    """Return e_NᵀW K_N e_N at each row, shape (N,); None if K_N or W is not known."""
+    gain = rollout.meta.get("null_space_gain")
+    if gain is None or not rollout.meta.get("controls_null_space", True):
+        return None
+    K_N, e = np.asarray(gain, dtype=float), rollout["null_space_error"]
+    if np.array_equal(K_N, K_N[0, 0] * np.eye(len(K_N))):
+        return np.asarray(K_N[0, 0] * rollout["null_space_norm"] ** 2)
+    W = constant_metric(rollout)
+    return None if W is None else np.einsum("ni,ij,nj->n", e, W @ K_N, e)
+
+
 def constant_metric(rollout: Rollout) -> Array | None:
     """Return the metric W, shape (nv, nv); None if it is not constant."""
     if rollout.meta.get("metric") == "IdentityMetric":
@@ -182,7 +194,8 @@ def _center_of(meta: Mapping[str, Any], name: str) -> str:
 def _edge(meta: Mapping[str, Any], name: str) -> tuple[float | None, str]:
     center = _center_of(meta, name)
     if not center:
-        return 0.0, ""
+        kept = meta.get("columns", {}).get(f"distance.{name}", {}).get("minimum", 0.0)
+        return float(kept), f"limit {kept:g} m" if kept else ""
     about = meta.get("obstacles", {}).get(center, {})
     # Only a ball has its surface at one distance from its centre.
     if about.get("shape") != "Sphere" or about.get("radius") is None:

@@ -59,6 +59,9 @@ SERIES = (
 )
 """Lines of one kind, such as joints; without yellow, which is invisible on white."""
 
+RUNS = ("#332288", "#AA4499", "#117733", "#999933", "#882255", "#44AA99")
+"""Lines of one run each, by Tol: none is a colour of `SERIES`, which tells joints."""
+
 TASKS = (ACTUAL, TASK, "#CC79A7", "#56B4E9", INK)
 """Measured values of the first task, the second and so on."""
 
@@ -73,6 +76,11 @@ def blend(start: str, end: str, fraction: float) -> str:
 def series(index: int) -> str:
     """Return the colour of line ``index``; the colours repeat."""
     return SERIES[index % len(SERIES)]
+
+
+def run(index: int) -> str:
+    """Return the colour of run ``index`` of several; the colours repeat."""
+    return RUNS[index % len(RUNS)]
 
 
 def task(index: int) -> str:

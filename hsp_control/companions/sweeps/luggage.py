@@ -25,9 +25,10 @@ from hsp_control.companions.sweeps.plan import SweepPlan, changed, fingerprint
 from hsp_control.config import Experiment
 from hsp_control.config.document import Document
 from hsp_control.config.experiment import build
+from hsp_control.config.own_code import located_imports
 from hsp_control.control.first_state import StartWarning
 from hsp_control.declaration import Part
-from hsp_control.declaration.imported import import_file
+from hsp_control.declaration.imported import import_file, is_file_name
 from hsp_control.robot import Robot
 from hsp_control.robot.recorded import robot_record
 from hsp_control.simulation.log_writer import versions
@@ -52,7 +53,7 @@ class Luggage(WorkerPlugin):  # type: ignore[misc]
 
     def __init__(
         self, plan: SweepPlan, robot: Robot, identity: dict[str, Any],
-        imports: Iterable[Path],
+        imports: Iterable[str],
     ) -> None:  # fmt: skip
         """Pack it.
 
@@ -60,7 +61,8 @@ class Luggage(WorkerPlugin):  # type: ignore[misc]
             plan: The sweep.
             robot: The robot of its first run.
             identity: That of the sweep.
-            imports: Python files to run first.
+            imports: Python files and modules to import first, besides those that the
+                configuration lists.
 
         Raises:
             SweepError: If a type that the runs use has no file.
@@ -69,17 +71,22 @@ class Luggage(WorkerPlugin):  # type: ignore[misc]
         self.versions = versions()
         self.files: dict[str, bytes] = {}
         named = {*_strings([plan.base.to_dict(), *(_listed(f) for f in plan.factors)])}
-        scripts = dict.fromkeys([*map(Path.resolve, imports), *_declaring(named)])
+        base = Path(plan.base.name).resolve()
+        listed = plan.base.to_dict().get("imports") or ()
+        code = [*imports, *(located_imports(listed, base.parent))]
+        files = [Path(each).resolve() for each in code if is_file_name(each)]
+        modules = [each for each in code if not is_file_name(each)]
+        scripts = dict.fromkeys([*files, *_declaring(named, modules)])
         self.scripts = [
             (self._packed(script), str(script.parent)) for script in scripts
         ]
         # Absolute, because a worker may have another working folder.
-        base = Path(plan.base.name).resolve()
         self.config = str(base)
         self.data = {
             key: value if key == "robot" else self._with_files(value, base.parent)
             for key, value in plan.base.to_dict().items()
         }
+        self.data["imports"] = list(dict.fromkeys(modules))
         self.record, self.model = plan.base.recorded_robot, ""
         if not plan.varies_robot:
             self.model = identity["model"]
@@ -189,14 +196,20 @@ def _record(robot: Robot) -> dict[str, Any] | None:
     return record
 
 
-def _declaring(named: set[str]) -> Iterator[Path]:
-    """Yield the files of the types that the data name, and no package installs."""
+def _declaring(named: set[str], imported: Sequence[str]) -> Iterator[Path]:
+    """Yield the files of the types that the data name, and nothing else brings.
+
+    Else an installed package does, or a module that a worker imports.
+    """
+    packages = {each.partition(".")[0] for each in imported}
     for part in _subclasses(Part):
         family, name = part.family, part.yaml_type
         if name not in named or family is None or family.members.get(name) is not part:
             continue
         module = part.__module__
         if module.startswith("hsp_control.") or name in entry_points(family.name):
+            continue
+        if module.partition(".")[0] in packages:
             continue
         file = getattr(sys.modules.get(module), "__file__", None)
         if file is None:

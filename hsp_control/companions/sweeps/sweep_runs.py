@@ -16,7 +16,7 @@ from hsp_control.companions.sweeps.factor import factors
 from hsp_control.companions.sweeps.plan import SweepPlan
 from hsp_control.companions.sweeps.results import Sweep
 from hsp_control.config.document import read_document
-from hsp_control.declaration.imported import import_file
+from hsp_control.declaration.imported import import_code
 
 if TYPE_CHECKING:
     from distributed import Client
@@ -64,9 +64,10 @@ def sweep(
         out: A folder for Parquet files, whose name ends with ``.parquet``. Runs of the
             same sweep that are in it are not computed again. None: nothing is written.
         overrides: Values to change in all runs, each ``key.path=value``.
-        imports: Python files to run first, here and in each worker, for the functions
-            and types that the configuration names. Those that declare types which this
-            process knows and the configuration names travel by themselves.
+        imports: Python files or modules to import first, here and in each worker, for
+            the functions and types that the configuration names. Those that declare
+            types which this process knows and the configuration names travel by
+            themselves.
         scheduler: The address of a Dask scheduler, such as ``tcp://10.0.0.1:8786``, or
             a client of one; None: workers on this computer.
         workers: The number of these; None: one per core.
@@ -102,9 +103,9 @@ def sweep(
         raise SweepError(f"{workers} workers; needs at least 1")
     if workers is not None and scheduler is not None:
         raise SweepError("a scheduler has workers of its own: give one of the two")
-    files = [Path(file) for file in imports]
-    for file in files:
-        import_file(file)
+    own = [str(each) for each in imports]
+    for each in own:
+        import_code(each)
     plan = _plan(source, over, overrides, design, samples, seed)
     first, experiment = plan.first_run()
     if experiment.live_sources:
@@ -116,7 +117,7 @@ def sweep(
     path = None if out is None else Path(out)
     if path is not None and path.suffix != ".parquet":
         raise SweepError(f"{path}: the name of a sweep's folder must end with .parquet")
-    packed = luggage.Luggage(plan, experiment.robot, identity, files)
+    packed = luggage.Luggage(plan, experiment.robot, identity, own)
     rows = RowFiles(plan, identity, path, fresh=fresh)
     tell = on_progress or (lambda *_: None)
     try:

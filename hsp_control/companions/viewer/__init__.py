@@ -14,6 +14,8 @@ if TYPE_CHECKING:  # for type checkers; a help text must not import what is slow
     from .replay import view_logs as view_logs
     from .transport import SceneRecorder as SceneRecorder
     from .viewer import Viewer as Viewer
+    from .watching import Watch as Watch
+    from .watching import watch as watch
 
 __getattr__, __dir__ = at_first_use(
     __name__,
@@ -25,5 +27,6 @@ __getattr__, __dir__ = at_first_use(
         "replay": "robot_of show view_logs",
         "transport": "SceneRecorder",
         "viewer": "Viewer",
+        "watching": "Watch watch",
     },
 )

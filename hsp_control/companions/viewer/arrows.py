@@ -9,11 +9,11 @@ import numpy as np
 import pinocchio as pin
 
 from hsp_control.common.arrays import Array
-from hsp_control.companions.plots.palette import FIELD, TASK, WARNING
-from hsp_control.companions.viewer import threejs
-from hsp_control.companions.viewer.analysis import (
+from hsp_control.companions.plots.analysis import (
     null_space_projector,
 )
+from hsp_control.companions.plots.palette import FIELD, TASK, WARNING
+from hsp_control.companions.viewer import threejs
 from hsp_control.companions.viewer.commands import (
     Json,
     LegendEntry,

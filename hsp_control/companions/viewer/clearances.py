@@ -7,9 +7,9 @@ from typing import NamedTuple
 import numpy as np
 
 from hsp_control.common.arrays import Array
+from hsp_control.companions.plots.analysis import acts, terms_of_type
 from hsp_control.companions.plots.palette import COLLISION, OBSTACLE, SERIES, fractions
 from hsp_control.companions.viewer import threejs
-from hsp_control.companions.viewer.analysis import acts, terms_of_type
 from hsp_control.companions.viewer.arrows import bar_tracks, unit_bar
 from hsp_control.companions.viewer.commands import (
     Json,
@@ -126,7 +126,7 @@ class ClosestPoints(NamedTuple):
 
 
 class _Distance(NamedTuple):
-    """A distance that a field evaluates."""
+    """A distance that a field or a barrier evaluates."""
 
     kind: str  # its name in the legend
     path: str
@@ -135,7 +135,7 @@ class _Distance(NamedTuple):
 
 
 def distances(controller: Controller, root: str, color: str) -> Layer:
-    """Draw a bar per obstacle, from the closest link, while the field is active there.
+    """Draw a bar per obstacle, from the closest link, where a field would be active.
 
     Bars are seen through all else: meshes lie inside the capsules that are measured.
     They and the obstacle are red while a link is inside it.
@@ -182,13 +182,17 @@ def distances(controller: Controller, root: str, color: str) -> Layer:
 
 
 def _distances(controller: Controller, root: str) -> Iterator[_Distance]:
-    """Yield the distances that the controller's field evaluates."""
-    field = controller.field
-    for clearance in terms_of_type(field, Clearance):  # type: ignore[type-abstract]
-        for name, pairs in _pairs_by_obstacle(clearance, controller.state).items():
+    """Yield the distances that the controller's field and its barriers evaluate."""
+    field, drawn = controller.field, set[str]()
+    for clearance in _clearances(controller):
+        found = _pairs_by_obstacle(clearance, controller.state)
+        for name, pairs in found.items():
+            if name in drawn:  # a barrier keeps what the field already shows
+                continue
             path = f"{root}/{path_element(f'{clearance.name} {name}')}"
             closest = partial(_between_pairs, clearance, pairs)
             yield _Distance(_SURFACES, path, closest, "" if name == _SELF else name)
+        drawn |= found.keys()
     for term in terms_of_type(field, PointDistance):
         if isinstance(term.obstacle, Obstacle):  # in a placed field it is
             path = f"{root}/{path_element(f'{term.name} {term.obstacle.name}')}"

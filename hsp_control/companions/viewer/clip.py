@@ -7,8 +7,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hsp_control.companions.plots import palette
+from hsp_control.companions.plots.analysis import acts, from_the_start
 from hsp_control.companions.plots.log_series import spans_of
-from hsp_control.companions.viewer.analysis import acts, from_the_start
 from hsp_control.companions.viewer.commands import (
     CLIP,
     Json,
@@ -82,7 +82,7 @@ def _activities(
         yield singular, rollout["damped"] > 0.0
     obstacle = itself = np.zeros(len(rollout), bool)
     deepest = np.full(len(rollout), np.inf)
-    for name, field in _fields_of(controller).items():
+    for name, field in _fields_of(controller, rollout).items():
         if isinstance(field, Clearance) and f"distance.{name}" in rollout:
             distance = rollout[f"distance.{name}"]
             deepest = np.minimum(deepest, distance)
@@ -107,11 +107,13 @@ def _out_of_reach(task: Unreached) -> Band:
     return Band(name, f"{name}, {length}", palette.SERIES[0], [])
 
 
-def _fields_of(controller: Controller | None) -> dict[str, NullSpaceField]:
+def _fields_of(
+    controller: Controller | None, run: Rollout
+) -> dict[str, NullSpaceField]:
     """Return the fields at the run's start and now, by their names in the log."""
     if controller is None:
         return {}
-    return logged_terms(from_the_start(controller)) | logged_terms(controller)
+    return logged_terms(from_the_start(controller, run)) | logged_terms(controller)
 
 
 class Clip(NamedTuple):

@@ -9,7 +9,13 @@ from contextlib import AbstractContextManager, nullcontext
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from hsp_control.cli.options import AddedCommand, CommandPage, add_strict, loaded
+from hsp_control.cli.options import (
+    AddedCommand,
+    CommandPage,
+    add_import,
+    add_strict,
+    loaded,
+)
 
 if TYPE_CHECKING:
     from hsp_control.companions.viewer.comparison import ComparedRun
@@ -45,6 +51,7 @@ def _add_view_options(view: argparse.ArgumentParser) -> None:
         help="repeat the run; default: as the log says",
     )
     add_page(view)
+    add_import(view)
     add_strict(view)
 
 
@@ -96,6 +103,7 @@ def _add_export_options(export: argparse.ArgumentParser) -> None:
         metavar="LOG",
         help="written by hsp run; several logs make one page with a switch",
     )
+    add_import(export)
     add_strict(export)
     export.add_argument(
         "--html",

@@ -7,7 +7,7 @@ import numpy as np
 
 from hsp_control.common.arrays import Array, Indices
 from hsp_control.companions.plots import log_series, palette
-from hsp_control.companions.viewer.analysis import expected_floor
+from hsp_control.companions.plots.analysis import expected_floor
 from hsp_control.companions.viewer.commands import (
     PLOTS,
     Json,

@@ -206,7 +206,10 @@ class Page(WebSocketHandler):
     def _hear(self, text: str) -> None:
         if len(text.encode()) > _LONGEST:
             raise ValueError("the message is too long")
-        message = json.loads(text, parse_constant=_refuse)
+        try:
+            message = json.loads(text, parse_constant=_refuse)
+        except RecursionError:
+            raise ValueError("the message is nested too deeply") from None
         if not isinstance(message, dict) or not isinstance(message.get("do"), str):
             raise ValueError("a message is an object with a text `do`")
         mine = self.hub.steering is self
@@ -287,6 +290,28 @@ class FileHandler(RequestHandler):
         self.finish(content)
 
 
+_LONGEST_QUESTION = 100  # characters
+
+
+class Alive(RequestHandler):
+    """Proves to a page that has lost its program that this server has its key."""
+
+    def initialize(self, door: Door) -> None:
+        """Store who is let in; called by Tornado."""
+        self._door = door
+
+    def prepare(self) -> None:
+        """Check the host."""
+        self._door.check(self, needs_key=False)
+
+    def get(self) -> None:
+        """Answer a question by its HMAC."""
+        question = self.get_query_argument("question")[:_LONGEST_QUESTION]
+        key = self._door.key.encode()
+        self.set_header("Cache-Control", "no-store")
+        self.finish(hmac.new(key, question.encode(), "sha256").hexdigest())
+
+
 _CLOSING = 2.0
 """Longest time in which connections are closed in order [s]."""
 
@@ -309,6 +334,7 @@ class ServerThread:
         self._hub = hub
         self._routes: list[Any] = [
             (r"/scene", Page, {"hub": hub, "door": door}),
+            (r"/alive", Alive, {"door": door}),
             (r"/(.*)", FileHandler, {"files": files, "door": door}),
         ]
         self._listener = _listen(door.host, port)

@@ -16,6 +16,7 @@ from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
 
 from hsp_control.cli.consoles import errors, out, working
 from hsp_control.cli.interrupts import end_in_order
+from hsp_control.cli.loading import run_imports
 from hsp_control.common.exceptions import ExportError, HspControlError, ViewerError
 from hsp_control.companions.viewer import (
     ComparedRun,
@@ -150,6 +151,7 @@ def _say_without(error: ViewerError) -> None:
 
 def show_logs(options: argparse.Namespace) -> None:
     """Play logs until the user closes the view."""
+    run_imports(options)
     with ExitStack() as stack:
         server = stack.enter_context(closing(PageServer(options.port)))
         draw_empty(server, ", ".join(log.stem for log in options.logs))
@@ -209,6 +211,7 @@ def export(
                 f"{formats[ending][0]} shows one run, {len(options.logs)} logs are "
                 "given: give one log, or --html for a page with a switch between them"
             )
+    run_imports(options)
     strict = options.strict or bool(options.allow)
     access = access_for(options.logs, strict, options.allow)
     runs = _titled(load_runs(options.logs, access))

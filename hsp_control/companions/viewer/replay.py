@@ -14,6 +14,7 @@ from hsp_control.companions.viewer.viewer import Viewer
 from hsp_control.config.document import Document
 from hsp_control.config.experiment import build
 from hsp_control.config.loaded_scenario import load_robot, validate
+from hsp_control.config.logged_run import logged_document
 from hsp_control.config.recorded_scene import with_recorded_scene
 from hsp_control.config.scenario import Scenario
 from hsp_control.control.controller import Controller
@@ -185,10 +186,7 @@ def _document(rollout: Rollout, access: Access) -> Document:
             f"{name!r}{_why_missing(rollout)}; give the robot, as in "
             "Viewer(robot).play(rollout)"
         )
-    document = Document(rollout.config, {}, "the log's configuration")
-    document.access = access
-    document.recorded_robot = usable_record(rollout.meta)
-    return document
+    return logged_document(rollout, access)
 
 
 def _why_missing(rollout: Rollout) -> str:

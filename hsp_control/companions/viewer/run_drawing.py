@@ -6,7 +6,7 @@ import numpy as np
 
 from hsp_control.common.arrays import Array
 from hsp_control.companions.plots import palette
-from hsp_control.companions.viewer.analysis import from_the_start
+from hsp_control.companions.plots.analysis import from_the_start
 from hsp_control.companions.viewer.arrows import contacts, ellipsoid, self_motion
 from hsp_control.companions.viewer.clearances import capsules, distances, influence
 from hsp_control.companions.viewer.clip import Band, Clip
@@ -51,7 +51,7 @@ def all_layers(
         "contacts": contacts(robot, motion, f"{root}/contacts"),
     }
     if controller is not None:
-        controller = from_the_start(controller)
+        controller = from_the_start(controller, motion.rows)
         shown, ink = logged_shapes(motion.rows), line_color(dark=dark)
         layers |= {
             "influence": influence(controller.field, shown, f"{root}/influence"),

@@ -5,11 +5,13 @@ import logging
 import os
 import secrets
 import sys
+import tempfile
 import threading
 import time
 import webbrowser
 from collections.abc import Iterable
 from contextlib import suppress
+from html import escape
 from pathlib import Path
 from typing import Any
 
@@ -57,8 +59,38 @@ def open_browser(url: str) -> bool:
     if reason is not None:
         _log.warning("%s; the view is at %s", reason, url)
         return False
-    threading.Thread(target=webbrowser.open, args=(url, 2), daemon=True).start()
+    threading.Thread(target=_open, args=(url,), daemon=True).start()
     return True
+
+
+def _open(url: str) -> None:
+    """Open a page through a file that leads there: arguments are seen by all users."""
+    file = _leading_to(url)
+    webbrowser.open(url if file is None else file.as_uri(), 2)
+    if file is not None:
+        time.sleep(_READ)
+        file.unlink(missing_ok=True)
+
+
+_READ = 30.0  # time in which a browser has read the file [s]
+
+
+def _leading_to(url: str) -> Path | None:
+    """Return a file that only this user can read, and that leads to a page."""
+    page = (
+        '<!DOCTYPE html><meta charset="utf-8"><title>hsp_control</title>'
+        f'<meta http-equiv="refresh" content="0;url={escape(url)}">'
+    )
+    try:
+        own = os.environ.get("XDG_DATA_HOME") or Path.home() / ".local" / "share"
+        folder = Path(own) / "hsp_control"  # where Jupyter has such files, too
+        folder.mkdir(parents=True, exist_ok=True)
+        number, name = tempfile.mkstemp(".html", "open-", folder)  # mode 0600
+        with os.fdopen(number, "w") as file:
+            file.write(page)
+    except (OSError, RuntimeError):  # no place for it
+        return None
+    return Path(name)
 
 
 def _why_not() -> str | None:
@@ -85,9 +117,14 @@ class PageServer(SceneRecorder):
     """A server for the page, see `page_server`: a thread that ends with the program."""
 
     def __init__(
-        self, port: int | None = None, *, host: str = LOOPBACK, steerable: bool = False
+        self,
+        port: int | None = None,
+        *,
+        host: str = LOOPBACK,
+        steerable: bool = False,
+        fresh: bool = False,
     ) -> None:
-        """Begin to listen."""
+        """Begin to listen; ``fresh``: with a key that no earlier page has."""
         # Here: Tornado is only needed where there is a page.
         from hsp_control.companions.viewer.page_server import Door, Hub, ServerThread
 
@@ -100,7 +137,7 @@ class PageServer(SceneRecorder):
             )
         super().__init__()
         self._hub = Hub(self.scene, steerable=steerable)
-        door, meshcat = Door(host, page_key(host)), meshcat_page()
+        door, meshcat = Door(host, page_key(host, fresh=fresh)), meshcat_page()
         try:
             self._thread = ServerThread(self._hub, door, port or 0, meshcat)
         except OSError as error:
@@ -158,28 +195,29 @@ class PageServer(SceneRecorder):
             raise ViewerError(f"the page's server has failed: {name} {text}".strip())
 
 
-def page_key(host: str) -> str:
+def page_key(host: str, *, fresh: bool = False) -> str:
     """Return what a page's address must contain.
 
     On this computer it is the user's, in a file that nobody else can read, so that an
-    open page finds the next start. In a network it is new at each start.
+    open page finds the next start. In a network, or if it is to be ``fresh``, it is new
+    at each start.
     """
-    fresh = secrets.token_urlsafe(16)
-    if host != LOOPBACK:
-        return fresh
+    new = secrets.token_urlsafe(16)
+    if fresh or host != LOOPBACK:
+        return new
     try:
         cache = os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache"
         file = Path(cache) / "hsp_control" / "page-key"
         file.parent.mkdir(parents=True, exist_ok=True)
         with suppress(FileExistsError):
             opened = os.open(file, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o600)
-            os.write(opened, fresh.encode())
+            os.write(opened, new.encode())
             os.close(opened)
         about, kept = file.stat(), file.read_text()
     except (OSError, RuntimeError, UnicodeDecodeError):  # no place for it
-        return fresh
+        return new
     private = about.st_uid == os.getuid() and not about.st_mode & 0o077
-    return kept if private and len(kept) == len(fresh) else fresh
+    return kept if private and len(kept) == len(new) else new
 
 
 def meshcat_page() -> Path:

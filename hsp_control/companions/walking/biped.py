@@ -10,7 +10,7 @@ from hsp_control.companions.walking.legs import leg_freedoms, root_frame
 from hsp_control.companions.walking.locomotion import MovingPlan
 from hsp_control.companions.walking.plan_composition import composed
 from hsp_control.constraints.contacts import Contact, SurfaceContact
-from hsp_control.control.plan import PlanParts
+from hsp_control.control.interface import PlanParts
 from hsp_control.declaration import within
 from hsp_control.declaration.quantities import (
     Flag,

@@ -6,7 +6,7 @@ import numpy as np
 
 from hsp_control.common.arrays import Array
 from hsp_control.companions.walking.written_part import Written
-from hsp_control.control.evolution import HELD
+from hsp_control.control.interface import HELD
 from hsp_control.declaration.quantities import Flag, NonNegative
 from hsp_control.trajectories.schedule import Intervals, Schedule, smooth_step
 

@@ -12,8 +12,7 @@ from hsp_control.companions.walking.four_feet import PointFoot, RunningQuadruped
 from hsp_control.companions.walking.polygon import convex_hull, nearest_inside
 from hsp_control.companions.walking.quadruped import QuadrupedPlan
 from hsp_control.companions.walking.quintic import at_rest, to_rest
-from hsp_control.control.controller import Controller
-from hsp_control.control.measurement import Measurement
+from hsp_control.control.interface import Controller, Measurement
 from hsp_control.declaration.quantities import Positive, ProperFraction
 from hsp_control.robot import RobotState
 from hsp_control.tasks import Gains

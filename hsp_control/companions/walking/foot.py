@@ -11,7 +11,7 @@ from hsp_control.companions.walking.planned_references import Fed, FedOrientatio
 from hsp_control.companions.walking.polygon import convex_hull
 from hsp_control.companions.walking.swing import Swing, turned
 from hsp_control.constraints.contacts import SurfaceContact
-from hsp_control.control.controller import Controller
+from hsp_control.control.interface import Controller
 from hsp_control.robot import RobotState
 from hsp_control.trajectories import ComposedPose
 

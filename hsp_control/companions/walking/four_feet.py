@@ -16,10 +16,13 @@ from hsp_control.companions.walking.planned_references import Fed, FedOrientatio
 from hsp_control.companions.walking.quadruped import QuadrupedPlan
 from hsp_control.companions.walking.quintic import at_rest, to_rest
 from hsp_control.companions.walking.swing import Swing, turned
-from hsp_control.control.controller import Controller
-from hsp_control.control.falling import FallDetector
-from hsp_control.control.measurement import LogChannel, Measurement
-from hsp_control.control.plan import RunningPlan
+from hsp_control.control.interface import (
+    Controller,
+    FallDetector,
+    LogChannel,
+    Measurement,
+    RunningPlan,
+)
 from hsp_control.robot import RobotState
 
 LATE = 0.12

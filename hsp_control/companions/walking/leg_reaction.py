@@ -31,7 +31,7 @@ from hsp_control.common.arrays import Array
 from hsp_control.companions.walking.footsteps import Footstep
 from hsp_control.companions.walking.pendulum import GRAVITY
 from hsp_control.companions.walking.swing import Swing
-from hsp_control.control.controller import Controller
+from hsp_control.control.interface import Controller
 from hsp_control.law import MetricSample
 from hsp_control.robot import RobotState
 

@@ -7,7 +7,7 @@ import numpy as np
 
 from hsp_control.common.exceptions import PlanError
 from hsp_control.companions.walking.footsteps import Velocity
-from hsp_control.control.plan import Plan
+from hsp_control.control.interface import Plan
 from hsp_control.declaration import within
 from hsp_control.declaration.quantities import Number
 from hsp_control.trajectories import Trajectory

@@ -8,7 +8,7 @@ from hsp_control.common.exceptions import PlanError
 from hsp_control.companions.walking.contact_switch import Switch
 from hsp_control.companions.walking.planned_references import Fed, FedOrientation
 from hsp_control.constraints.contacts import Contact
-from hsp_control.control.plan import PlanParts
+from hsp_control.control.interface import PlanParts
 from hsp_control.declaration import within
 from hsp_control.tasks import CenterOfMass, FrameOrientation, FramePose, Task
 from hsp_control.tasks.frame_task import TrackingTask

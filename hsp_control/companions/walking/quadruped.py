@@ -12,7 +12,7 @@ from hsp_control.companions.walking.locomotion import MovingPlan
 from hsp_control.companions.walking.plan_composition import composed
 from hsp_control.constraints.contacts import Contact
 from hsp_control.constraints.limits import Limits
-from hsp_control.control.plan import PlanParts
+from hsp_control.control.interface import PlanParts
 from hsp_control.declaration import within
 from hsp_control.declaration.quantities import Names, Positive
 from hsp_control.robot import Robot

@@ -12,9 +12,14 @@ from hsp_control.common.exceptions import PlanError
 from hsp_control.common.suggestions import did_you_mean, listing
 from hsp_control.companions.walking.contact_switch import Switch, Switched
 from hsp_control.constraints.contacts import Contact
-from hsp_control.control.controller import Controller
-from hsp_control.control.measurement import LogChannel, Measurement
-from hsp_control.control.plan import Plan, PlanParts, RunningPlan
+from hsp_control.control.interface import (
+    Controller,
+    LogChannel,
+    Measurement,
+    Plan,
+    PlanParts,
+    RunningPlan,
+)
 from hsp_control.declaration import Part, within
 from hsp_control.declaration.nested import BY_NAME
 from hsp_control.declaration.quantities import (

@@ -10,8 +10,7 @@ from hsp_control.companions.walking.footsteps import Footstep
 from hsp_control.companions.walking.four_feet import PointFoot, RunningQuadruped
 from hsp_control.companions.walking.pendulum import GRAVITY
 from hsp_control.companions.walking.quadruped import QuadrupedPlan
-from hsp_control.control.controller import Controller
-from hsp_control.control.measurement import Measurement
+from hsp_control.control.interface import Controller, Measurement
 from hsp_control.robot import RobotState
 from hsp_control.tasks import Gains
 

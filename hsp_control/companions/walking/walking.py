@@ -29,10 +29,13 @@ from hsp_control.companions.walking.push_recovery import PlannedSwing, PushRecov
 from hsp_control.companions.walking.quintic import at_rest, to_rest
 from hsp_control.companions.walking.step_planner import StepPlanner, stance_of
 from hsp_control.companions.walking.swing import Swing, turned
-from hsp_control.control.controller import Controller
-from hsp_control.control.falling import FallDetector
-from hsp_control.control.measurement import LogChannel, Measurement
-from hsp_control.control.plan import RunningPlan
+from hsp_control.control.interface import (
+    Controller,
+    FallDetector,
+    LogChannel,
+    Measurement,
+    RunningPlan,
+)
 from hsp_control.robot import RobotState
 
 FIRST_SHIFT = (0.4, 0.6)

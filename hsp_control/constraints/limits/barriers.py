@@ -18,10 +18,10 @@ from hsp_control.declaration import Part
 from hsp_control.declaration.quantities import Names, NonNegative, Number
 from hsp_control.engine.plans import OnlyIf, PartCall, PartCalls, says
 from hsp_control.geometry.scene import Start
-from hsp_control.null_space.differences import gradient
 from hsp_control.null_space.fields import Clearance, ObstacleClearance, SelfClearance
 from hsp_control.null_space.fields.clearance import ObstacleOrName
 from hsp_control.robot import RobotState
+from hsp_control.robot.differences import gradient
 from hsp_control.robot.gravity import Gravity
 
 _SPAN = 3e-3
@@ -274,6 +274,15 @@ class MinimumDistance(Barrier):
                 f"the start is outside the limits: {pair} are {distance:.4g} m apart, "
                 f"must be at least {self.minimum:g} m"
             )
+
+
+def barrier_names(barriers: Sequence[Barrier]) -> list[str]:
+    """Return what a log calls barriers: their types, several of one type numbered."""
+    types = [each.yaml_type or type(each).__name__ for each in barriers]
+    return [
+        name if types.count(name) == 1 else f"{name}_{k}"
+        for k, name in enumerate(types)
+    ]
 
 
 class _Elsewhere:

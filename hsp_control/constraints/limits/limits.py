@@ -79,10 +79,14 @@ class RobotLimits:
         positions = self.robot.joint_positions(q)
         outside = np.flatnonzero((positions < self.lower) | (positions > self.upper))
         if outside.size:
-            i = outside[0]
+            i, hint = outside[0], ""
+            if in_degrees(
+                self.robot.units[i], self.lower[i], self.upper[i], positions[i]
+            ):
+                hint = ": degrees? Angles are in rad"
             raise LimitError(
                 f"the start is outside the limits: {names[i]} is at {positions[i]:.6g},"
-                f" its limits are {self.lower[i]:.6g} to {self.upper[i]:.6g}"
+                f" its limits are {self.lower[i]:.6g} to {self.upper[i]:.6g}{hint}"
             )
         state = self.robot.state(0.0, q, v)
         for each in self.barriers:
@@ -94,6 +98,23 @@ class RobotLimits:
                 f"the start is outside the limits: {names[i]} moves at {v[i]:.6g}, "
                 f"its limit is {self.velocity[i]:.6g}"
             )
+
+
+_FAR = 2.0
+"""An angle this many times its joint's range from the middle is no angle in rad."""
+_NEAR = 1.0
+"""Nearer than this it is not degrees, however small the range [rad]."""
+
+
+def in_degrees(unit: str, lower: float, upper: float, position: float) -> bool:
+    """Return whether a joint's position is so far from its range that it is degrees.
+
+    Continuous and sliding joints are not looked at.
+    """
+    if unit != "rad" or not np.isfinite(upper - lower):
+        return False
+    away = abs(position - 0.5 * (lower + upper))
+    return bool(away > max(_FAR * (upper - lower), _NEAR))
 
 
 BANDWIDTH = 10.0

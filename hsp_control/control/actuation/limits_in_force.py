@@ -7,7 +7,11 @@ import numpy as np
 
 from hsp_control import engine
 from hsp_control.common.arrays import Array
-from hsp_control.constraints.limits import RobotLimits
+from hsp_control.constraints.limits import (
+    MinimumDistance,
+    RobotLimits,
+    barrier_names,
+)
 from hsp_control.constraints.limits.acceleration_bounds import (
     Bounds,
     Ends,
@@ -66,6 +70,8 @@ class LimitsInForce:
         self.sent = SentEffort(state)
         self._rate = False
         self._all: list[tuple[LimitSet, Evolution[float]]] = []
+        # where the steps write the distances of barriers [m], by the barriers' names
+        self.measured: list[tuple[str, Array]] = []
         self.plan(planned, -np.inf)
 
     def plan(self, planned: PlannedLimits, t: float) -> None:
@@ -86,6 +92,17 @@ class LimitsInForce:
             shares = [(each, share.at(t)) for each, share in self._all]
             # each set that counts, and its share in (0, 1]
             self.sets = [pair for pair in shares if pair[1] > 0.0]
+            self.measured = self._measured()
+
+    def _measured(self) -> list[tuple[str, Array]]:
+        """Return where each step writes the distances of barriers, by their names."""
+        limits, state = [each.limits for each, _ in self.sets], self._state
+        barriers = [b for each in limits if each is not None for b in each.barriers]
+        return [
+            (name, each.clearance.proximity(state).distances)
+            for name, each in zip(barrier_names(barriers), barriers, strict=True)
+            if isinstance(each, MinimumDistance)
+        ]
 
     @property
     def all(self) -> list[LimitSet]:

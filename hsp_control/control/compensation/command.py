@@ -64,7 +64,7 @@ class Command:
         self.state = controller.state
         self._measured = self.state
         if own.predictor is not None:
-            self._measured = RobotState(robot, self.state.dynamics)
+            self._measured = self.state.another()
         self._tau = np.zeros(robot.nv)
         feedback = own.force_feedback
         self.feels_contacts = feedback is not None and feedback.force == "measured"

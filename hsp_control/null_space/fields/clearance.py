@@ -19,9 +19,9 @@ from hsp_control.engine.plans import PartCall, PartCalls, says
 from hsp_control.geometry import LinkShape, Proximity, Proxy, link_shapes, self_pairs
 from hsp_control.geometry.scene import Obstacle, Start
 from hsp_control.law import FieldSample, MetricSample
-from hsp_control.null_space.differences import rate_along_flow
 from hsp_control.null_space.fields.cost import Cost, descent
 from hsp_control.robot import Robot, RobotState
+from hsp_control.robot.differences import rate_along_flow
 
 
 class Clearance(Cost):

@@ -11,9 +11,9 @@ from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import FieldError
 from hsp_control.declaration.imported import AS_TEXT, NAMED
 from hsp_control.law import FieldSample, MetricSample
-from hsp_control.null_space.differences import rate_along_flow
 from hsp_control.null_space.fields.field import NullSpaceField
 from hsp_control.robot import RobotState
+from hsp_control.robot.differences import rate_along_flow
 
 
 class VectorField(NullSpaceField):

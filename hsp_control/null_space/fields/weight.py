@@ -12,8 +12,8 @@ from hsp_control.common.exceptions import FieldError
 from hsp_control.declaration import Part
 from hsp_control.declaration.quantities import NonNegative, Number, Positive
 from hsp_control.engine.plans import PartCall
-from hsp_control.null_space.differences import rate_along_flow
 from hsp_control.robot import RobotState
+from hsp_control.robot.differences import rate_along_flow
 
 
 class Weight(Part, ABC, error=FieldError):

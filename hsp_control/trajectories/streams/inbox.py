@@ -237,6 +237,11 @@ class Reader:
         other._number, other._missed = self._number, self._missed.copy()
         return other
 
+    def catch_up(self, other: "Reader") -> None:
+        """Take first what another reader has taken in its run, each at its time."""
+        self._number = other._number
+        self._missed = [Received(other._number, each) for each in [*other.record]]
+
     def _add(self, message: Message) -> None:
         """Record a message, as long as there is room."""
         most = MOST if self.logged else min(BRIEF, MOST)

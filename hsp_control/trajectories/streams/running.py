@@ -260,6 +260,10 @@ class RunningStream:
         """Know the reference from a time on until a later one [s]."""
         self._kept[since] = max(until, self._kept.get(since, -inf))
 
+    def catch_up(self, reader: Reader) -> None:
+        """Hear first what a reader has taken in its run already."""
+        self._source.catch_up(reader)
+
     def copy(self) -> "RunningStream":
         """Return one that goes on from here by itself."""
         other = copy(self)

@@ -354,6 +354,14 @@ class Streamed(Remembering, error=TrajectoryError):
                 vars(copy)["_running"] = self.running.copy()
         return copy
 
+    def catch_up(self) -> None:
+        """Hear what the run that it previews has heard already, each at its time.
+
+        As far as the record goes: see `record`.
+        """
+        if (reader := self._mailbox.reader) is not None:
+            self.running.catch_up(reader)
+
     def preview(self) -> Self:
         """Return a stream that hears the same, but counts as heard for itself alone."""
         copy = self._shared(replace(self))

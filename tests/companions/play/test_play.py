@@ -12,10 +12,11 @@ from clips import Recorder, told
 import hsp_control as hsp
 from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import ConfigError
-from hsp_control.companions.play import Picture, Session, play
+from hsp_control.companions.play import Session, play
 from hsp_control.companions.play.knobs import _scaled, knobs_of
 from hsp_control.companions.play.playable import playable
 from hsp_control.companions.viewer import Viewer
+from hsp_control.companions.viewer.live_picture import Picture
 
 PANDA = "panda_obstacle"
 

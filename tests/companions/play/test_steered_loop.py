@@ -10,7 +10,6 @@ import pytest
 
 import hsp_control as hsp
 from hsp_control.cli.live_experiment import simulated_robot
-from hsp_control.companions.play import Picture
 from hsp_control.companions.play.live_loop import (
     TIMEOUT,
     Channel,
@@ -20,6 +19,7 @@ from hsp_control.companions.play.live_loop import (
     channel_pair,
 )
 from hsp_control.companions.viewer import SceneRecorder, Viewer
+from hsp_control.companions.viewer.live_picture import Picture
 from hsp_control.control.compensation import Command
 from hsp_control.live import InProcessRobot, LoopReport, OperatorRequests, run_loop
 from hsp_control.null_space.fields.field import terms_of

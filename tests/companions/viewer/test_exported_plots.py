@@ -9,9 +9,9 @@ import hsp_control.companions.plots as plots
 from hsp_control import Rollout, load_experiment
 from hsp_control.cli import main
 from hsp_control.common.exceptions import ExportError
+from hsp_control.companions.plots.analysis import expected_floor
 from hsp_control.companions.plots.log_series import held_period
 from hsp_control.companions.viewer import ComparedRun, export_html
-from hsp_control.companions.viewer.analysis import expected_floor
 from hsp_control.companions.viewer.packing import ArrayTable
 from hsp_control.companions.viewer.page_plots import Edge, Panel, pack_panels, panels_of
 

@@ -9,11 +9,11 @@ import pytest
 from clips import Clip, Recorder, told
 
 from hsp_control import Experiment, Robot, Rollout, load_experiment
-from hsp_control.companions.viewer import ComparedRun, LiveView, Viewer, live
-from hsp_control.companions.viewer.analysis import (
+from hsp_control.companions.plots.analysis import (
     null_space_projector,
     terms_of_type,
 )
+from hsp_control.companions.viewer import ComparedRun, LiveView, Viewer, live
 from hsp_control.companions.viewer.arrows import ELLIPSOID_SECONDS, principal_axes
 from hsp_control.companions.viewer.clearances import capsules, zone
 from hsp_control.companions.viewer.commands import CAPTION, CLIP, unpack

@@ -1,6 +1,7 @@
 """Check the view's server: to this machine alone, and it leaves nothing behind."""
 
 import asyncio
+import hmac
 import socket
 import subprocess
 import sys
@@ -274,6 +275,50 @@ def test_a_key_that_others_can_read_is_not_kept(
     assert file.read_text() == key == page_key("127.0.0.1")
     file.chmod(0o644)
     assert page_key("127.0.0.1") != key
+
+
+def test_a_page_that_lost_its_program_keeps_its_key(
+    steered: PageServer,
+) -> None:
+    """Whoever listens there answers a question if it has the key, and is not told."""
+    assert steered.url is not None
+    address, _, query = steered.url.partition("?")
+    key, question = query.removeprefix("key="), "a1b2"
+    with urllib.request.urlopen(f"{address}alive?question={question}") as answer:
+        told = answer.read().decode()
+    assert told == hmac.new(key.encode(), question.encode(), "sha256").hexdigest()
+    script = (Path(transport.__file__).parent / "page" / "scene.js").read_text()
+    asks = script[
+        script.index("async function lookForNext") : script.index("// From Pin")
+    ]
+    assert "fetch(`alive?question=" in asks
+    assert "fetch(location" not in asks
+
+
+def test_hardware_gets_a_key_that_no_earlier_page_has() -> None:
+    assert page_key("127.0.0.1", fresh=True) != page_key("127.0.0.1", fresh=True)
+    assert page_key("127.0.0.1", fresh=True) != page_key("127.0.0.1")
+
+
+def test_a_browser_is_started_without_the_key_in_its_arguments(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """All users see the arguments of a process; the file is this user's alone."""
+    monkeypatch.setenv("XDG_DATA_HOME", str(tmp_path))
+    seen: list[tuple[str, int, str]] = []
+
+    def look(url: str, new: int) -> None:
+        file = Path(url.removeprefix("file://"))
+        seen.append((url, file.stat().st_mode & 0o777, file.read_text()))
+
+    monkeypatch.setattr(transport.webbrowser, "open", look)
+    monkeypatch.setattr(transport, "_READ", 0.0)
+    transport._open("http://127.0.0.1:7000/?key=secret")
+    ((url, mode, text),) = seen
+    assert "secret" not in url
+    assert mode == 0o600
+    assert "url=http://127.0.0.1:7000/?key=secret" in text
+    assert not list((tmp_path / "hsp_control").iterdir())
 
 
 def test_one_page_steers_at_a_time(steered: PageServer) -> None:

@@ -22,7 +22,7 @@ from hsp_control.cli.interrupts import DeferredInterrupt
 
 MOVING = "paper/4_moving_obstacle"
 SHORT = ["--set", "simulation.duration=0.1"]
-LOG = "4_moving_obstacle,simulation.duration=0.1.npz"
+LOG = "4_moving_obstacle-simulation.duration=0.1.npz"
 
 
 def test_run_leaves_a_log_that_numpy_alone_reads(
@@ -82,14 +82,14 @@ def test_a_log_is_not_replaced_by_its_repetition(
     shown = ["--set", "title=Once more", "--set", "view.speed=2"]
     assert main([*run, str(log), *shown]) == 0
     told = json.loads(capsys.readouterr().out)
-    again = tmp_path / "4_moving_obstacle,simulation.duration=0.1-again.npz"
+    again = tmp_path / "4_moving_obstacle-simulation.duration=0.1-again.npz"
     assert told["log"] == str(again)
     setting = f"description={'x' * 200}", f"tasks.tip.gains={{kp: 100, kv: {20:0130d}}}"
     long = [word for each in setting for word in ("--set", each)]
     assert main([*run, str(log), *long]) == 0
     name = Path(json.loads(capsys.readouterr().out)["log"]).name
     assert re.fullmatch(
-        r"4_.*0\.1,tasks\.tip\.gains=.kp:_100,_kv:_0+-[0-9a-f]{8}\.npz", name
+        r"4_.*0\.1-tasks\.tip\.gains=.kp:_100-kv:_0+-[0-9a-f]{8}\.npz", name
     )
     assert log.read_bytes() == before
     elsewhere = tmp_path / "elsewhere"

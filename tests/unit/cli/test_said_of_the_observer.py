@@ -9,8 +9,8 @@ import pytest
 import yaml
 
 from hsp_control.cli.main import main
-from hsp_control.cli.run_summary import unexplained_rows
 from hsp_control.config import load_experiment
+from hsp_control.simulation.run_summary import unexplained_rows
 
 CONFIG: dict[str, Any] = {
     "robot": {"name": "panda"},

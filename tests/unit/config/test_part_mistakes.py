@@ -28,6 +28,7 @@ BASE: dict[str, Any] = {
 }
 TASKS = (
     "angular_momentum, center_of_mass, frame_orientation, frame_pose, frame_position, "
+    "function_task, "
     "joint_posture, pointing, relative_pose"
 )
 GAINS = {"kp": 1, "kv": 1}

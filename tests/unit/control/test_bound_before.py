@@ -32,6 +32,7 @@ CHANGES: dict[str, Callable[[Changes], object]] = {
     "no limits": lambda at: at.limits(None),
     "obstacle": lambda at: at.obstacle("ball", hsp.Hold([0.5, 0.3, 0.4])),
     "payload": lambda at: at.payload("panda_hand", 1.0),
+    "tool": lambda at: at.tool("panda_tcp", [0.0, 0.0, 0.1], [0.0, 0.5, 0.0]),
     "gravity": lambda at: at.gravity([0.0, 1.0, -9.7]),
 }
 
@@ -107,6 +108,42 @@ def test_changes_that_go_on_are_forgotten(monkeypatch: pytest.MonkeyPatch) -> No
     assert len(made._time_line.open) < 15
     with nothing_bound(monkeypatch):
         step(made, 3010)
+
+
+@pytest.mark.parametrize("kind", CHANGES)
+def test_what_is_over_is_forgotten(kind: str) -> None:
+    """Of many changes no more stays than of the first ones, in whatever is kept."""
+
+    def kept(number: int) -> tuple[int, str, int]:
+        # as many steps for any number: they are counted, in the clock's check as well
+        made = controller()
+        step(made, 0)
+        for k in range(1, 1500):
+            if k % 40 == 1 and k < 40 * number:
+                begin = made.at(k * H).ramp(0.02)
+                CHANGES[kind](begin)
+                if kind == "remove":
+                    begin.add(hsp.FramePosition(name="hand"))
+                elif kind == "add":
+                    made.at((k + 30) * H).ramp(0.005).remove("turned")
+                elif kind == "replace":
+                    made.at((k + 30) * H).ramp(0.005).remove("new").add(
+                        hsp.FramePosition(name="hand")
+                    )
+                elif kind == "exchange":
+                    begin.exchange("target_posture", hsp.TargetPosture(REST))
+                    begin.field(hsp.TargetPosture(REST, name="posture"))
+            step(made, k)
+        for k in range(3000, 3003):
+            step(made, k)
+        assert not made.changes
+        assert not made._time_line.open
+        plan = str(made.step_plan)
+        return len(pickle.dumps(made)), repr(made), len(plan)
+
+    few, many = kept(2), kept(30)
+    assert many[1:] == few[1:]
+    assert abs(many[0] - few[0]) < 50  # digits of counts and times
 
 
 def test_a_schedule_is_bound_beforehand(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -17,8 +17,8 @@ from scipy.integrate import quad, solve_ivp
 
 import hsp_control as hsp
 from hsp_control.common.arrays import Array
-from hsp_control.null_space.differences import rate_along_flow
 from hsp_control.null_space.fields import FieldSample
+from hsp_control.robot.differences import rate_along_flow
 from hsp_control.robot.integrators import Dop853
 from hsp_control.trajectories import HoldOrientation, Lissajous, Spin
 from hsp_control.trajectories.schedule import smooth_step

@@ -246,7 +246,7 @@ def holding(
 def test_the_robot_grows_just_above_and_dies_just_below(
     gains: Any, limit: float, delay: int
 ) -> None:
-    """3 % to either side of the limit; benchmarks/rate_limits.py has twenty such."""
+    """3 % to either side of the limit."""
     for side in (-1.0, 1.0):
         made = holding(**gains((1.0 + 0.03 * side) * limit / H))
         engine = IntegratedPlant(RigidBodyPlant(PANDA), Rk4(H))

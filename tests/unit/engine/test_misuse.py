@@ -159,7 +159,8 @@ def track(axes: Any) -> Any:
         "jacobian": np.zeros((3, n)),
         "jacobian_dot": np.zeros((3, n)),
     }
-    point |= {"position": np.zeros(3), "velocity": np.zeros(3)}
+    motion = ("position", "velocity", "own_acceleration")
+    point |= {name: np.zeros(3) for name in motion}
     desired: dict[str, Any] = {"position": np.zeros(m), "velocity": np.zeros(m)}
     return engine.TrackAxes(
         axes=axes,

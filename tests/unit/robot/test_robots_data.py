@@ -65,14 +65,17 @@ def links(path: Path) -> list[ElementTree.Element]:
 
 @pytest.mark.parametrize("name", NAMES)
 def test_files_name_no_place_on_this_machine(name: str) -> None:
-    """No absolute path; no address but the licence's and the meshes' package."""
+    """No absolute path; no address but licence, meshes' package and their schema."""
     assert ElementTree.parse(urdf(name)).getroot().attrib["name"] == name
-    for file in sorted((ROBOTS / name).iterdir()):
+    for file in sorted((ROBOTS / name).rglob("*.*")):
         text = file.read_text(encoding="utf-8")
         assert not re.search(r"(?<![\w./])/(home|root|work|tmp|usr|opt|Users)/", text)
         for address in re.findall(r"\w+://[^\s\"'`)]+", text):
             assert address.startswith(
-                ("package://example-robot-data/", "http://www.apache.org/licenses/")
+                (
+                    *("package://example-robot-data/", f"package://{name}/meshes/"),
+                    *("http://www.apache.org/licenses/", "http://www.collada.org/2005"),
+                )
             ), address
 
 

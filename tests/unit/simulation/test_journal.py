@@ -403,7 +403,7 @@ def test_what_a_killed_hsp_run_leaves_is_a_log_for_all_commands(
         [sys.executable, "-m", "hsp_control", "run", "paper/2_rest", *options],
         stderr=subprocess.DEVNULL,
     )
-    path = tmp_path / "2_rest,simulation.duration=1000.journal"
+    path = tmp_path / "2_rest-simulation.duration=1000.journal"
     end = time.monotonic() + 60
     try:
         while not (path.exists() and path.stat().st_size > 100_000):
@@ -424,7 +424,7 @@ def test_what_a_killed_hsp_run_leaves_is_a_log_for_all_commands(
     short = ["--out", str(tmp_path), "--set", "simulation.duration=0.02"]
     assert main(["run", "paper/2_rest", *short]) == 0
     assert len(list(tmp_path.glob("*.journal"))) == 1
-    with np.load(tmp_path / "2_rest,simulation.duration=0.02.npz") as log:
+    with np.load(tmp_path / "2_rest-simulation.duration=0.02.npz") as log:
         assert len(log["t"]) == 3
     capsys.readouterr()
 

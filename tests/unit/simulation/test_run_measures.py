@@ -7,7 +7,7 @@ import pytest
 
 import hsp_control as hsp
 from hsp_control.common.arrays import Array
-from hsp_control.simulation.measures import measures
+from hsp_control.simulation.measures import PULL_COLUMN, measures, unreached
 
 
 @cache
@@ -27,6 +27,20 @@ def changed_run() -> hsp.Rollout:
     run["damped"][:] = [1, 0, 0, 1, 1, 0]
     run.t[:] = [0.0, 0.1, 0.2, 0.4, 0.5, 0.7]
     return run
+
+
+def test_what_is_held_away_by_a_hand_is_not_out_of_reach() -> None:
+    t = np.arange(0.0, 1.0, 0.01)
+    error = np.tile([0.3, 0.0, 0.0], (len(t), 1))
+    columns = {"t": t, "task.hand.error": error, "damped": np.ones(len(t))}
+    columns["task.hand.error_rate"] = np.zeros_like(error)
+    tasks = {"hand": {"error": [["position", "m", "m/s", 3]]}}
+    (alone,) = unreached(columns, tasks)
+    assert alone.words(-1) == "target out of reach, 0.30 m"
+    pulled = {**columns, PULL_COLUMN: np.where(t < 0.9, 37.0, 0.0)}
+    (held,) = unreached(pulled, tasks)
+    assert held.words(80) == ""
+    assert held.words(-1) == ""  # let go 0.1 s ago: it has not rested for long
 
 
 def rms(values: Array) -> float:

@@ -7,7 +7,7 @@ class Legend {
     + "(max-width: 860px) and (max-aspect-ratio: 6/5)";
 
   constructor(viewer) {
-    Object.assign(this, {viewer, rows: [], small: matchMedia(Legend.SMALL)});
+    Object.assign(this, {viewer, rows: [], keepClosed: false, small: matchMedia(Legend.SMALL)});
     this.choices = new Map();  // path -> whether the user wants to see it
     this.caption = part("#caption");
     this.list = part("#layers");
@@ -21,7 +21,7 @@ class Legend {
 
   fit() {
     this.caption.classList.toggle("small", this.small.matches);
-    this.setOpen(!this.small.matches);
+    this.setOpen(!this.small.matches && !this.keepClosed);
   }
 
   setOpen(open) {

@@ -27,6 +27,7 @@ class Play {
     this.setup = setup;
     this.hand.end(true);
     document.body.classList.toggle("live-loop", !this.simulated);
+    document.body.classList.toggle("watched-loop", loop === "watched");
     if (loop === "held") this.holdKey ??= new PlayHold(this);
     this.touched.clear();
     this.force = null;
@@ -37,6 +38,7 @@ class Play {
     this.gizmos = new Map(gizmos.map((gizmo) => [gizmo.key, gizmo]));
     this.overlay.setThings(gizmos, (key) => this.select(key));
     this.panel.build(setup, gizmos);
+    this.bars.build(setup.joints ?? []);
     this.setUpPlots(plots);
     this.select(this.gizmos.has(this.selected) ? this.selected : null);
     this.showDrive();
@@ -49,11 +51,14 @@ class Play {
     this.overlay = new PlayOverlay();
     this.bar = new PlayBar(this);
     this.panel = new PlayPanel(this);
+    this.bars = new PlayBars(part(".play-joints"));
     this.hand = new PlayHand(this, this.viewer);
     this.keys = new PlayKeys(this);
     this.viewer.scene.onBeforeRender = () => this.layOut();
-    legend.setOpen(false);  // what is in the picture is to be touched
+    legend.keepClosed = true;  // what is in the picture is to be touched
+    legend.setOpen(false);
     this.panel.setOpen(!this.panel.narrow.matches);
+    refit();  // there is no legend to make room for
   }
 
   // After a reset the plots are the same: they keep what is shown alone.
@@ -210,6 +215,7 @@ Object.assign(commandHandlers, {
   play_targets(command) { if (play.ready) play.showTargets(command); },
   play_state(command) { play.showState(command); },
   play_values({values}) { if (play.ready) play.panel.setValues(values); },
+  play_joints(command) { if (play.ready && play.panel.open) play.bars.show(command); },
   play_force(command) { play.force = command.visible ? command : null; },
   play_samples({times, values}) { if (play.ready) play.plots.add(times, values); },
   play_drive(command) { play.setDrive(command); },

@@ -8,13 +8,18 @@ class PlayBar {
     const names = ["toggle", "panel", "clock", "rate"];
     [this.toggle, this.panel, this.clock, this.rate] =
       names.map((name) => part(`.${name}`, this.row));
-    const actions = ["step", "reset", "save", "stop"];
+    const actions = ["step", "reset", "save", "page", "stop"];
     this.acting = [onPress(this.toggle, () => play.toggle()), ...actions.map((name) =>
       onPress(part(`.${name}`, this.row), () => play.act(name)))];
     [this.status, this.watching] = [".play-status", ".play-watching"].map((name) => part(name));
     onPress(this.panel, () => play.panel.setOpen(!play.panel.open));
     onPress(part("button", this.watching), () => play.act("take_over"));
     presentation.addButton(part(".present", this.row));
+    const camera = new PlayCamera(play.viewer, () => document.title);
+    onPress(part(".picture", this.row), () => camera.picture());
+    const film = part(".film", this.row);
+    film.hidden = !window.MediaRecorder;
+    onPress(film, () => { film.ariaPressed = camera.film(); });
   }
 
   showState({t, running, rate, message, level}) {
@@ -24,7 +29,12 @@ class PlayBar {
       : [this.play.simulated ? "paused" : "stopped"]);
     const ariaLabel = running ? "Pause" : "Go";
     Object.assign(this.toggle, {ariaLabel, title: `${ariaLabel} (space)`});
-    if (this.status.textContent !== message) this.status.textContent = message;
+    if (this.told !== message) {
+      this.told = this.status.textContent = message;
+      clearTimeout(this.timer);
+      // What was done is said for a while; what is wrong stays.
+      if (level !== "warning") this.timer = setTimeout(() => { this.status.textContent = ""; }, 6000);
+    }
     this.status.classList.toggle("warning", level === "warning");
   }
 
@@ -64,6 +74,7 @@ class PlayHold {
 // that the program then reports, with each picture, is shown: a refused one goes back. While a slider
 // is held, and a moment after each change, what the program said before does not count.
 class PlayPanel {
+  static PATIENCE = 5000;  // ms; a program that draws slowly hears of a change later
   static NARROW = "(max-width: 620px), (max-width: 860px) and (max-aspect-ratio: 6/5)";
 
   constructor(play) {
@@ -85,9 +96,10 @@ class PlayPanel {
     panel.ariaPressed = panel.ariaExpanded = open;
   }
 
-  build({title, controls}, gizmos) {
-    part("h2", this.box).textContent = title || "Play";
+  build({controls}, gizmos) {
+    part("h2", this.box).textContent = "Controls and plots";  // the title is above the scene
     this.setters = new Map();
+    this.wanted = new Map();  // setting -> [value, when], until the program says the same
     this.things = new Map(gizmos.map((gizmo) => [gizmo.key, this.thing(gizmo)]));
     const {switch: switches = [], slider: sliders = []} = Object.groupBy(controls, ({kind}) => kind);
     const rows = [...gizmos.map(({key, noun}) => [`${noun}s`, this.things.get(key)]),
@@ -127,6 +139,7 @@ class PlayPanel {
     const show = (x) => {
       const words = [Plot.minus(String(short(x))), unit === "–" ? "" : unit].join(" ");
       shown.textContent = input.ariaValueText = words.trim();
+      Object.assign(input, {ariaValueNow: short(x), ariaValueMin: low, ariaValueMax: high});
       input.style.setProperty("--share", `${100 * clamp(place(x), 0, 1)}%`);
     };
     on(input, "input", () => {
@@ -160,13 +173,92 @@ class PlayPanel {
   set(id, value) {
     const key = `set ${id}`;
     this.play.touch(key);
+    this.wanted.set(id, [value, performance.now()]);
     this.play.sendLater(key, {do: "set", id, value});
   }
 
+  // Show what the program says, once it has heard of the last change or has refused it.
   setValues(values) {
+    const refused = this.play.state.level === "warning";
     for (const [id, value] of Object.entries(values)) {
-      if (this.play.isFresh(`set ${id}`)) this.setters.get(id)?.(value);
+      if (!this.play.isFresh(`set ${id}`)) continue;
+      const [wanted, since] = this.wanted.get(id) ?? [value, 0];
+      const same = wanted === value || Math.abs(wanted - value) <= 1e-6 * Math.abs(wanted);
+      if (!same && !refused && performance.now() - since < PlayPanel.PATIENCE) continue;
+      this.wanted.delete(id);
+      this.setters.get(id)?.(value);
     }
+  }
+}
+
+// Each joint's position in its range, its speed and its effort, over their limits.
+class PlayBars {
+  static NEAR = 0.95;  // of a limit: the bar is marked
+
+  constructor(box) { this.box = box; }
+
+  build(names) {
+    this.box.hidden = !names.length;
+    this.rows = names.map((name) => ["q", "v", "τ"].map((what) =>
+      make("i", {className: what === "q" ? "position" : "", title: `${what} of ${name}`})));
+    const cells = names.flatMap((name, k) =>
+      [make("span", {}, name), ...this.rows[k].map((bar) => make("b", {}, bar))]);
+    const heads = ["", "q", "v", "τ"].map((text) => make("small", {}, text));
+    part("div", this.box).replaceChildren(...heads, ...cells);
+  }
+
+  show({q, v, tau}) {
+    this.rows?.forEach(([position, speed, effort], k) => {
+      const share = q[k] === null ? null : clamp(q[k], 0, 1);
+      position.hidden = share === null;
+      position.style.left = `${100 * share}%`;
+      position.classList.toggle("near", Math.abs(2 * share - 1) > PlayBars.NEAR);
+      [[speed, v[k]], [effort, tau[k]]].forEach(([bar, value]) => {
+        const size = 50 * Math.min(Math.abs(value ?? 0), 1);
+        Object.assign(bar.style, {left: `${value < 0 ? 50 - size : 50}%`, width: `${size}%`});
+        bar.classList.toggle("near", Math.abs(value) > PlayBars.NEAR);
+      });
+    });
+  }
+}
+
+// The picture as a file, and a film of what the page shows from now on.
+class PlayCamera {
+  constructor(viewer, title) { Object.assign(this, {viewer, title, recorder: null}); }
+
+  get canvas() { return this.viewer.renderer.domElement; }
+
+  picture() {
+    this.viewer.render();  // in the same task: later the picture is gone
+    this.canvas.toBlob((blob) => this.save(blob, "png"));
+  }
+
+  // Begin a film, or end it and save it; return whether one is being made.
+  film() {
+    if (this.recorder) {
+      this.recorder.stop();
+      return false;
+    }
+    const pieces = [], types = ["video/webm;codecs=vp9", "video/webm", "video/mp4"];
+    const mimeType = types.find((type) => window.MediaRecorder?.isTypeSupported(type));
+    if (!mimeType) return false;
+    this.recorder = new MediaRecorder(this.canvas.captureStream(30), {mimeType,
+                                                                      videoBitsPerSecond: 12e6});
+    this.recorder.ondataavailable = ({data}) => pieces.push(data);
+    this.recorder.onstop = () => {
+      this.recorder = null;
+      this.save(new Blob(pieces, {type: mimeType}), mimeType.includes("mp4") ? "mp4" : "webm");
+    };
+    this.recorder.start();
+    return true;
+  }
+
+  save(blob, ending) {
+    const words = this.title().replace(/[^\p{L}\p{N}]+/gu, "-").replace(/^-|-$/g, "");
+    const link = make("a", {href: URL.createObjectURL(blob),
+                            download: `${words.slice(0, 60) || "picture"}.${ending}`});
+    link.click();
+    setTimeout(() => URL.revokeObjectURL(link.href), 60000);
   }
 }
 

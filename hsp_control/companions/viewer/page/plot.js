@@ -3,7 +3,8 @@
 
 class Plot {
   static HEIGHT = 118;  // px
-  static FONT = '10.5px system-ui, "Segoe UI", "Helvetica Neue", Arial, sans-serif';
+  // A whole number: uPlot scales the digits before "px" by the ratio of pixels.
+  static FONT = '11px system-ui, "Segoe UI", "Helvetica Neue", Arial, sans-serif';
   // Colours of the palette on a dark background.
   static DARK = {"#22272B": "#E3E8EC", "#6B7680": "#A4AFB8", "#DFE3E6": "#2F373E",
                  "#0072B2": "#3B9FDB", "#882255": "#D8689B", "#FFFFFF": "#1B2025"};
@@ -81,9 +82,10 @@ class Plot {
     };
   }
 
-  // Ticks where values are exponents of ten: at most five.
+  // Ticks where values are exponents of ten: at most five. uPlot knows no steps of 3 or 4.
   static DECADES = {
-    incrs: (_, axis, low, high) => [Math.max(1, Math.ceil((high - low) / 4.5))], space: 1,
+    incrs: (_, axis, low, high) =>
+      [[1, 2, 5, 10, 20].find((step) => step >= (high - low) / 4.5) ?? 50], space: 1,
     values: (_, ticks) => ticks.map((tick) => tick === 0 ? "1"
       : `10${[...String(tick)].map((c) => "⁰¹²³⁴⁵⁶⁷⁸⁹"[c] ?? "⁻").join("")}`),
   };
@@ -92,6 +94,7 @@ class Plot {
   static number(shown, logarithmic) {
     if (shown === null) return "–";
     const value = logarithmic ? 10 ** shown : shown, size = Math.abs(value);
+    if (size < 1e-12) return "0";  // rounding
     return Plot.minus(size !== 0 && (size < 1e-3 || size >= 1e5)
       ? value.toExponential(1) : value.toFixed(size < 10 ? 3 : size < 1000 ? 1 : 0));
   }

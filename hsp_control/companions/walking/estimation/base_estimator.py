@@ -25,9 +25,14 @@ from hsp_control.companions.walking.estimation.leg_kinematics import (
     rolled,
 )
 from hsp_control.constraints.contacts import Contact
-from hsp_control.control.controller import Controller
-from hsp_control.control.estimator import Estimator, RunningEstimator
-from hsp_control.control.measurement import Inertial, LogChannel, Measurement
+from hsp_control.control.interface import (
+    Controller,
+    Estimator,
+    Inertial,
+    LogChannel,
+    Measurement,
+    RunningEstimator,
+)
 from hsp_control.declaration.quantities import Names, NonNegative, Positive
 from hsp_control.engine.rotations import (
     log3,

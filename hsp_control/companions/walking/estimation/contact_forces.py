@@ -14,10 +14,15 @@ import numpy as np
 from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import EstimationError
 from hsp_control.constraints.contacts import Contact
-from hsp_control.control.compensation.momentum_observer import RunningObserver
-from hsp_control.control.controller import Controller
-from hsp_control.control.estimator import Estimator, RunningEstimator
-from hsp_control.control.measurement import Inertial, LogChannel, Measurement
+from hsp_control.control.interface import (
+    Controller,
+    Estimator,
+    Inertial,
+    LogChannel,
+    Measurement,
+    RunningEstimator,
+    RunningObserver,
+)
 from hsp_control.declaration.quantities import Flag, Positive
 from hsp_control.robot import RobotState
 

@@ -1,0 +1,1 @@
+"""What several benchmarks share: cases, controllers, timing, sections of pages."""

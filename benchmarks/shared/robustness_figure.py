@@ -1,0 +1,79 @@
+"""The figure of docs/measurements.md: every plant with every compensator."""
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.colors import LogNorm
+from matplotlib.image import AxesImage
+
+from hsp_control.companions.plots import new_figure, styled
+from hsp_control.companions.plots.palette import INK
+from shared.marked_sections import FIGURES
+
+FILE = FIGURES / "robustness.png"
+SHOWN = {"error": "task error [mm]", "e_N": "‖e_N‖ [rad/s]"}
+RANGES = {"error": (3e-3, 30.0), "e_N": (1e-3, 3.0)}
+ROBOTS = {"panda": "Panda", "iiwa14": "iiwa 14"}
+
+
+Cells = dict[tuple[str, ...], dict[str, float]]
+
+
+def draw_figure(cells: Cells, plants: dict[str, list[str]], columns: list[str]) -> None:
+    """Draw and save the figure.
+
+    Args:
+        cells: What was measured, by robot, engine, plant and compensation.
+        plants: The rows, by robot.
+        columns: The compensations.
+    """
+    with styled():
+        figure = new_figure(13.0, 11.5)
+        panels = figure.subplots(2, 2)
+        for row, (robot, title) in zip(panels, ROBOTS.items(), strict=True):
+            for axes, measure in zip(row, SHOWN, strict=True):
+                image = draw(axes, cells, robot, measure, plants[robot], columns)
+                axes.set_title(f"{title}: {SHOWN[measure]}")
+                figure.colorbar(image, ax=axes, shrink=0.8)
+        for axes in panels[:, 1]:
+            axes.set_yticklabels([])
+        for axes in panels[0]:
+            axes.set_xticklabels([])
+        figure.savefig(FILE, dpi=95)
+    print(f"Wrote {FILE}")
+
+
+def draw(
+    axes: Axes,
+    cells: Cells,
+    robot: str,
+    measure: str,
+    rows: list[str],
+    columns: list[str],
+) -> AxesImage:
+    """Draw one arm's measure on Pinocchio's plant, or else on MuJoCo's."""
+    values = np.full((len(rows), len(columns)), np.nan)
+    for i, name in enumerate(rows):
+        for j, column in enumerate(columns):
+            for engine in ("MuJoCo", "Pinocchio"):
+                if (found := cells.get((robot, engine, name, column))) is not None:
+                    values[i, j] = found[measure]
+    low, high = RANGES[measure]
+    image = axes.imshow(
+        np.clip(values, low, high),
+        cmap="Blues",  # dark is large, in grey too
+        norm=LogNorm(0.3 * low, high),  # no cell as pale as the paper
+        aspect="auto",
+    )
+    for (i, j), value in np.ndenumerate(values):
+        if np.isfinite(value):
+            color = "white" if image.norm(value) > 0.65 else INK
+            text = f"{value:.2g}".removeprefix("0")
+            axes.text(j, i, text, ha="center", va="center", fontsize=9, color=color)
+    axes.set_xticks(range(len(columns)), columns, rotation=35, ha="right")
+    axes.set_yticks(range(len(rows)), rows)
+    axes.grid(visible=False)
+    axes.set_xticks(np.arange(len(columns) - 1) + 0.5, minor=True)
+    axes.set_yticks(np.arange(len(rows) - 1) + 0.5, minor=True)
+    axes.grid(which="minor", color="white", linewidth=1.0)
+    axes.tick_params(which="minor", length=0)
+    return image

@@ -1,0 +1,20 @@
+"""What a plan, an estimator or another part of its own may know of this room.
+
+Walking imports from nowhere else here, and so a contract keeps it: what is not named
+below may move. A `Plan` gives a controller its tasks and contacts step by step, an
+`Estimator` the state that it computes with; both read a `Measurement`, write
+`LogChannel` columns, and may ask a `FallDetector` or a `RunningObserver`.
+"""
+
+from .compensation.momentum_observer import RunningObserver as RunningObserver
+from .controller import Controller as Controller
+from .estimator import Estimator as Estimator
+from .estimator import RunningEstimator as RunningEstimator
+from .evolution import HELD as HELD
+from .falling import FallDetector as FallDetector
+from .measurement import Inertial as Inertial
+from .measurement import LogChannel as LogChannel
+from .measurement import Measurement as Measurement
+from .plan import Plan as Plan
+from .plan import PlanParts as PlanParts
+from .plan import RunningPlan as RunningPlan

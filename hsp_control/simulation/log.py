@@ -1,0 +1,33 @@
+"""What the summaries of a run need of its log: `Rollout` is one."""
+
+from typing import Any, Protocol
+
+from hsp_control.common.arrays import Array
+
+
+class Log(Protocol):
+    """Columns of equal length, and their descriptions; see `Rollout`."""
+
+    # Here and not `Rollout` itself, which prints its own summary.
+    columns: dict[str, Array]
+    meta: dict[str, Any]
+
+    def __getitem__(self, name: str) -> Array: ...
+    def __contains__(self, name: str) -> bool: ...
+    def __len__(self) -> int: ...
+
+    @property
+    def t(self) -> Array:
+        """Time [s], shape (N,)."""
+
+    @property
+    def v(self) -> Array:
+        """Velocity, shape (N, nv)."""
+
+    @property
+    def tau(self) -> Array:
+        """Effort, shape (N, nv)."""
+
+    @property
+    def status(self) -> str:
+        """How the run ended."""

@@ -1,0 +1,35 @@
+"""This play as one page: a process writes it, and says what came of it."""
+
+from pathlib import Path
+
+import pytest
+from played import wait_until
+
+import hsp_control as hsp
+from hsp_control.companions.play.one_page import OnePage
+
+pytestmark = pytest.mark.process
+
+
+def written(tmp_path: Path, page: Path) -> str:
+    arm = hsp.Robot.load("planar3r")
+    controller = hsp.Controller(arm, [hsp.JointPosture("start")], limits=None)
+    run = hsp.simulate(controller, arm.home(), duration=0.05, control_period=0.01)
+    one = OnePage(lambda: run.save(tmp_path / "mine.npz"), page)
+    assert one.done() == ""
+    assert one.begin() == one.begin() == f"writing {page} …"  # one at a time
+    told: list[str] = []
+    wait_until(lambda: bool(told.append(one.done()) or told[-1]))
+    one.close()
+    return told[-1]
+
+
+def test_a_play_is_written_as_one_page(tmp_path: Path) -> None:
+    page = tmp_path / "mine.html"
+    assert written(tmp_path, page) == f"saved: {page}"
+    assert "<canvas" in page.read_text() or page.stat().st_size > 100_000
+
+
+def test_what_cannot_be_written_says_why(tmp_path: Path) -> None:
+    (tmp_path / "file").write_text("")
+    assert "hsp: " in written(tmp_path, tmp_path / "file" / "mine.html")

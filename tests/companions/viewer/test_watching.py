@@ -1,0 +1,203 @@
+"""A loop of one's own that is watched: what is taken of it, and what its page shows."""
+
+import subprocess
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import hsp_control as hsp
+from hsp_control.common.arrays import Array
+from hsp_control.common.exceptions import FieldError, ViewerError
+from hsp_control.companions.viewer.commands import unpack
+from hsp_control.companions.viewer.live_picture import Picture
+from hsp_control.companions.viewer.transport import SceneRecorder
+from hsp_control.companions.viewer.viewer import Viewer
+from hsp_control.companions.viewer.watched_page import Watched
+from hsp_control.companions.viewer.watching import Follower
+from hsp_control.simulation.journal import JournalReader
+
+PERIOD = 0.01
+
+
+def controller_of(field: Any = None) -> hsp.Controller:
+    panda = hsp.Robot.load("panda")
+    ball = hsp.Obstacle("ball", hsp.shapes.Sphere(0.1), hsp.Hold([0.6, 0.1, 0.6]))
+    limits = hsp.Limits(barriers=[hsp.limits.ObstacleDistance(minimum=0.02)])
+    circle = hsp.Circle(radius=0.1, angular_rate=2.0)  # about where the hand starts
+    hand = hsp.FramePose("panda_tcp", circle, name="hand", blend=1.0)
+    return hsp.Controller(
+        panda, [hand], field or hsp.JointCentering(), scene=[ball], limits=limits
+    )
+
+
+class Loop:
+    """A loop whose clock begins anywhere, as those of robots do."""
+
+    def __init__(self, controller: hsp.Controller) -> None:
+        self.controller, self.k = controller, 0
+        self.q, self.v = controller.robot.home(), np.zeros(controller.robot.nv)
+
+    def step(self, steps: int = 1) -> hsp.ControlOutput:
+        robot = self.controller.robot
+        for _ in range(steps):
+            t = 2.0**20 + self.k * PERIOD
+            output = self.controller.compute(t, self.q, self.v)
+            self.controller.applied(output.tau, PERIOD)
+            self.v = self.v + PERIOD * output.acceleration
+            self.q = robot.integrate(self.q, PERIOD * self.v)
+            self.k += 1
+        return output
+
+
+def followed(follower: Follower) -> dict[str, Array]:
+    taken = follower.newest()
+    assert taken is not None
+    follower.write(*taken)
+    reader = JournalReader(follower.journal)
+    reader.read()
+    return reader.rows(reader.count - 1)
+
+
+def test_a_row_is_what_the_loop_computed() -> None:
+    """The copy begins where the loop began, though it sees it later."""
+    loop = Loop(controller_of())
+    follower = Follower(loop.controller)
+    assert follower.newest() is None  # nothing was computed yet
+    loop.step(20)
+    output = loop.step()
+    row = followed(follower)
+    assert row["t"][0] == pytest.approx(20 * PERIOD, abs=1e-9)
+    # The loop's effort is within its rate limit; the copy saw no effort before.
+    assert row["acceleration"][0] == pytest.approx(output.acceleration, abs=1e-6)
+    assert row["task.hand.error"][0] == pytest.approx(output.error("hand"), abs=1e-9)
+    assert row["null_space_error"][0] == pytest.approx(
+        output.null_space_error, abs=1e-9
+    )
+    near = output.distances["obstacle_distance"]
+    assert row["distance.obstacle_distance"][0] == pytest.approx(near, abs=1e-12)
+    follower.end()
+
+
+def test_changes_targets_and_a_new_beginning_are_followed() -> None:
+    loop = Loop(controller_of())
+    follower = Follower(loop.controller)
+    loop.step(5)
+    followed(follower)
+    loop.controller.at(0.0).ramp(0.05).gains("hand", hsp.Gains(natural_frequency=20.0))
+    output = loop.step(20)
+    row = followed(follower)
+    assert row["acceleration"][0] == pytest.approx(output.acceleration, abs=1e-6)
+    goal = loop.controller.robot.state(0.0, loop.q, loop.v).position("panda_tcp")
+    loop.controller.set_target("hand", [*goal, 1.0, 0.0, 0.0, 0.0])
+    for _ in range(60):  # the copy hears the same message, at its own steps
+        output = loop.step()
+        row = followed(follower)
+    assert row["task.hand.error"][0] == pytest.approx(output.error("hand"), abs=1e-6)
+    journal = follower.journal
+    loop.controller.restart()
+    loop.step(3)
+    assert followed(follower)["t"][0] == pytest.approx(2 * PERIOD, abs=1e-9)
+    assert follower.journal != journal
+    follower.end()
+    assert not journal.parent.exists()
+
+
+def recorded(tmp_path: Path, controller: hsp.Controller) -> JournalReader:
+    recorder = hsp.Recorder(controller, tmp_path / "mine.npz", log_period=PERIOD)
+    loop = Loop(controller)
+    for _ in range(5):
+        recorder.record(loop.step())
+    reader = JournalReader(recorder.journal)
+    reader.read()
+    recorder.close()
+    return reader
+
+
+def drawn(watched: Watched) -> tuple[dict[str, Any], set[str]]:
+    """The setup of the page, and the nodes that are drawn."""
+    recorder = SceneRecorder()
+    picture = Picture(watched, Viewer(watched.robot, transport=recorder))
+    picture.draw(running=True, rate=1.0)
+    kept = [unpack(packed) for packed in recorder.scene.pop_all()]
+    setup = next(each for each in kept if each["type"] == "play_setup")
+    return setup, {each["path"] for each in kept}
+
+
+def test_a_recorder_is_shown_with_its_distances_and_plots(tmp_path: Path) -> None:
+    watched = Watched(recorded(tmp_path, controller_of()))
+    assert watched.controller is not None
+    setup, paths = drawn(watched)
+    assert setup["loop"] == "watched"
+    assert not setup["targets"]
+    assert not setup["controls"]
+    titles = [plot["title"] for plot in setup["plots"]]
+    assert titles[:3] == ["Null-space error ‖e_N‖", "Clearance", "Efforts τ"]
+    assert any(path.startswith("/targets") for path in paths)
+    assert any(path.startswith("/obstacles/ball") for path in paths)
+    assert any(path.startswith("/distances") for path in paths)
+
+
+def test_a_loop_with_a_function_of_its_own_is_shown_by_its_columns(
+    tmp_path: Path,
+) -> None:
+    """Another process cannot build it: the log knows all but lines and zones."""
+    own = hsp.FunctionCost(lambda state: float(state.q @ state.q))
+    watched = Watched(recorded(tmp_path, controller_of(own)))
+    assert watched.controller is None
+    assert "of one's own" in watched.handles.message
+    setup, paths = drawn(watched)
+    assert "Clearance" in [plot["title"] for plot in setup["plots"]]
+    assert any(path.startswith("/targets") for path in paths)
+    assert not any(path.startswith("/distances") for path in paths)
+
+
+def test_what_fails_is_said_and_does_not_reach_the_loop() -> None:
+    fails = False
+
+    def cost(state: hsp.RobotState) -> float:
+        if fails:
+            raise FieldError("no sensor")
+        return float(state.q @ state.q)
+
+    loop = Loop(controller_of(hsp.FunctionCost(cost)))
+    with hsp.viewer.watch(loop.controller) as page:
+        loop.step(3)
+        follower = page._follower
+        assert follower is not None
+        fails = True
+        with pytest.raises(FieldError):
+            loop.step()
+        _until(lambda: page.failure)
+        assert "no sensor" in page.failure
+        fails = False
+        loop.step(3)
+        _until(lambda: not page.failure)
+    assert not follower.journal.exists()
+
+
+def test_watch_refuses_what_is_no_loop() -> None:
+    with pytest.raises(ViewerError, match="a Controller or a Recorder; got Robot"):
+        hsp.viewer.watch(hsp.Robot.load("panda"))
+    with pytest.raises(ViewerError, match="backgroun"):
+        hsp.viewer.watch(controller_of(), backgroun="#fff")
+
+
+def _until(true: Any) -> None:
+    from time import monotonic, sleep
+
+    deadline = monotonic() + 60.0  # only ends a test that hangs
+    while not true():
+        assert monotonic() < deadline
+        sleep(0.01)
+
+
+def test_the_page_ends_with_the_loop(tmp_path: Path) -> None:
+    recorder = hsp.Recorder(controller_of(), tmp_path / "mine.npz")
+    page = hsp.viewer.watch(recorder)
+    assert page.url.startswith("http://127.0.0.1:")
+    process = page._end.peek()[2][0]
+    assert isinstance(process, subprocess.Popen)
+    page.close()
+    assert process.returncode == 0

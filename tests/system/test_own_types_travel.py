@@ -1,0 +1,164 @@
+"""A type of one's own is known to every command: by ``--import``, or by one list."""
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+PARTS = """
+import hsp_control as hsp
+from hsp_control.declaration.quantities import Number
+
+
+def elbow(state):
+    return (state.position("panda_link4")[1] - 0.2) ** 2
+
+
+class Nod(hsp.Cost, type="nod"):
+    '''The hand nods.'''
+
+    height: Number = 1.0
+    '''How high [m].'''
+
+    def value(self, state):
+        return (state.q[3] - self.height) ** 2
+"""
+CONFIG = """
+robot: {name: panda}
+tasks: {hand: {type: frame_position}}
+null_space: {fields: [{type: function_cost, function: elbow}, {type: nod, height: 1}]}
+simulation: {duration: 0.05, control_period: 0.001}
+"""
+PATIENCE = "--set live.missing=2000 --set live.watchdog=2000"
+WITH_CONFIGURATION = {
+    "run": "run mine.yaml",
+    "check": "check mine.yaml",
+    "live": f"live mine.yaml {PATIENCE}",
+    "play": "play mine.yaml --no-browser",
+    "sweep": "sweep mine.yaml --over null_space.gain=5,6 --workers 1",
+}
+WITH_LOG = {
+    "view": "view out/mine.npz --no-browser",
+    "export": "export out/mine.npz --html out/mine.html",
+    "plot": "plot out/mine.npz",
+    "run": "run out/mine.npz",
+    "of a live loop": "view out/mine-live.npz --no-browser",
+    "of its robot": "export out/mine-robot.npz --html out/robot.html",
+    "of a play": "run out/mine-play.npz",
+}
+WITHOUT_CONTROLLER = "no controller, only the log's columns are drawn"
+
+
+def hsp(line: str, folder: Path, status: int = 0) -> str:
+    """Type a command in a process of its own, and return what it prints."""
+    command = [sys.executable, "-m", "hsp_control", *line.split()]
+    if "play" in line.split()[:1]:  # until Ctrl-C
+        command = ["timeout", "--preserve-status", "-s", "INT", "8", *command]
+    done = subprocess.run(
+        command, cwd=folder, text=True, stdin=subprocess.DEVNULL,
+        stdout=subprocess.PIPE, stderr=subprocess.STDOUT, check=False,
+        env={k: v for k, v in os.environ.items() if k not in {"DISPLAY", "BROWSER"}},
+    )  # fmt: skip
+    assert done.returncode == status, f"{line}\n{done.stdout}"
+    return done.stdout
+
+
+@pytest.fixture(scope="module", params=["parts.py", "own_package.parts", "--import"])
+def folder(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory):
+    """Return a folder with a configuration and its logs, and how it names its code."""
+    folder = tmp_path_factory.mktemp("own")
+    package = folder / "own_package"
+    package.mkdir()
+    (package / "__init__.py").touch()
+    (folder / "parts.py").write_text(PARTS)
+    (package / "parts.py").write_text(PARTS)
+    named = request.param
+    listed = "" if named == "--import" else f"imports: [{named}]\n"
+    (folder / "mine.yaml").write_text(CONFIG + listed)
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setenv("PYTHONPATH", str(folder))
+        option = " --import parts.py" if named == "--import" else ""
+        for line in WITH_CONFIGURATION.values():
+            hsp(line + option, folder)
+        yield folder, option
+
+
+@pytest.mark.parametrize("what", WITH_LOG)
+def test_a_log_is_read_with_its_own_types(folder: tuple[Path, str], what: str) -> None:
+    where, _ = folder
+    said = hsp(WITH_LOG[what], where)
+    assert WITHOUT_CONTROLLER not in said
+
+
+def test_what_was_edited_is_not_run_again(tmp_path: Path) -> None:
+    parts = tmp_path / "parts.py"
+    parts.write_text(PARTS)
+    (tmp_path / "mine.yaml").write_text(f"{CONFIG}imports: [parts.py]\n")
+    hsp("run mine.yaml", tmp_path)
+    parts.write_text(f"{PARTS}\nopen('run', 'w').close()\n")
+    said = hsp("view out/mine.npz --no-browser", tmp_path)
+    assert "missing or was edited since the run; --import" in said
+    assert WITHOUT_CONTROLLER in said
+    assert not (tmp_path / "run").exists()
+    said = hsp(f"view out/mine.npz --no-browser --import {parts}", tmp_path)
+    assert WITHOUT_CONTROLLER not in said
+    assert (tmp_path / "run").exists()
+
+
+def test_strict_reading_runs_no_code(tmp_path: Path) -> None:
+    (tmp_path / "parts.py").write_text(f"{PARTS}\nopen('run', 'w').close()\n")
+    (tmp_path / "mine.yaml").write_text(f"{CONFIG}imports: [parts.py]\n")
+    said = hsp("run mine.yaml --strict", tmp_path, status=2)
+    assert "mine.yaml:6: imports.0: parts.py is code, which --strict does not run" in (
+        said
+    )
+    assert not (tmp_path / "run").exists()
+    hsp("run mine.yaml", tmp_path)
+    (tmp_path / "run").unlink()
+    said = hsp("view out/mine.npz --no-browser --strict", tmp_path)
+    assert WITHOUT_CONTROLLER in said
+    assert not (tmp_path / "run").exists()
+
+
+def test_a_script_s_log_names_the_module_of_its_types(tmp_path: Path) -> None:
+    """Types of the script itself have no module: the log's columns are drawn."""
+    (tmp_path / "parts.py").write_text(PARTS)
+    run = """
+robot = hsp.Robot.load("panda")
+arm = hsp.Controller(robot, [hsp.FramePosition("panda_tcp")], Nod())
+hsp.simulate(arm, robot.home(), duration=0.05).save("out/own.npz")
+experiment = hsp.Experiment("panda", [hsp.FramePosition("panda_tcp")], Nod())
+experiment.run().save("out/experiment.npz")
+open("experiment.yaml", "w").write(experiment.to_yaml())
+with hsp.Recorder(arm, "out/recorded.npz") as recorder:
+    for k in range(3):
+        recorder.record(arm.compute(0.01 * k, robot.home(), [0.0] * 7))
+"""
+    for name, head in {
+        "one": "import hsp_control as hsp\nfrom parts import Nod\n",
+        "two": PARTS,
+    }.items():
+        (tmp_path / f"{name}.py").write_text(head + run)
+        subprocess.run([sys.executable, f"{name}.py"], cwd=tmp_path, check=True)
+        for log in ("own", "experiment", "recorded"):
+            said = hsp(f"view out/{log}.npz --no-browser", tmp_path)
+            known = name == "one" or log == "own"
+            assert (WITHOUT_CONTROLLER not in said) == known, (name, log)
+            hsp(f"export out/{log}.npz --html out/{log}.html", tmp_path)
+            hsp(f"plot out/{log}.npz", tmp_path)
+        if name == "one":
+            hsp("run experiment.yaml --set simulation.duration=0.05", tmp_path)
+            hsp("run out/recorded.npz", tmp_path)
+
+
+def test_freeze_and_inspect_import_too(tmp_path: Path) -> None:
+    (tmp_path / "parts.py").write_text(f"{PARTS}\nopen('run', 'w').close()\n")
+    (tmp_path / "mine.yaml").write_text(CONFIG)
+    said = hsp("freeze mine.yaml --import parts.py", tmp_path, status=2)
+    assert "Python" in said  # a type that it knows, and cannot freeze
+    assert "no type" not in said
+    (tmp_path / "run").unlink()
+    hsp("inspect panda --import parts.py", tmp_path)
+    assert (tmp_path / "run").exists()

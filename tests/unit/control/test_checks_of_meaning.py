@@ -1,0 +1,96 @@
+"""What cannot be meant is said where it happens: mm, degrees, a run that was damped."""
+
+import warnings
+
+import numpy as np
+import pytest
+
+import hsp_control as hsp
+from hsp_control.cli import main
+from hsp_control.common.exceptions import HspControlError, LimitError
+from hsp_control.control.first_state import StartWarning
+from hsp_control.simulation.simulate import RunWarning
+
+PANDA = hsp.Robot.load("panda")
+REST = np.zeros(7)
+
+
+def told(target: object, **options: object) -> list[str]:
+    """What is said of a target where a loop begins."""
+    task = hsp.FramePosition("panda_tcp", target, name="hand", **options)  # type: ignore[arg-type]
+    controller = hsp.Controller(PANDA, [task])
+    with warnings.catch_warnings(record=True) as found:
+        warnings.simplefilter("always")
+        controller.compute(0.0, PANDA.home(), REST)
+        controller.compute(0.001, PANDA.home(), REST)
+    assert {each.filename for each in found} <= {__file__}
+    return [str(each.message) for each in found]
+
+
+@pytest.mark.parametrize(
+    ("target", "options", "said"),
+    [
+        ([0.4, 0.2, 0.5], {}, ""),
+        ([1.5, 0.0, 0.5], {}, ""),  # out of reach: that can be meant
+        ([3.0, 0.0, 0.5], {}, "the robot reaches 1.1 m: it goes as near"),
+        ([400.0, 200.0, 500.0], {}, "millimetres? Lengths are in m"),
+        ([400.0, 200.0, 500.0], {"blend": 1.0}, "millimetres?"),  # it begins here
+        ([500.0], {"axes": "z"}, "499.5 m away from 'panda_tcp'"),
+        (hsp.Circle(radius=0.1, angular_rate=1.0), {}, ""),  # about the start
+    ],
+)
+def test_a_target_far_beyond_the_reach_is_said_once(
+    target: object, options: dict[str, object], said: str
+) -> None:
+    found = told(target, **options)
+    assert len(found) == bool(said)
+    assert said in "".join(found)
+
+
+def test_a_target_that_is_set_is_looked_at_too() -> None:
+    controller = hsp.Controller(PANDA, [hsp.FramePose("panda_tcp", name="hand")])
+    controller.compute(0.0, PANDA.home(), REST)
+    with pytest.warns(StartWarning, match="millimetres") as found:
+        controller.set_target("hand", [400.0, 0.0, 500.0, 1.0, 0.0, 0.0, 0.0])
+    assert [each.filename for each in found] == [__file__]
+    controller.set_target("hand", [0.4, 0.0, 0.5, 1.0, 0.0, 0.0, 0.0])  # no warning
+
+
+@pytest.mark.filterwarnings("error")
+def test_a_run_that_is_damped_most_of_the_time_says_so() -> None:
+    out = hsp.FramePosition("panda_tcp", [1.5, 0.0, 0.5], blend=1.0, name="hand")
+    controller = hsp.Controller(PANDA, [out])
+    options = {"duration": 4.0, "control_period": 0.005}
+    with pytest.warns(RunWarning, match=r"damped in \d+ of 401 rows.*'hand': ") as told:
+        run = hsp.simulate(controller, PANDA.home(), **options)  # type: ignore[arg-type]
+    assert str(int((run["damped"] > 0.0).sum())) in str(told[0].message)
+    near = hsp.FramePosition("panda_tcp", blend=1.0)
+    hsp.simulate(hsp.Controller(PANDA, [near]), PANDA.home(), **options)  # type: ignore[arg-type]
+
+
+def test_degrees_are_named_in_python_and_in_yaml(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    degrees = [0.0, -45.0, 0.0, -135.0, 0.0, 90.0, 45.0]
+    controller = hsp.Controller(PANDA, [hsp.FramePosition("panda_tcp")])
+    with pytest.raises(HspControlError, match="degrees"):
+        controller.compute(0.0, degrees, REST)
+    limits = controller.limits
+    assert limits is not None
+    with pytest.raises(LimitError, match=r"at -45, .*degrees\? Angles are in rad"):
+        limits.check_start(np.array(degrees), REST)
+    a_little = PANDA.home()
+    a_little[1] = 1.8  # beyond the limit, in rad
+    with pytest.raises(LimitError, match=r"1\.7628$"):
+        limits.check_start(a_little, REST)
+    given = f"start={{configuration: {degrees}}}"
+    assert main(["check", "panda_limits", "--set", given]) == 2
+    assert "degrees? Angles are in rad" in capsys.readouterr().err
+
+
+def test_the_command_line_says_the_same(capsys: pytest.CaptureFixture[str]) -> None:
+    far = "tasks.hand.trajectory={type: hold, point: [400, 200, 500]}"
+    kind = "tasks.hand.type=frame_position"
+    code = main(["check", "panda_limits", "--set", kind, "--set", far])
+    assert code == 0, capsys.readouterr().err
+    assert "millimetres? Lengths are in m" in capsys.readouterr().err

@@ -1,0 +1,127 @@
+"""What a run's table says in words, of numbers that are made up."""
+
+from typing import Any
+
+import numpy as np
+import pytest
+
+import hsp_control as hsp
+from hsp_control.simulation import run_summary
+from hsp_control.simulation.measures import ForceKept, measures
+from hsp_control.simulation.run_summary import excess_rows, force_rows
+
+
+class Log:
+    """Columns and meta data, as of a `Rollout`."""
+
+    def __init__(self, meta: dict[str, Any], **columns: Any) -> None:
+        self.meta, self.columns = meta, columns
+        self.t = columns["t"]
+
+    def __getitem__(self, name: str) -> Any:
+        return self.columns[name]
+
+
+def test_the_worst_joint_its_unit_and_its_time_are_said() -> None:
+    t = np.array([0.0, 0.5, 1.0, 1.5])
+    position, velocity = np.zeros((2, 4, 3))
+    position[1, 2], position[2, 1], velocity[2, 0] = 0.04, 0.02, 0.7
+    meta = {"robot": {"dofs": ["a", "b", "c"], "units": ["rad", "rad", "m"]}}
+    log: Any = Log(meta, t=t, position_excess=position, velocity_excess=velocity)
+    first, second = excess_rows(log)
+    assert first.startswith("c is 0.04 m beyond its position limit at 0.5 s (2 rows)")
+    assert second.startswith("a is 0.7 rad/s beyond its speed limit at 1 s (1 rows)")
+
+
+def test_what_became_of_a_force_is_its_root_mean_square(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    wanted = np.full(4, 10.0)
+    actual = np.array([10.0, 10.0, 10.0, 16.0])
+    planned = np.array([10.0, 10.0, 7.0, 10.0])
+    kept = ForceKept("pad", wanted, planned, actual, 3)
+    monkeypatch.setattr(run_summary, "forces_kept", lambda _: [kept])
+    log: Any = None
+    assert list(force_rows(log)) == [
+        ("force pad", "16 of 10 N at the end, missed by 3 N rms"),
+        ("", "1 rows: planned up to 3 N off, for a limit or the balance"),
+        ("", "3 rows: contact lost"),
+    ]
+
+
+def damped_run() -> hsp.Rollout:
+    """Return a run whose hand cannot reach its target, and a task that ends."""
+    panda = hsp.Robot.load("panda")
+    hand = hsp.FramePosition("panda_tcp", [2.0, 0.0, 0.5], name="hand")
+    elbow = hsp.FramePosition("panda_link4", name="elbow")
+    barriers = [hsp.limits.SelfDistance(minimum=0.01)]
+    limits = hsp.Limits(barriers=barriers)
+    controller = hsp.Controller(panda, [hand, elbow], limits=limits)
+    controller.at(0.1).ramp(0.05).remove(elbow.name)
+    return hsp.simulate(controller, panda.home(), duration=0.4, control_period=0.01)
+
+
+def test_printing_a_run_shows_what_hsp_run_prints() -> None:
+    run = damped_run()
+    text, rows = str(run), [*run_summary.summary_rows(run)]
+    assert [line.split("  ")[0] for line in text.splitlines()] == [n for n, _ in rows]
+    damped = int((run["damped"] > 0.0).sum())
+    assert damped > 10
+    assert f"singular {damped} rows: the law was damped there" in " ".join(text.split())
+    assert f"completed, damped in {damped} rows" in repr(run)
+
+
+def test_a_task_that_goes_is_summarised_by_the_rows_in_which_it_was_there() -> None:
+    run = damped_run()
+    norm = np.linalg.norm(run["task.elbow.error"], axis=1)
+    active = norm[np.isfinite(norm)]
+    assert 0 < len(active) < len(norm)
+    found, text = measures(run), str(run)
+    rms = np.sqrt(np.mean(active**2))
+    assert found["tracking.elbow.rms"].value == pytest.approx(rms)
+    assert found["tracking.elbow.end"].value == active[-1]
+    assert f"at the end {active[-1]:.3g} m" in text
+    # Determinants of one task and of two do not compare; singular values do.
+    assert np.isnan(found["manipulability.min"].value)
+    least = np.nanmin(run["singular_values"])
+    assert found["singular_value.min"].value == least
+    assert f"smallest singular value {least:.3g}" in text
+    assert "det(" not in text
+    undefined = {name for name, each in found.items() if np.isnan(each.value)}
+    assert undefined == {"manipulability.min"}
+
+
+def test_distances_of_barriers_are_in_log_output_and_summary() -> None:
+    run = damped_run()
+    assert run.meta["columns"]["distance.self_distance"]["minimum"] == 0.01
+    panda = hsp.Robot.load("panda")
+    clearance = hsp.SelfClearance()
+    oracle = run.measure(panda, lambda state: clearance.minimum_distance(state))
+    assert run["distance.self_distance"] == pytest.approx(oracle, abs=1e-12)
+    limits = hsp.Limits(barriers=[hsp.limits.SelfDistance(minimum=0.01)])
+    controller = hsp.Controller(panda, [hsp.FramePosition("panda_tcp")], limits=limits)
+    first = controller.compute(0.0, run.q[0], run.v[0])
+    later = controller.compute(0.01, run.q[20], run.v[20])
+    assert first.distances == {"self_distance": pytest.approx(oracle[0], abs=1e-12)}
+    assert later.distances == {"self_distance": pytest.approx(oracle[20], abs=1e-12)}
+    least = run["distance.self_distance"].min()
+    assert f"self distance      minimum {least:.3g} m, to be at least 0.01 m" in str(
+        run
+    )
+
+
+def test_an_own_barrier_is_logged_by_its_type() -> None:
+    class Height(hsp.limits.Barrier):
+        """A frame stays above a height."""
+
+        def values(self, state: hsp.RobotState) -> float:
+            """Return the height [m]."""
+            return float(state.position("panda_tcp")[2])
+
+    panda = hsp.Robot.load("panda")
+    limits = hsp.Limits(barriers=[Height(minimum=0.1), Height(minimum=0.2)])
+    controller = hsp.Controller(panda, [hsp.FramePosition("panda_tcp")], limits=limits)
+    run = hsp.simulate(controller, panda.home(), duration=0.02, control_period=0.01)
+    height = run["task.panda_tcp.actual"][:, 2]
+    assert run["barrier.Height_0"] == pytest.approx(height, abs=1e-12)
+    assert run.meta["columns"]["barrier.Height_1"]["minimum"] == 0.2
