@@ -164,6 +164,9 @@ animations: $(STAMP) $(ENGINE) ## film the README's animations anew, into docs/f
 	@$(BIN)/python docs/make_animations.py
 	@$(BIN)/python docs/make_play_picture.py
 
+example-pictures: $(STAMP) $(ENGINE) ## run every example and draw its picture, into docs/figures/examples (needs Chromium)
+	@$(BIN)/python docs/make_example_pictures.py
+
 notebooks: $(STAMP) $(ENGINE) ## run the notebooks and keep what they print and draw
 	@$(BIN)/python tools/notebooks.py
 
@@ -187,7 +190,7 @@ clean: ## remove caches, builds and the demo's output; .venv stays
 	@rm -rf build dist docs/_build docs/_static/replays docs/reference/generated out/demo .coverage .*_cache .hypothesis
 	@find hsp_control tests -name __pycache__ -prune -exec rm -rf {} +
 
-.PHONY: help assertions sanitize docs links figures animations notebooks demo quick sims lerobot test test-system thorough lint coverage fuzz mutants wheel wheel-test release format constraints clean
+.PHONY: help assertions sanitize docs links figures animations example-pictures notebooks demo quick sims lerobot test test-system thorough lint coverage fuzz mutants wheel wheel-test release format constraints clean
 
 # ------------------------------------------------------------------- the environment
 

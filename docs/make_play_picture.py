@@ -47,7 +47,7 @@ def main() -> None:
             session.receive(message | {"to": hand.tolist()})
             session.advance()
         page = browser.new_page(viewport=SIZE, device_scale_factor=1.5)
-        page.goto(server.url)
+        page.goto(f"{server.url}&full")
         picture.draw(running=True, rate=1.0)
         viewer.wait_for_browser(60.0)
         page.evaluate("play.select('target hand')")

@@ -42,7 +42,7 @@ class StepsInCpp:
             RuntimeError: If the last effort differs from that of `compute`.
         """
         expected = controller.compute(*states[-1]).tau
-        bound = controller._run.bound
+        bound = controller._bound
         assert bound is not None, "something changes at present"
         t, q, v = (np.array(each, dtype=float) for each in zip(*states, strict=True))
         self._begin, self._end = np.zeros((2, 1), dtype=np.int64)

@@ -17,10 +17,10 @@ from hsp_control.constraints.limits import Limits, RobotLimits
 from hsp_control.control.actuation.limits_in_force import LimitsInForce
 from hsp_control.control.bound_step import BoundStep
 from hsp_control.control.changes import Change, Changes, TimeLine
-from hsp_control.control.clock_check import ClockCheck
 from hsp_control.control.declared_rates import check_field, check_metric
 from hsp_control.control.first_state import warn_of_far_target
 from hsp_control.control.gains_in_force import GainsInForce, check_held
+from hsp_control.control.memory import Memory
 from hsp_control.control.mixture import Mixture
 from hsp_control.control.model_in_force import ModelInForce
 from hsp_control.control.setup import (
@@ -31,6 +31,7 @@ from hsp_control.control.setup import (
     Setup,
 )
 from hsp_control.control.targets import RAMP, followed_stream, new_stream, target_of
+from hsp_control.control.task_stream import TaskStream
 from hsp_control.control.tools_in_force import ToolsInForce
 from hsp_control.declaration import within
 from hsp_control.geometry.scene import Obstacle, Scene, Start
@@ -42,6 +43,7 @@ from hsp_control.tasks import Task
 from hsp_control.tasks.compliant_task import impedance_of
 from hsp_control.tasks.feedback import Feedback
 from hsp_control.tasks.impedance import parts_of
+from hsp_control.trajectories.crossfade import settled
 from hsp_control.trajectories.streams.stream import Streamed
 from hsp_control.trajectories.streams.velocities import Axes
 
@@ -110,33 +112,35 @@ class Composition:
         law = tasks, field, null_space_gain, metric, singularity_threshold
         around = limits, contacts, base, scene, start
         self._declared = DeclaredController(robot, *law, *around)
-        self._allocate(changes)
-
-    def _allocate(self, changes: Sequence[Change]) -> None:
-        """Set up what a copy has of its own, and compose the parts."""
-        robot, given = self._declared.robot, self._declared.start
-        self._state = RobotState(robot)
-        self._gains = GainsInForce(robot.nv)
-        self._model = ModelInForce(robot, [self._state.dynamics])
-        self._tools = ToolsInForce(self._state)
-        self._run = PresentRun(self._declared.robot.nv)
-        self._origin: Array = np.zeros(1)  # `PresentRun.origin`, for calls [s]
-        self._clocked = self._state.bind_move(origin=self._origin)
+        self._bind_to(RobotState(robot), Memory.of(robot.nv))
+        given = self._declared.start
         q = robot.home() if given is None else given
         state = robot.state(0.0, q, np.zeros(robot.nv))
-        start = Start(state, self._declared.scene, known=given is not None)
-        self._compose(start, changes)
+        here = Start(state, self._declared.scene, known=given is not None)
+        self._compose(here, changes)
+
+    def _bind_to(self, state: RobotState, memory: Memory) -> None:
+        """Compute with a state, and remember in a memory."""
+        self._state, self._memory = state, memory
+        self._gains = GainsInForce(state.robot.nv, memory)
+        self._model = ModelInForce(state.robot, [state.dynamics])
+        self._tools = ToolsInForce(state)
+        self._clocked = state.bind_move(origin=memory.origin)
+        self._bound: BoundStep | None = None  # the step, while nothing changes
 
     # -- what counts at a time --------------------------------------------------------
 
     def _compose(self, start: Start, changes: Sequence[Change]) -> None:
         """Place all parts, and apply the changes."""
-        placed, robot = self._declared.placed(start), self._declared.robot
-        base = () if self._declared.base == "driven" else robot.unactuated
-        time_line = TimeLine.of(placed, changes)
-        self._limits = LimitsInForce(self._state, placed.limits)
-        around = self._limits, self._gains, time_line.setup, self._declared.threshold
-        self._mixture = Mixture(self._state, base, *around)
+        self._begin_at(TimeLine.of(self._declared.placed(start), changes))
+
+    def _begin_at(self, time_line: TimeLine) -> None:
+        """Make all that computes, and let it follow a time line."""
+        state, own, setup = self._state, self._declared, time_line.setup
+        base = () if own.base == "driven" else own.robot.unactuated
+        self._limits = LimitsInForce(state, setup.limits, self._memory.sent)
+        around = self._limits, self._gains, setup, own.threshold
+        self._mixture = Mixture(state, base, *around)
         self._follow(time_line)
 
     def _follow(self, time_line: TimeLine) -> None:
@@ -145,10 +149,10 @@ class Composition:
         self._mixture = self._mixture.following(self._setup)
         self._settled_later: Settled | None = None
         step = None
-        if self._run.begun:
+        if self._memory.begun:
             self._bind_ahead()
             if self._settled_later is None:  # else each step looks whether it is time
-                step = self._mixture.bound_step(self._origin)
+                step = self._mixture.bound_step(self._memory.origin)
         self._go_on(step)
 
     def _plan(self, time_line: TimeLine) -> None:
@@ -181,7 +185,7 @@ class Composition:
         over = time_line.settled_at(end)
         following = mixture.following(over.setup)
         following.prepare([end])
-        step = following.bound_step(self._origin)
+        step = following.bound_step(self._memory.origin)
         self._settled_later = Settled(end + MEMORY, over, following, step)
 
     def _settle(self, settled: "Settled") -> None:
@@ -193,19 +197,15 @@ class Composition:
 
     def _go_on(self, step: BoundStep | None) -> None:
         """Make the next steps as one call, if there is one."""
-        self._run.bound = step
+        self._bound = step
         if step is not None:
             self._mixture.active = step.active
 
     @property
     def _latest(self) -> float:
         """The latest time of a step [s]; -inf before the first one."""
-        run = self._run
-        return max(run.now, self._state.t) if run.begun else -np.inf
-
-    def _count_from(self, origin: float) -> None:
-        """Count times from a reading of the clock [s]."""
-        self._run.origin = self._origin[0] = origin
+        memory = self._memory
+        return max(memory.now, self._state.t) if memory.begun else -np.inf
 
     def _here(self) -> Start:
         """Return where the robot was at the last step."""
@@ -223,7 +223,7 @@ class Composition:
         """
         return Changes(self.change, t)
 
-    def set_target(self, task: str, target: ArrayLike | pin.SE3) -> Streamed:
+    def set_target(self, task: str, target: ArrayLike | pin.SE3) -> TaskStream:
         """Let a task go to a target from now on, smoothly, until the next one is set.
 
         ``controller.set_target("hand", pose)``, at any time and as often as needed. A
@@ -240,7 +240,7 @@ class Composition:
                 trajectory [m, or the task's unit].
 
         Returns:
-            The stream, which counts what it has taken.
+            The task's stream; see `stream`.
 
         Raises:
             ControllerError: If there is no such task, it follows no trajectory, or the
@@ -253,9 +253,29 @@ class Composition:
             warn_of_far_target(self._here().state, followed, value)
         return self._sent(task, value=value)
 
+    def stream(self, task: str) -> TaskStream:
+        """Return the stream that a task follows once all changes are over.
+
+        ``controller.stream("hand").send(pose)``, from any thread.
+
+        Raises:
+            ControllerError: If there is no such task, or it follows no stream.
+        """
+        self._streamed(task)
+        return TaskStream(lambda: self._streamed(task))
+
+    def _streamed(self, task: str) -> Streamed:
+        followed = settled(self._followed(task).followed, np.inf)
+        if isinstance(followed, Streamed):
+            return followed
+        raise ControllerError(
+            f"task {task!r} follows no stream, but {type(followed).__name__}; give it "
+            "one, such as StreamPose(), or set_target"
+        )
+
     def set_velocity(
         self, task: str, velocity: ArrayLike, axes: Axes = "world"
-    ) -> Streamed:
+    ) -> TaskStream:
         """Let a task move at a velocity from now on, as with a joystick.
 
         ``controller.set_velocity("hand", twist, axes="tool")``, again and again: if no
@@ -272,7 +292,7 @@ class Composition:
                 the axes of the moving body.
 
         Returns:
-            The stream, which counts what it has taken.
+            The task's stream; see `stream`.
 
         Raises:
             ControllerError: If there is no such task, or it follows no trajectory.
@@ -280,18 +300,18 @@ class Composition:
         """
         return self._sent(task, velocity=velocity, axes=axes)
 
-    def _sent(self, task: str, **message: Any) -> Streamed:
+    def _sent(self, task: str, **message: Any) -> TaskStream:
         """Send a message to a task's stream, which takes over if there is none yet."""
         present = self._followed(task)
         stream = followed_stream(present)
         if stream is not None:
             stream.send(**message)
-            return stream
+            return self.stream(task)
         stream = new_stream(present.followed)
         stream.send(**message)
         reference: Any = stream
         self.at(self._state.t).ramp(RAMP).reference(task, reference)
-        return stream
+        return self.stream(task)
 
     def _followed(self, task: str) -> Task:
         """Return a task that follows a trajectory."""
@@ -312,16 +332,17 @@ class Composition:
         """
         with self._lock:
             here, now, given = None, self._latest, change
-            self._run.clock.change(change.at, max(now, 0.0))
-            if self._run.begun:
+            begun = self._memory.begun
+            self._memory.clock.change(change.at, max(now, 0.0))
+            if begun:
                 change = replace(change, at=max(change.at, now))
                 here = self._here()
             known = self._time_line.settled_at(now - MEMORY)
             time_line = known.with_change(change, here)
-            if period := self._limits.sent.period:
+            if period := self._memory.sent.period:
                 state = (here or time_line.start).state
                 check_held(self._setup, time_line.setup, state, period)
-            if self._run.begun:
+            if begun:
                 self._check_terms(time_line.setup, self._setup.terms, self._state)
             before = self._time_line
             try:
@@ -329,8 +350,8 @@ class Composition:
             except BaseException:  # it cannot be bound: nothing of it stays
                 self._follow(before)
                 raise
-            if self._run.begun:
-                self._run.made_at(now, given)
+            if begun:
+                self._memory.made(now, given)
 
     def check_derivatives(self, state: RobotState) -> None:
         """Check what somebody has written of the field and the metric, at a state.
@@ -527,28 +548,17 @@ class Composition:
     # -- copies -----------------------------------------------------------------------
 
     def __getstate__(self) -> dict[str, Any]:
-        state = self._state
         return {
             "declared": self._declared,
             "time_line": self._time_line,
-            "begun": self._run.begun,
-            "origin": self._run.origin,
-            "now": self._run.now,
-            "at": (state.t, state.q.copy(), state.v.copy()),
-            "gains": self._gains.memory(),
-            "sent": self._limits.sent.memory(),
+            "state": self._state,
+            "memory": self._memory,
         }
 
     def __setstate__(self, saved: dict[str, Any]) -> None:
         self._declared = saved["declared"]
-        self._allocate(())
-        self._run.begun, self._run.now = saved["begun"], saved["now"]
-        self._state.update(*saved["at"])  # where the law is bound
-        self._follow(saved["time_line"])
-        self._gains.remember(saved["gains"])
-        if saved["origin"] is not None:
-            self._count_from(saved["origin"])
-        self._limits.remember(saved["sent"])
+        self._bind_to(saved["state"], saved["memory"])
+        self._begin_at(saved["time_line"])
 
 
 class Settled(NamedTuple):
@@ -558,28 +568,6 @@ class Settled(NamedTuple):
     time_line: TimeLine
     mixture: Mixture
     step: BoundStep | None
-
-
-class PresentRun:
-    """What a controller knows of the present run."""
-
-    # Not on the controller itself, whose own attributes cost 0.4 µs to set.
-    __slots__ = ("acceleration", "begun", "bound", "clock", "now", "origin", "unseen")
-
-    def __init__(self, nv: int) -> None:
-        # reading of the clock at time 0 [s]; None: that of the first step
-        self.origin: float | None = None
-        self.acceleration = np.zeros(nv)  # what the last step delivered
-        self.begun, self.now = False, -np.inf  # latest time of a step [s]
-        # changes as they were given that no step has seen, and the time of the last one
-        self.unseen: tuple[float, tuple[Change, ...]] = (-np.inf, ())
-        self.bound: BoundStep | None = None  # the step, while nothing changes
-        self.clock = ClockCheck()
-
-    def made_at(self, now: float, change: Change) -> None:
-        """Note a change that is made after a step at a time [s]."""
-        before = self.unseen[1] if self.unseen[0] == now else ()
-        self.unseen = now, (*before, change)
 
 
 _INSTEAD = {

@@ -17,12 +17,13 @@ from hsp_control.common.exceptions import ControllerError, NonFiniteError
 from hsp_control.control.active_stack import ActiveStack
 from hsp_control.control.bound_step import BoundStep, FreeStep
 from hsp_control.control.changes import Change
-from hsp_control.control.composition import Composition, PresentRun
+from hsp_control.control.composition import Composition
 from hsp_control.control.first_state import (
     check_angles,
     warn_of_far_targets,
     warn_of_jump,
 )
+from hsp_control.control.memory import Memory
 from hsp_control.control.mixture import AccelerationModifier
 from hsp_control.control.model_in_force import ModelInForce
 from hsp_control.control.output import ControlOutput, Diagnostics
@@ -36,8 +37,9 @@ class Controller(Composition):
 
     Wherever the stacked Jacobian keeps its rank and no limit binds: every task's error
     obeys e'' + Kv e' + Kp e = 0, and V = ½ e_NᵀW e_N obeys V' = -e_NᵀW K_N e_N. The
-    same state gives the same effort: its only memory is the last effort, used where
-    the effort rate is limited (see `applied`), and how long changes of impedances wait.
+    same state gives the same effort, but for what is remembered of a run (`Memory`):
+    the last effort, used where the effort rate or the speed is limited (see `applied`),
+    and how long changes of impedances wait.
 
     Times count from the first step of a run: a robot's clock may begin anywhere.
 
@@ -47,9 +49,9 @@ class Controller(Composition):
     controller can be copied and pickled at any time; several threads may share it.
     """
 
-    def _allocate(self, changes: Sequence[Change]) -> None:
+    def _bind_to(self, state: RobotState, memory: Memory) -> None:
         self._lock = _StepLock()
-        super()._allocate(changes)
+        super()._bind_to(state, memory)
 
     # -- the step ---------------------------------------------------------------------
 
@@ -90,7 +92,7 @@ class Controller(Composition):
         if out is not None:
             _check_output(out, self._declared.robot.nv)
         with self._lock:
-            run, bound = self._run, self._run.bound
+            bound = self._bound
             if (
                 bound is not None
                 and modifier is None
@@ -109,9 +111,9 @@ class Controller(Composition):
                 delivered = mixture.deliver(modifier)  # within the limits
                 stack, damped = self.active_stack, mixture.damped
                 stack.check(delivered.effort)
-                if run.bound is None and self._settled_later is None:
-                    run.bound = mixture.bound_step(self._origin)
-            run.acceleration = delivered.acceleration
+                if self._bound is None and self._settled_later is None:
+                    self._bound = mixture.bound_step(self._memory.origin)
+            self._memory.acceleration = delivered.acceleration
             if out is None:
                 out = ControlOutput()
                 tau, memory = delivered.effort.copy(), stack.memory.tobytes()
@@ -130,9 +132,9 @@ class Controller(Composition):
     ) -> None:
         """Move the state; see `compute`."""
         if q is not None and v is not None:
-            if self._run.origin is None:
+            if not self._memory.counts:
                 self._state.update(t, q, v)  # type: ignore[arg-type]
-                self._count_from(self._state.t)
+                self._memory.count_from(self._state.t)
             self._state.advance(self._clocked, t, q, v)  # type: ignore[arg-type]
             return
         if not isinstance(t, RobotState):
@@ -149,32 +151,30 @@ class Controller(Composition):
             )
         if t is not self._state.seen and t is not self._state:
             self._state.update(t.t, t.q, t.v)
-        if self._run.origin is None:
-            self._count_from(0.0)
+        if not self._memory.counts:
+            self._memory.count_from(0.0)
 
     def _begin(self) -> None:
         """Look at the first state, and without a start place there what is relative."""
         check_angles(self._declared.robot, self._state.q)
-        self._run.clock.begin(self._state.t)
+        self._memory.clock.begin(self._state.t)
         if self._declared.start is None:
             here = self._here()._replace(scene=self._declared.scene)
-            sent = self._limits.sent.memory()
             self._compose(here, self._time_line.declared)
-            self._limits.remember(sent)
         warn_of_far_targets(self._state, self.planned_tasks)
         self.check_derivatives(self._state)
-        self._run.begun = True
+        self._memory.begun = True
         self._write(self._state.t)  # what is bound is called once, at this state
         self._bind_ahead()
 
     def _advance(self) -> None:
         """Write the gains and the limits of the time of the state."""
-        run, t = self._run, self._state.t
-        if not run.begun:
+        memory, t = self._memory, self._state.t
+        if not memory.begun:
             self._begin()
-        run.now = max(run.now, t)
+        memory.now = max(memory.now, t)
         if later := self._settled_later:
-            if run.now > later.at:
+            if memory.now > later.at:
                 self._settle(later)
                 return
             self._write(t)
@@ -208,12 +208,14 @@ class Controller(Composition):
             raise NonFiniteError(f"period is {period}; needs a finite number")
         if not period > 0.0:
             raise ControllerError(f"period is {period} s; must be positive")
-        self._run.clock.look(self._state.t, period, self._state.stamp)
-        if not self._limits.sent.period:
+        self._memory.clock.look(self._state.t, period, self._state.stamp)
+        if not self._memory.sent.period:
             state = self._state
             warn_of_jump(state.robot, state.q, state.v, tau, state.dynamics)
-        self._limits.applied(tau, self._run.acceleration, period)
+        self._limits.applied(tau, self._memory.acceleration, period)
         if self._gains.stiffening:
+            if self._mixture.active is None:  # a copy, made since the step
+                self._mixture.resolve(self._state.t)
             self._gains.delay(self.active_stack, self._state.t, period)
 
     def _while_free(self, advance: Callable[[FreeStep], int]) -> int:
@@ -222,11 +224,11 @@ class Controller(Composition):
         # period of the last one. There are none where something changes, is streamed,
         # is no native call, or the last effort was not the law's own.
         with self._lock:
-            run, bound = self._run, self._run.bound
+            bound = self._bound
             if (
                 bound is None
                 or self._gains.stiffening
-                or run.acceleration is not bound.active.acceleration
+                or self._memory.acceleration is not bound.active.acceleration
             ):
                 return 0
             return 0 if bound.free is None else advance(bound.free)
@@ -294,13 +296,13 @@ class Controller(Composition):
         if origin is not None and not isfinite(origin):
             raise NonFiniteError(f"origin is {origin}; needs a finite number")
         with self._lock:
-            self._limits.forget()
-            self._gains.forget()
-            line, (at, unseen) = self._time_line, self._run.unseen
-            changes = (*line.declared, *(unseen if at == self._latest else ()))
-            self._run = PresentRun(self._declared.robot.nv)
+            line, memory = self._time_line, self._memory
+            changes = (*line.declared, *memory.not_seen(self._latest))
+            memory.clear()
+            self._limits.update()
+            self._bound = None
             if origin is not None:
-                self._count_from(origin)
+                memory.count_from(origin)
             self._mixture.active = None  # the next step places what is relative
             remembers = any(each.task.remembers for each in self._setup.tasks)
             if changes or line.count or remembers:
@@ -345,7 +347,7 @@ class Controller(Composition):
     @property
     def _settled(self) -> object:
         """An object that stays the same while nothing changes; None while it does."""
-        return self._run.bound
+        return self._bound
 
     # -- what explains it -------------------------------------------------------------
 
@@ -383,8 +385,9 @@ class Controller(Composition):
         start = self._setup.start.state.q if q is None else q
         self.compute(0.0, start, np.zeros(self.robot.nv))
         self._state.mass_matrix  # noqa: B018 (of this state: nothing of others is left)
-        self._limits.forget()
-        return self._run.bound
+        self._memory.sent.clear()
+        self._limits.update()
+        return self._bound
 
     @property
     def step_plan(self) -> Plan:
@@ -393,7 +396,7 @@ class Controller(Composition):
         Raises:
             ControllerError: If there was no step yet, or something changes at present.
         """
-        bound = self._run.bound
+        bound = self._bound
         if bound is None:
             raise ControllerError(
                 "there is no step whose calls could be shown: compute one, at a time "
@@ -445,7 +448,7 @@ class Controller(Composition):
         """Return a copy that goes on from here, to look ahead with its own times."""
         with self._lock:
             ahead = self._copy()
-        ahead._count_from(0.0)
+        ahead._memory.count_from(0.0)
         return ahead
 
     def _copy(self) -> "Controller":

@@ -18,14 +18,13 @@ for the period h, then has the transition
     x(h) = x + h x' + ½ h² x'',     x'(h) = x' + h x''.
 """
 
-from copy import deepcopy
-
 import numpy as np
 
 from hsp_control.common.arrays import Array, Indices
 from hsp_control.common.exceptions import UnstableRateError
 from hsp_control.control.active_stack import ActiveStack
 from hsp_control.control.evolution import Evolution
+from hsp_control.control.memory import Memory
 from hsp_control.control.setup import PlannedTask, Setup
 from hsp_control.declaration import within
 from hsp_control.robot import RobotState
@@ -44,12 +43,12 @@ _ROUNDING = 1e-7
 class GainsInForce:
     """Gains and impedances of the tasks, their offsets, and K_N, now."""
 
-    def __init__(self, nv: int) -> None:
+    def __init__(self, nv: int, memory: Memory) -> None:
+        self._memory, self._waiting = memory, memory.waiting
         # feedback of each task, by key; the arrays stay where they are
         self.feedback: dict[int, InForce] = {}
         self.null_space = np.zeros((nv, nv))  # K_N, shape (nv, nv) [1/s]
         self._tasks: dict[int, Task] = {}
-        self._waiting: dict[int, Array] = {}
 
     def plan(self, setup: Setup, t: float) -> None:
         """Follow a setup from now on; t is the present time [s]."""
@@ -59,6 +58,9 @@ class GainsInForce:
             key: known.get(id(task)) or self._feedback_of(key, task)
             for key, task in tasks.items()
         }
+        for kept in (self._waiting, self._memory.offsets):
+            for key in kept.keys() - tasks.keys():
+                del kept[key]
         self._tasks, self._setup = tasks, setup
         self._changing = any(
             changes_impedance(each.task, each.gains) for each in setup.tasks
@@ -71,7 +73,11 @@ class GainsInForce:
         old = self._tasks.get(key)
         if old is not None and old.name == task.name and old.rows == task.rows:
             return self.feedback[key]
-        return task.in_force()
+        in_force, offsets = task.in_force(), self._memory.offsets
+        if key not in offsets or len(offsets[key]) != task.rows:
+            offsets[key] = in_force.feedback.offset
+        feedback = in_force.feedback._replace(offset=offsets[key])
+        return in_force._replace(feedback=feedback)
 
     def write(self, t: float) -> None:
         """Write the gains of a time [s]."""
@@ -123,25 +129,6 @@ class GainsInForce:
         else:
             self._waiting[planned.key] = following
         in_force.numbers[:] = following
-
-    def forget(self) -> None:
-        """Forget the offsets, and what waits."""
-        self._waiting.clear()
-        for in_force in self.feedback.values():
-            in_force.feedback.offset[:] = 0.0
-
-    def memory(self) -> tuple[dict[int, Array], ...]:
-        """Return a copy of what to `remember`: by key, what waits, and the offsets."""
-        offsets = {key: each.feedback.offset for key, each in self.feedback.items()}
-        return deepcopy(self._waiting), deepcopy(offsets)
-
-    def remember(self, memory: tuple[dict[int, Array], ...]) -> None:
-        """Go on from a memory of the same setup."""
-        self._waiting, offsets = deepcopy(memory[0]), memory[1]
-        for key, numbers in self._waiting.items():
-            self.feedback[key].numbers[:] = numbers
-        for key, offset in offsets.items():
-            self.feedback[key].feedback.offset[:] = offset
 
 
 def changes_impedance(task: Task, numbers: Evolution[Array]) -> bool:

@@ -1,11 +1,11 @@
 """A type of one's own is known to every command: by ``--import``, or by one list."""
 
-import os
 import subprocess
 import sys
 from pathlib import Path
 
 import pytest
+from typing_commands import PATIENCE, hsp
 
 PARTS = """
 import hsp_control as hsp
@@ -31,7 +31,6 @@ tasks: {hand: {type: frame_position}}
 null_space: {fields: [{type: function_cost, function: elbow}, {type: nod, height: 1}]}
 simulation: {duration: 0.05, control_period: 0.001}
 """
-PATIENCE = "--set live.missing=2000 --set live.watchdog=2000"
 WITH_CONFIGURATION = {
     "run": "run mine.yaml",
     "check": "check mine.yaml",
@@ -49,20 +48,6 @@ WITH_LOG = {
     "of a play": "run out/mine-play.npz",
 }
 WITHOUT_CONTROLLER = "no controller, only the log's columns are drawn"
-
-
-def hsp(line: str, folder: Path, status: int = 0) -> str:
-    """Type a command in a process of its own, and return what it prints."""
-    command = [sys.executable, "-m", "hsp_control", *line.split()]
-    if "play" in line.split()[:1]:  # until Ctrl-C
-        command = ["timeout", "--preserve-status", "-s", "INT", "8", *command]
-    done = subprocess.run(
-        command, cwd=folder, text=True, stdin=subprocess.DEVNULL,
-        stdout=subprocess.PIPE, stderr=subprocess.STDOUT, check=False,
-        env={k: v for k, v in os.environ.items() if k not in {"DISPLAY", "BROWSER"}},
-    )  # fmt: skip
-    assert done.returncode == status, f"{line}\n{done.stdout}"
-    return done.stdout
 
 
 @pytest.fixture(scope="module", params=["parts.py", "own_package.parts", "--import"])

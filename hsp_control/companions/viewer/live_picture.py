@@ -354,7 +354,7 @@ def _plots(session: Shown) -> Iterator[LivePlot]:
     if names:
         labels = [distance_label(meta, n.removeprefix("distance.")) for n in names]
         curves = [Curve(*each) for each in zip(labels, names, strict=True)]
-        note = "To obstacles; below 0 is a collision."
+        note = "To obstacles and between links; below 0 is a collision."
         yield LivePlot("Clearance", note, "m", False, curves)
     curves = [Curve("‖τ‖", "tau", slice(0, len(dofs)))]
     if len(dofs) <= _JOINTS:

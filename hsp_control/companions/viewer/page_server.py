@@ -6,6 +6,7 @@ their address; one page at a time may steer the program.
 """
 
 import asyncio
+import gzip
 import hmac
 import json
 import os
@@ -13,6 +14,7 @@ import socket
 import struct
 from collections.abc import Callable, Iterable
 from contextlib import suppress
+from functools import partial
 from pathlib import Path
 from threading import Lock, Thread
 from typing import Any, NamedTuple, NoReturn
@@ -30,6 +32,7 @@ from hsp_control.companions.viewer.commands import (
     key_of,
 )
 
+_LARGE = 100_000  # bytes of a message from which on it is compressed: meshes
 _MAX_SIZE = 1_000_000  # bytes; the commands that move a robot are far smaller
 _LONGEST = 4000  # most bytes of a message of a page
 
@@ -156,6 +159,8 @@ class Page(WebSocketHandler):
         self.hub, self._door = hub, door
         self.has_pending, self._ready = asyncio.Event(), asyncio.Event()
         self._delivery: asyncio.Task[None] | None = None
+        # A page says so; a program that reads the scene need not.
+        self._unpacks = "gzip" in self.request.query_arguments
         self.answered = 0
 
     def prepare(self) -> None:
@@ -249,6 +254,8 @@ class Page(WebSocketHandler):
         try:
             while True:
                 for message in batch_messages(commands):
+                    if self._unpacks and len(message) > _LARGE:
+                        message = await self._compressed(message)
                     self._ready.clear()
                     await self.write_message(message, binary=True)
                     # Meanwhile newer commands replace pending ones.
@@ -261,6 +268,11 @@ class Page(WebSocketHandler):
             pass
         finally:
             self.hang_up()  # the page connects anew
+
+    async def _compressed(self, message: bytes) -> bytes:
+        """Return a message compressed, which another thread does; the page sees it."""
+        loop = asyncio.get_running_loop()
+        return await loop.run_in_executor(None, partial(gzip.compress, message, 4))
 
     def hang_up(self) -> None:
         """Close the connection at once: the program ends, whatever the page does."""

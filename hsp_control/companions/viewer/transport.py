@@ -1,5 +1,6 @@
 """Where commands go: into a scene that is kept and, with a server, to its pages."""
 
+import atexit
 import importlib.util
 import logging
 import os
@@ -90,6 +91,7 @@ def _leading_to(url: str) -> Path | None:
             file.write(page)
     except (OSError, RuntimeError):  # no place for it
         return None
+    atexit.register(Path(name).unlink, missing_ok=True)  # if it ends before that
     return Path(name)
 
 

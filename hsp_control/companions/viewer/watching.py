@@ -16,6 +16,7 @@ from hsp_control.companions.viewer.transport import LOOPBACK, open_browser
 from hsp_control.config import Recorder
 from hsp_control.config.recorder import declaration_of
 from hsp_control.config.scenario import ViewSettings
+from hsp_control.control.changes import Change
 from hsp_control.control.controller import Controller
 from hsp_control.declaration.nested import parts_within, with_parts_replaced
 from hsp_control.declaration.plain_data import plain_data
@@ -166,7 +167,7 @@ class Follower:
 
     _begun: bool
     _begin_anew: bool
-    _changes: int
+    _changes: dict[int, Change]
 
     def __init__(self, controller: Controller) -> None:
         """Copy the controller: here the loop does not run yet."""
@@ -215,7 +216,7 @@ class Follower:
         """Return time, q and v of the last step, copied; None before the first one."""
         controller = self._controller
         with controller._lock:  # no step is half made
-            if not controller._run.begun:
+            if not controller._memory.begun:
                 return None
             state = controller.state
             return state.t, state.q.copy(), state.v.copy()
@@ -240,7 +241,7 @@ class Follower:
     def _catch_up(self) -> None:
         """Make the changes that were made since; begin anew if the loop did."""
         controller = self._controller
-        if self._begin_anew or controller._run is not self._followed:
+        if self._begin_anew or controller._memory.runs != self._followed:
             self._copy_anew()
             self._change_journal()
         if not self._begun:
@@ -248,16 +249,16 @@ class Follower:
             start = controller._setup.start.state
             self._copy.compute(start.t, start.q, start.v)
             self._begun = True
-        changes = controller.changes
-        for change in changes[self._changes :]:
+        changes, known = {id(each): each for each in controller.changes}, self._changes
+        for change in (changes[key] for key in changes if key not in known):
             own = with_parts_replaced(change, Streamed, lambda each: each.preview())
-            known = {id(each) for each in self._streams()}
+            there = {id(each) for each in self._streams()}
             self._copy.change(own)
             for stream in self._streams():
-                if id(stream) not in known:  # the loop has heard its first message
+                if id(stream) not in there:  # the loop has heard its first message
                     with controller._lock:
                         stream.catch_up()
-        self._changes = len(changes)
+        self._changes = changes
 
     def _streams(self) -> list[Streamed]:
         return list(parts_within(self._copy.planned_tasks, Streamed))
@@ -265,8 +266,11 @@ class Follower:
     def _copy_anew(self) -> None:
         controller = self._controller
         self._copy = controller._ahead()
-        self._followed, self._begun = controller._run, controller._run.begun
-        self._changes, self._begin_anew = len(controller.changes), False
+        memory = controller._memory
+        self._followed, self._begun = memory.runs, memory.begun
+        # the changes that the copy has, by identity
+        self._changes = {id(each): each for each in controller.changes}
+        self._begin_anew = False
 
     def _new_journal(self) -> Path:
         config, lost = declaration_of(self._copy)

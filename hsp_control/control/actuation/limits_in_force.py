@@ -17,7 +17,7 @@ from hsp_control.constraints.limits.acceleration_bounds import (
     Ends,
     MotionLimits,
 )
-from hsp_control.control.actuation.sent_effort import SentEffort
+from hsp_control.control.actuation.sent_effort import SentEffort, SentMemory
 from hsp_control.control.evolution import Evolution, PlannedLimits
 from hsp_control.engine.plans import PartCall, PartCalls
 from hsp_control.robot import Robot, RobotState
@@ -65,10 +65,12 @@ class LimitsInForce:
     limited.
     """
 
-    def __init__(self, state: RobotState, planned: PlannedLimits) -> None:
+    def __init__(
+        self, state: RobotState, planned: PlannedLimits, memory: SentMemory
+    ) -> None:
         self._state = state
-        self.sent = SentEffort(state)
-        self._rate = False
+        self.sent = SentEffort(state, memory)
+        self._rate = True  # what the memory has of the last effort counts
         self._all: list[tuple[LimitSet, Evolution[float]]] = []
         # where the steps write the distances of barriers [m], by the barriers' names
         self.measured: list[tuple[str, Array]] = []
@@ -117,7 +119,7 @@ class LimitsInForce:
 
     def applied(self, tau: Array, acceleration: Array, period: float) -> None:
         """Record the effort that is sent now: its rate and the speed are limited."""
-        self.sent.period = period
+        self.sent.memory.period = period
         if not self._limit_anything:
             return
         if self._rate:
@@ -169,16 +171,6 @@ class LimitsInForce:
     @property
     def _limit_anything(self) -> bool:
         return any(each.limits is not None for each, _ in self.sets)
-
-    def forget(self) -> None:
-        """Forget the last efforts."""
-        self.sent.forget()
-        self.update()
-
-    def remember(self, memory: tuple[Array, ...]) -> None:
-        """Go on from what `SentEffort.memory` returned."""
-        self.sent.remember(memory)
-        self.update()
 
 
 def _mean(

@@ -1,5 +1,6 @@
 """What is remembered of the efforts sent: the last one, and what holding them did."""
 
+from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
@@ -29,6 +30,31 @@ class Held(NamedTuple):
     disturbance: Array  # acceleration that something else than the effort causes
 
 
+@dataclass
+class SentMemory:
+    """What is remembered of the efforts sent; calls read and write the arrays."""
+
+    # the last effort, and how long it is held [s], inf: not known; shape (nv + 1,)
+    last: Array
+    held: Held
+    period: float = 0.0  # of the last effort [s]; 0: there was none in this run
+
+    @classmethod
+    def of(cls, nv: int) -> "SentMemory":
+        """Return that of a robot to which nothing was sent."""
+        held = Held(np.zeros(2), *(np.zeros(nv) for _ in range(10)))
+        memory = cls(np.zeros(nv + 1), held)
+        memory.clear()
+        return memory
+
+    def clear(self) -> None:
+        """Begin anew."""
+        self.period = 0.0
+        for each in (self.last, *self.held):
+            each[:] = 0.0
+        self.held.timing[0] = self.last[-1] = np.inf
+
+
 class SentEffort:
     """The last effort, and the error of the acceleration while efforts are held.
 
@@ -43,16 +69,11 @@ class SentEffort:
     30 ms, and its worst is kept for 0.1 s, because the next one may be as large.
     """
 
-    def __init__(self, state: RobotState) -> None:
-        nv = state.robot.nv
-        self._state = state
-        self.period = 0.0  # of the last effort [s]; 0: there was none in this run
-        # the last effort, and how long it is held [s], inf: not known; shape (nv + 1,)
-        self.last = np.zeros(nv + 1)
-        self.held = Held(np.zeros(2), *(np.zeros(nv) for _ in range(10)))
-        self._acceleration = np.zeros(nv)
+    def __init__(self, state: RobotState, memory: SentMemory) -> None:
+        self._state, self.memory = state, memory
+        self.last, self.held = memory.last, memory.held
+        self._acceleration = np.zeros(state.robot.nv)
         self._expect = state.plan([self.expecting(self._acceleration)]).call()
-        self.forget()
 
     def record(self, tau: Array, acceleration: Array, period: float) -> None:
         """Record an effort, the acceleration it is to give, and how long it is held."""
@@ -88,20 +109,3 @@ class SentEffort:
     def forget_rate(self) -> None:
         """Forget the last effort: the rate of the next one has no limit."""
         self.last[-1] = np.inf
-
-    def forget(self) -> None:
-        """Begin anew."""
-        self.period = 0.0
-        for each in (self.last, *self.held):
-            each[:] = 0.0
-        self.held.timing[0] = np.inf
-        self.forget_rate()
-
-    def memory(self) -> tuple[Array, ...]:
-        """Return a copy of what it remembers."""
-        return tuple(each.copy() for each in (self.last, *self.held))
-
-    def remember(self, memory: tuple[Array, ...]) -> None:
-        """Set what `memory` returned."""
-        for each, value in zip((self.last, *self.held), memory, strict=True):
-            each[:] = value

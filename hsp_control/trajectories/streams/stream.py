@@ -209,7 +209,7 @@ class Streamed(Remembering, error=TrajectoryError):
         ``taken``: all valid ones; ``late``: of these, those that came too late to
         count; ``rejected``: invalid ones, and those that no motion can follow.
         The stream that a controller follows counts,
-        ``controller.tasks[0].trajectory``.
+        ``controller.stream(task)``.
 
         Raises:
             StreamError: If it begins where a robot starts, and no controller follows
@@ -378,7 +378,7 @@ class Streamed(Remembering, error=TrajectoryError):
         return StreamError(
             f"this {type(self).__name__} begins where a robot starts, and no "
             "controller follows it; that of a controller is its task's, for example "
-            "controller.tasks[0].trajectory"
+            "controller.stream('hand')"
         )
 
     def _bounds(self) -> MotionBounds:

@@ -117,12 +117,12 @@ def test_a_page_that_dies_before_its_key_was_held(
 def test_a_play_that_failed_and_was_not_reset_says_so_with_its_status(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    def fail(session: Any, *_: Any) -> None:
+    def fail(session: Any, *_: Any, **__: Any) -> None:
         session.over = "the arm is too fast; reset to go on"
 
     monkeypatch.setattr(PLAYED, fail)
     arguments = ["paper/4_moving_obstacle", "--out", str(tmp_path), "--no-browser"]
     assert main(["play", *arguments]) == 2
     assert capsys.readouterr().err.endswith("hsp: the arm is too fast\n")
-    monkeypatch.setattr(PLAYED, lambda *_: None)
+    monkeypatch.setattr(PLAYED, lambda *_, **__: None)
     assert main(["play", *arguments]) == 0

@@ -301,7 +301,8 @@ def test_the_picture_follows_what_is_dragged(session: Session) -> None:
     assert [each["name"] for each in setup["targets"]] == ["hand", "posture"]
     assert [each["name"] for each in setup["obstacles"]] == ["ball"]
     assert [each["title"] for each in setup["plots"]] == [
-        "Null-space error ‖e_N‖", "Clearance", "Efforts τ", "Task error", "Task error",
+        "Null-space error ‖e_N‖", "Clearance", "Efforts τ", "Speeds v", "Forces",
+        "Task error", "Task error",
     ]  # fmt: skip
     assert {each["id"] for each in setup["controls"]} == set(session.handles.knobs)
     session.receive({"do": "obstacle", "name": "ball", "position": [0.2, 0.4, 0.5]})

@@ -425,6 +425,92 @@ def test_a_target_out_of_reach_is_told_at_its_handle(page: Any) -> None:
     assert away.count() == 0
 
 
+def test_labels_are_right_at_every_ratio_and_range(page: Any) -> None:
+    """uPlot scales whole numbers before px, and has no steps of 3 or 4 decades."""
+    assert page.evaluate("/^\\d+px/.test(Plot.FONT)")
+    steps = page.evaluate(
+        "[1, 4, 6, 9, 12, 17].map((n) => Plot.DECADES.incrs(0, 1, -n, 0)[0])"
+    )
+    assert steps == [1, 1, 2, 2, 5, 5]
+    assert page.evaluate("Plot.number(Math.log10(3e-17), true)") == "0"
+
+
+def test_a_slow_program_does_not_turn_a_knob_back(page: Any) -> None:
+    """What it says before it has heard of the change is not shown."""
+    page.evaluate("play.panel.set('stiffness', 900)")
+    page.evaluate("play.touched.set('set stiffness', performance.now() - 1000)")
+    tell(page, "play_values", values={"stiffness": 400.0, "friction": False})
+    assert page.evaluate("play.panel.wanted.has('stiffness')")
+    tell(page, "play_values", values={"stiffness": 900.0, "friction": False})
+    shown = page.evaluate("document.querySelector('#play-stiffness').ariaValueNow")
+    assert float(shown) == 900.0
+    assert not page.evaluate("play.panel.wanted.has('stiffness')")
+
+
+def test_bars_show_joints_against_their_limits(page: Any) -> None:
+    setup = {**SETUP, "joints": ["one", "two"]}
+    page.evaluate("(command) => viewer.handle_command(command)", setup)
+    numbers = {"q": [0.25, 0.99], "v": [-0.5, None], "tau": [0.97, 0.1]}
+    tell(page, "play_joints", **numbers)
+    bars = page.evaluate(
+        "play.bars.rows.map((row) => row.map((i) => [i.style.left, i.style.width, "
+        "i.classList.contains('near')]))"
+    )
+    assert bars[0] == [
+        ["25%", "", False],
+        ["25%", "25%", False],
+        ["50%", "48.5%", True],
+    ]
+    assert bars[1][0] == ["99%", "", True]
+    assert bars[1][1] == ["50%", "0%", False]
+
+
+def test_the_slider_looks_back(page: Any) -> None:
+    node = "viewer.scene_tree.find(['seen']).object"
+    page.evaluate(f"{node}.name = 'seen'")  # what is not in the scene is ignored
+    for k in range(5):
+        track = {"path": "/seen", "property": "position", "values": [0.1 * k, 0, 0]}
+        track |= {"times": [0.0]}
+        tell(page, "pose", tracks=[track])
+        tell(page, "play_state", t=2.0 + k, running=True, rate=1.0, message="")
+    x = float(page.evaluate(f"{node}.position.x"))
+    page.evaluate(
+        "(() => { const back = document.querySelector('.back'); back.value = -2.5; "
+        "back.dispatchEvent(new Event('input')); })()"
+    )
+    assert until_sent(page, "pause")
+    assert page.evaluate("play.bar.clock.textContent") == "3.00 s"
+    assert page.evaluate(f"{node}.position.x") == pytest.approx(0.1)
+    assert x == pytest.approx(0.4)
+    for running in (False, True):  # it pauses, and later goes on
+        tell(page, "play_state", t=6.0, running=running, rate=1.0, message="")
+    assert not page.evaluate("play.bar.past.looking")
+
+
+def test_a_picture_is_a_file_of_what_is_seen(page: Any) -> None:
+    page.evaluate(
+        "(() => { window.saved = null; PlayCamera.prototype.save = (blob, ending) => "
+        "{ window.saved = [blob.size, ending]; }; })()"
+    )
+    page.evaluate("document.querySelector('.play-bar .picture').click()")
+    until(page, "window.saved !== null")
+    size, ending = page.evaluate("window.saved")
+    assert ending == "png"
+    assert size > 5000
+
+
+def test_without_a_graphics_card_it_draws_lightly_and_says_so(page: Any) -> None:
+    if not page.evaluate("isSoftware()"):
+        pytest.skip("this browser has a graphics card")
+    assert not page.evaluate("viewer.renderer.shadowMap.enabled")
+    kinds = page.evaluate(
+        "(() => { const found = new Set(); viewer.scene.traverse(({material}) => "
+        "[material].flat().forEach((one) => found.add(one?.type))); "
+        "return [...found]; })()"
+    )
+    assert "MeshStandardMaterial" not in kinds
+
+
 def test_it_fits_a_phone(chromium: Any, viewer: Viewer) -> None:
     page, wrong = opened(
         chromium,

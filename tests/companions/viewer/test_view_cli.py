@@ -130,9 +130,10 @@ def test_what_makes_no_sense_is_refused(
 
 
 def test_with_a_browser_it_stays_until_the_page_is_closed(
-    log: Path, monkeypatch: pytest.MonkeyPatch
+    log: Path, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
     monkeypatch.setattr(transport, "RELOAD_TIMEOUT", 0.5)
+    monkeypatch.setenv("XDG_DATA_HOME", str(tmp_path))
     monkeypatch.setenv("DISPLAY", ":0")
     graphical = transport.webbrowser.BackgroundBrowser("firefox")
     monkeypatch.setattr(transport.webbrowser, "get", lambda: graphical)
@@ -140,7 +141,9 @@ def test_with_a_browser_it_stays_until_the_page_is_closed(
     left: list[float] = []
 
     def look(url: str, new: int) -> None:
-        page = Page(url)
+        leads = Path(url.removeprefix("file://")).read_text()
+        address = leads.partition("url=")[2].partition('"')[0]
+        page = Page(address)
         pages.append(page)
         time.sleep(1.5)
         left.append(time.monotonic())

@@ -1,6 +1,7 @@
 """Check the view's server: to this machine alone, and it leaves nothing behind."""
 
 import asyncio
+import gzip
 import hmac
 import socket
 import subprocess
@@ -32,6 +33,7 @@ from hsp_control.companions.viewer.commands import (
     LatestCommands,
     PageCommand,
     key_of,
+    page_command,
 )
 from hsp_control.companions.viewer.transport import PageServer, page_key
 from hsp_control.geometry import Scene
@@ -295,6 +297,34 @@ def test_a_page_that_lost_its_program_keeps_its_key(
     assert "fetch(location" not in asks
 
 
+def test_meshes_come_compressed_to_pages_that_say_so(steered: PageServer) -> None:
+    text = " ".join(map(str, range(100_000)))
+    steered.send([page_command("nothing", "/mesh", "object", text=text)])
+    assert steered.url is not None
+    plain, packed = (
+        asyncio.run(largest_message(steered.url + more)) for more in ("", "&gzip=1")
+    )
+    assert len(packed) < 0.5 * len(plain)
+    assert text.encode() in plain
+    assert text.encode() in gzip.decompress(packed)
+
+
+async def largest_message(url: str) -> bytes:
+    """The largest of the messages that build the scene."""
+    connection = await websocket_connect(scene_request(url))
+    largest = b""
+    while len(largest) < 50_000:
+        message = await connection.read_message()
+        assert isinstance(message, bytes)
+        largest = max(largest, message, key=len)
+        await connection.write_message("taken")
+    protocol = connection.protocol
+    connection.close()
+    if protocol is not None and protocol.stream is not None:
+        protocol.stream.close()  # the event loop ends before the server could confirm
+    return largest
+
+
 def test_hardware_gets_a_key_that_no_earlier_page_has() -> None:
     assert page_key("127.0.0.1", fresh=True) != page_key("127.0.0.1", fresh=True)
     assert page_key("127.0.0.1", fresh=True) != page_key("127.0.0.1")
@@ -445,7 +475,7 @@ def test_a_browser_is_opened_only_where_there_is_one(
     monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
 ) -> None:
     url, opened = "http://127.0.0.1:7000/", threading.Event()
-    monkeypatch.setattr(transport.webbrowser, "open", lambda url, new: opened.set())
+    monkeypatch.setattr(transport, "_open", lambda url: opened.set())
     monkeypatch.setattr(transport.sys, "platform", "linux")
     for name in ("DISPLAY", "WAYLAND_DISPLAY", "BROWSER"):
         monkeypatch.delenv(name, raising=False)

@@ -1,5 +1,6 @@
 """Limits: the step is the law's where none binds, and keeps them where one does."""
 
+from copy import deepcopy
 from typing import Any
 
 import numpy as np
@@ -14,7 +15,7 @@ from hsp_control import engine
 from hsp_control.common.arrays import Array
 from hsp_control.constraints.limits import ObstacleDistance, RobotLimits, SelfDistance
 from hsp_control.control.actuation import Status
-from hsp_control.control.actuation.sent_effort import SentEffort
+from hsp_control.control.actuation.sent_effort import SentEffort, SentMemory
 from hsp_control.control.compensation import Compensation, MomentumObserver
 from hsp_control.geometry import Scene
 from hsp_control.geometry.scene import Start
@@ -309,7 +310,8 @@ def test_the_error_of_the_acceleration_is_what_is_observed() -> None:
     robot = hsp.Robot.load("planar3r")
     state, q = robot.state(0.0, robot.home(), np.zeros(3)), robot.home()
     v, a = np.array([0.1, 0.2, 0.0]), np.array([1.0, -1.0, 0.0])
-    effort, tau = SentEffort(state), np.zeros(3)
+    memory, tau = SentMemory.of(3), np.zeros(3)
+    effort = SentEffort(state, memory)
     held = effort.held
     for k in range(100):
         state.update(0.001 * k, q, v)
@@ -338,12 +340,12 @@ def test_the_error_of_the_acceleration_is_what_is_observed() -> None:
     np.testing.assert_allclose(held.most[0], np.exp(-0.2) * quick, rtol=1e-9)
     np.testing.assert_array_equal(held.least, np.minimum(held.quick, 0.0))
     assert held.least[0] < 0.0  # so quick it is
-    memory, drift, steady = effort.memory(), held.drift.copy(), held.steady.copy()
-    effort.forget()
+    kept, drift, steady = deepcopy(memory), held.drift.copy(), held.steady.copy()
+    memory.clear()
     assert not held.error.any()
     assert not held.drift.any()
     assert not held.steady.any()
-    effort.remember(memory)
+    held = SentEffort(state, kept).held
     np.testing.assert_array_equal(held.drift, drift)
     np.testing.assert_array_equal(held.steady, steady)
     np.testing.assert_allclose(held.error, [8.0, 8.0, 8.0], rtol=1e-9)
@@ -445,7 +447,7 @@ def test_a_step_with_minimum_distances_runs_no_python() -> None:
     limits = hsp.Limits(barriers=[ObstacleDistance(0.02), SelfDistance()])
     law = elbow(limits)
     law.compute(0.0, robot.home(), np.zeros(7))
-    bound = law._run.bound
+    bound = law._bound
     assert bound is not None
     assert bound.direct
     assert not bound.move.python

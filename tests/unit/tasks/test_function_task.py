@@ -9,9 +9,10 @@ import pytest
 from task_cases import SECOND, TIME, Motion, load, placed, wobble
 
 import hsp_control as hsp
-from hsp_control import FunctionTask, RobotState
+from hsp_control import RobotState
 from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import HspControlError, TaskError
+from hsp_control.tasks import FunctionTask
 
 
 def elbow(state: RobotState) -> Array:

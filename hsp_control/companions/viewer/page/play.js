@@ -58,6 +58,11 @@ class Play {
     legend.keepClosed = true;  // what is in the picture is to be touched
     legend.setOpen(false);
     this.panel.setOpen(!this.panel.narrow.matches);
+    // A page whose address has "full" draws fully all the same: for pictures.
+    if (isSoftware() && !new URLSearchParams(location.search).has("full")) {
+      drawLightly();
+      this.bar.say("This browser draws without a graphics card: the picture is a light one.");
+    }
     refit();  // there is no legend to make room for
   }
 
@@ -89,6 +94,7 @@ class Play {
   showState(state) {
     Object.assign(this.state, state);
     this.bar?.showState(this.state);
+    this.bar?.past.mark(this.state.t, this.state.running);
   }
 
   setDrive({mine, taken}) {
@@ -215,6 +221,7 @@ Object.assign(commandHandlers, {
   play_targets(command) { if (play.ready) play.showTargets(command); },
   play_state(command) { play.showState(command); },
   play_values({values}) { if (play.ready) play.panel.setValues(values); },
+  pose({tracks}) { if (!play.ready || play.bar.past.take(tracks)) player.pose(tracks); },
   play_joints(command) { if (play.ready && play.panel.open) play.bars.show(command); },
   play_force(command) { play.force = command.visible ? command : null; },
   play_samples({times, values}) { if (play.ready) play.plots.add(times, values); },

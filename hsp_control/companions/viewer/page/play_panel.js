@@ -15,6 +15,7 @@ class PlayBar {
     onPress(this.panel, () => play.panel.setOpen(!play.panel.open));
     onPress(part("button", this.watching), () => play.act("take_over"));
     presentation.addButton(part(".present", this.row));
+    this.past = new PlayPast(play, part(".back", this.row));
     const camera = new PlayCamera(play.viewer, () => document.title);
     onPress(part(".picture", this.row), () => camera.picture());
     const film = part(".film", this.row);
@@ -22,14 +23,20 @@ class PlayBar {
     onPress(film, () => { film.ariaPressed = camera.film(); });
   }
 
+  // Say something for a while, unless the program has something to say.
+  say(words) {
+    this.status.textContent = words;
+    this.timer = setTimeout(() => { this.status.textContent = ""; }, 8000);
+  }
+
   showState({t, running, rate, message, level}) {
-    this.clock.textContent = `${t.toFixed(2)} s`;
+    if (!this.past.looking) this.clock.textContent = `${t.toFixed(2)} s`;
     this.rate.replaceChildren(...running
       ? [`${Number(rate).toFixed(2)} ×`, make("span", {}, " real time")]
       : [this.play.simulated ? "paused" : "stopped"]);
     const ariaLabel = running ? "Pause" : "Go";
     Object.assign(this.toggle, {ariaLabel, title: `${ariaLabel} (space)`});
-    if (this.told !== message) {
+    if ((this.told ?? "") !== message) {
       this.told = this.status.textContent = message;
       clearTimeout(this.timer);
       // What was done is said for a while; what is wrong stays.
@@ -189,6 +196,48 @@ class PlayPanel {
       this.setters.get(id)?.(value);
     }
   }
+}
+
+// The poses of the last ten seconds, and the slider that looks back at them. What is shown is then
+// the past: a simulation pauses, a live loop goes on.
+class PlayPast {
+  static SPAN = 10;  // s
+
+  constructor(play, input) {
+    Object.assign(this, {play, input, poses: [], last: null});
+    on(input, "input", () => this.look());
+  }
+
+  get looking() { return Number(this.input.value) < 0; }
+
+  // Keep what is drawn; return whether it is to be shown.
+  take(tracks) {
+    this.last = tracks;
+    return !this.looking;
+  }
+
+  // The time of the last pose.
+  mark(t, running) {
+    if (t < (this.poses.at(-1)?.t ?? t)) this.poses = [];  // it has begun anew
+    if (this.last && t > (this.poses.at(-1)?.t ?? -1)) this.poses.push({t, tracks: this.last});
+    const old = this.poses.findIndex((pose) => pose.t > t - PlayPast.SPAN);
+    if (old > 50) this.poses.splice(0, old);
+    if (this.looking && running && this.play.simulated && this.paused) this.leave();
+    this.paused = !running;
+  }
+
+  look() {
+    const {play} = this, end = this.poses.at(-1)?.t;
+    if (end === undefined) return;
+    if (play.simulated && play.state.running) play.act("pause");
+    const wanted = end + Number(this.input.value);
+    const pose = this.poses.findLast(({t}) => t <= wanted) ?? this.poses[0];
+    player.pose(pose.tracks);
+    play.bar.clock.textContent = `${pose.t.toFixed(2)} s`;
+    play.viewer.set_dirty();
+  }
+
+  leave() { this.input.value = 0; }
 }
 
 // Each joint's position in its range, its speed and its effort, over their limits.

@@ -61,6 +61,39 @@ function newViewer(pane) {
   }
 }
 
+// Without a graphics card a picture takes a second. Without shadows and mirrors it takes a fifth.
+let drawsLightly = false;
+
+function isSoftware() {
+  const gl = viewer.renderer.getContext(), about = gl.getExtension("WEBGL_debug_renderer_info");
+  const name = about ? gl.getParameter(about.UNMASKED_RENDERER_WEBGL) : "";
+  return /swiftshader|llvmpipe|softpipe|software|basic render/i.test(name);
+}
+
+function drawLightly() {
+  drawsLightly = true;
+  viewer.renderer.shadowMap.enabled = false;
+  viewer.renderer.setPixelRatio(Math.min(devicePixelRatio, 1));
+  viewer.scene.environment = null;
+  viewer.scene.traverse(simplify);
+  viewer.set_3d_pane_size();
+  viewer.set_dirty();
+}
+
+function simplify(object) {
+  if (object.isLight) object.castShadow = false;
+  if (!object.material) return;
+  const simple = (one) => {
+    if (!one.isMeshStandardMaterial) return one;
+    const {color, map, opacity, transparent, side, depthTest, depthWrite} = one;
+    const {emissive, emissiveIntensity} = one;
+    return new MeshCat.THREE.MeshLambertMaterial(
+      {color, map, opacity, transparent, side, depthTest, depthWrite, emissive, emissiveIntensity});
+  };
+  object.material = Array.isArray(object.material)
+    ? object.material.map(simple) : simple(object.material);
+}
+
 // What surrounds a dark stage, for surfaces to mirror: soft boxes above and beside it.
 function studio() {
   const {Scene, Mesh, BoxGeometry, MeshBasicMaterial, BackSide, PMREMGenerator} = MeshCat.THREE;
@@ -85,7 +118,7 @@ function node(path) { return viewer.scene_tree.find(elements(path)).object; }
 function caption({title, legend: entries, dark}) {
   document.title = title;
   document.body.classList.toggle("dark", dark);
-  viewer.scene.environment = dark ? viewer.scene.environment ?? studio() : null;
+  viewer.scene.environment = dark && !drawsLightly ? viewer.scene.environment ?? studio() : null;
   part("#caption h1").textContent = title;
   legend.show(entries);
   refit();  // now it is known what title and legend cover
@@ -100,18 +133,30 @@ function ask({number}) {
 function connect() {
   const address = new URL("scene" + location.search, location.href);  // with its key
   address.protocol = address.protocol.replace("http", "ws");
+  const unpacks = typeof DecompressionStream === "function";
+  if (unpacks) address.searchParams.set("gzip", "1");
   const socket = new WebSocket(address);
   socket.binaryType = "arraybuffer";
   viewer.connection = socket;
   socket.onmessage = ({data}) => {
-    viewer.handle_command_bytearray(new Uint8Array(data));
-    socket.send("taken");  // flow control: the server sends the next message after it
+    const bytes = new Uint8Array(data);
+    const take = (message) => {
+      viewer.handle_command_bytearray(message);
+      socket.send("taken");  // flow control: the server sends the next message after it
+    };
+    // The meshes come compressed: 0x1F 0x8B begins no other message.
+    if (bytes[0] === 0x1F && bytes[1] === 0x8B) inflated(bytes).then(take); else take(bytes);
   };
   socket.onclose = () => {
     document.body.classList.add("lost");
     commandHandlers.lost?.();
     lookForNext();
   };
+}
+
+async function inflated(bytes) {
+  const stream = new Blob([bytes]).stream().pipeThrough(new DecompressionStream("gzip"));
+  return new Uint8Array(await new Response(stream).arrayBuffer());
 }
 
 // Whoever listens at this address may be another program, even another user's. The key is not
@@ -236,6 +281,7 @@ function set_object(command) {
     if (geometry?.isBufferGeometry && !geometry.attributes.normal) geometry.computeVertexNormals();
     if (material) object.material = Array.isArray(object.material)
       ? object.material.map(lit) : lit(object.material);
+    if (drawsLightly) simplify(object);
   });
 }
 

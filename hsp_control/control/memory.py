@@ -1,0 +1,65 @@
+"""What a controller remembers of its run: one record, to which all else is bound."""
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from hsp_control.common.arrays import Array
+from hsp_control.control.actuation.sent_effort import SentMemory
+from hsp_control.control.change import Change
+from hsp_control.control.clock_check import ClockCheck
+
+
+@dataclass
+class Memory:
+    """All that a controller remembers of its run.
+
+    A controller is what is declared, its time line, the state of its robot, and this.
+    What computes reads and writes these arrays, and remembers nothing by itself. A copy
+    and a pickle are of the four; a restart clears this one.
+    """
+
+    # what the last step delivered, shape (nv,) [rad/s² or m/s²]
+    acceleration: Array
+    sent: SentMemory  # the efforts sent, and what holding them did
+    # what the clock reads at time 0, shape (1,) [s], and whether that is known
+    origin: Array = field(default_factory=lambda: np.zeros(1))
+    counts: bool = False
+    begun: bool = False  # whether there was a step
+    now: float = -np.inf  # latest time of a step [s]
+    # changes as they were given that no step has seen, and the time of the last one
+    unseen: tuple[float, tuple[Change, ...]] = (-np.inf, ())
+    # of tasks, by key: the numbers of an impedance that wait, and what compensators add
+    waiting: dict[int, Array] = field(default_factory=dict)
+    offsets: dict[int, Array] = field(default_factory=dict)
+    clock: ClockCheck = field(default_factory=ClockCheck)
+    runs: int = 0  # how many times it was cleared
+
+    @classmethod
+    def of(cls, nv: int) -> "Memory":
+        """Return that of a controller before its first run."""
+        return cls(np.zeros(nv), SentMemory.of(nv))
+
+    def clear(self) -> None:
+        """Begin another run; the arrays stay where they are."""
+        self.acceleration = np.zeros_like(self.acceleration)
+        self.sent.clear()
+        self.origin[:], self.counts = 0.0, False
+        self.begun, self.now, self.unseen = False, -np.inf, (-np.inf, ())
+        self.waiting.clear()
+        for offset in self.offsets.values():
+            offset[:] = 0.0
+        self.clock, self.runs = ClockCheck(), self.runs + 1
+
+    def count_from(self, origin: float) -> None:
+        """Count times from a reading of the clock [s]."""
+        self.origin[0], self.counts = origin, True
+
+    def made(self, now: float, change: Change) -> None:
+        """Note a change that is made after a step at a time [s]."""
+        before = self.unseen[1] if self.unseen[0] == now else ()
+        self.unseen = now, (*before, change)
+
+    def not_seen(self, now: float) -> tuple[Change, ...]:
+        """Return the changes that were made after the last step, at a time [s]."""
+        return self.unseen[1] if self.unseen[0] == now else ()

@@ -1,0 +1,61 @@
+"""The stream of a task: what a controller gives to whoever sends targets."""
+
+from collections.abc import Callable, Mapping
+from typing import Any
+
+import pinocchio as pin
+from numpy.typing import ArrayLike
+
+from hsp_control.trajectories.streams.stream import Streamed
+from hsp_control.trajectories.streams.velocities import Axes
+
+
+class TaskStream:
+    """The stream that a task of a controller follows, in whichever run it is.
+
+    `send` and `send_chunk` may be called from any thread, before the first step, too.
+    What is counted and recorded is that of the present run.
+    """
+
+    def __init__(self, find: Callable[[], Streamed]) -> None:
+        """Set what returns the stream at present: each run begins another one."""
+        self._find = find
+
+    def send(
+        self,
+        value: ArrayLike | pin.SE3 | None = None,
+        *,
+        velocity: ArrayLike | None = None,
+        axes: Axes | None = None,
+        t: float | None = None,
+    ) -> None:
+        """Send a target, or a velocity; see `Streamed.send`."""
+        self._find().send(value, velocity=velocity, axes=axes, t=t)
+
+    def send_chunk(
+        self,
+        values: ArrayLike,
+        times: ArrayLike,
+        *,
+        velocities: ArrayLike | None = None,
+        t: float | None = None,
+    ) -> None:
+        """Send waypoints; see `Streamed.send_chunk`."""
+        self._find().send_chunk(values, times, velocities=velocities, t=t)
+
+    def counts(self) -> dict[str, float]:
+        """Return the time since the last message [s], and how many there were."""
+        return self._find().counts()
+
+    @property
+    def record(self) -> tuple[Mapping[str, Any], ...]:
+        """What the run has taken, and when; see `Streamed.messages`."""
+        return self._find().record
+
+    @property
+    def last_rejection(self) -> str:
+        """Why the last invalid message of another process was one; empty for none."""
+        return self._find().last_rejection
+
+    def __repr__(self) -> str:
+        return f"TaskStream of {self._find()!r}"

@@ -1,0 +1,102 @@
+"""Every command that takes a log takes each that anything of ours writes."""
+
+import sys
+from pathlib import Path
+
+import pytest
+from typing_commands import PATIENCE, hsp, typed
+
+CONFIG = """
+robot: {name: panda}
+tasks: {hand: {type: frame_pose, trajectory: {type: hold}, blend: 1}}
+null_space: {fields: [{type: joint_centering}]}
+simulation: {duration: 0.2, control_period: 0.001}
+"""
+PYTHON = """
+import pinocchio as pin
+import hsp_control as hsp
+from hsp_control.live import InProcessRobot, SimulatedRobot
+
+robot = hsp.Robot.load("panda")
+hand = hsp.FramePosition("panda_tcp")
+
+
+def law(field):
+    return hsp.Controller(robot, [hand], field)
+
+
+own = hsp.FunctionCost(lambda state: state.q[3] ** 2, weight=0.01)
+task = hsp.tasks.FunctionTask(lambda state: state.q[0], name="first")
+both = hsp.Controller(robot, [hand, task])
+run = {"duration": 0.05, "control_period": 0.001}
+hsp.simulate(law(hsp.JointCentering()), robot.home(), **run).save("out/simulated.npz")
+hsp.simulate(law(own), robot.home(), **run).save("out/function.npz")
+hsp.simulate(both, robot.home(), **run).save("out/task.npz")
+other = hsp.Robot.from_pinocchio(robot.model, home=robot.home())
+arm = hsp.Controller(other, [hand])
+with hsp.Recorder(arm, "out/from_pinocchio.npz") as recorder:
+    for k in range(30):
+        recorder.record(arm.compute(0.001 * k, robot.home(), [0.0] * 7))
+arm = law(hsp.JointCentering())
+with hsp.Recorder(arm, "out/recorded.npz") as recorder:
+    for k in range(30):
+        recorder.record(arm.compute(0.001 * k, robot.home(), [0.0] * 7))
+plant = hsp.plants.IntegratedPlant(
+    hsp.plants.RigidBodyPlant(robot), hsp.integrators.Rk4(0.001)
+)
+zero = [0.0] * 7
+simulated = SimulatedRobot(plant, robot.home(), pin.utils.zero(7), 0.001)
+hsp.run_loop(
+    law(hsp.JointCentering()), InProcessRobot(simulated), duration=0.2,
+    log="out/loop.journal",
+)
+"""
+REPEATED = "mine", "mine-live", "mine-robot", "mine-play", "recorded"
+"""Logs with a configuration that is data: `hsp run` repeats them."""
+OTHERS = {  # by what `hsp run` says of it
+    "simulated": "was made from Python and contains no configuration",
+    "function": "was made from Python and contains no configuration",
+    "task": "was made from Python and contains no configuration",
+    "from_pinocchio": "was made from Python and contains no configuration",
+    "loop": "was made from Python and contains no configuration",
+}
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("logs")
+    (folder / "mine.yaml").write_text(CONFIG)
+    (folder / "logs.py").write_text(PYTHON)
+    hsp("run mine.yaml", folder)
+    hsp(f"live mine.yaml {PATIENCE}", folder)
+    hsp("play mine.yaml --no-browser", folder)
+    typed([sys.executable, "logs.py"], folder)
+    return folder
+
+
+@pytest.mark.parametrize("name", [*REPEATED, *OTHERS])
+def test_a_log_is_taken(name: str, folder: Path) -> None:
+    log = next((folder / "out").glob(f"{name}.*")).relative_to(folder)
+    hsp(f"view {log} --no-browser", folder)
+    hsp(f"export {log} --html out/{name}.html", folder)
+    hsp(f"plot {log}", folder)
+    assert (folder / "out" / f"{name}.html").stat().st_size > 100_000
+    assert (folder / "out" / f"{name}-diagnostics.png").exists()
+    if name in REPEATED:
+        hsp(f"run {log}", folder)
+    else:
+        assert OTHERS[name] in hsp(f"run {log}", folder, status=2)
+
+
+def test_a_walk_s_log_is_taken(folder: Path) -> None:
+    hsp("run walking/solo12_trot --set simulation.duration=0.3", folder)
+    (log,) = (path.relative_to(folder) for path in folder.glob("out/solo12_trot*.npz"))
+    hsp(f"view {log} --no-browser", folder)
+    hsp(f"export {log} --html out/walk.html", folder)
+    hsp(f"plot {log}", folder)
+    hsp(f"run {log}", folder)
+
+
+def test_a_sweep_s_file_is_drawn(folder: Path) -> None:
+    hsp("sweep mine.yaml --over null_space.gain=5,8 --workers 1", folder)
+    hsp("plot out/mine-sweep.parquet", folder)

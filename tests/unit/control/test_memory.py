@@ -1,0 +1,103 @@
+"""What a controller remembers is one record: whatever is copied goes on like it."""
+
+import pickle
+import warnings
+from collections.abc import Callable
+from copy import deepcopy
+
+import numpy as np
+import pytest
+
+import hsp_control as hsp
+from hsp_control.control.clock_check import ClockWarning
+from hsp_control.control.first_state import StartWarning
+from hsp_control.control.memory import Memory
+
+ROBOT = hsp.Robot.load("panda")
+H = 1e-3
+COPIES: dict[str, Callable[[hsp.Controller], hsp.Controller]] = {
+    "copy": deepcopy,
+    "pickle": lambda made: pickle.loads(pickle.dumps(made)),
+}
+
+
+def controller() -> hsp.Controller:
+    """Return one with all that is remembered: rates, speeds, a stiffness that waits."""
+    hand = hsp.FramePose(
+        name="hand",
+        impedance=hsp.Impedance([200.0] * 3 + [10.0] * 3),
+        trajectory=hsp.Hold(),
+    )
+    made = hsp.Controller(ROBOT, [hand], hsp.TargetPosture("home"), start=ROBOT.home())
+    stiff = hsp.Impedance([900.0] * 3 + [40.0] * 3)
+    made.at(0.02).ramp(0.02).impedance("hand", stiff)
+    return made
+
+
+def sent(made: hsp.Controller, k: int) -> bytes:
+    """Let a period pass, in which the arm moves away from what it was to do."""
+    made.applied(np.sin(0.1 * k + np.arange(7)), H)
+    return b"".join(each.tobytes() for each in made._memory.sent.held)
+
+
+def computed(made: hsp.Controller, k: int) -> bytes:
+    away = 0.1 * np.sin(0.05 * k + np.arange(7))
+    rate = 0.05 * np.cos(0.05 * k + np.arange(7))
+    return made.compute(k * H, ROBOT.integrate(ROBOT.home(), away), rate).tau.tobytes()
+
+
+@pytest.mark.parametrize("kind", COPIES)
+@pytest.mark.parametrize("between", [True, False], ids=["computed", "sent"])
+def test_a_copy_goes_on_to_the_last_bit(kind: str, between: bool) -> None:
+    """Made at any step, before its effort is sent or afterwards."""
+    made, twins = controller(), list[hsp.Controller]()
+    made.feedback("hand").offset[:] = 0.1  # as a compensator writes it
+    for k in range(60):
+        efforts = {computed(each, k) for each in (made, *twins)}
+        if between and k % 7 == 0:
+            twins.append(COPIES[kind](made))
+        held = {sent(each, k) for each in (made, *twins)}
+        if not between and k % 7 == 0:
+            twins.append(COPIES[kind](made))
+        assert len(efforts) == len(held) == 1
+    assert made._memory.waiting  # the stiffness is behind: it would add energy
+    assert all(each.stiffness("hand")[0, 0] > 200.0 for each in (made, *twins))
+    assert all(each.feedback("hand").offset[0] == 0.1 for each in twins)
+
+
+@pytest.mark.parametrize("kind", COPIES)
+def test_a_copy_says_nothing_that_was_said(kind: str) -> None:
+    """Neither of the first effort, nor of a clock that stands still."""
+    made = controller()
+    with warnings.catch_warnings(record=True) as said:
+        warnings.simplefilter("always")
+        for _ in range(150):
+            made.compute(0.0, ROBOT.home(), np.zeros(7))
+            made.applied(np.zeros(7), H)
+    assert [each.category for each in said] == [StartWarning, ClockWarning]
+    twin = COPIES[kind](made)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        for _ in range(300):
+            twin.compute(0.0, ROBOT.home(), np.zeros(7))
+            twin.applied(np.zeros(7), H)
+
+
+def test_a_restart_remembers_nothing() -> None:
+    """What is left is that of a new one, but for how often it began."""
+    made, new = controller(), controller()
+    for k in range(60):
+        computed(made, k)
+        sent(made, k)
+    made.restart()
+    assert made._memory.runs == new._memory.runs + 1
+    made._memory.runs = 0
+    before, after = _plain(new._memory), _plain(made._memory)
+    assert before == after
+    assert [*_plain(Memory.of(7))] == [*before]
+
+
+def _plain(memory: Memory) -> dict[str, object]:
+    """Return what a memory contains, so that it can be compared."""
+    fields = vars(memory) | {"sent": vars(memory.sent), "clock": vars(memory.clock)}
+    return {name: pickle.dumps(each) for name, each in fields.items()}
