@@ -125,8 +125,7 @@ def main() -> None:
         sys.exit("no C compiler is there")
     load = os.getloadavg()[0]
     table = (
-        f"Load {load:.1f} on {os.cpu_count()} cores, real-time priority "
-        f"{options.fifo}.\n\n"
+        f"A load of {load:.1f} on {os.cpu_count()} cores, {options.turns} turns.\n\n"
         "| steps | in | median [µs] | 99.9 % | largest |\n|---|---|--:|--:|--:|\n"
     )
     with tempfile.TemporaryDirectory() as folder:
@@ -159,7 +158,8 @@ def main() -> None:
                 p50, p999, most = np.quantile(np.concatenate(each), [0.5, 0.999, 1.0])
                 table += f"| {name} | {where} | {p50:.1f} | {p999:.1f} | {most:.0f} |\n"
     print(table)
-    replace_section(RESULTS / "without_python.md", "without_python", table)
+    section = "fifo" if options.fifo else "usual"
+    replace_section(RESULTS / "without_python.md", section, table)
 
 
 if __name__ == "__main__":

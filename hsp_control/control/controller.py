@@ -367,7 +367,7 @@ class Controller(Composition):
         """Return a preview whose streams hear what a program sends, and no Python."""
         other = self.preview()
         other._declared = other._declared.without_python()
-        other._compose(other._time_line.start, other._time_line.made)
+        other._compose(other._time_line.start, other._time_line.declared)
         return other
 
     def step_alone(self, q: ArrayLike | None = None) -> BoundStep | None:

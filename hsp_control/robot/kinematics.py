@@ -83,7 +83,9 @@ class LocalMotion(NamedTuple):
     def fixed(cls, placement: pin.SE3) -> "LocalMotion":
         """Return that of a frame that does not move in its joint."""
         R = np.ascontiguousarray(placement.rotation)
-        return cls(R, placement.translation.copy(), *np.zeros((4, 3)))
+        # not rows of one array: a copy of each would lie otherwise to a packet
+        rest = (np.zeros(3) for _ in range(4))
+        return cls(R, placement.translation.copy(), *rest)
 
 
 class _ParentJoint(NamedTuple):

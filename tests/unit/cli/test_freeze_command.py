@@ -28,7 +28,10 @@ def test_a_configuration_is_frozen(
 @pytest.mark.parametrize(
     ("config", "message"),
     [
-        ("whole_body/talos_circle", r"talos_circle.yaml:\d+: contacts.left_foot: "),
+        (
+            "whole_body/talos_lift_foot",
+            r"talos_lift_foot.yaml:\d+: tasks.left_sole.schedule: ",
+        ),
         ("walking/talos_walk", r"talos_walk.yaml:\d+: plan: "),
         ("compliance/panda_cartesian_impedance", r"\.yaml:\d+: changes: "),
     ],
