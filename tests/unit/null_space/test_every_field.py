@@ -6,7 +6,7 @@ from field_cases import MEMBERS, draw, evaluate, every_field, metrics
 from field_oracles import TIME, derivative, load, plain
 
 from hsp_control.common.arrays import Array
-from hsp_control.null_space import differences
+from hsp_control.robot import differences
 
 # --- the members ---------------------------------------------------------------------
 

@@ -21,13 +21,13 @@ from hsp_control.common.exceptions import (
     HspControlError,
 )
 from hsp_control.declaration.quantities import Positive
-from hsp_control.null_space import differences
 from hsp_control.null_space.fields import InverseCondition, Manipulability
 from hsp_control.null_space.fields.jacobian_cost import (
     JacobianCost,
     JacobianTerms,
     Rows,
 )
+from hsp_control.robot import differences
 
 HANDS = {
     "planar3r": "tip",

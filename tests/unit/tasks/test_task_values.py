@@ -34,7 +34,7 @@ from hsp_control import (
 )
 from hsp_control.declaration import Part
 from hsp_control.declaration.families import value_fields
-from hsp_control.tasks import AngularMomentum, Impedance, RelativePose
+from hsp_control.tasks import AngularMomentum, FunctionTask, Impedance, RelativePose
 from hsp_control.trajectories import (
     ComposedPose,
     HoldOrientation,
@@ -48,7 +48,7 @@ NAMES: dict[str, Any] = {**vars(paths), **vars(tasks)}
 CLASSES = [
     each
     for each in vars(tasks).values()
-    if inspect.isclass(each) and issubclass(each, Part)
+    if inspect.isclass(each) and issubclass(each, Part) and each is not FunctionTask
 ]
 MEMBERS = [each for each in CLASSES if not inspect.isabstract(each)]
 EXAMPLES: dict[type[Part], Part] = {
