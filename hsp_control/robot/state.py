@@ -421,6 +421,13 @@ class SeenState(RobotState):
         self._own.update(t, q, v)
         return self
 
+    def move_frame(self, frame: str, motion: LocalMotion) -> None:
+        """Refuse to move a frame; see `RobotState.move_frame`."""
+        raise ImmutableError(
+            f"{frame!r} cannot be moved here: its controller moves it, "
+            "controller.at(t).tool(...); or take state.snapshot()"
+        )
+
     def __reduce__(self) -> tuple[Any, ...]:
         at = self.t, np.array(self.q), np.array(self.v)
         return _copy, (self.robot, self._own._local, *at)

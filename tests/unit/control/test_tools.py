@@ -10,6 +10,7 @@ import pytest
 
 import hsp_control as hsp
 from hsp_control.common.arrays import Array
+from hsp_control.robot.kinematics import LocalMotion
 
 ROBOT = hsp.Robot.load("panda")
 FRAME, OTHER = "panda_tcp", "panda_link1"
@@ -183,6 +184,21 @@ def test_a_target_counts_from_the_tool_there_is() -> None:
     made.restart()
     made.compute(0.0, q, v)
     np.testing.assert_array_equal(made.state.position(FRAME), home.position(FRAME))
+
+
+def test_nobody_else_moves_the_frames_of_a_controller() -> None:
+    """Neither who has its state nor a part's own Python; a snapshot is one's own."""
+    made = controller(TASKS["position"]())
+    made.compute(0.0, *motion(0))
+    there = LocalMotion.fixed(pin.SE3(np.eye(3), TIP))
+    for state in (made.state, made.state.read_only):
+        with pytest.raises(hsp.errors.ImmutableError, match=r"controller.at\(t\).tool"):
+            state.move_frame(FRAME, there)
+    before = made.state.position(FRAME).copy()
+    own = made.state.snapshot()
+    own.move_frame(FRAME, there)
+    assert np.abs(own.position(FRAME) - before).max() > 0.01
+    np.testing.assert_array_equal(made.state.position(FRAME), before)
 
 
 def test_a_frame_that_there_is_not_is_named() -> None:
