@@ -16,7 +16,6 @@ from typing import Any
 from PIL import Image
 
 from hsp_control.companions.film import FilmStyle, export_film
-from hsp_control.companions.sweeps.figure import save_sweep_figure
 from hsp_control.simulation import Rollout
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -107,8 +106,6 @@ def draw(name: str, folder: Path, file: Path) -> None:
     exec(compile(script, name, "exec"), space)
     if "picture" in space:
         Image.fromarray(space["picture"]).save(picture)
-    elif "found" in space:
-        (picture,) = save_sweep_figure(space["found"], folder / "out", "sweep", ["png"])
     else:
         space["figure"].savefig(picture, dpi=160)
     image = Image.open(picture).convert("RGB")

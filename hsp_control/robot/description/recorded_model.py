@@ -130,13 +130,17 @@ def _model_of(data: Mapping[str, Any]) -> pin.Model:
     for k, each in enumerate(data["joints"], start=1):
         model.inertias[k] = _inertia_of(each["inertia"])
     model.inertias[0] = _inertia_of(data["base_inertia"])
+    last = len(data["frames"])
     for k, each in enumerate(data["frames"], start=1):
-        if not (0 <= each["joint"] < model.njoints and 0 <= each["frame"] < k):
+        if not (0 <= each["joint"] < model.njoints and 0 <= each["frame"] <= last):
             raise ValueError(f"frame {each['name']!r} has no parent")
         kind = pin.FrameType.values[each["type"]]
         pose = _placement(each["pose"])
-        frame = pin.Frame(each["name"], each["joint"], each["frame"], pose, kind)
-        model.addFrame(frame, False)
+        # A locked joint's frame is its own parent in Pinocchio's reduced models.
+        known = min(each["frame"], k - 1)
+        model.addFrame(pin.Frame(each["name"], each["joint"], known, pose, kind), False)
+    for k, each in enumerate(data["frames"], start=1):
+        model.frames[k].parentFrame = each["frame"]
     for names, size in ((_PER_POSITION, model.nq), (_PER_VELOCITY, model.nv)):
         for name in names:
             numbers = np.array(data[name], dtype=float)

@@ -133,6 +133,7 @@ ROBOTS = {
         {name: (hsp.Robot.load("ur5"), pin.SE3.Identity()) for name in "ab"}
     ),
     "pinocchio": all_joints,
+    "reduced": lambda: hsp.Robot.from_pinocchio(hsp.Robot.load("panda").model),
 }
 
 
