@@ -18,3 +18,4 @@ for ending in ("pdf", "png"):
     figure.savefig(f"out/paper_figure.{ending}", dpi=200)
 for gain, run in zip(gains, runs, strict=True):
     run.save(f"out/paper_figure_{gain:g}.npz")
+print("Figure: out/paper_figure.pdf")

@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 from page_runner import OUTPUT, blocks_of, run_page, runs_commands
-from places import ROOT
+from places import ROOT, THOROUGH
 
 # No page starts a robot with a jump of its effort.
 pytestmark = pytest.mark.filterwarnings("error:the first effort of joint:UserWarning")
@@ -20,6 +20,13 @@ PAGES = [
     "docs/development/engine.md",
 ]
 WITH_BLOCKS = [page for page in PAGES if blocks_of(page)]
+FIRST = ("README.md", "docs/tutorial/", "docs/how_to/")
+"""Whose commands run each time; those of the others keep pace with real time."""
+WITH_COMMANDS = [
+    page
+    for page in WITH_BLOCKS
+    if runs_commands(page) and (THOROUGH or page.startswith(FIRST))
+]
 NOT_RUN = [
     pytest.param(page, block, id=f"{page}:{block.line}")
     for page in WITH_BLOCKS
@@ -36,14 +43,16 @@ def test_what_the_tutorial_prints_is_true(
     assert space["difference"] < 1e-8
 
 
-@pytest.mark.parametrize("page", WITH_BLOCKS)
+@pytest.mark.parametrize(
+    "page", [each for each in WITH_BLOCKS if each not in WITH_COMMANDS]
+)
 def test_python_and_configurations_of_a_page_run(page: str, tmp_path: Path) -> None:
     run_page(page, tmp_path, whole=False)
 
 
 @pytest.mark.process
 @pytest.mark.timeout(900)
-@pytest.mark.parametrize("page", [each for each in WITH_BLOCKS if runs_commands(each)])
+@pytest.mark.parametrize("page", WITH_COMMANDS)
 def test_a_page_runs_with_its_commands(page: str, tmp_path: Path) -> None:
     run_page(page, tmp_path, whole=True)
 
