@@ -40,7 +40,7 @@ demo: $(USE) $(ENGINE) ## the paper's run, and a Panda under a ball, with and wi
 	@mv out/demo/panda_obstacle.npz 'out/demo/with the field.npz'
 	@$(BIN)/hsp run panda_obstacle --out out/demo $(LOOK) \
 	  --set null_space.fields.0.weight=0 --set null_space.fields.1.weight=0
-	@mv out/demo/panda_obstacle,*.npz out/demo/without.npz
+	@mv out/demo/panda_obstacle-*.npz out/demo/without.npz
 	@$(BIN)/hsp export 'out/demo/with the field.npz' out/demo/without.npz \
 	  --html out/demo/panda.html
 	@echo
@@ -142,7 +142,7 @@ wheel-test: wheel ## build the wheel, install it elsewhere, use it from there
 	hsp robots; \
 	hsp check paper/4_moving_obstacle; \
 	hsp run paper/4_moving_obstacle --set simulation.duration=1 --out out; \
-	hsp export out/4_moving_obstacle,*.npz --html out/page.html; \
+	hsp export out/4_moving_obstacle-*.npz --html out/page.html; \
 	echo "The wheel works."
 
 ##@ Documents
