@@ -396,9 +396,16 @@ class OddError(BaseException):
 
 @pytest.mark.parametrize("raised", [SystemExit, KeyboardInterrupt])
 def test_a_server_that_ends_by_itself_says_so_and_leaves_nothing(
-    steered: PageServer, raised: type[BaseException], monkeypatch: pytest.MonkeyPatch
+    raised: type[BaseException], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Its thread ends at these two; all others asyncio and Tornado catch."""
+    """Its thread ends at these two; all others asyncio and Tornado catch.
+
+    Its port is none of those that servers look through: another process would take
+    one of them as soon as it is free.
+    """
+    with socket.create_server(("127.0.0.1", 0)) as probe:
+        port = probe.getsockname()[1]
+    steered = PageServer(port, steerable=True)
 
     def fails(*_: object) -> None:
         raise raised("why")
@@ -419,7 +426,6 @@ def test_a_server_that_ends_by_itself_says_so_and_leaves_nothing(
         with pytest.raises(ViewerError, match=f"has failed: {raised.__name__} why"):
             use()
     steered.wait_until_closed()
-    port = port_of(steered.url)
     PageServer(port).close()
     steered.close()
 
