@@ -52,7 +52,7 @@ from hsp_control.simulation.simulate import (
     default_integrator,
 )
 from hsp_control.tasks import Task
-from hsp_control.trajectories.streams.stream import Streamed
+from hsp_control.trajectories.streams.streamed import Streamed
 
 
 class Experiment:

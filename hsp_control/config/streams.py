@@ -11,8 +11,8 @@ from hsp_control.config.scenario import Scenario
 from hsp_control.declaration import within
 from hsp_control.declaration.nested import with_parts_replaced
 from hsp_control.robot.description.access import Access
-from hsp_control.trajectories.streams.mailbox import kind_of
-from hsp_control.trajectories.streams.stream import Streamed
+from hsp_control.trajectories.streams.sources import kind_of
+from hsp_control.trajectories.streams.streamed import Streamed
 
 
 def with_messages(scenario: Scenario, folder: Path, access: Access) -> Scenario:

@@ -15,6 +15,7 @@ from hsp_control.constraints.contacts import Contact
 from hsp_control.constraints.contacts.contact import UnactuatedRows, unactuated_count
 from hsp_control.control.actuation.support import Support
 from hsp_control.control.setup import PlannedTask
+from hsp_control.declaration.nested import parts_within
 from hsp_control.edge import Resolution
 from hsp_control.edge.threshold import Following
 from hsp_control.engine.plans import AnyCall, PartCall
@@ -28,7 +29,7 @@ from hsp_control.tasks.compliant_task import impedance_of
 from hsp_control.tasks.feedback import InForce, beyond_largest
 from hsp_control.tasks.impedance import parts_of
 from hsp_control.tasks.slipping import slipped
-from hsp_control.trajectories.streams.stream import Streamed
+from hsp_control.trajectories.streams.followed import FollowedStream
 
 
 class Layout(NamedTuple):
@@ -92,9 +93,7 @@ class ActiveStack:
         )
         self.rows = self.resolution.problem.task  # all rows stacked: J, J', e, e', a_x
         self.streamed = any(
-            isinstance(task.followed, Streamed)
-            for level in self.levels
-            for task in level
+            True for _ in parts_within([*self.levels, field], FollowedStream)
         )
         self.forces, self.has_forces = support.forces, support.size > 0
         # rows, the field and the law's results, in one block: see `Record`

@@ -22,7 +22,7 @@ from hsp_control.control.setup import (
     planned_terms,
 )
 from hsp_control.declaration import AnyOf, Part, within
-from hsp_control.declaration.nested import parts_within, with_memories_copied
+from hsp_control.declaration.nested import parts_within
 from hsp_control.declaration.quantities import Flag, Gain, NonNegative, Number
 from hsp_control.geometry.scene import Obstacle, Scene, Start
 from hsp_control.null_space.fields import FieldSum, NullSpaceField, Rest
@@ -35,7 +35,8 @@ from hsp_control.trajectories import (
     Trajectory,
     crossfade,
 )
-from hsp_control.trajectories.streams.stream import Streamed, stream_for
+from hsp_control.trajectories.streams.stream import stream_for
+from hsp_control.trajectories.streams.streamed import Streamed
 
 
 class Change(Part, ABC, family="changes", error=ControllerError):
@@ -52,10 +53,6 @@ class Change(Part, ABC, family="changes", error=ControllerError):
     ramp: NonNegative = 0.3
     """How long it takes [s]; 0 is a jump."""
 
-    def __deepcopy__(self, memo: dict[int, Any]) -> Self:
-        """Return the change; what has a memory in it goes on by itself."""
-        return with_memories_copied(self, memo)
-
     @property
     def end(self) -> float:
         """When it is complete [s]."""
@@ -64,6 +61,10 @@ class Change(Part, ABC, family="changes", error=ControllerError):
     @abstractmethod
     def apply(self, setup: Setup) -> Setup:
         """Return the setup with this change, after all earlier ones."""
+
+    def understood(self, setup: Setup) -> Self:
+        """Return the change as a setup lets it be understood: YAML says less."""
+        return self
 
     def placed(self, start: Start, setup: Setup) -> Self:
         """Return the change with its parts placed; see `Task.placed`."""
@@ -325,14 +326,19 @@ class ChangeReference(Change, type="reference"):
     """The new trajectory, in the task's unit; what is relative in it counts from where
     the robot is when the change is made."""
 
+    def understood(self, setup: Setup) -> Self:
+        """Return the change with a stream of the task's kind: YAML has one word."""
+        if not isinstance(self.trajectory, Streamed):
+            return self
+        followed = setup.task(self.task).task.followed
+        with within("trajectory"):
+            stream = stream_for(followed, self.trajectory)
+        return self if stream is self.trajectory else replace(self, trajectory=stream)
+
     def placed(self, start: Start, setup: Setup) -> Self:
         """Return the change with its trajectory in the world."""
         task = setup.task(self.task).task
-        trajectory = self.trajectory
-        if isinstance(trajectory, Streamed):  # YAML has one word for all kinds
-            with within("trajectory"):
-                trajectory = stream_for(task.followed, trajectory)
-        followed = task.following(trajectory).placed(start).followed
+        followed = task.following(self.trajectory).placed(start).followed
         assert followed is not None
         return replace(self, trajectory=followed)
 

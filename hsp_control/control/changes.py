@@ -1,6 +1,6 @@
 """Changes of a controller while it runs: events on one time line."""
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import takewhile
@@ -30,12 +30,15 @@ from hsp_control.control.change import (
 from hsp_control.control.change_model import ChangeGravity, ChangePayload, ChangeTool
 from hsp_control.control.setup import Setup
 from hsp_control.declaration import within
+from hsp_control.declaration.nested import parts_within
 from hsp_control.declaration.quantities import Gain
 from hsp_control.geometry.scene import Start
 from hsp_control.null_space.fields import NullSpaceField
 from hsp_control.tasks import Gains, Impedance, Task
 from hsp_control.trajectories import Trajectory
 from hsp_control.trajectories.crossfade import AnyReference
+from hsp_control.trajectories.streams.followed import FollowedStream
+from hsp_control.trajectories.streams.run import StreamRun
 
 __all__ = [
     "AddTask",
@@ -176,17 +179,27 @@ class TimeLine:
     def of(cls, setup: Setup, made: Sequence[Change]) -> "TimeLine":
         """Place changes in a setup."""
         # In order of time: a change may refer to what an earlier one has made.
-        later, placed = setup, []
+        given, later, placed = [*made], setup, []
         for k in sorted(range(len(made)), key=lambda k: made[k].at):
             with within("changes", k):
-                placed.append(made[k].placed(setup.start, later))
+                given[k] = given[k].understood(later)
+                placed.append(given[k].placed(setup.start, later))
                 later = placed[-1].apply(later)
-        return cls(setup.start, tuple(made), setup, tuple(placed))
+        return cls(setup.start, tuple(given), setup, tuple(placed))
 
     @property
     def known(self) -> tuple[Change, ...]:
         """Those of every run, and those made during this one that are not over."""
         return tuple(sorted((*self.declared, *self.made), key=lambda each: each.at))
+
+    def streams(self) -> Iterator[StreamRun]:
+        """Yield the streams that something follows, or will, each once."""
+        setup = self.setup
+        tasks = [each.task for each in setup.tasks]
+        fields = [each.field for each in setup.terms]
+        parts = [*tasks, *fields, setup.start.scene, *self.open]
+        runs = {id(e.run): e.run for e in parts_within(parts, FollowedStream)}
+        yield from runs.values()
 
     @cached_property
     def setup(self) -> Setup:
@@ -196,7 +209,9 @@ class TimeLine:
     def with_change(self, change: Change, here: Start | None) -> "TimeLine":
         """Return the time line with one more change."""
         earlier = [each for each in self.open if each.at <= change.at]
-        placed = change.placed(here or self.start, _applied(earlier, self.settled))
+        before = _applied(earlier, self.settled)
+        change = change.understood(before)
+        placed = change.placed(here or self.start, before)
         opened = sorted((*self.open, placed), key=lambda each: each.at)
         if here is None:
             declared = (*self.declared, change)

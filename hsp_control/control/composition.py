@@ -30,8 +30,8 @@ from hsp_control.control.setup import (
     PlannedTerm,
     Setup,
 )
+from hsp_control.control.stream_handle import StreamHandle
 from hsp_control.control.targets import RAMP, followed_stream, new_stream, target_of
-from hsp_control.control.task_stream import TaskStream
 from hsp_control.control.tools_in_force import ToolsInForce
 from hsp_control.declaration import within
 from hsp_control.geometry.scene import Obstacle, Scene, Start
@@ -44,7 +44,9 @@ from hsp_control.tasks.compliant_task import impedance_of
 from hsp_control.tasks.feedback import Feedback
 from hsp_control.tasks.impedance import parts_of
 from hsp_control.trajectories.crossfade import settled
-from hsp_control.trajectories.streams.stream import Streamed
+from hsp_control.trajectories.streams.followed import FollowedStream
+from hsp_control.trajectories.streams.run import StreamRun
+from hsp_control.trajectories.streams.streamed import Streamed
 from hsp_control.trajectories.streams.velocities import Axes
 
 MEMORY = 1.0
@@ -145,6 +147,7 @@ class Composition:
 
     def _follow(self, time_line: TimeLine) -> None:
         """Let the steps follow a time line."""
+        self._memory.follow(time_line.streams())
         self._plan(time_line)
         self._mixture = self._mixture.following(self._setup)
         self._settled_later: Settled | None = None
@@ -223,7 +226,7 @@ class Composition:
         """
         return Changes(self.change, t)
 
-    def set_target(self, task: str, target: ArrayLike | pin.SE3) -> TaskStream:
+    def set_target(self, task: str, target: ArrayLike | pin.SE3) -> StreamHandle:
         """Let a task go to a target from now on, smoothly, until the next one is set.
 
         ``controller.set_target("hand", pose)``, at any time and as often as needed. A
@@ -253,29 +256,42 @@ class Composition:
             warn_of_far_target(self._here().state, followed, value)
         return self._sent(task, value=value)
 
-    def stream(self, task: str) -> TaskStream:
-        """Return the stream that a task follows once all changes are over.
+    def stream(self, of: str | Streamed) -> StreamHandle:
+        """Return what commands a stream: ``controller.stream("hand").send(pose)``.
 
-        ``controller.stream("hand").send(pose)``, from any thread.
+        Args:
+            of: The name of a task: the stream is the one that it follows once all
+                changes are over. Or a stream that was given to the controller, for an
+                obstacle, say, or for the position of a pose.
 
         Raises:
-            ControllerError: If there is no such task, or it follows no stream.
+            ControllerError: If there is no such task, or it follows no stream, or
+                nothing follows the given one.
         """
-        self._streamed(task)
-        return TaskStream(lambda: self._streamed(task))
+        self._run_of(of)
+        return StreamHandle(lambda: self._run_of(of))
 
-    def _streamed(self, task: str) -> Streamed:
-        followed = settled(self._followed(task).followed, np.inf)
-        if isinstance(followed, Streamed):
-            return followed
+    def _run_of(self, of: str | Streamed) -> StreamRun:
+        """Return the stream of a task, or of a declaration, in the present run."""
+        if isinstance(of, Streamed):
+            for run in reversed(self._memory.streams):
+                if run.declared is of:
+                    return run
+            raise ControllerError(
+                f"nothing of this controller follows this {type(of).__name__}: give it "
+                "to a task, or to controller.at(t)"
+            )
+        followed = settled(self._followed(of).followed, np.inf)
+        if isinstance(followed, FollowedStream):
+            return followed.run
         raise ControllerError(
-            f"task {task!r} follows no stream, but {type(followed).__name__}; give it "
+            f"task {of!r} follows no stream, but {type(followed).__name__}; give it "
             "one, such as StreamPose(), or set_target"
         )
 
     def set_velocity(
         self, task: str, velocity: ArrayLike, axes: Axes = "world"
-    ) -> TaskStream:
+    ) -> StreamHandle:
         """Let a task move at a velocity from now on, as with a joystick.
 
         ``controller.set_velocity("hand", twist, axes="tool")``, again and again: if no
@@ -300,18 +316,16 @@ class Composition:
         """
         return self._sent(task, velocity=velocity, axes=axes)
 
-    def _sent(self, task: str, **message: Any) -> TaskStream:
+    def _sent(self, task: str, **message: Any) -> StreamHandle:
         """Send a message to a task's stream, which takes over if there is none yet."""
         present = self._followed(task)
-        stream = followed_stream(present)
-        if stream is not None:
-            stream.send(**message)
-            return self.stream(task)
-        stream = new_stream(present.followed)
+        if followed_stream(present) is None:
+            reference: Any = new_stream(present.followed)
+            reference.check(**message)
+            self.at(self._state.t).ramp(RAMP).reference(task, reference)
+        stream = self.stream(task)
         stream.send(**message)
-        reference: Any = stream
-        self.at(self._state.t).ramp(RAMP).reference(task, reference)
-        return self.stream(task)
+        return stream
 
     def _followed(self, task: str) -> Task:
         """Return a task that follows a trajectory."""
@@ -470,6 +484,11 @@ class Composition:
     def _changes_made(self) -> int:
         """How many changes there have been: those of every run, and of this one."""
         return len(self._time_line.declared) + self._time_line.count
+
+    @property
+    def streams(self) -> tuple[StreamRun, ...]:
+        """The streams that are followed now, or will be, in this run."""
+        return self._memory.streams
 
     def feedback(self, task: str) -> Feedback:
         """Return a task's gains and offset in force; compensators write the offset.

@@ -366,7 +366,8 @@ class Controller(Composition):
     def without_python(self) -> "Controller":
         """Return a preview whose streams hear what a program sends, and no Python."""
         other = self.preview()
-        other._declared = other._declared.without_python()
+        for stream in other._memory.streams:
+            stream.leave_python()
         other._compose(other._time_line.start, other._time_line.declared)
         return other
 
@@ -466,7 +467,6 @@ class Controller(Composition):
                 come in every run.
         """
         other = self._copy()
-        other._declared = other._declared.preview()
         other.restart(origin=0.0)
         if changes is not None:
             other._compose(other._time_line.start, changes)

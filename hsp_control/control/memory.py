@@ -1,5 +1,6 @@
 """What a controller remembers of its run: one record, to which all else is bound."""
 
+from collections.abc import Iterable
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -8,6 +9,7 @@ from hsp_control.common.arrays import Array
 from hsp_control.control.actuation.sent_effort import SentMemory
 from hsp_control.control.change import Change
 from hsp_control.control.clock_check import ClockCheck
+from hsp_control.trajectories.streams.run import StreamRun
 
 
 @dataclass
@@ -32,6 +34,7 @@ class Memory:
     # of tasks, by key: the numbers of an impedance that wait, and what compensators add
     waiting: dict[int, Array] = field(default_factory=dict)
     offsets: dict[int, Array] = field(default_factory=dict)
+    streams: tuple[StreamRun, ...] = ()  # of what is followed, or will be
     clock: ClockCheck = field(default_factory=ClockCheck)
     runs: int = 0  # how many times it was cleared
 
@@ -41,7 +44,10 @@ class Memory:
         return cls(np.zeros(nv), SentMemory.of(nv))
 
     def clear(self) -> None:
-        """Begin another run; the arrays stay where they are."""
+        """Begin another run; the arrays stay where they are.
+
+        So do the streams, until those of the new run take what was sent to them.
+        """
         self.acceleration = np.zeros_like(self.acceleration)
         self.sent.clear()
         self.origin[:], self.counts = 0.0, False
@@ -50,6 +56,22 @@ class Memory:
         for offset in self.offsets.values():
             offset[:] = 0.0
         self.clock, self.runs = ClockCheck(), self.runs + 1
+
+    def follow(self, streams: Iterable[StreamRun]) -> None:
+        """Remember the streams that are followed now, and forget those that are not.
+
+        One that is new takes what was sent to the one before it, of the same
+        declaration, and nobody took.
+        """
+        before, now = list(self.streams), list(streams)
+        known = {id(each) for each in before}
+        for run in now:
+            if id(run) not in known:
+                same = [each for each in before if each.declared is run.declared]
+                if same:
+                    run.follow(same[-1])
+                before.append(run)
+        self.streams = tuple(now)
 
     def count_from(self, origin: float) -> None:
         """Count times from a reading of the clock [s]."""

@@ -11,8 +11,11 @@ from hsp_control.constraints.limits import Limits
 from hsp_control.control.controller import Controller
 from hsp_control.control.measurement import LogChannel, Measurement
 from hsp_control.declaration import Part
+from hsp_control.declaration.nested import parts_within
 from hsp_control.robot import Robot, RobotState
 from hsp_control.tasks import Task
+from hsp_control.trajectories.streams.followed import FollowedStream
+from hsp_control.trajectories.streams.run import StreamRun
 
 
 class PlanParts(NamedTuple):
@@ -86,6 +89,11 @@ class RunningPlan(ABC):
         """Set the plan."""
         self.plan = plan
         self.stopping = False
+
+    @property
+    def streams(self) -> list[StreamRun]:
+        """The streams that lead the plan in this run, such as its velocity."""
+        return [each.run for each in parts_within(self.plan, FollowedStream)]
 
     def stop(self) -> None:
         """Come to rest as soon as the robot can stand, whatever else is planned."""

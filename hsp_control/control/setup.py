@@ -1,7 +1,6 @@
 """What a controller is made of, how that evolves, and whether it fits together."""
 
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from copy import copy
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
 from math import isfinite
@@ -34,7 +33,7 @@ from hsp_control.control.model_in_force import PlannedPayload
 from hsp_control.control.tools_in_force import PlannedTool
 from hsp_control.declaration import Part, within
 from hsp_control.declaration.language import check_kind, shortened
-from hsp_control.declaration.nested import parts_within, with_parts_replaced
+from hsp_control.declaration.nested import parts_within
 from hsp_control.declaration.quantities import LARGEST
 from hsp_control.geometry.scene import Obstacle, Scene, Start
 from hsp_control.law import VARYING, MetricSample
@@ -49,7 +48,7 @@ from hsp_control.tasks.compliant_task import impedance_of
 from hsp_control.tasks.gains import as_gain, as_matrix
 from hsp_control.trajectories.crossfade import settled
 from hsp_control.trajectories.schedule import Schedule
-from hsp_control.trajectories.streams.stream import Streamed
+from hsp_control.trajectories.streams.streamed import Streamed
 
 _MOST = 500
 """Events that are looked at: a schedule may repeat itself for hours."""
@@ -510,23 +509,6 @@ class DeclaredController:
             len(tasks),
             Evolution(np.array(robot.model.gravity.linear)),
         )
-
-    def preview(self) -> "DeclaredController":
-        """Return the same parts with streams that begin anew."""
-        return self._with_streams(Streamed.preview)
-
-    def without_python(self) -> "DeclaredController":
-        """Return the same parts with streams that a program feeds."""
-        return self._with_streams(Streamed.without_python)
-
-    def _with_streams(
-        self, change: Callable[[Streamed], Streamed]
-    ) -> "DeclaredController":
-        other = copy(self)
-        other.tasks = tuple(
-            with_parts_replaced(task, Streamed, change) for task in self.tasks
-        )
-        return other
 
 
 def _refuse_streams(field: NullSpaceField) -> None:

@@ -24,7 +24,9 @@ from hsp_control.trajectories import (
 from hsp_control.trajectories.crossfade import settled
 from hsp_control.trajectories.hold import HoldOrientation
 from hsp_control.trajectories.pose import HoldPose
-from hsp_control.trajectories.streams.stream import Streamed
+from hsp_control.trajectories.streams.followed import FollowedStream
+from hsp_control.trajectories.streams.run import StreamRun
+from hsp_control.trajectories.streams.streamed import Streamed
 
 RAMP = 0.2
 """Time that a change takes which somebody makes by hand [s]."""
@@ -53,12 +55,15 @@ def new_stream(followed: object) -> Streamed:
     return Stream(**MOVING, **how)
 
 
-def followed_stream(task: Task) -> Streamed | None:
-    """Return the stream that a task follows after all changes, if `send` feeds it."""
+def followed_stream(task: Task) -> StreamRun | None:
+    """Return the stream that a task follows after all changes; None: it follows none.
+
+    What reads a source or a recording is none: nobody can send to it.
+    """
     followed: object = settled(task.followed, np.inf)
-    if not isinstance(followed, Streamed) or followed.source or followed.messages:
-        return None
-    return followed
+    if isinstance(followed, FollowedStream) and not followed.run.stream.hears:
+        return followed.run
+    return None
 
 
 def target_of(task: Task, value: object, here: Callable[[], RobotState]) -> Array:

@@ -1,7 +1,6 @@
 """Parts inside parts: in mappings by name, to find, replace or copy those of a kind."""
 
 from collections.abc import Callable, Iterable, Iterator, Mapping
-from copy import deepcopy
 from dataclasses import replace
 from functools import partial
 from typing import Any, TypeVar
@@ -106,18 +105,7 @@ def with_parts_replaced(
 
 
 class Remembering(Part):
-    """A part with a memory: whoever has the value may feed it.
+    """A part that is no value: it moves during a run, as a stream's reference does.
 
-    A deep copy goes on by itself, from what the memory held then.
+    Only placed parts of a controller contain one. A deep copy goes on by itself.
     """
-
-
-Holder = TypeVar("Holder", bound=Part)
-
-
-def with_memories_copied(part: Holder, memo: dict[int, Any]) -> Holder:
-    """Return the deep copy of a part: the part itself, but for those with a memory."""
-    copied: Holder = with_parts_replaced(
-        part, Remembering, lambda each: deepcopy(each, memo)
-    )
-    return copied

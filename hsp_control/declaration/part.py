@@ -3,7 +3,9 @@
 import ast
 import inspect
 import sys
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
+from copy import deepcopy
+from dataclasses import replace
 from functools import cache
 from typing import Any, ClassVar, dataclass_transform
 
@@ -174,7 +176,25 @@ class Part(Declared, metaclass=ValueClass):
         return self
 
     def __deepcopy__(self, memo: dict[int, Any]) -> "Part":
-        return self
+        """Return the value itself, unless a stream's run is in it."""
+        given: dict[str, Any] = self.all_fields()
+        made = {name: _copied(value, memo) for name, value in given.items()}
+        changed = {name: made[name] for name in given if made[name] is not given[name]}
+        return replace(self, **changed) if changed else self  # type: ignore[type-var]
+
+
+def _copied(value: Any, memo: dict[int, Any]) -> Any:
+    """Return the deep copy of a field: only parts can have something that moves."""
+    if isinstance(value, Part):
+        return deepcopy(value, memo)
+    if isinstance(value, Mapping):
+        made = {key: _copied(each, memo) for key, each in value.items()}
+        return value if all(made[key] is value[key] for key in made) else made
+    if isinstance(value, tuple | list):
+        items = [_copied(each, memo) for each in value]
+        same = all(a is b for a, b in zip(items, value, strict=True))
+        return value if same else type(value)(items)
+    return value
 
 
 def _hashable(value: Any) -> Any:

@@ -23,7 +23,7 @@ from hsp_control.frozen.image import PAYLOAD, TARGET, VELOCITY, Port
 from hsp_control.law import VARYING
 from hsp_control.tasks.compliant_task import impedance_of
 from hsp_control.trajectories.streams.alone import StreamAlone
-from hsp_control.trajectories.streams.stream import Streamed
+from hsp_control.trajectories.streams.followed import FollowedStream
 
 _MOST = 8
 """How many ramps of one input may be under way."""
@@ -127,8 +127,9 @@ def streams_of(own: Controller) -> dict[str, StreamAlone]:
     """Return the streams of a controller without Python, by the tasks' names."""
     found = {}
     for task in own.tasks:
-        for stream in parts_within(task, Streamed):
-            found[task.name] = stream.alone
+        for each in parts_within(task, FollowedStream):
+            if each.run.alone is not None:
+                found[task.name] = each.run.alone
     return found
 
 

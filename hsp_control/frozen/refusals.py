@@ -17,7 +17,7 @@ from hsp_control.law import FieldSample, MetricSample, TaskSample
 from hsp_control.null_space.fields.field import terms_of
 from hsp_control.null_space.fields.weight import Ramp, Weight
 from hsp_control.robot import RobotState
-from hsp_control.trajectories.streams.stream import Streamed
+from hsp_control.trajectories.streams.followed import FollowedStream
 
 Path = tuple[str | int, ...]
 
@@ -84,7 +84,8 @@ def check_streams(own: Controller) -> None:
         FreezeError: If one is not, with its key.
     """
     for task in own.tasks:
-        for stream in parts_within(task, Streamed):
+        for each in parts_within(task, FollowedStream):
+            stream = each.run.stream
             asked = {
                 "policy": stream.policy == "latest" or "only 'latest' can",
                 "source": stream.source is None or "the program sets targets instead",

@@ -24,13 +24,12 @@ from hsp_control.trajectories import (
     Trajectory,
     TrajectorySample,
 )
-from hsp_control.trajectories.streams.stream import Streamed
+from hsp_control.trajectories.streams.streamed import Streamed
 
 
 def _in_space(center: Trajectory) -> Trajectory:
     """Return the trajectory of a point in the world."""
-    if _streamed(center):
-        return center
+    _refuse_declared_streams(center)
     try:
         center = center.anchored(None)
     except TrajectoryError as error:
@@ -40,20 +39,16 @@ def _in_space(center: Trajectory) -> Trajectory:
     return center
 
 
-def _streamed(trajectory: Part) -> bool:
-    """Return whether a trajectory has a stream, which then runs already."""
-    streams = list(parts_within(trajectory, Streamed))
-    if not all(stream.is_placed for stream in streams):
+def _refuse_declared_streams(trajectory: Part) -> None:
+    if any(True for _ in parts_within(trajectory, Streamed)):
         raise SceneError(
             "a stream cannot move an obstacle from the start; while the controller "
             "runs, controller.at(t).obstacle(name, stream) does"
         )
-    return bool(streams)
 
 
 def _from_world_axes(orientation: OrientationTrajectory) -> OrientationTrajectory:
-    if _streamed(orientation):
-        return orientation
+    _refuse_declared_streams(orientation)
     return orientation.anchored(np.eye(3))
 
 

@@ -27,7 +27,9 @@ from hsp_control.simulation.journal import Shapes, joined, views, width
 from hsp_control.tasks import Task
 from hsp_control.tasks.compliant_task import impedance_of
 from hsp_control.tasks.impedance import parts_of
-from hsp_control.trajectories.streams.stream import Streamed
+from hsp_control.trajectories.streams.followed import FollowedStream
+from hsp_control.trajectories.streams.run import StreamRun
+from hsp_control.trajectories.streams.streamed import Streamed
 
 MAX_SIZE = 2_000_000_000
 """Most bytes of all columns: an hour at 1 kHz with 70 numbers per row."""
@@ -122,7 +124,7 @@ STREAM_CHANNELS = {
     "late": "of these, messages that came too late to count",
     "rejected": "invalid messages",
 }
-"""What is logged of a stream; see `Streamed.counts`."""
+"""What is logged of a stream; see `StreamRun.counts`."""
 
 
 class TaskColumns:
@@ -132,10 +134,10 @@ class TaskColumns:
         self._controller, self._columns = controller, columns
         # all tasks that there have been, by their names in the log
         self.logged: dict[str, Task] = {}
-        # the streams that each had when it came; those of changes are the changes'
+        # the streams of each as it came, as declared; those of changes are the changes'
         self.streamed: dict[str, list[Streamed]] = {}
         self._levels: dict[str, int] = {}
-        self._streams: dict[str, list[tuple[str, Streamed]]] = {}
+        self._streams: dict[str, list[tuple[str, StreamRun]]] = {}
         self._names: dict[int, str] = {}  # in the log, of the tasks there are, by key
         self._known: list[tuple[int, int]] = []
         self.update()
@@ -157,7 +159,8 @@ class TaskColumns:
                 name = self._names.get(each.key) or self._log_name(task)
                 self._names[each.key] = name
                 self.logged[name], self._levels[name] = task, level
-                self.streamed.setdefault(name, [*parts_within(task, Streamed)])
+                runs = [each.run for each in parts_within(task, FollowedStream)]
+                self.streamed.setdefault(name, [run.declared for run in runs])
                 self._add(name, task, len(task.measure(probe.read_only)[0]))
 
     def _log_name(self, task: Task) -> str:
@@ -245,11 +248,11 @@ def _present_state(controller: Controller) -> RobotState:
     return robot.state(controller.state.t, robot.neutral(), np.zeros(robot.nv))
 
 
-def _streams_of(task: Task, name: str) -> Iterator[tuple[str, Streamed]]:
+def _streams_of(task: Task, name: str) -> Iterator[tuple[str, StreamRun]]:
     """Yield the streams of a task that is logged by a name, with their own names."""
     if task.remembers:
-        for k, stream in enumerate(parts_within(task, Streamed)):
-            yield f"stream.{name}" + (f"_{k + 1}" if k else ""), stream
+        for k, each in enumerate(parts_within(task, FollowedStream)):
+            yield f"stream.{name}" + (f"_{k + 1}" if k else ""), each.run
 
 
 class TermColumns:

@@ -2,7 +2,6 @@
 
 import platform
 from collections.abc import Mapping
-from dataclasses import replace
 from importlib.metadata import version
 from pathlib import Path
 from typing import Any
@@ -20,7 +19,7 @@ from hsp_control.control.measurement import LogChannel
 from hsp_control.control.output import ControlOutput
 from hsp_control.control.plan import RunningPlan
 from hsp_control.declaration.imported import fingerprints
-from hsp_control.declaration.nested import parts_within, with_parts_replaced
+from hsp_control.declaration.nested import with_parts_replaced
 from hsp_control.declaration.plain_data import plain_data
 from hsp_control.geometry.scene import Obstacle, Scene
 from hsp_control.geometry.shapes import Mesh, shape_to_log
@@ -40,7 +39,9 @@ from hsp_control.simulation.log_columns import (
     write_channels,
 )
 from hsp_control.simulation.rollout import FORMAT, Rollout, complete_columns
-from hsp_control.trajectories.streams.stream import Streamed
+from hsp_control.trajectories.streams.followed import FollowedStream
+from hsp_control.trajectories.streams.run import StreamRun
+from hsp_control.trajectories.streams.streamed import Streamed
 
 _EFFORT_UNITS = {"rad": "N·m", "m": "N"}
 
@@ -83,6 +84,8 @@ class LogWriter:
         self._columns = columns = LogColumns(rows)
         self._settled: object = None
         self._made: dict[int, Change] = {}  # all changes of the run, by identity
+        # the latest run of each stream that there was, by its declaration's identity
+        self._streams: dict[int, StreamRun] = {}
         self._law: Record | None = None  # of the present row
         self._active: ActiveStack | None = None  # what `_sources` are of
         self._sources: list[tuple[str, Array]] = []  # what the law writes for columns
@@ -325,18 +328,14 @@ class LogWriter:
 
         A log repeats both.
         """
-        there = {id(each): each for each in self._controller.changes}
-        if self._made and there.keys() <= self._made.keys():
-            return
-        self._made |= there
+        self._made |= {id(each): each for each in self._controller.changes}
         self._let_streams_record()
 
     def _let_streams_record(self) -> None:
-        controller = self._controller
-        planned = [] if self.plan is None else [self.plan.plan]
-        parts = [*controller.planned_tasks, *controller.changes, *planned]
-        for stream in parts_within(parts, Streamed):
-            stream.log()
+        planned = [] if self.plan is None else self.plan.streams
+        for run in (*self._controller.streams, *planned):
+            run.log()
+            self._streams[id(run.declared)] = run
 
     def _changes(self) -> dict[str, Any]:
         """Return the changes that were made, their streams as they were recorded."""
@@ -347,32 +346,45 @@ class LogWriter:
             return {"changes": None, "changes_lost": lost}
         try:
             changes = [
-                plain_data(with_parts_replaced(change, Streamed, _as_recorded))
+                plain_data(self._repeated(change))
                 for change in sorted(self._made.values(), key=lambda each: each.at)
             ]
         except ConfigError as error:
             return {"changes": None, "changes_lost": str(error)}
         return {"changes": changes}
 
+    def _repeated(self, change: Change) -> Change:
+        """Return a change whose streams repeat what they took."""
+
+        def declared(stream: Streamed) -> Streamed:
+            return self._streams[id(stream)].repeated()
+
+        made: Change = with_parts_replaced(
+            with_parts_replaced(change, Streamed, declared),
+            FollowedStream,
+            lambda followed: followed.run.repeated(),
+        )
+        return made
+
     def _came_during_run(self) -> dict[str, Any]:
         """Return changes that were made, and what streams have taken, as JSON data.
 
         With them, a run can be repeated from its log.
         """
-        streams = {name: each for name, each in self._tasks.streamed.items() if each}
+        streams = {
+            name: [self._streams[id(each)] for each in declared]
+            for name, declared in self._tasks.streamed.items()
+            if declared
+        }
         heard = {name: [list(s.record) for s in each] for name, each in streams.items()}
         lost = sum(s.unrecorded for each in streams.values() for s in each)
         found = self._changes() | ({"streams": heard} if heard else {})
         if self.plan is not None:
-            planned = list(parts_within(self.plan.plan, Streamed))
+            planned = self.plan.streams
             lost += sum(stream.unrecorded for stream in planned)
             if planned:
                 found["plan_streams"] = [list(stream.record) for stream in planned]
         return found | ({"streams_lost": lost} if lost else {})
-
-
-def _as_recorded(stream: Streamed) -> Streamed:
-    return replace(stream, source=None, messages=stream.record)
 
 
 def _meshes_of(scene: Scene) -> dict[str, Any]:

@@ -10,7 +10,7 @@ import numpy as np
 from hsp_control.common.arrays import Array, Indices
 from hsp_control.common.exceptions import TaskError
 from hsp_control.declaration import Part, within
-from hsp_control.declaration.nested import parts_within, with_memories_copied
+from hsp_control.declaration.nested import parts_within
 from hsp_control.declaration.quantities import PositiveCount
 from hsp_control.engine.plans import PartCall, PartCalls, says
 from hsp_control.geometry.scene import Start
@@ -27,7 +27,7 @@ from hsp_control.tasks.feedback import (
 from hsp_control.tasks.gains import Gains
 from hsp_control.trajectories import Schedule
 from hsp_control.trajectories.crossfade import AnyReference
-from hsp_control.trajectories.streams.stream import Streamed
+from hsp_control.trajectories.streams.followed import FollowedStream
 
 Drawn = Literal["position", "orientation", "direction"]
 """What can be drawn in the world; see `Task`."""
@@ -182,12 +182,8 @@ class Task(Part, ABC, family="tasks", error=TaskError):
 
     @property
     def remembers(self) -> bool:
-        """Whether its trajectory has a memory of the run, as streams have."""
-        return any(True for _ in parts_within(self, Streamed))
-
-    def __deepcopy__(self, memo: dict[int, Any]) -> Self:
-        """Return the task; what has a memory in it goes on by itself."""
-        return with_memories_copied(self, memo)
+        """Whether it follows a stream, which takes messages and moves by itself."""
+        return any(True for _ in parts_within(self, FollowedStream))
 
     def following(self, trajectory: AnyReference) -> Self:
         """Return the task with another trajectory.

@@ -180,7 +180,7 @@ class Along(Trajectory, type="along"):
         """Whether the path depends on where the robot starts."""
         return self.path.relative or super().relative
 
-    def anchored(self, start: ArrayLike | None) -> Self:
+    def anchored(self, start: ArrayLike | None) -> Trajectory:
         """Return the path in the world; see `Trajectory.anchored`."""
         if self.origin == "start":
             return super().anchored(start)  # which refuses it: the path has an origin

@@ -54,12 +54,11 @@ class Blend(Trajectory, type="blend"):
         """Whether it, or the trajectory, depends on where the robot starts."""
         return self.trajectory.relative or super().relative
 
-    def anchored(self, start: ArrayLike | None) -> Self:
+    def anchored(self, start: ArrayLike | None) -> Trajectory:
         """Return both in the world; see `Trajectory.anchored`."""
         inner = self.trajectory.anchored(start)
-        if not self.relative:
-            return super().anchored(start)
-        return super(Blend, replace(self, trajectory=inner)).anchored(start)
+        placed = self if inner is self.trajectory else replace(self, trajectory=inner)
+        return super(Blend, placed).anchored(start)
 
     @property
     def dimension(self) -> int:

@@ -16,7 +16,7 @@ from hsp_control.trajectories.orientation import (
     OrientationTrajectory,
 )
 from hsp_control.trajectories.pose import ComposedPose, PoseTrajectory
-from hsp_control.trajectories.streams.stream import Streamed
+from hsp_control.trajectories.streams.followed import FollowedStream
 from hsp_control.trajectories.trajectory import Trajectory, TrajectorySample
 
 AnyReference = Trajectory | OrientationTrajectory | PoseTrajectory
@@ -127,13 +127,13 @@ class CrossfadeOrientation(OrientationTrajectory, type="crossfade"):
     def keep_start(self, until: float) -> None:
         """Let streams know until a time how R_0 was where the change began."""
         for stream in self._streams:
-            stream.running.keep(self.start_time, until)
+            stream.run.keep(self.start_time, until)
         for earlier in self._earlier:
             earlier.keep_start(until)
 
     @cached_property
-    def _streams(self) -> tuple[Streamed, ...]:
-        return tuple(parts_within(self.before, Streamed))
+    def _streams(self) -> tuple[FollowedStream, ...]:
+        return tuple(parts_within(self.before, FollowedStream))
 
     @cached_property
     def _earlier(self) -> tuple["CrossfadeOrientation", ...]:

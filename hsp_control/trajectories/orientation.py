@@ -3,7 +3,7 @@
 from abc import ABC
 from dataclasses import KW_ONLY, replace
 from functools import cached_property
-from typing import Any, ClassVar, NamedTuple, Self
+from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -59,7 +59,7 @@ class OrientationTrajectory(Part, ABC, family="orientations", error=TrajectoryEr
         """Whether it depends on where the robot starts."""
         return getattr(self, "rotation", self) is None
 
-    def anchored(self, start: ArrayLike) -> Self:
+    def anchored(self, start: ArrayLike) -> "OrientationTrajectory":
         """Return this trajectory for a robot that starts in an orientation.
 
         Args:

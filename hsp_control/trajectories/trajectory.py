@@ -3,7 +3,7 @@
 from abc import ABC, abstractmethod
 from collections.abc import Callable
 from dataclasses import KW_ONLY, replace
-from typing import Any, ClassVar, Literal, NamedTuple, Self
+from typing import Any, ClassVar, Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -97,8 +97,10 @@ class Trajectory(Part, ABC, family="trajectories", error=TrajectoryError):
             getattr(self, name) is None for name in self.points
         )
 
-    def anchored(self, start: ArrayLike | None) -> Self:
+    def anchored(self, start: ArrayLike | None) -> "Trajectory":
         """Return this trajectory in the world, for a robot that starts at a point.
+
+        A stream returns what it is in a new run; all others one of their own type.
 
         Args:
             start: Where the robot starts, in the trajectory's coordinates, shape (n,);

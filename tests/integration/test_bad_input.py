@@ -78,7 +78,7 @@ def test_a_target_that_is_none_is_refused(value: float) -> None:
     with pytest.raises(HspControlError, match=r"^TargetPosture: target\.0: " + why):
         hsp.TargetPosture(posture)
     law = controller(hsp.Stream())
-    stream: Any = law.tasks[0].followed
+    stream = law.stream("hand")
     law.compute(0.0, HOME, np.zeros(7))
     for send in (
         lambda: stream.send([value, 0.0, 0.5]),
@@ -111,7 +111,7 @@ def to_reference(law: hsp.Controller, reference: Any) -> hsp.Controller:
 
 def sent(*values: Any) -> hsp.Controller:
     law = controller(hsp.Stream())
-    stream: Any = law.tasks[0].followed
+    stream = law.stream("hand")
     law.compute(0.0, HOME, np.zeros(7))
     if len(values) == 1:
         stream.send(values[0])

@@ -47,15 +47,16 @@ def every(
 def test_tracking_and_the_null_space_are_as_exact_as_without_a_stream() -> None:
     # The law in the integrator's stages, without sampling: only the integrator errs.
     stream = hsp.StreamPose(policy="interpolate", delay=0.15)
-    hand = hsp.FramePose("panda_tcp", stream)
-    controller = hsp.Controller(PANDA, [hand], hsp.JointCentering(), null_space_gain=8)
+    task = hsp.FramePose("panda_tcp", stream)
+    controller = hsp.Controller(PANDA, [task], hsp.JointCentering(), null_space_gain=8)
+    hand = controller.stream(stream)
     start = hand_pose(PANDA)
     run = hsp.simulate(
         controller,
         PANDA.home(),
         duration=1.5,
         integrator=hsp.integrators.Rk4(1e-3),
-        on_row=every(0.05, lambda t: stream.send(moved(start, t), t=t)),
+        on_row=every(0.05, lambda t: hand.send(moved(start, t), t=t)),
     )
     # RK4 is of third order in steps within which the jerk of the reference jumps.
     assert np.abs(run["task.panda_tcp.error"]).max() < 2e-6
@@ -72,7 +73,7 @@ def test_a_posture_is_streamed_in_joint_positions() -> None:
     task = hsp.JointPosture([0.0] * 7, displacement=stream)
     controller = hsp.Controller(PANDA, [task])
     goal = PANDA.home() + 0.1
-    stream.send(goal)
+    controller.stream("posture").send(goal)
     run = hsp.simulate(controller, PANDA.home(), duration=2.0, control_period=PERIOD)
     assert np.abs(run["task.posture.error"]).max() < 1e-3  # from the start on
     assert np.abs(run.q[-1] - goal).max() < 1e-5
@@ -87,8 +88,9 @@ def test_a_target_out_of_reach_is_approached_within_all_limits() -> None:
         singularity_threshold=0.1,
     )
     here = hand_pose(PANDA).translation
-    stream.send(here + np.array([0.8, 0.0, 0.1]))
-    back = every(2.5, lambda t: stream.send(here) if t > 1.0 else None)
+    hand = controller.stream("panda_tcp")
+    hand.send(here + np.array([0.8, 0.0, 0.1]))
+    back = every(2.5, lambda t: hand.send(here) if t > 1.0 else None)
     run = hsp.simulate(
         controller, PANDA.home(), duration=5.0, control_period=PERIOD, on_row=back
     )
@@ -113,7 +115,7 @@ def test_a_clutch_that_closes_elsewhere_makes_no_jump() -> None:
         t = next(times)
         if not 0.8 < t < 1.6:  # open; then the operator's hand is elsewhere
             away = pin.SE3(np.eye(3), np.array([0.0, 0.3 * (t > 1.0), 0.0]))
-            stream.send(away * moved(start, t), t=t)
+            controller.stream("panda_tcp").send(away * moved(start, t), t=t)
 
     run = hsp.simulate(
         controller,
@@ -132,14 +134,15 @@ def test_a_clutch_that_closes_elsewhere_makes_no_jump() -> None:
 def test_a_preview_takes_nothing_from_the_run() -> None:
     stream = hsp.StreamPose()
     controller = hsp.Controller(PANDA, [hsp.FramePose("panda_tcp", stream)])
-    stream.send(moved(hand_pose(PANDA), 0.5))
+    hand = controller.stream("panda_tcp")
+    hand.send(moved(hand_pose(PANDA), 0.5))
     preview, v = controller.preview(), np.zeros(7)
     for t in np.arange(0.0, 3.0, 0.01):
         preview.compute(t, PANDA.home(), v)
     run = hsp.simulate(controller, PANDA.home(), duration=1.0, control_period=PERIOD)
     there = moved(hand_pose(PANDA), 0.5).translation
     assert run["task.panda_tcp.reference"][-1, :3] == pytest.approx(there)
-    assert len(stream.record) == 1
+    assert len(hand.record) == 1
 
 
 def test_the_reference_of_a_task_changes_to_a_stream_while_it_runs() -> None:
@@ -272,7 +275,7 @@ def test_a_log_records_all_that_streams_take(
         if k == 30:
             controller.at(0.3).reference("hand", later)
         elif k > 30:
-            later.send([0.4, 0.1, 0.5])
+            controller.stream(later).send([0.4, 0.1, 0.5])
 
     run = hsp.simulate(
         controller, PANDA.home(), duration=0.6, control_period=PERIOD, on_row=lead

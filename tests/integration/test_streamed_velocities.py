@@ -54,12 +54,13 @@ def test_tracking_and_the_null_space_are_as_exact_as_without_a_stick(
     stream = kind(axes=axes)
     hand = replace(task, trajectory=stream, name="hand")
     controller = hsp.Controller(PANDA, [hand], hsp.JointCentering(), null_space_gain=8)
+    led = controller.stream("hand")
     run = hsp.simulate(
         controller,
         PANDA.home(),
         duration=1.5,
         integrator=hsp.integrators.Rk4(1e-3),
-        on_row=until(1.0, lambda t: stream.send(velocity=stick(t)[rows])),
+        on_row=until(1.0, lambda t: led.send(velocity=stick(t)[rows])),
     )
     assert np.abs(run["task.hand.error"]).max() < 2e-6
     expected = run["null_space_norm"][0] * np.exp(-8.0 * run.t)
@@ -75,13 +76,14 @@ def test_a_relative_pose_is_led_along_the_axes_of_its_reference() -> None:
         "panda_tcp", reference="panda_link1", trajectory=stream, name="hand"
     )
     controller = hsp.Controller(PANDA, [hand], hsp.JointCentering())
+    led = controller.stream("hand")
     q = PANDA.home() + np.array([0.6, 0, 0, 0, 0, 0, 0])
     run = hsp.simulate(
         controller,
         q,
         duration=1.0,
         control_period=1e-3,
-        on_row=until(2.0, lambda t: stream.send(velocity=[0.05, 0, 0, 0, 0, 0])),
+        on_row=until(2.0, lambda t: led.send(velocity=[0.05, 0, 0, 0, 0, 0])),
     )
     moved = np.diff(run["task.hand.actual"][[50, 90]], axis=0)[0]
     assert moved[:3] == pytest.approx([0.4 * 0.05, 0.0, 0.0], abs=2e-5)
@@ -99,7 +101,7 @@ def test_joints_are_jogged() -> None:
         PANDA.home(),
         duration=1.5,
         control_period=1e-3,
-        on_row=until(1.0, lambda t: stream.send(velocity=jog)),
+        on_row=until(1.0, lambda t: controller.stream("posture").send(velocity=jog)),
     )
     assert np.abs(run.v[90] - jog).max() < 1e-4
     assert np.abs(run.v[-1]).max() < 1e-3

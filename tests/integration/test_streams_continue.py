@@ -13,7 +13,6 @@ import pinocchio as pin
 import pytest
 
 import hsp_control as hsp
-from hsp_control.declaration.nested import parts_within
 from hsp_control.tasks import RelativePose
 from hsp_control.trajectories import ComposedPose
 
@@ -49,8 +48,7 @@ def send(controller: hsp.Controller, kind: str, k: int) -> None:
     """Send what comes before step k: targets, chunks, velocities, out of order."""
     if k % 9:
         return
-    task: Any = controller.tasks[0]
-    stream = task.displacement if kind == "joints" else task.trajectory
+    stream = controller.stream("hand")
     rng, t = np.random.default_rng(k), PERIOD * k - (0.03 if k % 4 == 0 else 0.0)
     turns = kind not in ("position", "joints")
     point = Q if kind == "joints" else np.array([0.3, 0.0, 0.5])
@@ -88,10 +86,9 @@ def amid(kind: str, policy: str) -> hsp.Controller:
     """Return a controller that has made some steps, and has a message to take."""
     controller = law(kind, policy)
     steps(controller, kind, range(FIRST))
-    task: Any = controller.tasks[0]
-    stream = task.displacement if kind == "joints" else task.trajectory
     size = {"joints": 7, "pose": 6, "tool": 6, "relative": 6}.get(kind, 3)
-    stream.send(velocity=0.05 * np.ones(size))  # nobody has taken it yet
+    velocity = 0.05 * np.ones(size)
+    controller.stream("hand").send(velocity=velocity)  # nobody has taken it yet
     return controller
 
 
@@ -143,24 +140,23 @@ def test_copies_go_on_and_what_looks_ahead_moves_nothing(
     assert copied == expected
 
 
-def leaving() -> tuple[hsp.Controller, hsp.StreamPose]:
+def leaving() -> hsp.Controller:
     """Return a controller whose task leaves a stream from 0.3 s on, for two seconds."""
     stream = hsp.StreamPose(delay=0.05, dead_man=1.0)
     controller = hsp.Controller(PANDA, [hsp.FramePose(None, stream)], limits=None)
-    led(controller, stream, 0, 30)
+    led(controller, 0, 30)
     controller.at(0.3).ramp(2.0).reference("end_effector", ComposedPose())
-    return controller, stream
+    return controller
 
 
-def led(
-    controller: hsp.Controller, stream: hsp.StreamPose, first: int, last: int
-) -> list[np.ndarray]:
+def led(controller: hsp.Controller, first: int, last: int) -> list[np.ndarray]:
     """Return the efforts of steps of 10 ms, while the stream goes on."""
     found = []
     for k in range(first, last):
         if k % 5 == 0:
             turn = 0.2 * np.sin(k * np.ones(3))
-            stream.send(velocity=np.concatenate([0.1 * turn, turn]))
+            for stream in controller.streams:  # none, once it is left
+                stream.send(velocity=np.concatenate([0.1 * turn, turn]))
         found.append(controller.compute(0.01 * k, Q, V).tau.copy())
         controller.applied(np.zeros(7), 0.01)
     return found
@@ -170,16 +166,15 @@ def test_a_task_that_leaves_a_stream_goes_on_in_copies_and_beside_other_changes(
     None
 ):
     """A second later a stream knows where the change began, for who asks again."""
-    expected = np.array(led(*leaving(), 30, 250))
+    expected = np.array(led(leaving(), 30, 250))
     for k in (31, 180, 240):
-        controller, stream = leaving()
-        led(controller, stream, 30, k)
+        controller = leaving()
+        led(controller, 30, k)
         copy = pickle.loads(pickle.dumps(controller))
-        heard = next(parts_within(copy.tasks[0], hsp.StreamPose), stream)
-        np.testing.assert_array_equal(led(copy, heard, k, 250), expected[k - 30 :])
+        np.testing.assert_array_equal(led(copy, k, 250), expected[k - 30 :])
         # The same gains again: all references are made anew, and (1 - s) Kp + s Kp.
         controller.at(0.0).gains("end_effector", hsp.Gains(natural_frequency=10.0))
-        found = led(deepcopy(controller), stream, k, 250)
+        found = led(deepcopy(controller), k, 250)
         np.testing.assert_allclose(found, expected[k - 30 :], rtol=0, atol=1e-11)
 
 

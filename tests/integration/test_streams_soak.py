@@ -32,16 +32,17 @@ def test_targets_are_forgotten(policy: Any, monkeypatch: pytest.MonkeyPatch) -> 
     twists = policy == "twists"
     stream = hsp.StreamPose(policy="latest" if twists else policy, delay=0.02)
     controller = hsp.Controller(PANDA, [hsp.FramePose("panda_tcp", stream)])
+    hand = controller.stream("panda_tcp")
     out, memory = hsp.ControlOutput(), []
     sizes, words, lengths = [], [], []
     tracemalloc.start()
     try:
         for k in range(4 * EACH):
             if twists:
-                stream.send(velocity=0.02 * rng.normal(size=6), axes="tool")
+                hand.send(velocity=0.02 * rng.normal(size=6), axes="tool")
             else:
                 near = origin + 1e-3 * rng.normal(size=3)
-                stream.send(np.concatenate([near, QUATERNION]), t=PERIOD * k)
+                hand.send(np.concatenate([near, QUATERNION]), t=PERIOD * k)
             controller.compute(PERIOD * k, Q, V, out=out)
             controller.applied(out.tau, PERIOD)
             if (k + 1) % EACH == 0:
@@ -50,13 +51,13 @@ def test_targets_are_forgotten(policy: Any, monkeypatch: pytest.MonkeyPatch) -> 
                 lengths.append(len(pickle.dumps(controller)))
                 words.append(repr(controller))
                 followed: Any = controller.tasks[0].followed
-                running = followed.running
-                memory += [len(running._segments), len(running.waypoints.times)]
+                planner = followed.run._planner
+                memory += [len(planner._segments), len(planner.waypoints.times)]
     finally:
         tracemalloc.stop()
     assert len(set(words)) == 1
     # Pieces and waypoints of the last second are kept: a number that varies a little.
     assert max(lengths[1:]) < 1.1 * min(lengths[1:])
     assert max(sizes[1:]) < sizes[1] + 60_000  # of a target 500 bytes would be 300 kB
-    assert stream.unrecorded > 2 * EACH
+    assert followed.run.unrecorded > 2 * EACH
     assert max(memory) < 600

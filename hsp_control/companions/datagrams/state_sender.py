@@ -19,7 +19,7 @@ from hsp_control.engine.rotations import quaternion_from_rotation
 from hsp_control.robot import RobotState
 from hsp_control.simulation.control_chain import EffortSource
 from hsp_control.tasks import JointPosture
-from hsp_control.trajectories.streams.stream import Streamed
+from hsp_control.trajectories.streams.followed import FollowedStream
 
 _BYES = 3
 """How often the end is told: a datagram may be lost."""
@@ -117,8 +117,8 @@ class Teller:
         state, output, controller = source.state, source.output, source.controller
         streams: dict[str, Any] = {}
         for task in controller.tasks:
-            for stream in parts_within(task, Streamed) if task.remembers else ():
-                counts = {**stream.counts(), "reason": stream.last_rejection}
+            for each in parts_within(task, FollowedStream) if task.remembers else ():
+                counts = {**each.run.counts(), "reason": each.run.last_rejection}
                 streams.setdefault(task.name, counts)
         logged = source.log_channels().items()
         return {

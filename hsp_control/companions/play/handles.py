@@ -35,7 +35,8 @@ from hsp_control.robot import Robot, RobotState
 from hsp_control.tasks import FrameOrientation, FramePose, FramePosition, Task
 from hsp_control.trajectories import Stream
 from hsp_control.trajectories.crossfade import AnyReference
-from hsp_control.trajectories.streams.stream import Streamed
+from hsp_control.trajectories.streams.followed import FollowedStream
+from hsp_control.trajectories.streams.streamed import Streamed
 
 BACK = 1.5
 """Time over which a path of its own comes back [s]: half a metre at 0.6 m/s at most."""
@@ -54,12 +55,13 @@ class Grip(ABC):
 
     def move(self, value: Any, t: float) -> None:
         """Lead it somewhere from time t on [s]."""
-        known = self._stream is not None
-        stream = self._stream or self._new_stream()
-        stream.send(self._wanted(np.asarray(value, dtype=float)))  # it may refuse
-        if not known:
+        wanted = self._wanted(np.asarray(value, dtype=float))  # it may refuse
+        if self._stream is None:
+            stream = self._new_stream()
+            stream.check(wanted)
             self._follow(stream, self._controller.at(t).ramp(RAMP))
             self._stream = stream
+        self._controller.stream(self._stream).send(wanted)
         self._wanted_at = t, [float(x) for x in value]
 
     def resume(self, t: float) -> None:
@@ -185,7 +187,7 @@ def targets_of(controller: Controller) -> dict[str, TargetGrip]:
         if isinstance(task, kinds)
         and task.followed is not None
         and all(
-            isinstance(each, Streamed)
+            isinstance(each, FollowedStream)
             for each in parts_within(task.followed, Remembering)
         )
     }

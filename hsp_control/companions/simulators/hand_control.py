@@ -58,7 +58,7 @@ class HandControl:
         """
         settings, document = read_settings(source)
         self.robot, self.frame, self.axes = robot, frame, axes
-        self._stream: Stream | StreamPose | None = None
+        self._streams = settings.stream is not None
         self._point, self._rotation = HeldPoint(), HeldRotation()
         with document.at():
             null_space = settings.null_space
@@ -112,9 +112,10 @@ class HandControl:
             raise NonFiniteError(f"the target contains NaN or inf at t = {t:.6g} s")
         rotation = pin.Quaternion(goal.rotation).normalized().toRotationMatrix()
         point = goal.translation
-        if self._stream is not None:
+        if self._streams:
             pose = pin.SE3(rotation, point)
-            self._stream.send(point[self._indices] if self.axes else pose, t=t)
+            target = point[self._indices] if self.axes else pose
+            self.command.controller.stream("hand").send(target, t=t)
             return
         self._point.aim(point[self._indices] if self.axes else point)
         self._rotation.aim(rotation)
@@ -145,12 +146,11 @@ class HandControl:
         if self.axes is not None:
             point: HeldPoint | Stream = self._point
             if stream is not None:
-                point = self._stream = _linear(stream)
+                point = _linear(stream)
             return FramePosition(
                 self.frame, point, gains=gains, axes=self.axes, name="hand"
             )
         if stream is not None:
-            self._stream = stream
             return FramePose(self.frame, stream, gains=gains, name="hand")
         held = ComposedPose(self._point, self._rotation)
         return FramePose(self.frame, held, gains=gains, name="hand")

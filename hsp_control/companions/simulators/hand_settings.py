@@ -88,6 +88,4 @@ def read_settings(source: Source) -> tuple[HandSettings, Document]:
     with document.at():
         folder = Path(document.name).resolve().parent
         scene = located_scene(settings.scene, folder, document.access)
-    stream = settings.stream  # what is sent to it is for one hand
-    stream = None if stream is None else replace(stream)
-    return replace(settings, scene=scene, stream=stream), document
+    return replace(settings, scene=scene), document

@@ -6,6 +6,7 @@ import subprocess
 import sys
 import threading
 from contextlib import suppress
+from copy import deepcopy
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any, Self
@@ -18,10 +19,8 @@ from hsp_control.config.recorder import declaration_of
 from hsp_control.config.scenario import ViewSettings
 from hsp_control.control.changes import Change
 from hsp_control.control.controller import Controller
-from hsp_control.declaration.nested import parts_within, with_parts_replaced
 from hsp_control.declaration.plain_data import plain_data
 from hsp_control.simulation.log_writer import LogWriter
-from hsp_control.trajectories.streams.stream import Streamed
 
 START = 60.0  # time in which the page's process must say its address [s]
 RATE = 30.0  # states that are taken of a controller in a second [1/s]
@@ -251,17 +250,10 @@ class Follower:
             self._begun = True
         changes, known = {id(each): each for each in controller.changes}, self._changes
         for change in (changes[key] for key in changes if key not in known):
-            own = with_parts_replaced(change, Streamed, lambda each: each.preview())
-            there = {id(each) for each in self._streams()}
+            with controller._lock:
+                own = deepcopy(change)  # its stream goes on from where the loop's is
             self._copy.change(own)
-            for stream in self._streams():
-                if id(stream) not in there:  # the loop has heard its first message
-                    with controller._lock:
-                        stream.catch_up()
         self._changes = changes
-
-    def _streams(self) -> list[Streamed]:
-        return list(parts_within(self._copy.planned_tasks, Streamed))
 
     def _copy_anew(self) -> None:
         controller = self._controller

@@ -12,7 +12,7 @@ from pydantic import AfterValidator
 from hsp_control.common.arrays import Array, Indices
 from hsp_control.common.exceptions import ContactError, TrajectoryError
 from hsp_control.declaration import Part, within
-from hsp_control.declaration.nested import parts_within, with_memories_copied
+from hsp_control.declaration.nested import parts_within
 from hsp_control.declaration.quantities import (
     ArrayField,
     Number,
@@ -27,7 +27,7 @@ from hsp_control.robot import Robot, RobotState
 from hsp_control.robot.kinematics import FrameKinematics
 from hsp_control.trajectories import Hold, Trajectory
 from hsp_control.trajectories.schedule import Schedule
-from hsp_control.trajectories.streams.stream import Streamed
+from hsp_control.trajectories.streams.streamed import Streamed
 
 NORMAL, FORCE, WRENCH = 1, 3, 6
 """What is commanded, by the number of coordinates."""
@@ -192,10 +192,6 @@ class Contact(Part, ABC, family="contacts", error=ContactError):
         if self.name == self.frame:
             changed.pop("name", None)
         return changed
-
-    def __deepcopy__(self, memo: dict[int, Any]) -> Self:
-        """Return the contact; what has a memory in it goes on by itself."""
-        return with_memories_copied(self, memo)
 
     def placed(self, start: Start) -> Self:
         """Return the contact, checked."""

@@ -11,13 +11,13 @@ from hsp_control.engine.plans import TIME, PartCall, PartCalls
 from hsp_control.trajectories.orientation import OrientationSample
 from hsp_control.trajectories.pose import PoseSample
 from hsp_control.trajectories.streams.chart import Chart, State
-from hsp_control.trajectories.streams.running import Policy
+from hsp_control.trajectories.streams.planner import Policy
 from hsp_control.trajectories.streams.segments import MotionBounds, coast
 from hsp_control.trajectories.trajectory import TrajectorySample
 
 
 class StreamAlone:
-    """What `RunningStream` does with the newest target or velocity, as calls.
+    """What a `Planner` does with the newest target or velocity, as calls.
 
     Attributes:
         target: What is sent next, the start at first: linear coordinates, then perhaps

@@ -10,7 +10,7 @@ from threading import Lock
 from typing import Any, NamedTuple, Self
 
 from hsp_control.common.exceptions import StreamError
-from hsp_control.trajectories.streams.message import NO_TOOL, Message, Space, message_of
+from hsp_control.trajectories.streams.message import Message, Space, message_of
 
 _log = logging.getLogger(__name__)
 MOST = 5_000_000
@@ -126,23 +126,6 @@ class Inbox:
         if self._source and aloud:
             self._say(f"a message is dropped: {reason}")
 
-    def fits(self, message: Message) -> bool:
-        """Return whether a message that was sent before the size was known fits."""
-        space = self.space
-        for array, width in (
-            (message.values, space.width),
-            (message.velocities, space.rates),
-        ):
-            if array is not None and width is not None and array.shape[1] != width:
-                self.reject(
-                    f"a message has {array.shape[1]} numbers; this stream needs {width}"
-                )
-                return False
-        if message.axes == "tool" and not space.rotational:
-            self.reject(NO_TOOL)
-            return False
-        return True
-
     def _say(self, what: str) -> None:
         """Warn, once for all that differs in its numbers alone."""
         kind = _NUMBER.sub("", what)
@@ -194,13 +177,14 @@ class Reader:
     """Takes messages for one run, and records them; it begins with what nobody took.
 
     Attributes:
+        inbox: The queue.
         record: The messages that were taken, with the times ``at`` when they were.
         lost: How many more there were than are recorded.
     """
 
     def __init__(self, inbox: Inbox, *, aside: bool = False) -> None:
         """Begin to read; ``aside``: what is taken waits for the others all the same."""
-        self._inbox, self._aside = inbox, aside
+        self.inbox, self._aside = inbox, aside
         self._number = inbox.taken
         self._missed: list[Received] = []
         self.record: list[Message] = []
@@ -213,7 +197,7 @@ class Reader:
         Raises:
             StreamError: If nobody listens any more.
         """
-        inbox = self._inbox
+        inbox = self.inbox
         if inbox.failure:
             raise StreamError(f"{inbox.source}: its thread has ended: {inbox.failure}")
         if inbox.count == self._number and not self._missed:
@@ -225,7 +209,6 @@ class Reader:
         taken = [
             each.message if each.message.at > -inf else each.message._replace(at=t)
             for each in received
-            if inbox.fits(each.message)
         ]
         for each in taken:
             self._add(each)
@@ -233,14 +216,9 @@ class Reader:
 
     def copy(self) -> "Reader":
         """Return a reader that goes on from here, with a record of its own."""
-        other = Reader(self._inbox, aside=True)
+        other = Reader(self.inbox, aside=True)
         other._number, other._missed = self._number, self._missed.copy()
         return other
-
-    def catch_up(self, other: "Reader") -> None:
-        """Take first what another reader has taken in its run, each at its time."""
-        self._number = other._number
-        self._missed = [Received(other._number, each) for each in [*other.record]]
 
     def _add(self, message: Message) -> None:
         """Record a message, as long as there is room."""
@@ -253,7 +231,7 @@ class Reader:
 
     def __getstate__(self) -> dict[str, Any]:
         """Return what it reads, and what waits for it alone, but no record."""
-        inbox, number = self._inbox, self._number
+        inbox, number = self.inbox, self._number
         waiting = inbox.after(number, take=False) if number < inbox.taken else []
         missed = self._missed + [each for each in waiting if each.number <= inbox.taken]
         return {

@@ -63,11 +63,11 @@ def test_it_hears_the_loop_and_moves_its_hand(states: str, loop: Loop) -> None:
         else:
             goals = [[x, y, first[0] + d, *turned] for d in (0.015, 0.02)]
             loop.send_chunk(targets, goals, [0.05, 0.1])
-        while hand._mailbox.inbox.count < len(first):  # the loop has no clock
+        while hand.run.inbox.count < len(first):  # the loop has no clock
             sleep(1e-3)
 
     report = run_loop(source, Rig(), duration=1.0, on_period=lead)
-    counts = source.controller.tasks[0].trajectory.counts()
+    counts = source.controller.stream("hand").counts()
     assert (counts["taken"], counts["rejected"]) == (4, 0)
     where = source.state.position("panda_tcp")
     rest = panda().state(0.0, start(), np.zeros(7)).position("panda_tcp")

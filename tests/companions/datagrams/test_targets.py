@@ -18,6 +18,7 @@ from hsp_control.cli.live_experiment import of_a_robot
 from hsp_control.common.exceptions import StreamError
 from hsp_control.companions.datagrams.targets import opened
 from hsp_control.config.document import read_document
+from hsp_control.trajectories.streams.followed import FollowedPoint, FollowedPose
 from hsp_control.trajectories.streams.inbox import Inbox
 from hsp_control.trajectories.streams.message import Space
 
@@ -48,7 +49,7 @@ def wait_until(done: Callable[[], bool]) -> None:
     raise AssertionError("it did not happen")
 
 
-def listening(port: int, part: str = "") -> Stream:
+def listening(port: int, part: str = "") -> FollowedPoint:
     stream = Stream([0.0], source=f"udp://127.0.0.1:{port}{part}").anchored(None)
     stream.sample(0.0)  # it listens from here on
     return stream
@@ -58,7 +59,7 @@ def test_datagrams_arrive_and_bad_ones_are_counted_and_said_once(
     port: int, sender: socket.socket, caplog: pytest.LogCaptureFixture
 ) -> None:
     stream = listening(port)
-    inbox = stream._mailbox.inbox
+    inbox = stream.run.inbox
     bad = ("{", '{"value": [NaN]}', '{"value": [0.1, 0.2]}', "[]", "1" * 9000, "")
     backwards = '{"values": [[0.1], [0.2]], "times": [0.2, 0.1]}'
     for text in (*bad, backwards, backwards.replace("0.2", "0.3")):
@@ -68,8 +69,8 @@ def test_datagrams_arrive_and_bad_ones_are_counted_and_said_once(
     assert [caplog.text.count(each) for each in ("NaN is no", "times must")] == [1, 1]
     last = [stream.sample(t).position[0] for t in np.arange(0.0, 1.0, 0.01)][-1]
     assert last == pytest.approx(0.1, abs=1e-9)
-    assert stream.counts()["rejected"] == 8
-    assert "times[1] = 0.1 is not later" in stream.last_rejection
+    assert stream.run.counts()["rejected"] == 8
+    assert "times[1] = 0.1 is not later" in stream.run.last_rejection
 
 
 def test_a_second_sender_is_refused_until_the_first_is_silent(
@@ -118,7 +119,7 @@ def test_a_port_in_use_is_told_and_streams_of_one_process_share_it(port: int) ->
         with pytest.raises(StreamError, match="cannot listen there: Address already"):
             listening(port)
     one, two = listening(port), listening(port)
-    assert one._mailbox.inbox is two._mailbox.inbox
+    assert one.run.inbox is two.run.inbox
     with pytest.raises(StreamError, match="already carries 1 numbers; this stream"):
         Stream([0.0] * 2, source=f"udp://127.0.0.1:{port}").anchored(None).sample(0.0)
     with pytest.raises(StreamError, match="another stream of this process hears all"):
@@ -142,14 +143,14 @@ def test_a_robot_alone_leaves_the_port_to_its_loop(port: int) -> None:
         experiment = of_a_robot(document)
         with pytest.raises(StreamError, match="cannot listen there"):
             hsp.load_experiment(ROOT / "examples/stream/panda.yaml", source)
-    assert isinstance(experiment.controller.tasks[0].trajectory, hsp.StreamPose)
+    assert isinstance(experiment.controller.tasks[0].trajectory, FollowedPose)
 
 
 def test_each_stream_of_a_port_hears_its_part_or_nobody_does(
     port: int, sender: socket.socket
 ) -> None:
     left, right = listening(port, "/left"), listening(port, "/right")
-    one, other = left._mailbox.inbox, right._mailbox.inbox
+    one, other = left.run.inbox, right.run.inbox
     for text, reason in (
         (
             {"left": {"value": [0.1]}, "right": {"value": [0.1, 0.2]}},
@@ -161,8 +162,8 @@ def test_each_stream_of_a_port_hears_its_part_or_nobody_does(
         before = other.rejected
         sender.sendto(json.dumps(text).encode(), ("127.0.0.1", port))
         wait_until(lambda before=before: other.rejected > before)  # type: ignore[misc]
-        assert reason in left.last_rejection
-        assert reason in right.last_rejection
+        assert reason in left.run.last_rejection
+        assert reason in right.run.last_rejection
     assert (one.count, other.count) == (0, 0)
     sender.sendto(b'{"t": 2, "left": {"value": [0.1]}}', ("127.0.0.1", port))
     wait_until(lambda: one.count == 1)
@@ -207,11 +208,11 @@ def test_one_stream_of_two_poses_or_two_senders_lead_two_hands(
             for one, text in zip((sender, other), texts, strict=False):
                 data = json.dumps({"t": 7.0, **text}).encode()
                 one.sendto(data, ("127.0.0.1", port))
-        wait_until(lambda: all(each._mailbox.inbox.count == 2 for each in streams))
+        wait_until(lambda: all(each.run.inbox.count == 2 for each in streams))
         if senders == 2:  # each keeps to its own hand
             sender.sendto(data, ("127.0.0.1", port))
-            wait_until(lambda: all(each._mailbox.inbox.rejected for each in streams))
-            assert re.match(r"right: \S+ sends while", streams[0].last_rejection)
+            wait_until(lambda: all(each.run.inbox.rejected for each in streams))
+            assert re.match(r"right: \S+ sends while", streams[0].run.last_rejection)
 
     run = experiment.run(on_row=lead)
     other.close()
@@ -255,7 +256,7 @@ def test_a_joystick_s_velocities_name_their_axes(
         [0.0] * 3, [1.0, 0.0, 0.0], source=f"udp://127.0.0.1:{port}"
     ).anchored(pin.SE3.Identity())
     stream.sample(0.0)
-    inbox = stream._mailbox.inbox
+    inbox = stream.run.inbox
     twist = [0.1, 0.0, 0.0, 0.0, 0.0, 0.4]
     for axes in ("tool", "hand"):
         data = json.dumps({"velocity": twist, "axes": axes}).encode()

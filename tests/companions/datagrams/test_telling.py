@@ -32,16 +32,16 @@ def states() -> Iterator[socket.socket]:
         yield heard
 
 
-def command() -> tuple[Command, hsp.StreamPose]:
+def command() -> Command:
     stream = hsp.StreamPose(speed=50.0, acceleration=1e4, jerk=1e6, delay=0.0)
     task = hsp.FramePose("panda_tcp", stream, largest_error=[0.01, None], name="hand")
     controller = hsp.Controller(panda(), [task], limits=hsp.Limits())
     observer = Compensation(momentum_observer=MomentumObserver())
-    return Command(controller, observer), stream
+    return Command(controller, observer)
 
 
 def test_it_tells_what_a_policy_needs(states: socket.socket) -> None:
-    source, stream = command()
+    source = command()
     told = publish(f"127.0.0.1:{states.getsockname()[1]}?rate=100", source)
     truth = []
 
@@ -49,7 +49,7 @@ def test_it_tells_what_a_policy_needs(states: socket.socket) -> None:
         told(t)
         truth.append((t, source.state.q.copy(), source.output.tau.copy()))
         if len(truth) == 50:
-            stream.send(FAR)
+            source.controller.stream("hand").send(FAR)
 
     report = run_loop(source, Rig(), duration=0.2, on_period=on_period)
     told.ended(report.ended, report.reason)
@@ -97,7 +97,7 @@ def test_the_page_s_client_hears_and_answers(capsys: pytest.CaptureFixture) -> N
         code = compile(client, "policies.md", "exec")
         thread = Thread(target=exec, args=(code, space), daemon=True)
         thread.start()
-        source, _ = command()
+        source = command()
         told = publish(f"127.0.0.1:{port}?rate=10", source)
         source.effort(0.0, start(), np.zeros(7), 0.001)
         goals.settimeout(0.05)
@@ -133,7 +133,7 @@ states.bind(0, "127.0.0.1", () => console.log(states.address().port))
 @pytest.mark.process
 @pytest.mark.skipif(shutil.which("node") is None, reason="needs Node.js")
 def test_a_client_in_another_language_hears_the_same_numbers() -> None:
-    source, _ = command()
+    source = command()
     node = ["node", "-e", OTHER_LANGUAGE]
     with subprocess.Popen(node, stdout=subprocess.PIPE, text=True) as client:
         assert client.stdout is not None
@@ -148,7 +148,7 @@ def test_a_client_in_another_language_hears_the_same_numbers() -> None:
 
 
 def test_what_is_no_number_is_null(states: socket.socket) -> None:
-    source, _ = command()
+    source = command()
     told = publish(f"127.0.0.1:{states.getsockname()[1]}", source)
     source.effort(0.0, start(), np.zeros(7), 0.001)
     source.output.tau[2] = np.nan
@@ -173,13 +173,13 @@ def test_what_is_no_number_is_null(states: socket.socket) -> None:
 )
 def test_mistakes_are_named(address: str, message: str) -> None:
     with pytest.raises(HardwareError, match=message):
-        publish(address, command()[0])
+        publish(address, command())
 
 
 def test_what_cannot_be_sent_is_said_once_and_hinders_nothing(
     caplog: pytest.LogCaptureFixture,
 ) -> None:
-    source, _ = command()
+    source = command()
     told = publish("255.255.255.255:5006", source)  # which a plain socket may not
     source.effort(0.0, start(), np.zeros(7), 0.001)
     told(0.0)

@@ -24,8 +24,8 @@ from hsp_control.companions.ros2.messages import (
 )
 from hsp_control.companions.ros2.node import Node, TopicPublisher
 from hsp_control.trajectories.streams.inbox import Inbox
-from hsp_control.trajectories.streams.mailbox import listening_inbox
 from hsp_control.trajectories.streams.message import ORIENTATION, POSE, Space
+from hsp_control.trajectories.streams.sources import listening_inbox
 
 POSITION = Space(3, False)
 HALF = 0.5

@@ -104,9 +104,9 @@ def test_a_streamed_velocity_is_followed_and_repeated_from_the_log(tmp_path):
 
     def drive(recorder):
         if recorder.count == 20:
-            velocity.send([0.2, 0.0, 0.0])
+            recorder.plan.streams[0].send([0.2, 0.0, 0.0])
         if recorder.count == 90:
-            velocity.send([0.0, 0.0, 0.0])
+            recorder.plan.streams[0].send([0.0, 0.0, 0.0])
 
     run = experiment.run(on_row=drive)
     assert (run["plan.phase"][:20] == 0).all()  # it stands until it is told

@@ -15,7 +15,7 @@ from hsp_control.common.exceptions import (
 from hsp_control.declaration.imported import import_file
 from hsp_control.simulation import Rollout
 from hsp_control.simulation.journal import JournalReader
-from hsp_control.trajectories.streams.mailbox import read_recording
+from hsp_control.trajectories.streams.sources import read_recording
 
 CODE = """
 import os, sys

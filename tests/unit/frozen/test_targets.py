@@ -44,8 +44,7 @@ class Pair:
         given = tasks(kind)
         self.controller = hsp.Controller(ROBOT, given, hsp.JointCentering(), start=Q)
         self.opened = Opened(hsp.freeze(self.controller, folder / "frozen.hsp"))
-        followed: Any = self.controller.tasks[0].followed
-        self.stream: Any = followed
+        self.stream = self.controller.stream("hand")
         self.k = 0
 
     def target(self, value: np.ndarray) -> None:
@@ -121,7 +120,7 @@ def test_a_new_run_begins_anew(tmp_path: Path) -> None:
     first = pair.steps(50)
     assert LIB.hsp_restart(pair.opened.handle) == OK
     pair.controller.restart()
-    pair.stream, pair.k = pair.controller.tasks[0].followed, 0
+    pair.k = 0
     pair.steps(2)
     pair.target(START.translation + 0.1)
     np.testing.assert_array_equal(pair.steps(50), first)

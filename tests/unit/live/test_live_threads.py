@@ -9,7 +9,8 @@ from live_rigs import PERIOD, Rig, panda, start, watched
 
 import hsp_control as hsp
 from hsp_control.live import LoopReport, run_loop
-from hsp_control.trajectories.streams import mailbox, stream
+from hsp_control.trajectories.streams import sources
+from hsp_control.trajectories.streams import streamed as declared
 
 
 class PanicError(BaseException):
@@ -46,7 +47,7 @@ class FailingKind:
 
 
 def streamed(kind: FailingKind, monkeypatch: pytest.MonkeyPatch) -> hsp.Controller:
-    for module in (mailbox, stream):
+    for module in (sources, declared):
         monkeypatch.setattr(module, "kind_of", lambda source: kind)
     tip = panda().state(0.0, start(), 0.0 * start()).position("panda_tcp")
     task = hsp.FramePosition("panda_tcp", hsp.Stream(tip, source="mine://here"))
@@ -68,7 +69,7 @@ def test_what_a_streams_thread_raises_ends_in_the_safe_stop(
         if t > 20 * PERIOD:
             kind.go.set()
             assert kind.ended.wait(10.0)
-            mailbox._threads["mine://here"].join(10.0)
+            sources._threads["mine://here"].join(10.0)
 
     def run(controller: hsp.Controller) -> LoopReport:
         rig = Rig(watched())

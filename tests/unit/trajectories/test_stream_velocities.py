@@ -43,7 +43,7 @@ def held(
 
     def feed(k: int) -> None:
         if first <= k < last and (k - first) % every == 0:
-            stream.send(velocity=velocity)
+            stream.run.send(velocity=velocity)
 
     return feed
 
@@ -108,7 +108,7 @@ def test_the_pose_is_the_integral_of_what_is_commanded(axes: Any) -> None:
     run(
         stream,
         0.9,
-        lambda k: k % 70 or stream.send(velocity=rng.normal(size=6) * [0.3] * 6),
+        lambda k: k % 70 or stream.run.send(velocity=rng.normal(size=6) * [0.3] * 6),
     )
     assert_integral(stream, np.linspace(0.05, 0.88, 300))
 
@@ -185,11 +185,11 @@ def test_a_stick_that_is_turned_back_amid_a_change_keeps_the_bounds(axes: Any) -
     for late in range(10, 150, 10):
         stream = StreamPose(dead_man=9.0, delay=0.0, axes=axes).anchored(START)
         twists = {5: [0.5, 0.2, 0, 0, 0, 0.5], 5 + late: [-0.5, 0.5, 0.3, 0.5, 0, -0.5]}
-        feed = lambda k, s=stream, w=twists: k in w and s.send(velocity=w[k])  # noqa: E731
+        feed = lambda k, s=stream, w=twists: k in w and s.run.send(velocity=w[k])  # noqa: E731
         found = np.array([twist(each, axes) for each in run(stream, 0.6, feed)])
         most = max(most, np.abs(found[:, :3]).max())
         assert np.abs(found[-1] - twists[5 + late]).max() < 1e-12
-    assert most <= stream.speed + 1e-9
+    assert most <= stream.run.stream.speed + 1e-9
 
 
 def test_a_spin_that_is_followed_by_a_target_keeps_its_bound() -> None:
@@ -202,13 +202,15 @@ def test_a_spin_that_is_followed_by_a_target_keeps_its_bound() -> None:
 
         def feed(k: int, s: Any = stream, w: Any = spin, to: Any = goal) -> None:
             if k == 5:
-                s.send(velocity=w)
+                s.run.send(velocity=w)
             elif k == 350:
-                s.send(to)
+                s.run.send(to)
 
         samples = run(stream, 3.0, feed)
         omega = [each.orientation.angular_velocity for each in samples]
-        assert 2.3 < np.linalg.norm(omega, axis=1).max() <= stream.angular_speed
+        assert (
+            2.3 < np.linalg.norm(omega, axis=1).max() <= stream.run.stream.angular_speed
+        )
         away = goal.actInv(pose(samples[-1]))
         assert np.abs(away.np - np.eye(4)).max() < 1e-7
 
@@ -222,17 +224,17 @@ def test_bounds_hold_in_the_axes_of_the_command(seed: int, delay: float) -> None
 
     def feed(k: int) -> None:
         if rng.random() < 0.03:
-            stream.send(velocity=rng.normal(size=6) * 10.0 ** rng.uniform(-2, 1))
+            stream.run.send(velocity=rng.normal(size=6) * 10.0 ** rng.uniform(-2, 1))
 
     samples = run(stream, 1.0, feed)
     rates = np.array([twist(each, "tool") for each in samples])
-    assert np.abs(rates[:, :3]).max() <= stream.speed + 1e-9
+    assert np.abs(rates[:, :3]).max() <= stream.run.stream.speed + 1e-9
     linear = np.diff(rates[:, :3], axis=0) / H
-    assert np.abs(linear).max() <= stream.acceleration + 1e-9
-    assert np.linalg.norm(rates[:, 3:], axis=1).max() <= stream.angular_speed
+    assert np.abs(linear).max() <= stream.run.stream.acceleration + 1e-9
+    assert np.linalg.norm(rates[:, 3:], axis=1).max() <= stream.run.stream.angular_speed
     turning = [each.orientation.angular_acceleration for each in samples]
     most = np.linalg.norm(turning, axis=1).max()
-    assert most <= stream.angular_acceleration * (1.0 + 1e-6)
+    assert most <= stream.run.stream.angular_acceleration * (1.0 + 1e-6)
     assert_integral(stream, np.linspace(0.1, 0.98, 20))
 
 
@@ -250,18 +252,19 @@ def test_targets_and_velocities_in_both_axes_follow_each_other(
             return
         if rng.random() < 0.4:
             goal = START * pin.exp6(rng.normal(size=6) * 0.2)
-            stream.send(goal)
+            stream.run.send(goal)
         else:
             velocity = rng.normal(size=6) * 10.0 ** rng.uniform(-2, 1)
-            stream.send(velocity=velocity, axes=rng.choice(AXES))
+            stream.run.send(velocity=velocity, axes=rng.choice(AXES))
 
     samples = run(stream, 1.5, feed)
     assert_integral(stream, np.linspace(0.6, 1.48, 40))
     omega = [each.orientation.angular_velocity for each in samples]
-    assert np.linalg.norm(omega, axis=1).max() <= stream.angular_speed * (1 + 1e-6)
+    bounds = stream.run.stream
+    assert np.linalg.norm(omega, axis=1).max() <= bounds.angular_speed * (1 + 1e-6)
     # In other axes than those of the command a component is √3 larger at most.
     speed = [each.position.velocity for each in samples]
-    assert np.linalg.norm(speed, axis=1).max() <= np.sqrt(3) * stream.speed + 1e-9
+    assert np.linalg.norm(speed, axis=1).max() <= np.sqrt(3) * bounds.speed + 1e-9
 
 
 def test_an_orientation_turns_about_axes_of_its_own() -> None:
@@ -275,12 +278,12 @@ def test_a_message_may_name_other_axes_and_its_record_repeats_them() -> None:
 
     def feed(k: int) -> None:
         if k in (100, 400):
-            stream.send(velocity=TWIST, axes="tool" if k == 100 else None)
+            stream.run.send(velocity=TWIST, axes="tool" if k == 100 else None)
 
     first = run(stream, 0.8, feed)
     assert np.abs(twist(first[399], "tool") - TWIST).max() < 1e-12
     assert np.abs(twist(first[-1], "world") - TWIST).max() < 1e-12
-    messages = json.loads(json.dumps(stream.record))
+    messages = json.loads(json.dumps(stream.run.record))
     again = StreamPose(dead_man=1.0, messages=messages).anchored(START)
     for one, other in zip(first, run(again, 0.8), strict=True):
         assert np.array_equal(pose(one).np, pose(other).np)
@@ -294,16 +297,12 @@ def test_a_message_may_name_other_axes_and_its_record_repeats_them() -> None:
 ])  # fmt: skip
 def test_wrong_axes_are_refused(kind: Any, message: str, arguments: Any) -> None:
     with pytest.raises(StreamError, match=message):
-        kind().send(**arguments)
+        kind().anchored(START).run.send(**arguments)
 
 
 def test_a_stream_of_points_has_no_tool() -> None:
-    early = Stream([0.0])
-    early.send(velocity=[0.1], axes="tool")  # before anything knows what it moves
-    placed = early.anchored(None)
-    run(placed, 0.1)
-    assert placed.counts()["rejected"] == 1
+    stream = Stream([0.0]).anchored(None)
     with pytest.raises(StreamError, match="a stream without an orientation has no"):
-        early.send(velocity=[0.1], axes="tool")
+        stream.run.send(velocity=[0.1], axes="tool")
     with pytest.raises(TrajectoryError, match="axes: unknown argument 'axes'"):
         Stream([0.0], axes="tool")  # type: ignore[call-arg]

@@ -21,8 +21,12 @@ from hsp_control.trajectories import (
 )
 from hsp_control.trajectories.streams import inbox
 from hsp_control.trajectories.streams.chart import Chart
-from hsp_control.trajectories.streams.mailbox import read_recording
-from hsp_control.trajectories.streams.running import SenderClock
+from hsp_control.trajectories.streams.followed import (
+    FollowedOrientation,
+    FollowedPose,
+)
+from hsp_control.trajectories.streams.sources import read_recording
+from hsp_control.trajectories.streams.waypoints import SenderClock
 
 H = 5e-4
 """Time between samples [s]."""
@@ -70,7 +74,7 @@ def assert_derivatives(x: Any, rate: Any, acceleration: Any, jerk: float) -> Non
 
 def hostile(rng: np.random.Generator, stream: Any, n: int) -> Callable[[float], None]:
     """Return a feed of random messages of all kinds, in bursts and out of order."""
-    rotational = 4 if isinstance(stream, StreamPose | StreamOrientation) else 0
+    rotational = 4 if isinstance(stream, FollowedPose | FollowedOrientation) else 0
 
     def value() -> np.ndarray:
         point = rng.normal(size=n) * 10.0 ** rng.uniform(-3, 1)
@@ -88,14 +92,14 @@ def hostile(rng: np.random.Generator, stream: Any, n: int) -> Callable[[float], 
             stamp = None if rng.random() < 0.4 else t + rng.normal() * 0.05
             kind = rng.integers(4)
             if kind == 0:
-                stream.send(velocity=rates(), t=stamp)
+                stream.run.send(velocity=rates(), t=stamp)
             elif kind == 1:
-                stream.send(value(), velocity=rates(), t=stamp)
+                stream.run.send(value(), velocity=rates(), t=stamp)
             elif kind == 2:
-                stream.send(value(), t=stamp)
+                stream.run.send(value(), t=stamp)
             else:
                 times = np.cumsum(rng.uniform(1e-3, 0.1, rng.integers(1, 20)))
-                stream.send_chunk([value() for _ in times], times, t=stamp)
+                stream.run.send_chunk([value() for _ in times], times, t=stamp)
 
     return feed
 
@@ -129,23 +133,23 @@ def test_poses_keep_their_bounds_whatever_is_sent(
     samples = sampled(stream, 1.0, hostile(rng, stream, 3))
     x, rate, acceleration = columns([each.position for each in samples])
     R, omega, omega_dot = columns([each.orientation for each in samples])
-    assert_derivatives(x, rate, acceleration, stream.jerk)
-    assert np.abs(rate).max() <= stream.speed + 1e-9
-    assert np.abs(acceleration).max() <= stream.acceleration + 1e-9
+    assert_derivatives(x, rate, acceleration, stream.run.stream.jerk)
+    assert np.abs(rate).max() <= stream.run.stream.speed + 1e-9
+    assert np.abs(acceleration).max() <= stream.run.stream.acceleration + 1e-9
     for value, bound in (
-        (omega, stream.angular_speed),
-        (omega_dot, stream.angular_acceleration),
-        (np.diff(omega_dot, axis=0) / H, stream.angular_jerk),
+        (omega, stream.run.stream.angular_speed),
+        (omega_dot, stream.run.stream.angular_acceleration),
+        (np.diff(omega_dot, axis=0) / H, stream.run.stream.angular_jerk),
     ):
         assert np.linalg.norm(value, axis=1).max() <= bound * (1.0 + 1e-6)
     for k in range(len(R) - 1):
         turned = pin.log3(R[k + 1] @ R[k].T)
         mean = (omega[k] + omega[k + 1]) / 2  # the commutator is of third order
-        assert np.abs(turned - H * mean).max() < stream.angular_jerk * H**3
+        assert np.abs(turned - H * mean).max() < stream.run.stream.angular_jerk * H**3
         assert np.abs(R[k] @ R[k].T - np.eye(3)).max() < 1e-12
     trapezia = H * (omega_dot[1:] + omega_dot[:-1]) / 2
     error = np.abs(np.diff(omega, axis=0) - trapezia).max()
-    assert error < stream.angular_jerk * H * H / 4 + 1e-11
+    assert error < stream.run.stream.angular_jerk * H * H / 4 + 1e-11
 
 
 # -- policies -------------------------------------------------------------------------
@@ -159,7 +163,7 @@ def circle(t: float) -> np.ndarray:
 def test_the_reference_passes_waypoints_at_their_time(policy: Any) -> None:
     stream = Stream([0.0, 0.0], policy=policy, delay=0.15).anchored(None)
     times = np.arange(0.05, 2.0, 0.05)
-    feed = at_times(*((t, lambda t=t: stream.send(circle(t), t=t)) for t in times))
+    feed = at_times(*((t, lambda t=t: stream.run.send(circle(t), t=t)) for t in times))
     x, _, acceleration = columns(sampled(stream, 2.0, feed))
     for t in times[10:-6]:  # after it has caught up
         k = round((t + 0.15) / H)
@@ -175,7 +179,7 @@ def test_lost_and_jittered_waypoints_in_any_order_change_little() -> None:
     for t in np.arange(0.05, 2.0, 0.05):
         if rng.random() > 0.05:
             late = t + rng.uniform(0.0, 0.07)  # later than the next one, at times
-            events.append((late, lambda t=t: stream.send(circle(t), t=t)))
+            events.append((late, lambda t=t: stream.run.send(circle(t), t=t)))
     x, _, _ = columns(sampled(stream, 2.0, at_times(*events)))
     t = H * np.arange(len(x))
     wanted = np.array([circle(s - 0.2) for s in t])
@@ -189,7 +193,10 @@ def test_lost_and_jittered_waypoints_in_any_order_change_little() -> None:
 def test_the_newest_target_is_reached_at_rest(policy: Any, goals: list[float]) -> None:
     stream = Stream([0.0], policy=policy).anchored(None)
     feed = at_times(
-        *((0.1 + 0.2 * k, lambda x=x: stream.send([x])) for k, x in enumerate(goals))
+        *(
+            (0.1 + 0.2 * k, lambda x=x: stream.run.send([x]))
+            for k, x in enumerate(goals)
+        )
     )
     x, rate, acceleration = columns(sampled(stream, 2.0, feed))
     assert x[-1, 0] == pytest.approx(0.2, abs=1e-9)
@@ -202,7 +209,10 @@ def test_extrapolation_ends_and_the_reference_holds() -> None:
         None
     )
     feed = at_times(
-        *((t, lambda t=t: stream.send([0.2 * t], t=t)) for t in np.arange(0, 1, 0.05))
+        *(
+            (t, lambda t=t: stream.run.send([0.2 * t], t=t))
+            for t in np.arange(0, 1, 0.05)
+        )
     )
     x, rate, _ = columns(sampled(stream, 2.0, feed))
     last = 0.95 + 0.1
@@ -217,7 +227,7 @@ def test_a_twist_turns_the_hand_about_a_fixed_axis_until_it_is_silent() -> None:
     stream = StreamPose(delay=0.05, extrapolation=0.1).anchored(start)
     twist = np.array([0.1, 0.0, -0.05, 0.0, 0.6, 0.3])
     feed = at_times(
-        *((t, lambda: stream.send(velocity=twist)) for t in np.arange(0.1, 1, 0.02))
+        *((t, lambda: stream.run.send(velocity=twist)) for t in np.arange(0.1, 1, 0.02))
     )
     samples = sampled(stream, 1.5, feed)
     moving, still = samples[round(0.8 / H)], samples[-1]
@@ -232,15 +242,15 @@ def test_a_chunk_replaces_the_rest_of_the_one_before() -> None:
     stream = Stream([0.0], policy="interpolate", delay=0.05).anchored(None)
     times = np.arange(1, 17) * 0.02
     feed = at_times(
-        (0.1, lambda: stream.send_chunk((0.2 * times)[:, None], times, t=0.1)),
-        (0.2, lambda: stream.send_chunk((-0.1 * times)[:, None], times, t=0.2)),
+        (0.1, lambda: stream.run.send_chunk((0.2 * times)[:, None], times, t=0.1)),
+        (0.2, lambda: stream.run.send_chunk((-0.1 * times)[:, None], times, t=0.2)),
         # An old chunk that arrives late does not count.
-        (0.25, lambda: stream.send_chunk((9.0 + times)[:, None], times, t=0.15)),
+        (0.25, lambda: stream.run.send_chunk((9.0 + times)[:, None], times, t=0.15)),
     )
     x, _, _ = columns(sampled(stream, 1.0, feed))
     assert x.max() < 0.05
     assert x[-1, 0] == pytest.approx(-0.1 * times[-1], abs=1e-9)
-    assert stream.counts()["late"] == 1
+    assert stream.run.counts()["late"] == 1
 
 
 # -- time, silence, runs --------------------------------------------------------------
@@ -248,7 +258,7 @@ def test_a_chunk_replaces_the_rest_of_the_one_before() -> None:
 
 def test_silence_holds_and_then_stops_with_the_time() -> None:
     stream = Stream([0.0], hold_after=0.2, stop_after=0.6).anchored(None)
-    feed = at_times((0.1, lambda: stream.send([50.0])))
+    feed = at_times((0.1, lambda: stream.run.send([50.0])))
     x, rate, _ = columns(sampled(stream, 0.65, feed))
     assert rate.max() > 0.5
     assert not rate[-1].any()
@@ -272,57 +282,65 @@ def test_the_sender_s_clock_is_found_and_may_start_again() -> None:
 def test_a_new_run_begins_anew_and_hears_only_what_is_new() -> None:
     stream = Stream([0.0])
     first = stream.anchored(None)
-    feed = at_times((0.1, lambda: stream.send([0.1])))
+    feed = at_times((0.1, lambda: first.run.send([0.1])))
     x, _, _ = columns(sampled(first, 1.0, feed))
     assert x[-1, 0] == pytest.approx(0.1)
-    assert [entry["at"] for entry in stream.record] == [pytest.approx(0.1)]
+    assert [entry["at"] for entry in first.run.record] == [pytest.approx(0.1)]
     second = stream.anchored(None)
+    second.run.follow(first.run)
     x, _, _ = columns(sampled(second, 1.0))
     assert not x.any()
+    assert not second.run.record
+    first.run.send([0.2])  # nobody has taken it
+    third = stream.anchored(None)
+    third.run.follow(second.run)
+    x, _, _ = columns(sampled(third, 1.0))
+    assert x[-1, 0] == pytest.approx(0.2)
 
 
 def test_what_was_recorded_gives_the_same_bits() -> None:
     rng = np.random.default_rng(3)
     stream = StreamPose(policy="extrapolate").anchored(pin.SE3.Identity())
     first = sampled(stream, 1.0, hostile(rng, stream, 3))
-    messages = json.loads(json.dumps(stream.record))
+    messages = json.loads(json.dumps(stream.run.record))
     again = StreamPose(policy="extrapolate", messages=messages)
-    second = sampled(again.anchored(pin.SE3.Identity()), 1.0)
+    again = again.anchored(pin.SE3.Identity())
+    second = sampled(again, 1.0)
     for one, other in zip(first, second, strict=True):
         assert np.array_equal(one.position, other.position)
         assert all(map(np.array_equal, one.orientation, other.orientation))
-    assert json.loads(json.dumps(again.record)) == messages
+    assert json.loads(json.dumps(again.run.record)) == messages
 
 
 def test_a_record_that_is_full_says_how_much_it_lost(monkeypatch: Any) -> None:
     monkeypatch.setattr(inbox, "MOST", 7)  # a value and its time each
     stream = Stream([0.0]).anchored(None)
-    feed = at_times(*((0.1, lambda: stream.send([0.1])) for _ in range(5)))
+    feed = at_times(*((0.1, lambda: stream.run.send([0.1])) for _ in range(5)))
     sampled(stream, 0.2, feed)
-    assert (len(stream.record), stream.unrecorded) == (3, 2)
-    assert stream.counts()["taken"] == 5
+    assert (len(stream.run.record), stream.run.unrecorded) == (3, 2)
+    assert stream.run.counts()["taken"] == 5
 
 
 def test_little_is_recorded_where_nobody_writes_a_log(monkeypatch: Any) -> None:
     monkeypatch.setattr(inbox, "BRIEF", 7)
     for logged, kept in ((False, 3), (True, 5)):
-        stream = Stream([0.0])
+        stream = Stream([0.0]).anchored(None)
         if logged:
-            stream.log()
-        feed = at_times(*((0.1, lambda s=stream: s.send([0.1])) for _ in range(5)))
-        sampled(stream.anchored(None), 0.2, feed)
-        assert (len(stream.record), stream.unrecorded) == (kept, 5 - kept)
+            stream.run.log()
+        feed = at_times(*((0.1, lambda s=stream: s.run.send([0.1])) for _ in range(5)))
+        sampled(stream, 0.2, feed)
+        assert (len(stream.run.record), stream.run.unrecorded) == (kept, 5 - kept)
 
 
 def test_a_target_that_no_motion_reaches_is_refused_and_the_reference_rests() -> None:
     stream = Stream([0.0] * 3, speed=0.01).anchored(None)
     feed = at_times(
-        (0.1, lambda: stream.send([0.1, 0.0, 0.0])),
-        (0.5, lambda: stream.send([9e5, 1.0, 1.0])),
-        (1.5, lambda: stream.send([0.0, 0.0, 0.001])),
+        (0.1, lambda: stream.run.send([0.1, 0.0, 0.0])),
+        (0.5, lambda: stream.run.send([9e5, 1.0, 1.0])),
+        (1.5, lambda: stream.run.send([0.0, 0.0, 0.001])),
     )
     x, rate, _ = columns(sampled(stream, 3.0, feed))
-    assert stream.counts()["rejected"] == 1
+    assert stream.run.counts()["rejected"] == 1
     assert not rate[round(1.4 / H)].any()
     assert x[-1] == pytest.approx([0.0, 0.0, 0.001])
 
@@ -330,7 +348,7 @@ def test_a_target_that_no_motion_reaches_is_refused_and_the_reference_rests() ->
 def test_a_time_that_is_forgotten_is_an_error_and_not_an_extrapolation() -> None:
     stream = Stream([0.0]).anchored(None)
     feed = at_times(
-        *((0.05 * k, lambda k=k: stream.send([0.1 * k])) for k in range(60))
+        *((0.05 * k, lambda k=k: stream.run.send([0.1 * k])) for k in range(60))
     )
     sampled(stream, 3.0, feed)
     with pytest.raises(StreamError, match=r"at t = 0 s is not known any more: the run"):
@@ -345,7 +363,7 @@ def test_a_copy_changes_nothing_for_the_original() -> None:
             k = round(t / H)
             if k % 100 == 0:
                 late = 0.0 if k == 2000 else 0.08
-                stream.send([np.sin(t - late)], t=t - late + 100.0)
+                stream.run.send([np.sin(t - late)], t=t - late + 100.0)
             if preview and k == 2100:
                 copy.deepcopy(stream).sample(4.0)
 
@@ -362,7 +380,10 @@ def test_a_pickle_brakes_where_its_original_does() -> None:
     """A motion to a goal that moves ends before Ruckig's does, if no message comes."""
     stream = Stream([0.0], policy="extrapolate", jerk=2.0, speed=5.0).anchored(None)
     feed = at_times(
-        *((0.05 * k, lambda k=k: stream.send([0.02 * k], t=0.05 * k)) for k in range(9))
+        *(
+            (0.05 * k, lambda k=k: stream.run.send([0.02 * k], t=0.05 * k))
+            for k in range(9)
+        )
     )
     sampled(stream, 0.41, feed)
     again = pickle.loads(pickle.dumps(stream))
@@ -372,8 +393,8 @@ def test_a_pickle_brakes_where_its_original_does() -> None:
 
 def test_a_pickle_takes_what_waits_and_not_what_was_taken() -> None:
     stream = Stream([0.0]).anchored(None)
-    sampled(stream, 0.1, at_times((0.05, lambda: stream.send([0.1]))))
-    stream.send([0.2])
+    sampled(stream, 0.1, at_times((0.05, lambda: stream.run.send([0.1]))))
+    stream.run.send([0.2])
     again, copied = pickle.loads(pickle.dumps(stream)), copy.deepcopy(stream)
     for t in np.arange(0.11, 1.0, 0.01):
         stream.sample(t)
@@ -382,7 +403,7 @@ def test_a_pickle_takes_what_waits_and_not_what_was_taken() -> None:
     for each in (again, behind):
         each.sample(0.2)
         assert each.sample(1.0).position[0] == pytest.approx(0.2, abs=1e-9)
-    assert [each.counts()["taken"] for each in (stream, again, behind)] == [2, 2, 2]
+    assert [each.run.counts()["taken"] for each in (stream, again, behind)] == [2, 2, 2]
 
 
 def test_a_recording_goes_on_in_a_pickle() -> None:
@@ -392,7 +413,7 @@ def test_a_recording_goes_on_in_a_pickle() -> None:
     again = pickle.loads(pickle.dumps(stream))
     for t in np.arange(0.46, 1.5, 0.02):
         assert state_of(again, t) == state_of(stream, t)
-    assert again.counts() == stream.counts()
+    assert again.run.counts() == stream.run.counts()
 
 
 # -- bad input ------------------------------------------------------------------------
@@ -415,7 +436,7 @@ def test_a_wrong_target_is_refused_where_it_is_sent(
     arguments: dict[str, Any], message: str
 ) -> None:
     with pytest.raises(StreamError, match=message):
-        StreamPose().send(**arguments)
+        StreamPose().anchored(pin.SE3.Identity()).run.send(**arguments)
 
 
 @pytest.mark.parametrize(("values", "times", "message"), [
@@ -426,17 +447,17 @@ def test_a_wrong_target_is_refused_where_it_is_sent(
 ])  # fmt: skip
 def test_a_wrong_chunk_is_refused(values: Any, times: Any, message: str) -> None:
     with pytest.raises(StreamError, match=message):
-        Stream([0.0]).send_chunk(values, times)
+        Stream([0.0]).anchored(None).run.send_chunk(values, times)
 
 
-def test_what_does_not_fit_the_task_is_counted_and_dropped() -> None:
+def test_a_stream_of_two_sizes_is_refused() -> None:
+    """One declaration that two tasks follow has one queue."""
     stream = Stream()
-    stream.send([0.1, 0.2])  # before anything knows how many coordinates there are
-    placed = stream.anchored([0.0, 0.0, 0.0])
-    sampled(placed, 0.1)
-    assert placed.counts()["rejected"] == 1
+    one, other = stream.anchored([0.0, 0.0, 0.0]), stream.anchored([0.0])
     with pytest.raises(StreamError, match="value has 2 numbers; this stream needs 3"):
-        stream.send([0.1, 0.2])
+        one.run.send([0.1, 0.2])
+    with pytest.raises(StreamError, match="already carries 3 numbers; here 1 are"):
+        other.run.follow(one.run)
 
 
 @pytest.mark.parametrize(("arguments", "message"), [
@@ -466,14 +487,19 @@ def test_bounds_that_contradict_each_other_are_refused() -> None:
 
 
 @pytest.mark.parametrize("kind", [Stream, StreamOrientation, StreamPose])
-def test_only_a_stream_that_begins_somewhere_counts(kind: Any) -> None:
-    with pytest.raises(StreamError, match=f"this {kind.__name__} begins where"):
-        kind().counts()
+def test_a_declaration_moves_nothing_and_says_who_does(kind: Any) -> None:
+    message = f"this {kind.__name__} is declared, .* controller.stream\\('hand'\\)"
+    with pytest.raises(StreamError, match=message):
+        kind().sample(0.0)
+    with pytest.raises(StreamError, match=message):
+        kind().begin()
+    assert kind() == kind()
+    assert hash(kind()) == hash(kind())
 
 
 def test_a_stream_that_hears_something_else_cannot_be_sent_to() -> None:
     with pytest.raises(StreamError, match=r"hears goals\.jsonl; only"):
-        Stream(source="goals.jsonl").send([0.0])
+        Stream([0.0], source="goals.jsonl").anchored(None).run.send([0.0])
 
 
 @pytest.mark.parametrize(("text", "message"), [

@@ -1,4 +1,4 @@
-"""Where a stream's messages come from: `send`, another process, or a recording."""
+"""Where a stream's messages come from: what is sent, an address, or a recording."""
 
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
@@ -8,7 +8,7 @@ from weakref import WeakValueDictionary, ref
 
 from hsp_control.common.entry_points import entry_points
 from hsp_control.common.exceptions import StreamError
-from hsp_control.trajectories.streams.inbox import Inbox, Reader
+from hsp_control.trajectories.streams.inbox import Inbox
 from hsp_control.trajectories.streams.message import Message, Space, message_of, parsed
 
 Listen = Callable[["ref[Inbox]"], None]
@@ -127,52 +127,3 @@ def read_recording(path: Path) -> list[dict[str, Any]]:
 def _is_number(value: object) -> bool:
     number = isinstance(value, int | float) and not isinstance(value, bool)
     return number and abs(value) < float("inf")  # type: ignore[arg-type]
-
-
-class Mailbox:
-    """What the values of one stream share: its messages, and what took them last."""
-
-    def __init__(self, hears: str, space: Space) -> None:
-        """Begin without messages."""
-        self._hears = hears
-        self.inbox = Inbox(space)
-        self.reader: Reader | None = None  # of the last run that was no preview
-        self._logged = False
-
-    def put(self, **data: Any) -> None:
-        """Add a message; see `message_of`."""
-        if self._hears:
-            raise StreamError(
-                f"this stream hears {self._hears}; only a stream without source and "
-                "messages can be sent to"
-            )
-        self.inbox.put(**data)
-
-    def log(self) -> None:
-        """Let all be recorded that is taken from now on."""
-        self._logged = True
-        if self.reader is not None:
-            self.reader.logged = True
-
-    def live(self, space: Space, *, kept: bool) -> Reader:
-        """Return the reader of a new run; a source is opened here."""
-        if is_address(self._hears):
-            self.inbox = listening_inbox(self._hears, space)
-        elif self.inbox.space.linear not in (None, space.linear):
-            raise StreamError(
-                f"this stream already carries {self.inbox.space.width} numbers; here "
-                f"{space.width} are needed"
-            )
-        self.inbox.space = space
-        return self._begun(Reader(self.inbox, aside=not kept), kept)
-
-    def recording(
-        self, space: Space, messages: Sequence[Message], *, kept: bool
-    ) -> Reader:
-        """Return the reader of recorded messages, see `recorded`, in a new run."""
-        return self._begun(Reader(Inbox.recorded(space, messages), aside=True), kept)
-
-    def _begun(self, reader: Reader, kept: bool) -> Reader:
-        if kept:
-            self.reader, reader.logged = reader, self._logged
-        return reader

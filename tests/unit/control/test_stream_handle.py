@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import hsp_control as hsp
-from hsp_control.control.task_stream import TaskStream
+from hsp_control.control.stream_handle import StreamHandle
 
 ROBOT = hsp.Robot.load("panda")
 REST = np.zeros(7)
@@ -61,7 +61,7 @@ def test_a_target_gives_the_same_stream() -> None:
     with pytest.raises(hsp.HspControlError, match="no task 'hnad'; did you mean"):
         made.stream("hnad")
     stream = made.set_target("hand", TARGET)
-    assert isinstance(stream, TaskStream)
+    assert isinstance(stream, StreamHandle)
     assert run(made, 5.0) == pytest.approx(TARGET, abs=1e-6)
     made.stream("hand").send([0.4, 0.0, 0.5])
     assert stream.counts()["taken"] == 1.0  # it is taken in a step

@@ -1,4 +1,4 @@
-"""The stream of a task: what a controller gives to whoever sends targets."""
+"""What a controller gives to whoever commands one of its streams."""
 
 from collections.abc import Callable, Mapping
 from typing import Any
@@ -6,19 +6,19 @@ from typing import Any
 import pinocchio as pin
 from numpy.typing import ArrayLike
 
-from hsp_control.trajectories.streams.stream import Streamed
+from hsp_control.trajectories.streams.run import StreamRun
 from hsp_control.trajectories.streams.velocities import Axes
 
 
-class TaskStream:
-    """The stream that a task of a controller follows, in whichever run it is.
+class StreamHandle:
+    """A stream of a controller, in whichever run it is; see `Controller.stream`.
 
     `send` and `send_chunk` may be called from any thread, before the first step, too.
     What is counted and recorded is that of the present run.
     """
 
-    def __init__(self, find: Callable[[], Streamed]) -> None:
-        """Set what returns the stream at present: each run begins another one."""
+    def __init__(self, find: Callable[[], StreamRun]) -> None:
+        """Set what returns the stream at present: each run has one of its own."""
         self._find = find
 
     def send(
@@ -29,7 +29,7 @@ class TaskStream:
         axes: Axes | None = None,
         t: float | None = None,
     ) -> None:
-        """Send a target, or a velocity; see `Streamed.send`."""
+        """Send a target, or a velocity; see `StreamRun.send`."""
         self._find().send(value, velocity=velocity, axes=axes, t=t)
 
     def send_chunk(
@@ -40,7 +40,7 @@ class TaskStream:
         velocities: ArrayLike | None = None,
         t: float | None = None,
     ) -> None:
-        """Send waypoints; see `Streamed.send_chunk`."""
+        """Send waypoints; see `StreamRun.send_chunk`."""
         self._find().send_chunk(values, times, velocities=velocities, t=t)
 
     def counts(self) -> dict[str, float]:
@@ -58,4 +58,4 @@ class TaskStream:
         return self._find().last_rejection
 
     def __repr__(self) -> str:
-        return f"TaskStream of {self._find()!r}"
+        return f"StreamHandle of {self._find()!r}"

@@ -1,0 +1,246 @@
+"""A stream in one run: the messages that it takes, and the reference that they make."""
+
+from collections.abc import Mapping
+from copy import copy
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import pinocchio as pin
+from numpy.typing import ArrayLike
+
+from hsp_control.common.exceptions import StreamError
+from hsp_control.trajectories.streams.alone import StreamAlone
+from hsp_control.trajectories.streams.chart import Chart, State
+from hsp_control.trajectories.streams.inbox import Inbox, Reader
+from hsp_control.trajectories.streams.message import Space
+from hsp_control.trajectories.streams.planner import Planner
+from hsp_control.trajectories.streams.sources import (
+    is_address,
+    listening_inbox,
+    read_recording,
+    recorded,
+)
+from hsp_control.trajectories.streams.streamed import Streamed
+from hsp_control.trajectories.streams.velocities import Axes
+
+
+class StreamRun:
+    """A stream in one run of a controller: takes messages, and plans the reference.
+
+    A controller remembers those of its streams. A copy goes on from where this one is,
+    and takes what is sent to this one; what it takes waits for this one all the same. A
+    pickle goes on likewise, and takes what is sent to itself.
+
+    Attributes:
+        declared: The stream as it was declared; the next run begins with what was sent
+            to the stream of this value, and nobody took.
+        stream: The stream, which begins where the run does.
+    """
+
+    def __init__(self, declared: Streamed, stream: Streamed) -> None:
+        """Begin at rest."""
+        self.declared, self.stream = declared, stream
+        self._start, rotational = stream.begin(), stream.space.rotational
+        self.chart = Chart(len(self._start.x) - 3 * rotational, rotational)
+        self._space = Space(self.chart.linear, rotational)
+        self._inbox = Inbox(self._space)
+        self._aside = self._logged = self._without_python = False
+        self._reader: Reader | None = None
+        self._planner: Planner | None = None
+        self._alone: StreamAlone | None = None
+
+    # -- messages ---------------------------------------------------------------------
+
+    def send(
+        self,
+        value: ArrayLike | pin.SE3 | None = None,
+        *,
+        velocity: ArrayLike | None = None,
+        axes: Axes | None = None,
+        t: float | None = None,
+    ) -> None:
+        """Send a target, or a velocity; from any thread.
+
+        Args:
+            value: The target: n coordinates, a quaternion (x, y, z, w), or for a pose
+                x, y, z and a quaternion, or a pin.SE3; None: only the velocity counts.
+            velocity: The velocity at the target, in world axes; or alone, as a joystick
+                sends it: linear velocities, then angular ones [1/s].
+            axes: Those of a velocity alone: ``world``, or ``tool``, the axes of the
+                moving body; None: the stream's own.
+            t: The target's time by the sender's clock [s]; None: now.
+
+        Raises:
+            StreamError: If it is not valid, or the stream has another source.
+        """
+        if isinstance(value, pin.SE3):
+            value = pin.SE3ToXYZQUAT(value)
+        self._put(value=value, velocity=velocity, axes=axes, t=t)
+
+    def send_chunk(
+        self,
+        values: ArrayLike,
+        times: ArrayLike,
+        *,
+        velocities: ArrayLike | None = None,
+        t: float | None = None,
+    ) -> None:
+        """Send waypoints, which replace all that were to follow; from any thread.
+
+        Args:
+            values: The waypoints, shape (k, width), each as in `send`.
+            times: Their times after ``t``, increasing, shape (k,) [s].
+            velocities: Their velocities; None: those that the waypoints show.
+            t: When the chunk was made, by the sender's clock [s]; None: now.
+
+        Raises:
+            StreamError: If it is not valid, or the stream has another source.
+        """
+        self._put(values=values, times=times, velocities=velocities, t=t)
+
+    def _put(self, **message: Any) -> None:
+        if self.stream.hears:
+            raise StreamError(
+                f"this stream hears {self.stream.hears}; only a stream without source "
+                "and messages can be sent to"
+            )
+        self._inbox.put(**message)
+
+    def follow(self, before: "StreamRun") -> None:
+        """Take what was sent to the stream of another run, and nobody took.
+
+        Raises:
+            StreamError: If what that one moves has another number of coordinates.
+        """
+        if before._space != self._space:
+            raise StreamError(
+                f"this stream already carries {before._space.width} numbers; here "
+                f"{self._space.width} are needed"
+            )
+        self._inbox = before._inbox
+        self._aside, self._logged = before._aside, before._logged
+        self._without_python = before._without_python
+
+    @property
+    def inbox(self) -> Inbox:
+        """The queue that it reads: that of `send`, or of its source once it runs."""
+        return self._inbox if self._reader is None else self._reader.inbox
+
+    @property
+    def reader(self) -> Reader:
+        """What takes its messages; a source is opened here."""
+        if self._reader is None:
+            self._reader = self._opened()
+            self._reader.logged = self._logged
+        return self._reader
+
+    def _opened(self) -> Reader:
+        source, messages = self.stream.source, self.stream.messages
+        if source is not None and is_address(source):
+            return Reader(listening_inbox(source, self._space), aside=self._aside)
+        if source is not None:
+            messages = read_recording(Path(source))
+        if messages is not None:
+            taken = recorded(messages, self._space)
+            return Reader(Inbox.recorded(self._space, taken), aside=True)
+        return Reader(self._inbox, aside=self._aside)
+
+    # -- what became of them ----------------------------------------------------------
+
+    def counts(self) -> dict[str, float]:
+        """Return the time since the last message [s], and how many there were.
+
+        ``taken``: all valid ones; ``late``: of these, those that came too late to
+        count; ``rejected``: invalid ones, and those that no motion can follow.
+        """
+        planner = self._planned
+        return {
+            "age": planner.age,
+            "taken": planner.taken,
+            "late": planner.waypoints.late,
+            "rejected": self.inbox.rejected + planner.refused,
+        }
+
+    @property
+    def last_rejection(self) -> str:
+        """Why the last invalid message of another process was one; empty for none."""
+        return self.inbox.reason
+
+    def log(self) -> None:
+        """Record all that is taken from now on, up to five million numbers."""
+        self._logged = True
+        if self._reader is not None:
+            self._reader.logged = True
+
+    @property
+    def record(self) -> tuple[Mapping[str, Any], ...]:
+        """What it has taken, and when; see `Streamed.messages`.
+
+        Where no log is written, only the first messages.
+        """
+        taken = self._reader.record if self._reader is not None else []
+        return tuple(each.to_dict() for each in taken)
+
+    @property
+    def unrecorded(self) -> int:
+        """How many messages the record had no room for."""
+        return self._reader.lost if self._reader is not None else 0
+
+    def repeated(self) -> Streamed:
+        """Return the declaration of a stream that takes the same messages again."""
+        return replace(self.stream, source=None, messages=self.record)
+
+    # -- the reference ----------------------------------------------------------------
+
+    def at(self, t: float) -> State:
+        """Return the reference at a time [s]; messages are taken up to a later one.
+
+        Raises:
+            StreamError: If there was no message for too long, or nobody listens any
+                more, or the time is long past.
+        """
+        planner = self._planned
+        if t > planner.now:
+            planner.advance(t, self.reader.take(t) if planner.begun else [])
+        return planner.at(t)
+
+    def keep(self, since: float, until: float) -> None:
+        """Know the reference from a time on until a later one [s]."""
+        self._planned.keep(since, until)
+
+    @property
+    def _planned(self) -> Planner:
+        if self._planner is None:
+            _ = self.reader  # a source that cannot be opened is said at the first step
+            bounds, how = self.stream.bounds(), self.stream.how
+            self._planner = Planner(self.chart, bounds, how, self._start)
+        return self._planner
+
+    # -- without Python ---------------------------------------------------------------
+
+    def leave_python(self) -> None:
+        """Take only what a program sends, from the next run on; see `StreamAlone`."""
+        self._without_python = True
+
+    @property
+    def alone(self) -> StreamAlone | None:
+        """What computes it without Python; None: it takes messages."""
+        if self._without_python and self._alone is None:
+            bounds, how = self.stream.bounds(), self.stream.how
+            self._alone = StreamAlone(self.chart, bounds, how, self._start)
+        return self._alone
+
+    def __repr__(self) -> str:
+        return f"StreamRun of {self.declared!r}"
+
+    def __deepcopy__(self, memo: dict[int, Any]) -> "StreamRun":
+        """Return one that goes on from here by itself."""
+        memo[id(self)] = other = copy(self)
+        other._aside = True
+        other._alone = None
+        if self._reader is not None:
+            other._reader = self._reader.copy()
+        if self._planner is not None:
+            other._planner = self._planner.copy()
+        return other

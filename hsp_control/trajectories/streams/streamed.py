@@ -1,0 +1,161 @@
+"""What all streams declare: where messages come from, and how they are followed."""
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import KW_ONLY, replace
+from math import inf
+from pathlib import Path
+from typing import Annotated, Any, ClassVar, Literal, NoReturn, Self
+
+from pydantic import AfterValidator
+
+from hsp_control.common.exceptions import StreamError, TrajectoryError
+from hsp_control.declaration.part import Part
+from hsp_control.declaration.quantities import NonNegative, Positive
+from hsp_control.trajectories.streams.chart import State
+from hsp_control.trajectories.streams.message import Space, message_of
+from hsp_control.trajectories.streams.planner import Policy
+from hsp_control.trajectories.streams.segments import MotionBounds
+from hsp_control.trajectories.streams.sources import (
+    is_address,
+    kind_of,
+    read_recording,
+    recorded,
+)
+from hsp_control.trajectories.streams.velocities import Axes
+
+
+class Streamed(Part, error=TrajectoryError):
+    """A reference that is commanded while the robot moves; a value.
+
+    A controller that follows it has its stream: ``controller.stream("hand")`` takes
+    targets, velocities or chunks of waypoints from any thread, at any rate, late or out
+    of order. The reference is C², x' and x'' are exactly its derivatives, and speed,
+    acceleration and jerk keep their bounds, whatever is sent. Until the first message
+    it stays where it starts. Invalid messages are refused; those of another process are
+    counted, and the reference goes on without them.
+
+    The reference is at a target ``delay`` after the target's time, or as soon as the
+    bounds permit. On its way it follows quintics where they keep the bounds, and
+    otherwise Ruckig's fastest motion.
+
+    * ``interpolate``: the reference passes through all waypoints, with the velocities
+      and accelerations that they show. If no more follow, it brakes at the last one,
+      and comes to rest there, as it does at a single target.
+    * ``latest``: only the newest message counts; the reference comes to rest at its
+      last waypoint. For single targets that replace each other, such as a hand that
+      is dragged.
+    * ``extrapolate``: it goes on from the last one at the velocity that the waypoints
+      show, for a time, and then comes to rest.
+
+    A velocity alone, as a joystick sends it, is reached within the bounds and kept; the
+    position is its integral. If no other message comes for ``dead_man``, it fades to
+    zero. One beyond the bounds keeps its direction.
+    """
+
+    _: KW_ONLY
+    source: str | None = None
+    """Where messages come from: ``udp://HOST:PORT`` for JSON datagrams, or
+    ``udp://HOST:PORT/PART`` of a shared port; ``ros2://TOPIC`` for poses of ROS 2; or
+    the path of a recording, of JSON lines with a time ``at`` [-]; by default `send`."""
+    messages: Annotated[Sequence[Mapping[str, Any]], AfterValidator(tuple)] | None = (
+        None
+    )
+    """A recording, instead of a source: messages with the times ``at`` [s] at which
+    they are taken; a log contains those of its run."""
+    policy: Literal["interpolate", "latest", "extrapolate"] = "interpolate"
+    """How waypoints are followed."""
+    delay: NonNegative = 0.1
+    """Time from a waypoint's own time to when the reference is there [s]. For
+    ``interpolate`` choose the time between two messages, plus their jitter, plus
+    ``smoothing``."""
+    smoothing: NonNegative = 0.0
+    """Waypoints not farther in time than this are smoothed by a parabola [s]; for noisy
+    trackers. For ``interpolate`` and ``extrapolate``."""
+    extrapolation: NonNegative = 0.1
+    """How long the reference goes on at the last velocity [s]."""
+    dead_man: Positive | None = None
+    """Time after which a velocity that was sent alone fades to zero, unless another one
+    comes (a dead man's switch) [s]; by default ``extrapolation``."""
+    hold_after: Positive | None = None
+    """Time without a message after which the reference comes to rest [s]; never by
+    default."""
+    stop_after: Positive | None = None
+    """Time without a message after which the run is stopped [s]; a live loop brakes and
+    holds. Never by default."""
+
+    space: ClassVar[Space]
+    axes: ClassVar[Axes] = "world"
+
+    def __post_init__(self) -> None:
+        """Check the source."""
+        if self.source is not None and self.messages is not None:
+            raise StreamError("give either source or messages")
+        if self.source is not None and is_address(self.source):
+            kind_of(self.source).check_address(self.source)
+        if self.messages is not None:  # what they carry is checked where it is known
+            recorded(self.messages, Space(None, False))
+
+    @property
+    def live(self) -> bool:
+        """Whether another process feeds it, in real time."""
+        return self.source is not None and is_address(self.source)
+
+    @property
+    def hears(self) -> str:
+        """What its messages come from, instead of `send`; empty: nothing."""
+        return self.source or ("a recording" if self.messages is not None else "")
+
+    def recorded_in(self, folder: Path, allow: Callable[[Path], object]) -> Self:
+        """Return the stream with the messages of its recording, if it names one."""
+        if self.source is None or self.live:
+            return self
+        path = folder / self.source
+        allow(path)
+        return replace(self, source=None, messages=read_recording(path))
+
+    def check(self, value: Any = None, **message: Any) -> None:
+        """Raise if a message is not valid; see `StreamRun.send` for what it says."""
+        message_of({"value": value, **message}, self.space)
+
+    @property
+    def how(self) -> Policy:
+        """How messages become goals."""
+        return Policy(
+            self.policy,
+            self.delay,
+            self.smoothing,
+            self.extrapolation,
+            inf if self.hold_after is None else self.hold_after,
+            inf if self.stop_after is None else self.stop_after,
+            self.extrapolation if self.dead_man is None else self.dead_man,
+            self.axes,
+        )
+
+    @property
+    def relative(self) -> bool:
+        """True: it moves in a run alone; see `Trajectory.anchored`."""
+        return True
+
+    def begin(self) -> State:
+        """Return where the reference is before the first message.
+
+        Raises:
+            StreamError: If it begins where a robot starts.
+        """
+        raise NotImplementedError
+
+    def bounds(self) -> MotionBounds:
+        """Return the bounds in the coordinates of the chart."""
+        raise NotImplementedError
+
+    def sample(self, t: float, out: Any = None) -> NoReturn:
+        """Raise: a stream moves in a run; see `Trajectory.anchored`."""
+        raise self._placeless()
+
+    def _placeless(self) -> StreamError:
+        """Return the error of a stream that is no controller's."""
+        return StreamError(
+            f"this {type(self).__name__} is declared, and moves where a controller "
+            "follows it: controller.stream('hand') has what is sent; without a "
+            "controller, stream.anchored(start).run has"
+        )

@@ -1,0 +1,174 @@
+"""Waypoints on the controller's clock, and the derivatives that they show."""
+
+from bisect import bisect_left, bisect_right
+from collections import deque
+from copy import copy, deepcopy
+
+import numpy as np
+
+from hsp_control.common.arrays import Array
+from hsp_control.trajectories.streams.message import Message
+
+_WINDOW = 2.0  # the sender's clock is compared with the controller's over this time [s]
+_NEW_CLOCK = 1.0  # a sender's time that jumps back by more shows another start [s]
+KEPT = 1.0
+"""Waypoints that were passed are kept so long, to estimate velocities [s]."""
+MOST = 4096  # most waypoints that are kept
+_APART = 0.01  # between neighbours for derivatives [s]; closer ones differ by noise
+
+
+class SenderClock:
+    """The time of a sender's clock on the controller's clock.
+
+    A message needs an unknown time to arrive; the one that needed least shows the
+    difference of the clocks best.
+    """
+
+    def __init__(self) -> None:
+        """Begin without a message."""
+        self._seen: deque[tuple[float, float]] = deque()
+        self._newest = -np.inf
+
+    def restarts_at(self, t: float) -> bool:
+        """Return whether a sender's time [s] shows that it has started again."""
+        return t < self._newest - _NEW_CLOCK
+
+    def to_controller(self, t: float, now: float) -> float:
+        """Return a sender's time on the controller's clock; its message arrived now."""
+        if self.restarts_at(t):
+            self._seen.clear()
+            self._newest = t
+        self._newest = max(self._newest, t)
+        while self._seen and self._seen[0][0] < now - _WINDOW:
+            self._seen.popleft()
+        while self._seen and self._seen[-1][1] >= now - t:
+            self._seen.pop()  # never the smallest again
+        self._seen.append((now, now - t))
+        return t + self._seen[0][1]
+
+
+class Waypoints:
+    """Values and times, in order of time."""
+
+    def __init__(self) -> None:
+        """Begin without waypoints."""
+        self.times: list[float] = []
+        self.values: list[Array] = []
+        self.velocities: list[Array | None] = []
+        self.late = 0
+        self._clock = SenderClock()
+        self._made = -np.inf  # when the newest message was made
+        self._superseded = -np.inf  # what was made before this no longer counts
+
+    def copy(self) -> "Waypoints":
+        """Return waypoints that go on from here by themselves."""
+        other = copy(self)
+        other._clock = deepcopy(self._clock)
+        other.times, other.values = self.times.copy(), self.values.copy()
+        other.velocities = self.velocities.copy()
+        return other
+
+    def add(self, message: Message, now: float, delay: float, replace: bool) -> bool:
+        """Add a message's waypoints; return whether it changes what lies ahead."""
+        made = now
+        if message.t is not None:
+            if self._clock.restarts_at(message.t):
+                self.clear()
+                self._made = self._superseded = -np.inf
+            made = self._clock.to_controller(message.t, now)
+        alone = message.values is None
+        newer = replace or message.chunk or alone
+        if made < (self._made if newer else self._superseded):
+            self.late += 1
+            return False
+        times = made + delay + message.times
+        behind = times[-1] <= now and bool(self.times) and self.times[-1] > now
+        if behind and not newer:
+            self.late += 1
+            return False
+        self._made = max(made, self._made)
+        if newer:
+            self._superseded = made
+        if alone or replace:
+            self.clear()
+        elif message.chunk:
+            self._cut(self.ahead(now))
+        if message.values is None:
+            return True
+        given = message.velocities
+        rates: list[Array | None] = [None] * len(times) if given is None else [*given]
+        if not self.times or times[0] > self.times[-1]:
+            self.times += times.tolist()
+            self.values += [*message.values]
+            self.velocities += rates
+            return True
+        for time, value, velocity in zip(times, message.values, rates, strict=True):
+            self._insert(float(time), value, velocity)
+        return True
+
+    def ahead(self, t: float) -> int:
+        """Return the index of the first waypoint later than a time [s]."""
+        return bisect_right(self.times, t)
+
+    def near(self, t: float, window: float, most: int) -> slice:
+        """Return which waypoints matter at a time: some passed ones, ``most`` ahead."""
+        ahead = self.ahead(t)
+        first = min(bisect_left(self.times, t - window), max(ahead - 3, 0))
+        return slice(max(first, ahead - most), ahead + most)
+
+    def forget(self, t: float) -> None:
+        """Forget waypoints that were passed long before a time [s], and the surplus."""
+        gone = max(bisect_left(self.times, t - KEPT), len(self.times) - MOST)
+        gone = min(gone, max(len(self.times) - 1, 0))  # the last one is the goal
+        if gone > 0:
+            for each in (self.times, self.values, self.velocities):
+                del each[:gone]
+
+    def clear(self) -> None:
+        """Forget all waypoints."""
+        self._cut(0)
+
+    def _cut(self, k: int) -> None:
+        del self.times[k:], self.values[k:], self.velocities[k:]
+
+    def _insert(self, time: float, value: Array, velocity: Array | None) -> None:
+        k = bisect_left(self.times, time)
+        if k < len(self.times) and self.times[k] == time:
+            self.values[k], self.velocities[k] = value, velocity
+            return
+        self.times.insert(k, time)
+        self.values.insert(k, value)
+        self.velocities.insert(k, velocity)
+
+
+def derivatives(times: Array, x: Array, k: int, window: float) -> tuple[Array, ...]:
+    """Return x_k, x_k' and x_k'' of a parabola through waypoints, shape (n,) each.
+
+    Through a waypoint and its two neighbours, at least `_APART` from it; or, with a
+    window, nearest to all waypoints not farther from it in time, which smooths noise
+    (Savitzky and Golay).
+
+    Shapes: times (m,) [s], x (m, n).
+    """
+    if window > 0.0:
+        wide = slice(*np.searchsorted(times, [times[k] - window, times[k] + window]))
+        if wide.stop - wide.start > 3:
+            return _nearest_parabola(times[wide] - times[k], x[wide])
+    i = min(int(np.searchsorted(times, times[k] - _APART, "right")) - 1, k - 1)
+    j = max(int(np.searchsorted(times, times[k] + _APART)), k + 1)
+    if i >= 0 and j < len(times):
+        before, after = times[k] - times[i], times[j] - times[k]
+        back, forth = (x[k] - x[i]) / before, (x[j] - x[k]) / after
+        curve = 2.0 * (forth - back) / (before + after)
+        return x[k], (after * back + before * forth) / (before + after), curve
+    i, j = max(i, 0), min(j, len(times) - 1)
+    slope = (x[j] - x[i]) / (times[j] - times[i])
+    return x[k], slope, np.zeros_like(slope)
+
+
+def _nearest_parabola(tau: Array, x: Array) -> tuple[Array, ...]:
+    """Return the value and derivatives at tau = 0 of the least-squares parabola."""
+    scale = float(np.abs(tau).max())
+    powers = np.vander(tau / scale, 3, increasing=True)
+    c = np.linalg.lstsq(powers, x, rcond=None)[0]
+    return c[0], c[1] / scale, 2.0 * c[2] / scale**2
