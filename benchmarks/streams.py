@@ -154,7 +154,7 @@ def followed(case: Case, way: str) -> tuple[str, ...]:
             delay=case.delay,
             smoothing=case.smoothing if "smoothed" in way else 0.0,
         )
-    rows = iter(range(10**9))
+    controller, rows = controller_of(case, reference), iter(range(10**9))
 
     def deliver(recorder: object) -> None:
         t = PERIOD * next(rows)
@@ -162,7 +162,8 @@ def followed(case: Case, way: str) -> tuple[str, ...]:
             _, made, times, values = left.pop(0)
             if isinstance(reference, hsp.Stream):
                 one = len(times) == 1
-                send = reference.send if one else reference.send_chunk
+                stream = controller.stream(reference)
+                send = stream.send if one else stream.send_chunk
                 send(*((values[0],) if one else (values, times)), t=made)
                 continue
             late = case.arrivals[0].at - case.arrivals[0].made
@@ -174,7 +175,7 @@ def followed(case: Case, way: str) -> tuple[str, ...]:
             )
 
     run = hsp.simulate(
-        controller_of(case, reference),
+        controller,
         q0,
         duration=DURATION - 0.5,
         control_period=PERIOD,

@@ -7,9 +7,10 @@ import hsp_control as hsp
 
 PERIOD, DURATION, STEP = 0.002, 4.0, 0.05  # s, s, s between two waypoints
 robot = hsp.Robot.load("panda")
-target = hsp.Stream(policy="interpolate", delay=0.1, speed=1.0)
-hand = hsp.FramePosition("panda_tcp", target, name="hand")
+streamed = hsp.Stream(policy="interpolate", delay=0.1, speed=1.0)
+hand = hsp.FramePosition("panda_tcp", streamed, name="hand")
 controller = hsp.Controller(robot, [hand], hsp.JointCentering(), null_space_gain=8.0)
+target = controller.stream("hand")
 start = robot.state(0.0, robot.home(), np.zeros(robot.nv)).position("panda_tcp").copy()
 
 

@@ -321,7 +321,7 @@ class Composition:
         present = self._followed(task)
         if followed_stream(present) is None:
             reference: Any = new_stream(present.followed)
-            reference.check(**message)
+            reference.check(getattr(present.followed, "dimension", None), **message)
             self.at(self._state.t).ramp(RAMP).reference(task, reference)
         stream = self.stream(task)
         stream.send(**message)

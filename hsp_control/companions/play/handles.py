@@ -58,7 +58,7 @@ class Grip(ABC):
         wanted = self._wanted(np.asarray(value, dtype=float))  # it may refuse
         if self._stream is None:
             stream = self._new_stream()
-            stream.check(wanted)
+            stream.check(value=wanted)
             self._follow(stream, self._controller.at(t).ramp(RAMP))
             self._stream = stream
         self._controller.stream(self._stream).send(wanted)

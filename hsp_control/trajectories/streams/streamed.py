@@ -113,9 +113,16 @@ class Streamed(Part, error=TrajectoryError):
         allow(path)
         return replace(self, source=None, messages=read_recording(path))
 
-    def check(self, value: Any = None, **message: Any) -> None:
-        """Raise if a message is not valid; see `StreamRun.send` for what it says."""
-        message_of({"value": value, **message}, self.space)
+    def check(self, dimension: int | None = None, **message: Any) -> None:
+        """Raise if a message is not valid, before there is a run; see `StreamRun.send`.
+
+        Args:
+            dimension: How many linear coordinates there are, where the stream does not
+                say it.
+            message: The arguments of `send`.
+        """
+        known = self.space.linear if dimension is None else dimension
+        message_of(message, self.space._replace(linear=known))
 
     @property
     def how(self) -> Policy:

@@ -1,6 +1,10 @@
 """The stream of a task, as a controller gives it: heard in whichever run it is."""
 
+import pickle
+from collections.abc import Callable
+from copy import deepcopy
 from threading import Thread
+from typing import Any
 
 import numpy as np
 import pytest
@@ -70,3 +74,92 @@ def test_a_target_gives_the_same_stream() -> None:
     made.at(5.1).reference("hand", hsp.Hold())
     with pytest.raises(hsp.HspControlError, match="follows no stream"):
         stream.send(TARGET)
+
+
+def test_a_target_that_is_refused_changes_nothing() -> None:
+    made = controller(hsp.Hold())
+    for wrong in ([0.4, np.nan, 0.5], [0.4, 0.1, 1e9]):
+        with pytest.raises(hsp.HspControlError):
+            made.set_target("hand", wrong)
+    with pytest.raises(hsp.errors.StreamError, match="velocity has 2 numbers"):
+        made.set_velocity("hand", [0.1, 0.0])
+    assert made.changes == ()
+    assert made.streams == ()
+
+
+def test_a_stream_within_a_reference_is_commanded_by_its_declaration() -> None:
+    point, turn = hsp.Stream(), hsp.StreamOrientation()
+    pose = hsp.trajectories.ComposedPose(point, turn)
+    made = hsp.Controller(ROBOT, [hsp.FramePose(trajectory=pose, name="hand")])
+    made.stream(point).send(TARGET)
+    made.stream(turn).send([1.0, 0.0, 0.0, 0.0])
+    found = run(made, 5.0)
+    assert [*found[:3], abs(found[3])] == pytest.approx([*TARGET, 1.0], abs=1e-6)
+    with pytest.raises(
+        hsp.HspControlError, match="follows no stream, but ComposedPose"
+    ):
+        made.stream("hand")
+    with pytest.raises(hsp.HspControlError, match="nothing of this controller follows"):
+        made.stream(hsp.Stream())  # equal, and another one
+
+
+def test_one_declaration_that_two_tasks_follow_is_one_stream() -> None:
+    both = hsp.Stream()
+    arm = hsp.load_experiment("dual_panda").robot
+    sides = [name for name in arm.frame_names if name.endswith("panda_tcp")]
+    tasks = [hsp.FramePosition(side, both, axes="z") for side in sides]
+    assert len(tasks) == 2
+    made, rest = hsp.Controller(arm, tasks), np.zeros(arm.nv)
+    made.stream(both).send([0.5])
+    for k in range(500):
+        made.compute(0.01 * k, arm.home(), rest)
+    for task in made.tasks:
+        assert task.measure(made.state.read_only)[0] == pytest.approx([0.5], abs=1e-6)
+
+
+LED: dict[str, Callable[[], tuple[Any, Callable[[hsp.Controller], Any]]]] = {
+    "a field": lambda: (
+        (stream := hsp.Stream(np.zeros(7), delay=0.05)),
+        lambda made: made.at(0.1).exchange(
+            "target_posture", hsp.TargetPosture(ROBOT.home(), displacement=stream)
+        ),
+    ),
+    "an obstacle": lambda: (
+        (stream := hsp.Stream(delay=0.05)),
+        lambda made: made.at(0.1).obstacle("ball", stream),
+    ),
+}
+
+
+@pytest.mark.parametrize("what", LED)
+def test_what_looks_ahead_moves_no_stream_of(what: str) -> None:
+    """Nor a copy or a pickle, which go on by themselves, to the last bit."""
+
+    def begun() -> hsp.Controller:
+        ball = hsp.Obstacle("ball", hsp.Sphere(0.1), hsp.Hold([0.5, 0.2, 0.6]))
+        away = hsp.fields.ObstacleClearance(obstacles=["ball"])
+        field = hsp.fields.FieldSum([hsp.TargetPosture(ROBOT.home()), away])
+        hand = hsp.FramePosition(name="hand")
+        made = hsp.Controller(ROBOT, [hand], field, scene=[ball])
+        made.compute(0.0, ROBOT.home(), REST)
+        stream, lead = LED[what]()
+        lead(made)
+        size = 7 if what == "a field" else 3
+        made.compute(0.12, ROBOT.home(), REST)
+        made.stream(stream).send(0.3 * np.ones(size))
+        return made
+
+    def efforts(made: hsp.Controller, looking: bool = False) -> list[bytes]:
+        found = []
+        for k in range(20, 80):
+            found.append(made.compute(0.01 * k, ROBOT.home(), REST).tau.tobytes())
+            if looking:
+                made.flow(5.0, ROBOT.home())
+                made.stack(ROBOT.state(4.0, ROBOT.home(), REST))
+        return found
+
+    expected = efforts(begun())
+    assert len(set(expected)) > 30  # it was moving
+    assert efforts(begun(), looking=True) == expected
+    assert efforts(deepcopy(begun())) == expected
+    assert efforts(pickle.loads(pickle.dumps(begun()))) == expected
