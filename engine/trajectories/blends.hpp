@@ -6,6 +6,18 @@
 
 namespace hsp {
 
+inline void assign(const TrajectorySample<In>& from, TrajectorySample<Out>& out) {
+  out.position = from.position;
+  out.velocity = from.velocity;
+  out.acceleration = from.acceleration;
+}
+
+inline void assign(const OrientationSample<In>& from, OrientationSample<Out>& out) {
+  out.rotation = from.rotation;
+  out.angular_velocity = from.angular_velocity;
+  out.angular_acceleration = from.angular_acceleration;
+}
+
 struct Blend {
   static constexpr const char* doc =
       "x(t) = (1 - s) (x0 + (t - t0) v0) + s x_d(t), s the smooth step; x0 before t0.";
@@ -17,9 +29,7 @@ struct Blend {
   void operator()(double t) {
     const double elapsed = t - start_time;
     if (elapsed >= duration) {  // exactly
-      out.position = desired.position;
-      out.velocity = desired.velocity;
-      out.acceleration = desired.acceleration;
+      assign(desired, out);
       return;
     }
     out.position = start.row(0).transpose();
@@ -34,12 +44,21 @@ struct Blend {
 
 struct Crossfade {
   static constexpr const char* doc =
-      "x(t) = (1 - s) x_0(t) + s x_1(t), s the smooth step, in the place of x_1.";
+      "x(t) = (1 - s) x_0(t) + s x_1(t), s the smooth step; exactly x_0 before t0, x_1 afterwards.";
   double start_time, duration;
-  TrajectorySample<In> before;
-  TrajectorySample<InOut> after;
+  TrajectorySample<In> before, after;
+  TrajectorySample<Out> out;
 
-  void operator()(double t) { mix(smooth_step(t, start_time, duration), before, after, after); }
+  void operator()(double t) {
+    const double elapsed = t - start_time;
+    if (elapsed < 0.0) {
+      assign(before, out);
+    } else if (elapsed >= duration) {
+      assign(after, out);
+    } else {
+      mix(smooth_step(elapsed, 0.0, duration), before, after, out);
+    }
+  }
 };
 
 struct BlendOrientation {
@@ -58,13 +77,35 @@ struct BlendOrientation {
       out.angular_velocity.setZero();
       out.angular_acceleration.setZero();
     } else if (elapsed >= duration) {
-      out.rotation = desired.rotation;
-      out.angular_velocity = desired.angular_velocity;
-      out.angular_acceleration = desired.angular_acceleration;
+      assign(desired, out);
     } else {
       TrajectorySample<Own, 3> y;
       polynomial(elapsed / duration, duration, coefficients, y);
       turn_from(desired, y, out);
+    }
+  }
+};
+
+struct CrossfadeOrientation {
+  static constexpr const char* doc =
+      "R(t) = R_1(t) exp(y(t)), y a polynomial of (t - t0)/T; R_0(t) before t0, R_1 from t0 + T "
+      "on.";
+  double start_time, duration;
+  OrientationSample<In> before;
+  In<6, 3> coefficients;  // of y
+  OrientationSample<In> after;
+  OrientationSample<Out> out;
+
+  void operator()(double t) {
+    const double elapsed = t - start_time;
+    if (elapsed < 0.0) {
+      assign(before, out);
+    } else if (elapsed >= duration) {
+      assign(after, out);
+    } else {
+      TrajectorySample<Own, 3> y;
+      polynomial(elapsed / duration, duration, coefficients, y);
+      turn_from(after, y, out);
     }
   }
 };

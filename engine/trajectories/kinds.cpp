@@ -9,7 +9,8 @@
 namespace hsp {
 const Kind* const* trajectory_kinds() {
   return kinds<Circle, Lissajous, UniformLine, Polynomial, PiecewisePolynomial, Blend, Crossfade,
-               OrientationPath, Spin, BlendOrientation, Screw, OrientationOfChart, RotationVectors,
-               Extrapolation, ExtrapolatedOrientation, Along, AlongOrientation, AlongPose>();
+               OrientationPath, Spin, BlendOrientation, CrossfadeOrientation, Screw,
+               OrientationOfChart, RotationVectors, Extrapolation, ExtrapolatedOrientation, Along,
+               AlongOrientation, AlongPose>();
 }
 }  // namespace hsp

@@ -121,7 +121,8 @@ class BlendOrientation(OrientationTrajectory, type="blend"):
         return matrix_of(self.rotation)
 
     @cached_property
-    def _coefficients(self) -> Array:
+    def coefficients(self) -> Array:
+        """Those of y, a polynomial of (t - t0)/T, shape (6, 3)."""
         T, rest = self.duration, np.zeros(3)
         y, y_dot, y_ddot = self._start_offset()
         return QUINTIC @ np.stack([y, T * y_dot, T * T * y_ddot, rest, rest, rest])
@@ -147,6 +148,6 @@ class BlendOrientation(OrientationTrajectory, type="blend"):
             start_time=self.start_time,
             duration=self.duration,
             start=self._start,
-            coefficients=self._coefficients,
+            coefficients=self.coefficients,
             desired=self.trajectory,
         )

@@ -4,12 +4,15 @@ from dataclasses import KW_ONLY, replace
 from functools import cached_property
 from typing import Any, TypeVar
 
+import numpy as np
 from numpy.typing import ArrayLike
 
 from hsp_control import engine
+from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import TrajectoryError
 from hsp_control.declaration.nested import parts_within, with_parts_replaced
 from hsp_control.declaration.quantities import NonNegative, Number
+from hsp_control.engine.plans import TIME, PartCall, PartCalls
 from hsp_control.trajectories.blend import BlendOrientation
 from hsp_control.trajectories.orientation import (
     OrientationSample,
@@ -17,7 +20,11 @@ from hsp_control.trajectories.orientation import (
 )
 from hsp_control.trajectories.pose import ComposedPose, PoseTrajectory
 from hsp_control.trajectories.streams.followed import FollowedStream
-from hsp_control.trajectories.trajectory import Trajectory, TrajectorySample
+from hsp_control.trajectories.trajectory import (
+    Trajectory,
+    TrajectorySample,
+    write_sample,
+)
 
 AnyReference = Trajectory | OrientationTrajectory | PoseTrajectory
 
@@ -64,20 +71,25 @@ class Crossfade(Trajectory, type="crossfade"):
         """The number n of coordinates."""
         return self.after.dimension
 
+    def call(self) -> PartCall:
+        """Return the call; see `Trajectory.call`."""
+        return PartCall(
+            engine.Crossfade,
+            start_time=self.start_time,
+            duration=self.duration,
+            before=self.before,
+            after=self.after,
+        )
+
     def sample(self, t: float, out: TrajectorySample | None = None) -> TrajectorySample:
         """Return the point at time t; see `Trajectory.sample`."""
-        out = self._output(out)
-        if t < self.start_time:
-            return self.before.sample(t, out)
-        self.after.sample(t, out)
-        if t < self.start_time + self.duration:
-            engine.Crossfade(
-                start_time=self.start_time,
-                duration=self.duration,
-                before=self.before.sample(t),
-                after=out,
-            )(float(t))
-        return out
+        if t >= self.start_time + self.duration:  # a stream may know x_0 no more
+            return self.after.sample(t, self._output(out))
+        return super().sample(t, out)
+
+    def calls(self, out: TrajectorySample) -> PartCalls:
+        """Return the calls that write ``out``; see `Trajectory.calls`."""
+        return _calls(self, out) or super().calls(out)
 
 
 class CrossfadeOrientation(OrientationTrajectory, type="crossfade"):
@@ -110,6 +122,17 @@ class CrossfadeOrientation(OrientationTrajectory, type="crossfade"):
             duration=self.duration,
         )
 
+    def call(self) -> PartCall:
+        """Return the call; see `Trajectory.call`."""
+        return PartCall(
+            engine.CrossfadeOrientation,
+            start_time=self.start_time,
+            duration=self.duration,
+            before=self.before,
+            coefficients=self._coefficients,
+            after=self.after,
+        )
+
     def sample(
         self, t: float, out: OrientationSample | None = None
     ) -> OrientationSample:
@@ -122,7 +145,11 @@ class CrossfadeOrientation(OrientationTrajectory, type="crossfade"):
             self.keep_start(end)
         if t < self.start_time:
             return self.before.sample(t, out)
-        return self._blend.sample(t, out)
+        return super().sample(t, out)
+
+    def calls(self, out: OrientationSample) -> PartCalls:
+        """Return the calls that write ``out``; see `Trajectory.calls`."""
+        return _calls(self, out) or super().calls(out)
 
     def keep_start(self, until: float) -> None:
         """Let streams know until a time how R_0 was where the change began."""
@@ -140,9 +167,12 @@ class CrossfadeOrientation(OrientationTrajectory, type="crossfade"):
         return tuple(parts_within(self.before, CrossfadeOrientation))
 
     @cached_property
-    def _blend(self) -> BlendOrientation:
+    def _coefficients(self) -> Array:
+        """Those of y, which begins with R_0's derivatives; shape (6, 3)."""
+        if self.duration == 0.0:
+            return np.zeros((6, 3))
         R, omega, omega_dot = self.before.sample(self.start_time)
-        return BlendOrientation(
+        blend = BlendOrientation(
             self.after,
             self.duration,
             rotation=R,
@@ -150,6 +180,7 @@ class CrossfadeOrientation(OrientationTrajectory, type="crossfade"):
             start_angular_acceleration=omega_dot,
             start_time=self.start_time,
         )
+        return blend.coefficients
 
 
 class PositionOf(Trajectory):
@@ -170,6 +201,11 @@ class PositionOf(Trajectory):
             own[:] = other
         return out
 
+    def calls(self, out: TrajectorySample) -> PartCalls:
+        """Return the calls that write ``out``; see `Trajectory.calls`."""
+        pose, calls = self.pose.supplied()
+        return _copied(calls, pose.position, out)
+
 
 class OrientationOf(OrientationTrajectory):
     """The orientation of a pose trajectory."""
@@ -185,6 +221,31 @@ class OrientationOf(OrientationTrajectory):
         for own, other in zip(out, self.pose.sample(t).orientation, strict=True):
             own[:] = other
         return out
+
+    def calls(self, out: OrientationSample) -> PartCalls:
+        """Return the calls that write ``out``; see `Trajectory.calls`."""
+        pose, calls = self.pose.supplied()
+        return _copied(calls, pose.orientation, out)
+
+
+def _copied(calls: PartCalls, sample: Any, out: Any) -> PartCalls:
+    """Return calls that write a sample, and then those that copy it."""
+    for own, other in zip(out, sample, strict=True):
+        own[:] = other  # once, if it is constant
+    if not calls:
+        return calls
+    copies = [
+        PartCall(engine.Copy, x=other.ravel(), out=own.ravel(), t=TIME)
+        for own, other in zip(out, sample, strict=True)
+    ]
+    return [*calls, *copies]
+
+
+def _calls(part: Crossfade | CrossfadeOrientation, out: Any) -> PartCalls:
+    """Return the calls of a change that streams follow: their past is forgotten."""
+    if any(True for _ in parts_within(part, FollowedStream)):
+        return [PartCall(write_sample, sampler=part.sample, out=out, t=TIME)]
+    return []
 
 
 def crossfade(
