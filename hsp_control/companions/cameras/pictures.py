@@ -35,6 +35,8 @@ _LARGEST = 2048
 """Most pixels of a side."""
 _SIZES = 4
 """Of how many sizes pictures are drawn without a new start."""
+_PATIENCE = 60.0
+"""Longest time until the first picture could be drawn [s]."""
 _INSTALL = "(pip install 'hsp_control[cameras]'; on Debian and Ubuntu also libegl1)"
 
 
@@ -47,7 +49,7 @@ def show(address: str, plant: Plant) -> Callable[..., object]:
 
     Raises:
         HardwareError: If the address is invalid, the scene has no camera, or nothing
-            can be drawn here.
+            can be drawn here; by what is returned, if nothing is drawn any more.
     """
     where = f"http://{address}"
     try:
@@ -76,21 +78,32 @@ def show(address: str, plant: Plant) -> Callable[..., object]:
     memory = anew.RawArray(ctypes.c_double, mujoco.mj_stateSize(model, kind))
     state, lock = np.ctypeslib.as_array(memory), anew.Lock()
 
-    def tell(*_: object) -> None:
-        if lock.acquire(block=False):  # who draws has it for microseconds
-            mujoco.mj_getState(model, data, state, kind)
-            lock.release()
-
-    tell()
     ours, theirs = anew.Pipe(duplex=False)
     arguments = (host, port, compiled.tobytes(), memory, lock, theirs)
-    anew.Process(target=_serve, args=arguments, name="cameras", daemon=True).start()
+    drawing = anew.Process(target=_serve, args=arguments, name="cameras", daemon=True)
+
+    def tell(*_: object) -> None:
+        if drawing.exitcode is not None:
+            raise HardwareError(f"{where}: the process that draws there has ended")
+        if lock.acquire(block=False):  # who draws has it for microseconds
+            try:
+                mujoco.mj_getState(model, data, state, kind)
+            finally:
+                lock.release()
+
+    tell()
+    drawing.start()
     theirs.close()
     try:
-        fault = ours.recv()
+        ready = ours.poll(_PATIENCE)
+        fault = ours.recv() if ready else f"it did not start in {_PATIENCE:g} s"
     except EOFError:
         fault = "its process has ended"
+    except BaseException:  # Ctrl-C, say
+        drawing.kill()
+        raise
     if fault:
+        drawing.kill()
         raise HardwareError(f"{where}: no pictures there: {fault}")
     return tell
 

@@ -162,6 +162,8 @@ class GripperClient:
                     text, sender = self.inbox.recvfrom(LONGEST)
                 except OSError:  # who was told something is not there any more
                     continue
+                if is_answer(text) or sender == self.inbox.getsockname():
+                    continue  # our own, which came back: no answer to it would be last
                 listeners.add(sender)
                 waiting = 0.0
                 try:
@@ -214,6 +216,15 @@ class GripperClient:
         if line != self.last_line:
             self.last_line = line
             print(f"The gripper: {line}", flush=True)
+
+
+def is_answer(text: bytes) -> bool:
+    """Return whether a datagram is one of those that a gripper answers with."""
+    try:
+        message = json.loads(text)
+    except Exception:  # `read` says what is wrong
+        return False
+    return isinstance(message, dict) and "grasped" in message
 
 
 def main(descriptor: int) -> None:

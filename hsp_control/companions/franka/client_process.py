@@ -87,14 +87,21 @@ class ClientProcess:
     def close(self) -> None:
         """End the process, without waiting for an answer."""
         self._link.close()
-        if self.waiting:
-            self._process.kill()
         try:
+            if self.waiting:
+                self._process.kill()
             self._process.wait(2.0)
         except subprocess.TimeoutExpired:
+            pass
+        finally:  # also where Ctrl-C cuts the waiting short
             self._process.kill()
             self._process.wait()
-        self._errors.close()
+            self._errors.close()
+
+    @property
+    def gone(self) -> bool:
+        """Whether the process has closed its connection, while nothing is asked."""
+        return bool(select([self._link], [], [], 0.0)[0])
 
     def _ended(self) -> str:
         """Return how the process ended, and the last line that it wrote."""

@@ -113,7 +113,9 @@ class FrankaHardware:
         q, v, self._applied = np.array(numbers).reshape(3, 7)
         sequence = round((t - self._origin) / self.period)
         t = sequence * self.period
-        return Measurement(sequence, t, q, v, applied=self._applied)
+        gone = self._gripper is not None and self._gripper.gone
+        fault = "the process that drives the gripper has ended" if gone else ""
+        return Measurement(sequence, t, q, v, applied=self._applied, fault=fault)
 
     def write(self, effort: Array) -> None:
         """Send an effort for the last state; without a new state it is too late.
@@ -152,9 +154,11 @@ class FrankaHardware:
         except HardwareError:
             pass  # it is kept: `fault`
         finally:
-            process.close()
-            if self._gripper is not None:
-                self._gripper.close()
+            try:
+                process.close()
+            finally:
+                if self._gripper is not None:
+                    self._gripper.close()
 
     def _send(self, kind: bytes) -> None:
         self._process.ask(client.REQUEST.pack(kind, *self._effort.tolist()))

@@ -98,6 +98,8 @@ class Hub:
         self.steering: Page | None = None  # the page that steers
         self.received: dict[str, dict[str, Any]] = {}  # its newest words, by `receive`
         self.asked = 0
+        self.end = asyncio.Event()  # of the server
+        self.failure: BaseException | None = None  # what ends it before
 
     def keep(self, commands: Iterable[PageCommand]) -> None:
         """Add commands to the scene, and to what each page gets next."""
@@ -128,6 +130,11 @@ class Hub:
         for page in self.pages:
             mine = self.steering is page
             page.command(PLAY, "drive", type="play_drive", mine=mine, taken=taken)
+
+    def fail(self, error: BaseException) -> None:
+        """End the server: what a page held could not be let go."""
+        self.failure = self.failure or error
+        self.end.set()
 
     def leave(self) -> "set[Page]":
         """Return the pages that were open, and forget them."""
@@ -225,7 +232,14 @@ class Page(WebSocketHandler):
             self.hub.receive(message)
 
     def on_close(self) -> None:
-        """Remove the page."""
+        """Remove the page; if that fails, the server ends, and its program hears so."""
+        try:
+            self._remove()
+        except BaseException as error:
+            self.hub.fail(error)
+            raise
+
+    def _remove(self) -> None:
         with self.hub.lock:
             self.hub.pages.discard(self)
         if self._delivery is not None:
@@ -353,7 +367,7 @@ class ServerThread:
         own = self._listener.getsockname()[1]
         self.url = f"http://{door.host}:{own}/?key={door.key}"
         self.failure: BaseException | None = None
-        self._loop, self._end = asyncio.new_event_loop(), asyncio.Event()
+        self._loop = asyncio.new_event_loop()
         self._thread = Thread(target=self._run, name="page server", daemon=True)
         self._thread.start()
 
@@ -364,7 +378,7 @@ class ServerThread:
 
     def close(self) -> None:
         """End the thread, and all connections; a second call does nothing."""
-        self.call(self._end.set)
+        self.call(self._hub.end.set)
         self._thread.join()
 
     def _run(self) -> None:
@@ -375,6 +389,7 @@ class ServerThread:
         except BaseException as error:
             self.failure = error
         finally:
+            self.failure = self.failure or self._hub.failure
             self._listener.close()
             for page in self._hub.leave():
                 page.hang_up()
@@ -388,7 +403,7 @@ class ServerThread:
             )
         )
         server.add_socket(self._listener)
-        await self._end.wait()
+        await self._hub.end.wait()
         server.stop()
         for page in self._hub.leave():
             page.hang_up()

@@ -1,5 +1,6 @@
 """What another process sees through the cameras of a MuJoCo scene."""
 
+import multiprocessing
 import socket
 from ctypes.util import find_library
 from io import BytesIO
@@ -94,6 +95,22 @@ def test_a_robot_in_its_own_process_is_seen(cell: hsp.Experiment, address: str) 
         wait_until(lambda: seen(address, "above.jpg")[0] >= 0.05)
     with pytest.raises(OSError, match="refused"):
         seen(address, "above.jpg")
+
+
+def test_where_nothing_is_drawn_any_more_the_robot_stops(
+    cell: hsp.Experiment, address: str
+) -> None:
+    plant = cell.plant
+    assert isinstance(plant, hsp.mujoco.MujocoScenePlant)
+    plant.reset(0.0, cell.q0, cell.v0)
+    before = set(multiprocessing.active_children())
+    told = show(address, plant)
+    (drawing,) = set(multiprocessing.active_children()) - before
+    told()
+    drawing.kill()
+    drawing.join()
+    with pytest.raises(HardwareError, match="the process that draws there has ended"):
+        told()
 
 
 @pytest.mark.parametrize(

@@ -1,6 +1,13 @@
 """A Franka arm as the loop sees it, with a client that answers to order."""
 
+import signal
+import socket
+import subprocess
+import sys
+from contextlib import closing
+from io import BytesIO
 from math import pi
+from typing import Any
 
 import numpy as np
 import pytest
@@ -135,6 +142,51 @@ def test_at_the_end_the_arm_says_why_it_did_not_answer() -> None:
     assert hardware.fault == "a reflex"
     assert answers.closed
     assert b"F" not in answers.asked
+
+
+def test_without_the_gripper_s_process_the_arm_stops() -> None:
+    hardware, _ = arm()
+    gripper = hardware._gripper = ClientProcess.__new__(ClientProcess)
+    gripper._link, theirs = socket.socketpair()
+    state(hardware)
+    assert not state(hardware).fault
+    theirs.close()  # as the system does for a process that dies
+    assert state(hardware).fault == "the process that drives the gripper has ended"
+    gripper._link.close()
+
+
+def test_both_processes_end_whatever_is_raised() -> None:
+    class Fails(Answers):
+        def close(self) -> None:
+            super().close()
+            raise KeyboardInterrupt
+
+    hardware, _ = arm()
+    hardware._process, hardware._gripper = both = Fails(), Fails()  # type: ignore[assignment]
+    with pytest.raises(KeyboardInterrupt):
+        hardware.close()
+    assert [each.closed for each in both] == [True, True]
+
+
+def test_ctrl_c_leaves_no_process(monkeypatch: pytest.MonkeyPatch) -> None:
+    """One that hangs in libfranka sees no end of its connection."""
+    process = ClientProcess.__new__(ClientProcess)
+    process._link, theirs = socket.socketpair()
+    process._errors, process.waiting = BytesIO(), False  # type: ignore[assignment]
+    hangs = [sys.executable, "-c", "import time; time.sleep(60)"]
+    process._process = subprocess.Popen(hangs)
+
+    def interrupted(self: Any, timeout: float | None = None) -> int:
+        if timeout is not None:
+            raise KeyboardInterrupt
+        return ended(self)
+
+    ended = subprocess.Popen.wait
+    monkeypatch.setattr(subprocess.Popen, "wait", interrupted)
+    with closing(theirs), pytest.raises(KeyboardInterrupt):
+        process.close()
+    assert process._process.returncode == -signal.SIGKILL
+    assert process._errors.closed
 
 
 def test_control_that_does_not_start_is_an_error() -> None:

@@ -1,5 +1,10 @@
 """What the gripper's process takes from a datagram, without a gripper."""
 
+import json
+import socket
+import threading
+from contextlib import closing
+from types import SimpleNamespace
 from typing import Any
 
 import pytest
@@ -36,3 +41,40 @@ def test_nothing_else_moves_the_fingers(message: Any) -> None:
     """A text was a number by its first letter: "0.02" closed the gripper."""
     with pytest.raises((ValueError, LookupError, TypeError)):
         gripper().read(message, SENDER, 0.01)
+
+
+def test_its_own_answers_that_come_back_are_no_orders() -> None:
+    """A policy that sends back what it hears: they answered each other without end."""
+    made, openings = gripper(), []
+    state = SimpleNamespace(width=0.03, is_grasped=True)
+    made.gripper = SimpleNamespace(
+        grasp=lambda width, *_: openings.append(width),
+        move=lambda width, _: openings.append(width),
+        read_once=lambda: state,
+    )
+    made.opening, made.last_line = 0.0, ""
+    loop, link = socket.socketpair()
+    with (
+        closing(socket.socket(socket.AF_INET, socket.SOCK_DGRAM)) as made.inbox,
+        closing(socket.socket(socket.AF_INET, socket.SOCK_DGRAM)) as policy,
+        closing(link),
+    ):
+        made.inbox.bind(("127.0.0.1", 0))
+        policy.settimeout(20.0)
+        serving = threading.Thread(target=made.serve, args=(link,))
+        serving.start()
+
+        def told(message: Any) -> bytes:
+            policy.sendto(json.dumps(message).encode(), made.inbox.getsockname())
+            return policy.recv(999)
+
+        answer = told({"value": [0.04]})
+        for _ in range(3):
+            policy.sendto(answer, made.inbox.getsockname())
+        assert told({}) == answer
+        policy.settimeout(0.0)
+        with pytest.raises(BlockingIOError):  # not one of the three was answered
+            policy.recv(999)
+        loop.close()
+        serving.join(20.0)
+    assert openings == [0.08]

@@ -458,6 +458,29 @@ def test_a_page_that_cannot_be_served_is_not_open(
     wait_until(lambda: after.drives() == (True, True))
 
 
+@pytest.mark.parametrize("raised", [MemoryError, OddError, SystemExit])
+@pytest.mark.parametrize("function", ["Hub.steer", "Hub.show_who_steers"])
+def test_where_a_page_cannot_be_removed_the_server_ends(
+    function: str,
+    raised: type[BaseException],
+    steered: PageServer,
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """Else the program would go on with what the page held, and nobody could steer."""
+    assert steered.url is not None
+    page = Steering(steered.url)
+    wait_until(lambda: page.drives() == (True, True))
+
+    def fails(*_: object) -> None:
+        raise raised
+
+    monkeypatch.setattr("hsp_control.companions.viewer.page_server." + function, fails)
+    page.leave()
+    wait_until(lambda: steered._thread.failure)
+    with pytest.raises(ViewerError, match=f"has failed: {raised.__name__}"):
+        steered.messages()
+
+
 def test_it_is_said_what_to_install(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(transport.importlib.util, "find_spec", lambda name: None)
     with pytest.raises(ViewerError, match="pip install meshcat"):
