@@ -353,10 +353,13 @@ def _geometry(piece: Piece, scale: float, arrays: ArrayTable) -> Json:
     solid = smooth_shade(solid, angle=CREASE, facet_minarea=None)
     vertices, triangles = sort_along_curve(solid.vertices, solid.faces)
     size = float(np.ptp(vertices, axis=0).max(initial=0.0)) or 1.0
-    step = max(VERTEX_STEP / scale, size * 2.0**-16)
+    step = max(VERTEX_STEP / float(f"{scale:.6g}"), size * 2.0**-16)
     places = arrays.numbers(vertices, step)
     corners = arrays.whole(triangles.astype(np.uint32).ravel())
     position = {"itemSize": 3, "type": "Float32Array", "array": places}
     index = {"itemSize": 1, "type": "Uint32Array", "array": corners}
     data = {"attributes": {"position": position}, "index": index}
-    return {"uuid": unique_name(), "type": "BufferGeometry", "data": data}
+    # Equal meshes have equal names: the page keeps one geometry for all of them.
+    name = f"mesh {places['$array']} {corners['$array']}"
+    about = {"uuid": unique_name(), "type": "BufferGeometry", "name": name}
+    return {**about, "data": data}

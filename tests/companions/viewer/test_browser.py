@@ -191,6 +191,20 @@ def test_every_joint_is_where_pinocchio_has_it(
     assert len(meshes) > 11
     assert all(vertices == normals for vertices, normals, _ in meshes)
     assert sum(corners for *_, corners in meshes) / 3 > 130_000  # all there are
+    fingers = watched.page.evaluate(
+        """() => {
+          const of = (path) => {
+            const found = [];
+            node(path).traverse(({geometry}) => geometry && found.push(geometry));
+            return found;
+          };
+          const [one, other] = ['left', 'right'].map(
+            (side) => of(`/robot/panda_joint7/panda_${side}finger`));
+          return [one.length, one.every((geometry, k) => geometry === other[k])];
+        }"""
+    )
+    assert fingers[0] > 0  # of one mesh: one geometry
+    assert fingers[1]
 
 
 def test_timeline_plots_and_robot_move_together(

@@ -275,6 +275,7 @@ function set_object(command) {
     BufferGeometry.prototype.applyMatrix4 = apply;
   }
   node(command.path).traverse((object) => {
+    object.geometry &&= shared(object.geometry);
     const {geometry, material} = object;
     if (geometry?.userData.mergedUserData && Array.isArray(material)) assignMaterials(object);
     // Without normals, a mesh would be black.
@@ -283,6 +284,17 @@ function set_object(command) {
       ? object.material.map(lit) : lit(object.material);
     if (drawsLightly) simplify(object);
   });
+}
+
+// One geometry for all meshes of a name, in whichever robot or run: its normals are computed once, and
+// the graphics card has it once.
+const geometries = new Map();
+
+function shared(geometry) {
+  const {name} = geometry;
+  if (!name) return geometry;
+  if (!geometries.has(name)) geometries.set(name, geometry);
+  return geometries.get(name);
 }
 
 // A material, lit as all others are.
