@@ -541,7 +541,7 @@ class Composition:
 
     def _force_offset(self, contact: str) -> Array:
         """Return what compensators add to a contact's commanded force, (1,) [N]."""
-        return self._setup.contact(contact).force_offset
+        return self._memory.force_offset(self._setup.contact(contact).contact.name)
 
     def __repr__(self) -> str:
         gain = self.null_space_gain

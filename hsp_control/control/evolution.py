@@ -1,7 +1,7 @@
 """Values, contacts and limits as functions of time."""
 
 from bisect import insort
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from typing import Generic, TypeVar
 
 import numpy as np
@@ -135,9 +135,6 @@ class PlannedContact:
 
     contact: Contact
     presence: Evolution[float]  # 1 while it is active, 0 while it is lifted
-    # what a compensator adds to the commanded normal force, shape (1,) [N]; every step
-    # reads this array
-    force_offset: Array = field(default_factory=lambda: np.zeros(1), compare=False)
 
     @property
     def always(self) -> bool:

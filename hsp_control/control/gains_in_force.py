@@ -50,6 +50,10 @@ class GainsInForce:
         self.null_space = np.zeros((nv, nv))  # K_N, shape (nv, nv) [1/s]
         self._tasks: dict[int, Task] = {}
 
+    def force_offset(self, contact: str) -> Array:
+        """Return what compensators add to a contact's commanded force, (1,) [N]."""
+        return self._memory.force_offset(contact)
+
     def plan(self, setup: Setup, t: float) -> None:
         """Follow a setup from now on; t is the present time [s]."""
         tasks = {each.key: each.task for each in setup.tasks}

@@ -34,6 +34,8 @@ class Memory:
     # of tasks, by key: the numbers of an impedance that wait, and what compensators add
     waiting: dict[int, Array] = field(default_factory=dict)
     offsets: dict[int, Array] = field(default_factory=dict)
+    # what compensators add to commanded normal forces, by contact, shape (1,) [N]
+    forces: dict[str, Array] = field(default_factory=dict)
     streams: tuple[StreamRun, ...] = ()  # of what is followed, or will be
     clock: ClockCheck = field(default_factory=ClockCheck)
     runs: int = 0  # how many times it was cleared
@@ -53,7 +55,7 @@ class Memory:
         self.origin[:], self.counts = 0.0, False
         self.begun, self.now, self.unseen = False, -np.inf, (-np.inf, ())
         self.waiting.clear()
-        for offset in self.offsets.values():
+        for offset in (*self.offsets.values(), *self.forces.values()):
             offset[:] = 0.0
         self.clock, self.runs = ClockCheck(), self.runs + 1
 
@@ -76,6 +78,10 @@ class Memory:
     def count_from(self, origin: float) -> None:
         """Count times from a reading of the clock [s]."""
         self.origin[0], self.counts = origin, True
+
+    def force_offset(self, contact: str) -> Array:
+        """Return what is added to a contact's commanded force; the array stays."""
+        return self.forces.setdefault(contact, np.zeros(1))
 
     def made(self, now: float, change: Change) -> None:
         """Note a change that is made after a step at a time [s]."""

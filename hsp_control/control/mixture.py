@@ -233,7 +233,8 @@ class Mixture:
             levels = [
                 [each for each in level if each.key not in off] for level in self.levels
             ]
-            support = Support(standing, self._state, self._base)
+            offset = self._gains.force_offset
+            support = Support(standing, self._state, self._base, offset)
             gains, metric = self._gains, self._setup.metric
             law = gains.feedback, metric, self.field, gains.null_space, self._threshold
             self._stacks[key] = ActiveStack(self._state, support, levels, *law)

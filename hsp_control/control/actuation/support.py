@@ -29,7 +29,9 @@ class Support:
         contacts: Sequence[PlannedContact],
         state: RobotState,
         base: Sequence[int] = (),
+        force_offset: Callable[[str], Array] = lambda _: np.zeros(1),
     ) -> None:
+        """Bind contacts; each reads its ``force_offset``, by name, in each step."""
         robot, nv = state.robot, state.robot.nv
         self._state = state
         # degrees of freedom without a motor
@@ -71,7 +73,8 @@ class Support:
             friction = planned.contact.friction
             full = np.tile([friction**2, friction**2, 1.0], where.stop - where.start)
             if planned.contact.force is not None:
-                command = CommandedForces(planned, state)
+                offset = force_offset(planned.contact.name)
+                command = CommandedForces(planned.contact, state, offset)
                 full[command.mask] *= COMMANDED_INVERSE_COST
                 self._commanded.append((planned, command, self.reference[columns]))
             self.inverse_cost[columns] = full
@@ -193,11 +196,10 @@ cheaper than a miss of the tasks."""
 class CommandedForces:
     """Writes f_ref for the points of one contact, and how dear other forces are."""
 
-    def __init__(self, planned: PlannedContact, state: RobotState) -> None:
-        """Follow the command of a contact."""
-        contact = planned.contact
+    def __init__(self, contact: Contact, state: RobotState, offset: Array) -> None:
+        """Follow the command of a contact; ``offset`` is added to its normal force."""
         assert contact.force is not None
-        self._contact, self._offset = contact, planned.force_offset
+        self._contact, self._offset = contact, offset
         n = contact.force.dimension
         self._command = TrajectorySample.allocate(n)
         calls = contact.force.followed.calls(self._command)
