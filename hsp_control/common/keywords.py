@@ -21,15 +21,15 @@ def suggesting(function: Callable[_Given, _Result]) -> Callable[_Given, _Result]
     names = [
         each.name
         for each in signature(function).parameters.values()
-        if each.kind in named and each.name != "self"
+        if each.kind in named and each.name not in {"self", "cls"}
     ]
 
     @wraps(function)
     def called(*args: _Given.args, **given: _Given.kwargs) -> _Result:
         for name in given:
             if name not in names:
-                what = function.__name__
-                if what == "__init__":
+                what = function.__qualname__
+                if function.__name__ == "__init__":
                     what = type(args[0]).__name__
                 raise TypeError(
                     f"{what}: unknown argument {name!r}{did_you_mean(name, names)} "

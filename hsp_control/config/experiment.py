@@ -19,6 +19,7 @@ from hsp_control.common.exceptions import (
     ModelError,
     SceneError,
 )
+from hsp_control.common.keywords import suggesting
 from hsp_control.config.document import Document, read_document
 from hsp_control.config.loaded_scenario import LoadedScenario, load_scenario
 from hsp_control.config.own_code import own_modules
@@ -365,6 +366,7 @@ class Experiment:
         )
 
 
+@suggesting
 def load_experiment(
     source: str | PathLike[str] | dict[str, Any],
     *overrides: str,

@@ -12,6 +12,7 @@ import pinocchio as pin
 
 from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import FallError, LiveError
+from hsp_control.common.keywords import suggesting
 from hsp_control.control.compensation import Command, Compensation
 from hsp_control.control.controller import Controller
 from hsp_control.control.estimator import Estimator
@@ -41,6 +42,7 @@ _WARM_UP = 20
 """Steps before real-time operation: they bind calls and touch all memory."""
 
 
+@suggesting
 def run_loop(
     controller: Controller | EffortSource,
     hardware: Hardware,

@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike
 from hsp_control.common.arrays import Array
 from hsp_control.common.entry_points import entry_points
 from hsp_control.common.exceptions import ModelError
+from hsp_control.common.keywords import suggesting
 from hsp_control.declaration import within
 from hsp_control.robot.description.access import ANYWHERE, Access
 from hsp_control.robot.description.from_pinocchio import take_model
@@ -53,6 +54,7 @@ class Robot(RobotModel):
         self.parts = tuple(parts) or (RobotPart("", source, pin.SE3.Identity()),)
 
     @classmethod
+    @suggesting
     def load(
         cls,
         name: str | Path | RobotDescription,
@@ -169,6 +171,7 @@ class Robot(RobotModel):
         return cls(*read(model, root, joints, qpos, keyframe, locked, tool_frames))
 
     @classmethod
+    @suggesting
     def from_pinocchio(
         cls,
         model: pin.Model,

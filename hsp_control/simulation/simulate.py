@@ -15,6 +15,7 @@ from hsp_control.common.exceptions import (
     SimulationError,
     StreamError,
 )
+from hsp_control.common.keywords import suggesting
 from hsp_control.control.change_model import ChangeGravity, ChangePayload
 from hsp_control.control.compensation import Command, Compensation
 from hsp_control.control.compensation import check_rate as check_loop
@@ -58,6 +59,7 @@ MAX_STEPS = 1e9
 """Most control periods, or integrator steps, of a run: at 50 µs each, 14 hours."""
 
 
+@suggesting
 def simulate(
     controller: Controller,
     q0: Any,

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from hsp_control.common.exceptions import SweepError
+from hsp_control.common.keywords import suggesting
 from hsp_control.companions.sweeps.design import chosen_design, points
 from hsp_control.companions.sweeps.factor import factors
 from hsp_control.companions.sweeps.plan import SweepPlan
@@ -29,6 +30,7 @@ AT_ONCE = 1000
 """Runs that the scheduler knows: 10^5 would take it a minute, and much memory."""
 
 
+@suggesting
 def sweep(
     source: str | PathLike[str] | dict[str, Any],
     over: Mapping[str, Any] | Iterable[str],

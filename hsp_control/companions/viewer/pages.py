@@ -18,6 +18,7 @@ from hsp_control.cli.consoles import errors, out, working
 from hsp_control.cli.interrupts import end_in_order
 from hsp_control.cli.loading import run_imports
 from hsp_control.common.exceptions import ExportError, HspControlError, ViewerError
+from hsp_control.common.keywords import suggesting
 from hsp_control.companions.viewer import (
     ComparedRun,
     LiveView,
@@ -192,6 +193,7 @@ _LONGEST = 24
 """Longest title that is a name in the switch between runs."""
 
 
+@suggesting
 def export(
     options: argparse.Namespace, formats: Mapping[str, tuple[str, Writer]]
 ) -> int:

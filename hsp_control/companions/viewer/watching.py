@@ -13,6 +13,7 @@ from typing import Any, Self
 from weakref import finalize
 
 from hsp_control.common.exceptions import HspControlError, ViewerError
+from hsp_control.common.keywords import suggesting
 from hsp_control.companions.viewer.transport import LOOPBACK, open_browser
 from hsp_control.config import Recorder
 from hsp_control.config.recorder import declaration_of
@@ -65,6 +66,7 @@ class Watch:
         return f"Watch({self.url})"
 
 
+@suggesting
 def watch(
     loop: Controller | Recorder,
     *,

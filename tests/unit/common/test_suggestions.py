@@ -28,6 +28,20 @@ def test_an_unknown_argument_is_named_with_the_nearest_one() -> None:
     )
     with pytest.raises(TypeError, match=r"^Recorder: unknown argument 'log_perod'"):
         hsp.Recorder(None, log_perod=1)  # type: ignore[call-arg]
+    for call, wrong, meant in (
+        (hsp.simulate, "durations", "duration"),
+        (hsp.load_experiment, "stric", "strict"),
+        (hsp.Robot.load, "gravty", "gravity"),
+        (hsp.Robot.from_pinocchio, "tool_frame", "tool_frames"),
+        (hsp.freeze, "perid", "period"),
+        (hsp.run_loop, "duraton", "duration"),
+        (hsp.viewer.watch, "prot", "port"),
+    ):
+        said = (
+            rf"^{call.__qualname__}: unknown argument '{wrong}'; did you mean '{meant}'"
+        )
+        with pytest.raises(TypeError, match=said):
+            call(**{wrong: 1})
     with pytest.raises(TypeError, match="missing 1 required positional argument"):
         hsp.Controller(None)  # type: ignore[call-arg]
     assert "robot" in inspect.signature(hsp.Controller).parameters
