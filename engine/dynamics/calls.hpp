@@ -34,7 +34,7 @@ struct Carry {
   In<'k'> masses;       // [kg]
   In<'k', 3> centers;   // [m]
   In<'k', 9> inertias;  // about the centre [kg·m²]
-  In<'k'> shares, rates;
+  In<'k'> shares, rates, accelerations;
 
   void check() const {
     check_indices("joints", joints, dynamics->joints(), 1);
@@ -44,7 +44,8 @@ struct Carry {
     dynamics->put_down();
     for (Index k = 0; k < joints.size(); ++k)
       dynamics->carry({joints[k], masses[k], centers.row(k).transpose(),
-                       Eigen::Map<const Matrix3>(inertias.row(k).data()), shares[k], rates[k]});
+                       Eigen::Map<const Matrix3>(inertias.row(k).data()), shares[k], rates[k],
+                       accelerations[k]});
   }
 };
 
@@ -162,7 +163,8 @@ struct CentroidalMotion {
   In<'q'> q;
   In<'n'> v;
   Out<3> position, velocity;
-  Out<1> mass;  // of the whole robot [kg]
+  Out<3> own_acceleration, own_momentum;  // see MassFlow
+  Out<1> mass;                            // of the whole robot [kg]
   Out<3, 'n'> J, J_dot, angular, angular_dot;
   struct Map : Eigen::Matrix<double, 6, Eigen::Dynamic> {
     void prepare(const Sizes& size) { setZero(6, size('n')); }
@@ -171,14 +173,18 @@ struct CentroidalMotion {
   void check() const { check_sizes(*dynamics.object, q.size(), v.size()); }
   void operator()() {
     Vector3 c;
-    dynamics->centroidal_map(q, v, c, {A.data(), 6, A.cols()}, {A_dot.data(), 6, A.cols()});
+    const MassFlow flow =
+        dynamics->centroidal_map(q, v, c, {A.data(), 6, A.cols()}, {A_dot.data(), 6, A.cols()});
     position = c;
     mass[0] = dynamics->mass();
     J = A.topRows<3>() / mass[0];
     J_dot = A_dot.topRows<3>() / mass[0];
-    velocity = J.lazyProduct(v);
+    const Vector3 u = J.lazyProduct(v);
+    velocity = u + flow.velocity;
+    own_acceleration = flow.acceleration;
+    own_momentum = flow.momentum;
     angular = A.bottomRows<3>();
-    angular_dot = A_dot.bottomRows<3>() - skew(velocity).lazyProduct(A.topRows<3>());
+    angular_dot = A_dot.bottomRows<3>() - skew(u).lazyProduct(A.topRows<3>());
   }
 };
 

@@ -36,10 +36,16 @@ struct Joint {
 // A body that is fixed to a joint, in the joint's axes, and how much of it is carried.
 struct Carried {
   std::int64_t joint;
-  double mass;         // [kg]
-  Vector3 center;      // [m]
-  Matrix3 inertia;     // about the centre [kg·m²]
-  double share, rate;  // how much of it, and the share's rate [1/s]
+  double mass;                       // [kg]
+  Vector3 center;                    // [m]
+  Matrix3 inertia;                   // about the centre [kg·m²]
+  double share, rate, acceleration;  // how much of it, and the share's derivatives [1/s, 1/s²]
+};
+
+// What bodies that come or go add to the motion of the centre of mass c: to c' and c'' [m/s, m/s²],
+// and to the rate of the angular momentum about c per mass [m²/s²].
+struct MassFlow {
+  Vector3 velocity = Vector3::Zero(), acceleration = Vector3::Zero(), momentum = Vector3::Zero();
 };
 
 const char* pinocchio_version();  // of what is compiled in
@@ -82,9 +88,9 @@ class Dynamics {
   bool forward_dynamics(const ConstVector& q, const ConstVector& v, const ConstVector& tau,
                         Eigen::Map<Vector> a);
   // The centroidal map: A v = (momentum, angular momentum about the centre of mass c), and A'
-  // about a point at rest.
-  void centroidal_map(const ConstVector& q, const ConstVector& v, Vector3& c, Jacobian A,
-                      Jacobian A_dot);
+  // about a point at rest, both of constant masses. Returns what others add.
+  MassFlow centroidal_map(const ConstVector& q, const ConstVector& v, Vector3& c, Jacobian A,
+                          Jacobian A_dot);
 
  private:
   struct Pinocchio;

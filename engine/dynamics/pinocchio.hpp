@@ -63,6 +63,8 @@ struct Dynamics::Pinocchio {
   void write_rate_by_differences(const ConstVector& q, const ConstVector& v, Square M_dot);
   // A and A' of `centroidal_map`, of models with followers; returns the centre of mass.
   Vector3 map_of_followers(const ConstVector& q, const ConstVector& v, Jacobian A, Jacobian A_dot);
+  // At the placements and velocities of `data`; u = J v, l = A v/m.
+  MassFlow mass_flow(const Vector3& c, const Vector3& u, const Vector3& l) const;
   // q ⊕ h v, until the next call.
   ConstVector moved(const ConstVector& q, const ConstVector& v, double h);
 };

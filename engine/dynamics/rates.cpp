@@ -61,18 +61,52 @@ bool Dynamics::forward_dynamics(const ConstVector& q, const ConstVector& v, cons
   return own.factor.info() == Eigen::Success;
 }
 
-void Dynamics::centroidal_map(const ConstVector& q, const ConstVector& v, Vector3& c, Jacobian A,
-                              Jacobian A_dot) {
+// With shares s_k of masses m_k at p_k, and m the whole mass, c = (Σ m_i c_i + Σ s_k m_k p_k)/m has
+//
+//   c'  = u + w,   u = J v,   w = Σ s_k' m_k (p_k - c)/m
+//   c'' = J v' + J' v + Σ m_k [s_k' (p_k' - u + p_k' - c') + s_k'' (p_k - c)]/m - m' w/m
+//
+// and h = m l, the angular momentum about c, adds Σ s_k' [I_k ω_k + m_k (p_k - c) × p_k'] - w × m u
+// to h', so that l' has the m-th part of that less m' l.
+MassFlow Dynamics::Pinocchio::mass_flow(const Vector3& c, const Vector3& u,
+                                        const Vector3& l) const {
+  double mass = 0.0, mass_rate = 0.0;
+  for (const auto& body : model.inertias) mass += body.mass();
+  Vector3 velocity = Vector3::Zero(), acceleration = velocity, momentum = velocity;
+  for (const Carried& body : carried) {
+    const auto& joint = data.oMi[body.joint];
+    const Matrix3 R = joint.rotation();
+    const Vector3 omega = R * data.v[body.joint].angular();
+    const Vector3 arm = R * body.center, away = joint.translation() + arm - c;
+    const Vector3 rate = R * data.v[body.joint].linear() + omega.cross(arm);
+    const double flow = body.rate * body.mass;
+    mass_rate += flow;
+    velocity += flow * away;
+    acceleration += 2.0 * flow * (rate - u) + body.acceleration * body.mass * away;
+    momentum +=
+        flow * away.cross(rate) + body.rate * (R * (body.inertia * (R.transpose() * omega)));
+  }
+  velocity /= mass;
+  acceleration = (acceleration - 2.0 * mass_rate * velocity) / mass;
+  momentum = (momentum - mass_rate * l) / mass - velocity.cross(u);
+  return {velocity, acceleration, momentum};
+}
+
+MassFlow Dynamics::centroidal_map(const ConstVector& q, const ConstVector& v, Vector3& c,
+                                  Jacobian A, Jacobian A_dot) {
   auto& data = pinocchio_->data;
   if (pinocchio_->has_followers()) {
     c = pinocchio_->map_of_followers(q, v, A, A_dot);
-    return;
+  } else {
+    data.vcom[0].setZero();  // it reads this, and writes it later
+    pin::computeCentroidalMapTimeVariation(pinocchio_->model, data, q, v);
+    c = data.com[0];
+    A = data.Ag;
+    A_dot = data.dAg;
   }
-  data.vcom[0].setZero();  // it reads this, and writes it later
-  pin::computeCentroidalMapTimeVariation(pinocchio_->model, data, q, v);
-  c = data.com[0];
-  A = data.Ag;
-  A_dot = data.dAg;
+  if (pinocchio_->carried.empty()) return {};
+  const double m = mass();
+  return pinocchio_->mass_flow(c, A.topRows<3>() * v / m, A.bottomRows<3>() * v / m);
 }
 
 }  // namespace hsp

@@ -56,9 +56,10 @@ struct Payloads {
     dynamics->put_down();
     for (Index k = 0; k < used; ++k) {
       const Index frame = std::clamp<Index>(frames[k], 0, joints.size() - 1);
-      const auto [share, rate] = share_of(k, t);
+      const auto [share, rate, acceleration] = share_of(k, t);
       dynamics->carry({joints[frame], masses[k], centers.row(k).transpose(),
-                       Eigen::Map<const Matrix3>(inertias.row(k).data()), share, rate});
+                       Eigen::Map<const Matrix3>(inertias.row(k).data()), share, rate,
+                       acceleration});
     }
   }
 
@@ -112,22 +113,23 @@ struct Payloads {
     return I;
   }
 
-  // How much of it is carried, and the rate of that.
-  std::pair<double, double> share_of(Index k, double t) const {
-    double x = 0.0, x_dot = 0.0;
+  // How much of it is carried, and the derivatives of that: see `Evolution`.
+  SmoothStep share_of(Index k, double t) const {
+    double x = 0.0, x_dot = 0.0, x_ddot = 0.0;
     for (Index i = 0; i < number_of(k); ++i) {
       const double start = starts(k, i), ramp = ramps(k, i), target = i == 0 ? 1.0 : 0.0;
       if (start > t) break;
       const auto step = ramp == 0.0 ? SmoothStep{1.0, 0.0, 0.0} : smooth_step(t, start, ramp);
       if (step.s == 1.0) {
         x = target;
-        x_dot = 0.0;
+        x_dot = x_ddot = 0.0;
       } else if (step.s > 0.0) {
+        x_ddot = (1.0 - step.s) * x_ddot - 2.0 * step.s_dot * x_dot + step.s_ddot * (target - x);
         x_dot = (1.0 - step.s) * x_dot + step.s_dot * (target - x);
         x = (1.0 - step.s) * x + step.s * target;
       }
     }
-    return {x, x_dot};
+    return {x, x_dot, x_ddot};
   }
 
   // Forget what has been put down.

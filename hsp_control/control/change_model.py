@@ -70,11 +70,6 @@ class ChangePayload(Change, type="payload"):
                 raise ControllerError(
                     f"{self.frame!r} is fixed to the world, which carries everything"
                 )
-            if robot.unactuated:
-                raise ControllerError(
-                    f"{robot.name} has a free-flyer root, on whose balance a payload "
-                    "counts, too; needs a robot with a fixed base"
-                )
         center, inertia = np.zeros(3), np.zeros((3, 3))
         engine.BodyInJoint(
             rotation=np.ascontiguousarray(frame.placement.rotation),

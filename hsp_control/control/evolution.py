@@ -30,12 +30,11 @@ class Transition(Generic[Value]):
         """When it is complete [s]."""
         return self.start + self.ramp
 
-    def share(self, t: float) -> tuple[float, float]:
-        """Return s(t) from 0 to 1, and s' [1/s]; C² in t."""
+    def share(self, t: float) -> tuple[float, float, float]:
+        """Return s(t) from 0 to 1, s' [1/s] and s'' [1/s²]; C² in t."""
         if self.ramp == 0.0:
-            return float(t >= self.start), 0.0
-        s, s_dot, _ = smooth_step(t, self.start, self.ramp)
-        return s, s_dot
+            return float(t >= self.start), 0.0, 0.0
+        return smooth_step(t, self.start, self.ramp)
 
 
 @dataclass(frozen=True)
@@ -80,18 +79,26 @@ class Evolution(Generic[Value]):
 
     def with_rate(self, t: float) -> tuple[Value, Value]:
         """Return x(t) and x'(t)."""
+        return self.with_rates(t)[:2]
+
+    def with_rates(self, t: float) -> tuple[Value, Value, Value]:
+        """Return x(t), x'(t) and x''(t)."""
         x: Value = self.initial
         x_dot: Value = 0.0 * x
+        x_ddot = x_dot
         for each in self.transitions:
             if each.start > t:
                 break
-            s, s_dot = each.share(t)
+            s, s_dot, s_ddot = each.share(t)
             if s == 1.0:
                 x, x_dot = each.target, 0.0 * each.target
+                x_ddot = x_dot
             elif s > 0.0:
-                x_dot = (1.0 - s) * x_dot + s_dot * (each.target - x)
+                away = each.target - x
+                x_ddot = (1.0 - s) * x_ddot - 2.0 * s_dot * x_dot + s_ddot * away
+                x_dot = (1.0 - s) * x_dot + s_dot * away
                 x = (1.0 - s) * x + s * each.target
-        return x, x_dot
+        return x, x_dot, x_ddot
 
     def settled(self, t: float) -> "Evolution[Value]":
         """Return the evolution for times from t on: complete transitions are folded."""

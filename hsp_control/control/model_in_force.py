@@ -41,7 +41,7 @@ class ModelInForce:
 
     def __init__(self, robot: Robot, dynamics: Sequence[Dynamics]) -> None:
         self._payloads: Sequence[PlannedPayload] = ()
-        self._shares, self._rates = np.zeros((2, 0))
+        self._shares = np.zeros((3, 0))  # of each payload, with two derivatives
         self._gravity = Evolution(np.array(robot.model.gravity.linear))
         self._own = self._gravity.initial
         self._change = np.zeros(3)  # from it: a plant may have another one
@@ -67,21 +67,22 @@ class ModelInForce:
     def write(self, t: float) -> None:
         """Let the model be that of a time [s]."""
         for k, each in enumerate(self._payloads):
-            self._shares[k], self._rates[k] = each.share.with_rate(t)
+            self._shares[:, k] = each.share.with_rates(t)
         self._change[:] = self._gravity.at(t) - self._own
         self._write()
 
     def _bind(self) -> None:
         bodies, count = [each.body for each in self._payloads], len(self._payloads)
-        if len(self._shares) != count:
-            self._shares, self._rates = np.zeros((2, count))
+        if self._shares.shape[1] != count:
+            self._shares = np.zeros((3, count))
         carried = {
             "joints": np.array([each.joint for each in bodies], dtype=np.int64),
             "masses": np.array([each.mass for each in bodies]),
             "centers": _rows([each.center for each in bodies], 3),
             "inertias": _rows([each.inertia for each in bodies], 9),
-            "shares": self._shares,
-            "rates": self._rates,
+            "shares": self._shares[0],
+            "rates": self._shares[1],
+            "accelerations": self._shares[2],
         }
         calls = []
         for each in self._dynamics:

@@ -88,8 +88,6 @@ def model_inputs(
     port = Port("gravity", "m/s²", "gravity in the world", gravity, evolve)
     yield Input(port, calls)
     places, robot = {}, own.robot
-    if robot.unactuated:
-        return  # on whose balance a payload counts, too: see `ChangePayload`
     of_tasks = (getattr(task, "frame", None) for task in own.tasks)
     named = [each for each in of_tasks if isinstance(each, str)]
     for name in named if carrying is None else carrying:

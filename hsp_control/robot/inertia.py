@@ -29,9 +29,11 @@ class CentroidalMotion:
     Attributes:
         calls: Bring the attributes below up to date, if they are not.
         position: The centre of mass c [m], shape (3,).
-        velocity: c' = J v [m/s], shape (3,).
+        velocity: c' [m/s], shape (3,): J v, and what masses that come or go add.
         jacobian: J, shape (3, nv).
         jacobian_dot: J' = dJ/dt along v, exact, shape (3, nv).
+        own_acceleration: What these add to c'' = J a + J' v [m/s²], shape (3,).
+        own_momentum: What they add to the rate of A v/m [m²/s²], shape (3,).
         momentum_matrix: A, where A v is the angular momentum about c [kg·m²/s], shape
             (3, nv).
         momentum_matrix_dot: A' = dA/dt along v, exact, shape (3, nv).
@@ -49,6 +51,8 @@ class CentroidalMotion:
         self._mass: Array = np.zeros(1)
         self.position: Array = np.zeros(3)
         self.velocity: Array = np.zeros(3)
+        self.own_acceleration: Array = np.zeros(3)
+        self.own_momentum: Array = np.zeros(3)
         self.jacobian: Array = np.zeros((3, model.nv))
         self.jacobian_dot: Array = np.zeros((3, model.nv))
         self.momentum_matrix: Array = np.zeros((3, model.nv))
@@ -61,6 +65,8 @@ class CentroidalMotion:
             mass=self._mass,
             position=self.position,
             velocity=self.velocity,
+            own_acceleration=self.own_acceleration,
+            own_momentum=self.own_momentum,
             J=self.jacobian,
             J_dot=self.jacobian_dot,
             angular=self.momentum_matrix,
@@ -84,7 +90,11 @@ class CentroidalMotion:
 
     def supplied(self) -> tuple[PointMotion, PartCalls]:
         """Return the centre's motion as an argument of a call; see `planned`."""
-        J, J_dot = self.jacobian, self.jacobian_dot
-        # Its own motion, while a payload comes or goes, is none that the law follows.
-        motion = PointMotion(J, J_dot, self.position, self.velocity, np.zeros(3))
+        motion = PointMotion(
+            self.jacobian,
+            self.jacobian_dot,
+            self.position,
+            self.velocity,
+            self.own_acceleration,
+        )
         return motion, self.calls

@@ -115,7 +115,8 @@ class AngularMomentum(Task, type="angular_momentum"):
         np.divide(mass.momentum_matrix_dot, mass.mass, out=out.jacobian_dot)
         out.error[:] = desired.position - out.jacobian @ state.v
         out.error_rate[:] = -(feedback.Kp @ out.error)
-        out.acceleration[:] = desired.velocity - out.error_rate + feedback.offset
+        wanted = desired.velocity - out.error_rate + feedback.offset
+        out.acceleration[:] = wanted - mass.own_momentum
         return out
 
     def reference_rate(self, state: RobotState) -> Array:

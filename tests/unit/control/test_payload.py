@@ -240,11 +240,122 @@ def test_what_is_no_payload_is_refused(change: Any, message: str) -> None:
         made.at(0.0).payload(*change)
 
 
-def test_a_robot_that_balances_is_refused() -> None:
-    robot = hsp.Robot.load("solo12", root="free_flyer")
-    made = hsp.Controller(robot, [hsp.JointPosture()], base="flying")
-    with pytest.raises(ControllerError, match="needs a robot with a fixed base"):
-        made.at(0.0).payload("FL_FOOT", 1.0)
+# --- the centre of mass, and robots that balance -------------------------------------
+
+LEGGED = {"panda": ("panda_hand", "fixed"), "solo12": ("base_link", "free_flyer")}
+
+
+def carrying(name: str, task: hsp.Task, **options: Any) -> hsp.Controller:
+    """Return one whose robot takes up one payload, and puts down another."""
+    frame, root = LEGGED[name]
+    robot = hsp.Robot.load(name, root=root)  # type: ignore[arg-type]
+    base: Any = "flying" if robot.unactuated else None
+    q = robot.home() if name == "solo12" else start(robot)
+    made = hsp.Controller(robot, [task], base=base, start=q, limits=None, **options)
+    last = robot.frame_names[-1]
+    made.at(AT).ramp(RAMP).payload(frame, MASS, CENTER, INERTIA)
+    made.at(0.0).ramp(0.0).payload(last, 0.5, CENTER)
+    made.at(0.4).ramp(0.5).payload(last, 0.0)
+    return made
+
+
+def part_of(robot: hsp.Robot, t: float) -> list[tuple[str, pin.Inertia]]:
+    """Return what of both bodies is carried at a time."""
+    x = np.clip((t - 0.4) / 0.5, 0.0, 1.0)
+    left = 1.0 - float(x**3 * (10.0 - 15.0 * x + 6.0 * x * x))
+    here = pin.Inertia(smooth(t) * MASS, CENTER, smooth(t) * INERTIA)
+    there = pin.Inertia(left * 0.5, CENTER, np.zeros((3, 3)))
+    return [(LEGGED[robot.name][0], here), (robot.frame_names[-1], there)]
+
+
+def balance(robot: hsp.Robot, t: float, q: Array, v: Array) -> tuple[Array, Array]:
+    """Return c and A v/m of the model of a time, as Pinocchio has them."""
+    model = robot.model.copy()
+    for name, body in part_of(robot, t):
+        frame = model.frames[model.getFrameId(name)]
+        model.inertias[frame.parentJoint] += frame.placement.act(body)
+    data = model.createData()
+    momentum = pin.computeCentroidalMomentum(model, data, q, v).angular.copy()
+    mass = sum(each.mass for each in [*model.inertias][1:])  # the world's is no robot's
+    c = pin.centerOfMass(model, data, q).copy()
+    return c, momentum / mass
+
+
+@pytest.mark.parametrize("t", [0.2, 0.45, 0.55, 0.65, 0.8, 5.0])
+@pytest.mark.parametrize("name", LEGGED)
+def test_the_centre_of_mass_moves_with_what_comes_and_goes(name: str, t: float) -> None:
+    """c', c'' and the rate of A v/m along a motion, by differences of fourth order."""
+    made = carrying(name, hsp.tasks.CenterOfMass())
+    robot, rng = made.robot, np.random.default_rng(7)
+    q0 = robot.integrate(robot.home(), 0.2 * rng.normal(size=robot.nv))
+    v0, a = rng.normal(size=robot.nv), rng.normal(size=robot.nv)
+    made.compute(robot.state(t, q0, v0))
+
+    # Joints of one degree of freedom add; a free-flyer's constant twist is a motion of
+    # constant velocity, and its acceleration is left out.
+    a[list(robot.unactuated)] = 0.0
+
+    def along(s: float) -> tuple[Array, Array]:
+        q = robot.integrate(q0, s * v0 + 0.5 * s * s * a)
+        return balance(robot, t + s, q, v0 + s * a)
+
+    h = 1e-3
+    points = [along(k * h) for k in range(-2, 3)]
+    c, momentum = (np.array([each[i] for each in points]) for i in range(2))
+    first = np.array([1, -8, 0, 8, -1]) / 12
+    second = np.array([-1, 16, -30, 16, -1]) / 12
+    mass = made.state.centroidal
+    np.testing.assert_allclose(mass.position, c[2], rtol=0, atol=1e-13)
+    np.testing.assert_allclose(mass.velocity, first @ c / h, rtol=0, atol=1e-9)
+    moved = mass.jacobian @ a + mass.jacobian_dot @ v0 + mass.own_acceleration
+    np.testing.assert_allclose(moved, second @ c / h**2, rtol=0, atol=1e-6)
+    turned = mass.momentum_matrix @ a + mass.momentum_matrix_dot @ v0
+    rate = turned / mass.mass + mass.own_momentum
+    np.testing.assert_allclose(rate, first @ momentum / h, rtol=0, atol=1e-8)
+    if 0.4 < t < 0.7:
+        assert np.abs(mass.own_acceleration).max() > 1e-3
+        assert np.abs(mass.own_momentum).max() > 1e-5
+
+
+@pytest.mark.parametrize(
+    "task",
+    [
+        hsp.tasks.CenterOfMass(hsp.Circle(0.02, 2.0), name="hand"),
+        hsp.tasks.AngularMomentum(rate=4.0, name="hand"),
+    ],
+    ids=["centre", "momentum"],
+)
+def test_balance_obeys_its_equation_while_it_is_taken_up(task: hsp.Task) -> None:
+    """The error is the one without a payload, but for the integrator's."""
+    # Per mass a momentum is small: so are the singular values of its rows.
+    made = carrying("panda", task, singularity_threshold=1e-4)
+    robot = made.robot
+    v = 0.3 * np.sin(np.arange(7.0))
+    run = hsp.simulate(made, start(robot), v0=v, duration=1.0)
+    error = run["task.hand.error"]
+    assert np.abs(error[0]).max() > 1e-3
+    if task.order == 1:
+        expected = error[0] * np.exp(-4.0 * run.t)[:, None]
+    else:
+        e0, rate = error[0], run["task.hand.error_rate"][0]
+        gains = task.feedback()  # critically damped
+        w = np.sqrt(np.diag(gains.Kp))
+        t = run.t[:, None]
+        expected = (e0 + (rate + w * e0) * t) * np.exp(-w * t)
+    np.testing.assert_allclose(error, expected, rtol=0, atol=2e-7)
+
+
+def test_a_robot_on_feet_takes_up_a_payload() -> None:
+    """Its trunk stays, and the ground carries the weight."""
+    experiment = hsp.load_experiment("whole_body/solo12_trunk")
+    made, robot = experiment.controller, experiment.robot
+    made.at(0.1).ramp(0.2).payload("base_link", 0.5, [0.05, 0.0, 0.05])
+    q, v = experiment.q0, np.zeros(robot.nv)
+    light = made.compute(0.0, q, v).forces.copy()
+    heavy = made.compute(1.0, q, v).forces
+    up = heavy.reshape(-1, 3)[:, 2].sum() - light.reshape(-1, 3)[:, 2].sum()
+    acceleration = made.compute(1.0, q, v).acceleration
+    assert up == pytest.approx(0.5 * 9.81, abs=0.05 + 10.0 * np.abs(acceleration).max())
 
 
 def test_a_configuration_says_it(tmp_path: Path) -> None:
