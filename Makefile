@@ -79,8 +79,8 @@ assertions: $(STAMP) $(ENGINE) ## those of the engine, with Eigen's assertions a
 sanitize: $(STAMP) $(ENGINE) ## those of the engine, under AddressSanitizer and UBSan (needs g++)
 	@HSP_ENGINE=$$($(BIN)/python hatch_build.py Sanitized) \
 	  LD_PRELOAD="$$(g++ -print-file-name=libasan.so) $$(g++ -print-file-name=libstdc++.so.6)" \
-	  ASAN_OPTIONS=detect_leaks=0 PYTHONMALLOC=malloc \
-	  $(BIN)/python -m pytest $(SPREAD) $(CALLS) $(ARGS)
+	  ASAN_OPTIONS=detect_leaks=0 UBSAN_OPTIONS=print_stacktrace=1 PYTHONMALLOC=malloc \
+	  $(BIN)/python -m pytest --capture=sys $(SPREAD) $(CALLS) $(ARGS)
 
 lint: $(STAMP) $(ENGINE) ## ruff, mypy --strict, the layers of the architecture
 	@$(BIN)/ruff check

@@ -49,7 +49,9 @@ struct Resolve {
       B.prepare(size);
       turned.prepare(size);
       square.prepare(size);
-      spectrum = SymmetricSpectrum(size('m'));
+      // Once, for its memory. Eigen's constructor of a size leaves what it has found undefined.
+      if (const Index m = size('m'); m > 0)
+        spectrum.compute(Eigen::MatrixXd::Identity(m, m), Eigen::EigenvaluesOnly);
     }
   } memory;
 

@@ -245,6 +245,11 @@ def _read_npz(path: Path) -> tuple[dict[str, Array], dict[str, Any]]:
             f"{path}: not a log of hsp_control: it has no text entry 'meta' with a "
             f"JSON object (it has {listing(columns)})"
         )
+    for name, column in columns.items():
+        if column.dtype.kind not in "fiub":
+            raise LogError(
+                f"{path}: the column {name!r:.80} is of {column.dtype}; needs numbers"
+            )
     return {name: np.asarray(c, dtype=float) for name, c in columns.items()}, meta
 
 

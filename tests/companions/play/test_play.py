@@ -248,6 +248,37 @@ def test_somebody_pulls_at_the_elbow_and_the_hand_goes_on(
         hsp.load_experiment(log)
 
 
+def test_a_pull_follows_the_hand_up_to_its_largest_force(session: Session) -> None:
+    go(session, 0.1)
+    point = np.array(session.controller.state.data.oMi[4].translation)
+    pull = {"do": "pull", "path": "/robot/panda_joint4", "point": point.tolist()}
+    for away, newtons in ((0.1, 30.0), (0.2, 60.0), (0.9, 100.0)):
+        hand = point + np.array([0.0, away, 0.0])
+        session.receive(pull | {"to": hand.tolist()})
+        found = session.pull()
+        assert found is not None
+        np.testing.assert_allclose(found[1], hand)
+        assert found[2] == pytest.approx(newtons)
+
+
+@pytest.mark.parametrize("message", ["let_go", "left", "reset"])
+def test_who_lets_go_leaves_or_begins_anew_pulls_no_more(
+    message: str, session: Session
+) -> None:
+    """A page that is closed is ``left``: else its last pull would never end."""
+    go(session, 0.1)
+    point = list(map(float, session.controller.state.data.oMi[4].translation))
+    session.receive(
+        {"do": "pull", "path": "/robot/panda_joint4", "point": point, "to": [0, 0, 9]}
+    )
+    assert session.pull() is not None
+    if message == "reset":
+        session.reset()
+    else:
+        session.receive({"do": message})
+    assert session.pull() is None
+
+
 def test_it_begins_anew(session: Session) -> None:
     go(session, 0.3)
     first = session.rollout().q

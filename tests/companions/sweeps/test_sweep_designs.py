@@ -247,6 +247,31 @@ def test_sensitivities_are_those_that_were_put_in() -> None:
     assert share[1, 2] == pytest.approx(1.0 - 194 / (11 * F + 183), abs=1e-12)
 
 
+def test_chance_is_that_of_the_completed_runs() -> None:
+    """One correlation of twenty is beyond, of runs that have nothing to do with each
+    other: 4000 of 30 tell that share to 0.0035."""
+    half = invented(60)
+    half["status"][:30] = "diverged"
+    noise = sweeps.sensitivity(half).noise
+    rng = np.random.default_rng(1)
+    ranks = rng.permuted(np.tile(np.arange(30.0), (4000, 1)), axis=1) - 14.5
+    order = np.arange(30.0) - 14.5
+    correlations = ranks @ order / (order @ order)
+    beyond = (np.abs(correlations) > noise).mean()
+    assert beyond == pytest.approx(0.05, abs=0.015)
+
+
+def test_a_configuration_is_that_of_the_run_wherever_its_row_is() -> None:
+    """Rows of a sweep that is not complete begin with another run."""
+    whole = invented(20)
+    part = Sweep({name: each[7:] for name, each in whole.columns.items()}, whole.meta)
+    for run in (7, 12):
+        assert part.configuration(run) == whole.configuration(run)
+        assert part.configuration(run)["up"] == whole["up"][run]
+    with pytest.raises(SweepError, match="has no run 3"):
+        part.configuration(3)
+
+
 def test_what_cannot_be_told_is_not_told() -> None:
     with pytest.raises(SweepError, match="5 runs were completed"):
         sweeps.sensitivity(invented(10))

@@ -151,11 +151,18 @@ def test_a_dead_sensor_leaves_it_to_the_robot() -> None:
 def test_a_sensor_that_is_dead_from_the_start_is_found(kind: str, joint: int) -> None:
     """Friction could hold the joint; but the others feel it move (12 rad/s before)."""
     robot = Liar(LIES[f"both: {kind}"], [joint], 2)
-    report = run_loop(moving(), robot, duration=0.3, settings=SETTINGS)
+    report = run_loop(
+        moving(),
+        robot,
+        duration=0.3,
+        settings=SETTINGS,
+        on_period=lambda t: robot.running(),
+    )
     assert report.ended == "fault"
     assert f"panda_joint{joint + 1} stands to the last bit" in report.reason
     assert "the other joints feel it move" in report.reason
     assert report.silent
+    assert len(robot.sent) - robot.stopped <= 20  # then the robot brakes by itself
     assert np.abs(robot.speeds).max() < 2.7
 
 
@@ -610,6 +617,14 @@ def test_a_joint_may_be_held_by_friction_where_the_masses_are_wrong(
         sensors.judge(start(), zero, gravity + pushed)
     assert bool(sensors.dead[3]) == dead
     assert sensors.dead.sum() == dead
+
+
+def test_where_no_effort_limit_is_known_friction_may_hold_anything() -> None:
+    sensors = StillSensors(panda(), SETTINGS, np.full(7, np.inf), PERIOD)
+    for _ in range(60):
+        sensors.update(np.zeros(7), np.zeros(7), np.zeros(7), PERIOD)
+        sensors.judge(start(), np.zeros(7), np.full(7, 500.0))
+    assert not sensors.dead.any()
 
 
 def test_a_robot_that_stops_by_itself_does_not_throw_its_wrist() -> None:

@@ -235,6 +235,17 @@ def test_positions_may_be_beyond_a_limit_by_their_margin(end: str) -> None:
         assert (found is None) == fits, share
 
 
+def test_speeds_may_be_beyond_a_limit_by_a_tenth_of_it() -> None:
+    monitor = MeasurementMonitor(panda(), None, LiveSettings(), PERIOD)
+    limit = own_limits(panda()).velocity
+    for joint in range(7):
+        for factor, fits in ((1.0, True), (1.099, True), (1.101, False)):
+            for sign in (1.0, -1.0):
+                v = sign * factor * limit * np.eye(7)[joint]
+                found = monitor.violation(Measurement(1, 0.0, start(), v))
+                assert (found is None) == fits, (joint, factor)
+
+
 @pytest.mark.parametrize("states", [1, 3])
 def test_a_jump_is_farther_than_the_greatest_speed_over_the_gap(states: int) -> None:
     """Also where the clock stands still: the numbers of the states count."""

@@ -28,8 +28,12 @@ def test_its_own_effort_lasts_five_answers_and_then_fades() -> None:
     assert most == -10.0
 
 
-def test_a_robot_may_have_an_old_effort_for_as_long_as_its_watchdog_waits() -> None:
-    settings = LiveSettings(missing=1, watchdog=30, effort_rate=1e9)
+@pytest.mark.parametrize(("missing", "watchdog"), [(1, 30), (30, 1)])
+def test_a_robot_may_have_an_old_effort_for_as_long_as_its_watchdog_waits(
+    missing: int, watchdog: int
+) -> None:
+    """Or for as long as its loop waits for a state."""
+    settings = LiveSettings(missing=missing, watchdog=watchdog, effort_rate=1e9)
     limiter, q = EffortLimiter(panda(), settings, PERIOD), start()
     limiter.reset(q)
     gravity = limiter.sent.copy()
