@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 import pinocchio as pin
 import pytest
+from places import THOROUGH
 
 from hsp_control import (
     Controller,
@@ -257,7 +258,7 @@ def test_effort_is_bounded_in_the_singularity(which: str) -> None:
 
 # --- random starts -------------------------------------------------------------------
 
-STARTS = 1250
+STARTS = 1250 if THOROUGH else 400
 ROBOTS = {
     "planar3r": "xy", "panda": "pose", "iiwa14": "pose", "ur5": "xyz", "kinova": "xyz",
     "xarm7": "pose", "talos_arm": "pose", "tiago_no_hand": "pose",
@@ -317,7 +318,7 @@ def loaded(name: str) -> Robot:
 @pytest.mark.parametrize("largest", ["none", "robot"])
 @pytest.mark.parametrize("name", ROBOTS)
 def test_random_starts(name: str, largest: Any) -> None:
-    """20,000 in all: finite, bounded, exact where nothing is damped, and said so.
+    """20,000 if thorough: finite, bounded, exact where nothing is damped, and said so.
 
     Half of them with a threshold that follows the feedback: then most are damped.
     """
@@ -363,4 +364,4 @@ def test_random_starts(name: str, largest: Any) -> None:
             left = task.jacobian @ output.null_space_error
             np.testing.assert_allclose(left, 0.0, rtol=0, atol=1e-10)
     if largest == "none":
-        assert 30 <= singular <= STARTS - 30  # of both kinds
+        assert STARTS // 80 <= singular <= STARTS - STARTS // 80  # of both kinds

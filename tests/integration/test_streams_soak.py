@@ -20,7 +20,7 @@ Q, V = PANDA.home(), np.zeros(7)
 HERE = PANDA.state(0.0, Q, V).frame("panda_tcp")
 QUATERNION = pin.SE3ToXYZQUAT(pin.SE3(HERE.rotation, HERE.position))[3:]
 PERIOD = 5e-3
-EACH = 300  # targets in a part of the run, of 1.5 s
+EACH = 200  # targets in a part of the run, of 1 s
 
 
 @pytest.mark.parametrize("policy", ["latest", "interpolate", "extrapolate", "twists"])
@@ -58,6 +58,6 @@ def test_targets_are_forgotten(policy: Any, monkeypatch: pytest.MonkeyPatch) -> 
     assert len(set(words)) == 1
     # Pieces and waypoints of the last second are kept: a number that varies a little.
     assert max(lengths[1:]) < 1.1 * min(lengths[1:])
-    assert max(sizes[1:]) < sizes[1] + 60_000  # of a target 500 bytes would be 300 kB
+    assert max(sizes[1:]) < sizes[1] + 60_000  # of a target 500 bytes would be 200 kB
     assert followed.run.unrecorded > 2 * EACH
     assert max(memory) < 600

@@ -85,7 +85,7 @@ def test_a_command_goes_on_where_nobody_takes_its_text(where: str) -> None:
 @pytest.mark.parametrize(("where", "status"), [("/dev/full", 2), ("/dev/null", 0)])
 def test_the_status_tells_whether_all_was_written(where: str, status: int) -> None:
     with Path(where).open("w") as file:
-        command = [sys.executable, "-m", "hsp_control", "robots"]
+        command = [sys.executable, "-m", "hsp_control", "robots", "panda"]
         done = subprocess.run(command, stdout=file, stderr=subprocess.PIPE, text=True)
     said = "hsp: standard output: No space left on device" if status else ""
     assert (done.returncode, done.stderr.strip()) == (status, said)

@@ -18,15 +18,18 @@ from hsp_control.control.actuation import Status, actuation
 from hsp_control.control.compensation import Command, FrictionFeedForward
 from hsp_control.trajectories import HoldOrientation, Schedule
 
-ROBOTS = ["planar3r", "panda", "iiwa14", "ur5", "xarm7"]
+# One of each kind: with 1, 4 and 3 joints more than the hand has directions.
+ROBOTS = ["planar3r", "panda", "ur5", *(("iiwa14", "xarm7") if THOROUGH else ())]
 START, RAMP = 0.2, 0.3
 EVENTS = (START, START + 0.1, START + RAMP - 0.1, START + RAMP)
 """When something begins or ends, of the changes below [s]."""
 FINEST = 1e-9
 """To which the place of the largest change is bisected [s]."""
+JUMP = 1e-6
+"""The largest change of an effort that is no jump [N·m]."""
 
 many = settings(
-    max_examples=40 if THOROUGH else 4, deadline=None, derandomize=not THOROUGH
+    max_examples=40 if THOROUGH else 3, deadline=None, derandomize=not THOROUGH
 )
 seeds = st.integers(0, 2**32 - 1)
 
@@ -109,7 +112,8 @@ class Case:
 
         worst = 0.0, times[0]
         for a, b in pairwise(times):
-            while b - a > FINEST:
+            # Nearer than 1e-5 s a change that is smaller than a jump hides none.
+            while b - a > FINEST and (b - a > 1e-5 or change(a, b) >= JUMP):
                 middle = 0.5 * (a + b)
                 first = change(a, middle) >= change(middle, b)
                 a, b = (a, middle) if first else (middle, b)
@@ -124,7 +128,7 @@ class Case:
         times = np.unique(np.r_[np.linspace(0.1, end, 26), near])
         jump, t = self.largest_jump(controller, times)
         assume(self.binds)
-        assert jump < 1e-6, f"{jump} N·m at {t} s"
+        assert jump < JUMP, f"{jump} N·m at {t} s"
 
 
 def changed(controller: hsp.Controller, act: Callable[[Any], Any]) -> hsp.Controller:

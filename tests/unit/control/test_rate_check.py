@@ -324,10 +324,9 @@ def test_the_advice_on_a_compensator_works(
     check_rate(made, Q0, H, make(best), effort_delay=delay)
 
 
-@pytest.mark.parametrize("late", [45, 70, 300, 100_000])
 @pytest.mark.parametrize("which", ["effort_delay", "sensor_delay"])
 def test_a_delay_that_the_loop_does_not_bear_is_told_with_one_that_it_bears(
-    which: str, late: int
+    which: str,
 ) -> None:
     """For ω0 = 20: the phase margin over the crossover, less half a period's hold."""
     robot = Robot.load("panda")
@@ -338,13 +337,14 @@ def test_a_delay_that_the_loop_does_not_bear_is_told_with_one_that_it_bears(
         delays = {"effort_delay": 0, "sensor_delay": 0, which: periods}
         return check_rate(law, robot.home(), H, **delays, strict=False)
 
-    (found,) = (each for each in check(late) if "tasks" in each.path)
-    assert found.unstable
     kp, kv = 400.0, 40.0
     crossover = np.sqrt(0.5 * (kv**2 + np.sqrt(kv**4 + 4.0 * kp**2)))
     margin = np.arctan(crossover * kv / kp) / crossover
     most = int(margin / H - 0.5)
-    assert f"at most {most}" in found.message
+    for late in (45, 300, 100_000):
+        (found,) = (each for each in check(late) if "tasks" in each.path)
+        assert found.unstable, late
+        assert f"at most {most}" in found.message, late
     assert not any(each.unstable for each in check(most))
     assert any(each.unstable for each in check(most + 1))
 

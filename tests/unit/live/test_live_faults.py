@@ -27,6 +27,7 @@ from live_rigs import (
     start,
     watched,
 )
+from places import THOROUGH
 
 import hsp_control as hsp
 from hsp_control import Rollout
@@ -131,7 +132,7 @@ ODD_RESULTS = st.one_of(
 
 
 @pytest.mark.slow
-@settings(max_examples=30)
+@settings(max_examples=100 if THOROUGH else 15)
 @given(odd=ODD_RESULTS, count=st.sampled_from([1, 30, 20_000]))
 def test_whatever_read_returns(odd: Trick, count: int) -> None:
     robot = rig(always(odd, BEGIN, count))
@@ -363,7 +364,7 @@ class Failing(Rig):
 
 
 @pytest.mark.slow
-@settings(max_examples=16)
+@settings(max_examples=100 if THOROUGH else 10)
 @given(
     method=st.sampled_from(["read", "write", "close", "on_period", "change"]),
     error=ERRORS,

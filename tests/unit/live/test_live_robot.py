@@ -7,6 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from live_rigs import PERIOD, Array, Rig, gravity, law, panda, start, watched
+from places import THOROUGH
 
 from hsp_control import Gains, Robot
 from hsp_control.control.compensation import Command, Compensation, MomentumObserver
@@ -157,7 +158,7 @@ def test_lost_efforts_do_not_add_up_where_the_robot_says_what_it_has(
 
 
 @pytest.mark.slow
-@settings(max_examples=15)
+@settings(max_examples=40 if THOROUGH else 8)
 @given(seed=st.integers(0, 2**32 - 1), loss=st.sampled_from([0.1, 0.3]))
 def test_a_robot_never_rejects_an_effort_over_a_bad_line(
     seed: int, loss: float

@@ -99,13 +99,13 @@ def test_an_unknown_effort_moves_the_hand_as_far_as_is_told(joint: int) -> None:
         plant = Pushed(made.robot)
         plant.push = small * np.eye(7)[joint]
         log = hsp.simulate(
-            made, q, duration=3.0, control_period=H, log_period=H, plant=plant,
+            made, q, duration=1.5, control_period=H, log_period=H, plant=plant,
             compensation=compensation, check_rate=False,
         )  # fmt: skip
         for each, rows in zip(found.moved, (slice(0, 3), slice(3, 6)), strict=True):
             away = np.linalg.norm(log["task.hand.error"][:, rows], axis=1)
             peak = small * each.peak[joint]
-            if compensation == ALONE:  # 3 s are 30 of its time constants
+            if compensation == ALONE:  # 1.5 s are 15 of its time constants
                 resting = small * each.resting[joint]
                 assert away[-1] == pytest.approx(resting, rel=0.03, abs=1e-7)
             else:
