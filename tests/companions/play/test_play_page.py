@@ -42,7 +42,9 @@ SETUP: dict[str, Any] = {
          "series": [{"name": "hand", "color": "#0072B2"}]},
         {"id": "torque", "title": "Torque", "unit": "N m", "log": False,
          "series": [{"name": "q1", "color": "#0072B2"},
-                    {"name": "q2", "color": "#22272B"}]},
+                    {"name": "q2", "color": "#22272B"}],
+         "lines": [{"value": 87.0, "name": "limit of q1", "curves": [0]},
+                   {"value": 1.0, "name": "limit of q2", "curves": [1]}]},
     ],
     "pull": True, "loop": "simulated", "period_ms": 1.0,
 }  # fmt: skip
@@ -252,6 +254,28 @@ def test_the_keyboard_moves_by_a_centimetre(page: Any) -> None:
     assert moved["position"] == pytest.approx([BALL[0] + 0.01, *BALL[1:]], abs=1e-12)
     page.keyboard.press("Escape")
     assert page.evaluate("play.selected") is None
+
+
+def test_a_plot_draws_the_limits_of_its_curves(page: Any) -> None:
+    """Of a curve shown alone, only its own, and the axis reaches them."""
+    # Two joints, at 0.9 and at 1.1, which is beyond the second one's limit of 1.
+    page.evaluate(
+        """() => {
+          for (let t = 0; t < 1; t += 0.1) {
+            play.plots.add([t], Float32Array.of(0.01, 0.9, 1.1));
+          }
+          play.plots.plots[1].update();
+        }"""
+    )
+    plot = page.locator(".play-plots .plot").nth(1)
+    edges = plot.locator(".edge")
+    assert edges.all_inner_texts() == ["limit of q2"]  # 87 is beyond the axis
+    plot.locator("button").nth(0).click()
+    assert edges.all_inner_texts() == ["limit of q1"]
+    plot.locator("button").nth(1).click()
+    until(page, "play.plots.plots[1].alone === 1")
+    assert edges.all_inner_texts() == ["limit of q2"]
+    plot.locator("button").nth(1).click()
 
 
 @pytest.mark.smoke
