@@ -1,7 +1,7 @@
 """The page of what goes on now: the scene, its handles and its knobs."""
 
 import operator
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Any, Protocol
 
 import numpy as np
@@ -17,6 +17,8 @@ from hsp_control.companions.viewer.commands import (
     page_command,
     typed_array,
 )
+from hsp_control.companions.viewer.comparison import GHOST_OPACITY, ghost_color
+from hsp_control.companions.viewer.ghosts import Ghosts
 from hsp_control.companions.viewer.live_plots import live_plots
 from hsp_control.companions.viewer.motion import Layer, RunMotion
 from hsp_control.companions.viewer.obstacles import logged_shapes
@@ -64,10 +66,28 @@ class Rows(Protocol):
         """Return the columns from a row on."""
 
 
+class OtherLaw(Protocol):
+    """The same robot with another law."""
+
+    law: str
+
+    @property
+    def q(self) -> Array:
+        """Its configuration, shape (nq,)."""
+
+
 class Shown(Protocol):
     """What goes on and is shown: a play, a live loop, a loop of one's own."""
 
     over: str
+
+    @property
+    def laws(self) -> Sequence[str]:
+        """The laws that can be stepped beside it."""
+
+    @property
+    def other(self) -> OtherLaw | None:
+        """The law that is stepped beside it, if any."""
 
     @property
     def kind(self) -> str:
@@ -116,12 +136,15 @@ class Picture:
         """Draw it as it is, with all that can be touched."""
         self._session, self._viewer = session, viewer
         self._batch = 0
+        color, opacity = ghost_color(1), GHOST_OPACITY
+        self._ghost = Ghosts("other law", session.robot, color, opacity)
         self.begin()
 
     def begin(self) -> None:
         """Draw the scene anew: the session has begun anew."""
         session, viewer = self._session, self._viewer
         self._sent = 0
+        self._compared = False
         self._moved: dict[str, float] = {}
         self._away: dict[str, str] = {}
         self._meta = session.meta
@@ -174,6 +197,7 @@ class Picture:
             _told("state", **moving, message=text, level=level),
             _told("values", values=handles.settings),
             self._force(),
+            *self._other_law(),
             *self._joints(),
             *samples,
         ]
@@ -257,6 +281,16 @@ class Picture:
         point, hand, newtons = pull
         ends = {"from": point.tolist(), "to": hand.tolist()}
         return _told("force", visible=True, newtons=newtons, **ends)
+
+    def _other_law(self) -> Iterator[PageCommand]:
+        """Yield which law is stepped beside it, and where it has the robot."""
+        other = self._session.other
+        law = "" if other is None else other.law
+        yield _told("laws", laws=list(self._session.laws), law=law)
+        if other is not None or self._compared:
+            shown = [] if other is None else [other.q]
+            yield self._ghost.show(shown, law)
+        self._compared = other is not None
 
     def _samples(self) -> Iterator[PageCommand]:
         """Yield the rows of the plots since the last picture."""

@@ -11,11 +11,14 @@ from typing import Any
 
 import browsers
 import numpy as np
+import pinocchio as pin
 import pytest
 from browsers import PATIENCE, until
 
 from hsp_control import Robot
 from hsp_control.companions.viewer import Viewer
+from hsp_control.companions.viewer.commands import unpack
+from hsp_control.companions.viewer.ghosts import Ghosts
 
 pytestmark = pytest.mark.browser
 
@@ -276,6 +279,58 @@ def test_a_plot_draws_the_limits_of_its_curves(page: Any) -> None:
     until(page, "play.plots.plots[1].alone === 1")
     assert edges.all_inner_texts() == ["limit of q2"]
     plot.locator("button").nth(1).click()
+
+
+def test_key_and_button_compare_laws_and_the_other_one_is_a_ghost(page: Any) -> None:
+    button = page.locator(".play-bar .other")
+    tell(page, "play_laws", laws=[], law="")
+    assert not button.is_visible()
+    laws = ["no field", "operational-space law"]
+    for law, following in (("", laws[0]), (laws[0], laws[1]), (laws[1], "")):
+        tell(page, "play_laws", laws=laws, law=law)
+        assert button.get_attribute("aria-pressed") == str(bool(law)).lower()
+        page.evaluate("sent.length = 0")
+        page.keyboard.press("o")
+        button.click()
+        assert until_sent(page, "compare", 2) == 2 * [
+            {"do": "compare", "law": following}
+        ]
+    robot = Robot.load("planar3r")
+    ghosts = Ghosts("other law", robot, "#117733", 0.4)
+    q = robot.integrate(robot.neutral(), np.array([0.4, 0.5, -0.6]))
+    command = unpack(ghosts.show([q], "no field").packed)
+    command["poses"] = command["poses"].tolist()
+    page.evaluate("(command) => viewer.handle_command(command)", command)
+    page.evaluate("viewer.render()")
+    assert page.locator(".play-label.ghost").inner_text() == "no field"
+    placed = page.evaluate(
+        """() => {
+          const [ghost] = play.ghosts.groups.get("other law");
+          return ghost.children.map(({name, position}) => [name, position.toArray()]);
+        }"""
+    )
+    data = robot.model.createData()
+    pin.forwardKinematics(robot.model, data, q)
+    expected = [
+        (name, data.oMi[joint].translation)
+        for joint, name in enumerate(robot.model.names)
+        if joint
+    ]
+    for (name, position), (known, there) in zip(placed, expected, strict=True):
+        assert name == known
+        np.testing.assert_allclose(position, there, atol=1e-6)
+    own = page.evaluate("""() => {
+      const shown = (root) => {
+        const found = [];
+        root.traverse(({geometry}) => geometry && found.push(geometry.uuid));
+        return found;
+      };
+      const [ghost] = play.ghosts.groups.get("other law");
+      return [shown(ghost), shown(node("/robot"))];
+    }""")
+    assert own[0]
+    assert set(own[0]) <= set(own[1])  # it shares the geometries
+    page.evaluate("play.ghosts.clear()")
 
 
 @pytest.mark.smoke
