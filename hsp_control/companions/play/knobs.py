@@ -69,7 +69,7 @@ def _null_space(controller: Controller, period: float) -> Iterator[Knob]:
     field, group = controller.field, "Null space"
     if not field.controls:
         return
-    switch = _FieldSwitch(field)
+    switch = FieldSwitch(field)
     if switch.whole:
         note = "Off: nothing tells the free joints where to go."
         yield Knob("field", group, "Field", "", True, 0.0, 1.0, switch.turn, note)
@@ -91,7 +91,7 @@ def _null_space(controller: Controller, period: float) -> Iterator[Knob]:
             )
 
 
-class _FieldSwitch:
+class FieldSwitch:
     """Lets the field go (its terms stay, with weight 0), and brings it back."""
 
     def __init__(self, field: NullSpaceField) -> None:

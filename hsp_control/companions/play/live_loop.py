@@ -193,6 +193,8 @@ class Mirror:
     """What a picture needs of a live loop, as of a `Session`."""
 
     pushes = None
+    laws: tuple[str, ...] = ()
+    other = None
 
     def __init__(
         self,

@@ -14,6 +14,7 @@ from hsp_control.common.exceptions import SimulationError
 from hsp_control.companions.play.handles import Handles
 from hsp_control.companions.play.knobs import Knob
 from hsp_control.companions.play.operational_space import ComparedCommand
+from hsp_control.companions.play.other_law import OtherLaw, laws_beside
 from hsp_control.companions.viewer.commands import path_element
 from hsp_control.config import Experiment
 from hsp_control.control.changes import Changes
@@ -57,10 +58,10 @@ class Session:
             raise SimulationError("a session needs a control period")
         self.experiment = experiment
         self.period, self.row = settings.control_period, settings.log_period
-        self._plant = sampled(
+        self.plant = sampled(
             experiment.plant, experiment.integrator, settings.control_period
         )
-        self.pushes = pushes_of(self._plant)
+        self.pushes = pushes_of(self.plant)
         if self.pushes is not None:
             self.pushes.reachable = True
         self._point: Array | None = None
@@ -71,15 +72,16 @@ class Session:
         experiment, robot = self.experiment, self.experiment.robot
         memo: dict[int, Any] = {id(robot): robot}
         self.controller: Controller = deepcopy(experiment.controller, memo)
-        self._command = ComparedCommand(self.controller, experiment.compensation)
+        self.command = ComparedCommand(self.controller, experiment.compensation)
+        self.other: OtherLaw | None = None
         self.let_go()
         self._unrepeatable = ""
         rows, plan = self._rows(), experiment.scenario.plan
         times = [k * self.row for k in range(rows)]
-        chain = ControlChain(self._command, plan, experiment.scenario.estimators)
-        chain.begin(self._plant.inertial())
+        chain = ControlChain(self.command, plan, experiment.scenario.estimators)
+        chain.begin(self.plant.inertial())
         self._loop: Iterator[Instant] = sampled_loop(
-            chain, self._plant, round(self.row / self.period), times,
+            chain, self.plant, round(self.row / self.period), times,
             experiment.q0, experiment.v0,
         )  # fmt: skip
         scene = self.controller.scene
@@ -122,6 +124,7 @@ class Session:
         if not self.over:
             self._step()
             self.handles.turn_knobs()
+            self._step_other()
 
     def _step(self) -> None:
         try:
@@ -130,7 +133,7 @@ class Session:
                 self.over = f"the log is full at t = {self.t:.0f} s; reset to go on"
                 return
             state, output, tau, own = instant
-            others = self._plant.log_channels(state.t, state.q, state.v, tau)
+            others = self.plant.log_channels(state.t, state.q, state.v, tau)
             pulled = self.pull()
             force = LogChannel(0.0 if pulled is None else pulled[2], "N", "of a hand")
             channels = {**own, **others, PULL_COLUMN: force}
@@ -140,6 +143,34 @@ class Session:
         except BaseException as error:  # a user's task or field may raise anything
             self.over = f"{described(error)}; reset to go on"
             _log.warning("%s", described(error))
+
+    # -- another law beside it --------------------------------------------------------
+
+    @property
+    def laws(self) -> list[str]:
+        """The laws that can be stepped beside it; none of what has a plan."""
+        if self.experiment.scenario.plan is not None:
+            return []
+        operational = self.command.operational
+        return laws_beside(self.controller, operational=operational)
+
+    def compare_with(self, law: str | None) -> None:
+        """Step another law beside it from now on; None: no more."""
+        if law is not None and law not in self.laws:
+            raise ValueError(f"there is no {law!r} to compare with")
+        self.other = None if law is None else OtherLaw(self, law)
+
+    def _step_other(self) -> None:
+        """Let the other law go on; where it fails, only it ends."""
+        if self.other is None:
+            return
+        try:
+            self.other.advance()
+        except (KeyboardInterrupt, SystemExit):
+            raise
+        except BaseException as error:  # the other law may fail where this one does not
+            self.handles.say(f"{self.other.law}: {described(error)}", warning=True)
+            self.other = None
 
     # -- messages ---------------------------------------------------------------------
 
@@ -152,8 +183,12 @@ class Session:
                     self._pull(path, _vector(point), _vector(hand))
                 case {"do": "let_go" | "left"}:
                     self.let_go()
+                case {"do": "compare", "law": str(law)}:
+                    self.compare_with(law or None)
                 case _:
                     self.handles.receive(message)
+                    if self.other is not None:
+                        self.other.receive(message)
         except (ValueError, TypeError, OverflowError) as error:
             self.handles.say(str(error), warning=True)
         except (KeyboardInterrupt, SystemExit):
@@ -164,7 +199,8 @@ class Session:
 
     def _compare(self, _at: Changes, operational: bool) -> None:
         """Follow another law; it is no part of the controller, nor of its log."""
-        self._command.operational = operational
+        self.command.operational = operational
+        self.other = None  # its law may be the same now
         if operational:
             self._unrepeatable = "the operational-space law was tried"
 
@@ -204,7 +240,7 @@ class Session:
     @property
     def meta(self) -> dict[str, Any]:
         """The meta data of the rows so far."""
-        return self.recorder.meta("", "", plant=self._plant.describe())
+        return self.recorder.meta("", "", plant=self.plant.describe())
 
     def rollout(self) -> Rollout:
         """Return the log so far; `hsp run` repeats it, unless somebody pulled."""
@@ -220,9 +256,14 @@ class Session:
             name=f"{experiment.name}, played",
             title=experiment.scenario.title,
             config=config,
-            plant=self._plant.describe(),
+            plant=self.plant.describe(),
             **lost,
         )
+
+    @property
+    def rows_left(self) -> int:
+        """How many rows the log still takes, the present one included."""
+        return self._rows() - self.recorder.count + 1
 
     def _rows(self) -> int:
         probe = LogWriter(self.controller, self.controller.scene, 1)

@@ -1,15 +1,13 @@
-"""The page of what goes on now: the scene, its handles, its knobs and its plots."""
+"""The page of what goes on now: the scene, its handles and its knobs."""
 
 import operator
-import re
-from collections.abc import Iterator, Mapping
-from typing import Any, NamedTuple, Protocol
+from collections.abc import Iterator, Mapping, Sequence
+from typing import Any, Protocol
 
 import numpy as np
 
 from hsp_control.common.arrays import Array
-from hsp_control.companions.plots.log_series import distance_label, joint_names
-from hsp_control.companions.plots.palette import SERIES
+from hsp_control.companions.plots.log_series import joint_names
 from hsp_control.companions.viewer.clearances import capsules, distances, influence
 from hsp_control.companions.viewer.clip import track_fields
 from hsp_control.companions.viewer.commands import (
@@ -19,6 +17,9 @@ from hsp_control.companions.viewer.commands import (
     page_command,
     typed_array,
 )
+from hsp_control.companions.viewer.comparison import GHOST_OPACITY, ghost_color
+from hsp_control.companions.viewer.ghosts import Ghosts
+from hsp_control.companions.viewer.live_plots import live_plots
 from hsp_control.companions.viewer.motion import Layer, RunMotion
 from hsp_control.companions.viewer.obstacles import logged_shapes
 from hsp_control.companions.viewer.run_drawing import RunDrawing, all_layers, line_color
@@ -29,31 +30,12 @@ from hsp_control.null_space.fields.field import terms_of
 from hsp_control.null_space.fields.weight import sample_weight
 from hsp_control.robot import Robot
 from hsp_control.simulation import Rollout
-from hsp_control.simulation.measures import PULL_COLUMN, PULLED, REACHED, unreached
+from hsp_control.simulation.measures import PULLED, REACHED, unreached
 
 FRAME = 1.0 / 30.0  # time between two pictures [s]
 _FIELD_LAYERS = ("influence", "distances", "capsules")
 _BATCHES = 64
 """Batches of samples that wait for a page at most; what is older is left out."""
-_JOINTS = 8  # most joints whose efforts have a curve each
-
-
-class Curve(NamedTuple):
-    """One curve of a plot."""
-
-    name: str
-    column: str  # column of the log
-    rows: slice = slice(0, 1)  # which components, of which the norm is shown
-
-
-class LivePlot(NamedTuple):
-    """One plot."""
-
-    title: str
-    note: str  # what it tells
-    unit: str
-    log: bool  # whether its scale is logarithmic
-    curves: list[Curve]
 
 
 class Touched(Protocol):
@@ -84,10 +66,28 @@ class Rows(Protocol):
         """Return the columns from a row on."""
 
 
+class OtherLaw(Protocol):
+    """The same robot with another law."""
+
+    law: str
+
+    @property
+    def q(self) -> Array:
+        """Its configuration, shape (nq,)."""
+
+
 class Shown(Protocol):
     """What goes on and is shown: a play, a live loop, a loop of one's own."""
 
     over: str
+
+    @property
+    def laws(self) -> Sequence[str]:
+        """The laws that can be stepped beside it."""
+
+    @property
+    def other(self) -> OtherLaw | None:
+        """The law that is stepped beside it, if any."""
 
     @property
     def kind(self) -> str:
@@ -136,12 +136,15 @@ class Picture:
         """Draw it as it is, with all that can be touched."""
         self._session, self._viewer = session, viewer
         self._batch = 0
+        color, opacity = ghost_color(1), GHOST_OPACITY
+        self._ghost = Ghosts("other law", session.robot, color, opacity)
         self.begin()
 
     def begin(self) -> None:
         """Draw the scene anew: the session has begun anew."""
         session, viewer = self._session, self._viewer
         self._sent = 0
+        self._compared = False
         self._moved: dict[str, float] = {}
         self._away: dict[str, str] = {}
         self._meta = session.meta
@@ -153,7 +156,7 @@ class Picture:
         )
         title = session.title
         self._size = viewer.set_stage(self._run, title)
-        self._plots = list(_plots(session))
+        self._plots = live_plots(session.recorder.rows(0), self._meta)
         viewer.transport.send([self._setup(title), *self.frame(running=True, rate=1.0)])
 
     def _layers(self, motion: RunMotion) -> dict[str, Layer]:
@@ -194,6 +197,7 @@ class Picture:
             _told("state", **moving, message=text, level=level),
             _told("values", values=handles.settings),
             self._force(),
+            *self._other_law(),
             *self._joints(),
             *samples,
         ]
@@ -239,18 +243,13 @@ class Picture:
         session, handles = self._session, self._session.handles
         controller = session.controller
         state = None if controller is None else controller.state
-        plots = []
-        for plot in self._plots:
-            names = enumerate(curve.name for curve in plot.curves)
-            series = [{"name": n, "color": SERIES[i % len(SERIES)]} for i, n in names]
-            plots.append({**plot._replace(curves=[])._asdict(), "series": series})
         return _told(
             "setup",
             title=title,
             targets=[grip.describe(state) for grip in handles.targets.values()],
             obstacles=[grip.describe(state) for grip in handles.obstacles.values()],
             controls=[knob.describe() for knob in handles.knobs.values()],
-            plots=plots,
+            plots=[plot.describe() for plot in self._plots],
             joints=joint_names(self._motion().rows) if self._meta["limits"] else [],
             pull=session.pushes is not None,
             loop=session.kind,
@@ -283,6 +282,16 @@ class Picture:
         ends = {"from": point.tolist(), "to": hand.tolist()}
         return _told("force", visible=True, newtons=newtons, **ends)
 
+    def _other_law(self) -> Iterator[PageCommand]:
+        """Yield which law is stepped beside it, and where it has the robot."""
+        other = self._session.other
+        law = "" if other is None else other.law
+        yield _told("laws", laws=list(self._session.laws), law=law)
+        if other is not None or self._compared:
+            shown = [] if other is None else [other.q]
+            yield self._ghost.show(shown, law)
+        self._compared = other is not None
+
     def _samples(self) -> Iterator[PageCommand]:
         """Yield the rows of the plots since the last picture."""
         recorder = self._session.recorder
@@ -300,7 +309,7 @@ class Picture:
         times = rows["t"]
         self._batch += 1
         values = np.column_stack(
-            [_values(rows, curve) for plot in self._plots for curve in plot.curves]
+            [curve.values(rows) for plot in self._plots for curve in plot.curves]
             or [np.zeros((len(times), 0))]
         )
         yield page_command(
@@ -327,59 +336,3 @@ def _off(rows: dict[str, Array], task: str) -> bool:
     """Return whether a task's error is worth a word in the last row."""
     error = rows.get(f"task.{task}.error")
     return error is not None and bool(np.linalg.norm(error[-1]) > REACHED)
-
-
-def _values(rows: dict[str, Array], curve: Curve) -> Array:
-    """Return the values of a curve, shape (N,); NaN where there is none."""
-    column = rows.get(curve.column)
-    if column is None:
-        return np.full(len(rows["t"]), np.nan)
-    if column.ndim == 1:
-        return column
-    part = column[:, curve.rows]
-    return part[:, 0] if part.shape[1] == 1 else np.linalg.norm(part, axis=1)
-
-
-def _plots(session: Shown) -> Iterator[LivePlot]:
-    """Yield the plots of a session, what tells most first."""
-    rows, meta = session.recorder.rows(0), session.meta
-    dofs = joint_names(Rollout(rows, meta))
-    units = list(dict.fromkeys(meta["robot"]["units"]))
-    if meta["controls_null_space"]:
-        norm = Curve("‖e_N‖", "null_space_norm")
-        unit = ", ".join(f"{unit}/s" for unit in units)
-        note = "Of the free joints' motion; decays with K_N where nothing binds."
-        yield LivePlot("Null-space error ‖e_N‖", note, unit, True, [norm])
-    names = [name for name in rows if name.startswith("distance.")]
-    if names:
-        labels = [distance_label(meta, n.removeprefix("distance.")) for n in names]
-        curves = [Curve(*each) for each in zip(labels, names, strict=True)]
-        note = "To obstacles and between links; below 0 is a collision."
-        yield LivePlot("Clearance", note, "m", False, curves)
-    curves = [Curve("‖τ‖", "tau", slice(0, len(dofs)))]
-    if len(dofs) <= _JOINTS:
-        curves = [Curve(n, "tau", slice(k, k + 1)) for k, n in enumerate(dofs)]
-    yield LivePlot("Efforts τ", "Of the motors.", "N·m", False, curves)
-    curves = [Curve("‖v‖", "v", slice(0, len(dofs)))]
-    if len(dofs) <= _JOINTS:
-        curves = [Curve(n, "v", slice(k, k + 1)) for k, n in enumerate(dofs)]
-    unit = ", ".join(f"{unit}/s" for unit in units)
-    yield LivePlot("Speeds v", "Of the joints.", unit, False, curves)
-    contacts = re.compile(r"contact\.(.+)\.force")
-    found = filter(None, map(contacts.fullmatch, rows))
-    curves = [Curve(f"contact {each[1]}", each[0], slice(0, 3)) for each in found]
-    if PULL_COLUMN in rows:
-        curves.append(Curve("your pull", PULL_COLUMN))
-    if curves:
-        yield LivePlot("Forces", "On the robot, their size.", "N", False, curves)
-    errors: dict[str, list[Curve]] = {}
-    for task, about in meta["tasks"].items():
-        first = 0
-        for part, unit, _, size in about["error"]:
-            name = task if len(about["error"]) == 1 else f"{task}, {part}"
-            curve = Curve(name, f"task.{task}.error", slice(first, first + size))
-            errors.setdefault(unit, []).append(curve)
-            first += size
-    for unit, curves in errors.items():
-        note = "From each target."
-        yield LivePlot("Task error", note, unit, True, curves)

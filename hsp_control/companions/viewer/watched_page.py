@@ -50,6 +50,8 @@ class Watched:
 
     kind = "watched"
     pushes = None
+    laws: tuple[str, ...] = ()
+    other = None
 
     def __init__(self, reader: JournalReader) -> None:
         """Begin with a reader that has the first row."""

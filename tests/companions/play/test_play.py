@@ -14,6 +14,7 @@ from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import ConfigError
 from hsp_control.companions.play import Session, play
 from hsp_control.companions.play.knobs import _scaled, knobs_of
+from hsp_control.companions.play.other_law import OtherLaw
 from hsp_control.companions.play.playable import playable
 from hsp_control.companions.viewer import Viewer
 from hsp_control.companions.viewer.live_picture import Picture
@@ -311,6 +312,60 @@ def test_what_goes_wrong_ends_the_run_and_not_the_session(
     assert not session.over
 
 
+@pytest.mark.parametrize("law", ["no field", "operational-space law"])
+def test_another_law_goes_beside_it(law: str) -> None:
+    """From the same state, with the same hand; the play itself does not notice."""
+    both = [Session(playable("panda_obstacle")) for _ in range(2)]
+    for session in both:
+        go(session, 0.5)
+        wanted = pose_of(session)
+        wanted[2] += 0.03
+        session.receive({"do": "move", "target": "hand", "pose": wanted.tolist()})
+        go(session, 0.1)
+    session, alone = both
+    assert session.laws == ["no field", "operational-space law"]
+    session.receive({"do": "compare", "law": law})
+    other = session.other
+    assert other is not None
+    np.testing.assert_array_equal(other.q, session.controller.state.q)
+    wanted[1] += 0.05
+    for session in both:
+        session.receive({"do": "move", "target": "hand", "pose": wanted.tolist()})
+        session.receive({"do": "obstacle", "name": "ball", "position": [0.1, 0.3, 0.6]})
+        go(session, 1.5)
+    session, alone = both
+    assert session.other is other
+    log, same = session.rollout(), alone.rollout()
+    np.testing.assert_array_equal(log.q, same.q)
+    assert other.controller.state.t == session.t
+    hand = [each.state.frame("panda_tcp") for each in (other.controller,
+                                                       session.controller)]  # fmt: skip
+    np.testing.assert_allclose(hand[0].position, hand[1].position, atol=1e-4)
+    assert np.abs(other.q - session.controller.state.q).max() > 0.02  # the elbow
+    session.receive({"do": "compare", "law": ""})
+    assert session.other is None
+    session.receive({"do": "compare", "law": "another"})
+    assert session.handles.message == "there is no 'another' to compare with"
+    session.receive({"do": "compare", "law": law})
+    session.reset()
+    assert session.other is None
+
+
+def test_what_fails_beside_a_play_ends_alone(
+    session: Session, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    go(session, 0.1)
+    session.receive({"do": "compare", "law": "no field"})
+
+    def fail(_: object) -> None:
+        raise RuntimeError("an error of its own")
+
+    monkeypatch.setattr(OtherLaw, "advance", fail)
+    go(session, 0.1)
+    assert session.other is None
+    assert "no field: RuntimeError: an error of its own" in session.handles.message
+
+
 def test_the_log_has_an_end(session: Session, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("hsp_control.companions.play.session.LONGEST", 0.1)
     session.reset()
@@ -335,6 +390,17 @@ def test_the_picture_follows_what_is_dragged(session: Session) -> None:
         "Null-space error ‖e_N‖", "Clearance", "Efforts τ", "Speeds v", "Forces",
         "Task error", "Task error",
     ]  # fmt: skip
+    effort = setup["plots"][2]
+    assert effort["note"] == "Of the motors; limits ±12, ±87."
+    lines = [(each["value"], each["name"], each["curves"]) for each in effort["lines"]]
+    assert lines == [
+        (87.0, "limit of joint1 … joint4", [0, 1, 2, 3]),
+        (-87.0, "", [0, 1, 2, 3]),
+        (12.0, "limit of joint5 … joint7", [4, 5, 6]),
+        (-12.0, "", [4, 5, 6]),
+    ]
+    edges = {line["name"]: line["value"] for line in setup["plots"][1]["lines"]}
+    assert edges == {"contact": 0.0}
     assert {each["id"] for each in setup["controls"]} == set(session.handles.knobs)
     session.receive({"do": "obstacle", "name": "ball", "position": [0.2, 0.4, 0.5]})
     go(session, 1.5)

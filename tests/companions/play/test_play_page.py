@@ -11,11 +11,14 @@ from typing import Any
 
 import browsers
 import numpy as np
+import pinocchio as pin
 import pytest
 from browsers import PATIENCE, until
 
 from hsp_control import Robot
 from hsp_control.companions.viewer import Viewer
+from hsp_control.companions.viewer.commands import unpack
+from hsp_control.companions.viewer.ghosts import Ghosts
 
 pytestmark = pytest.mark.browser
 
@@ -42,7 +45,9 @@ SETUP: dict[str, Any] = {
          "series": [{"name": "hand", "color": "#0072B2"}]},
         {"id": "torque", "title": "Torque", "unit": "N m", "log": False,
          "series": [{"name": "q1", "color": "#0072B2"},
-                    {"name": "q2", "color": "#22272B"}]},
+                    {"name": "q2", "color": "#22272B"}],
+         "lines": [{"value": 87.0, "name": "limit of q1", "curves": [0]},
+                   {"value": 1.0, "name": "limit of q2", "curves": [1]}]},
     ],
     "pull": True, "loop": "simulated", "period_ms": 1.0,
 }  # fmt: skip
@@ -252,6 +257,80 @@ def test_the_keyboard_moves_by_a_centimetre(page: Any) -> None:
     assert moved["position"] == pytest.approx([BALL[0] + 0.01, *BALL[1:]], abs=1e-12)
     page.keyboard.press("Escape")
     assert page.evaluate("play.selected") is None
+
+
+def test_a_plot_draws_the_limits_of_its_curves(page: Any) -> None:
+    """Of a curve shown alone, only its own, and the axis reaches them."""
+    # Two joints, at 0.9 and at 1.1, which is beyond the second one's limit of 1.
+    page.evaluate(
+        """() => {
+          for (let t = 0; t < 1; t += 0.1) {
+            play.plots.add([t], Float32Array.of(0.01, 0.9, 1.1));
+          }
+          play.plots.plots[1].update();
+        }"""
+    )
+    plot = page.locator(".play-plots .plot").nth(1)
+    edges = plot.locator(".edge")
+    assert edges.all_inner_texts() == ["limit of q2"]  # 87 is beyond the axis
+    plot.locator("button").nth(0).click()
+    assert edges.all_inner_texts() == ["limit of q1"]
+    plot.locator("button").nth(1).click()
+    until(page, "play.plots.plots[1].alone === 1")
+    assert edges.all_inner_texts() == ["limit of q2"]
+    plot.locator("button").nth(1).click()
+
+
+def test_key_and_button_compare_laws_and_the_other_one_is_a_ghost(page: Any) -> None:
+    button = page.locator(".play-bar .other")
+    tell(page, "play_laws", laws=[], law="")
+    assert not button.is_visible()
+    laws = ["no field", "operational-space law"]
+    for law, following in (("", laws[0]), (laws[0], laws[1]), (laws[1], "")):
+        tell(page, "play_laws", laws=laws, law=law)
+        assert button.get_attribute("aria-pressed") == str(bool(law)).lower()
+        page.evaluate("sent.length = 0")
+        page.keyboard.press("o")
+        button.click()
+        assert until_sent(page, "compare", 2) == 2 * [
+            {"do": "compare", "law": following}
+        ]
+    robot = Robot.load("planar3r")
+    ghosts = Ghosts("other law", robot, "#117733", 0.4)
+    q = robot.integrate(robot.neutral(), np.array([0.4, 0.5, -0.6]))
+    command = unpack(ghosts.show([q], "no field").packed)
+    command["poses"] = command["poses"].tolist()
+    page.evaluate("(command) => viewer.handle_command(command)", command)
+    page.evaluate("viewer.render()")
+    assert page.locator(".play-label.ghost").inner_text() == "no field"
+    placed = page.evaluate(
+        """() => {
+          const [ghost] = play.ghosts.groups.get("other law");
+          return ghost.children.map(({name, position}) => [name, position.toArray()]);
+        }"""
+    )
+    data = robot.model.createData()
+    pin.forwardKinematics(robot.model, data, q)
+    expected = [
+        (name, data.oMi[joint].translation)
+        for joint, name in enumerate(robot.model.names)
+        if joint
+    ]
+    for (name, position), (known, there) in zip(placed, expected, strict=True):
+        assert name == known
+        np.testing.assert_allclose(position, there, atol=1e-6)
+    own = page.evaluate("""() => {
+      const shown = (root) => {
+        const found = [];
+        root.traverse(({geometry}) => geometry && found.push(geometry.uuid));
+        return found;
+      };
+      const [ghost] = play.ghosts.groups.get("other law");
+      return [shown(ghost), shown(node("/robot"))];
+    }""")
+    assert own[0]
+    assert set(own[0]) <= set(own[1])  # it shares the geometries
+    page.evaluate("play.ghosts.clear()")
 
 
 @pytest.mark.smoke

@@ -74,7 +74,8 @@ class LivePlots {
 class LivePlot extends Plot {
   constructor(plots, definition) {
     super("h3", definition, definition.series);
-    Object.assign(this, {plots, log: definition.log});
+    const {log, lines = [], reaches = false} = definition;
+    Object.assign(this, {plots, log, lines, reaches, marks: make("div", {className: "marks"})});
     const ariaLabel = `${definition.title}, the last ${LivePlots.SPAN} s`;
     Object.assign(this.figure, {role: "img", ariaLabel});
   }
@@ -104,8 +105,23 @@ class LivePlot extends Plot {
         y: {range: (_, least, most) => this.range(least, most)},
       },
       cursor: {points: {size: 7, width: 0, fill: (_, k) => shades[k - 1]}},
-      hooks: {setCursor: [() => this.showValues()]},
+      hooks: {setCursor: [() => this.showValues()], draw: [(chart) => this.drawLines(chart)]},
     });
+  }
+
+  // The lines of what is shown; a curve that is shown alone has only its own.
+  get ownLines() {
+    return this.lines.filter(({curves}) => this.alone === null || curves.includes(this.alone));
+  }
+
+  // Limits and contacts within the axis, with their names at the left.
+  drawLines({over, scales: {y: {min, max}}, valToPos}) {
+    const inside = this.ownLines.filter(({value}) => value >= min && value <= max);
+    this.marks.replaceChildren(...inside.map(({value, name}) => {
+      const top = Math.round(valToPos(value, "y"));
+      return make("i", {className: top < 16 ? "edge below" : "edge", style: `top: ${top}px`}, name);
+    }));
+    over.prepend(this.marks);
   }
 
   update() {
@@ -123,6 +139,11 @@ class LivePlot extends Plot {
     if (this.log) {
       const least = Math.max(Math.floor(low - 0.05), -9);  // below is nothing to see
       return [least, Math.max(Math.ceil(high + 0.05), least + 1)];
+    }
+    if (Math.max(-low, high) < 1e-9) return [0, 1];  // nothing but rounding
+    if (this.reaches || this.alone !== null) {
+      const ends = this.ownLines.map(({value}) => value);
+      [low, high] = [Math.min(low, ...ends), Math.max(high, ...ends)];
     }
     const size = Math.max(Math.abs(low), Math.abs(high), 5e-8), middle = (low + high) / 2;
     const half = Math.max(high - low, 0.02 * size) / 2;

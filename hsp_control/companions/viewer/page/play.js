@@ -13,6 +13,9 @@ class Play {
     this.gizmos = new Map();  // key -> Gizmo, of a target or an obstacle
     this.touched = new Map();  // key of a thing or a setting -> when the hand has changed it [ms]
     this.state = {t: 0, running: true, rate: 1, message: "", level: "info"};
+    this.laws = [];  // that can be stepped beside it
+    this.law = "";  // which one is; "": none
+    this.ghosts = new Ghosts(viewer);
     this.away = {};  // task -> what to say of a target that is not reached
     this.setup = this.selected = this.force = this.pull = null;
   }
@@ -26,6 +29,7 @@ class Play {
     if (!this.ready) this.build();
     this.setup = setup;
     this.hand.end(true);
+    this.ghosts.clear();
     document.body.classList.toggle("live-loop", !this.simulated);
     document.body.classList.toggle("watched-loop", loop === "watched");
     if (loop === "held") this.holdKey ??= new PlayHold(this);
@@ -173,6 +177,17 @@ class Play {
   act(what) { this.send({do: what}); }
   toggle() { this.act(this.state.running ? "pause" : "go"); }
 
+  // Step the next other law beside it; after the last one, none.
+  compareNext() {
+    const law = this.laws[this.laws.indexOf(this.law) + 1] ?? "";
+    this.send({do: "compare", law});
+  }
+
+  showLaws({laws, law}) {
+    Object.assign(this, {laws, law});
+    this.bar.showLaws(laws, law);
+  }
+
   select(key) {
     this.selected = key;
     this.panel.showSelected(key);
@@ -200,6 +215,7 @@ class Play {
       this.overlay.place(key, at, radius, lines.filter(Boolean).join("\n"), Boolean(away));
     }
     this.layOutSpring(sight);
+    this.ghosts.layOut(sight);
   }
 
   // The hand's end of the spring is where the pointer is; the link's end moves with it.
@@ -220,6 +236,8 @@ Object.assign(commandHandlers, {
   play_setup(command) { play.setUp(command); },
   play_targets(command) { if (play.ready) play.showTargets(command); },
   play_state(command) { play.showState(command); },
+  play_laws(command) { if (play.ready) play.showLaws(command); },
+  ghosts(command) { if (play.ready) play.ghosts.show(command); },
   play_values({values}) { if (play.ready) play.panel.setValues(values); },
   pose({tracks}) { if (!play.ready || play.bar.past.take(tracks)) player.pose(tracks); },
   play_joints(command) { if (play.ready && play.panel.open) play.bars.show(command); },

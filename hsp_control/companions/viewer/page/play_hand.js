@@ -172,7 +172,7 @@ class PlayKeys {
     if (key === " " && play.holdKey) return () => play.holdKey.set(true);
     return play.simulated && {
       " ": () => play.toggle(), ".": () => play.act("step"),
-      r: () => play.act("reset"), s: () => play.act("save"),
+      r: () => play.act("reset"), s: () => play.act("save"), o: () => play.compareNext(),
     }[key];
   }
 

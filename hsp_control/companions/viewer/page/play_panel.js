@@ -14,6 +14,8 @@ class PlayBar {
     [this.status, this.watching] = [".play-status", ".play-watching"].map((name) => part(name));
     onPress(this.panel, () => play.panel.setOpen(!play.panel.open));
     onPress(part("button", this.watching), () => play.act("take_over"));
+    this.other = part(".other", this.row);
+    this.acting.push(onPress(this.other, () => play.compareNext()));
     presentation.addButton(part(".present", this.row));
     this.past = new PlayPast(play, part(".back", this.row));
     const camera = new PlayCamera(play.viewer, () => document.title);
@@ -43,6 +45,13 @@ class PlayBar {
       if (level !== "warning") this.timer = setTimeout(() => { this.status.textContent = ""; }, 6000);
     }
     this.status.classList.toggle("warning", level === "warning");
+  }
+
+  showLaws(laws, law) {
+    this.other.hidden = !laws.length;
+    this.other.ariaPressed = Boolean(law);
+    const title = law ? `The ghost: ${law}` : "The other law beside it, as a ghost";
+    if (this.other.title !== `${title} (o)`) this.other.title = `${title} (o)`;
   }
 
   showDrive(mine, taken) {

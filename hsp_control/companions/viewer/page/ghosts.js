@@ -1,0 +1,56 @@
+// Translucent copies of the robot in other configurations; see viewer/ghosts.py. They share the
+// geometries of the robot that is drawn.
+"use strict";
+
+class Ghosts {
+  constructor(viewer) { Object.assign(this, {viewer, groups: new Map(), labels: new Map()}); }
+
+  show({ghosts: name, joints, count, poses, text, color, opacity}) {
+    const ghosts = this.groups.get(name) ?? [];
+    this.groups.set(name, ghosts);
+    while (ghosts.length > count) ghosts.pop().removeFromParent();
+    while (ghosts.length < count) ghosts.push(this.made(color, opacity));
+    ghosts.forEach((ghost, k) => joints.forEach((joint, j) => {
+      const part = ghost.getObjectByName(joint), at = 7 * (k * joints.length + j);
+      part?.position.fromArray(poses, at);
+      part?.quaternion.fromArray(poses, at + 3);
+    }));
+    this.label(name, count ? text : "", color);
+    this.viewer.set_dirty();
+  }
+
+  made(color, opacity) {
+    const ghost = node("/robot").clone();
+    ghost.getObjectByName("universe")?.removeFromParent();  // what does not move is there
+    ghost.name = "ghost";
+    makeGhost(ghost, color, opacity);
+    node("").add(ghost);
+    return ghost;
+  }
+
+  // The robot was drawn anew: what was copied is another one.
+  clear() {
+    for (const ghost of [...this.groups.values()].flat()) ghost.removeFromParent();
+    this.groups.clear();
+  }
+
+  // What ghosts are is said above the first one's highest joint.
+  label(name, text, color) {
+    const known = this.labels.get(name) ?? make("div", {className: "play-label ghost"});
+    if (!this.labels.has(name)) part(".play-overlay").append(known);
+    this.labels.set(name, known);
+    known.textContent = text;
+    known.hidden = !text;
+    known.style.setProperty("--color", color);
+  }
+
+  layOut(sight) {
+    for (const [name, label] of this.labels) {
+      const [ghost] = this.groups.get(name) ?? [];
+      if (label.hidden || !ghost) continue;
+      const points = ghost.children.map(({position}) => sight.project(position.clone()));
+      const top = points.reduce((one, other) => (one.y < other.y ? one : other));
+      PlayOverlay.put(label, top.x, top.y - 40);
+    }
+  }
+}
