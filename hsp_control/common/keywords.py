@@ -15,7 +15,7 @@ def suggesting(function: Callable[_Given, _Result]) -> Callable[_Given, _Result]
     """Let a function, or a class's ``__init__``, say which argument was meant.
 
     As the arguments of parts do; Python itself names only the wrong one, in a
-    TypeError, which this is as well.
+    TypeError, which this is as well. A function that takes any keyword checks its own.
     """
     named = Parameter.POSITIONAL_OR_KEYWORD, Parameter.KEYWORD_ONLY
     names = [

@@ -58,7 +58,7 @@ class ActiveStack:
     the tasks follow, then the field.
     """
 
-    share = 1.0  # how much it counts in the mixture that was resolved last, in (0, 1]
+    share = 1.0  # its share in the mixture that was resolved last, in (0, 1]
 
     def __init__(
         self,
@@ -71,7 +71,7 @@ class ActiveStack:
         gain: Array,
         threshold: float,
     ) -> None:
-        robot: Robot = state.robot  # its state says which base motions contacts permit
+        robot: Robot = state.robot  # from its state: which base motions contacts permit
         self.support, base = support, support.base  # contacts' forces, their bounds
         self.contacts = support.contacts
         planned = [level for level in levels if level]
@@ -188,8 +188,8 @@ class ActiveStack:
     def bind(self) -> None:
         """Bind what `resolve` calls, now instead of then; and call it once.
 
-        A part, or a user's function, may make something at its first use. What a stream
-        hears belongs to a time, and what raises is told by the step that meets it.
+        A part, or a user's function, may make something at its first use. A stream's
+        messages belong to a time, and what raises does so in the step that meets it.
         """
         if "_plan" in self.__dict__:
             return
@@ -204,7 +204,7 @@ class ActiveStack:
 
     @cached_property
     def calls(self) -> list[Callable[[float], Any]]:
-        """The calls of `resolve`, each of the time [s]; bound when first asked for."""
+        """The calls of `resolve`, each of the time [s]; bound when first read."""
         state, metric, field = self._state, self._metric, self._field
         problem = self.resolution.problem
         calls = [*self._calls]
@@ -266,7 +266,7 @@ class ActiveStack:
             self.raise_not_finite()
 
     def raise_not_finite(self) -> NoReturn:
-        """Say what made a step's effort NaN or infinite."""
+        """Raise for what made a step's effort NaN or infinite."""
         state, problem = self._state, self.resolution.problem
         for part, sample in self._parts:
             if not all(np.isfinite(array).all() for array in sample):

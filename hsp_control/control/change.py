@@ -42,7 +42,7 @@ from hsp_control.trajectories.streams.streamed import Streamed
 class Change(Part, ABC, family="changes", error=ControllerError):
     """A change that begins at a time and takes a while; efforts stay continuous.
 
-    Changes count in the order of their times, whatever the order in which they are
+    Changes apply in the order of their times, whatever the order in which they are
     made. Each continues from what is then in force, so that several may overlap. A
     subclass implements `apply`.
     """
@@ -63,7 +63,7 @@ class Change(Part, ABC, family="changes", error=ControllerError):
         """Return the setup with this change, after all earlier ones."""
 
     def understood(self, setup: Setup) -> Self:
-        """Return the change as a setup lets it be understood: YAML says less."""
+        """Return the change with the types that a setup implies: YAML has fewer."""
         return self
 
     def placed(self, start: Start, setup: Setup) -> Self:
@@ -224,7 +224,7 @@ class AddTask(Change, type="add_task"):
     """A task is added; it fades in."""
 
     task: Task
-    """The task; what is relative in it counts from where the robot is when the change
+    """The task; what is relative in it starts from where the robot is when the change
     is made."""
 
     def placed(self, start: Start, setup: Setup) -> Self:
@@ -323,7 +323,7 @@ class ChangeReference(Change, type="reference"):
         Trajectory | OrientationTrajectory | PoseTrajectory,
         AnyOf(PoseTrajectory, Trajectory, OrientationTrajectory),
     ]
-    """The new trajectory, in the task's unit; what is relative in it counts from where
+    """The new trajectory, in the task's unit; what is relative in it starts from where
     the robot is when the change is made."""
 
     def understood(self, setup: Setup) -> Self:
@@ -386,7 +386,7 @@ class MoveObstacle(Change, type="obstacle"):
         return replace(self, center=self.center.anchored(here))
 
     def apply(self, setup: Setup) -> Setup:
-        """Return the setup with the obstacle wherever it counts; see `Change.apply`."""
+        """Return the setup with the obstacle at all its uses; see `Change.apply`."""
         scene = setup.start.scene
         with within("obstacle"):
             old = scene[self.obstacle]

@@ -166,7 +166,7 @@ class Changes:
 
 @dataclass(frozen=True)
 class TimeLine:
-    """What counts at each time."""
+    """What is in force at each time."""
 
     start: Start  # where the parts were placed
     declared: tuple[Change, ...]  # those of every run, as they were given

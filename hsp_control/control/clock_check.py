@@ -17,7 +17,7 @@ class ClockWarning(UserWarning):
 
 
 class ClockCheck:
-    """Says once what is wrong with the times of the steps of a run."""
+    """Warns once of what is wrong with the times of the steps of a run."""
 
     def __init__(self) -> None:
         self._last: float | None = None
@@ -81,7 +81,7 @@ class ClockCheck:
 
 
 _UNIT = (
-    "the clock advances by {passed:.3g} s in a period that was said to be "
+    "the clock advances by {passed:.3g} s in a period that was given as "
     "{period:.3g} s; are both in seconds?"
 )
 _MESSAGES = {

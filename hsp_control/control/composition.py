@@ -1,4 +1,4 @@
-"""What a controller is composed of, and what of it counts at a time."""
+"""What a controller is composed of, and what of it is active at a time."""
 
 from collections.abc import Iterable, Sequence
 from contextlib import AbstractContextManager
@@ -55,7 +55,7 @@ earlier times than the last one."""
 
 
 class Composition:
-    """What a controller is made of, and what of it counts at a time."""
+    """What a controller is made of, and what of it is active at a time."""
 
     _lock: AbstractContextManager[None]  # held while something is computed
 
@@ -130,7 +130,7 @@ class Composition:
         self._clocked = state.bind_move(origin=memory.origin)
         self._bound: BoundStep | None = None  # the step, while nothing changes
 
-    # -- what counts at a time --------------------------------------------------------
+    # -- what is active at a time ------------------------------------------------------
 
     def _compose(self, start: Start, changes: Sequence[Change]) -> None:
         """Place all parts, and apply the changes."""
@@ -177,7 +177,7 @@ class Composition:
     def _bind_ahead(self) -> None:
         """Bind what steps call until all changes are over, and then.
 
-        Not before the first state: it says which motions of a base contacts leave free.
+        Not before the first state: from it follow the motions that contacts leave free.
         """
         time_line, mixture = self._time_line, self._mixture
         if time_line.open or not mixture.steady:
@@ -406,17 +406,17 @@ class Composition:
 
     @property
     def tasks(self) -> tuple[Task, ...]:
-        """The tasks that count now or fade, placed, the highest priority first."""
+        """The tasks that are active now or fade, placed, the highest priority first."""
         return tuple(task for level in self.levels for task in level)
 
     @property
     def planned_tasks(self) -> tuple[Task, ...]:
-        """All tasks, placed: those that count, have not come yet, or have gone."""
+        """All tasks, placed: those that are active, have not come yet, or have gone."""
         return tuple(each.task for each in self._setup.tasks)
 
     @property
     def levels(self) -> tuple[tuple[Task, ...], ...]:
-        """The tasks that count now or fade, by level, the highest priority first."""
+        """The tasks that are active now or fade, by level, the highest first."""
         levels = self.planned_levels
         return tuple(tuple(each.task for each in level) for level in levels)
 
@@ -524,7 +524,7 @@ class Composition:
         return parts_of(self._gains.feedback[planned.key].numbers)[0].copy()
 
     def weight_of(self, task: str, t: float) -> float:
-        """Return how much a task counts at time t [s], in [0, 1].
+        """Return the weight of a task at time t [s], in [0, 1].
 
         Raises:
             ControllerError: If there is no such task.

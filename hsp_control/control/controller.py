@@ -105,7 +105,7 @@ class Controller(Composition):
             else:
                 self._observe(t, q, v)  # the state
                 if bound is None:
-                    self._advance()  # what counts at its time
+                    self._advance()  # to what is in force at its time
                 mixture = self._mixture
                 mixture.resolve(self._state.t)  # references, and the law
                 delivered = mixture.deliver(modifier)  # within the limits
@@ -182,7 +182,7 @@ class Controller(Composition):
     def applied(self, tau: ArrayLike, period: float) -> None:
         """Store the effort that was sent to the robot.
 
-        It counts for the limit on the effort's rate, and for the margin of speed
+        The limit on the effort's rate starts from it, and so does the margin of speed
         limits, which covers what the robot does while the effort is held. Without
         limits it has no effect. The first one, also after `restart`, is warned of
         (`StartWarning`) where a robot at rest would jump; see `first_state`.
@@ -238,7 +238,7 @@ class Controller(Composition):
 
         From now on limits on motion hold for the sum of it and the law's acceleration:
         a robot that somebody pushes may be braked harder, and not driven on. An
-        observer tells it; without one the limits hold for the model alone.
+        observer estimates it; without one the limits hold for the model alone.
 
         Args:
             acceleration: M⁻¹ times the disturbing efforts, shape (nv,) [rad/s² or
@@ -316,7 +316,7 @@ class Controller(Composition):
     ) -> float:
         """Bind the law for some contacts and tasks now, instead of in a step.
 
-        What schedules and changes say is bound by itself: in the first step, and when
+        Schedules and changes are bound by themselves: in the first step, and when
         they are made. A plan that switches contacts by events asks for each combination
         that it will use.
 
@@ -364,7 +364,7 @@ class Controller(Composition):
         return active
 
     def without_python(self) -> "Controller":
-        """Return a preview whose streams hear what a program sends, and no Python."""
+        """Return a preview whose streams are commanded by a program, not by Python."""
         other = self.preview()
         for stream in other._memory.streams:
             stream.leave_python()
@@ -459,8 +459,8 @@ class Controller(Composition):
     def preview(self, changes: Sequence[Change] | None = None) -> "Controller":
         """Return a copy at the beginning of a run: to look ahead, or at a log.
 
-        It is of the same robot object, and counts times from 0. What its streams hear
-        counts for it alone.
+        It is of the same robot object, and counts times from 0. Messages that
+        it takes from streams remain for the controller.
 
         Args:
             changes: All changes of the run, such as those of a log; None: those that
@@ -487,7 +487,7 @@ def _check_output(out: object, nv: int) -> None:
 
 
 class _StepLock:
-    """A lock: other threads wait for it, and the thread that has it is told."""
+    """A lock: other threads wait for it; the thread that holds it gets an error."""
 
     __slots__ = ("__weakref__", "_lock", "_taken")
 

@@ -8,7 +8,7 @@ robot mostly begins at rest.
 
 A value that is differentiable has the same slope over four intervals in a row, and its
 rate is that slope. Where the slopes differ, because a kink, a jump or noise lies among
-them, the rate may be anything within a few times their spread, and nothing is said.
+them, the rate may be anything within a few times their spread, and nothing is reported.
 """
 
 from collections.abc import Callable, Iterator

@@ -46,7 +46,7 @@ class Evolution(Generic[Value]):
         x_k(t) = (1 - s_k(t)) x_{k-1}(t) + s_k(t) target_k.
 
     So a transition that begins while another is under way continues its motion, and x
-    is C² however they overlap. x depends on time alone, not on when it is asked for.
+    is C² however they overlap. x depends on time alone, not on when it is evaluated.
     """
 
     initial: Value  # value before all transitions

@@ -44,7 +44,7 @@ class Measurement(NamedTuple):
         halted: Whether the robot has stopped by itself and ignores efforts.
         applied: Effort the robot had when it measured, in the terms of
             `Hardware.write` (libfranka's ``tau_J_d``), shape (nv,), where the hardware
-            knows it; None: what was sent last counts.
+            knows it; None: what was sent last is used.
         fault: Why the robot must be stopped safely, if hardware knows a reason.
         wrenches: What the world exerts on the robot at each contact, by the name of
             its frame: force and moment about the frame's origin, world axes, shape (6,)

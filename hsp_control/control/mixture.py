@@ -31,7 +31,7 @@ AccelerationModifier = Callable[
 """How compensators act between the law and the limits: a function of (state, active
 stack, a). It returns the acceleration to deliver, shape (nv,), and an additional effort
 besides M a + N, shape (nv,), or None. While tasks fade it is called for each set of
-them, which counts by the stack's `share`."""
+them, weighted by the stack's `share`."""
 
 
 _Counting = tuple[frozenset[int], frozenset[tuple[int, int]]]
@@ -112,7 +112,7 @@ class Mixture:
         self.damped = ""
 
     def resolve(self, t: float) -> None:
-        """Resolve the law for each set of tasks that counts."""
+        """Resolve the law for each set of tasks that is active."""
         self._parts, self.damped = [], ""
         for share, active in self._sets(t):
             active.share = share
@@ -125,7 +125,7 @@ class Mixture:
         self.active = active
 
     def _sets(self, t: float) -> Iterator[tuple[float, ActiveStack]]:
-        """Yield the share of each set that counts at a time, and its stack."""
+        """Yield the share of each set that is active at a time, and its stack."""
         tasks = [(each.weight(t), each) for each in self._fading]
         contacts = [(each.share(t), each) for each in self._setup.contacts]
         coming = sorted(

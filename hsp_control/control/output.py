@@ -57,7 +57,7 @@ class ControlOutput:
     _distances: Sequence[tuple[str, bytes]]  # of each barrier, of all its pairs
     _layout: Layout  # of the memory
     _memory: Array | bytes  # see `ActiveStack.memory`
-    _views: Record | None  # of the memory, once they were asked for
+    _views: Record | None  # of the memory, once they were read
 
     @property
     def size(self) -> int:
@@ -129,10 +129,10 @@ class ControlOutput:
         return found
 
     def error(self, task: str) -> Array:
-        """Return the error e of a task, as its class says, shape (m,) [m or rad].
+        """Return the error e of a task, as its class defines it, shape (m,) [m or rad].
 
         Raises:
-            ControllerError: If no such task counts at this time.
+            ControllerError: If no such task is active at this time.
         """
         return self._record.task.error[self._rows_of(task)].copy()
 
@@ -145,7 +145,7 @@ class ControlOutput:
         if task not in places:
             near = did_you_mean(task, places)
             raise ControllerError(
-                f"no task {task!r} counts now{near} (there are {listing(places)})"
+                f"no task {task!r} is active now{near} (there are {listing(places)})"
             )
         return places[task]
 
@@ -218,5 +218,5 @@ class Diagnostics(NamedTuple):
 
     @property
     def singular_values(self) -> Array:
-        """Those of J L⁻ᵀ, W = L Lᵀ, the largest first; computed when asked for."""
+        """Those of J L⁻ᵀ, W = L Lᵀ, the largest first; computed when first read."""
         return singular_values(self.triangle)

@@ -82,7 +82,7 @@ class RunningPlan(ABC):
 
     Attributes:
         plan: The plan, with the streams of this run.
-        stopping: Whether it was told to come to rest.
+        stopping: Whether it was commanded to come to rest.
     """
 
     def __init__(self, plan: Plan) -> None:

@@ -173,7 +173,7 @@ def check_support(robot: Robot, contacts: Sequence[Contact], base: Base | None) 
 
 @dataclass(frozen=True)
 class PlannedTask:
-    """A task, when it counts, and its gains."""
+    """A task, when it is active, and its gains."""
 
     key: int  # tells it from every other task of the controller, also of the same name
     task: Task  # placed
@@ -183,17 +183,17 @@ class PlannedTask:
     gains: Evolution[Array]
 
     def weight(self, t: float) -> float:
-        """Return how much the task counts at time t [s], in [0, 1]."""
+        """Return the weight of the task at time t [s], in [0, 1]."""
         present = self.presence.at(t)
         schedule = self.task.schedule
         return present if schedule is None else present * schedule.weight(t)
 
     def weight_beyond(self, t: float, edges: Sequence[float]) -> float:
-        """Return how much it counts at time t where some contacts are lifted.
+        """Return its weight at time t where some contacts are lifted.
 
         A task without a ramp that begins where a contact ends moves what the contact
-        kept at rest. So it counts before, in proportion as the contact does not; and so
-        does one that ends where a contact begins.
+        kept at rest. So it is active before, in proportion as the contact is not; so is
+        one that ends where a contact begins.
         """
         now, schedule = self.weight(t), self.task.schedule
         if schedule is None or schedule.ramp or 0.0 < now < 1.0:
@@ -204,7 +204,7 @@ class PlannedTask:
 
     @property
     def always(self) -> bool:
-        """Whether it counts fully at all times."""
+        """Whether its weight is 1 at all times."""
         schedule = self.task.schedule
         unscheduled = schedule is None or (schedule.constant and not schedule.ramp)
         return unscheduled and self.presence == PRESENT
@@ -212,7 +212,7 @@ class PlannedTask:
 
 @dataclass(frozen=True)
 class PlannedTerm:
-    """A term of the field, and when it counts."""
+    """A term of the field, and when it is active."""
 
     field: NullSpaceField  # placed, with its own weight
     presence: Evolution[float]  # factor of its weight
@@ -265,7 +265,7 @@ class Setup:
         return max(self.limits.end, *(each.end for each in evolutions))
 
     def instants(self, begin: float) -> Iterator[float]:
-        """Yield times from a beginning on at which the sets of what counts differ [s].
+        """Yield times from a beginning on at which the active sets differ [s].
 
         They are those at which a task or a contact may come or go, and some between
         two of them: of several that fade at once, each may count most.
@@ -295,7 +295,7 @@ class Setup:
         return _found("task", name, {each.task.name: each for each in present})
 
     def present_task(self, name: str, t: float) -> PlannedTask:
-        """Return the task of a name that counts at time t [s], or is to come."""
+        """Return the task of a name that is active at time t [s], or is to come."""
         for each in self.tasks:
             if each.task.name == name and each.presence.at(t) > 0.0:
                 return each

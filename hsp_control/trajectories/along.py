@@ -148,8 +148,8 @@ class Along(Trajectory, type="along"):
 
     Raises:
         TrajectoryError: Where no speed passes (a corner), or where the path bends so
-            much that v²/r is more than the acceleration. The message says where, and
-            which speed would do.
+            much that v²/r is more than the acceleration. The message gives the place,
+            and which speed would do.
 
     References:
         B. Siciliano, L. Sciavicco, L. Villani, G. Oriolo, "Robotics: Modelling,
@@ -157,7 +157,7 @@ class Along(Trajectory, type="along"):
     """
 
     path: Trajectory
-    """p. Of its times only the order counts, and for a spline its shape; of a circle's
+    """p. Of its times only the order matters, and for a spline its shape; of a circle's
     rate the sense."""
     speed: Positive
     """Largest speed v along the path [m/s, or the task's unit per s]."""
@@ -222,7 +222,7 @@ class AlongOrientation(OrientationTrajectory, type="along"):
     """
 
     path: OrientationTrajectory
-    """P. Of its times only the order counts, of a spin's rate the sense."""
+    """P. Of its times only the order matters, of a spin's rate the sense."""
     speed: Positive
     """Largest angular speed |ω| [rad/s]."""
     acceleration: Positive | None = None
@@ -275,7 +275,7 @@ class AlongPose(PoseTrajectory, type="along_pose"):
     """
 
     path: PoseTrajectory
-    """P. Of its times only the order counts; a position and an orientation that it is
+    """P. Of its times only the order matters; a position and an orientation that it is
     composed of stay together."""
     speed: Positive
     """Largest speed v of the origin [m/s, or rad/s]."""

@@ -7,7 +7,7 @@ from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import TrajectoryError
 from hsp_control.declaration.rotation import matrix_of
 
-_ORTHONORMAL = 1e-8  # largest entry of A Aᵀ - I that counts as rounding error
+_ORTHONORMAL = 1e-8  # largest entry of A Aᵀ - I that may be rounding error
 
 
 def array(value: ArrayLike, name: str, shape: tuple[int | None, ...]) -> Array:

@@ -24,7 +24,7 @@ class Circle(Trajectory, type="circle"):
 
     The paper's (1 + cos 3t, 1 + sin 3t) is ``Circle(1, 3, center=[1, 1])``. In the
     plane u1 and u2 are the x and y axes; in space the circle is level, unless
-    ``normal`` or ``axes`` say otherwise.
+    ``normal`` or ``axes`` define others.
     """
 
     points: ClassVar[tuple[str, ...]] = ("center",)

@@ -52,7 +52,7 @@ def join(times: ArrayLike, coefficients: ArrayLike, end: ArrayLike | None) -> Pi
 
 
 class PolynomialTrajectory(Trajectory):
-    """Polynomials that join at knots; a subclass says which, in `_pieces`.
+    """Polynomials that join at knots; a subclass defines them, in `_pieces`.
 
     The motion rests exactly at the first point before the first knot, and at the last
     point after the last knot. The coefficients decide how smooth it is at the knots.

@@ -134,7 +134,7 @@ class Polyline(Trajectory, type="polyline"):
     Raises:
         TrajectoryError: At a corner that is not rounded, where a blend does not fit,
             and where a bend needs more than the acceleration across it. The message
-            says where, and what would do.
+            gives the place, and what would do.
     """
 
     points: ClassVar[tuple[str, ...]] = ("waypoints",)

@@ -27,7 +27,7 @@ def sampled(trajectory: Any, t: float, out: Any) -> Any:
 
 
 def calls_of_sample(trajectory: Any, out: Any) -> PartCalls:
-    """Return the calls of a trajectory that says its call, or its sample."""
+    """Return the calls of a trajectory that implements `call`, or `sample`."""
     if trajectory.constant:
         trajectory.sample(0.0, out)
         return []
@@ -70,8 +70,8 @@ class Trajectory(Part, ABC, family="trajectories", error=TrajectoryError):
 
     A subclass declares its parameters as fields (see `Part`) and implements `dimension`
     and `sample`, or `call`, which makes a step faster. The coordinates may have any
-    unit; a task says which frame and units it needs. A motion of finite duration rests
-    at its first point before the start and at its last point after the end.
+    unit; a task defines its frame and units. A motion of finite duration rests at its
+    first point before the start and at its last point after the end.
 
     Points may be relative to where the robot starts: those that ``origin: start``
     moves, and those that are omitted. Such a trajectory cannot be sampled; `anchored`

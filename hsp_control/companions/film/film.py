@@ -8,7 +8,6 @@ from threading import Event
 from typing import Any, NamedTuple
 
 from hsp_control.common.exceptions import ExportError
-from hsp_control.common.keywords import suggesting
 from hsp_control.common.suggestions import did_you_mean
 from hsp_control.companions.film.chromium import headless_browser, open_page
 from hsp_control.companions.film.encoding import FORMATS, encoder, find_ffmpeg
@@ -43,7 +42,6 @@ class FilmStyle(NamedTuple):
     end: float | None = None
 
 
-@suggesting
 def export_film(
     rollout: Rollout,
     path: str | Path,

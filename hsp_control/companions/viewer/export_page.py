@@ -6,7 +6,6 @@ from pathlib import Path
 from typing import Any
 
 from hsp_control.common.exceptions import ExportError
-from hsp_control.common.keywords import suggesting
 from hsp_control.companions.viewer.commands import Json
 from hsp_control.companions.viewer.comparison import (
     GHOST_OPACITY,
@@ -25,7 +24,6 @@ from hsp_control.robot import Robot
 from hsp_control.simulation import Rollout
 
 
-@suggesting
 def export_html(
     rollout: Rollout | Sequence[ComparedRun],
     path: str | Path,

@@ -13,7 +13,6 @@ from typing import Any, Self
 from weakref import finalize
 
 from hsp_control.common.exceptions import HspControlError, ViewerError
-from hsp_control.common.keywords import suggesting
 from hsp_control.companions.viewer.transport import LOOPBACK, open_browser
 from hsp_control.config import Recorder
 from hsp_control.config.recorder import declaration_of
@@ -66,7 +65,6 @@ class Watch:
         return f"Watch({self.url})"
 
 
-@suggesting
 def watch(
     loop: Controller | Recorder,
     *,

@@ -104,7 +104,7 @@ class Actuation:
         # what is delivered there of the law's own acceleration
         self.own = Delivered(state.effort, law.acceleration, np.zeros(0), EXACT, 0.0)
         self.nearest = self.own
-        # whether `nearest` is delivered, and nothing else is to be said, shape (1,)
+        # whether `nearest` is delivered, and its status stands, shape (1,)
         self.is_nearest: Indices = np.zeros(1, dtype=np.int64)
         self._wanted = wanted = Wanted(state.mass_matrix, np.zeros(nv), np.zeros(nv))
         self.outcome = LimitsOutcome.allocate()
@@ -144,7 +144,7 @@ class Actuation:
         )
 
     def _within_bounds(self, effort: Array) -> Callable[[], float]:
-        """Return the call that says whether an effort is within its bounds."""
+        """Return the call that checks whether an effort is within its bounds."""
         bounds = self._limits.bounds
         call = PartCall(
             engine.Within, x=effort, lower=bounds.tau_lower, upper=bounds.tau_upper

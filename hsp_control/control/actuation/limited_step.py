@@ -58,7 +58,7 @@ class Status(IntEnum):
     """The limits contradict each other: they are relaxed as little as possible."""
     BEYOND = 4
     """A joint is more than 1 mrad or mm beyond its range, or faster than its limit by
-    more than 2 %, whatever is delivered: the robot is not what the model says. Each
+    more than 2 %, whatever is delivered: the robot differs from its model. Each
     excess is in the log, ``position_excess`` and ``velocity_excess``."""
 
 
@@ -75,7 +75,7 @@ class QPOutcome(NamedTuple):
     """What became of a QP: the engine writes it, shape (1,) each."""
 
     unsolved: Indices
-    """1 where there is no result: none was asked for, the constraints contradict each
+    """1 where there is no result: none was requested, the constraints contradict each
     other, or the solver gave up; else 0."""
     status: Indices
     """The `Status` of the result."""

@@ -70,7 +70,7 @@ class LimitsInForce:
     ) -> None:
         self._state = state
         self.sent = SentEffort(state, memory)
-        self._rate = True  # what the memory has of the last effort counts
+        self._rate = True  # the last effort in the memory limits the next one
         self._all: list[tuple[LimitSet, Evolution[float]]] = []
         # where the steps write the distances of barriers [m], by the barriers' names
         self.measured: list[tuple[str, Array]] = []
@@ -92,7 +92,7 @@ class LimitsInForce:
         """Find the sets that count at a time [s]."""
         if always or len(self._all) > 1:
             shares = [(each, share.at(t)) for each, share in self._all]
-            # each set that counts, and its share in (0, 1]
+            # each set in force, and its share in (0, 1]
             self.sets = [pair for pair in shares if pair[1] > 0.0]
             self.measured = self._measured()
 

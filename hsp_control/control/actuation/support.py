@@ -155,7 +155,7 @@ class Support:
 
     @cached_property
     def permits(self) -> Callable[[], float]:
-        """The call that says whether `forces` are within cones and bounds."""
+        """The call that checks whether `forces` are within cones and bounds."""
         call = PartCall(
             engine.WithinCones,
             cone=self.cone,

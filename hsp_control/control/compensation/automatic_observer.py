@@ -1,7 +1,7 @@
 """Where a momentum observer is on by itself, and how fast it is.
 
 It is on wherever the robot may differ from its model and nothing is to yield: a spring
-that gives way to a hand, and a contact that presses, are forces that the model does not
+that yields to a hand, and a contact that presses, are forces that the model does not
 explain, too, and an observer would cancel them.
 
 The rate. On a robot whose inertia is 1/ρ times the model's the loop is, slower than the
@@ -11,8 +11,8 @@ observer's own poles,
 
 A heavy robot (ρ < 1, rotors that the model lacks) makes the observer ρ K_O slow: with
 Kp = 100 and Kv = 20 it winds up below ρ = 0.08 at 50 1/s, and below 0.11 at 30. On a
-lighter one (ρ > 1) a fast observer bears less delay: with 2 ms and a lag of 3 ms, ρ = 4
-is borne at 50 1/s, 2 at 100. Its noise is less than that of the law's own
+lighter one (ρ > 1) a fast observer tolerates less delay: with 2 ms and a lag of 3 ms,
+up to ρ = 4 at 50 1/s, 2 at 100. Its noise is less than that of the law's own
 damping up to 58 1/s at 1 kHz (`MomentumObserver.order`). So 50 1/s; and at longer
 periods as many per period, since half a period of hold and one of computing is delay.
 """

@@ -97,7 +97,7 @@ class RunningForceFeedback(Stage):
             self._estimate(run.measured, run.disturbance, run.output.forces)
 
     def _read(self, wrenches: Mapping[str, Array], pressed: bool) -> None:
-        """Read the sensors' wrenches by frame; none counts before an effort acted."""
+        """Read the sensors' wrenches by frame; none is used before an effort acted."""
         for contact in self._fed:
             if contact.frame not in wrenches:
                 with within("compensation", "force_feedback", "force"):

@@ -72,7 +72,7 @@ class LinearLoop:
     period: float  # h [s]
     effort_delay: int = 0  # delay of efforts, in periods
     sensor_delay: int = 0  # delay of measurements, in periods
-    # what counts: velocity filter, predictor, momentum observer; integral action is ki
+    # in the loop: velocity filter, predictor, momentum observer; integral action is ki
     compensation: Compensation = field(
         default_factory=lambda: Compensation(momentum_observer=None)
     )
@@ -185,7 +185,7 @@ class LinearLoop:
         return [*(moved + effect[:, None, None] * u)]
 
     def _performed(self, u: Array) -> Array:
-        """Return the acceleration that the robot performs where u is asked for."""
+        """Return the acceleration that the robot performs where u is commanded."""
         share = np.asarray(self.share)
         return share @ u if share.ndim else share * u
 

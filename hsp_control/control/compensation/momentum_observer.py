@@ -41,7 +41,7 @@ from hsp_control.tasks.compliant_task import CompliantTask
 
 LARGE_SHARE = 0.25
 """Share of an effort limit from which on unexplained effort is no error of masses: the
-robot does not do what the model says [-]."""
+robot does not move as its model does [-]."""
 
 
 class MomentumObserver(Part, error=CompensationError):

@@ -40,10 +40,10 @@ RULE_HEAVY = 5.0
 """Integral action must stay stable for a robot up to this many times as heavy, at a
 task, as its model. Without other compensators this is a rate of Kv/5."""
 SLOWEST_GROWTH = 0.02
-"""Rate of growth that is told of [1/s]: slower ones need a minute to be seen."""
+"""Rate of growth that is reported [1/s]: slower ones need a minute to be seen."""
 _LONG = 50
-"""A delay of more periods is first compared with what the loop bears: the matrix of a
-loop grows with its delay."""
+"""Longer delays [periods] are first compared with the longest tolerated one: the matrix
+of a loop grows with its delay."""
 _ROUNDING = 1e-7
 """Tolerance of the radius: self-motion without a field has eigenvalues of 1."""
 
@@ -338,7 +338,7 @@ def _finding(
 ) -> RateFinding | None:
     gain, h, late = speed.rate, loop.period, loop.effort_delay + loop.sensor_delay
     if late > _LONG and (borne := _borne(loop)) is not None:
-        # What a loop bears is a product of rate and delay.
+        # What a loop tolerates is a product of rate and delay.
         share = borne / late
         slower = f" or {speed.at_most(share * gain)}" if share else ""
         return RateFinding(

@@ -18,9 +18,9 @@ MOST = 5_000_000
 BRIEF = 20_000
 """Most numbers that are recorded where nobody writes a log."""
 CAPACITY = 4096  # most messages that wait; where more come, the oldest are dropped
-_SILENCE = 2.0  # who sent several messages is heard alone until so long a silence [s]
+_SILENCE = 2.0  # a sender of several messages stays the only one so long [s]
 _JUMP = 1.0  # what a clock goes back, or ahead of ours, that is no delay [s]
-_MOST_SAID = 16  # different things that are said of one source
+_MOST_SAID = 16  # different warnings about one source
 _NUMBER = re.compile(r"-?\d[\d.:e+-]*|\bnan\b|-?\binf\b")
 
 
@@ -40,7 +40,7 @@ class Inbox:
     """
 
     def __init__(self, space: Space, source: str = "") -> None:
-        """Set what a value is, and the address that is heard; by default none is."""
+        """Set what a value is, and the address that is listened to; by default none."""
         self.space, self._source = space, source
         self.count = self.rejected = self.taken = 0
         self.reason = ""
@@ -48,7 +48,7 @@ class Inbox:
         self._waiting: deque[Received] = deque(maxlen=CAPACITY)
         self._lock = Lock()
         self._said: set[str] = set()
-        self._sender, self._until = "", -inf  # who is heard alone, and until when
+        self._sender, self._until = "", -inf  # the only sender accepted, until when
         self._seen: dict[str, float] = {}
         self._newest, self._behind = -inf, inf  # of its clock: its time, ours after it
 
@@ -62,7 +62,7 @@ class Inbox:
 
     @property
     def source(self) -> str:
-        """The address that is heard; empty without one."""
+        """The address that is listened to; empty without one."""
         return self._source
 
     def check_sender(self, sender: str, now: float) -> None:
@@ -74,7 +74,7 @@ class Inbox:
             )
 
     def receive(self, sender: str, now: float, data: Mapping[str, Any]) -> None:
-        """Add a message of somebody elsewhere; say once what is odd about its clock."""
+        """Add a message of another process; warn once if its clock is odd."""
         self.check_sender(sender, now)
         self.put(**data)
         if sender != self._sender:
@@ -89,12 +89,12 @@ class Inbox:
             self._say(f"the sender's clock jumps back by {back:.3g} s")
         elif _JUMP < ahead < inf:
             self._say(f"the sender's clock jumps ahead by {ahead:.3g} s")
-        if max(back, ahead) > _JUMP:  # it counts as another clock
+        if max(back, ahead) > _JUMP:  # it is treated as another clock
             self._newest, self._behind = -inf, inf
         self._newest, self._behind = max(self._newest, t), min(self._behind, now - t)
 
     def note_silence(self, now: float) -> None:
-        """Say once that who sent several messages sends no more."""
+        """Warn once that the only sender has fallen silent."""
         if -inf < self._until <= now:
             self._until = -inf
             self._say(
@@ -119,7 +119,7 @@ class Inbox:
         self.failure = f"{name}: {text}" if text else name
 
     def reject(self, reason: str, *, aloud: bool = True) -> None:
-        """Count an invalid message; each kind of reason is said once."""
+        """Count an invalid message; each kind of reason is logged once."""
         with self._lock:
             self.rejected += 1
             self.reason = reason
@@ -154,7 +154,7 @@ class Inbox:
         return found
 
     def __getstate__(self) -> dict[str, Any]:
-        """Return what nobody took: a copy elsewhere hears later what is sent there."""
+        """Return what nobody took; a copy elsewhere takes what is sent there."""
         taken, bounded = self.taken, self._waiting.maxlen is not None
         waiting = self.after(taken if bounded else 0, take=False)
         return {

@@ -1,4 +1,4 @@
-"""What a sender says: one target, a velocity, or a chunk of waypoints with times."""
+"""A message: one target, a velocity, or a chunk of waypoints with times."""
 
 import json
 from collections.abc import Mapping
@@ -18,13 +18,13 @@ overflow."""
 LATEST = 1e12  # times beyond this are refused [s]; a clock of 1970 shows 2e9
 NO_TOOL = "axes is 'tool'; a stream without an orientation has no tool"
 _UNIT = 1e-3
-"""Deviation of a quaternion's norm from 1 that counts as a sender's rounding."""
+"""Deviation of a quaternion's norm from 1 that may be a sender's rounding."""
 
 
 class Space(NamedTuple):
     """What one value of a stream is: linear coordinates, then perhaps a quaternion."""
 
-    # Number of linear coordinates; None: any, as nothing said it yet.
+    # Number of linear coordinates; None: not known yet.
     linear: int | None
     rotational: bool  # whether a quaternion (x, y, z, w) follows them
 
@@ -63,7 +63,7 @@ class Message(NamedTuple):
     # Their velocities, (k, rates), in world axes; None: unknown.
     velocities: Array | None
     chunk: bool = False  # whether they replace those that were to follow
-    axes: Literal["world", "tool"] | None = None  # those of a velocity alone, if said
+    axes: Literal["world", "tool"] | None = None  # those of a velocity alone, if given
     at: float = -inf  # when it is taken, by the controller's clock [s]; -inf: at once
 
     @property
@@ -123,7 +123,7 @@ def message_of(data: Any, space: Space) -> Message:
 
 
 def parsed(text: str | bytes) -> Any:
-    """Return what a JSON text says; NaN and Infinity are no JSON."""
+    """Return what a JSON text contains; NaN and Infinity are no JSON."""
     return json.loads(text, parse_constant=_refuse_constant)
 
 

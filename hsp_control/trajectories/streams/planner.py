@@ -2,7 +2,8 @@
 
 Whenever a message arrives, the rest of the reference is planned again, from what it
 *is* (x, x', x'') and not from what was planned. A piece, once begun, never changes; so
-the reference is a C² function of time, whatever arrives and however often it is asked.
+the reference is a C² function of time, whatever arrives and
+however often it is sampled.
 """
 
 from bisect import bisect_right

@@ -64,7 +64,7 @@ class StreamRun:
 
         Args:
             value: The target: n coordinates, a quaternion (x, y, z, w), or for a pose
-                x, y, z and a quaternion, or a pin.SE3; None: only the velocity counts.
+                x, y, z and a quaternion, or a pin.SE3; None: a velocity alone.
             velocity: The velocity at the target, in world axes; or alone, as a joystick
                 sends it: linear velocities, then angular ones [1/s].
             axes: Those of a velocity alone: ``world``, or ``tool``, the axes of the
@@ -212,7 +212,7 @@ class StreamRun:
     @property
     def _planned(self) -> Planner:
         if self._planner is None:
-            _ = self.reader  # a source that cannot be opened is said at the first step
+            _ = self.reader  # a source that cannot be opened raises in the first step
             bounds, how = self.stream.bounds(), self.stream.how
             self._planner = Planner(self.chart, bounds, how, self._start)
         return self._planner

@@ -12,7 +12,7 @@ from hsp_control.trajectories.streams.inbox import Inbox
 from hsp_control.trajectories.streams.message import Message, Space, message_of, parsed
 
 Listen = Callable[["ref[Inbox]"], None]
-"""Puts what it hears into an inbox for as long as that is there."""
+"""Puts what it receives into an inbox for as long as that is there."""
 
 
 class AddressKind(Protocol):
@@ -60,7 +60,7 @@ def listening_inbox(source: str, space: Space) -> Inbox:
 
 
 def _run(listen: Listen, inbox: "ref[Inbox]") -> None:
-    """Listen; who reads the inbox is told if that fails, whatever is raised."""
+    """Listen; whoever reads the inbox gets what is raised."""
     try:
         listen(inbox)
     except BaseException as error:

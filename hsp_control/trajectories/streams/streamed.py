@@ -41,8 +41,8 @@ class Streamed(Part, error=TrajectoryError):
     * ``interpolate``: the reference passes through all waypoints, with the velocities
       and accelerations that they show. If no more follow, it brakes at the last one,
       and comes to rest there, as it does at a single target.
-    * ``latest``: only the newest message counts; the reference comes to rest at its
-      last waypoint. For single targets that replace each other, such as a hand that
+    * ``latest``: only the newest message is followed; the reference comes to rest at
+      its last waypoint. For single targets that replace each other, such as a hand that
       is dragged.
     * ``extrapolate``: it goes on from the last one at the velocity that the waypoints
       show, for a time, and then comes to rest.
@@ -118,7 +118,7 @@ class Streamed(Part, error=TrajectoryError):
 
         Args:
             dimension: How many linear coordinates there are, where the stream does not
-                say it.
+                define it.
             message: The arguments of `send`.
         """
         known = self.space.linear if dimension is None else dimension

@@ -40,7 +40,7 @@ class Command(NamedTuple):
     axes: Axes
 
     def same(self, other: "Command | None") -> bool:
-        """Return whether another command says the same."""
+        """Return whether another command is the same."""
         return (
             other is not None
             and self.axes == other.axes
@@ -83,7 +83,7 @@ class Velocities:
 
 
 _IN_TOOL_AXES = 2.0
-"""What the engine says of a piece in which x stands for the integral of u."""
+"""The engine's record of a piece in which x stands for the integral of u."""
 
 
 def _cross(a: Array, b: Array) -> Array:

@@ -58,7 +58,7 @@ class Waypoints:
         self.late = 0
         self._clock = SenderClock()
         self._made = -np.inf  # when the newest message was made
-        self._superseded = -np.inf  # what was made before this no longer counts
+        self._superseded = -np.inf  # what was made before this is ignored
 
     def copy(self) -> "Waypoints":
         """Return waypoints that go on from here by themselves."""

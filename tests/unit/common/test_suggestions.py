@@ -35,7 +35,6 @@ def test_an_unknown_argument_is_named_with_the_nearest_one() -> None:
         (hsp.Robot.from_pinocchio, "tool_frame", "tool_frames"),
         (hsp.freeze, "perid", "period"),
         (hsp.run_loop, "duraton", "duration"),
-        (hsp.viewer.watch, "prot", "port"),
     ):
         said = (
             rf"^{call.__qualname__}: unknown argument '{wrong}'; did you mean '{meant}'"

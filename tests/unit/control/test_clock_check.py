@@ -33,9 +33,9 @@ STEPS = H * np.arange(40)
 @pytest.mark.parametrize(
     ("times", "period", "message"),
     [
-        (1e3 * STEPS, H, "advances by 2 s in a period that was said to be 0.002 s"),
+        (1e3 * STEPS, H, "advances by 2 s in a period that was given as 0.002 s"),
         (1e9 * STEPS, H, "advances by 2e.06 s in a period"),
-        (STEPS, 2.0, "advances by 0.002 s in a period that was said to be 2 s"),
+        (STEPS, 2.0, "advances by 0.002 s in a period that was given as 2 s"),
         (-STEPS, H, "the clock runs back: t = -0.01 s came -0.002 s after the step"),
         (np.zeros(200), H, "the clock stands still at t = 0 s, while efforts are held"),
     ],

@@ -132,7 +132,9 @@ def test_errors_by_name_and_what_is_printed() -> None:
     np.testing.assert_array_equal(out.error_rate("panda_tcp"), out.task.error_rate)
     length = np.linalg.norm(out.task.error)
     assert f", EXACT; |e of panda_tcp| = {length:.3g}, |e_N| = " in repr(out)
-    with pytest.raises(ControllerError, match="no task 'tcp' counts now; did you mean"):
+    with pytest.raises(
+        ControllerError, match="no task 'tcp' is active now; did you mean"
+    ):
         out.error("tcp")
 
 

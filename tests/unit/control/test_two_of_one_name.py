@@ -47,7 +47,7 @@ def test_each_has_its_rows_and_errors() -> None:
     output = made.compute(0.4, q, REST)
     assert list(made.task_rows) == ["hand"]
     np.testing.assert_allclose(output.error("hand"), expected, rtol=0, atol=1e-15)
-    with pytest.raises(ControllerError, match=r"no task 'hand \(old\)' counts now"):
+    with pytest.raises(ControllerError, match=r"no task 'hand \(old\)' is active now"):
         output.error("hand (old)")
 
 
