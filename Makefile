@@ -80,7 +80,7 @@ sanitize: $(STAMP) $(ENGINE) ## those of the engine, under AddressSanitizer and 
 	@HSP_ENGINE=$$($(BIN)/python hatch_build.py Sanitized) \
 	  LD_PRELOAD="$$(g++ -print-file-name=libasan.so) $$(g++ -print-file-name=libstdc++.so.6)" \
 	  ASAN_OPTIONS=detect_leaks=0 UBSAN_OPTIONS=print_stacktrace=1 PYTHONMALLOC=malloc \
-	  $(BIN)/python -m pytest --capture=sys $(SPREAD) $(CALLS) $(ARGS)
+	  $(BIN)/python -m pytest --capture=sys --timeout 1800 $(SPREAD) $(CALLS) $(ARGS)
 
 lint: $(STAMP) $(ENGINE) ## ruff, mypy --strict, the layers of the architecture
 	@$(BIN)/ruff check

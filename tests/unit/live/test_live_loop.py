@@ -3,6 +3,7 @@
 import re
 import warnings
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -46,6 +47,7 @@ from hsp_control.live import (
     run_loop,
 )
 from hsp_control.live.live_log import DueRows
+from hsp_control.live.loop import LiveRun
 
 AT_REST = 0.02
 """Speeds of a robot that holds: below twice the speed at which damping ends [rad/s]."""
@@ -321,3 +323,20 @@ def test_a_row_is_due_at_each_tenth_state_also_where_times_are_rounded(
             due.written(t, 1)
             rows.append(k)
     assert rows == [*range(0, 500, 10)]
+
+
+def test_schedules_of_feet_are_asked_at_the_controllers_time() -> None:
+    """A run may begin at another time than the robot's."""
+    asked: list[float] = []
+    measured = Measurement(1, 0.2, start(), np.zeros(7))
+    run: Any = SimpleNamespace(
+        reader=SimpleNamespace(
+            measurement=measured, state=panda().state(7.2, start(), np.zeros(7))
+        ),
+        detector=SimpleNamespace(check=lambda state: None),
+        safe_stop=SimpleNamespace(
+            feet=SimpleNamespace(update=lambda each: asked.append(each.t))
+        ),
+    )
+    LiveRun.feel_ground(run)
+    assert asked == [7.2]
