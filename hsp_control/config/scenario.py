@@ -126,8 +126,9 @@ class ViewSettings(Part, error=ViewerError):
     """The 3-D view."""
 
     _: KW_ONLY
-    camera: Vector3 | None = None
-    """Position of the camera [m]; by default the whole robot is visible."""
+    camera: Vector3 | Literal["front", "side", "top", "tool"] | None = None
+    """Position of the camera [m], or a view by its name: the whole robot from a side,
+    or the tool, which the camera follows; by default the whole robot is visible."""
     target: Vector3 | None = None
     """Point that the camera looks at [m]; by default the centre of the scene."""
     speed: Positive = 1.0

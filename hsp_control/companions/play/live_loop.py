@@ -195,6 +195,7 @@ class Mirror:
     pushes = None
     laws: tuple[str, ...] = ()
     other = None
+    previews = False
 
     def __init__(
         self,
@@ -245,7 +246,10 @@ class Mirror:
         return None
 
     def say(self, message: dict[str, Any]) -> None:
-        """Pass on what a page says."""
+        """Pass on what a page says; a preview is this process's own."""
+        if message["do"] == "preview":
+            self.previews = message.get("on") is True
+            return
         self._channel.send(message)
         if "name" in message:  # of an obstacle
             self.handles.receive(message)  # zones and distances follow it here, too

@@ -65,6 +65,7 @@ class Session:
         if self.pushes is not None:
             self.pushes.reachable = True
         self._point: Array | None = None
+        self.previews = False  # whether the page shows what the null space would let
         self.reset()
 
     def reset(self) -> None:
@@ -183,6 +184,8 @@ class Session:
                     self._pull(path, _vector(point), _vector(hand))
                 case {"do": "let_go" | "left"}:
                     self.let_go()
+                case {"do": "preview", "on": bool(on)}:
+                    self.previews = on
                 case {"do": "compare", "law": str(law)}:
                     self.compare_with(law or None)
                 case _:

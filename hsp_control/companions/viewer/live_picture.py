@@ -23,6 +23,7 @@ from hsp_control.companions.viewer.live_plots import live_plots
 from hsp_control.companions.viewer.motion import Layer, RunMotion
 from hsp_control.companions.viewer.obstacles import logged_shapes
 from hsp_control.companions.viewer.run_drawing import RunDrawing, all_layers, line_color
+from hsp_control.companions.viewer.self_motion_preview import PreviewDrawing
 from hsp_control.companions.viewer.viewer import Viewer
 from hsp_control.control.controller import Controller
 from hsp_control.null_space.fields import FieldSum, NullSpaceField, Rest
@@ -81,6 +82,8 @@ class Shown(Protocol):
 
     over: str
 
+    previews: bool  # whether a preview of self-motion is wanted
+
     @property
     def laws(self) -> Sequence[str]:
         """The laws that can be stepped beside it."""
@@ -137,6 +140,7 @@ class Picture:
         self._session, self._viewer = session, viewer
         self._batch = 0
         color, opacity = ghost_color(1), GHOST_OPACITY
+        self._preview = PreviewDrawing(session.robot)
         self._ghost = Ghosts("other law", session.robot, color, opacity)
         self.begin()
 
@@ -145,6 +149,7 @@ class Picture:
         session, viewer = self._session, self._viewer
         self._sent = 0
         self._compared = False
+        self._preview.begin()
         self._moved: dict[str, float] = {}
         self._away: dict[str, str] = {}
         self._meta = session.meta
@@ -198,6 +203,8 @@ class Picture:
             _told("values", values=handles.settings),
             self._force(),
             *self._other_law(),
+            *self._preview.draw(session.controller, session.previews),
+            _told("preview", on=session.previews),
             *self._joints(),
             *samples,
         ]

@@ -16,6 +16,7 @@ from hsp_control.companions.viewer.commands import (
     LegendEntry,
     PageCommand,
     page_command,
+    path_element,
     set_object,
     set_property,
     set_transform,
@@ -199,12 +200,19 @@ _THICKNESS = 0.11  # radius of the balls around the points, over the size of the
 _DEFAULT_DIRECTION = np.array([1.0, -1.35, 0.62])
 _COS_STEEP = np.cos(np.radians(30.0))
 _MAX_POINTS = 300
+VIEWS = {
+    "front": np.array([1.0, 0.0, 0.12]),
+    "side": np.array([0.0, -1.0, 0.12]),
+    "top": np.array([0.0, 0.0, 1.0]),
+    "tool": _DEFAULT_DIRECTION,
+}
+"""Directions from the target to the eye of the views by name."""
 
 
 def look_at(
     robot: Robot,
     points: Array,
-    eye: ArrayLike | None = None,
+    eye: ArrayLike | str | None = None,
     target: ArrayLike | None = None,
     *,
     fit: bool = False,
@@ -213,8 +221,11 @@ def look_at(
 
     A planar arm is seen along its joint axes, any other robot from its front and above.
     ``eye`` None: far enough to see all ``points``, (K, 3) [m]; ``fit``: only its
-    direction.
+    direction. A name is one of `VIEWS`; the page has them all.
     """
+    named = eye if isinstance(eye, str) else None
+    if isinstance(eye, str):
+        eye = None
     middle = 0.5 * (points.min(axis=0) + points.max(axis=0))
     center = middle if target is None or fit else np.asarray(target, float)
     direction = viewing_direction(robot, eye, center if target is None else target)
@@ -222,27 +233,48 @@ def look_at(
     view: dict[str, object] = {
         "points": points[::stride].tolist(),
         "radius": _THICKNESS * scene_size(points),
+        "size": scene_size(points),
+        "views": {name: _from(direction) for name, direction in VIEWS.items()},
+        "tool": _tool_of(robot),
+        "view": named,
     }
     if eye is not None and not fit:
         view["eye"] = np.asarray(eye, float).tolist()
     else:
         view["direction"] = direction.tolist()
-    steep = abs(direction[2]) > _COS_STEEP * np.linalg.norm(direction)
     return page_command(
         "camera",
         CAMERA,
         "camera",
         **view,
         target=center.tolist(),
-        up=[0.0, 1.0, 0.0] if steep else [0.0, 0.0, 1.0],
+        up=_up(direction),
         field_of_view=FIELD_OF_VIEW,
     )
 
 
+def _from(direction: Array) -> Json:
+    return {"direction": direction.tolist(), "up": _up(direction)}
+
+
+def _up(direction: Array) -> list[float]:
+    """Return the direction that is up in the picture."""
+    steep = abs(direction[2]) > _COS_STEEP * np.linalg.norm(direction)
+    return [0.0, 1.0, 0.0] if steep else [0.0, 0.0, 1.0]
+
+
+def _tool_of(robot: Robot) -> str:
+    """Return the node of the joint that carries the end effector."""
+    frame = robot.model.frames[robot.frame_id(robot.end_effector)]
+    return f"/robot/{path_element(robot.model.names[frame.parentJoint])}"
+
+
 def viewing_direction(
-    robot: Robot, eye: ArrayLike | None, target: ArrayLike | None
+    robot: Robot, eye: ArrayLike | str | None, target: ArrayLike | None
 ) -> Array:
     """Return the direction from the target to the eye, shape (3,), not normalised."""
+    if isinstance(eye, str):
+        return VIEWS[eye]
     if eye is not None:
         return np.subtract(eye, np.zeros(3) if target is None else target)
     normal = plane_normal(robot)
@@ -250,7 +282,7 @@ def viewing_direction(
 
 
 def right_direction(
-    robot: Robot, eye: ArrayLike | None, target: ArrayLike | None
+    robot: Robot, eye: ArrayLike | str | None, target: ArrayLike | None
 ) -> Array:
     """Return the horizontal direction to the right in the picture, a unit vector."""
     direction = viewing_direction(robot, eye, target)

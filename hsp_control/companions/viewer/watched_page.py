@@ -52,6 +52,7 @@ class Watched:
     pushes = None
     laws: tuple[str, ...] = ()
     other = None
+    previews = False
 
     def __init__(self, reader: JournalReader) -> None:
         """Begin with a reader that has the first row."""

@@ -295,6 +295,14 @@ def test_key_and_button_compare_laws_and_the_other_one_is_a_ghost(page: Any) -> 
         assert until_sent(page, "compare", 2) == 2 * [
             {"do": "compare", "law": following}
         ]
+    preview = page.locator(".play-bar .preview")
+    for on in (False, True):
+        tell(page, "play_preview", on=on)
+        assert preview.get_attribute("aria-pressed") == str(on).lower()
+        page.evaluate("sent.length = 0")
+        page.keyboard.press("m")
+        preview.click()
+        assert until_sent(page, "preview", 2) == 2 * [{"do": "preview", "on": not on}]
     robot = Robot.load("planar3r")
     ghosts = Ghosts("other law", robot, "#117733", 0.4)
     q = robot.integrate(robot.neutral(), np.array([0.4, 0.5, -0.6]))

@@ -207,6 +207,57 @@ def test_every_joint_is_where_pinocchio_has_it(
     assert fingers[1]
 
 
+def test_views_by_key_button_and_configuration(
+    tmp_path: Path, watch: Callable[..., Watched]
+) -> None:
+    rollout = load_experiment(
+        "ur5_position", *COARSE, "simulation.duration=1", "view.camera=tool"
+    ).run()
+    page = export_html(rollout, tmp_path / "ur5.html")
+    watched = exported(watch, page, at="#t=0")
+    browser = watched.page
+    seen = """() => {
+      const root = node("").matrixWorld.clone().invert(), {controls, camera} = viewer;
+      const here = (point) => point.clone().applyMatrix4(root).toArray();
+      const [eye, target] = [camera.position, controls.target].map(here);
+      return [views.name, eye, target];
+    }"""
+
+    def looked(name: str) -> tuple[np.ndarray, np.ndarray]:
+        """The direction to the camera, of length 1, and the point that it looks at."""
+        browser.evaluate("viewer.render()")
+        found, eye, target = browser.evaluate(seen)
+        assert found == name
+        pressed = browser.locator(".views [aria-pressed=true]").all_inner_texts()
+        assert pressed == ([name] if name else [])
+        away = np.subtract(eye, target)
+        return away / np.linalg.norm(away), np.array(target)
+
+    def tool() -> np.ndarray:
+        return watched.matrix("/robot/wrist_3_joint")[:3, 3]
+
+    before = tool()
+    np.testing.assert_allclose(looked("tool")[1], before, atol=1e-6)
+    seek(watched, 0.8)
+    assert np.linalg.norm(tool() - before) > 0.01
+    np.testing.assert_allclose(looked("tool")[1], tool(), atol=1e-6)  # it follows
+    browser.keyboard.press("c")
+    whole = looked("")[1]
+    for name, direction in (
+        ("front", [0.993, 0.0, 0.119]), ("side", [0.0, -0.993, 0.119]),
+        ("top", [0.0, 0.0, 1.0]),
+    ):  # fmt: skip
+        browser.keyboard.press("c")
+        way, target = looked(name)
+        np.testing.assert_allclose(way, direction, atol=1e-3)
+        np.testing.assert_allclose(target, whole, atol=1e-6)
+    browser.locator(".views button").get_by_text("side").click()
+    looked("side")
+    browser.set_viewport_size({"width": 500, "height": 700})
+    browser.wait_for_timeout(200)
+    np.testing.assert_allclose(looked("side")[0], [0.0, -0.993, 0.119], atol=1e-3)
+
+
 def test_timeline_plots_and_robot_move_together(
     planar: Rollout, planar_page: Path, watch: Callable[..., Watched]
 ) -> None:
@@ -291,7 +342,8 @@ def states(watched: Watched) -> dict[str, bool]:
     """Which rows of the legend are switched on."""
     return watched.page.evaluate(
         """() => {
-          const rows = [...document.querySelectorAll("#layers button")];
+          const all = document.querySelectorAll("#layers button");
+          const rows = [...all].filter(({dataset}) => !dataset.view);
           const state = (row) => row.getAttribute("aria-pressed") === "true";
           return Object.fromEntries(rows.map((row) => [row.textContent, state(row)]));
         }"""

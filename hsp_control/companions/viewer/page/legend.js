@@ -11,6 +11,7 @@ class Legend {
     this.choices = new Map();  // path -> whether the user wants to see it
     this.caption = part("#caption");
     this.list = part("#layers");
+    this.views = make("li", {className: "plain"}, part(".views"));  // its first row; see Views
     this.toggle = onPress(part(".layers-toggle"), () => this.setOpen(!this.open));
     on(this.caption, "keydown", ({key}) => {
       if (key === "Escape" && this.small.matches) this.setOpen(false);
@@ -36,7 +37,7 @@ class Legend {
     this.told = told;
     this.rows = entries.map((entry) => [entry, this.row(entry)]);
     this.toggle.hidden = !entries.length;
-    this.list.replaceChildren(...this.rows.map(([{plain}, row]) =>
+    this.list.replaceChildren(this.views, ...this.rows.map(([{plain}, row]) =>
       make("li", {className: plain ? "plain" : ""}, row)));
   }
 

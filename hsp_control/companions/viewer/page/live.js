@@ -117,9 +117,13 @@ class LivePlot extends Plot {
   // Limits and contacts within the axis, with their names at the left.
   drawLines({over, scales: {y: {min, max}}, valToPos}) {
     const inside = this.ownLines.filter(({value}) => value >= min && value <= max);
+    const named = [];  // where names stand: none covers another one
     this.marks.replaceChildren(...inside.map(({value, name}) => {
       const top = Math.round(valToPos(value, "y"));
-      return make("i", {className: top < 16 ? "edge below" : "edge", style: `top: ${top}px`}, name);
+      const free = named.every((other) => Math.abs(other - top) >= 12);
+      if (free && name) named.push(top);
+      return make("i", {className: top < 16 ? "edge below" : "edge", style: `top: ${top}px`},
+                  free ? name : "");
     }));
     over.prepend(this.marks);
   }

@@ -183,6 +183,14 @@ class Play {
     this.send({do: "compare", law});
   }
 
+  // Ask for a preview of self-motion, or no more.
+  togglePreview() { this.send({do: "preview", on: !this.previewed}); }
+
+  showPreview({on}) {
+    this.previewed = on;
+    this.bar.preview.ariaPressed = on;
+  }
+
   showLaws({laws, law}) {
     Object.assign(this, {laws, law});
     this.bar.showLaws(laws, law);
@@ -237,6 +245,7 @@ Object.assign(commandHandlers, {
   play_targets(command) { if (play.ready) play.showTargets(command); },
   play_state(command) { play.showState(command); },
   play_laws(command) { if (play.ready) play.showLaws(command); },
+  play_preview(command) { if (play.ready) play.showPreview(command); },
   ghosts(command) { if (play.ready) play.ghosts.show(command); },
   play_values({values}) { if (play.ready) play.panel.setValues(values); },
   pose({tracks}) { if (!play.ready || play.bar.past.take(tracks)) player.pose(tracks); },

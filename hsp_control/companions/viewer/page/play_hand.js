@@ -169,6 +169,7 @@ class PlayKeys {
     }
     if (way) return play.selected && (() => this.move(key, way, shiftKey));
     if (repeat && key !== ".") return null;
+    if (key === "m") return () => play.togglePreview();
     if (key === " " && play.holdKey) return () => play.holdKey.set(true);
     return play.simulated && {
       " ": () => play.toggle(), ".": () => play.act("step"),

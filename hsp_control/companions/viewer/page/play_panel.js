@@ -15,6 +15,8 @@ class PlayBar {
     onPress(this.panel, () => play.panel.setOpen(!play.panel.open));
     onPress(part("button", this.watching), () => play.act("take_over"));
     this.other = part(".other", this.row);
+    this.preview = part(".preview", this.row);
+    this.acting.push(onPress(this.preview, () => play.togglePreview()));
     this.acting.push(onPress(this.other, () => play.compareNext()));
     presentation.addButton(part(".present", this.row));
     this.past = new PlayPast(play, part(".back", this.row));

@@ -12,9 +12,11 @@ viewer.renderer.shadowMap.type = MeshCat.THREE.VSMShadowMap;  // soft edges
 const player = new Player(viewer), legend = new Legend(viewer);
 new PlayerBar(player, part(".player"));
 const lengthLabels = new LengthLabels(viewer);
+const views = new Views(viewer, camera);
 let placed = null;  // the last camera of the program, and where it was placed then
 const drawScene = viewer.render.bind(viewer);
 viewer.render = () => {
+  followTool();
   // Meshcat's controls round the position anew each time: begin from the same, so that the
   // same time gives the same image.
   if (untouched()) viewer.camera.position.copy(placed.position);
@@ -33,7 +35,8 @@ const presentation = new Presentation(refit);
 presentation.addButton(part(".player .present"));
 
 const commandHandlers = {
-  camera, caption, set_object, ask,
+  caption, set_object, ask,
+  camera(command) { views.begin(command); },
   nothing() {},
   time({text}) { part("#caption .time").textContent = text; },
   status({text}) { part("#caption .status").textContent = text; },
@@ -244,6 +247,14 @@ function camera(command) {
   placed = {command, position: lens.position.clone(), target: center, slack: 1e-9 * away};
 }
 
+// The camera goes along with the tool, if it is to; also one that the user has turned.
+function followTool() {
+  const way = views.moved();
+  if (!way) return;
+  for (const point of [viewer.camera.position, viewer.controls.target,
+                       placed.position, placed.target]) point.add(way);
+}
+
 function untouched() {
   const near = (one, other) => one.distanceTo(other) < placed.slack;
   return placed !== null && near(viewer.camera.position, placed.position)
@@ -253,7 +264,7 @@ function untouched() {
 // Place the camera again for another size of the window, unless the user has moved it.
 function refit() {
   viewer.set_3d_pane_size();
-  if (untouched()) camera(placed.command);
+  if (untouched()) views.place();
   viewer.set_dirty();
 }
 

@@ -1,0 +1,57 @@
+// Views by name: front, side, top, and the tool from near, which the camera then follows. Keys: c shows
+// the next one, after the last one the first view again.
+"use strict";
+
+class Views {
+  constructor(viewer, show) {
+    Object.assign(this, {viewer, show, command: null, name: "", tool: null, followed: null});
+    const buttons = legend.views.querySelectorAll("button");
+    this.buttons = new Map([...buttons].map((button) =>
+      [button.dataset.view, onPress(button, () => this.select(button.dataset.view))]));
+    onKey(({key, repeat}) => key === "c" && !repeat && this.command && (() => {
+      const names = ["", ...this.buttons.keys()];
+      this.select(names[(names.indexOf(this.name) + 1) % names.length]);
+    }));
+  }
+
+  // The program has placed the camera: what it sees first, or a view that a configuration names.
+  begin(command) {
+    this.command = command;
+    this.select(command.view ?? "");
+  }
+
+  select(name) {
+    this.name = name;
+    for (const [each, button] of this.buttons) button.ariaPressed = each === name;
+    this.place();
+  }
+
+  // Place the camera, also for another size of the window.
+  place() {
+    const {command, name, viewer} = this, {views, tool, ...first} = command;
+    this.followed = name === "tool" ? this.toolPlace() : null;
+    if (!name) this.show(first);
+    else if (!this.followed) this.show({...first, eye: undefined, ...views[name] ?? views.front});
+    else {
+      const target = [this.followed.x, -this.followed.z, this.followed.y];
+      const near = {points: [target], radius: 0.3 * command.size, target};
+      this.show({...first, eye: undefined, ...views.tool, ...near});
+    }
+    viewer.set_dirty();
+  }
+
+  // Where the tool is, in three.js's axes.
+  toolPlace() {
+    const object = findNode(this.viewer, this.command.tool)?.object;
+    object?.updateWorldMatrix(true, false);
+    return object ? new MeshCat.THREE.Vector3().setFromMatrixPosition(object.matrixWorld) : null;
+  }
+
+  // How far the tool has moved since the last picture; null where it is not followed.
+  moved() {
+    if (!this.followed) return null;
+    const here = this.toolPlace(), way = here?.clone().sub(this.followed);
+    if (here) this.followed = here;
+    return way ?? null;
+  }
+}
