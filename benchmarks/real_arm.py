@@ -288,7 +288,7 @@ def _number(value: float) -> str:
 
 BORNE = """\
 With which a pose settles on the model itself, whose wrist has no rotors: a damping of
-10 N·m·s/rad on 0.007 kg m² bears less than a period."""
+10 N·m·s/rad on 0.007 kg m² tolerates less than a period."""
 HEADER = (
     "| arm | law | held: hand [mm] | angle [°] | circle: hand [mm] | angle [°] "
     "| effort's change [N·m] | rests |\n|---|---|--:|--:|--:|--:|--:|--:|"

@@ -258,7 +258,7 @@ class Experiment:
 
     @cached_property
     def model_errors(self) -> ModelErrors | None:
-        """What the loop bears at the start of what its model does not say.
+        """What of its model's errors the loop tolerates at the start.
 
         As it is on a robot that is not its model. None without a control period, and
         where `model_errors` has no answer.

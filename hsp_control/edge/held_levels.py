@@ -19,7 +19,7 @@ from hsp_control.engine.plans import PartCall
 
 STIFFEST = 1000.0
 """K [1/s²], the most that a deviation changes for each radian by which its direction
-turns. A sampled loop bears k h < 2 c, that is 2000 1/s² with a null-space gain of
+turns. A sampled loop tolerates k h < 2 c, that is 2000 1/s² with a null-space gain of
 10 1/s and periods of up to 10 ms: K is half of it."""
 
 

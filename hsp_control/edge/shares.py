@@ -3,7 +3,7 @@
     a = a_exact + μ (a_damped - a_exact),      0 ≤ μ ≤ 1
 
 Out of reach an error persists, and with it what the feedback asks for. Near a singular
-posture the exact inverse of that changes faster than a sampled loop bears, so the
+posture the exact inverse of that changes faster than a sampled loop can follow, so the
 inverse of a_damped is bounded by thresholds that follow what is asked for
 (`threshold.py`). But a threshold cannot tell an error that persists from a step within
 reach. What can is where the arm is held, and how: singular, or far away, or at a limit.

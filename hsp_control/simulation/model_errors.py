@@ -1,4 +1,4 @@
-"""What a loop bears of what its model does not say, linearised about a posture.
+"""Which errors of its model a loop tolerates, linearised about a posture.
 
 The loop of the whole robot (`linear_loop.py: LoadedLoop`) with other masses, rotors,
 delays and lags: its growing modes, and what an unknown effort does to the tasks.
@@ -31,7 +31,7 @@ from hsp_control.simulation.plants.model_changes import (
 )
 
 ERROR = 0.2
-"""Relative error of masses and inertias that the loop is to bear [-]."""
+"""Relative error of masses and inertias that the loop is to tolerate [-]."""
 _BODIES: Sequence[tuple[Inertias, int]] = [
     (Inertias(mass_factor=1.0 + ERROR), 0),
     (Inertias(mass_factor=1.0 - ERROR), 0),
@@ -70,7 +70,7 @@ class Moved(NamedTuple):
 
 
 class ModelErrors(NamedTuple):
-    """What the loop bears at a posture; rates and times are of the linear loop."""
+    """What the loop tolerates at a posture; rates and times are of the linear loop."""
 
     moved: tuple[Moved, ...]  # of the tasks
     joints: tuple[str, ...]  # the degrees of freedom
@@ -97,7 +97,7 @@ def model_errors(
     sensor_delay: int = 0,
     effort_lag: float = 0.0,
 ) -> ModelErrors | None:
-    """Return what the loop bears at a posture.
+    """Return what the loop tolerates at a posture.
 
     None for a floating base and contacts, where the law is damped, and where nothing
     controls the null space.
@@ -158,7 +158,7 @@ def model_errors(
 
 
 def lines(found: ModelErrors) -> dict[str, str]:
-    """Return what the loop bears in words, by what it is about."""
+    """Return what the loop tolerates in words, by what it is about."""
     texts: dict[str, str] = {}
     for each in found.moved:
         scale, unit = (1e3, "mm") if each.unit == "m" else (180.0 / np.pi, "°")
@@ -172,11 +172,11 @@ def lines(found: ModelErrors) -> dict[str, str]:
         )
     grows = f"{found.growing} of {found.tried} grow, as exp({found.growth:.2g} t)"
     texts["masses ±20 %"] = grows if found.growing else "no growing mode"
-    texts["bears"] = (
+    texts["tolerates"] = (
         f"a delay of {1e3 * found.delay:.3g} ms, or a lag of {1e3 * found.lag:.3g} ms"
     )
     if found.rotor < np.inf:
-        texts["bears"] += (
+        texts["tolerates"] += (
             f"; rotors of up to {found.rotor:.2g} kg m² that the model lacks, see "
             "robot: motor_inertia"
         )
@@ -190,7 +190,7 @@ def lines(found: ModelErrors) -> dict[str, str]:
         most = f"at most {1e3 * found.hidden:.3g} ms" if found.hidden else "hardly any"
         texts["rotors hidden"] = (
             "where the drives' torque control makes the arm behave as its bare links, "
-            f"{most} of delay is borne: then motor_inertia: 0"
+            f"{most} of delay is tolerated: then motor_inertia: 0"
         )
     return texts
 

@@ -21,7 +21,7 @@ from hsp_control.tasks.compliant_task import impedance_of
 from hsp_control.tasks.task import SecondOrderTask
 
 _REACH = 10.0
-"""A slider goes from a tenth of a setting to ten times it, within what is borne."""
+"""A slider goes from a tenth of a setting to ten times it, within what is tolerated."""
 _BORNE = 0.2  # largest rate times period that a slider offers; see `rate_check.RULE`
 
 

@@ -344,7 +344,8 @@ def _finding(
         return RateFinding(
             path,
             f"unstable with a delay of {late} periods ({late * h:.4g} s): the loop "
-            f"bears at most {borne} ({borne * h:.4g} s); use a shorter delay{slower}",
+            f"tolerates at most {borne} ({borne * h:.4g} s); use a shorter "
+            f"delay{slower}",
             np.inf,
             True,
         )
