@@ -5,7 +5,7 @@
 A constant is replaced in a copy of the package; a line that is not found ends the
 benchmark, so that what is replaced is always a constant of the law as it is. Targets
 out of reach with defaults only, the kinds of `edge_rest.py`, in the metrics I and M(q),
-at 10 ms, where a sampled loop tolerates least; and feasible tasks beside fields that push
+at 10 ms, where a sampled loop tolerates least; and feasible tasks beside fields pushing
 into limits. Writes the table of constants into benchmarks/results/edge.md.
 """
 
