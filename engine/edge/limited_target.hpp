@@ -6,7 +6,7 @@
 //
 // into what moves the tasks and the self-motion. Two things change, each as far as a is beyond a
 // limit, so that the step is a continuous function of the state. With E the excess, relative to
-// what the limit permits, 1/(1 + E) is the part of what is asked for that is within it.
+// what the limit permits, 1/(1 + E) is the part of what is commanded that is within it.
 //
 // *The tasks are damped.* An arm that is held at its edge, or rushes to it, asks for more than its
 // motors give, from one side and then from the other: the nearest step within the limits would
@@ -51,7 +51,7 @@ struct LimitedTarget {
     In<'k', 'w'> A;    // the first n columns count
     InOut<'k'> lower;  // for a deviation δ from a: A δ ≥ lower
   } barred;
-  double large;  // E_t from which on the damped law counts wholly
+  double large;  // E_t from which on the damped law applies wholly
   Scratch<'n'> change, asked;
   Scratch<'n'> effort_change, effort_asked;  // M times them
 

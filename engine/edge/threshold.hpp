@@ -15,7 +15,7 @@
 
 namespace hsp {
 
-// How the thresholds follow what is asked for, and when the exact law counts beside; the constants
+// How the thresholds follow what is commanded, and when the exact law applies beside; the constants
 // and their reasons are those of `hsp_control/edge/constants.py`.
 struct Following {
   double size;      // the robot's [m]; 0: they do not follow
@@ -23,9 +23,9 @@ struct Following {
   double modest;    // f_0 [m/s² or rad/s²]; 0 on a fixed base
   double below;     // by how much L is less below a held level
   double turning;   // ε for each rad/s of a field where a spring slips [s], times the size
-  double quickest;  // the most that counts of a field [rad/s]
-  double near;      // σ_x: the exact law counts wholly above [m]
-  double far;       // part of the largest error up to which it counts wholly
+  double quickest;  // the largest part of a field that is used [rad/s]
+  double near;      // σ_x: the exact law applies wholly above [m]
+  double far;       // part of the largest error up to which it applies wholly
 };
 
 // Where the inverses of the levels begin to be bounded.
@@ -35,7 +35,7 @@ struct Thresholds {
   InOut<'l'> scales;   // by how much J L⁻ᵀ is longer than J, at least 1: the unit of ε
 };
 
-// What is asked of the rows of the stack, level after level.
+// What is commanded for the rows of the stack, level after level.
 struct Asked {
   Ints<'l'> ends;      // where each level's rows end
   In<'m'> asked;       // f, what the feedback asks for at rest

@@ -324,7 +324,7 @@ class Experiment:
 
     @property
     def live_sources(self) -> tuple[str, ...]:
-        """The addresses at which its streams hear other processes, in real time."""
+        """The addresses at which its streams receive messages, in real time."""
         streams = parts_within(self.scenario, Streamed)
         return tuple(str(each.source) for each in streams if each.live)
 

@@ -61,7 +61,7 @@ def followed_stream(task: Task) -> StreamRun | None:
     What reads a source or a recording is none: nobody can send to it.
     """
     followed: object = settled(task.followed, np.inf)
-    if isinstance(followed, FollowedStream) and not followed.run.stream.hears:
+    if isinstance(followed, FollowedStream) and not followed.run.stream.listens_to:
         return followed.run
     return None
 

@@ -2,7 +2,7 @@
 
 Where a limit binds, what is below a level yields before the level does. How it yields
 turns with the posture, the more the less it can and the cheaper it is. A task that
-cannot be met asks for it forever: so the cost ρ follows what is asked for beyond the
+cannot be met asks for it forever: so the cost ρ follows what is commanded beyond the
 limit, as ε follows f (`threshold.py`), and the tiny ρ of strict priorities is for tasks
 that can be met, and for what yields easily. ``docs/edge.md`` has the proof, the call
 the equations.

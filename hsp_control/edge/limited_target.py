@@ -33,7 +33,7 @@ from hsp_control.common.arrays import Array
 from hsp_control.engine.plans import PartCall
 
 LARGE = 2.0
-"""Excess of the tasks from which on the damped law counts wholly: where they ask for
+"""Excess of the tasks from which on the damped law applies wholly: where they ask for
 three times what the limits permit."""
 
 

@@ -19,7 +19,7 @@ the whole size, and the spring moves the whole arm. So an error of one component
 third of L, one of two components half.
 
 Below a level of the singular value s_1 the null space turns by up to |∂J/∂q|/s_1, and
-what is asked for there with it. A level follows with L s_1/size where that is less; a
+what is commanded there with it. A level follows with L s_1/size where that is less; a
 field costs a spring above it an ε that grows with g, as far as the spring slips.
 
 A level that is held at its edge leaves to those below the very directions in which it
@@ -55,12 +55,12 @@ since feet ask for that much where they land."""
 
 TURNING, QUICKEST = 50.0, 7.0
 """How fast what a field asks for may change as its null space turns [1/s]: what is held
-for a period h is stable below 2/h, and periods are up to 10 ms. No field counts for
+for a period h is stable below 2/h, and periods are up to 10 ms. No field is used for
 more than 7 rad/s: none costs a spring all that it has."""
 
 
 class Following(NamedTuple):
-    """How the thresholds follow what is asked for, and when the exact law counts."""
+    """How the thresholds follow what is commanded, and when the exact law applies."""
 
     size: float  # the robot's [m]; 0: they do not
     # L [rad/s² for each unit of a singular value]; inf: it does not follow
@@ -68,9 +68,9 @@ class Following(NamedTuple):
     modest: float  # f_0 [m/s² or rad/s²]; 0 on a fixed base
     below: float  # by how much L is less below a held level
     turning: float  # ε for each rad/s of a field where a spring slips
-    quickest: float  # the most that counts of a field [rad/s]
-    near: float  # σ_x: the exact law counts wholly above
-    far: float  # part of the largest error up to which it counts wholly
+    quickest: float  # the largest part of a field that is used [rad/s]
+    near: float  # σ_x: the exact law applies wholly above
+    far: float  # part of the largest error up to which it applies wholly
 
     @classmethod
     def of(cls, size: float, *, on_legs: bool) -> Self:

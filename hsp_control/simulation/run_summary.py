@@ -121,7 +121,7 @@ def _text(measure: Measure) -> str:
 
 
 def beyond_limits(rollout: Log) -> str:
-    """Return that a field asks for more than limits give, if it does at the end."""
+    """Return that a field demands more than limits give, if it does at the end."""
     last = slice(-max(len(rollout) // 10, 1), None)
     asked = np.linalg.norm(rollout["field.g"][-1])
     missing = rollout["null_space_norm"][-1]
@@ -130,7 +130,7 @@ def beyond_limits(rollout: Log) -> str:
         return ""
     unit = rate_unit(rollout)
     return (
-        f"the field asks for more than the limits give: |g| {asked:.3g} {unit}, "
+        f"the field demands more than the limits give: |g| {asked:.3g} {unit}, "
         f"|e_N| {missing:.3g} {unit} at the end"
     )
 

@@ -79,15 +79,15 @@ def opened(source: str, space: Space) -> Callable[["ref[Inbox]"], None]:
         parts = [name for name, each in port.parts.items() if not each or each()]
         if parts and "" in (*parts, address.part):
             raise StreamError(
-                f"{source}: another stream of this process hears all that comes there, "
-                "or a part of it; give each its own udp://HOST:PORT/PART"
+                f"{source}: another stream of this process receives all that comes "
+                "there, or a part of it; give each its own udp://HOST:PORT/PART"
             )
         port.parts[address.part] = None
     return partial(_listen, port, address.part)
 
 
 class _Port:
-    """A port, and the streams of this process that hear what comes there."""
+    """A port, and the streams of this process that receive what comes there."""
 
     def __init__(self, address: Address) -> None:
         self.parts: dict[str, ref[Inbox] | None] = {}  # None: it listens soon
@@ -136,7 +136,7 @@ class _Port:
 
 
 def _parts_of(text: bytes, inboxes: Mapping[str, Inbox]) -> dict[str, dict[str, Any]]:
-    """Return what each stream hears of a datagram; all of it is valid."""
+    """Return what each stream receives of a datagram; all of it is valid."""
     try:
         data = parsed(text)
     except (ValueError, RecursionError) as error:
@@ -176,7 +176,7 @@ _lock = Lock()
 
 
 def _listen(port: _Port, part: str, inbox: "ref[Inbox]") -> None:
-    """Hear what comes for as long as an inbox is there, in turn with the others."""
+    """Receive what comes for as long as an inbox is there, in turn with the others."""
     port.parts[part] = inbox
     try:
         while inbox() is not None:

@@ -31,7 +31,7 @@ _POLL = 0.01
 
 
 class Ros2Hardware:
-    """`Hardware` that hears ``sensor_msgs/JointState`` and sends efforts.
+    """`Hardware` that receives ``sensor_msgs/JointState`` and sends efforts.
 
     ros2_control's ``JointStateBroadcaster`` publishes these states, and its
     ``ForwardCommandController`` of efforts, once ``JointGroupEffortController``, takes
@@ -56,7 +56,7 @@ class Ros2Hardware:
     def __init__(
         self, address: str, robot: Robot, period: float, *, timeout: float = 10.0
     ) -> None:
-        """Connect, and wait until the robot sends its states and hears commands.
+        """Connect, and wait until the robot sends its states and receives commands.
 
         Args:
             address: ``CONTROLLER?states=TOPIC&joints=A,B&domain=N``. Efforts go to
@@ -169,7 +169,7 @@ class Ros2Hardware:
         return self._last._replace(sequence=self._stamps.sequence, fault=fault)
 
     def _check_period(self, end: float) -> Measurement:
-        """Hear some states, compare their period with the loop's, return the last."""
+        """Receive some states, compare their period with the loop's, return one."""
         stamps: list[int] = []
         while self._last is None or len(stamps) < _STATES:
             left = end - monotonic()

@@ -153,16 +153,16 @@ class TopicPublisher(_End[M]):
 
     @property
     def matched(self) -> int:
-        """Number of subscriptions that hear it."""
+        """Number of subscriptions that receive it."""
         return len(self._writer.get_matched_subscriptions())
 
     def why_none(self) -> str:
-        """Return why nobody hears it, as far as can be seen."""
+        """Return why nobody receives it, as far as can be seen."""
         return self._others(BuiltinTopicDcpsSubscription, "listens to")
 
 
 class Subscription(_End[M]):
-    """Hears messages of a topic.
+    """Receives messages of a topic.
 
     Attributes:
         malformed: Number of messages with a text that is not UTF-8.
@@ -181,7 +181,7 @@ class Subscription(_End[M]):
             Policy.DataRepresentation(use_cdrv0_representation=True),
             self._user_data,
         )
-        with _explained(f"cannot hear {topic}"):
+        with _explained(f"cannot receive {topic}"):
             self._reader = DataReader(participant, self._topic, qos)
             new = SampleState.NotRead | ViewState.Any | InstanceState.Any
             self._new = ReadCondition(self._reader, new)
@@ -190,11 +190,11 @@ class Subscription(_End[M]):
 
     @property
     def matched(self) -> int:
-        """Number of publishers that it hears."""
+        """Number of publishers that it receives."""
         return len(self._reader.get_matched_publications())
 
     def why_none(self) -> str:
-        """Return why it hears nobody, as far as can be seen."""
+        """Return why it receives nobody, as far as can be seen."""
         return self._others(BuiltinTopicDcpsPublication, "publishes")
 
     def wait(self, timeout: float) -> bool:
@@ -218,7 +218,7 @@ class Subscription(_End[M]):
             try:
                 taken = self._reader.take(1)
             except DDSException as error:
-                raise HardwareError(f"cannot hear {self.topic}: {error}") from error
+                raise HardwareError(f"cannot receive {self.topic}: {error}") from error
             except UnicodeDecodeError:  # all else Cyclone has checked
                 self.malformed += 1
                 continue

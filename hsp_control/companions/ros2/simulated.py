@@ -30,7 +30,7 @@ _POLL = 0.1
 
 
 class RobotTopics:
-    """What a robot with ros2_control would publish and hear.
+    """What a robot with ros2_control would publish and receive.
 
     Attributes:
         commands: The topic of the efforts.

@@ -112,8 +112,8 @@ def sweep(
     first, experiment = plan.first_run()
     if experiment.live_sources:
         raise SweepError(
-            f"a stream hears {experiment.live_sources[0]}, which only one run can; "
-            "sweep the log of a run, or give the stream a recording as its source"
+            f"a stream listens to {experiment.live_sources[0]}, which only one run "
+            "can; sweep the log of a run, or give the stream a recording as its source"
         )
     identity = plan.identity(experiment.robot)
     path = None if out is None else Path(out)

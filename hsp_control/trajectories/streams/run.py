@@ -100,10 +100,10 @@ class StreamRun:
         self._put(values=values, times=times, velocities=velocities, t=t)
 
     def _put(self, **message: Any) -> None:
-        if self.stream.hears:
+        if self.stream.listens_to:
             raise StreamError(
-                f"this stream hears {self.stream.hears}; only a stream without source "
-                "and messages can be sent to"
+                f"this stream listens to {self.stream.listens_to}; only a stream "
+                "without source and messages can be sent to"
             )
         self._inbox.put(**message)
 

@@ -101,7 +101,7 @@ class Streamed(Part, error=TrajectoryError):
         return self.source is not None and is_address(self.source)
 
     @property
-    def hears(self) -> str:
+    def listens_to(self) -> str:
         """What its messages come from, instead of `send`; empty: nothing."""
         return self.source or ("a recording" if self.messages is not None else "")
 

@@ -122,7 +122,9 @@ def test_a_port_in_use_is_told_and_streams_of_one_process_share_it(port: int) ->
     assert one.run.inbox is two.run.inbox
     with pytest.raises(StreamError, match="already carries 1 numbers; this stream"):
         Stream([0.0] * 2, source=f"udp://127.0.0.1:{port}").anchored(None).sample(0.0)
-    with pytest.raises(StreamError, match="another stream of this process hears all"):
+    with pytest.raises(
+        StreamError, match="another stream of this process receives all"
+    ):
         listening(port, "/left")
 
 
