@@ -43,7 +43,7 @@ from hsp_control.live import (
     StopSettings,
     run_loop,
 )
-from hsp_control.live.state_reader import MeasurementMonitor
+from hsp_control.live.state_reader import FrozenState, MeasurementMonitor
 from hsp_control.robot import RobotState
 
 RATE, EFFORT = 1000.0, 80.0
@@ -275,6 +275,20 @@ def test_a_robot_that_its_friction_can_hold_is_not_frozen(friction: float) -> No
     else:
         assert "stands to the last bit: its effort is" in report.reason
         assert "its sensor is dead, or it is blocked" in report.reason
+
+
+def test_a_state_that_stays_is_frozen_where_the_efforts_would_move_it() -> None:
+    """Under the efforts that act: those that hold the arm leave it where it is."""
+    v = np.full(7, 1e-6)  # with 0 in all joints, brakes may hold it
+    hold = panda().inverse_dynamics(start(), v, np.zeros(7))
+    for effort, frozen in ((hold, False), (hold + 5.0 * np.eye(7)[1], True)):
+        state = FrozenState(panda(), PERIOD, 20)
+        found = [
+            state.fault(Measurement(k, k * PERIOD, start(), v), effort)
+            for k in range(60)
+        ]
+        assert any(found) == frozen
+        assert not any(found[:21])
 
 
 def test_buffers_that_the_driver_reuses_are_copied() -> None:

@@ -93,3 +93,22 @@ def test_states_of_a_robot_have_the_age_of_the_newest_packet(
         monkeypatch.undo()
         hardware.close()
         hardware.drain()
+
+
+def test_a_robot_of_whatever_phase_of_its_stop_has_stopped_by_itself(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    hardware = UdpHardware(panda(), PERIOD)
+    payload = np.concatenate([panda().home(), np.zeros(7)])
+    try:
+        for phase in Phase:
+            head = PacketKind.STATE, phase, hardware.session, 1, 0
+            packets = [Packet(*head, 0, 0.0, payload)]
+            monkeypatch.setattr(hardware.link, "receive", lambda _, p=packets: p)
+            found = hardware.read(0.0)
+            assert found is not None
+            assert found.halted == (phase in {Phase.DAMPING, Phase.HOLDING})
+    finally:
+        monkeypatch.undo()
+        hardware.close()
+        hardware.drain()
