@@ -1,9 +1,15 @@
 """Types commands of ``hsp`` as a user does, each in a process of its own."""
 
+import io
 import os
+import signal
 import subprocess
 import sys
+import time
+from contextlib import chdir, redirect_stderr, redirect_stdout
 from pathlib import Path
+
+from hsp_control.cli import main
 
 PATIENCE = "--set live.missing=2000 --set live.watchdog=2000 --set live.age=60"
 """What `hsp live` is given on a busy computer."""
@@ -12,17 +18,54 @@ PATIENCE = "--set live.missing=2000 --set live.watchdog=2000 --set live.age=60"
 def hsp(line: str, folder: Path, status: int = 0) -> str:
     """Type a command in a folder, and return what it prints; Ctrl-C ends a play."""
     command = [sys.executable, "-m", "hsp_control", *line.split()]
-    if line.startswith("play "):
-        command = ["timeout", "--preserve-status", "-s", "INT", "8", *command]
-    return typed(command, folder, status)
+    return (
+        played(command, folder)
+        if line.startswith("play ")
+        else typed(command, folder, status)
+    )
+
+
+def played(command: list[str], folder: Path) -> str:
+    """Begin a play, and end it two seconds after it has said how one ends it."""
+    with subprocess.Popen(
+        command, cwd=folder, text=True, env=without_display(),
+        stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.STDOUT,
+    ) as play:  # fmt: skip
+        assert play.stdout is not None
+        begin = ""
+        for line in play.stdout:
+            begin += line
+            if line.startswith("Ctrl-C ends it"):
+                break
+        time.sleep(2.0)  # some rows; even one is a log
+        play.send_signal(signal.SIGINT)
+        said = begin + play.communicate(timeout=250)[0]
+    assert play.returncode == 0, said
+    return said
+
+
+def without_display() -> dict[str, str]:
+    """Return the environment of a command that can open no window."""
+    hidden = {"DISPLAY", "WAYLAND_DISPLAY", "BROWSER"}
+    return {key: value for key, value in os.environ.items() if key not in hidden}
+
+
+def in_this_process(line: str, folder: Path, status: int = 0) -> str:
+    """Do what `hsp` does, without a process of its own, which takes a second to begin.
+
+    How a command begins and ends only a process shows: one test of each is enough.
+    """
+    printed = io.StringIO()
+    with chdir(folder), redirect_stdout(printed), redirect_stderr(printed):
+        found = main(line.split())
+    assert found == status, f"hsp {line}\n{printed.getvalue()}"
+    return printed.getvalue()
 
 
 def typed(command: list[str], folder: Path, status: int = 0) -> str:
     """Run a command in a folder without a display, and return what it prints."""
-    hidden = {"DISPLAY", "WAYLAND_DISPLAY", "BROWSER"}
     done = subprocess.run(
-        command, cwd=folder, text=True, check=False, timeout=250,
-        env={key: value for key, value in os.environ.items() if key not in hidden},
+        command, cwd=folder, text=True, check=False, timeout=250, env=without_display(),
         stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.STDOUT,
     )  # fmt: skip
     assert done.returncode == status, f"{' '.join(command)}\n{done.stdout}"

@@ -4,7 +4,7 @@ import sys
 from pathlib import Path
 
 import pytest
-from typing_commands import PATIENCE, hsp, typed
+from typing_commands import PATIENCE, hsp, in_this_process, typed
 
 CONFIG = """
 robot: {name: panda}
@@ -61,6 +61,9 @@ OTHERS = {  # by what `hsp run` says of it
     "loop": "was made from Python and contains no configuration",
 }
 
+TAKERS = "view {log} --no-browser", "export {log} --html out/{name}.html", "plot {log}"
+"""Of a walk's log these are processes of their own, too."""
+
 
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
@@ -77,24 +80,21 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 @pytest.mark.parametrize("name", [*REPEATED, *OTHERS])
 def test_a_log_is_taken(name: str, folder: Path) -> None:
     log = next((folder / "out").glob(f"{name}.*")).relative_to(folder)
-    hsp(f"view {log} --no-browser", folder)
-    hsp(f"export {log} --html out/{name}.html", folder)
-    hsp(f"plot {log}", folder)
+    for command in TAKERS:
+        in_this_process(command.format(log=log, name=name), folder)
     assert (folder / "out" / f"{name}.html").stat().st_size > 100_000
     assert (folder / "out" / f"{name}-diagnostics.png").exists()
     if name in REPEATED:
-        hsp(f"run {log}", folder)
+        in_this_process(f"run {log}", folder)
     else:
-        assert OTHERS[name] in hsp(f"run {log}", folder, status=2)
+        assert OTHERS[name] in in_this_process(f"run {log}", folder, status=2)
 
 
 def test_a_walk_s_log_is_taken(folder: Path) -> None:
     hsp("run walking/solo12_trot --set simulation.duration=0.3", folder)
     (log,) = (path.relative_to(folder) for path in folder.glob("out/solo12_trot*.npz"))
-    hsp(f"view {log} --no-browser", folder)
-    hsp(f"export {log} --html out/walk.html", folder)
-    hsp(f"plot {log}", folder)
-    hsp(f"run {log}", folder)
+    for command in (*TAKERS, "run {log}"):
+        hsp(command.format(log=log, name="walk"), folder)
 
 
 def test_a_sweep_s_file_is_drawn(folder: Path) -> None:

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from page_runner import Running, Shell
 from places import ROOT
-from typing_commands import hsp, typed
+from typing_commands import hsp, in_this_process, typed
 
 from hsp_control import Rollout
 
@@ -53,7 +53,7 @@ def test_a_script_runs(name: str, folder: Path) -> None:
         assert run.status == "completed"
         if run.t[-1] > 1.0:
             assert np.isfinite(run.tau).all()
-        hsp(f"view {log} --no-browser", folder)
+        in_this_process(f"view {log} --no-browser", folder)
 
 
 @pytest.mark.parametrize("name", CONFIGURATIONS)
@@ -62,7 +62,7 @@ def test_a_configuration_runs(name: str, folder: Path) -> None:
     printed = hsp(f"run {name}", folder)
     assert "completed" in printed
     (log,) = (folder / "out").glob("*.npz")
-    hsp(f"view {log} --no-browser", folder)
+    in_this_process(f"view {log} --no-browser", folder)
 
 
 def test_a_franka_s_box_is_moved(folder: Path) -> None:

@@ -97,6 +97,8 @@ class RowFiles:
                 os.close(self._lock)
                 self._lock = -1
                 raise SweepError(f"{folder}: another sweep writes it already") from None
+            # Left by one that was killed while it wrote; nobody else writes here now.
+            self._remove([*folder.glob(".*.part")])
             files = _files(folder)
             if files:
                 self._number = int(files[-1].stem.rpartition("-")[2])
@@ -176,6 +178,8 @@ class RowFiles:
         except OSError as error:
             reason = error.strerror or str(error)
             raise SweepError(f"{path}: cannot write the sweep: {reason}") from error
+        finally:  # Ctrl-C may come while it writes: `close` writes the rows again
+            part.unlink(missing_ok=True)
 
     def _remove(self, files: Sequence[Path]) -> None:
         for file in files:

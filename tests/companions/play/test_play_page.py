@@ -64,12 +64,12 @@ PIXEL = """(point) => {
   const {x, y} = play.sight.update().project(new MeshCat.THREE.Vector3(...point));
   return [x, y];
 }"""
-# A point of a handle that no other one covers: [x, y].
+# A point of a handle that no other one covers: [x, y]; handles reach 100 pixels out.
 HANDLE = """([name, kind, axis]) => {
   const gizmo = [...play.gizmos.values()].find(({target}) => target.name === name);
-  const {left, top, width, height} = play.sight.update().box;
-  for (let y = top; y < top + height; y += 2) {
-    for (let x = left; x < left + width; x += 2) {
+  const middle = play.sight.update().project(gizmo.position);
+  for (let y = middle.y - 100; y < middle.y + 100; y += 2) {
+    for (let x = middle.x - 100; x < middle.x + 100; x += 2) {
       const found = gizmo.find(play.sight, x, y, "mouse");
       const {handle, gap} = found ?? {};
       if (handle?.kind === kind && handle.axis === axis && gap < 1.5) return [x, y];
@@ -79,8 +79,8 @@ HANDLE = """([name, kind, axis]) => {
 }"""
 LINK = """() => {
   const {left, top, width, height} = play.sight.update().box;
-  for (let y = top; y < top + height; y += 5) {
-    for (let x = left; x < left + width; x += 5) {
+  for (let y = top; y < top + height; y += 12) {
+    for (let x = left; x < left + width; x += 12) {
       if (play.hand.find(x, y, "mouse")?.path) return [x, y];
     }
   }
@@ -110,7 +110,7 @@ def opened(chromium: Any, viewer: Viewer, **options: Any) -> tuple[Any, list[str
 
 @pytest.fixture(scope="module")
 def desktop(chromium: Any, viewer: Viewer) -> Iterator[tuple[Any, list[str]]]:
-    page, wrong = opened(chromium, viewer, viewport={"width": 1280, "height": 800})
+    page, wrong = opened(chromium, viewer, viewport={"width": 960, "height": 600})
     yield page, wrong
     page.close()
 
@@ -456,7 +456,8 @@ def told_until(page: Any, values: dict[str, Any], expression: str) -> None:
 
 def test_a_refused_value_goes_back(page: Any) -> None:
     """Whether a word of the program is older is a matter of time: here it stands."""
-    page.evaluate("window.echo = Play.ECHO; Play.ECHO = 1e9")
+    page.evaluate("window.usual = [Play.ECHO, PlayPanel.PATIENCE]")
+    page.evaluate("Play.ECHO = PlayPanel.PATIENCE = 1e9")
     slider, shown = page.locator("#play-stiffness"), page.locator(".slider output")
     before = slider.input_value()
     slider.fill("0.5")  # the middle, on a logarithmic scale
@@ -464,21 +465,21 @@ def test_a_refused_value_goes_back(page: Any) -> None:
     assert shown.inner_text() == "200 N/m"
     tell(page, "play_values", values={"stiffness": 400.0})
     assert shown.inner_text() == "200 N/m"  # the program had not heard of it yet
-    page.evaluate("Play.ECHO = 0")
+    page.evaluate("Play.ECHO = PlayPanel.PATIENCE = 0")
     told_until(page, {"stiffness": 400.0}, "document.querySelector('#play-stiffness')"
                ".getAttribute('aria-valuetext') === '400 N/m'")  # fmt: skip
     assert slider.input_value() == before
-    page.evaluate("sent.length = 0; Play.ECHO = 1e9")
+    page.evaluate("sent.length = 0; Play.ECHO = PlayPanel.PATIENCE = 1e9")
     page.get_by_role("switch", name="Friction").click()
     until_sent(page, "set")
     assert [message["value"] for message in sent(page)] == [True]
     tell(page, "play_values", values={"friction": False})
     assert page.get_by_role("switch", name="Friction").is_checked()
-    page.evaluate("Play.ECHO = 0")
+    page.evaluate("Play.ECHO = PlayPanel.PATIENCE = 0")
     told_until(
         page, {"friction": False}, "!document.querySelector('.switch input').checked"
     )
-    page.evaluate("Play.ECHO = window.echo")
+    page.evaluate("[Play.ECHO, PlayPanel.PATIENCE] = window.usual")
 
 
 def test_a_target_and_an_obstacle_return_to_their_paths(page: Any) -> None:

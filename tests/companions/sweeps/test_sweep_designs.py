@@ -12,7 +12,7 @@ from scipy.special import ndtr, ndtri
 
 from hsp_control.common.exceptions import SweepError
 from hsp_control.companions import sweeps
-from hsp_control.companions.sweeps import Sweep
+from hsp_control.companions.sweeps import Sweep, row_files
 from hsp_control.companions.sweeps.design import chosen_design, points
 from hsp_control.companions.sweeps.factor import factors
 from hsp_control.companions.sweeps.one_run import Row
@@ -177,6 +177,29 @@ def test_a_file_is_in_the_order_of_the_plan(tmp_path: Path) -> None:
         for name in ("one", "other")
     )
     assert one == other
+
+
+def test_ctrl_c_while_a_file_is_written_leaves_no_part_of_it(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Nor does one that was killed then; its rows are written when it closes."""
+    folder = tmp_path / "a.parquet"
+    folder.mkdir()
+    (folder / ".rows-000099.parquet.part").write_bytes(b"PAR1")
+    files = RowFiles(plan_of({"a": "10:30:3"}), {}, folder, fresh=False)
+    files.add(Row(1, "completed", "", {"x": Measure(1.0, "m", "")}, 0.0))
+
+    def interrupted(*_: Any, **__: Any) -> None:
+        raise KeyboardInterrupt
+
+    with monkeypatch.context() as patch:
+        patch.setattr(row_files.pq, "write_table", interrupted)
+        with pytest.raises(KeyboardInterrupt):
+            files.write()
+    files.close()
+    (file,) = (path for path in folder.iterdir() if path.name != ".lock")
+    assert file.suffix == ".parquet"
+    assert Sweep.load(folder)["run"].tolist() == [1]
 
 
 # --- sensitivity ---------------------------------------------------------------------
