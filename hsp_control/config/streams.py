@@ -59,7 +59,7 @@ def with_recordings(
     received: Mapping[str, Sequence[Any]],
     planned: Sequence[Any] = (),
 ) -> dict[str, Any]:
-    """Return a log's configuration in which its streams repeat what they heard."""
+    """Return a log's configuration in which its streams repeat what they received."""
     repeated = deepcopy(dict(config))
     tasks = repeated.get("tasks", {})
     of_tasks = [(tasks.get(name, {}), each) for name, each in received.items()]

@@ -4,7 +4,7 @@
 
 Out of reach an error persists, and with it what the feedback asks for. Near a singular
 posture the exact inverse of that changes faster than a sampled loop bears, so the
-inverse of a_damped is bounded by thresholds that follow what is asked for
+inverse of a_damped is bounded by thresholds that follow what is commanded
 (`threshold.py`). But a threshold cannot tell an error that persists from a step within
 reach. What can is where the arm is held, and how: singular, or far away, or at a limit.
 So μ is the largest of three shares, each of them 0 in the middle:

@@ -60,7 +60,7 @@ more than 7 rad/s: none costs a spring all that it has."""
 
 
 class Following(NamedTuple):
-    """How the thresholds follow what is asked for, and when the exact law counts."""
+    """How thresholds follow the commanded f, and where the exact law is active."""
 
     size: float  # the robot's [m]; 0: they do not
     # L [rad/s² for each unit of a singular value]; inf: it does not follow

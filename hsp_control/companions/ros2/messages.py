@@ -1,4 +1,4 @@
-"""The messages of ROS 2 that are sent and heard here, with ROS 2's own layouts.
+"""The messages of ROS 2 that are sent and received here, with ROS 2's own layouts.
 
 On the wire, ROS 2's ``sensor_msgs/msg/JointState`` is the DDS type
 ``sensor_msgs::msg::dds_::JointState_``. Its bytes are plain CDR (XCDR1), in the order

@@ -182,7 +182,7 @@ class Follower:
         self.journal = self._new_journal()
 
     def begin(self, process: subprocess.Popen[bytes]) -> None:
-        """Begin to follow; the page's process is told of each new journal."""
+        """Begin to follow; the page's process is notified of each new journal."""
         self._process = process
         self._thread.start()
 
@@ -255,7 +255,7 @@ class Follower:
             there = {id(each) for each in self._streams()}
             self._copy.change(own)
             for stream in self._streams():
-                if id(stream) not in there:  # the loop has heard its first message
+                if id(stream) not in there:  # the loop has received its first message
                     with controller._lock:
                         stream.catch_up()
         self._changes = changes
