@@ -45,7 +45,7 @@ def name_and_options(address: str) -> tuple[str, dict[str, str]]:
 
 
 class Rate:
-    """Says when something is due that is told at a rate, once a period of a loop.
+    """Says when something is due that is sent at a rate, once a period of a loop.
 
     The mean rate is right, also where a loop's period does not divide its own.
     """
@@ -68,7 +68,7 @@ class Rate:
 
 
 def rate_of(options: Mapping[str, str]) -> float:
-    """Return the option ``rate``, how often something is told [Hz]; 100 by default."""
+    """Return the option ``rate``, how often something is sent [Hz]; 100 by default."""
     text = options.get("rate", "100")
     try:
         rate = float(text)

@@ -15,7 +15,7 @@ near to the damped law instead (`shares.py`), wholly from E_t = 2 on.
 
 *What a field asks for is bounded.* That is φ_N + P K_N P v, the self-motion without
 what brakes it. A field may ask for anything; at most what the limits permit far from
-them is asked of the QP, and what brakes stays whole: else it would swing at the limits.
+them is passed to the QP; damping is not scaled: else it would swing at the limits.
 
 An excess E is relative to what the limit permits: of an effort, the maximum; of an
 acceleration, what the barriers of `Limits` permit far from them. A field keeps at least

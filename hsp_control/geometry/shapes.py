@@ -201,7 +201,7 @@ class Mesh(Shape, type="mesh"):
 
         Raises:
             SceneError: If the file cannot be read or holds no finite triangles, or the
-                mesh is flat and its hull is asked for.
+                mesh is flat and its hull is requested.
         """
         return self._load()[0]
 

@@ -55,7 +55,7 @@ class Problem:
         field: g and g'.
         metric: W, its Cholesky factor and W'; the identity until it is written.
         gain: K_N, shape (nv, nv) [1/s].
-        asked: Kp s(e), what the feedback asks for at rest in the coordinates of e,
+        asked: Kp s(e), what the feedback commands at rest in the coordinates of e,
             shape (m,); zero in rows without one, such as those of contacts.
         yields: How much the threshold of a row's level yields to what the row asks
             for, shape (m,): 0 where no bound is on its error, so that it follows only
@@ -83,6 +83,6 @@ class Problem:
 
     @property
     def rows(self) -> dict[str, Array | Flags]:
-        """What is asked of each row, by name."""
+        """What is commanded in each row, by name."""
         names = "asked", "yields", "pulls", "springs", "stretched"
         return {name: getattr(self, name) for name in names}

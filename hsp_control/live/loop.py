@@ -238,7 +238,7 @@ class LiveRun:
     error: BaseException | None = None
     # how it will end, and why, once the plan has brought the robot to rest
     ending: tuple[Ended, str] | None = None
-    asked_at: float = 0.0  # when that was asked for [s]
+    asked_at: float = 0.0  # when that was requested [s]
     silent: bool = False  # whether it stopped sending efforts
     done: bool = False
     abandoned: bool = False

@@ -43,8 +43,8 @@ _log = logging.getLogger(__name__)
 def robot_record(robot: Robot) -> dict[str, Any]:
     """Return what a log says of its robot, so that it is there without its files.
 
-    It is the text of each URDF and what `Robot.load` was told, or the model itself if
-    there is no such text. Where a robot cannot be written, it says why.
+    It is the text of each URDF and the arguments of `Robot.load`, or the model itself
+    if there is no such text. Where a robot cannot be written, it says why.
     """
     try:
         description = robot.description

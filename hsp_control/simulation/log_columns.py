@@ -195,7 +195,7 @@ class TaskColumns:
         column(f"{prefix}.actual", (width,), unit, "actual value")
 
     def write(self, state: RobotState) -> None:
-        """Write references, what follows them, and what streams have heard."""
+        """Write references, what follows them, and what streams have received."""
         row = self._columns.row
         for name, task in self.logged.items():
             reference, actual = task.measure(state.read_only)

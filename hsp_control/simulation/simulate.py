@@ -220,7 +220,7 @@ def simulate(
         for row, (state, output, tau, own_channels) in enumerate(loop):
             if row == 0 and periods:  # else efforts are continuous, and have no rate
                 warn_of_slow_efforts(robot, q, controller.limits)
-            elif row == 0:  # else `applied` has told
+            elif row == 0:  # else `applied` has reported it
                 warn_of_jump(robot, q, v, tau, controller.state.dynamics)
             plant_channels = plant.log_channels(state.t, state.q, state.v, tau)
             writer.record(state, output, tau, {**own_channels, **plant_channels})

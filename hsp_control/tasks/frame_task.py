@@ -26,7 +26,7 @@ from hsp_control.trajectories import (
 
 
 def place_point(trajectory: Trajectory, here: Array, blend: float | None) -> Trajectory:
-    """Return the trajectory of a point in the world, blended if asked for."""
+    """Return the trajectory of a point in the world, blended if requested."""
     with within("trajectory"):
         placed = trajectory.anchored(here)
         if placed.dimension != len(here):
@@ -40,7 +40,7 @@ def place_point(trajectory: Trajectory, here: Array, blend: float | None) -> Tra
 def place_orientation(
     trajectory: OrientationTrajectory, here: Array, blend: float | None
 ) -> OrientationTrajectory:
-    """Return the trajectory of an orientation, blended if asked for."""
+    """Return the trajectory of an orientation, blended if requested."""
     with within("trajectory"):
         placed = trajectory.anchored(here)
         if blend is None:
@@ -51,7 +51,7 @@ def place_orientation(
 def place_pose(
     trajectory: PoseTrajectory | Trajectory, here: pin.SE3, blend: float | None
 ) -> PoseTrajectory:
-    """Return the trajectory of a pose, blended if asked for."""
+    """Return the trajectory of a pose, blended if requested."""
     if isinstance(trajectory, Trajectory):
         point = place_point(trajectory, np.array(here.translation), None)
         trajectory = ComposedPose(point)

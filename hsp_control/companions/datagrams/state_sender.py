@@ -22,7 +22,7 @@ from hsp_control.tasks import JointPosture
 from hsp_control.trajectories.streams.followed import FollowedStream
 
 _BYES = 3
-"""How often the end is told: a datagram may be lost."""
+"""How often the end is sent: a datagram may be lost."""
 _log = logging.getLogger(__name__)
 
 

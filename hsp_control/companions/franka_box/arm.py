@@ -27,7 +27,7 @@ These three are Research 3's for every joint: libfranka 0.21, ``rate_limiting.h`
 ELBOW_FLIP = -0.467002423653011
 """Position of joint 4 at which the arm is stretched [rad]; the same page."""
 _ANY_DECELERATION = 1e9
-"""What clients are told if velocity limits do not depend on the position [rad/s²]."""
+"""What clients receive if velocity limits do not depend on the position [rad/s²]."""
 
 
 @dataclass(frozen=True)
@@ -76,7 +76,7 @@ class Arm:
         flange: Placement of the flange in the frame of the last joint.
         nominal_end_effector: Placement of the nominal end effector in the flange.
         end_effector: Its inertia in the flange's frame.
-        urdf: What clients are told: the arm without its end effector.
+        urdf: What clients receive: the arm without its end effector.
     """
 
     def __init__(self, robot: Robot) -> None:

@@ -55,7 +55,7 @@ class ControlBox:
         arm: The arm.
         model: The box's own model of it, with the load that a client has set.
         plant: The simulated arm, which may differ.
-        readings: The state that a client is told.
+        readings: The state that a client receives.
         motion: The motion under way, or None.
         mode: The robot's mode.
         thresholds: Of contacts and collisions; none until a client sets them.

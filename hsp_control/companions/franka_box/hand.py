@@ -32,7 +32,7 @@ def at_rest(pose: pin.SE3) -> HandMotion:
 
 
 def as_commanded(motion: HandMotion) -> HandMotion:
-    """Return a motion as its client is told it, see `reference.as_commanded`."""
+    """Return a motion as its client receives it, see `reference.as_commanded`."""
     pose = motion.pose
     rotation, position, twist, acceleration = (
         x.astype(np.float32).astype(float)

@@ -17,7 +17,7 @@ def at_rest(q: Array) -> Reference:
 
 
 def as_commanded(reference: Reference) -> Reference:
-    """Return a motion as its client is told it: in single precision.
+    """Return a motion as its client receives it: in single precision.
 
     From there the client continues, and so its command is differentiated from there;
     otherwise rounding alone would be a jerk of some 100 rad/s³.

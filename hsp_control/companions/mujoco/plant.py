@@ -67,7 +67,7 @@ class MujocoEngine(SampledPlant):
         self.model, self.data, self.coordinates = model, data, coordinates
         self.pushes = Pushes(robot, pushes)
         self._roots = FloatingRoots(robot)
-        # whose contact forces are told, by the geom
+        # whose contact forces are reported, by the geom
         self._owners: dict[int, str] = {}
 
     @property

@@ -152,7 +152,7 @@ class MujocoScenePlant(MujocoEngine):
     def log_channels(
         self, t: float, q: Array, v: Array, tau: Array
     ) -> Mapping[str, LogChannel]:
-        """Return the contacts' force and moment on each body that was asked for."""
+        """Return the contacts' force and moment on each body that was requested."""
         if not self.contacts:
             return {}
         mujoco, probe = self._mujoco, self._probe  # the data itself is not touched

@@ -276,7 +276,7 @@ def diagnostics_figure(
 
 
 def _chosen_panels(runs: Sequence[Rollout], panels: Sequence[str]) -> list[str]:
-    """Return the panels that are asked for, or all that can be drawn of all runs."""
+    """Return the panels that are requested, or all that can be drawn of all runs."""
     tasks = all(run["singular_values"].size for run in runs)
     can = {
         "determinant": tasks and all(map(measures.rows_compare, runs)),

@@ -28,7 +28,7 @@ from hsp_control.simulation.measures import FAR, LIMITED, OUT, Unreached, unreac
 CLOSED_SHARE = 1 / 200
 """Gaps up to this share of the whole run are closed: nobody would see them."""
 _SAME = 0.9
-"""Distances of which the smallest is this share of the largest are told as one."""
+"""Distances of which the smallest is this share of the largest are reported as one."""
 
 
 class Band(NamedTuple):

@@ -181,7 +181,7 @@ class Follower:
         self.journal = self._new_journal()
 
     def begin(self, process: subprocess.Popen[bytes]) -> None:
-        """Begin to follow; the page's process is told of each new journal."""
+        """Begin to follow; the page's process is notified of each new journal."""
         self._process = process
         self._thread.start()
 

@@ -84,7 +84,7 @@ class RobotSource:
     locked: Mapping[str, float] = field(default_factory=dict)
     end_effector: str | None = None  # the frame that tasks use by default, if known
     # inertias of the rotors by joint [kg·m² or kg], if the robot's folder has them;
-    # used where they are asked for
+    # used where they are requested
     motor_inertia: Mapping[str, float] = field(default_factory=dict)
     # joint values of a good start posture, shape (nv,) [rad or m], if known
     home: tuple[float, ...] | None = None

@@ -117,7 +117,7 @@ class EffortLag(Drive, type="lag"):
 
 
 class RunningLag:
-    """A drive of first order in one run; it is told how long each period is."""
+    """A drive of first order in one run; it receives the length of each period."""
 
     def __init__(self, time_constant: float) -> None:
         self._time_constant = time_constant
