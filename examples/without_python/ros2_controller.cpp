@@ -1,5 +1,6 @@
-// A controller of ros2_control without Python. IT HAS NOT RUN ON AN ARM, and is not compiled by our
-// tests: it needs the packages controller_interface and pluginlib.
+// A controller of ros2_control without Python. IT HAS NOT RUN ON AN ARM: our tests compile it, and
+// run it, against declarations of their own, not against the packages controller_interface and
+// pluginlib.
 //
 //   find_package(hsp_step REQUIRED)   # with -D hsp_step_DIR=$(hsp freeze --cmake-dir)
 //   add_library(hsp_controller SHARED ros2_controller.cpp)
@@ -8,9 +9,11 @@
 //
 // Parameters: `file`, what `hsp freeze` wrote, and `joints`, in the order of the frozen robot. It
 // claims the effort of each joint, and reads its position and velocity; each joint has one degree
-// of freedom, and is not continuous.
+// of freedom, and is not continuous. Once a step is refused it brakes and holds, until it is
+// activated again.
 #include <controller_interface/controller_interface.hpp>
 #include <hsp_step.hpp>
+#include <limits>
 #include <memory>
 #include <pluginlib/class_list_macros.hpp>
 #include <string>
@@ -22,6 +25,13 @@ using controller_interface::CallbackReturn;
 using controller_interface::interface_configuration_type;
 using controller_interface::InterfaceConfiguration;
 using controller_interface::return_type;
+
+// An interface of ROS 2 Humble has a number; a later one may be without, which no step accepts.
+template <class Interface> double value_of(const Interface& interface) {
+  if constexpr (requires { interface.get_optional(); })
+    return interface.get_optional().value_or(std::numeric_limits<double>::quiet_NaN());
+  else return interface.get_value();
+}
 
 class HspController : public controller_interface::ControllerInterface {
  public:
@@ -59,6 +69,8 @@ class HspController : public controller_interface::ControllerInterface {
 
   CallbackReturn on_activate(const rclcpp_lifecycle::State&) override {
     controller_->restart();
+    stopping_ = false;
+    refused_ = 0;
     return CallbackReturn::SUCCESS;
   }
 
@@ -66,13 +78,18 @@ class HspController : public controller_interface::ControllerInterface {
   return_type update(const rclcpp::Time& time, const rclcpp::Duration&) override {
     const std::size_t n = joints_.size();
     for (std::size_t i = 0; i < n; ++i) {
-      q_[i] = state_interfaces_[i].get_value();
-      v_[i] = state_interfaces_[n + i].get_value();
+      q_[i] = value_of(state_interfaces_[i]);
+      v_[i] = value_of(state_interfaces_[n + i]);
     }
-    const hsp_status status = controller_->step(time.seconds(), q_, v_, tau_);
+    const double t = time.seconds();
+    const hsp_status status =
+        stopping_ ? controller_->stop(t, q_, v_, tau_) : controller_->step(t, q_, v_, tau_);
+    stopping_ |= status < 0;
+    // Without a state nothing can brake: for a few periods the last effort is right.
     refused_ = status < 0 ? refused_ + 1 : 0;
     if (refused_ > 5) return return_type::ERROR;  // the manager stops the controller
-    for (std::size_t i = 0; i < n; ++i) command_interfaces_[i].set_value(tau_[i]);
+    for (std::size_t i = 0; i < n; ++i)
+      static_cast<void>(command_interfaces_[i].set_value(tau_[i]));
     return return_type::OK;
   }
 
@@ -88,6 +105,7 @@ class HspController : public controller_interface::ControllerInterface {
   std::unique_ptr<hsp::FrozenController> controller_;
   std::vector<std::string> joints_;
   std::vector<double> q_, v_, tau_;
+  bool stopping_ = false;
   int refused_ = 0;  // steps in a row
 };
 

@@ -115,6 +115,30 @@ def test_what_is_wrong_behind_a_right_checksum_is_no_crash(
     assert refused > 30
 
 
+def test_a_changed_file_that_opens_steps_and_stops(
+    frozen: Path, q: np.ndarray, tmp_path: Path
+) -> None:
+    """Numbers may be any behind a right checksum: a status says so, and no crash."""
+    content, other = frozen.read_bytes(), tmp_path / "other.hsp"
+    rng = np.random.default_rng(SEED)
+    stepped = 0
+    for places in rng.integers(90, len(content), size=(200, 2)):
+        changed = bytearray(content)
+        for place in places:
+            changed[place] = rng.integers(256)
+        other.write_bytes(summed(bytes(changed)))
+        try:
+            opened = Opened(other)
+        except RuntimeError:
+            continue
+        if len(opened.tau) == len(q):
+            said = [opened.step(0.001 * k, q, 0.0 * q) for k in range(3)]
+            said += [opened.stop(0.001 * k, q, 0.0 * q) for k in range(3, 6)]
+            assert all(opened.error for status in said if status < 0)
+            stepped += 1
+    assert stepped > 20
+
+
 # -- steps --------------------------------------------------------------------------
 
 
