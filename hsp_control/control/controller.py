@@ -261,6 +261,16 @@ class Controller(Composition):
         with self._lock:
             self._model.follow(dynamics)
 
+    def model_at(self, t: float) -> None:
+        """Let payload and gravity be those of a time of the clock [s].
+
+        A step does it by itself. An observer evaluates the dynamics before it, where
+        they would be those of the step before.
+        """
+        memory = self._memory
+        if memory.counts and self._time_line.open and isfinite(t):
+            self._model.write(t - memory.origin[0])
+
     def model_changes(
         self, dynamics: Dynamics | None
     ) -> Callable[[float], object] | None:

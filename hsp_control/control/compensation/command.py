@@ -110,6 +110,7 @@ class Command:
         """
         run = self._run
         run.t, run.q, run.v, run.period, run.wrenches = t, q, v, period, wrenches
+        self.controller.model_at(t)
         for stage in self.stages:
             stage.measure(run)
         self.output = run.output = self._law(run.t, run.q, run.v)

@@ -190,6 +190,35 @@ def test_payloads_are_taken_up_and_put_down(
     run(controller, opened, range(130), changes)
 
 
+def test_an_observer_has_the_model_of_the_step(tmp_path: Path) -> None:
+    """Its own evaluation comes before the law's, in Python as without it."""
+    experiment = hsp.load_experiment("panda_limits")
+    observer = hsp.compensation.MomentumObserver(30.0)
+    observed = hsp.compensation.Compensation(momentum_observer=observer)
+    frozen = tmp_path / "observed.hsp"
+    hsp.freeze(experiment.controller, frozen, compensation=observed, period=H)
+    opened = Opened(frozen)
+    controller = experiment.controller.preview()
+    command = hsp.compensation.Command(controller, observed)
+    command.restart(origin=0.0)
+    place = next(at for at in opened.ports if at.endswith(".payload"))
+    body = said(1.0, [0.0, 0.0, 0.1], [0.0, 0.0, 0.0])
+    for k in range(60):
+        t = k * H
+        q = experiment.q0 + 0.02 * np.sin(0.1 * k)
+        v = 0.1 * np.ones(7)
+        tau = command.effort(t, q, v, H)
+        opened.step(t, q, v)
+        np.testing.assert_array_equal(opened.tau, tau)
+        if k == 10:
+            frame = place.split(".")[0]
+            controller.at(t).ramp(0.02).payload(frame, 1.0, [0.0, 0.0, 0.1])
+            assert opened.ramp(place, body, 0.02) == OK
+        if k == 20:
+            controller.at(t).ramp(0.02).gravity([1.0, 0.0, -9.0])
+            assert opened.ramp("gravity", [1.0, 0.0, -9.0], 0.02) == OK
+
+
 @pytest.mark.parametrize("ramp", [0.0, 0.02])
 def test_gravity(ramp: float, tmp_path: Path) -> None:
     controller, opened = pair("panda_limits", tmp_path)
