@@ -4,22 +4,19 @@ What hands do to the robot is done to it, too: targets, obstacles, settings and 
 Only the law differs, so what is seen between the two is the law's.
 """
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from copy import deepcopy
-from typing import TYPE_CHECKING, Any
+from typing import Any, NamedTuple
 
 from hsp_control.common.arrays import Array
 from hsp_control.companions.play.handles import Handles
 from hsp_control.companions.play.knobs import FieldSwitch
+from hsp_control.companions.play.operational_space import ComparedCommand
 from hsp_control.control.controller import Controller
 from hsp_control.control.measurement import NO_WRENCHES
 from hsp_control.simulation.control_chain import ControlChain
 from hsp_control.simulation.loops import Instant, sampled_loop
 from hsp_control.simulation.plants import SampledPlant
-
-if TYPE_CHECKING:
-    from hsp_control.companions.play.operational_space import ComparedCommand
-    from hsp_control.companions.play.session import Session
 
 WITHOUT_FIELD = "no field"
 OPERATIONAL = "operational-space law"
@@ -34,8 +31,16 @@ def laws_beside(controller: Controller, *, operational: bool) -> list[str]:
     return [*without, EXACT if operational else OPERATIONAL]
 
 
+class Playing(NamedTuple):
+    """What a play steps: the parts of which the other law has copies."""
+
+    command: ComparedCommand
+    handles: Handles
+    plant: SampledPlant
+
+
 class OtherLaw:
-    """A copy of a session's robot and controller with another law.
+    """A copy of a play's robot and controller with another law.
 
     Attributes:
         law: The name of its law.
@@ -43,27 +48,37 @@ class OtherLaw:
         handles: What hands move; see `receive`.
     """
 
-    def __init__(self, session: "Session", law: str) -> None:
-        """Begin where the session is, with the law from there on."""
+    def __init__(
+        self,
+        law: str,
+        playing: Playing,
+        times: Sequence[float],
+        periods: int,
+        shared: object,
+    ) -> None:
+        """Begin where a play is, with the law from there on.
+
+        Args:
+            law: The name of the law.
+            playing: What the play steps.
+            times: The times of its rows, the present one first [s].
+            periods: How many control periods a row has.
+            shared: Who may be named in what is copied, and is not: the play.
+        """
         self.law = law
-        robot = session.robot
-        shared = robot, session, NO_WRENCHES
-        memo: dict[int, Any] = {id(each): each for each in shared}
-        copied = deepcopy((session.command, session.handles, session.plant), memo)
-        command: ComparedCommand = copied[0]
-        self.handles: Handles = copied[1]
-        self.plant: SampledPlant = copied[2]
+        state = playing.command.controller.state
+        kept = playing.command.controller.robot, NO_WRENCHES, shared
+        memo: dict[int, Any] = {id(each): each for each in kept}
+        command, self.handles, self.plant = deepcopy(playing, memo)
         self.controller = command.controller
         if law == WITHOUT_FIELD:
             switch = FieldSwitch(self.controller.field)
-            switch.turn(self.controller.at(session.t), on=False)
+            switch.turn(self.controller.at(times[0]), on=False)
         else:
             command.operational = law == OPERATIONAL
-        state = session.controller.state
-        times = [session.t + k * session.row for k in range(session.rows_left)]
         self._loop: Iterator[Instant] = sampled_loop(
-            ControlChain(command), self.plant, round(session.row / session.period),
-            times, state.q.copy(), state.v.copy(),
+            ControlChain(command), self.plant, periods, times,
+            state.q.copy(), state.v.copy(),
         )  # fmt: skip
         self.advance()
 

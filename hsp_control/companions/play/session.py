@@ -14,7 +14,7 @@ from hsp_control.common.exceptions import SimulationError
 from hsp_control.companions.play.handles import Handles
 from hsp_control.companions.play.knobs import Knob
 from hsp_control.companions.play.operational_space import ComparedCommand
-from hsp_control.companions.play.other_law import OtherLaw, laws_beside
+from hsp_control.companions.play.other_law import OtherLaw, Playing, laws_beside
 from hsp_control.companions.viewer.commands import path_element
 from hsp_control.config import Experiment
 from hsp_control.control.changes import Changes
@@ -159,7 +159,13 @@ class Session:
         """Step another law beside it from now on; None: no more."""
         if law is not None and law not in self.laws:
             raise ValueError(f"there is no {law!r} to compare with")
-        self.other = None if law is None else OtherLaw(self, law)
+        if law is None:
+            self.other = None
+            return
+        playing = Playing(self.command, self.handles, self.plant)
+        times = [self.t + k * self.row for k in range(self.rows_left)]
+        periods = round(self.row / self.period)
+        self.other = OtherLaw(law, playing, times, periods, shared=self)
 
     def _step_other(self) -> None:
         """Let the other law go on; where it fails, only it ends."""
