@@ -1,4 +1,4 @@
-"""A step while nothing changes: state, references, law and limits in one call."""
+"""A step of the same tasks and contacts: state, references, law, limits in one call."""
 
 from collections.abc import Sequence
 from functools import cached_property
@@ -19,7 +19,10 @@ from hsp_control.robot import RobotState
 
 
 class BoundStep:
-    """A step while nothing changes: state, references, law and limits as one call."""
+    """A step of the same tasks, contacts and limits, from the state on, as one call.
+
+    It reads gains, K_N, payloads and tools where they are in force: these may change.
+    """
 
     def __init__(
         self,

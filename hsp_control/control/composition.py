@@ -128,7 +128,8 @@ class Composition:
         self._model = ModelInForce(state.robot, [state.dynamics])
         self._tools = ToolsInForce(state)
         self._clocked = state.bind_move(origin=memory.origin)
-        self._bound: BoundStep | None = None  # the step, while nothing changes
+        # the step as one call, while the same tasks and contacts are active
+        self._bound: BoundStep | None = None
 
     # -- what is active at a time ------------------------------------------------------
 
@@ -154,8 +155,7 @@ class Composition:
         step = None
         if self._memory.begun:
             self._bind_ahead()
-            if self._settled_later is None:  # else each step looks whether it is time
-                step = self._mixture.bound_step(self._memory.origin)
+            step = self._mixture.bound_step(self._memory.origin)
         self._go_on(step)
 
     def _plan(self, time_line: TimeLine) -> None:
@@ -199,10 +199,15 @@ class Composition:
         self._go_on(settled.step)
 
     def _go_on(self, step: BoundStep | None) -> None:
-        """Make the next steps as one call, if there is one."""
+        """Make the next steps as one call, if they are one."""
         self._bound = step
         if step is not None:
             self._mixture.active = step.active
+
+    @property
+    def _changing(self) -> bool:
+        """Whether steps have to write what is in force at their time."""
+        return not self._memory.begun or self._settled_later is not None
 
     @property
     def _latest(self) -> float:

@@ -92,26 +92,22 @@ class Controller(Composition):
         if out is not None:
             _check_output(out, self._declared.robot.nv)
         with self._lock:
-            bound = self._bound
-            if (
-                bound is not None
-                and modifier is None
-                and q is not None
-                and v is not None
-            ):
-                # While nothing changes, all of what follows is one call.
-                delivered = bound.make(t, q, v)  # type: ignore[arg-type]
-                stack, damped = bound.active, bound.damped
-            else:
+            whole = modifier is None and q is not None and v is not None
+            step = self._bound if whole else None
+            if step is None or self._changing:
                 self._observe(t, q, v)  # the state
-                if bound is None:
-                    self._advance()  # to what is in force at its time
+                self._advance()  # to what is in force at its time
+                step = self._bound if whole else None
+            if step is not None:  # all that follows is one call
+                delivered = step.make(t, q, v)  # type: ignore[arg-type]
+                stack, damped = step.active, step.damped
+            else:
                 mixture = self._mixture
                 mixture.resolve(self._state.t)  # references, and the law
                 delivered = mixture.deliver(modifier)  # within the limits
                 stack, damped = self.active_stack, mixture.damped
                 stack.check(delivered.effort)
-                if self._bound is None and self._settled_later is None:
+                if self._bound is None:
                     self._bound = mixture.bound_step(self._memory.origin)
             self._memory.acceleration = delivered.acceleration
             if out is None:
@@ -227,6 +223,7 @@ class Controller(Composition):
             bound = self._bound
             if (
                 bound is None
+                or self._changing
                 or self._gains.stiffening
                 or self._memory.acceleration is not bound.active.acceleration
             ):
@@ -357,7 +354,7 @@ class Controller(Composition):
     @property
     def _settled(self) -> object:
         """An object that stays the same while nothing changes; None while it does."""
-        return self._bound
+        return None if self._changing else self._bound
 
     # -- what explains it -------------------------------------------------------------
 
@@ -398,20 +395,20 @@ class Controller(Composition):
         self._state.mass_matrix  # noqa: B018 (of this state: nothing of others is left)
         self._memory.sent.clear()
         self._limits.update()
-        return self._bound
+        return None if self._changing else self._bound
 
     @property
     def step_plan(self) -> Plan:
         """The calls of a step, from a state to its effort: see `engine.inspection`.
 
         Raises:
-            ControllerError: If there was no step yet, or something changes at present.
+            ControllerError: If there was no step yet, or tasks or contacts change.
         """
         bound = self._bound
         if bound is None:
             raise ControllerError(
                 "there is no step whose calls could be shown: compute one, at a time "
-                "at which nothing changes"
+                "at which no task or contact fades"
             )
         plan: Plan = bound.move.values["calls"]
         return plan

@@ -58,7 +58,7 @@ class Mixture:
 
     # stack that was resolved last, with the most tasks of a mixture; None before
     active: ActiveStack | None
-    steady: bool  # whether it is the same at all times
+    steady: bool  # whether tasks, contacts and limits are the same at all times
     # tasks of each level, the highest priority first
     levels: tuple[tuple[PlannedTask, ...], ...]
 
@@ -105,7 +105,7 @@ class Mixture:
         }
         self._fading = [each for each in setup.tasks if not each.always]
         self.levels = levels_of(setup.tasks, self._state.robot)
-        self.steady = setup.steady and setup.end == -np.inf
+        self.steady = setup.steady and setup.limits.end == -np.inf
         self._parts: list[ActiveStack] = []
         # tasks of the first level with a bounded inverse in the last `resolve`, by
         # name; empty: none

@@ -187,3 +187,26 @@ def test_a_pickle_of_a_standing_robot_goes_on() -> None:
         np.testing.assert_array_equal(*found)
         for each, tau in zip((made, again), found, strict=True):
             each.applied(tau, H)
+
+
+@pytest.mark.parametrize(
+    "kind", [k for k in CHANGES if k not in ("add", "remove", "replace")]
+)
+def test_a_change_of_numbers_leaves_the_step_one_call(kind: str) -> None:
+    """It gives what the law, the limits and a modifier give that adds nothing."""
+    made, apart = controller(), controller()
+    for k in range(1, 3):
+        for each in (made, apart):
+            step(each, k)
+    for each in (made, apart):
+        CHANGES[kind](each.at(AT).ramp(RAMP))
+    swing = 0.3 * np.ones(7)
+    for k in range(15, 30):
+        q = ROBOT.integrate(ROBOT.home(), 1e-3 * k * swing)
+        whole = made.compute(k * H, q, swing).tau
+        out = apart.compute(k * H, q, swing, modifier=lambda _, __, a: (a, None))
+        np.testing.assert_allclose(whole, out.tau, rtol=0, atol=1e-9)
+        if "limits" not in kind:  # two sets of limits are mixed
+            assert made.step_plan
+        for each in (made, apart):
+            each.applied(whole, H)
