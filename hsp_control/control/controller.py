@@ -94,7 +94,7 @@ class Controller(Composition):
         with self._lock:
             whole = modifier is None and q is not None and v is not None
             step = self._bound if whole else None
-            if step is None or self._changing:
+            if step is None or self._settled_later is not None:
                 self._observe(t, q, v)  # the state
                 self._advance()  # to what is in force at its time
                 step = self._bound if whole else None
