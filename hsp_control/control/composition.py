@@ -1,9 +1,8 @@
 """What a controller is composed of, and what of it is active at a time."""
 
 from collections.abc import Iterable, Sequence
-from contextlib import AbstractContextManager
 from dataclasses import replace
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 import pinocchio as pin
@@ -14,15 +13,12 @@ from hsp_control.common.exceptions import ControllerError, ImmutableError
 from hsp_control.common.keywords import suggesting
 from hsp_control.constraints.contacts import Contact
 from hsp_control.constraints.limits import Limits, RobotLimits
-from hsp_control.control.actuation.limits_in_force import LimitsInForce
-from hsp_control.control.bound_step import BoundStep
 from hsp_control.control.changes import Change, Changes, TimeLine
 from hsp_control.control.declared_rates import check_field, check_metric
 from hsp_control.control.first_state import warn_of_far_target
-from hsp_control.control.gains_in_force import GainsInForce, check_held
+from hsp_control.control.gains_in_force import check_held
+from hsp_control.control.in_force import InForce
 from hsp_control.control.memory import Memory
-from hsp_control.control.mixture import Mixture
-from hsp_control.control.model_in_force import ModelInForce
 from hsp_control.control.setup import (
     Base,
     DeclaredController,
@@ -30,9 +26,9 @@ from hsp_control.control.setup import (
     PlannedTerm,
     Setup,
 )
+from hsp_control.control.step_lock import StepLock
 from hsp_control.control.stream_handle import StreamHandle
 from hsp_control.control.targets import RAMP, followed_stream, new_stream, target_of
-from hsp_control.control.tools_in_force import ToolsInForce
 from hsp_control.declaration import within
 from hsp_control.geometry.scene import Obstacle, Scene, Start
 from hsp_control.null_space.fields import NullSpaceField
@@ -49,15 +45,9 @@ from hsp_control.trajectories.streams.run import StreamRun
 from hsp_control.trajectories.streams.streamed import Streamed
 from hsp_control.trajectories.streams.velocities import Axes
 
-MEMORY = 1.0
-"""Changes that were complete this long ago are forgotten [s]; an integrator may ask for
-earlier times than the last one."""
-
 
 class Composition:
     """What a controller is made of, and what of it is active at a time."""
-
-    _lock: AbstractContextManager[None]  # held while something is computed
 
     @suggesting
     def __init__(
@@ -123,101 +113,18 @@ class Composition:
 
     def _bind_to(self, state: RobotState, memory: Memory) -> None:
         """Compute with a state, and remember in a memory."""
+        self._lock = StepLock()  # held while something is computed
         self._state, self._memory = state, memory
-        self._gains = GainsInForce(state.robot.nv, memory)
-        self._model = ModelInForce(state.robot, [state.dynamics])
-        self._tools = ToolsInForce(state)
+        self._in_force = InForce(self._declared, state, memory)
         self._clocked = state.bind_move(origin=memory.origin)
-        # the step as one call, while the same tasks and contacts are active
-        self._bound: BoundStep | None = None
-
-    # -- what is active at a time ------------------------------------------------------
 
     def _compose(self, start: Start, changes: Sequence[Change]) -> None:
         """Place all parts, and apply the changes."""
-        self._begin_at(TimeLine.of(self._declared.placed(start), changes))
-
-    def _begin_at(self, time_line: TimeLine) -> None:
-        """Make all that computes, and let it follow a time line."""
-        state, own, setup = self._state, self._declared, time_line.setup
-        base = () if own.base == "driven" else own.robot.unactuated
-        self._limits = LimitsInForce(state, setup.limits, self._memory.sent)
-        around = self._limits, self._gains, setup, own.threshold
-        self._mixture = Mixture(state, base, *around)
-        self._follow(time_line)
-
-    def _follow(self, time_line: TimeLine) -> None:
-        """Let the steps follow a time line."""
-        self._memory.follow(time_line.streams())
-        self._plan(time_line)
-        self._mixture = self._mixture.following(self._setup)
-        self._settled_later: Settled | None = None
-        step = None
-        if self._memory.begun:
-            self._bind_ahead()
-            step = self._mixture.bound_step(self._memory.origin)
-        self._go_on(step)
-
-    def _plan(self, time_line: TimeLine) -> None:
-        """Let gains, limits, model and tools follow a time line."""
-        setup, t = time_line.setup, self._latest
-        self._time_line, self._setup = time_line, setup
-        self._gains.plan(setup, t)
-        self._limits.plan(setup.limits, t)
-        self._model.plan(setup.payloads, setup.gravity, t)
-        self._tools.plan(setup.tools, t)
-
-    def _write(self, t: float) -> None:
-        """Write the gains, the limits, the model and the tools of a time [s]."""
-        self._gains.write(t)
-        self._limits.write(t)
-        self._model.write(t)
-        self._tools.write(t)
-
-    def _bind_ahead(self) -> None:
-        """Bind what steps call until all changes are over, and then.
-
-        Not before the first state: from it follow the motions that contacts leave free.
-        """
-        time_line, mixture = self._time_line, self._mixture
-        if time_line.open or not mixture.steady:
-            mixture.prepare(self._setup.instants(self._latest))
-        if not time_line.open:
-            return
-        end = max(each.end for each in time_line.open)
-        over = time_line.settled_at(end)
-        following = mixture.following(over.setup)
-        following.prepare([end])
-        step = following.bound_step(self._memory.origin)
-        self._settled_later = Settled(end + MEMORY, over, following, step)
-
-    def _settle(self, settled: "Settled") -> None:
-        """Go on without the changes that are over; all is bound."""
-        self._plan(settled.time_line)
-        settled.mixture.active = self._mixture.active
-        self._mixture, self._settled_later = settled.mixture, None
-        self._go_on(settled.step)
-
-    def _go_on(self, step: BoundStep | None) -> None:
-        """Make the next steps as one call, if they are one."""
-        self._bound = step
-        if step is not None:
-            self._mixture.active = step.active
-
-    @property
-    def _changing(self) -> bool:
-        """Whether steps have to write what is in force at their time."""
-        return not self._memory.begun or self._settled_later is not None
-
-    @property
-    def _latest(self) -> float:
-        """The latest time of a step [s]; -inf before the first one."""
-        memory = self._memory
-        return max(memory.now, self._state.t) if memory.begun else -np.inf
+        self._in_force.begin(TimeLine.of(self._declared.placed(start), changes))
 
     def _here(self) -> Start:
         """Return where the robot was at the last step."""
-        return Start(self._state.snapshot(), self._setup.start.scene)
+        return Start(self._state.snapshot(), self.setup.start.scene)
 
     # -- changes while running --------------------------------------------------------
 
@@ -334,7 +241,7 @@ class Composition:
 
     def _followed(self, task: str) -> Task:
         """Return a task that follows a trajectory."""
-        present = self._setup.task(task).task
+        present = self.setup.task(task).task
         if present.followed is None:
             raise ControllerError(f"task {task!r} follows no trajectory")
         return present
@@ -350,25 +257,20 @@ class Composition:
             HspControlError: If its parts do not fit the robot.
         """
         with self._lock:
-            here, now, given = None, self._latest, change
+            here, now, given = None, self._in_force.latest, change
             begun = self._memory.begun
             self._memory.clock.change(change.at, max(now, 0.0))
             if begun:
                 change = replace(change, at=max(change.at, now))
                 here = self._here()
-            known = self._time_line.settled_at(now - MEMORY)
+            known = self._in_force.kept
             time_line = known.with_change(change, here)
             if period := self._memory.sent.period:
                 state = (here or time_line.start).state
-                check_held(self._setup, time_line.setup, state, period)
+                check_held(self.setup, time_line.setup, state, period)
             if begun:
-                self._check_terms(time_line.setup, self._setup.terms, self._state)
-            before = self._time_line
-            try:
-                self._follow(time_line)
-            except BaseException:  # it cannot be bound: nothing of it stays
-                self._follow(before)
-                raise
+                self._check_terms(time_line.setup, self.setup.terms, self._state)
+            self._in_force.go_over_to(time_line)
             if begun:
                 self._memory.made(now, given)
 
@@ -381,8 +283,8 @@ class Composition:
             RateError: If a rate or a gradient is wrong, or the field depends on v.
         """
         with within("null_space", "metric"):
-            check_metric(self._setup.metric, state)
-        self._check_terms(self._setup, (), state)
+            check_metric(self.setup.metric, state)
+        self._check_terms(self.setup, (), state)
 
     def _check_terms(
         self, setup: Setup, known: Sequence[PlannedTerm], state: RobotState
@@ -407,7 +309,7 @@ class Composition:
     @property
     def setup(self) -> Setup:
         """All parts, placed, and when they count: what a step is bound for."""
-        return self._setup
+        return self._in_force.setup
 
     @property
     def tasks(self) -> tuple[Task, ...]:
@@ -417,7 +319,7 @@ class Composition:
     @property
     def planned_tasks(self) -> tuple[Task, ...]:
         """All tasks, placed: those that are active, have not come yet, or have gone."""
-        return tuple(each.task for each in self._setup.tasks)
+        return tuple(each.task for each in self.setup.tasks)
 
     @property
     def levels(self) -> tuple[tuple[Task, ...], ...]:
@@ -428,27 +330,27 @@ class Composition:
     @property
     def planned_levels(self) -> tuple[tuple[PlannedTask, ...], ...]:
         """The same tasks as they are planned, each with its key."""
-        now = self._latest
+        now = self._in_force.latest
         levels = [
             tuple(each for each in level if each.presence.at(now) > 0.0)
-            for level in self._mixture.levels
+            for level in self._in_force.mixture.levels
         ]
         return tuple(level for level in levels if level)
 
     @property
     def field(self) -> NullSpaceField:
         """The null-space field, placed; while it changes, all terms of old and new."""
-        return self._mixture.field
+        return self._in_force.mixture.field
 
     @property
     def null_space_gain(self) -> Array:
         """K_N in force, shape (nv, nv) [1/s]."""
-        return self._gains.null_space.copy()
+        return self._in_force.gains.null_space.copy()
 
     @property
     def metric(self) -> Metric:
         """The joint-space metric."""
-        return self._setup.metric
+        return self.setup.metric
 
     @property
     def singularity_threshold(self) -> float:
@@ -458,12 +360,12 @@ class Composition:
     @property
     def limits(self) -> RobotLimits | None:
         """The limits, as numbers of this robot."""
-        return self._limits.limits
+        return self._in_force.limits.limits
 
     @property
     def contacts(self) -> tuple[Contact, ...]:
         """The contacts."""
-        return tuple(each.contact for each in self._setup.contacts)
+        return tuple(each.contact for each in self.setup.contacts)
 
     @property
     def base(self) -> Base | None:
@@ -473,7 +375,7 @@ class Composition:
     @property
     def scene(self) -> Scene:
         """The obstacles that fields and limits name."""
-        return self._setup.start.scene
+        return self.setup.start.scene
 
     @property
     def changes(self) -> tuple[Change, ...]:
@@ -483,12 +385,12 @@ class Composition:
         come in every run. One that is made during a run is forgotten once it is over; a
         log contains all.
         """
-        return self._time_line.known
+        return self._in_force.time_line.known
 
     @property
     def _changes_made(self) -> int:
         """How many changes there have been: those of every run, and of this one."""
-        return len(self._time_line.declared) + self._time_line.count
+        return len(self._in_force.time_line.declared) + self._in_force.time_line.count
 
     @property
     def streams(self) -> tuple[StreamRun, ...]:
@@ -501,13 +403,15 @@ class Composition:
         Raises:
             ControllerError: If there is no such task.
         """
-        return self._gains.feedback[self._setup.task(task).key].feedback
+        return self._in_force.gains.feedback[self.setup.task(task).key].feedback
 
     def _linear_feedback(self, task: str, state: RobotState) -> dict[float, Feedback]:
         """Return a task's feedback for small errors, by the time when it begins [s]."""
         # That is -inf for the present one, and the ends of the changes that are open.
-        planned = self._setup.present_task(task, self._latest)
-        now = planned.task.linear_feedback(state, self._gains.feedback[planned.key])
+        planned = self.setup.present_task(task, self._in_force.latest)
+        now = planned.task.linear_feedback(
+            state, self._in_force.gains.feedback[planned.key]
+        )
         found = {-np.inf: now}
         for each in planned.gains.transitions:
             later = planned.task.in_force()
@@ -523,10 +427,10 @@ class Composition:
         Raises:
             ControllerError: If there is no such task, or it has no impedance.
         """
-        planned = self._setup.present_task(task, self._latest)
+        planned = self.setup.present_task(task, self._in_force.latest)
         if impedance_of(planned.task) is None:
             raise ControllerError(f"task {task!r} has gains, and no stiffness")
-        return parts_of(self._gains.feedback[planned.key].numbers)[0].copy()
+        return parts_of(self._in_force.gains.feedback[planned.key].numbers)[0].copy()
 
     def weight_of(self, task: str, t: float) -> float:
         """Return the weight of a task at time t [s], in [0, 1].
@@ -534,7 +438,7 @@ class Composition:
         Raises:
             ControllerError: If there is no such task.
         """
-        return self._setup.task(task).weight(t)
+        return self.setup.task(task).weight(t)
 
     def contact_weight(self, contact: str, t: float) -> float:
         """Return how active a contact is at time t [s], in [0, 1].
@@ -542,11 +446,11 @@ class Composition:
         Raises:
             ControllerError: If there is no such contact.
         """
-        return self._setup.contact(contact).weight(t)
+        return self.setup.contact(contact).weight(t)
 
     def _force_offset(self, contact: str) -> Array:
         """Return what compensators add to a contact's commanded force, (1,) [N]."""
-        return self._memory.force_offset(self._setup.contact(contact).contact.name)
+        return self._memory.force_offset(self.setup.contact(contact).contact.name)
 
     def __repr__(self) -> str:
         gain = self.null_space_gain
@@ -574,7 +478,7 @@ class Composition:
     def __getstate__(self) -> dict[str, Any]:
         return {
             "declared": self._declared,
-            "time_line": self._time_line,
+            "time_line": self._in_force.time_line,
             "state": self._state,
             "memory": self._memory,
         }
@@ -582,16 +486,7 @@ class Composition:
     def __setstate__(self, saved: dict[str, Any]) -> None:
         self._declared = saved["declared"]
         self._bind_to(saved["state"], saved["memory"])
-        self._begin_at(saved["time_line"])
-
-
-class Settled(NamedTuple):
-    """What a controller goes on with once all changes are over."""
-
-    at: float  # from when on [s]
-    time_line: TimeLine
-    mixture: Mixture
-    step: BoundStep | None
+        self._in_force.begin(saved["time_line"])
 
 
 _INSTEAD = {

@@ -1,13 +1,9 @@
 """The controller: from tasks, a null-space field and a metric to one effort."""
 
-import os
 from collections.abc import Callable, Collection, Mapping, Sequence
 from copy import deepcopy
 from math import isfinite
-from threading import RLock
 from time import perf_counter
-from typing import Any
-from weakref import WeakSet
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -23,7 +19,6 @@ from hsp_control.control.first_state import (
     warn_of_far_targets,
     warn_of_jump,
 )
-from hsp_control.control.memory import Memory
 from hsp_control.control.mixture import AccelerationModifier
 from hsp_control.control.model_in_force import ModelInForce
 from hsp_control.control.output import ControlOutput, Diagnostics
@@ -48,10 +43,6 @@ class Controller(Composition):
     refers to ``start``, or else to the first state for which an effort is computed. A
     controller can be copied and pickled at any time; several threads may share it.
     """
-
-    def _bind_to(self, state: RobotState, memory: Memory) -> None:
-        self._lock = _StepLock()
-        super()._bind_to(state, memory)
 
     # -- the step ---------------------------------------------------------------------
 
@@ -92,23 +83,23 @@ class Controller(Composition):
         if out is not None:
             _check_output(out, self._declared.robot.nv)
         with self._lock:
+            now = self._in_force
             whole = modifier is None and q is not None and v is not None
-            step = self._bound if whole else None
-            if step is None or self._settled_later is not None:
+            step = now.step if whole else None
+            if step is None or now.later is not None:
                 self._observe(t, q, v)  # the state
                 self._advance()  # to what is in force at its time
-                step = self._bound if whole else None
+                step = now.step if whole else None
             if step is not None:  # all that follows is one call
                 delivered = step.make(t, q, v)  # type: ignore[arg-type]
                 stack, damped = step.active, step.damped
             else:
-                mixture = self._mixture
+                mixture = now.mixture
                 mixture.resolve(self._state.t)  # references, and the law
                 delivered = mixture.deliver(modifier)  # within the limits
                 stack, damped = self.active_stack, mixture.damped
                 stack.check(delivered.effort)
-                if self._bound is None:
-                    self._bound = mixture.bound_step(self._memory.origin)
+                now.bind_step()
             self._memory.acceleration = delivered.acceleration
             if out is None:
                 out = ControlOutput()
@@ -116,8 +107,8 @@ class Controller(Composition):
                 out.write(tau, memory, delivered, stack, damped)
             else:
                 out.overwrite(delivered, stack, damped)
-            if self._limits.measured:
-                out.keep_distances(self._limits.measured)
+            if measured := now.limits.measured:
+                out.keep_distances(measured)
             return out
 
     def _observe(
@@ -156,24 +147,18 @@ class Controller(Composition):
         self._memory.clock.begin(self._state.t)
         if self._declared.start is None:
             here = self._here()._replace(scene=self._declared.scene)
-            self._compose(here, self._time_line.declared)
+            self._compose(here, self._in_force.time_line.declared)
         warn_of_far_targets(self._state, self.planned_tasks)
         self.check_derivatives(self._state)
         self._memory.begun = True
-        self._write(self._state.t)  # what is bound is called once, at this state
-        self._bind_ahead()
+        self._in_force.write(self._state.t)  # what is bound is called once, here
+        self._in_force.bind_ahead()
 
     def _advance(self) -> None:
-        """Write the gains and the limits of the time of the state."""
-        memory, t = self._memory, self._state.t
-        if not memory.begun:
+        """Go on to what is in force at the time of the state."""
+        if not self._memory.begun:
             self._begin()
-        memory.now = max(memory.now, t)
-        if later := self._settled_later:
-            if memory.now > later.at:
-                self._settle(later)
-                return
-            self._write(t)
+        self._in_force.advance(self._state.t)
 
     def applied(self, tau: ArrayLike, period: float) -> None:
         """Store the effort that was sent to the robot.
@@ -208,11 +193,12 @@ class Controller(Composition):
         if not self._memory.sent.period:
             state = self._state
             warn_of_jump(state.robot, state.q, state.v, tau, state.dynamics)
-        self._limits.applied(tau, self._memory.acceleration, period)
-        if self._gains.stiffening:
-            if self._mixture.active is None:  # a copy, made since the step
-                self._mixture.resolve(self._state.t)
-            self._gains.delay(self.active_stack, self._state.t, period)
+        now = self._in_force
+        now.limits.applied(tau, self._memory.acceleration, period)
+        if now.gains.stiffening:
+            if now.mixture.active is None:  # a copy, made since the step
+                now.mixture.resolve(self._state.t)
+            now.gains.delay(self.active_stack, self._state.t, period)
 
     def _while_free(self, advance: Callable[[FreeStep], int]) -> int:
         """Let the engine's loop make steps that are free; return how many it made."""
@@ -220,15 +206,14 @@ class Controller(Composition):
         # period of the last one. There are none where something changes, is streamed,
         # is no native call, or the last effort was not the law's own.
         with self._lock:
-            bound = self._bound
+            step = self._settled_step
             if (
-                bound is None
-                or self._changing
-                or self._gains.stiffening
-                or self._memory.acceleration is not bound.active.acceleration
+                step is None
+                or self._in_force.gains.stiffening
+                or self._memory.acceleration is not step.active.acceleration
             ):
                 return 0
-            return 0 if bound.free is None else advance(bound.free)
+            return 0 if step.free is None else advance(step.free)
 
     def disturbed(self, acceleration: ArrayLike) -> None:
         """Store an acceleration that something else than the efforts causes.
@@ -246,7 +231,7 @@ class Controller(Composition):
             NonFiniteError: If it contains NaN or inf.
         """
         known = self._declared.robot.check_tangent(acceleration, "acceleration")
-        self._limits.sent.held.disturbance[:] = known
+        self._in_force.limits.sent.held.disturbance[:] = known
 
     def followed_by(self, dynamics: Dynamics | None) -> None:
         """Let other dynamics follow changes of payload and gravity, as a plant's do.
@@ -256,7 +241,7 @@ class Controller(Composition):
                 None: nobody follows.
         """
         with self._lock:
-            self._model.follow(dynamics)
+            self._in_force.model.follow(dynamics)
 
     def model_at(self, t: float) -> None:
         """Let payload and gravity be those of a time of the clock [s].
@@ -265,8 +250,8 @@ class Controller(Composition):
         they would be those of the step before.
         """
         memory = self._memory
-        if memory.counts and self._time_line.open and isfinite(t):
-            self._model.write(t - memory.origin[0])
+        if memory.counts and self._in_force.time_line.open and isfinite(t):
+            self._in_force.model.write(t - memory.origin[0])
 
     def model_changes(
         self, dynamics: Dynamics | None
@@ -279,7 +264,7 @@ class Controller(Composition):
         Returns:
             A function of the time [s]; None if nothing changes, or ``dynamics`` is.
         """
-        setup = self._setup
+        setup = self.setup
         constant = setup.gravity.constant and not setup.payloads
         if dynamics is None or constant:
             return None
@@ -303,15 +288,16 @@ class Controller(Composition):
         if origin is not None and not isfinite(origin):
             raise NonFiniteError(f"origin is {origin}; needs a finite number")
         with self._lock:
-            line, memory = self._time_line, self._memory
-            changes = (*line.declared, *memory.not_seen(self._latest))
+            now, memory = self._in_force, self._memory
+            line = now.time_line
+            changes = (*line.declared, *memory.not_seen(now.latest))
             memory.clear()
-            self._limits.update()
-            self._bound = None
+            now.limits.update()
+            now.step = None
             if origin is not None:
                 memory.count_from(origin)
-            self._mixture.active = None  # the next step places what is relative
-            remembers = any(each.task.remembers for each in self._setup.tasks)
+            now.mixture.active = None  # the next step places what is relative
+            remembers = any(each.task.remembers for each in self.setup.tasks)
             if changes or line.count or remembers:
                 self._compose(line.start, changes)
 
@@ -338,7 +324,8 @@ class Controller(Composition):
         begun = perf_counter()
         with self._lock:
             self._state.update(state.t, state.q, state.v)
-            self._mixture.bind(self._mixture.stack_without(lifted, without))
+            mixture = self._in_force.mixture
+            mixture.bind(mixture.stack_without(lifted, without))
         return perf_counter() - begun
 
     @property
@@ -352,9 +339,10 @@ class Controller(Composition):
         return self._state.seen
 
     @property
-    def _settled(self) -> object:
-        """An object that stays the same while nothing changes; None while it does."""
-        return None if self._changing else self._bound
+    def _settled_step(self) -> BoundStep | None:
+        """The step while nothing changes, the same object; None while it does."""
+        now = self._in_force
+        return now.step if now.later is None else None
 
     # -- what explains it -------------------------------------------------------------
 
@@ -365,7 +353,7 @@ class Controller(Composition):
         Raises:
             ControllerError: If there was none yet.
         """
-        active = self._mixture.active
+        active = self._in_force.mixture.active
         if active is None:
             raise ControllerError("nothing has been computed yet")
         return active
@@ -375,7 +363,8 @@ class Controller(Composition):
         other = self.preview()
         for stream in other._memory.streams:
             stream.leave_python()
-        other._compose(other._time_line.start, other._time_line.declared)
+        line = other._in_force.time_line
+        other._compose(line.start, line.declared)
         return other
 
     def step_alone(self, q: ArrayLike | None = None) -> BoundStep | None:
@@ -390,12 +379,12 @@ class Controller(Composition):
         Returns:
             The step, which has its parts; None if it is not the same at all times.
         """
-        start = self._setup.start.state.q if q is None else q
+        start = self.setup.start.state.q if q is None else q
         self.compute(0.0, start, np.zeros(self.robot.nv))
         self._state.mass_matrix  # noqa: B018 (of this state: nothing of others is left)
         self._memory.sent.clear()
-        self._limits.update()
-        return None if self._changing else self._bound
+        self._in_force.limits.update()
+        return self._settled_step
 
     @property
     def step_plan(self) -> Plan:
@@ -404,13 +393,13 @@ class Controller(Composition):
         Raises:
             ControllerError: If there was no step yet, or tasks or contacts change.
         """
-        bound = self._bound
-        if bound is None:
+        step = self._in_force.step
+        if step is None:
             raise ControllerError(
                 "there is no step whose calls could be shown: compute one, at a time "
                 "at which no task or contact fades"
             )
-        plan: Plan = bound.move.values["calls"]
+        plan: Plan = step.move.values["calls"]
         return plan
 
     def stack(self, state: RobotState) -> TaskSample:
@@ -427,7 +416,7 @@ class Controller(Composition):
         with ahead._lock:
             ahead._observe(state)
             ahead._advance()
-            ahead._mixture.resolve(state.t)
+            ahead._in_force.mixture.resolve(state.t)
             return ahead.active_stack
 
     @property
@@ -476,7 +465,7 @@ class Controller(Composition):
         other = self._copy()
         other.restart(origin=0.0)
         if changes is not None:
-            other._compose(other._time_line.start, changes)
+            other._compose(other._in_force.time_line.start, changes)
         return other
 
 
@@ -491,52 +480,3 @@ def _check_output(out: object, nv: int) -> None:
         raise ControllerError(
             f"out is of a step with {given} efforts; this controller has {nv}"
         )
-
-
-class _StepLock:
-    """A lock: other threads wait for it; the thread that holds it gets an error."""
-
-    __slots__ = ("__weakref__", "_lock", "_taken")
-
-    def __init__(self) -> None:
-        self._lock, self._taken = RLock(), ""  # why it cannot be had, if so
-        _locks.add(self)
-
-    def __enter__(self) -> None:
-        self._lock.acquire()
-        if self._taken:  # by this thread: others are still waiting
-            self._lock.release()
-            raise ControllerError(self._taken)
-        self._taken = _BY_ITSELF
-
-    def __exit__(self, *_: object) -> None:
-        self._taken = ""
-        self._lock.release()
-
-    def forked(self) -> None:
-        """Go on in a child process: a thread that has the lock is not there."""
-        own: Any = self._lock
-        if self._taken and not own._is_owned():
-            self._lock, self._taken = RLock(), _FORKED
-
-
-_BY_ITSELF = (
-    "a step of a controller calls the same controller, for example within a field: it "
-    "would wait for itself for ever; use the state that the field is given, or a copy, "
-    "controller.preview()"
-)
-_FORKED = (
-    "this process was forked while another thread computed with this controller, whose "
-    "memory is half a step here: make the controller in each process, or start "
-    'processes by "spawn"'
-)
-_locks: WeakSet[_StepLock] = WeakSet()
-
-
-def _after_fork() -> None:
-    for each in [*_locks]:
-        each.forked()
-
-
-if hasattr(os, "register_at_fork"):  # where processes can fork
-    os.register_at_fork(after_in_child=_after_fork)

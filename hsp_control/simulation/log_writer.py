@@ -157,7 +157,7 @@ class LogWriter:
         """
         controller, columns = self._controller, self._columns
         columns.begin_row()
-        settled = controller._settled
+        settled = controller._settled_step
         if settled is None or settled is not self._settled:
             self._settled = settled
             self._tasks.update()

@@ -245,7 +245,7 @@ class Follower:
             self._change_journal()
         if not self._begun:
             # What is relative to the start is placed where the loop placed it.
-            start = controller._setup.start.state
+            start = controller.setup.start.state
             self._copy.compute(start.t, start.q, start.v)
             self._begun = True
         changes, known = {id(each): each for each in controller.changes}, self._changes

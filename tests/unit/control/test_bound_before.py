@@ -79,7 +79,9 @@ def test_no_step_around_a_change_binds(
         for k in (*range(2, 40), *range(1010, 1060, 5)):
             step(made, k)
     made.at(2.0).null_space_gain(4.0)
-    assert len(made._time_line.open) == 1  # the other one is over, and forgotten
+    assert (
+        len(made._in_force.time_line.open) == 1
+    )  # the other one is over, and forgotten
 
 
 def test_the_sets_of_overlapping_changes_are_all_bound(
@@ -105,7 +107,7 @@ def test_changes_that_go_on_are_forgotten(monkeypatch: pytest.MonkeyPatch) -> No
             gains = hsp.Gains(natural_frequency=10.0 + k % 3)
             made.at(k * H).ramp(0.05).gains("hand", gains)
         step(made, k)
-    assert len(made._time_line.open) < 15
+    assert len(made._in_force.time_line.open) < 15
     with nothing_bound(monkeypatch):
         step(made, 3010)
 
@@ -137,7 +139,7 @@ def test_what_is_over_is_forgotten(kind: str) -> None:
         for k in range(3000, 3003):
             step(made, k)
         assert not made.changes
-        assert not made._time_line.open
+        assert not made._in_force.time_line.open
         plan = str(made.step_plan)
         return len(pickle.dumps(made)), repr(made), len(plan)
 

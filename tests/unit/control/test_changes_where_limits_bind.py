@@ -374,7 +374,7 @@ def test_a_mixture_keeps_the_limits(name: str, seed: int) -> None:
         out = controller.compute(case.robot.state(t, case.q, case.v))
         assume(out.status == Status.LIMITED)
         limits = controller.limits
-        bounds = controller._limits.sets[-1][0].bounds
+        bounds = controller._in_force.limits.sets[-1][0].bounds
         assert limits is not None
         assert (np.abs(out.tau) <= limits.effort).all()
         assert (out.acceleration >= bounds.a_lower - 1e-6).all()

@@ -75,8 +75,8 @@ def drawn(name: str, seed: int, spread: float) -> hsp.Controller:
 
 def actuation_of(made: hsp.Controller) -> Actuation:
     """Return what delivered the controller's last step."""
-    ((limits, _),) = made._limits.sets
-    return made._mixture.actuation(made.active_stack, limits)
+    ((limits, _),) = made._in_force.limits.sets
+    return made._in_force.mixture.actuation(made.active_stack, limits)
 
 
 def repeated(made: hsp.Controller, barriers: Barriers | None = None) -> Delivered:
@@ -235,7 +235,7 @@ def test_one_native_call_is_the_same_as_its_parts(
         q = panda().home() + 0.3 * rng.standard_normal(7)
         v = 0.3 * rng.standard_normal(7)
         parts = made.compute(0.3, q, v, modifier=lambda _, __, a: (a, None))
-        assert made._settled is not None
+        assert made._settled_step is not None
         once = made.compute(0.3, q, v)
         seen.add(once.status)
         assert once.status is parts.status

@@ -447,7 +447,7 @@ def test_a_step_with_minimum_distances_runs_no_python() -> None:
     limits = hsp.Limits(barriers=[ObstacleDistance(0.02), SelfDistance()])
     law = elbow(limits)
     law.compute(0.0, robot.home(), np.zeros(7))
-    bound = law._bound
+    bound = law._in_force.step
     assert bound is not None
     assert bound.direct
     assert not bound.move.python

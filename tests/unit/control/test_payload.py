@@ -190,7 +190,7 @@ def test_what_is_over_is_forgotten() -> None:
         made.at(float(k)).ramp(0.1).payload("panda_hand", 0.1 * (k % 3))
         made.compute(k + 0.5, q, v)
     made.compute(400.0, q, v)
-    assert len(made._setup.payloads) <= 2
+    assert len(made.setup.payloads) <= 2
 
 
 def test_gravity_changes_with_the_base() -> None:

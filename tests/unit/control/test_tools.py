@@ -102,7 +102,7 @@ def test_a_frame_that_moves_in_its_joint_has_exact_rates(name: str) -> None:
         data, there = model.createData(), ROBOT.integrate(q, s * v)
         pin.framesForwardKinematics(model, data, there)
         pin.computeJointJacobians(model, data, there)
-        tool = next(each for each in made._setup.tools if each.frame == name)
+        tool = next(each for each in made.setup.tools if each.frame == name)
         sample = tool.placement.sample(t)
         offset = pin.SE3(sample.orientation.rotation, sample.position.position)
         joint = model.frames[index].parentJoint

@@ -1,0 +1,153 @@
+"""What of a time line is in force now, and the step that is bound for it."""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from hsp_control.control.actuation.limits_in_force import LimitsInForce
+from hsp_control.control.bound_step import BoundStep
+from hsp_control.control.changes import TimeLine
+from hsp_control.control.gains_in_force import GainsInForce
+from hsp_control.control.memory import Memory
+from hsp_control.control.mixture import Mixture
+from hsp_control.control.model_in_force import ModelInForce
+from hsp_control.control.setup import DeclaredController, Setup
+from hsp_control.control.tools_in_force import ToolsInForce
+from hsp_control.robot import RobotState
+
+MEMORY = 1.0
+"""Changes that were complete this long ago are forgotten [s]; an integrator may ask for
+earlier times than the last one."""
+
+
+class InForce:
+    """What of a time line is in force now, and the step that is bound for it.
+
+    Gains, limits, model and tools are arrays that the calls of a step read; `advance`
+    writes those of a time. What steps call is bound in `follow`, when a change is made,
+    also for the time when all changes are over.
+    """
+
+    time_line: TimeLine
+    setup: Setup  # that of the time line
+    limits: LimitsInForce
+    mixture: Mixture
+    # the step as one call, while the same tasks and contacts are active
+    step: BoundStep | None
+    later: "Settled | None"  # once all changes are over; None: nothing changes
+
+    def __init__(
+        self, declared: DeclaredController, state: RobotState, memory: Memory
+    ) -> None:
+        self._declared, self._state, self._memory = declared, state, memory
+        self.gains = GainsInForce(state.robot.nv, memory)
+        self.model = ModelInForce(state.robot, [state.dynamics])
+        self.tools = ToolsInForce(state)
+        self.step = None
+        self.later = None
+
+    def begin(self, time_line: TimeLine) -> None:
+        """Make all that computes, and follow a time line."""
+        state, own, setup = self._state, self._declared, time_line.setup
+        base = () if own.base == "driven" else own.robot.unactuated
+        self.limits = LimitsInForce(state, setup.limits, self._memory.sent)
+        around = self.limits, self.gains, setup, own.threshold
+        self.mixture = Mixture(state, base, *around)
+        self.follow(time_line)
+
+    def follow(self, time_line: TimeLine) -> None:
+        """Follow a time line from now on; what its steps call is bound."""
+        self._memory.follow(time_line.streams())
+        self._plan(time_line)
+        self.mixture = self.mixture.following(self.setup)
+        self.later, step = None, None
+        if self._memory.begun:
+            self.bind_ahead()
+            step = self.mixture.bound_step(self._memory.origin)
+        self._go_on(step)
+
+    def go_over_to(self, time_line: TimeLine) -> None:
+        """Follow another time line; if it cannot be bound, nothing of it stays."""
+        before = self.time_line
+        try:
+            self.follow(time_line)
+        except BaseException:
+            self.follow(before)
+            raise
+
+    def bind_ahead(self) -> None:
+        """Bind what steps call until all changes are over, and then.
+
+        Not before the first state: from it follow the motions that contacts leave free.
+        """
+        time_line, mixture = self.time_line, self.mixture
+        if time_line.open or not mixture.steady:
+            mixture.prepare(self.setup.instants(self.latest))
+        if not time_line.open:
+            return
+        end = max(each.end for each in time_line.open)
+        over = time_line.settled_at(end)
+        following = mixture.following(over.setup)
+        following.prepare([end])
+        step = following.bound_step(self._memory.origin)
+        self.later = Settled(end + MEMORY, over, following, step)
+
+    def advance(self, t: float) -> None:
+        """Write what is in force at a time [s]."""
+        memory, later = self._memory, self.later
+        memory.now = max(memory.now, t)
+        if later is None:
+            return
+        if memory.now <= later.at:
+            self.write(t)
+            return
+        # All changes are over: go on without them.
+        self._plan(later.time_line)
+        later.mixture.active = self.mixture.active
+        self.mixture, self.later = later.mixture, None
+        self._go_on(later.step)
+
+    def write(self, t: float) -> None:
+        """Write the gains, the limits, the model and the tools of a time [s]."""
+        self.gains.write(t)
+        self.limits.write(t)
+        self.model.write(t)
+        self.tools.write(t)
+
+    def bind_step(self) -> None:
+        """Bind the step as one call, after the first one, if there is none yet."""
+        if self.step is None:
+            self.step = self.mixture.bound_step(self._memory.origin)
+
+    @property
+    def kept(self) -> TimeLine:
+        """The time line without the changes that are over and forgotten."""
+        return self.time_line.settled_at(self.latest - MEMORY)
+
+    @property
+    def latest(self) -> float:
+        """The latest time of a step [s]; -inf before the first one."""
+        memory = self._memory
+        return max(memory.now, self._state.t) if memory.begun else -np.inf
+
+    def _plan(self, time_line: TimeLine) -> None:
+        setup, t = time_line.setup, self.latest
+        self.time_line, self.setup = time_line, setup
+        self.gains.plan(setup, t)
+        self.limits.plan(setup.limits, t)
+        self.model.plan(setup.payloads, setup.gravity, t)
+        self.tools.plan(setup.tools, t)
+
+    def _go_on(self, step: BoundStep | None) -> None:
+        self.step = step
+        if step is not None:
+            self.mixture.active = step.active
+
+
+class Settled(NamedTuple):
+    """What a controller goes on with once all changes are over."""
+
+    at: float  # from when on [s]
+    time_line: TimeLine
+    mixture: Mixture
+    step: BoundStep | None

@@ -1,0 +1,57 @@
+"""The lock of a controller, which several threads may share."""
+
+import os
+from threading import RLock
+from typing import Any
+from weakref import WeakSet
+
+from hsp_control.common.exceptions import ControllerError
+
+
+class StepLock:
+    """A lock: other threads wait for it; the thread that holds it gets an error."""
+
+    __slots__ = ("__weakref__", "_lock", "_taken")
+
+    def __init__(self) -> None:
+        self._lock, self._taken = RLock(), ""  # why it cannot be had, if so
+        _locks.add(self)
+
+    def __enter__(self) -> None:
+        self._lock.acquire()
+        if self._taken:  # by this thread: others are still waiting
+            self._lock.release()
+            raise ControllerError(self._taken)
+        self._taken = _BY_ITSELF
+
+    def __exit__(self, *_: object) -> None:
+        self._taken = ""
+        self._lock.release()
+
+    def forked(self) -> None:
+        """Go on in a child process: a thread that has the lock is not there."""
+        own: Any = self._lock
+        if self._taken and not own._is_owned():
+            self._lock, self._taken = RLock(), _FORKED
+
+
+_BY_ITSELF = (
+    "a step of a controller calls the same controller, for example within a field: it "
+    "would wait for itself for ever; use the state that the field is given, or a copy, "
+    "controller.preview()"
+)
+_FORKED = (
+    "this process was forked while another thread computed with this controller, whose "
+    "memory is half a step here: make the controller in each process, or start "
+    'processes by "spawn"'
+)
+_locks: WeakSet[StepLock] = WeakSet()
+
+
+def _after_fork() -> None:
+    for each in [*_locks]:
+        each.forked()
+
+
+if hasattr(os, "register_at_fork"):  # where processes can fork
+    os.register_at_fork(after_in_child=_after_fork)
