@@ -27,6 +27,21 @@ if TYPE_CHECKING:  # what a type checker reads; the names are looked up below
     from . import trajectories as trajectories
     from .common import exceptions as errors  # noqa: F401 (a namespace)
     from .common.exceptions import HspControlError as HspControlError
+    from .companions import cameras as cameras
+    from .companions import datagrams as datagrams
+    from .companions import film as film
+    from .companions import franka as franka
+    from .companions import franka_box as franka_box
+    from .companions import inspection as inspection
+    from .companions import mujoco as mujoco
+    from .companions import play as play
+    from .companions import plots as plots
+    from .companions import rerun as rerun
+    from .companions import ros2 as ros2
+    from .companions import simulators as simulators
+    from .companions import sweeps as sweeps
+    from .companions import viewer as viewer
+    from .companions import walking as walking
     from .config import Experiment as Experiment
     from .config import Recorder as Recorder
     from .config import load_experiment as load_experiment
