@@ -53,7 +53,6 @@ class Controller(Composition):
         v: ArrayLike | None = None,
         *,
         modifier: AccelerationModifier | None = None,
-        out: ControlOutput | None = None,
     ) -> ControlOutput:
         """Return the effort at a time, configuration and velocity.
 
@@ -65,7 +64,6 @@ class Controller(Composition):
             v: Velocity, shape (nv,) [rad/s or m/s].
             modifier: Changes the law's acceleration before the limits are applied;
                 None: nothing does.
-            out: An output of an earlier step, to be overwritten; None: a new one.
 
         Raises:
             ShapeError: If q or v has the wrong shape.
@@ -80,8 +78,6 @@ class Controller(Composition):
             ControllerError: If the state belongs to another robot, or what a step
                 calls, such as a field, calls its own controller.
         """
-        if out is not None:
-            _check_output(out, self._declared.robot.nv)
         with self._lock:
             now = self._in_force
             whole = modifier is None and q is not None and v is not None
@@ -101,15 +97,7 @@ class Controller(Composition):
                 stack.check(delivered.effort)
                 now.bind_step()
             self._memory.acceleration = delivered.acceleration
-            if out is None:
-                out = ControlOutput()
-                tau, memory = delivered.effort.copy(), stack.memory.tobytes()
-                out.write(tau, memory, delivered, stack, damped)
-            else:
-                out.overwrite(delivered, stack, damped)
-            if measured := now.limits.measured:
-                out.keep_distances(measured)
-            return out
+            return ControlOutput(delivered, stack, damped, now.limits.measured)
 
     def _observe(
         self,
@@ -467,16 +455,3 @@ class Controller(Composition):
         if changes is not None:
             other._compose(other._in_force.time_line.start, changes)
         return other
-
-
-def _check_output(out: object, nv: int) -> None:
-    """Check that an output is one of a controller with as many efforts."""
-    if not isinstance(out, ControlOutput):
-        raise ControllerError(
-            f"out is of type {type(out).__name__}; needs a ControlOutput: that of an "
-            "earlier step, or ControlOutput()"
-        )
-    if (given := out.size) not in (0, nv):
-        raise ControllerError(
-            f"out is of a step with {given} efforts; this controller has {nv}"
-        )

@@ -17,8 +17,8 @@ from hsp_control.law.problem import Record
 class ControlOutput:
     """The effort at one state, and everything that explains it.
 
-    It belongs to the caller: the controller does not write into it again, unless it is
-    given to `Controller.compute` as ``out``. What explains the effort may be read-only.
+    It belongs to the caller: the controller does not write into it again. What explains
+    the effort may be read-only.
 
     Attributes:
         tau: Effort M a + N minus what the contact forces supply, shape (nv,)
@@ -56,47 +56,25 @@ class ControlOutput:
     _acceleration: bytes | None  # None: the law's own
     _distances: Sequence[tuple[str, bytes]]  # of each barrier, of all its pairs
     _layout: Layout  # of the memory
-    _memory: Array | bytes  # see `ActiveStack.memory`
+    _memory: bytes  # see `ActiveStack.memory`
     _views: Record | None  # of the memory, once they were read
 
-    @property
-    def size(self) -> int:
-        """Number of efforts; 0 before the first step."""
-        return len(self.tau) if hasattr(self, "tau") else 0
-
-    def write(
+    def __init__(
         self,
-        tau: Array,
-        memory: Array | bytes,
         delivered: Delivered,
         stack: ActiveStack,
         damped: str,
+        measured: Sequence[tuple[str, Array]],
     ) -> None:
-        """Make this the output of a step; its effort and its memory are copies."""
-        _, a, forces, self.status, self.relaxation = delivered
-        self.tau, self._memory, self._views = tau, memory, None
+        """Copy what a step wrote: its effort, its memory, the distances it measured."""
+        tau, a, forces, self.status, self.relaxation = delivered
+        self.tau, self._memory, self._views = tau.copy(), stack.memory.tobytes(), None
         self._acceleration = None if a is stack.acceleration else a.tobytes()
-        self._layout, self.damped, self._distances = stack.layout, damped, ()
+        self._layout, self.damped = stack.layout, damped
         self.forces = forces.copy() if stack.has_forces else forces
-
-    def overwrite(self, delivered: Delivered, stack: ActiveStack, damped: str) -> None:
-        """Make this the output of a step, in the arrays that it has."""
-        tau, memory, views = delivered[0], stack.memory, None
-        if not self.size:
-            self.write(tau.copy(), memory.tobytes(), delivered, stack, damped)
-            return
-        self.tau[:] = tau
-        own = self._memory
-        if isinstance(own, bytes) or len(own) != len(memory):
-            own = memory.copy()
-        else:
-            own[:], views = memory, self._views
-        self.write(self.tau, own, delivered, stack, damped)
-        self._views = views
-
-    def keep_distances(self, measured: Sequence[tuple[str, Array]]) -> None:
-        """Keep what the step measured, by the names of the barriers."""
-        self._distances = [(name, found.tobytes()) for name, found in measured]
+        self._distances = ()
+        if measured:
+            self._distances = [(name, found.tobytes()) for name, found in measured]
 
     @property
     def distances(self) -> dict[str, float]:
@@ -165,8 +143,6 @@ class ControlOutput:
         return self._record.null_space_error
 
     def __repr__(self) -> str:
-        if not self.size:
-            return "ControlOutput(not computed yet)"
         sizes = {f"e of {name}": self.error(name) for name in self._layout.places}
         sizes["e_N"] = self.null_space_error
         notes = [

@@ -49,8 +49,10 @@ def test_a_recorded_loop_is_repeated(tmp_path: Path) -> None:
     # Only what integrates the robot differs.
     for name in ("q", "task.hand.reference", "task.hand.error"):
         np.testing.assert_allclose(again[name], log[name], atol=2e-3)
+    home = controller.robot.home()
+    output = controller.compute(0.501, home, np.zeros(len(home)))
     with pytest.raises(LogError, match="the recorder is closed"):
-        recorder.record(hsp.ControlOutput())
+        recorder.record(output)
 
 
 def test_what_cannot_be_repeated_says_why_and_an_error_ends_the_log(

@@ -121,13 +121,12 @@ def test_a_target_of_another_kind_is_refused(
 
 
 def test_errors_by_name_and_what_is_printed() -> None:
-    law, out = holding(null_space_gain=8.0), hsp.ControlOutput()
-    assert repr(out) == "ControlOutput(not computed yet)"
+    law = holding(null_space_gain=8.0)
     assert repr(law) == (
         "Controller of panda: 'panda_tcp' (FramePosition); field rest, K_N = 8, "
         "IdentityMetric; no limits"
     )
-    law.compute(0.0, panda().home(), REST, out=out)
+    out = law.compute(0.0, panda().home(), REST)
     np.testing.assert_array_equal(out.error("panda_tcp"), out.task.error)
     np.testing.assert_array_equal(out.error_rate("panda_tcp"), out.task.error_rate)
     length = np.linalg.norm(out.task.error)
