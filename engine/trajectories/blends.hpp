@@ -61,6 +61,18 @@ struct Crossfade {
   }
 };
 
+// R_d exp(y), y a polynomial of the time since it began over T; exactly R_d from T on.
+inline void turn_into(const OrientationSample<In>& desired, const In<6, 3>& coefficients,
+                      double elapsed, double duration, OrientationSample<Out>& out) {
+  if (elapsed >= duration) {
+    assign(desired, out);
+    return;
+  }
+  TrajectorySample<Own, 3> y;
+  polynomial(elapsed / duration, duration, coefficients, y);
+  turn_from(desired, y, out);
+}
+
 struct BlendOrientation {
   static constexpr const char* doc =
       "R(t) = R_d(t) exp(y(t)), y a polynomial of (t - t0)/T; R0 before t0, R_d from t0 + T on.";
@@ -72,17 +84,13 @@ struct BlendOrientation {
 
   void operator()(double t) {
     const double elapsed = t - start_time;
-    if (elapsed < 0.0) {
-      out.rotation = start;
-      out.angular_velocity.setZero();
-      out.angular_acceleration.setZero();
-    } else if (elapsed >= duration) {
-      assign(desired, out);
-    } else {
-      TrajectorySample<Own, 3> y;
-      polynomial(elapsed / duration, duration, coefficients, y);
-      turn_from(desired, y, out);
+    if (elapsed >= 0.0) {
+      turn_into(desired, coefficients, elapsed, duration, out);
+      return;
     }
+    out.rotation = start;
+    out.angular_velocity.setZero();
+    out.angular_acceleration.setZero();
   }
 };
 
@@ -98,15 +106,8 @@ struct CrossfadeOrientation {
 
   void operator()(double t) {
     const double elapsed = t - start_time;
-    if (elapsed < 0.0) {
-      assign(before, out);
-    } else if (elapsed >= duration) {
-      assign(after, out);
-    } else {
-      TrajectorySample<Own, 3> y;
-      polynomial(elapsed / duration, duration, coefficients, y);
-      turn_from(after, y, out);
-    }
+    if (elapsed < 0.0) assign(before, out);
+    else turn_into(after, coefficients, elapsed, duration, out);
   }
 };
 
