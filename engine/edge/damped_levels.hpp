@@ -20,7 +20,7 @@ struct DampedMemory {
 // 0 if none was damped. The thresholds are raised below levels that turn or are held. `by_tasks` is
 // what the levels make of a; the rest is φ_N.
 template <class B, class E, class A>
-int write_damped_levels(const LawInput& in, const Asked& rows, double least,
+int write_damped_levels(const LawInput& in, const Demand& rows, double least,
                         const Following& following, Thresholds& thresholds,
                         Projectors<InOut>& projectors, DampedMemory& memory, LevelMemory& levels,
                         B& by_tasks, E& e_N, A& a) {
@@ -35,7 +35,7 @@ int write_damped_levels(const LawInput& in, const Asked& rows, double least,
   for (Index level = 0; level < rows.ends.size(); ++level) {
     const Index size = rows.ends[level] - start;
     const auto J_k = J.middleRows(start, size), J_dot_k = J_dot.middleRows(start, size);
-    const auto asked = rows.asked.segment(start, size);
+    const auto demand = rows.demand.segment(start, size);
     const auto springs = rows.springs.segment(start, size);
     auto QJ = projectors.QJ.middleCols(start, size);
     auto G_inverse = projectors.G_inverse.block(start, start, size, size);
@@ -47,7 +47,7 @@ int write_damped_levels(const LawInput& in, const Asked& rows, double least,
     rest = a_x.segment(start, size);
     rest.noalias() -= J_dot_k * in.v;
     rest.noalias() -= J_k * a;
-    opposed = asked;
+    opposed = demand;
     opposed.noalias() -= J_k * drawn;
     const double threshold = std::max(
         thresholds.own[level], threshold_below(opposed, held, above, level, following, thresholds));
@@ -63,9 +63,9 @@ int write_damped_levels(const LawInput& in, const Asked& rows, double least,
     if (springs.any() || (rows.yields.segment(start, size).array() > 0.0).any())
       above = std::min(above, std::max(std::sqrt(smallest), threshold) / thresholds.scales[level]);
     if (smallest < threshold * threshold) {
-      opposed = asked;
+      opposed = demand;
       opposed.noalias() -= J_k * drawn;
-      const double wanted = springs.select(0.0, asked).squaredNorm();
+      const double wanted = springs.select(0.0, demand).squaredNorm();
       const double lacking = springs.select(0.0, opposed).squaredNorm();
       held = std::max(held, how_held(lacking, wanted, least, following));
       if (damped == 0) damped = static_cast<int>(level) + 1;

@@ -52,8 +52,8 @@ struct LimitedTarget {
     InOut<'k'> lower;  // for a deviation δ from a: A δ ≥ lower
   } barred;
   double large;  // E_t from which on the damped law applies wholly
-  Scratch<'n'> change, asked;
-  Scratch<'n'> effort_change, effort_asked;  // M times them
+  Scratch<'n'> change, demand;
+  Scratch<'n'> effort_change, effort_demand;  // M times them
 
   void check() const {
     check_at_least("a", a.size(), 1);
@@ -70,12 +70,12 @@ struct LimitedTarget {
 
     change = damped * (parts.damped - parts.law);
     effort_change.noalias() = M * change;
-    asked = (1.0 - damped) * (parts.law_self_motion + parts.law_braking);
-    asked += damped * (parts.damped_self_motion + parts.damped_braking);
-    effort_asked.noalias() = M * asked;
+    demand = (1.0 - damped) * (parts.law_self_motion + parts.law_braking);
+    demand += damped * (parts.damped_self_motion + parts.damped_braking);
+    effort_demand.noalias() = M * demand;
     const double lost = 1.0 - 1.0 / std::min(1.0 + excess(), times_permitted());
-    change -= lost * asked;
-    effort_change -= lost * effort_asked;
+    change -= lost * demand;
+    effort_change -= lost * effort_demand;
 
     a += change;
     effort += effort_change;
@@ -98,10 +98,10 @@ struct LimitedTarget {
     return most;
   }
 
-  // How many times what the limits permit far from them is asked for; 1 if it is less.
+  // How many times what the limits permit far from them is demanded; at least 1.
   double times_permitted() const {
-    const double efforts = (effort_asked.array().abs() / permitted.effort.array()).maxCoeff();
-    const double motions = (asked.array().abs() / permitted.acceleration.array()).maxCoeff();
+    const double efforts = (effort_demand.array().abs() / permitted.effort.array()).maxCoeff();
+    const double motions = (demand.array().abs() / permitted.acceleration.array()).maxCoeff();
     return std::max({1.0, efforts, motions});
   }
 };

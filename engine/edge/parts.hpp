@@ -9,7 +9,7 @@ struct WriteThresholds {
       "Write the threshold of each level; return a singular value of the stack from which on none "
       "is bounded.";
   In<'m', 'n'> J, B;  // B = J L⁻ᵀ
-  Asked rows;
+  Demand rows;
   double least, turning;
   Following following;
   Thresholds thresholds;
@@ -21,14 +21,14 @@ struct WriteThresholds {
 
 struct ThresholdBelow {
   static constexpr const char* doc = "The ε that a level below others has at least.";
-  In<'m'> asked;
+  In<'m'> demand;
   double held, above;
   int level;
   Following following;
   Thresholds thresholds;
 
   void check() const { check_index("level", level, thresholds.own.size()); }
-  double operator()() { return threshold_below(asked, held, above, level, following, thresholds); }
+  double operator()() { return threshold_below(demand, held, above, level, following, thresholds); }
 };
 
 struct HowHeld {

@@ -20,7 +20,7 @@ template <template <int...> class As> struct EdgeMemory {
 struct Resolve {
   static constexpr const char* doc = "Write e_N and a, and what became of the law.";
   LawInput law;
-  Asked rows;
+  Demand rows;
   double least;  // ε_0
   Following following;
   bool exact_beside;  // whether there is an exact law beside the damped one

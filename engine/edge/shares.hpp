@@ -3,11 +3,11 @@
 //   a = a_exact + μ (a_damped - a_exact),      0 ≤ μ ≤ 1
 //
 // Out of reach an error persists, and with it what the feedback asks for. Near a singular posture
-// the exact inverse of that changes faster than a sampled loop can follow, so the inverse of a_damped is
-// bounded by thresholds that follow what is commanded (`threshold.hpp`). But a threshold cannot
-// tell an error that persists from a step within reach. What can is where the arm is held, and how:
-// singular, or far away, or at a limit. So μ is the largest of three shares, each of them 0 in the
-// middle:
+// the exact inverse of that changes faster than a sampled loop can follow, so the inverse of
+// a_damped is bounded by thresholds that follow what is commanded (`threshold.hpp`). But a
+// threshold cannot tell an error that persists from a step within reach. What can is where the arm
+// is held, and how: singular, or far away, or at a limit. So μ is the largest of three shares, each
+// of them 0 in the middle:
 //
 //   near    σ ≥ σ_x: 0;  σ ≤ σ_x/2: 1.    σ_x is a tenth of the robot's size
 //   far     |e| ≤ 0.85 ℓ: 0;  |e| ≥ ℓ: 1.      ℓ is the largest error that is fed back
@@ -26,7 +26,7 @@ inline double smooth_share(double x) {
   return x * x * (3.0 - 2.0 * x);
 }
 
-// How near a singular posture is, from 0 to 1. `edge` is σ_x [m]; no exact law is asked for below
+// How near a singular posture is, from 0 to 1. `edge` is σ_x [m]; the law is not exact below
 // twice ε_0. What is written besides is used. The share is 1 long before rounding shows in σ.
 template <class J, class B, class X, class S>
 double near_share(const J& jacobian, double edge, double least, B& rows, X& factor, S& square,

@@ -2,7 +2,7 @@
 //
 // A level asks for J a = d. Along a direction of the singular value s it gets d/s where s is above
 // the threshold ε, and s (2 - s²/ε²) d/ε² below. The steepest of both is 2 d/ε², at s = 0. Let
-// f = Kp s(e) be what the feedback asks for at rest, the part of d that persists while a task
+// f = Kp s(e) be what the feedback commands at rest, the part of d that persists while a task
 // cannot be met. With
 //
 //   ε² = max(ε_0², ‖f‖/L)
@@ -36,15 +36,15 @@ struct Thresholds {
 };
 
 // What is commanded for the rows of the stack, level after level.
-struct Asked {
+struct Demand {
   Ints<'l'> ends;      // where each level's rows end
-  In<'m'> asked;       // f, what the feedback asks for at rest
-  In<'m'> yields;      // by how much L is less for a row; 0: it does not count
+  In<'m'> demand;      // f, what the feedback commands at rest
+  In<'m'> yields;      // by how much L is less for a row; 0: it is not active
   In<'m'> pulls;       // with how much of its largest force a spring pulls
   Flags<'m'> springs;  // whether a row is that of a spring
   In<'m'> stretched;   // how long an error is, relative to its largest length
 
-  void check() const { check_ends("ends", ends, asked.size()); }
+  void check() const { check_ends("ends", ends, demand.size()); }
 };
 
 // The ε that a field needs where a spring slips.
@@ -55,18 +55,18 @@ template <class G> double turning_threshold(const G& g, const Following& followi
 // Write the threshold of each level, B = J L⁻ᵀ; return a singular value of the stack from which on
 // no level is bounded.
 template <class J, class B>
-double write_thresholds(const J& jacobian, const B& whitened, const Asked& rows, double least,
+double write_thresholds(const J& jacobian, const B& whitened, const Demand& rows, double least,
                         double turning, const Following& following, Thresholds& thresholds) {
   double largest = least, above = 0.0;  // the largest scale of those above
   Index start = 0;
   for (Index level = 0; level < rows.ends.size(); ++level) {
     const Index size = rows.ends[level] - start;
-    const auto asked = rows.asked.segment(start, size).array();
+    const auto demand = rows.demand.segment(start, size).array();
     const auto yields = rows.yields.segment(start, size).array();
     const bool sprung = rows.springs.segment(start, size).all();
     const bool tracks = (yields > 0.0).any();
-    const double square = (yields > 0.0).select(asked.square(), 0.0).sum();
-    const double more = (yields > 0.0).select((yields - 1.0) * asked.square(), 0.0).sum();
+    const double square = (yields > 0.0).select(demand.square(), 0.0).sum();
+    const double more = (yields > 0.0).select((yields - 1.0) * demand.square(), 0.0).sum();
     const double pull = rows.pulls.segment(start, size).norm();
     const double plain = jacobian.middleRows(start, size).squaredNorm();
     const double longer = whitened.middleRows(start, size).squaredNorm();
@@ -92,9 +92,9 @@ double write_thresholds(const J& jacobian, const B& whitened, const Asked& rows,
 // The ε that a level below others has at least. What it asks for is f - J a_f; `held` is how much
 // those above are held, and `above` their least singular value in their scale, inf if none turns.
 template <class F>
-double threshold_below(const F& asked, double held, double above, Index level,
+double threshold_below(const F& demand, double held, double above, Index level,
                        const Following& following, const Thresholds& thresholds) {
-  const double beyond = std::max(asked.norm() - following.modest, 0.0);
+  const double beyond = std::max(demand.norm() - following.modest, 0.0);
   const double scale = thresholds.scales[level], follows = thresholds.follows[level];
   const double square = scale * scale * held * following.below * beyond / following.steepest;
   return std::sqrt(square + follows * follows * following.size / above);

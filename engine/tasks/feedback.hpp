@@ -61,16 +61,16 @@ struct FeedbackAcceleration {
   }
 };
 
-struct AskedAtRest {
+struct DemandAtRest {
   static constexpr const char* doc =
       "Kp s(e), and of each row of a bounded part that part's length relative to its largest.";
   Feedback<> feedback;
   In<'m'> e;
-  Out<'m'> asked, stretched;
+  Out<'m'> demand, stretched;
 
   void operator()() {
-    asked.setZero();
-    feedback.add_pull_to(asked, e);
+    demand.setZero();
+    feedback.add_pull_to(demand, e);
     for (Index part = 0; part < feedback.largest.rows(); ++part) {
       const auto [first, size, longest] = feedback.bound(part);
       stretched.segment(first, size).setConstant(e.segment(first, size).norm() / longest);

@@ -8,7 +8,7 @@
 
 namespace hsp {
 const Kind* const* task_kinds() {
-  return kinds<FeedbackAcceleration, AskedAtRest, TrackAxes, TrackPosture, TrackOrientation,
+  return kinds<FeedbackAcceleration, DemandAtRest, TrackAxes, TrackPosture, TrackOrientation,
                TrackPose, TrackDirection, RelativeKinematics, SpringStiffness, SpringPulls,
                ImpedanceGains>();
 }

@@ -119,7 +119,7 @@ class ActiveStack:
             sample = self.rows.rows(here.start, here.stop)
             self._parts.append((each.task, sample))
             self._calls += each.task.calls_in_force(state, in_force, sample)
-            asked = self.resolution.problem.asked[here]
+            demand = self.resolution.problem.demand[here]
             spring = impedance_of(each.task) is not None
             self.resolution.problem.springs[here] = spring
             if spring:
@@ -149,10 +149,10 @@ class ActiveStack:
                 # at rest: what damps is not lost, at any speed
                 stretched = self.resolution.problem.stretched[here]
                 call = PartCall(
-                    engine.AskedAtRest,
+                    engine.DemandAtRest,
                     feedback=in_force.feedback,
                     e=sample.error,
-                    asked=asked,
+                    demand=demand,
                     stretched=stretched,
                 )
                 self._calls.append(call)

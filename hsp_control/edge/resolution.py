@@ -162,7 +162,7 @@ class Resolution:
             each level k but the last, and all that the tasks make of a, shape (levels,
             nv); orthonormal rows Q = X J L⁻ᵀ of the stack, X lower triangular.
         """
-        task, m = self.problem.task, len(self.problem.asked)
+        task, m = self.problem.task, len(self.problem.demand)
         made = np.zeros((len(self.ends), len(v)))
         factors = Factors(np.zeros((m, len(v))), np.zeros((m, m)))
         call = PartCall(

@@ -55,7 +55,7 @@ class Problem:
         field: g and g'.
         metric: W, its Cholesky factor and W'; the identity until it is written.
         gain: K_N, shape (nv, nv) [1/s].
-        asked: Kp s(e), what the feedback commands at rest in the coordinates of e,
+        demand: Kp s(e), what the feedback commands at rest in the coordinates of e,
             shape (m,); zero in rows without one, such as those of contacts.
         yields: How much the threshold of a row's level yields to what the row asks
             for, shape (m,): 0 where no bound is on its error, so that it follows only
@@ -75,7 +75,7 @@ class Problem:
         self.field = self.record.field
         self.metric = MetricSample.allocate(nv)
         self.gain = gain
-        self.asked = np.zeros(rows)
+        self.demand = np.zeros(rows)
         self.yields = np.zeros(rows)
         self.pulls = np.zeros(rows)
         self.stretched = np.zeros(rows)
@@ -84,5 +84,5 @@ class Problem:
     @property
     def rows(self) -> dict[str, Array | Flags]:
         """What is commanded in each row, by name."""
-        names = "asked", "yields", "pulls", "springs", "stretched"
+        names = "demand", "yields", "pulls", "springs", "stretched"
         return {name: getattr(self, name) for name in names}

@@ -81,7 +81,7 @@ def threshold_below(
 ) -> float:
     """Return the threshold of the second level, which follows slowly."""
     return engine.ThresholdBelow(
-        asked=asked,
+        demand=asked,
         held=held,
         above=above,
         level=1,
