@@ -77,11 +77,11 @@ def how_held(lacking: float, wanted: float, following: Following) -> float:
 
 
 def threshold_below(
-    asked: Array, held: float, above: float, thresholds: Thresholds
+    demand: Array, held: float, above: float, thresholds: Thresholds
 ) -> float:
     """Return the threshold of the second level, which follows slowly."""
     return engine.ThresholdBelow(
-        demand=asked,
+        demand=demand,
         held=held,
         above=above,
         level=1,
