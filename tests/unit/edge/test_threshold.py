@@ -36,7 +36,7 @@ STEP = 1e-6  # of differences; the law bends within ε of 0.03 or more
 
 
 def written(
-    asked: Array,
+    demand: Array,
     ends: list[int],
     following: Following,
     *,
@@ -46,12 +46,12 @@ def written(
     turning: float = 0.0,
 ) -> tuple[float, Thresholds]:
     """Return the thresholds of springs, where they pull, or of other levels."""
-    m, thresholds = len(asked), Thresholds.allocate(len(ends))
+    m, thresholds = len(demand), Thresholds.allocate(len(ends))
     J, pulling = np.ones((m, 7)), np.broadcast_to(pulls, m)
     springs = np.full(m, bool(pulling.any()))
     rows = {
         "ends": np.array(ends),
-        "asked": asked,
+        "demand": demand,
         "yields": np.full(m, yields),
         "pulls": np.array(pulling),
         "springs": springs,
@@ -99,23 +99,23 @@ def test_it_bounds_what_the_feedback_asks_for_over_its_square(
     f_0 is that of legs; on a fixed base it is 0. In a metric that makes J L⁻ᵀ longer
     than J the same holds for ε in its scale.
     """
-    asked = 10.0**size * np.random.default_rng(seed).standard_normal(9)
+    demand = 10.0**size * np.random.default_rng(seed).standard_normal(9)
     following = SLOW
     ends = [3, 3, 5, 9]
-    largest, (own, *_) = written(asked, ends, following)
-    _, scaled = written(asked, ends, following, whitened=scale)
+    largest, (own, *_) = written(demand, ends, following)
+    _, scaled = written(demand, ends, following, whitened=scale)
     assert largest >= own.max()
-    for f, epsilon in zip(np.split(asked, ends[:-1]), own, strict=True):
+    for f, epsilon in zip(np.split(demand, ends[:-1]), own, strict=True):
         norm = np.linalg.norm(f)
         assert norm <= (150.0 + 1.3 / LEAST**2) * epsilon**2 * (1.0 + 1e-12)
         assert epsilon >= LEAST
         if norm <= 1.3 + 0.99 * 150.0 * LEAST**2:
             assert epsilon == LEAST
-    few, exact = written(asked, ends, following, yields=3.0)[1].own, own > LEAST
+    few, exact = written(demand, ends, following, yields=3.0)[1].own, own > LEAST
     np.testing.assert_allclose(few[exact] ** 2, 3.0 * own[exact] ** 2)
     np.testing.assert_allclose(scaled.own[exact], max(scale, 1.0) * own[exact])
     for counts, kind in ((1.0, NOT), (0.0, following)):
-        assert (written(asked, ends, kind, yields=counts)[1].own == LEAST).all()
+        assert (written(demand, ends, kind, yields=counts)[1].own == LEAST).all()
 
 
 @given(seeds, st.floats(0.0, 1.0))
@@ -124,18 +124,18 @@ def test_a_level_below_a_held_one_asks_for_less_than_draws_that_one(
 ) -> None:
     """It gets 2 s ‖f‖/ε² at most along s; held for good, that is 2 L s/40."""
     rng, following = np.random.default_rng(seed), SLOW
-    asked, above = 10.0 ** rng.uniform(-1.0, 4.0, (2, 1)) * unit(rng, 3)
+    demand, above = 10.0 ** rng.uniform(-1.0, 4.0, (2, 1)) * unit(rng, 3)
     square = above @ above
     held = how_held(lacks**2 * square, square, following)
     assert 0.0 <= held <= 1.0
     assert held == 0.0 or (lacks > 0.0 and square > 1.3**2)
-    # it fades with what is asked for: nothing jumps where an error vanishes
+    # it fades with what is demanded: nothing jumps where an error vanishes
     arm = following._replace(modest=0.0)
     least = how_held(lacks**2 * 1e-12 * square, 1e-12 * square, arm)
     assert least <= 1e-6 * np.sqrt(square) / (150.0 * LEAST**2)
     _, thresholds = written(np.zeros(6), [3, 6], following)
-    below = threshold_below(asked, held, np.inf, thresholds)
-    beyond = max(np.linalg.norm(asked) - 1.3, 0.0)
+    below = threshold_below(demand, held, np.inf, thresholds)
+    beyond = max(np.linalg.norm(demand) - 1.3, 0.0)
     assert below**2 == pytest.approx(held * beyond * 40.0 / 150.0)
 
 
@@ -145,9 +145,9 @@ def test_a_level_below_follows_as_slowly_as_those_above_turn(
 ) -> None:
     """ε² = f size/(L s_1); and it is below s where all are resolved at once."""
     rng, following = np.random.default_rng(seed), SLOW
-    asked = 10.0**size * rng.standard_normal(6)
+    demand = 10.0**size * rng.standard_normal(6)
     scales = 10.0 ** rng.uniform(-1.0, 1.0, (6, 1))
-    largest, thresholds = written(asked, [3, 6], following, whitened=scales)
+    largest, thresholds = written(demand, [3, 6], following, whitened=scales)
     s = largest * 10.0 ** (log_s * rng.random(2))  # of both levels
     above = s[0] / thresholds.scales[0]
     below = threshold_below(np.zeros(3), 0.0, above, thresholds)
