@@ -70,7 +70,8 @@ class ValueClass(ABCMeta):
         hidden = _hide_properties(cls)
         # Not in __init_subclass__: ABCMeta looks at all attributes then, which would
         # build pydantic's schema.
-        dataclass(cls, frozen=True, eq=False, repr=False, config=_CONFIG)
+        # Nor is it `frozen`, for which two functions are compiled that ours replace.
+        dataclass(cls, eq=False, repr=False, config=_CONFIG)
         cls.__doc__ = _Docstring()
         for each in hidden:
             setattr(cls, each, _field_property(each))
