@@ -154,6 +154,9 @@ def unexplained_rows(rollout: Log) -> Iterator[str]:
     found = rollout.columns.get("observer.disturbance")
     if found is None:
         return
+    found = found[np.isfinite(found).all(axis=1)]  # a safe stop's rows have none
+    if not len(found):
+        return
     size = np.abs(found).max(axis=0)
     dof = int(size.argmax())
     unit = effort_units(rollout)[dof]

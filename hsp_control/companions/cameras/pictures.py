@@ -12,7 +12,9 @@ from collections.abc import Callable
 from http.server import BaseHTTPRequestHandler, HTTPServer
 from io import BytesIO
 from multiprocessing.connection import Connection
+from multiprocessing.util import Finalize
 from threading import Thread
+from time import monotonic
 from typing import Any
 from urllib.parse import parse_qsl, unquote, urlsplit
 
@@ -37,6 +39,11 @@ _SIZES = 4
 """Of how many sizes pictures are drawn without a new start."""
 _PATIENCE = 60.0
 """Longest time until the first picture could be drawn [s]."""
+_HANGS = 20.0
+"""After how much silence the process that draws hangs [s]: a large picture without a
+graphics card, the first of its size, takes some seconds."""
+_LOOK = 0.1
+"""Longest time between two steps that counts [s]: who simulates may stand, too."""
 _INSTALL = "(pip install 'hsp_control[cameras]'; on Debian and Ubuntu also libegl1)"
 
 
@@ -49,7 +56,8 @@ def show(address: str, plant: Plant) -> Callable[..., object]:
 
     Raises:
         HardwareError: If the address is invalid, the scene has no camera, or nothing
-            can be drawn here; by what is returned, if nothing is drawn any more.
+            can be drawn here; by what is returned, if the process that draws has ended
+            or hangs.
     """
     where = f"http://{address}"
     try:
@@ -79,12 +87,19 @@ def show(address: str, plant: Plant) -> Callable[..., object]:
     state, lock = np.ctypeslib.as_array(memory), anew.Lock()
 
     ours, theirs = anew.Pipe(duplex=False)
-    arguments = (host, port, compiled.tobytes(), memory, lock, theirs)
+    alive = anew.RawValue(ctypes.c_ulonglong)  # who draws counts it up
+    arguments = (host, port, compiled.tobytes(), memory, lock, theirs, alive)
     drawing = anew.Process(target=_serve, args=arguments, name="cameras", daemon=True)
+    silence = _Silence()
 
     def tell(*_: object) -> None:
         if drawing.exitcode is not None:
             raise HardwareError(f"{where}: the process that draws there has ended")
+        if silence.after(alive.value, monotonic()) > _HANGS:
+            raise HardwareError(
+                f"{where}: the process that draws there has done nothing for "
+                f"{_HANGS:g} s"
+            )
         if lock.acquire(block=False):  # who draws has it for microseconds
             try:
                 mujoco.mj_getState(model, data, state, kind)
@@ -93,6 +108,8 @@ def show(address: str, plant: Plant) -> Callable[..., object]:
 
     tell()
     drawing.start()
+    # Python ends such processes with a signal that one that hangs does not take.
+    Finalize(drawing, drawing.kill, exitpriority=10)
     theirs.close()
     try:
         ready = ours.poll(_PATIENCE)
@@ -108,8 +125,29 @@ def show(address: str, plant: Plant) -> Callable[..., object]:
     return tell
 
 
+class _Silence:
+    """For how long a count has not changed, by looks at it."""
+
+    def __init__(self) -> None:
+        self._count, self._looked, self._lasts = -1, 0.0, 0.0
+
+    def after(self, count: int, now: float) -> float:
+        """Return that time [s] after a look at the count, now [s]."""
+        self._lasts += min(now - self._looked, _LOOK)
+        if count != self._count:
+            self._lasts = 0.0
+        self._count, self._looked = count, now
+        return self._lasts
+
+
 def _serve(
-    host: str, port: int, compiled: bytes, memory: Any, lock: Any, ready: Connection
+    host: str,
+    port: int,
+    compiled: bytes,
+    memory: Any,
+    lock: Any,
+    ready: Connection,
+    alive: Any,
 ) -> None:
     """Draw until the process that simulates has ended."""
     nothing = os.open(os.devnull, os.O_RDWR)
@@ -121,7 +159,7 @@ def _serve(
         pictures = _Pictures(compiled, memory, lock)
         check_host_name(host)
         server = _Drawer((host, port), _Handler)
-        server.pictures = pictures
+        server.pictures, server.alive = pictures, alive
     except ImportError as error:
         ready.send(f"{error} {_INSTALL}")
         return
@@ -178,6 +216,11 @@ class _Drawer(HTTPServer):
     """Answers one request after another, in the thread that draws."""
 
     pictures: _Pictures
+    alive: Any  # what is counted up while it does something, also wait
+
+    def service_actions(self) -> None:
+        """Say that it lives: twice a second, and after each request."""
+        self.alive.value += 1
 
 
 class _Handler(BaseHTTPRequestHandler):

@@ -15,6 +15,7 @@ import os
 import socket
 import struct
 import sys
+from contextlib import suppress
 from select import select
 from time import monotonic
 from typing import Any
@@ -34,6 +35,10 @@ _SAME = 0.001
 """Openings of a finger that are one [m]."""
 _SILENCE = 2.0
 """After how much another sender is heard [s]."""
+ALIVE = b"L"
+"""What the gripper's process says without being asked, while it lives."""
+_BEAT = 0.5
+"""Time between two of these [s]; a motion of the fingers takes longer."""
 
 
 class Client:
@@ -150,12 +155,15 @@ class GripperClient:
         self.inbox = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
         self.inbox.bind((host, port))
         self.sender, self.last_time, self.last_line = ("", 0), -_SILENCE, ""
+        self.last_beat = -_BEAT
 
     def serve(self, link: socket.socket) -> None:
         """Do what comes until the loop ends; the fingers stay as they are then."""
         while True:
-            wanted, waiting, listeners = self.opening, None, set()
+            wanted, waiting, listeners = self.opening, _BEAT, set()
+            self.beat(link)
             while ready := select([self.inbox, link], [], [], waiting)[0]:
+                self.beat(link)
                 if link in ready:
                     return
                 try:
@@ -170,6 +178,8 @@ class GripperClient:
                     wanted = self.read(json.loads(text), sender, wanted)
                 except Exception as error:  # a datagram may say anything
                     self.say(f"a message is dropped: {error}")
+            if not listeners:
+                continue
             try:
                 self.move(wanted)
                 state = self.gripper.read_once()
@@ -182,6 +192,13 @@ class GripperClient:
                     self.inbox.sendto(json.dumps(answer).encode(), listener)
                 except OSError as error:
                     self.say(f"{listener[0]}:{listener[1]} is not told: {error}")
+
+    def beat(self, link: socket.socket) -> None:
+        """Say that this process lives; nothing if the loop has not read the last."""
+        if monotonic() - self.last_beat >= _BEAT:
+            self.last_beat = monotonic()
+            with suppress(OSError):
+                link.send(ALIVE, socket.MSG_DONTWAIT)
 
     def read(self, message: Any, sender: tuple[str, int], wanted: float) -> float:
         """Return the opening that a message asks for, if it does."""

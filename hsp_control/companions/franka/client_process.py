@@ -9,6 +9,7 @@ import subprocess
 import sys
 import tempfile
 from select import select
+from time import monotonic
 from typing import Any
 
 from hsp_control.common.exceptions import HardwareError
@@ -16,6 +17,11 @@ from hsp_control.companions.franka import client
 from hsp_control.companions.franka.reflexes import explained
 
 INSTALL = "pip install 'hsp_control[franka]'"
+_HANGS = 5.0
+"""After how much silence a process hangs [s]: a motion of the fingers, in which it is
+silent, takes less than two."""
+_LOOK = 0.1
+"""Longest time between two looks that counts [s]."""
 
 
 class ClientProcess:
@@ -43,6 +49,7 @@ class ClientProcess:
             start_new_session=True,
         )
         theirs.close()
+        self._looked, self._silent_for = monotonic(), 0.0
         self.waiting = False
         self.fault: str | None = None
 
@@ -98,10 +105,25 @@ class ClientProcess:
             self._process.wait()
             self._errors.close()
 
-    @property
-    def gone(self) -> bool:
-        """Whether the process has closed its connection, while nothing is asked."""
-        return bool(select([self._link], [], [], 0.0)[0])
+    def trouble(self) -> str:
+        """Return why nobody does what this process should, "" if it lives.
+
+        While nothing is asked it says now and then that it lives. The time in which
+        this process was stopped itself does not count.
+        """
+        now = monotonic()
+        self._silent_for += min(now - self._looked, _LOOK)
+        self._looked = now
+        while select([self._link], [], [], 0.0)[0]:
+            try:
+                said = self._link.recv(client.LONGEST)
+            except OSError:
+                said = b""
+            if not said:
+                return "has ended"
+            self._silent_for = 0.0
+        hangs = self._silent_for > _HANGS
+        return f"has said nothing for {_HANGS:g} s" if hangs else ""
 
     def _ended(self) -> str:
         """Return how the process ended, and the last line that it wrote."""

@@ -113,8 +113,8 @@ class FrankaHardware:
         q, v, self._applied = np.array(numbers).reshape(3, 7)
         sequence = round((t - self._origin) / self.period)
         t = sequence * self.period
-        gone = self._gripper is not None and self._gripper.gone
-        fault = "the process that drives the gripper has ended" if gone else ""
+        trouble = "" if self._gripper is None else self._gripper.trouble()
+        fault = f"the process that drives the gripper {trouble}" if trouble else ""
         return Measurement(sequence, t, q, v, applied=self._applied, fault=fault)
 
     def write(self, effort: Array) -> None:

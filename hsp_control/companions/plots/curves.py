@@ -138,7 +138,8 @@ def draw_lines(
     for place, k in enumerate(named):
         low, high = (each[k] for each in limits) if limits else (-np.inf, np.inf)
         for edge in (low, high) if high < np.inf else ():
-            if np.abs(values[:, k] - edge).min() <= _NEAR * (high - low):
+            near = np.abs(values[:, k] - edge) <= _NEAR * (high - low)  # NaN is not
+            if near.any():
                 color, dotted = palette.series(place), (0, (1, 1.5))
                 axes.axhline(
                     edge, color=color, linewidth=0.9, linestyle=dotted, label=label

@@ -246,7 +246,8 @@ def predicted_decay(rollout: Rollout) -> Decay:
     norm, elapsed = rollout["null_space_norm"], rollout.t - rollout.t[0]
     speeds = np.linalg.norm(rollout["field.g"], axis=1)
     speeds = speeds + np.linalg.norm(rollout.v, axis=1)
-    if not norm[0] > ROUNDING * float(speeds.max()):
+    # Without the law, in a safe stop, they are not known.
+    if not norm[0] > ROUNDING * float(np.nanmax(speeds, initial=0.0)):
         why = "no prediction: starts with $e_N$ = 0"
         return Decay(None, None, (slowest, fastest), why)
     slow = norm[0] * np.exp(-slowest * elapsed)

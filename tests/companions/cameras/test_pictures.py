@@ -1,7 +1,10 @@
 """What another process sees through the cameras of a MuJoCo scene."""
 
 import multiprocessing
+import os
 import socket
+import subprocess
+import sys
 from ctypes.util import find_library
 from io import BytesIO
 from pathlib import Path
@@ -10,6 +13,7 @@ from urllib.request import urlopen
 
 import numpy as np
 import pytest
+import yaml
 from mjcf_texts import ARM, CELL
 from PIL import Image
 from played import wait_until
@@ -18,6 +22,7 @@ import hsp_control as hsp
 from hsp_control.cli.robot_process import RobotProcess
 from hsp_control.common.exceptions import HardwareError
 from hsp_control.companions.cameras import show
+from hsp_control.companions.cameras.pictures import _Silence
 from hsp_control.live import run_loop
 
 pytest.importorskip("mujoco")
@@ -111,6 +116,52 @@ def test_where_nothing_is_drawn_any_more_the_robot_stops(
     drawing.join()
     with pytest.raises(HardwareError, match="the process that draws there has ended"):
         told()
+
+
+HANGING = """
+import os, signal, sys
+import multiprocessing
+import hsp_control as hsp
+from hsp_control.companions.cameras import pictures
+from hsp_control.common.exceptions import HardwareError
+
+if __name__ == "__main__":
+    plant = hsp.load_experiment(sys.argv[1]).plant
+    told = pictures.show(sys.argv[2], plant)
+    (drawing,) = multiprocessing.active_children()
+    os.kill(drawing.pid, signal.SIGSTOP)
+    pictures._HANGS = 1.0
+    try:
+        while True:
+            told()
+    except HardwareError as error:
+        print(error, drawing.pid)
+"""
+
+
+def test_who_draws_and_hangs_is_noticed_and_ended(
+    cell: hsp.Experiment, address: str, tmp_path: Path
+) -> None:
+    """Stopped, as by a debugger: Python waited for it without end when it ended."""
+    scenario, script = tmp_path / "cell.yaml", tmp_path / "hanging.py"
+    scenario.write_text(yaml.safe_dump(cell.config))
+    script.write_text(HANGING)
+    command = [sys.executable, str(script), str(scenario), address]
+    said = subprocess.run(
+        command, capture_output=True, text=True, timeout=120.0, check=True
+    )
+    what, _, number = said.stdout.strip().rpartition(" ")
+    assert what.endswith("the process that draws there has done nothing for 1 s")
+    with pytest.raises(ProcessLookupError):
+        os.kill(int(number), 0)
+
+
+def test_a_step_that_takes_long_is_no_silence() -> None:
+    """Whoever simulates was stopped itself."""
+    silence = _Silence()
+    for k in range(10):
+        assert silence.after(7, 900.0 * k) == pytest.approx(0.1 * k)
+    assert silence.after(8, 9000.0) == 0.0
 
 
 @pytest.mark.parametrize(

@@ -33,6 +33,7 @@ from hsp_control.companions.franka import (
     FrankaHardware,
     FrankaSettings,
     Load,
+    client_process,
     connect,
     connection,
 )
@@ -256,6 +257,40 @@ def test_the_gripper_goes_where_openings_say_and_tells_where_it_is() -> None:
     assert said == [
         "the gripper grasps with 30 N to 0 mm", "the gripper goes to 60 mm"
     ]  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ("sent", "said"),
+    [(signal.SIGKILL, "has ended"), (signal.SIGSTOP, "has said nothing for 2 s")],
+)
+def test_without_a_gripper_that_obeys_the_arm_stops(
+    sent: signal.Signals, said: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Its process dies or hangs amid a run; the loop holds the arm itself."""
+    monkeypatch.setattr(client_process, "_HANGS", 2.0)  # four signs of life
+    experiment, times = circle(), list[float]()
+    with serving(experiment, 3 + (sent == signal.SIGSTOP)) as box:
+        gripper = Gripper(lambda line: None, box.host)
+        with closing(udp()) as free:
+            free.bind((box.host, 0))
+            port = free.getsockname()[1]
+        settings = f"{box.address}&gripper=udp://{box.host}:{port}"
+        arm = connect(settings, experiment.robot, PERIOD)
+
+        def strike(t: float) -> None:
+            assert arm._gripper is not None
+            if t > 0.1 and not times:
+                arm._gripper._process.send_signal(sent)
+                times.append(t)
+
+        report = moved(arm, experiment, duration=600.0, on_period=strike)
+    assert gripper.width == 0.08
+    assert report.ended == "fault"
+    assert report.reason == f"the process that drives the gripper {said}"
+    assert report.at_rest
+    assert not report.silent
+    assert arm._gripper is not None
+    assert arm._gripper._process.poll() == -signal.SIGKILL
 
 
 def udp() -> socket.socket:

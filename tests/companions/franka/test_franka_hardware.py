@@ -20,6 +20,7 @@ from hsp_control.companions.franka import (
     FrankaSettings,
     Load,
     client,
+    client_process,
     connection,
 )
 from hsp_control.companions.franka.client_process import ClientProcess
@@ -148,11 +149,35 @@ def test_without_the_gripper_s_process_the_arm_stops() -> None:
     hardware, _ = arm()
     gripper = hardware._gripper = ClientProcess.__new__(ClientProcess)
     gripper._link, theirs = socket.socketpair()
+    gripper._looked, gripper._silent_for = 0.0, 0.0
     state(hardware)
     assert not state(hardware).fault
     theirs.close()  # as the system does for a process that dies
     assert state(hardware).fault == "the process that drives the gripper has ended"
     gripper._link.close()
+
+
+def test_a_gripper_s_process_that_hangs_is_noticed(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """Not one that drives the fingers, nor while this process was stopped itself."""
+    now = 10.0
+    monkeypatch.setattr(client_process, "monotonic", lambda: now)
+    process = ClientProcess.__new__(ClientProcess)
+    process._link, theirs = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
+    process._looked, process._silent_for = now, 0.0
+    with closing(theirs), closing(process._link):
+        for step in 30 * [0.1] + [900.0] + 10 * [0.1]:
+            now += step
+            assert not process.trouble()
+        theirs.send(client.ALIVE)
+        for _ in range(51):  # the first one hears it
+            now += 0.0999
+            assert not process.trouble()
+        now += 0.0999
+        assert process.trouble() == "has said nothing for 5 s"
+        theirs.send(client.ALIVE)
+        assert not process.trouble()
 
 
 def test_both_processes_end_whatever_is_raised() -> None:

@@ -9,6 +9,7 @@ from typing import Any
 
 import pytest
 
+from hsp_control.companions.franka import client
 from hsp_control.companions.franka.client import GripperClient
 
 SENDER = ("127.0.0.1", 5)
@@ -52,7 +53,7 @@ def test_its_own_answers_that_come_back_are_no_orders() -> None:
         move=lambda width, _: openings.append(width),
         read_once=lambda: state,
     )
-    made.opening, made.last_line = 0.0, ""
+    made.opening, made.last_line, made.last_beat = 0.0, "", -10.0
     loop, link = socket.socketpair()
     with (
         closing(socket.socket(socket.AF_INET, socket.SOCK_DGRAM)) as made.inbox,
@@ -78,3 +79,24 @@ def test_its_own_answers_that_come_back_are_no_orders() -> None:
         loop.close()
         serving.join(20.0)
     assert openings == [0.08]
+
+
+def test_whoever_drives_the_fingers_says_that_it_lives(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """Also while datagrams come without end; and it waits for nobody who listens."""
+    now = 0.0
+    monkeypatch.setattr(client, "monotonic", lambda: now)
+    made = gripper()
+    made.last_beat = -10.0
+    loop, link = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
+    with closing(loop), closing(link):
+        for now in (0.0, 0.1, 0.4, 0.5, 0.9, 1.1):  # noqa: B007 (its clock)
+            made.beat(link)
+        said = [loop.recv(9, socket.MSG_DONTWAIT) for _ in range(3)]
+        assert said == 3 * [client.ALIVE]
+        with pytest.raises(BlockingIOError):
+            loop.recv(9, socket.MSG_DONTWAIT)
+        for k in range(2000):  # more than fits
+            now = 2.0 + k
+            made.beat(link)

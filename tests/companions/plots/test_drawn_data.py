@@ -248,6 +248,10 @@ def test_a_scalar_gain_predicts_a_line_and_the_log_lies_on_it(
     np.testing.assert_allclose(predicted[:, 1], norm, rtol=1e-3)
     late = changed(log, columns={"t": log.t + 5.0})  # the clock need not start at 0
     np.testing.assert_allclose(predicted_decay(late).slow, predicted[:, 1])
+    g = log["field.g"].copy()
+    g[-1] = np.nan  # a safe stop without the law is no start with e_N = 0
+    stopped = changed(log, columns={"field.g": g})
+    np.testing.assert_array_equal(predicted_decay(stopped).slow, predicted[:, 1])
 
 
 def test_a_matrix_gain_predicts_a_band_and_the_log_lies_in_it(

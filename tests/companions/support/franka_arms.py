@@ -135,9 +135,14 @@ class RunningBox:
 
 
 @contextmanager
-def serving(experiment: Experiment, **options: Any) -> Iterator[RunningBox]:
-    """Serve an experiment's plant in lockstep; options are the `Server`'s."""
-    running, ended = RunningBox(host()), threading.Event()
+def serving(
+    experiment: Experiment, number: int = 0, **options: Any
+) -> Iterator[RunningBox]:
+    """Serve an experiment's plant in lockstep; options are the `Server`'s.
+
+    A gripper keeps its address, so a box beside another gripper has another number.
+    """
+    running, ended = RunningBox(host(number)), threading.Event()
     plant = sampled(experiment.plant, experiment.integrator, PERIOD)
     box = ControlBox(Arm(experiment.robot), plant, experiment.q0, running.lines.append)
     server = Server(

@@ -69,3 +69,15 @@ def test_a_run_says_how_much_nobody_explained() -> None:
     whole = {"robot": {"name": "panda", "motor_inertia": 0.05}, "plant": beside}
     assert len([*unexplained_rows(load_experiment(CONFIG | whole).run())]) == 2
     assert not [*unexplained_rows(load_experiment(CONFIG).run())]
+
+
+def test_a_safe_stop_hides_nothing_of_what_an_observer_found() -> None:
+    """Of each live run it was said: up to nan N·m, and never that it is a lot."""
+    beside = {**LOAD, "payload": {**LOAD["payload"], "center": [0.15, 0.0, 0.0]}}
+    log = load_experiment(CONFIG | {"plant": beside}).run()
+    known = [*unexplained_rows(log)]
+    assert len(known) == 3
+    log.columns["observer.disturbance"][-1] = np.nan
+    assert [*unexplained_rows(log)] == known
+    log.columns["observer.disturbance"][:] = np.nan
+    assert not [*unexplained_rows(log)]
