@@ -238,7 +238,7 @@ def main() -> None:
     if options.ours:
         return
     case = Case("panda", moves=False)
-    ending += ["", "## The delay that is borne", "", BORNE, ""]
+    ending += ["", "## The delay that is tolerated", "", BORNE, ""]
     ending += ["| law | Panda [ms] |", "|---|--:|"]
     for name, make in laws(case, "exact", missing).items():
         ending.append(f"| {name} | {borne_delay(case, make)} |")
