@@ -212,8 +212,8 @@ class Document:
     def at(self, *path: str | int) -> Iterator[None]:
         """Add the location of a key path to errors that are raised inside the block.
 
-        An error that has a location already keeps it: the innermost block counts. A key
-        path that the error has itself continues the given one::
+        An error that has a location already keeps it: that of the innermost block. A
+        key path that the error has itself continues the given one::
 
             with document.at("tasks", "hand"), within("frame"):
                 robot.frame_id("panda_hnad")  # FrameNotFoundError: panda.yaml:7: ...

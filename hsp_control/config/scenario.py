@@ -190,7 +190,7 @@ class Scenario(Part, error=ConfigError):
     """Compensators for the differences between the plant and the model."""
     estimators: Estimators = ()
     """What completes each measurement, by type: the base of a robot, or forces of
-    contacts; by default what is measured counts."""
+    contacts; by default what is measured is used."""
     simulation: SimulationSettings = SimulationSettings()
     """Settings of the simulation."""
     live: LiveSettings = LiveSettings()

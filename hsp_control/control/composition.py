@@ -132,7 +132,7 @@ class Composition:
         """Return what makes changes that begin at a time [s].
 
         ``controller.at(2.0).ramp(0.5).gains("hand", hsp.Gains(natural_frequency=20))``.
-        Changes count in the order of their times, whatever the order of the calls; each
+        Changes apply in the order of their times, whatever the order of the calls; each
         continues from what is then in force, so that several may overlap, and efforts
         stay continuous. A time that has passed means now, with the whole ramp.
         """

@@ -36,7 +36,7 @@ class Controller(Composition):
     the last effort, used where the effort rate or the speed is limited (see `applied`),
     and how long changes of impedances wait.
 
-    Times count from the first step of a run: a robot's clock may begin anywhere.
+    Time is zero at the first step of a run: a robot's clock may begin anywhere.
 
     The parts are values and do not change; `at` makes changes while the controller
     runs. What they leave relative (a circle without a centre, ``target="start"``)
@@ -267,8 +267,8 @@ class Controller(Composition):
         does one that was made after its last step, which no step has seen.
 
         Args:
-            origin: What the clock of `compute` reads at time 0, from which references,
-                schedules and changes count [s]; None: what it reads in the next step.
+            origin: What the clock of `compute` reads at time 0, the origin of references,
+                schedules and changes [s]; None: what it reads in the next step.
 
         Raises:
             NonFiniteError: If the origin is NaN or inf.
@@ -304,7 +304,7 @@ class Controller(Composition):
         Args:
             state: A state in which the others are active.
             lifted: The names of the contacts that are not active.
-            without: The names of the tasks that do not count.
+            without: The names of the tasks that are not active.
 
         Returns:
             How long it took [s].

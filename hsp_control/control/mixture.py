@@ -34,13 +34,13 @@ besides M a + N, shape (nv,), or None. While tasks fade it is called for each se
 them, weighted by the stack's `share`."""
 
 
-_Counting = tuple[frozenset[int], frozenset[tuple[int, int]]]
-"""The contacts and the tasks that count, by identity: to compare their values would
-cost more than the step."""
+_Active = tuple[frozenset[int], frozenset[tuple[int, int]]]
+"""The contacts and the tasks that are active, by identity: to compare their values
+would cost more than the step."""
 
 
 class Mixture:
-    """Resolves the law for the contacts and tasks that count at a time.
+    """Resolves the law for the contacts and tasks that are active at a time.
 
     A task that fades in or out has a weight between 0 and 1, and so has a contact that
     is almost lifted (`PlannedContact.share`), or else the task that takes its place
@@ -73,7 +73,7 @@ class Mixture:
     ) -> None:
         self._state, self._base, self._limits = state, base, limits
         self._gains, self._threshold = gains, threshold
-        self._stacks: dict[_Counting, ActiveStack] = {}
+        self._stacks: dict[_Active, ActiveStack] = {}
         self._actuations: dict[tuple[ActiveStack, LimitSet], Actuation] = {}
         self.field, self.active = setup.field, None
         self._follow(setup)

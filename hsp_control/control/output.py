@@ -93,7 +93,7 @@ class ControlOutput:
 
     @property
     def bounded(self) -> dict[str, float]:
-        """How far a target is from what should be there, where it is too far to count.
+        """The lengths of the errors that are fed back in part only.
 
         By the name of each task whose error is longer than its `largest_error`, or
         whose spring pulls with its largest force: the length of that part of the error

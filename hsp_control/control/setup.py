@@ -268,7 +268,7 @@ class Setup:
         """Yield times from a beginning on at which the active sets differ [s].
 
         They are those at which a task or a contact may come or go, and some between
-        two of them: of several that fade at once, each may count most.
+        two of them: of several that fade at once, each may have the largest weight.
         """
         events = set[float]()
         for task in self.tasks:

@@ -1,4 +1,4 @@
-"""What a controller gives to whoever commands one of its streams."""
+"""The handle of a controller's stream, by which it is commanded."""
 
 from collections.abc import Callable, Mapping
 from typing import Any

@@ -17,7 +17,7 @@ class _Discriminator(NamedTuple):
 
 
 _BY_TYPE = _Discriminator("type")
-"""The members of a family of parts are told apart by this key."""
+"""The key that says which member of a family a part is."""
 
 
 class ValueTypes(NamedTuple):

@@ -82,7 +82,7 @@ class Resolution:
 
         Args:
             v: Velocity, shape (nv,).
-            beside: Whether the damped law is written even where it does not count.
+            beside: Whether the damped law is written even where its share is zero.
         """
         problem = self.problem
         law = {

@@ -38,7 +38,7 @@ def compiler_flags() -> str:
 
 
 def cmake_folder() -> Path:
-    """Return the folder that CMake's ``find_package(hsp_step)`` is told of.
+    """Return the folder that CMake's ``find_package(hsp_step)`` is given.
 
     ``cmake -D hsp_step_DIR=$(hsp freeze --cmake-dir)``
     """

@@ -2,7 +2,7 @@
 
 Of the postures that qualify, the nearest to the middle of the joints' limits is taken.
 The candidates come from a Halton sequence, so that the result depends on nothing but
-the robot and what is asked.
+the robot and the task.
 """
 
 import logging
@@ -46,7 +46,7 @@ Rows = tuple[str, tuple[int, ...]]
 
 
 class Judgement(NamedTuple):
-    """What counts for a posture."""
+    """The criteria by which a posture is judged."""
 
     q: Array  # the configuration, shape (nq,)
     regularity: float  # the smallest singular value of the tasks' stacked Jacobian
@@ -91,7 +91,7 @@ class PostureSearch:
         self._gaps = np.array([_GAP if j >= links else 0.0 for _, j in pairs])
 
     def judge(self, q: Array) -> Judgement:
-        """Return what counts for a configuration, shape (nq,)."""
+        """Return the criteria at a configuration, shape (nq,)."""
         robot, state = self.robot, self._state_at(q)
         regularity = np.inf
         if self._rows:

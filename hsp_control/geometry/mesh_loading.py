@@ -14,7 +14,7 @@ def load_mesh(file: Path, scale: Array) -> Any:
     """Return Coal's mesh of a file.
 
     Args:
-        file: The file; its unit and its up axis count.
+        file: The file; its unit and its up axis are applied.
         scale: A factor along each axis of a link, shape (3,) [-].
 
     Raises:

@@ -76,7 +76,7 @@ class CoalDistances:
         distances[self.places] = [result.min_distance for result in self._results]
 
     def witness(self, k: int) -> tuple[Array, Array, Array]:
-        """Return the k-th pair's witness points [m] and normal, asked of Coal."""
+        """Return the k-th pair's witness points [m] and normal, from Coal."""
         result = self._results[k]
         first, second = result.getNearestPoint1(), result.getNearestPoint2()
         if k in self._reversed:

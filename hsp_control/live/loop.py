@@ -136,7 +136,7 @@ def run_loop(
                 settings,
                 clock,
                 start_time,
-                controller.state.dynamics,  # with what it is told to carry
+                controller.state.dynamics,  # with the declared payload
             )
             first = reader.wait_for_first()
             # Bind and allocate everything now, not in real-time operation.

@@ -28,9 +28,9 @@ class Target(NamedTuple):
     """Where a frame shall be."""
 
     frame: str  # name of the frame
-    # its placement in the world; only the position counts for three rows
+    # its placement in the world; only the position is used for three rows
     place: pin.SE3
-    # 3 for its position, 6 for its pose, or which rows of its error in world axes count
+    # 3 for its position, 6 for its pose, or which rows of its error in world axes are used
     rows: int | Indices
 
 

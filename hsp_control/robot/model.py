@@ -73,7 +73,7 @@ class RobotModel(Structure):
         for joint in range(1, model.njoints):
             own = model.joints[joint]
             turns, ratio, follows = self.units[own.idx_v] == "rad", 1.0, own.nv == 0
-            if follows:  # its leader bears it
+            if follows:  # its leader supplies it
                 turns, ratio = self._followed(joint)
             for body in model.subtrees[joint]:
                 inertia = model.inertias[body]
@@ -124,7 +124,7 @@ class RobotModel(Structure):
         """The largest force and moment of springs by default [N, N·m]; inf for none.
 
         The force is what the strongest motor holds at half of `size`, the moment half
-        of that motor's effort. Only motors that slide count as they are. Without a
+        of that motor's effort. Only motors that slide are taken as they are. Without a
         maximum effort it is what moves the robot's mass as gains of 100 1/s² do at 0.3
         of its size.
         """

@@ -319,7 +319,7 @@ class LogWriter:
             **({"obstacle_meshes": self._meshes} if self._meshes else {}),
             "versions": versions(),
             **(given := {**self._meta, **meta}),
-            # Whoever reads the log runs this code only if it is the same.
+            # A reader of the log runs this code only if it is the same.
             "imported": fingerprints((given.get("config") or {}).get("imports") or ()),
         }
 

@@ -100,7 +100,7 @@ def column_unit(rollout: Log, name: str) -> str:
 PULL_COLUMN, PULLED = "pull.force", 1.0
 """Column of the force by which somebody pulls at a link, and what counts of it [N]."""
 FAR, OUT = "target far away", "target out of reach"
-"""What is said of them, whoever says it."""
+"""Their words in every summary."""
 REACHED = 0.01
 """An error up to this length is not spoken of [m, rad or N]."""
 RESTING = 0.1

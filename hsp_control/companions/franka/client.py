@@ -6,7 +6,7 @@ no thread of the same process could help. Its destructors may end the process. S
 runs here, where the loop can kill it.
 
 It does one request at a time, and needs nothing of hsp_control: it starts at once.
-Asked to listen somewhere, it drives the gripper instead.
+Given an address to listen at, it drives the gripper instead.
 """
 
 import gc
@@ -34,7 +34,7 @@ SPEED, FORCE = 0.1, 30.0
 _SAME = 0.001
 """Openings of a finger that are one [m]."""
 _SILENCE = 2.0
-"""After how much another sender is heard [s]."""
+"""Silence after which another sender is accepted [s]."""
 ALIVE = b"L"
 """What the gripper's process says without being asked, while it lives."""
 _BEAT = 0.5

@@ -68,7 +68,7 @@ class ArmLimits:
 
 
 class Arm:
-    """A robot's arm of seven revolute joints, told apart from what its flange carries.
+    """A robot's arm of seven revolute joints, without what its flange carries.
 
     Attributes:
         robot: The arm with its end effector.

@@ -31,7 +31,7 @@ class ConnectionEnd(HardwareError):
     """The client has gone, or what it sent is not of the protocol.
 
     Attributes:
-        answered: Whether the client was told, and will go by itself.
+        answered: Whether the client was informed, and will close by itself.
     """
 
     answered = False

@@ -38,7 +38,7 @@ class Requests:
     """Answers the requests of a client, except the first, which connects it."""
 
     def __init__(self, box: ControlBox, say: Say) -> None:
-        """Set the box, and who is told what is refused."""
+        """Set the box, and the receiver of refusals."""
         self._box, self._say = box, say
         self._handlers: dict[FrankaCommand, Callable[[int, np.void], int | None]] = {
             FrankaCommand.MOVE: self._move,

@@ -1,4 +1,4 @@
-"""From what was asked for to an experiment that can be played with."""
+"""From a command's arguments to an experiment that can be played with."""
 
 from os import PathLike
 from typing import Any

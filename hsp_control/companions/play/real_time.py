@@ -149,7 +149,7 @@ def play_command(options: argparse.Namespace) -> int:
 
 @contextmanager
 def _stop_at_termination() -> Iterator[None]:
-    """End as at Ctrl-C when the process is asked to terminate: the log is saved."""
+    """End as at Ctrl-C on SIGTERM: the log is saved."""
 
     def stop(_number: int, _frame: FrameType | None) -> None:
         raise KeyboardInterrupt

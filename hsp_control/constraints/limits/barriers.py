@@ -114,7 +114,8 @@ class Barrier(Part, ABC, family="barriers", error=LimitError):
         Args:
             state: The state.
             bandwidth: α [1/s].
-            wanted: The acceleration without them, shape (nv,): it may tell which count.
+            wanted: The acceleration without them, shape (nv,); it may
+                show which rows are needed.
         """
         least = self._least_acceleration(state, bandwidth)
         return self.gradients(state.read_only), least

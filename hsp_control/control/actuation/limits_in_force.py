@@ -59,7 +59,7 @@ class LimitSet:
 
 
 class LimitsInForce:
-    """The sets of limits that count now, and what is remembered of the efforts sent.
+    """The sets of limits in force, and what is remembered of the efforts sent.
 
     Its only memory is of the last efforts, used where the effort's rate or the speed is
     limited.
@@ -89,7 +89,7 @@ class LimitsInForce:
         self.write(t, always=True)
 
     def write(self, t: float, *, always: bool = False) -> None:
-        """Find the sets that count at a time [s]."""
+        """Find the sets that are in force at a time [s]."""
         if always or len(self._all) > 1:
             shares = [(each, share.at(t)) for each, share in self._all]
             # each set in force, and its share in (0, 1]
@@ -108,7 +108,7 @@ class LimitsInForce:
 
     @property
     def all(self) -> list[LimitSet]:
-        """The sets that count now, or will."""
+        """The sets that are in force, or will be."""
         return [each for each, _ in self._all]
 
     @property

@@ -25,7 +25,7 @@ class Held(NamedTuple):
     most: Array  # the highest, 0 or more
     lasting: Array  # what that mean and that of the last hundredth of a second share
     # what the mean error and that of the last hundredth of a second have in common: a
-    # force that has ended does not count
+    # force that has ended is not included
     steady: Array
     disturbance: Array  # acceleration that something else than the effort causes
 

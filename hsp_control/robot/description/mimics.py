@@ -144,7 +144,7 @@ def name_frames(model: pin.Model) -> None:
 
 
 def _unite_kinds(joints: dict[str, Element], own: Sequence[Follower]) -> None:
-    """Let a leader and its followers count their angles in the same way.
+    """Let a leader and its followers measure their angles in the same way.
 
     Of a continuous leader (cos, sin) is known, not how often it has turned: that is
     enough for continuous followers at a whole multiple.
@@ -164,7 +164,7 @@ def _unite_kinds(joints: dict[str, Element], own: Sequence[Follower]) -> None:
 def _bound_by_followers(
     joints: dict[str, Element], own: Sequence[Follower]
 ) -> Iterator[str]:
-    """Bound and brake a leader by what its followers are; yield what cannot count."""
+    """Bound and brake a leader by what its followers are; yield what cannot be kept."""
     leader = joints[own[0].leader]
     for each in own:
         follower, ratio = joints[each.name], abs(each.multiplier)
@@ -203,7 +203,7 @@ def _give_coordinates(
 ) -> None:
     """Let leaders that come after a follower follow a joint that comes before all.
 
-    That joint moves nothing, so that it only counts.
+    That joint moves no body: it is a coordinate only.
     """
     text = _skeleton(robot)
     try:

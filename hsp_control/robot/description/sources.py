@@ -59,7 +59,7 @@ class BodyShape:
     # red, green, blue and opacity, from 0 to 1
     color: tuple[float, float, float, float]
     seen: bool  # whether it is drawn
-    collides: bool  # whether distances and collisions count it
+    collides: bool  # whether distances and collisions include it
     # of a mesh: its vertices [m], shape (k, 3), and triangles of their indices, shape
     # (n, 3). What collides is its convex hull
     mesh: tuple[Array, Indices] | None = None

@@ -193,7 +193,7 @@ class IntegratedPlant(SampledPlant):
     def native_steps(self) -> Steps | None:
         """Return the steps that `advance` takes, if they are native.
 
-        Whoever calls them begins with `hold`, and ends with `moved`.
+        A caller begins with `hold`, and ends with `moved`.
         """
         steps = self._advance or self._begin()
         return steps if isinstance(steps, Steps) and steps.native else None

@@ -60,7 +60,7 @@ def listening_inbox(source: str, space: Space) -> Inbox:
 
 
 def _run(listen: Listen, inbox: "ref[Inbox]") -> None:
-    """Listen; whoever reads the inbox gets what is raised."""
+    """Listen; a reader of the inbox gets what is raised."""
     try:
         listen(inbox)
     except BaseException as error:
