@@ -267,7 +267,7 @@ class Controller(Composition):
         does one that was made after its last step, which no step has seen.
 
         Args:
-            origin: What the clock of `compute` reads at time 0, the origin of references,
+            origin: What the clock of `compute` reads at time 0, for references,
                 schedules and changes [s]; None: what it reads in the next step.
 
         Raises:

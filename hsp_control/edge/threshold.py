@@ -14,9 +14,9 @@ target. A task that is tracked has f = 0 nearly, at any speed: for it the law is
 down to ε_0. ``docs/edge.md`` has the propositions and where each constant is from.
 
 How hard the spring at the edge draws is 2 L |∂s/∂q|. At a stretched elbow |∂s/∂q| is up
-to a quarter of the robot's size. Where only a height is controlled, or x and y, it is up to
-the whole size, and the spring moves the whole arm. So an error of one component gets a
-third of L, one of two components half.
+to a quarter of the robot's size. Where only a height is controlled, or x and y, it is
+up to the whole size, and the spring moves the whole arm. So an error of one component
+gets a third of L, one of two components half.
 
 Below a level of the singular value s_1 the null space turns by up to |∂J/∂q|/s_1, and
 what is commanded there with it. A level follows with L s_1/size where that is less; a

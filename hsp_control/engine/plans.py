@@ -87,8 +87,8 @@ class CallOutput(NamedTuple):
 def says(part: object, *ways: str) -> str:
     """Return by which of several methods a part's class says its mathematics.
 
-    It is the one of the most derived class, so that a class that derives from a part of the
-    package may override any of them; the first, if one class has several.
+    It is the one of the most derived class, so that a subclass of a part of the package
+    may override any of them; the first, if one class has several.
     """
     for each in type(part).__mro__:
         for way in ways:

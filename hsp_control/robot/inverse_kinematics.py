@@ -30,7 +30,7 @@ class Target(NamedTuple):
     frame: str  # name of the frame
     # its placement in the world; only the position is used for three rows
     place: pin.SE3
-    # 3 for its position, 6 for its pose, or which rows of its error in world axes are used
+    # 3 for its position, 6 for its pose, or the rows of its error in world axes
     rows: int | Indices
 
 

@@ -1,4 +1,4 @@
-"""The feedback of a task, Kv e' + Kp s(e) + offset, and how much of an error is fed back."""
+"""The feedback of a task, Kv e' + Kp s(e) + offset, and the bounds of s(e)."""
 
 from collections.abc import Mapping, Sequence
 from typing import Annotated, Any, Literal, NamedTuple
