@@ -610,7 +610,8 @@ def test_it_fits_a_phone(chromium: Any, viewer: Viewer) -> None:
     begin(page)
     tell(page, "play_laws", laws=["no field"], law="")
     bar = page.locator(".play-bar")
-    for name in ("reset", "save", "page", "other", "preview", "back", "picture", "film"):
+    acts = "reset", "save", "page", "other", "preview", "back", "picture", "film"
+    for name in acts:
         assert bar.locator(f".{name}").is_visible(), name
     assert page.locator(".play-panel").is_hidden()
     page.locator(".play-bar .panel").tap()
