@@ -1,6 +1,6 @@
 """What a controller returns: an effort, and everything that explains it."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -94,16 +94,20 @@ class ControlOutput:
         self.write(self.tau, own, delivered, stack, damped)
         self._views = views
 
-    def keep_distances(self, measured: Sequence[tuple[str, Array]]) -> None:
+    def keep_distances(
+        self, measured: Sequence[tuple[str, Callable[[], Array]]]
+    ) -> None:
         """Keep what the step measured, by the names of the barriers."""
-        self._distances = [(name, found.tobytes()) for name, found in measured]
+        self._distances = [(name, found().tobytes()) for name, found in measured]
 
     @property
     def distances(self) -> dict[str, float]:
         """The smallest distance that each barrier measured [m], by its name.
 
-        The names are those of the types, such as ``obstacle_distance``; of one type
-        they are numbered. The distance of shapes that overlap is negative.
+        Of a barrier of one's own: its smallest value, in its unit. The names are those
+        of the log's columns ``distance.NAME`` and ``barrier.NAME``: the types, such as
+        ``obstacle_distance``; of one type they are numbered. The distance of shapes
+        that overlap is negative.
         """
         return {n: float(np.frombuffer(d).min()) for n, d in self._distances}
 
@@ -173,7 +177,7 @@ class ControlOutput:
             f"|{name}| = {np.linalg.norm(each):.3g}" for name, each in sizes.items()
         ]
         for name, distance in self.distances.items():
-            notes.append(f"{name} = {distance:.3g} m")
+            notes.append(f"{name} = {distance:.3g}")
         if self.damped:
             notes.append(f"damped: {self.damped}")
         tau = np.round(self.tau, 3).tolist()
