@@ -73,6 +73,8 @@ class LimitsInForce:
         self.sent = SentEffort(state, memory)
         self._rate = True  # the last effort in the memory limits the next one
         self._all: list[tuple[LimitSet, Evolution[float]]] = []
+        # each set in force, and its share in (0, 1]
+        self.sets: list[tuple[LimitSet, float]] = []
         # what returns the distances of barriers in a step, by the barriers' names
         self.measured: list[tuple[str, Callable[[], Array]]] = []
         self.plan(planned, -np.inf)
@@ -93,9 +95,10 @@ class LimitsInForce:
         """Find the sets that are in force at a time [s]."""
         if always or len(self._all) > 1:
             shares = [(each, share.at(t)) for each, share in self._all]
-            # each set in force, and its share in (0, 1]
+            before = [] if always else [each for each, _ in self.sets]
             self.sets = [pair for pair in shares if pair[1] > 0.0]
-            self.measured = self._measured()
+            if [each for each, _ in self.sets] != before:
+                self.measured = self._measured()
 
     def _measured(self) -> list[tuple[str, Callable[[], Array]]]:
         """Return what returns the distances of barriers, by their names.
