@@ -219,6 +219,17 @@ def test_the_limiter_keeps_the_rate_from_both(seed: int, compensates: bool) -> N
     np.testing.assert_array_equal(limiter.sent, before)
 
 
+def test_nothing_presses_while_brakes_hold_a_robot(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    robot, pressed = watched(), np.arange(6.0)
+    felt = {"panda_hand": pressed}
+    monkeypatch.setattr(robot.plant, "contact_wrenches", lambda *_: felt)
+    np.testing.assert_array_equal(robot.measured().wrenches["panda_hand"], np.zeros(6))
+    robot.advance([robot.tau])
+    assert robot.measured().wrenches["panda_hand"] is pressed
+
+
 @pytest.mark.parametrize("sign", [1.0, -1.0])
 def test_a_stop_keeps_the_limits_of_motors_that_bear_gravity_themselves(
     sign: float,
