@@ -1,4 +1,4 @@
-"""``hsp check``: what a configuration is made of, and its numbers at the start."""
+"""``hsp check``: the parts of a configuration, and its numbers at the start."""
 
 import argparse
 import json
@@ -72,7 +72,7 @@ def check(options: argparse.Namespace) -> int:
 def _checked(
     experiment: Experiment, output: ControlOutput, diagnostics: Diagnostics
 ) -> dict[str, Any]:
-    """Return what a configuration is made of, and its numbers at the start."""
+    """Return the parts of a configuration, and its numbers at the start."""
     robot, controller = experiment.robot, experiment.controller
     values, efforts = diagnostics.singular_values, np.abs(output.tau)
     borne = experiment.model_errors
@@ -193,11 +193,11 @@ _LIMITS = {
     "relaxed": "contradict each other at the start",
     "beyond": "are not kept at the start: a joint is beyond its range or its speed",
 }
-"""What the step's status says of the limits."""
+"""The step's status in words, of its limits."""
 
 
 def warn_of_reach(experiment: Experiment) -> None:
-    """Print what the plant's motors cannot move, and which targets cannot be had."""
+    """Print the loads that the plant's motors cannot move, and infeasible targets."""
     robot, law = experiment.robot, experiment.controller
     for message in heavy_plant(experiment.scenario.plant, robot, experiment.q0):
         print(f"hsp: {message}", file=sys.stderr)
@@ -220,7 +220,7 @@ def warn_of_rates(experiment: Experiment) -> None:
 
 
 def robot_advice(robot: Robot) -> Iterator[str]:
-    """Yield lines about links whose inertias no body can have."""
+    """Yield lines about links with physically inconsistent inertias."""
     description = robot.description
     if description is None or description.project_inertias:
         return
@@ -240,7 +240,7 @@ def robot_advice(robot: Robot) -> Iterator[str]:
 
 
 def advice_of_run(experiment: Experiment, rollout: Rollout) -> Iterator[str]:
-    """Yield what `hsp check` advises if a run began singular."""
+    """Yield the advice of `hsp check` if a run began singular."""
     controller = experiment.controller
     least = rollout["singular_values"][0].min(initial=np.inf)
     if not least < controller.singularity_threshold:

@@ -1,4 +1,4 @@
-"""The commands of ``hsp`` that have no file of their own."""
+"""The commands of ``hsp`` without a separate file."""
 
 import argparse
 import json
@@ -62,7 +62,7 @@ def run(options: argparse.Namespace) -> int:
 
 _LONGEST = 120  # of a file's name, without its ending
 _SHOWN = re.compile(r"\s*(title|description|view)\b")
-"""What does not change a run, but how it is shown."""
+"""Keys that change how a run is shown, not the run."""
 
 
 def file_name(words: str) -> str:
@@ -74,9 +74,9 @@ def file_name(words: str) -> str:
 
 
 def _log_of(source: Path, options: argparse.Namespace) -> Path:
-    """Return the path of a run's log, whose name says what was set.
+    """Return the path of a run's log, whose name contains the settings.
 
-    So it does not replace the log of another run, nor ever that which it repeats.
+    So it replaces neither the log of another run nor the one that it repeats.
     """
     changed = [each for each in options.overrides if not _SHOWN.match(each)]
     folder: Path = options.out
@@ -138,7 +138,7 @@ def _run_and_save(
 
 
 def _tell(rollout: Rollout, log: Path, stopwatch: Stopwatch) -> None:
-    """Print what a run did, as a table."""
+    """Print the summary of a run, as a table."""
     table = Table(show_header=False, box=None, pad_edge=False)
     for line in [*summary_rows(rollout), *stopwatch.table_rows(rollout)]:
         table.add_row(*line)
@@ -147,7 +147,7 @@ def _tell(rollout: Rollout, log: Path, stopwatch: Stopwatch) -> None:
 
 
 def _tell_json(rollout: Rollout, log: Path, stopwatch: Stopwatch) -> None:
-    """Print what a run did, by the names of its measures; null where undefined."""
+    """Print the measures of a run by their names; null where undefined."""
     found = {name: each.value for name, each in measures(rollout).items()}
     numbers = {name: x if np.isfinite(x) else None for name, x in found.items()}
     facts = {"log": str(log), "status": rollout.status, "rows": len(rollout)} | numbers

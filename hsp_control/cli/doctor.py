@@ -1,4 +1,4 @@
-"""``hsp doctor``: whether this machine has what a fast and punctual loop needs."""
+"""``hsp doctor``: whether this machine suits a fast and punctual loop."""
 
 import argparse
 import json
@@ -23,18 +23,18 @@ _OURS = {"test", "dev", "docs"}
 
 
 class Check(NamedTuple):
-    """What was looked at, and what was found."""
+    """A check and its result."""
 
-    topic: str  # what was looked at
+    topic: str  # the topic
     # ``ok``; ``note``: something is slower, later or absent; ``bad``: something does
     # not work
     state: Literal["ok", "note", "bad"]
     found: str  # what was found
-    advice: str = ""  # what would change it
+    advice: str = ""  # the remedy
 
 
 def doctor(options: argparse.Namespace) -> int:
-    """Print what was found; return 2 if something does not work."""
+    """Print the results; return 2 if something does not work."""
     checks = [
         *_versions(),
         _dynamics(),
@@ -71,7 +71,7 @@ def _versions() -> Iterator[Check]:
 
 
 def _dynamics() -> Check:
-    """Say which Pinocchio loads models, and which one is compiled in."""
+    """Report which Pinocchio loads models, and which one is compiled in."""
     from pinocchio import __version__ as loads
 
     from hsp_control.engine import PINOCCHIO
@@ -80,7 +80,7 @@ def _dynamics() -> Check:
 
 
 def _threads() -> Check:
-    """Look whether BLAS would start threads for small matrices."""
+    """Check whether BLAS would start threads for small matrices."""
     names = ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS")
     given = {name: os.environ[name] for name in names if name in os.environ}
     if "1" in given.values():
@@ -95,14 +95,14 @@ def _threads() -> Check:
 
 
 def _companions() -> Iterator[Check]:
-    """Ask companions, by the entry points of ``hsp_control.checks``."""
+    """Run the checks of companions, entry points of ``hsp_control.checks``."""
     for _, entry in sorted(entry_points("checks").items()):
         check: Callable[[], Check] = entry.load()
         yield check()
 
 
 def _real_time() -> Iterator[Check]:
-    """Look at the kernel, the permission for real-time priority, and the clock."""
+    """Check the kernel, the permission for real-time priority, and the clock."""
     if platform.system() != "Linux":
         return
     preempt = "PREEMPT_RT" in platform.version() or _is("/sys/kernel/realtime", "1")
@@ -138,7 +138,7 @@ def _is(file: str, text: str) -> bool:
 
 
 def _extras() -> Iterator[Check]:
-    """Look which extras are installed."""
+    """Check which extras are installed."""
     wanted: dict[str, list[Requirement]] = {}
     for line in metadata.requires(_PACKAGE) or ():
         requirement = Requirement(line)

@@ -1,6 +1,6 @@
-"""What a live run needs of an experiment: its period, its start, its plant as a robot.
+"""The parts of an experiment for a live run: period, start, plant as a robot.
 
-A live run begins where the robot is, not where the configuration thinks it is.
+A live run begins where the robot is, not where the configuration places it.
 """
 
 import argparse
@@ -25,7 +25,7 @@ FINAL_HOLD = 0.5
 
 
 def of_a_robot(document: Document) -> Experiment:
-    """Return the experiment of a robot, which leaves to its loop what that hears."""
+    """Return the experiment of a robot, whose loop receives the streams."""
     loaded = load_scenario(document)
     return Experiment.of(loaded._replace(scenario=deaf(loaded.scenario)))
 

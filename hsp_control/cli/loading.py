@@ -30,7 +30,7 @@ def read(options: argparse.Namespace, *overrides: str) -> Document:
 
 
 def own_code(options: argparse.Namespace) -> list[str]:
-    """Return what ``--import`` names, which strict reading does not admit."""
+    """Return the code that ``--import`` names, which strict reading does not admit."""
     for name in options.imports:
         if options.strict or options.allow:
             raise AccessError(
@@ -40,7 +40,7 @@ def own_code(options: argparse.Namespace) -> list[str]:
 
 
 def run_imports(options: argparse.Namespace) -> None:
-    """Import what ``--import`` names, for a command without a configuration."""
+    """Import the code of ``--import``, for a command without a configuration."""
     for name in own_code(options):
         import_code(name)
 

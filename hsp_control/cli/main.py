@@ -14,7 +14,7 @@ from hsp_control.common.exceptions import HspControlError
 _OWN_FILES = {"check", "doctor", "freeze", "live"}
 """Commands with a file of their own; `commands` has the others."""
 _PACKAGES = {"libgomp.so.1": "libgomp1 (Debian, Ubuntu) or libgomp (Fedora)"}
-"""What has a library that the wheels of our dependencies expect."""
+"""The system package of a library that the wheels of our dependencies expect."""
 FAILURE = 2
 """Exit status after any error."""
 
@@ -23,7 +23,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """Run ``hsp``: status 0, 2 after one clear message, 130 after Ctrl-C."""
     make_usable()
     parser = command_line()
-    if "_ARGCOMPLETE" in os.environ:  # a shell asks what may come next
+    if "_ARGCOMPLETE" in os.environ:  # a shell requests completions
         import argcomplete
 
         argcomplete.autocomplete(parser)

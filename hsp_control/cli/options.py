@@ -27,7 +27,7 @@ class Parser(argparse.ArgumentParser):
     def parse_known_args(  # type: ignore[override]
         self, args: Sequence[str] | None = None, namespace: Any = None
     ) -> tuple[Any, list[str]]:
-        """Parse, and refuse here what a command does not know."""
+        """Parse, and refuse here unknown arguments."""
         found, unknown = super().parse_known_args(args, namespace)
         if unknown:
             options = [name for name in unknown if name.startswith("-")]
@@ -200,7 +200,7 @@ def add_freeze(freeze: argparse.ArgumentParser) -> None:
 def add_configuration(
     parser: argparse.ArgumentParser, or_else: str = "", default: str | None = None
 ) -> None:
-    """Add the configuration that a command is about, and what changes it."""
+    """Add a command's configuration, and the options that change it."""
     config = parser.add_argument(
         "config",
         nargs=None if default is None else "?",
@@ -227,7 +227,7 @@ def add_overrides(parser: argparse.ArgumentParser) -> None:
 
 
 def add_strict(parser: argparse.ArgumentParser) -> None:
-    """Add what files a configuration may name."""
+    """Add the options of the files that a configuration may name."""
     parser.add_argument(
         "--strict",
         action="store_true",
@@ -303,7 +303,7 @@ class CommandPage(NamedTuple):
     Attributes:
         add_options: Adds its options to the command's parser.
         open: Opens it, given the options and what the command is about: a context with
-            what the command tells, or None if the options ask for no page.
+            the command's outputs, or None if the options open no page.
     """
 
     add_options: Callable[[argparse.ArgumentParser], object]
@@ -324,7 +324,7 @@ def add_page(command: str, parser: argparse.ArgumentParser) -> None:
 
 
 def loaded(group: str) -> Iterator[tuple[str, Any]]:
-    """Yield what can be imported; what cannot is told, and stops no other command."""
+    """Yield importable entry points; failures are reported and stop no other."""
     for name, entry in sorted(entry_points(group).items()):
         try:
             yield name, entry.load()

@@ -235,7 +235,7 @@ class _RobotLog:
     """The robot's own log: its true states, to the end of its safe stop.
 
     The controller's columns are computed with the configuration's controller: the robot
-    does not know the changes that the loop makes while it runs.
+    does not receive the changes that the loop makes while it runs.
     """
 
     def __init__(

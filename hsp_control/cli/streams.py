@@ -12,7 +12,7 @@ _WRITTEN = "·µ°≤→"
 
 
 class LastingStream:
-    """A standard stream for as long as somebody takes its text; then it leads nowhere.
+    """A standard stream as long as its text is read; then the text is discarded.
 
     A pipe may lose its reader (``hsp live ... | head``), a disk may be full: that must
     not end a run, and lose its log.

@@ -1,1 +1,1 @@
-"""What all rooms use: array types, errors, entry points and resources."""
+"""Used by all layers: array types, errors, entry points and resources."""

@@ -1,4 +1,4 @@
-"""What installed packages add, and what companions in this one do: entry points."""
+"""Entry points: the additions of installed packages, and of this one's companions."""
 
 from collections.abc import Callable
 from importlib import import_module, metadata

@@ -1,7 +1,7 @@
 """All errors that the package raises on purpose.
 
 They have one base class, `HspControlError`. Each also derives from the built-in
-exception that fits, so ``except ValueError`` works as well. A message says what was
+exception that fits, so ``except ValueError`` works as well. A message states what was
 given and what is needed; if a name does not exist, it suggests the nearest one.
 """
 
@@ -37,7 +37,7 @@ class NonFiniteError(HspControlError, ValueError):
 
 
 class ImmutableError(HspControlError, AttributeError):
-    """A value cannot be assigned; the message says what changes it instead."""
+    """A value cannot be assigned; the message names the method that changes it."""
 
 
 class GainError(HspControlError, ValueError):
@@ -131,7 +131,7 @@ class UnstableRateError(HspControlError, ValueError):
 
 
 class FreezeError(HspControlError, ValueError):
-    """A controller cannot run without Python: the message names what in it cannot."""
+    """A controller cannot run without Python; the message names the part."""
 
 
 class PlanError(HspControlError, ValueError):
@@ -139,11 +139,11 @@ class PlanError(HspControlError, ValueError):
 
 
 class EstimationError(HspControlError, ValueError):
-    """An estimator does not fit the robot, or what it needs is not measured."""
+    """An estimator does not fit the robot, or its inputs are not measured."""
 
 
 class FallError(HspControlError, RuntimeError):
-    """The robot falls: no plan can go on."""
+    """The robot falls: no plan can continue."""
 
 
 class SimulationError(HspControlError, RuntimeError):
@@ -187,7 +187,7 @@ class LiveError(HspControlError, ValueError):
 
 
 class EngineError(HspControlError, RuntimeError):
-    """A compiled part of one's own does not compile, or brings nothing."""
+    """A user's own compiled part does not compile, or defines nothing."""
 
 
 class HardwareError(HspControlError, RuntimeError):

@@ -4,7 +4,7 @@ import socket
 
 
 def check_host_name(host: str) -> None:
-    """Raise `OSError` at a name that no computer can have, as at one that none has.
+    """Raise `OSError` for a name that no computer can have, as for an unknown one.
 
     Python encodes a name before it is looked up. Labels of more than 63 letters and
     empty ones raise `UnicodeError` there, or `TypeError`.

@@ -1,4 +1,4 @@
-"""Unknown keyword arguments of what users call: refused with the nearest name."""
+"""Unknown keyword arguments of public functions: refused with the nearest name."""
 
 from collections.abc import Callable
 from functools import wraps
@@ -12,7 +12,7 @@ _Result = TypeVar("_Result")
 
 
 def suggesting(function: Callable[_Given, _Result]) -> Callable[_Given, _Result]:
-    """Let a function, or a class's ``__init__``, say which argument was meant.
+    """Let a function, or a class's ``__init__``, suggest the argument that was meant.
 
     As the arguments of parts do; Python itself names only the wrong one, in a
     TypeError, which this is as well. A function that takes any keyword checks its own.

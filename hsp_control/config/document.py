@@ -1,4 +1,4 @@
-"""A configuration as plain data, wherever it comes from, with each key's line."""
+"""A configuration as plain data, from any source, with each key's line."""
 
 import re
 from collections.abc import Iterator, Sequence
@@ -86,7 +86,7 @@ class Document:
         self.access = ANYWHERE  # which files the configuration may name
         # the packages whose types it may name, besides our own; None: all
         self.packages: frozenset[str] | None = None
-        # what a log says of its robot, unless another one is chosen; see `recorded`
+        # a log's record of its robot, unless another one is chosen; see `recorded`
         self.recorded_robot: Any = None
         # of a log: what the code that it imports was, by name, as SHA-256
         self.recorded_code: dict[str, str] | None = None
@@ -133,7 +133,7 @@ class Document:
 
     @contextmanager
     def reading(self) -> Iterator[None]:
-        """Read the data: messages speak their language, other packages are refused."""
+        """Read the data: messages use their language, other packages are refused."""
         with ExitStack() as stack:
             if self._written:
                 stack.enter_context(in_yaml())
@@ -314,7 +314,7 @@ def _read(source: str | PathLike[str] | dict[str, Any], strict: bool) -> Documen
 
 
 def _check_heard(path: Path, run: Rollout) -> None:
-    """Check that a log holds all that its streams have taken."""
+    """Check that a log contains all messages that its streams used."""
     for name, recordings in (run.meta.get("streams") or {}).items():
         for k, messages in enumerate(recordings):
             column = f"stream.{name}{f'_{k + 1}' if k else ''}.taken"

@@ -57,7 +57,7 @@ from hsp_control.trajectories.streams.streamed import Streamed
 
 
 class Experiment:
-    """A controller, and what it is tried on: the objects of one configuration.
+    """A controller and its plant: the objects of one configuration.
 
     It is made of the same parts in Python and in YAML: `load_experiment` reads what
     `to_yaml` writes. It does not change.
@@ -70,7 +70,7 @@ class Experiment:
         scene: Its obstacles.
         q0: Start configuration, shape (nq,).
         v0: Start velocity, shape (nv,).
-        plant: The simulated system that the efforts act on.
+        plant: The simulated system on which the efforts act.
         rate_findings: Gains that are high for the control period.
     """
 
@@ -122,15 +122,16 @@ class Experiment:
             singularity_threshold: Singular value below which the inverse is bounded.
             limits: Limits on efforts and motion; None: no limits.
             contacts: The contacts of a floating base.
-            base: What else moves a floating base.
-            plan: What writes references and switches contacts; it adds its own tasks.
-            scene: The obstacles; those that fields and limits hold are added.
+            base: What moves a floating base without contacts.
+            plan: The plan that writes references and switches contacts; it adds its own
+                tasks.
+            scene: The obstacles; those of fields and limits are added.
             changes: Changes while running.
             start: Where the run begins; at home and at rest by default. ``auto``: at a
                 good configuration that is found.
-            plant: What the efforts act on; the controller's own model by default.
-            compensation: Compensators for what the model lacks.
-            estimators: What completes each measurement.
+            plant: The simulated system; the controller's own model by default.
+            compensation: Compensators for model errors.
+            estimators: Estimators that complete each measurement.
             simulation: Duration, periods and integrator.
             live: Settings of a live run.
             view: Settings of the 3-D view.
@@ -243,9 +244,10 @@ class Experiment:
 
     @property
     def compensation(self) -> Compensation:
-        """Compensators for differences between plant and model: those that suit both.
+        """Compensators for differences between plant and model, which depend on both.
 
-        A real robot gets those of its `scenario` instead, which do not know the plant.
+        A real robot gets those of its `scenario` instead, which do not depend on the
+        plant.
         """
         own = self.scenario.compensation
         return own.suited(self.controller, *self._loop)
@@ -258,7 +260,7 @@ class Experiment:
 
     @cached_property
     def model_errors(self) -> ModelErrors | None:
-        """What of its model's errors the loop tolerates at the start.
+        """The model errors that the loop tolerates at the start.
 
         As it is on a robot that is not its model. None without a control period, and
         where `model_errors` has no answer.
@@ -299,7 +301,7 @@ class Experiment:
 
     @property
     def _imports(self) -> list[str]:
-        """Code that declares types of this experiment, for who reads it elsewhere."""
+        """Code that declares types of this experiment, for readers elsewhere."""
         own = [*self.scenario.imports, *own_modules(self.scenario)]
         return list(dict.fromkeys(own))
 
@@ -438,7 +440,7 @@ def controller_data(
     scene: Scene | Iterable[Obstacle],
     changes: Sequence[Change] = (),
 ) -> dict[str, Any]:
-    """Return what a configuration says about a controller; see `Experiment`.
+    """Return the configuration of a controller; see `Experiment`.
 
     The parts' own obstacles are in its scene, and the parts have their names.
     """

@@ -1,4 +1,4 @@
-"""Which Python code of one's own a configuration imports: its key ``imports``."""
+"""The user's Python code that a configuration imports: its key ``imports``."""
 
 import logging
 import sys
@@ -30,7 +30,7 @@ def add_imports(document: Document, names: Sequence[str | PathLike[str]]) -> Non
 
 
 def run_imports(document: Document) -> None:
-    """Import what a configuration lists, before its types are looked up.
+    """Import the code that a configuration lists, before its types are looked up.
 
     The code in a log's list is imported only if it is the same to the last byte as in
     the run, or named by ``--import`` as well.
@@ -42,7 +42,7 @@ def run_imports(document: Document) -> None:
     """
     listed = document.to_dict().get(_KEY)
     if not isinstance(listed, list) or not all(isinstance(x, str) for x in listed):
-        return  # the schema says what is wrong
+        return  # the schema reports the error
     folder = Path(document.name).resolve().parent
     for k, name in enumerate(listed):
         code = _absolute(name, folder)
@@ -55,7 +55,7 @@ def run_imports(document: Document) -> None:
 
 
 def _import_again(name: str, document: Document) -> None:
-    """Import what a log lists, if that is what its run has imported."""
+    """Import the code that a log lists, if it is unchanged since the run."""
     then = (document.recorded_code or {}).get(name)
     if document.access.strict:
         why = "--strict does not run code"

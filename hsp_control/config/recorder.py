@@ -1,4 +1,4 @@
-"""Records a loop of one's own, in the log that all commands take."""
+"""Records a user's own loop, in the log that all commands accept."""
 
 from math import inf
 from pathlib import Path
@@ -25,7 +25,7 @@ from hsp_control.simulation.log_writer import LogWriter
 
 
 class Recorder:
-    """Records a loop of one's own: `hsp plot`, `view`, `export` and `run` take its log.
+    """Records a user's own loop: `hsp plot`, `view`, `export` and `run` accept its log.
 
     Rows are on the disk at once, so that a killed program loses none:
 

@@ -1,4 +1,4 @@
-"""What a YAML configuration says: the parts of an experiment.
+"""The contents of a YAML configuration: the parts of an experiment.
 
 Each ``type:`` selects a class of a family. Units are SI: metres, radians, seconds.
 """
@@ -93,7 +93,7 @@ Color = Annotated[str, Field(pattern=_COLOR), BeforeValidator(_color)]
 
 
 class ShownItems(Part, error=ViewerError):
-    """What is shown at first; the rows of the page's legend switch each."""
+    """The layers shown at first; the rows of the page's legend switch each."""
 
     _: KW_ONLY
     paths: Flag = True
@@ -167,10 +167,10 @@ class Scenario(Part, error=ConfigError):
         field(default_factory=ReadOnlyDict)
     )
     """The tasks, by name; tasks of the same priority form one level. A plan adds
-    its own. Without any, the arm follows the field alone, without weight."""
+    its own. Without any, the arm follows the field alone, with gravity compensated."""
     plan: Plan | None = None
-    """What writes references and switches contacts while the robot moves; none by
-    default."""
+    """The plan that writes references and switches contacts while the robot moves; none
+    by default."""
     contacts: Annotated[
         dict[Name, Contact], Field(max_length=100), BY_NAME, READ_ONLY
     ] = field(default_factory=ReadOnlyDict)
@@ -179,20 +179,20 @@ class Scenario(Part, error=ConfigError):
     """For a free-flyer root without contacts: ``flying`` if nothing holds it,
     ``driven`` if something outside the controller moves it."""
     limits: LimitsOrNone = Limits()
-    """Limits on efforts and motion that the controller keeps: the robot's own by
+    """Limits on efforts and motion that the controller enforces: the robot's own by
     default; ``none``: no limits."""
     null_space: NullSpaceSettings = NullSpaceSettings()
     """The control of self-motion: fields, metric and gain."""
     changes: Annotated[Sequence[Change], AfterValidator(tuple)] = ()
     """Changes of tasks, gains, fields and contacts while the controller runs."""
     plant: AnyPlant = RigidBody()
-    """The simulated system that the efforts act on, and its differences from the
+    """The simulated system on which the efforts act, and its differences from the
     controller's model."""
     compensation: Compensation = Compensation()
     """Compensators for the differences between the plant and the model."""
     estimators: Estimators = ()
-    """What completes each measurement, by type: the base of a robot, or forces of
-    contacts; by default what is measured is used."""
+    """Estimators that complete each measurement, by type: the base of a robot, or
+    forces of contacts; by default the measurement is used as it is."""
     simulation: SimulationSettings = SimulationSettings()
     """Settings of the simulation."""
     live: LiveSettings = LiveSettings()
@@ -223,7 +223,7 @@ class _SchemaOfScenario(GenerateJsonSchema):
 
 
 def _name_added_tasks(definitions: dict[str, Any]) -> None:
-    """Let a task have a name where no key of a mapping is its name: in a change."""
+    """Let a task have a name where it is not the key of a mapping: in a change."""
     name = {"type": "string", "description": Task.documentation["name"]}
     for option in definitions["AddTask"]["properties"]["task"]["oneOf"]:
         task = option["$ref"].removeprefix("#/$defs/")

@@ -28,7 +28,7 @@ def with_messages(scenario: Scenario, folder: Path, access: Access) -> Scenario:
 
 
 def deaf(scenario: Scenario) -> Scenario:
-    """Return a scenario whose streams receive nothing: their references stay."""
+    """Return a scenario whose streams receive nothing: their references do not move."""
     return _with_streams(scenario, lambda stream: replace(stream, source=None))
 
 
@@ -59,7 +59,7 @@ def with_recordings(
     received: Mapping[str, Sequence[Any]],
     planned: Sequence[Any] = (),
 ) -> dict[str, Any]:
-    """Return a log's configuration in which its streams repeat what they received."""
+    """Return a log's configuration in which its streams repeat their messages."""
     repeated = deepcopy(dict(config))
     tasks = repeated.get("tasks", {})
     of_tasks = [(tasks.get(name, {}), each) for name, each in received.items()]
@@ -71,7 +71,7 @@ def with_recordings(
 
 
 def without_sources(config: Mapping[str, Any] | None) -> dict[str, Any] | None:
-    """Return a configuration whose streams receive nothing: their references stay."""
+    """Return a configuration whose streams receive nothing: references do not move."""
     if config is None:
         return None
     deaf = deepcopy(dict(config))

@@ -113,7 +113,7 @@ def warn_of_jump(
     unit = "N·m" if robot.units[j] == "rad" else "N"
     warnings.warn(
         f"the first effort of joint {robot.dof_names[j]!r} is {tau[j]:.3g} {unit}, but "
-        f"gravity asks for {gravity[j]:.3g} {unit}: a jump of {100.0 * share[j]:.0f} % "
+        f"gravity requires {gravity[j]:.3g} {unit}: a jump of {100.0 * share[j]:.0f} % "
         f"of its limit of {limit[j]:.3g} {unit}; let tasks begin gently with "
         f"{spoken('blend: 1.0', 'blend=1.0')}, or start on the trajectory with its "
         "velocity",

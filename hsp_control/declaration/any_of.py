@@ -17,9 +17,9 @@ class AnyOf:
     """The type of a field that holds a member of one of some families.
 
     As an annotation: ``Annotated[PoseTrajectory | Trajectory, AnyOf(PoseTrajectory,
-    Trajectory)]``. The members that exist when a value is checked count, not those that
-    exist when the field is declared. If a type name is in several families, the first
-    one counts that has all keys which are given.
+    Trajectory)]``. The members that exist when a value is checked are used, not those
+    that exist when the field is declared. If a type name is in several families, the
+    first member that has all given keys is used.
     """
 
     def __init__(self, *bases: type[Declared]) -> None:
@@ -128,7 +128,7 @@ def _is_known(reference: Any, handler: GetJsonSchemaHandler) -> bool:
 
 
 def _check_complete(type_name: str, member: type[Declared]) -> None:
-    """Check that a class implements what its family asks for."""
+    """Check that a class implements what its family requires."""
     missing = sorted(getattr(member, "__abstractmethods__", ()))
     if missing:
         raise ConfigError(
@@ -139,7 +139,7 @@ def _check_complete(type_name: str, member: type[Declared]) -> None:
 
 def _union(members: dict[str, type[Declared]]) -> CoreSchema:
     choices: dict[str, CoreSchema] = {}
-    shared: dict[str, CoreSchema] = {}  # each definition once, whoever refers to it
+    shared: dict[str, CoreSchema] = {}  # each definition once, also if used twice
     for name, member in members.items():
         schema, others = _own_and_others(member)
         shared |= {str(other["ref"]): other for other in others}

@@ -28,7 +28,7 @@ class ByType:
     As an annotation: ``Annotated[Sequence[Sensor], ByType(Sensor)]``. Python gives a
     sequence of parts. YAML gives a mapping: to a mapping of fields; to the value of the
     first field alone; to ``true`` for a part without fields; to ``null`` or ``false``
-    for none. The members that exist when a value is checked count.
+    for none. The members that exist when a value is checked are used.
     """
 
     def __init__(self, base: type[Declared]) -> None:
@@ -90,7 +90,7 @@ class ByType:
 
 
 def as_entry(part: Declared) -> Any:
-    """Return what YAML may say for a part after its type: the shortest form."""
+    """Return the value in YAML of a part after its type: the shortest form."""
     given = part.changed_fields()
     if not given:
         return True
@@ -101,7 +101,7 @@ def as_entry(part: Declared) -> Any:
 
 
 class _AfterType:
-    """What YAML may say after a type."""
+    """The forms in YAML that may follow a type."""
 
     def __init__(self, member: type[Declared]) -> None:
         self.member = member  # the class of the type

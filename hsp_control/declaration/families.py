@@ -1,4 +1,4 @@
-"""Families of parts, and what their members declare of themselves."""
+"""Families of parts, and the declarations of their members."""
 
 import dataclasses
 from collections.abc import Iterator, Mapping
@@ -15,11 +15,11 @@ from hsp_control.common.exceptions import AccessError, ConfigError, HspControlEr
 
 
 class Declared:
-    """What is declared by fields, in a family or without one: see `Part`.
+    """A class that is declared by fields, in a family or without one: see `Part`.
 
     Attributes:
         family: The family that the part belongs to; None for parts of parts.
-        yaml_type: What YAML calls it in ``type:``; None for parts of parts, and for
+        yaml_type: Its name in YAML's ``type:``; None for parts of parts, and for
             classes that only Python uses.
         error: The class of the errors about its fields.
         yaml_key: The field that YAML gives as the key of a mapping, not inside it.
@@ -90,7 +90,7 @@ class Family:
 
     A class registers itself when it is declared. A package elsewhere names its classes
     as entry points of the group ``hsp_control.<name>``; an entry point is loaded when a
-    configuration uses its name, not before. A configuration can name what is installed,
+    configuration uses its name, not before. A configuration can name installed parts,
     never a module or a file.
 
     Attributes:
@@ -125,7 +125,7 @@ class Family:
     def load(self, type_name: Any) -> None:
         """Import the class of a companion or an installed package, if it is not known.
 
-        For a name that nobody knows all companions are, so that a message can list
+        For an unknown name all companions are imported, so that a message can list
         their types.
 
         Raises:

@@ -113,7 +113,7 @@ def _take_functions(module: ModuleType) -> None:
 
 
 def name_of(function: object) -> str | None:
-    """Return the name that YAML has for a function; None: it has none."""
+    """Return the name of a function in YAML; None: it has none."""
     names = (name for name, each in _functions.items() if each is function)
     return next(names, None)
 

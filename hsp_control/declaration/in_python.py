@@ -80,7 +80,7 @@ def with_fields(cls: type[Declared], docstring: str) -> str:
 
 
 def _in_order(cls: type[Declared]) -> list["Field[Any]"]:
-    """Return the fields, those that may be given by position first."""
+    """Return the fields, first those that may be given by position."""
     return sorted(value_fields(cls), key=lambda field: bool(field.kw_only))
 
 

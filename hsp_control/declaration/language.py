@@ -1,7 +1,7 @@
-"""Messages speak the language in which the user typed: YAML, or Python.
+"""Messages use the language of the user's input: YAML, or Python.
 
-Python is the language unless something else is said: data of a text and the command
-line speak YAML, in which None is null, an array a list, and a part a mapping.
+Python is the language by default: data of a text and the command line use YAML, in
+which None is null, an array a list, and a part a mapping.
 """
 
 import math
@@ -36,7 +36,7 @@ _NAMESPACES = {
     "poses": "trajectories",
     "sensors": "plants",
 }
-"""The public namespace of a family, where it is not called as the family is."""
+"""The public namespace of a family, where its name differs from the family's."""
 _OF_FUNCTIONS = {
     "fields": "FunctionField or FunctionCost",
     "orientations": "CallableOrientation",
@@ -49,7 +49,7 @@ _IN_YAML: ContextVar[bool] = ContextVar("_IN_YAML", default=False)
 
 @contextmanager
 def in_yaml() -> Iterator[None]:
-    """Within the block the user has typed YAML, or a command with words of it."""
+    """Within the block the input is YAML, or a command that contains YAML."""
     token = _IN_YAML.set(True)
     try:
         yield
@@ -58,7 +58,7 @@ def in_yaml() -> Iterator[None]:
 
 
 def spoken(yaml: str, python: str) -> str:
-    """Return the words in the language in which the user typed."""
+    """Return the words in the language of the input."""
     return yaml if _IN_YAML.get() else python
 
 
@@ -114,7 +114,7 @@ def meant(value: Any, kinds: Sequence[type[Any]]) -> Any:
 
 
 def misfit(value: object, kinds: Sequence[type[Any]]) -> str:
-    """Return what is wrong with a value that is an instance of none of some classes."""
+    """Return the reason why a value is an instance of none of some classes."""
     if isinstance(value, type):
         return f"{value.__name__}, a class; give an instance, {value.__name__}(...)"
     families = [family for each in kinds if (family := getattr(each, "family", None))]

@@ -445,7 +445,7 @@ def domain_error(error: Mapping[str, Any]) -> HspControlError | None:
 
 
 class _Arguments:
-    """What `findings` asks about a text, for arguments that come from no text."""
+    """The interface of a text for `findings`, for arguments that are from no text."""
 
     def __contains__(self, path: KeyPath) -> bool:
         return True

@@ -105,7 +105,7 @@ def with_parts_replaced(
 
 
 class Remembering(Part):
-    """A part that is no value: it moves during a run, as a stream's reference does.
+    """A part that is no value: it moves during a run, as a stream's reference.
 
-    Only placed parts of a controller contain one. A deep copy goes on by itself.
+    Only placed parts of a controller contain one. A deep copy continues independently.
     """

@@ -57,7 +57,7 @@ def _of_attributes(node: ast.ClassDef) -> Iterator[tuple[str, str]]:
 
 
 class _Documentation:
-    """The docstring of each field: sources are read when somebody asks."""
+    """The docstring of each field: sources are read on request."""
 
     def __get__(self, part: object, cls: type["Part"]) -> dict[str, str]:
         found: dict[str, str] = {}
@@ -71,9 +71,9 @@ class _Documentation:
 class Part(Declared, metaclass=ValueClass):
     """A value that declares one part of a controller, a world or a simulation.
 
-    A subclass annotates its fields; each has a docstring that says what it is and in
-    which unit. From this one declaration come the constructor and its checks, the YAML
-    and JSON schemas, the reference pages and the messages::
+    A subclass annotates its fields; each has a docstring that gives its meaning and
+    unit. From this one declaration come the constructor and its checks, the YAML and
+    JSON schemas, the reference pages and the messages::
 
         class Circle(Trajectory, type="circle"):
             \"\"\"x(t) = c + r (cos ωt, sin ωt).\"\"\"
@@ -83,11 +83,11 @@ class Part(Declared, metaclass=ValueClass):
             angular_rate: Number
             \"\"\"ω [rad/s].\"\"\"
 
-    A part knows no robot. It never changes: its fields cannot be assigned, and the
+    A part refers to no robot. It never changes: its fields cannot be assigned, and the
     arrays among them are read-only; `dataclasses.replace` returns a changed copy. Parts
     are equal if their fields are, have a hash, and can be pickled; their `repr` is the
     call that makes them. A method ``__post_init__`` may check how the fields fit
-    together. A field may stand for a property that a base class asks for.
+    together. A field may implement a property that a base class requires.
     """
 
     documentation = _Documentation()
@@ -141,10 +141,10 @@ class Part(Declared, metaclass=ValueClass):
         vars(self)[field] = value
 
     def to_dict(self) -> dict[str, Any]:
-        """Return what YAML would say: the type, and the fields that are not defaults.
+        """Return the part as YAML has it: type, and fields that are not defaults.
 
         Raises:
-            ConfigError: If YAML cannot say a field, such as a Python function.
+            ConfigError: If a field has no form in YAML, such as a Python function.
         """
         data: dict[str, Any] = plain_data(self)
         return data

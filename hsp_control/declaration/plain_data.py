@@ -1,4 +1,4 @@
-"""Parts as plain data: what YAML would say."""
+"""Parts as plain data, as they are in YAML."""
 
 from collections.abc import Mapping
 from pathlib import Path
@@ -57,7 +57,7 @@ def _of_part(part: Declared, defaults: bool) -> dict[str, Any]:
 
 
 def _type_of(part: Declared) -> str:
-    """Return what YAML calls the part's class."""
+    """Return the name of the part's class in YAML."""
     if part.yaml_type is None:
         raise ConfigError(
             f"YAML has no name for {type(part).__name__}: declare it with "

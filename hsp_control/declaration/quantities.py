@@ -82,7 +82,7 @@ Flag = Annotated[bool, Strict()]
 Name = Annotated[
     str, Strict(), Field(min_length=1, max_length=100, pattern=r"^[^\x00-\x1f\x7f]*$")
 ]
-"""What a user calls a part, in messages and in columns of the log."""
+"""The name that a user gives a part, in messages and in columns of the log."""
 FileName = Annotated[
     str | Path, AfterValidator(str), WithJsonSchema({"type": "string"})
 ]
@@ -126,7 +126,7 @@ class ArrayField:
         # what pydantic checks first, such as nested lists of numbers
         self.items = items
         self.convert = convert  # makes the array of them, and may check more
-        self.none = none  # what plain data say for None
+        self.none = none  # the form of None in plain data
 
     def __get_pydantic_core_schema__(
         self, source: Any, handler: GetCoreSchemaHandler
@@ -141,10 +141,10 @@ class ArrayField:
 
 
 class OrInstance(ArrayField):
-    """The validation of a field: what YAML says, or in Python an instance of a class.
+    """The validation of a field: its form in YAML, or in Python an instance of a class.
 
     As an annotation: ``Annotated[str | Obstacle, OrInstance(Name, Obstacle)]``. Schemas
-    and messages mention only what YAML says.
+    and messages mention only the form in YAML.
     """
 
     def __init__(self, items: Any, instance_of: type) -> None:

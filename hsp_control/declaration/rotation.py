@@ -1,4 +1,4 @@
-"""Orientations, as a person types them."""
+"""Orientations, as users type them."""
 
 from typing import Annotated, Any
 
@@ -11,7 +11,7 @@ from hsp_control.common.arrays import Array
 from hsp_control.declaration.quantities import ArrayField, Number, read_only
 
 _ROUNDING = 1e-8
-"""Deviation from norm 1, or from orthonormal rows, that counts as rounding error."""
+"""Deviation from norm 1, or from orthonormal rows, that is accepted as rounding."""
 
 
 def matrix_of(rotation: ArrayLike, name: str = "rotation") -> Array:

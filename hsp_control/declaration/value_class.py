@@ -100,7 +100,7 @@ class ValueClass(ABCMeta):
 
     @__signature__.setter
     def __signature__(cls, value: object) -> None:
-        """Ignore pydantic's, which contains what only pydantic reads."""
+        """Ignore pydantic's, which has metadata that only pydantic reads."""
 
 
 def _hide_properties(cls: type) -> list[str]:
@@ -118,7 +118,7 @@ def _hide_properties(cls: type) -> list[str]:
 
 def _annotated(cls: type) -> Iterable[str]:
     """Return the names that a class itself annotates."""
-    if sys.version_info >= (3, 14):  # annotations are evaluated when somebody asks
+    if sys.version_info >= (3, 14):  # annotations are evaluated on request
         from annotationlib import Format, get_annotations
 
         return get_annotations(cls, format=Format.FORWARDREF)
@@ -127,7 +127,7 @@ def _annotated(cls: type) -> Iterable[str]:
 
 
 def _field_property(name: str) -> property:
-    """Return what gives and sets a field, instead of the inherited property."""
+    """Return the descriptor of a field, instead of the inherited property."""
     return property(
         lambda part: vars(part)[name],
         lambda part, value: vars(part).update({name: value}),

@@ -1,3 +1,3 @@
-"""The edge: what is done where tasks cannot be met, so that nothing shakes there."""
+"""The edge: bounds where tasks cannot be met, so that no arm oscillates."""
 
 from .resolution import Resolution as Resolution

@@ -1,11 +1,11 @@
 """What yielding costs where limits hold the tasks, level by level.
 
-Where a limit binds, what is below a level yields before the level does. How it yields
-turns with the posture, the more the less it can and the cheaper it is. A task that
-cannot be met asks for it forever: so the cost ρ follows what is commanded beyond the
-limit, as ε follows f (`threshold.py`), and the tiny ρ of strict priorities is for tasks
-that can be met, and for what yields easily. ``docs/edge.md`` has the proof, the call
-the equations.
+Where a limit is active, what is below a level yields before the level does. The
+direction in which it yields turns with the posture, the more the less it can yield and
+the cheaper it is. A task that cannot be met demands it forever: so the cost ρ follows
+what is commanded beyond the limit, as ε follows f (`threshold.py`), and the tiny ρ of
+strict priorities is for feasible tasks, and for what yields easily. ``docs/edge.md``
+has the proof, the call the equations.
 """
 
 import numpy as np
@@ -34,22 +34,22 @@ def held_levels(
     permitted: Array,
     barred: Barred,
 ) -> tuple[PartCall, Array]:
-    """Return the call that writes what is below each level costs at least, and where.
+    """Return the call that writes the least costs of what is below each level.
 
     Args:
         M: Mass matrix, shape (nv, nv).
-        a: The law's acceleration, and what compensators add, shape (nv,).
-        effort: M a + N, and what compensators add, shape (nv,).
+        a: The law's acceleration, and that of compensators, shape (nv,).
+        effort: M a + N, and the compensators' effort, shape (nv,).
         resolution: The law.
-        by_levels: What the first k levels make of it, shape (levels, nv).
+        by_levels: The part of the first k levels in it, shape (levels, nv).
         factors: Orthonormal rows Q = X J L⁻ᵀ of all levels, X lower triangular.
         bounds: Bounds on the acceleration.
         permitted: Maximum efforts, inf where there is no limit, shape (nv,).
         barred: Rows of barriers, for deviations from a.
 
     Returns:
-        The call, and what it writes, shape (levels,): ρ for what the first levels ask
-        for beyond limits, 0 if that is nothing. It may be more than 1.
+        The call, and what it writes, shape (levels,): ρ for what the first levels
+        command beyond limits, 0 if that is nothing. It may be more than 1.
     """
     held, metric = np.zeros(len(by_levels)), resolution.problem.metric
     call = PartCall(

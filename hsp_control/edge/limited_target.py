@@ -1,27 +1,28 @@
-"""What a step comes near to where a limit binds.
+"""The acceleration that a step approximates where a limit is active.
 
-The law promises nothing where a limit binds. Then it is taken apart,
+Where a limit is active the law's equations cannot hold. Then it is decomposed,
 
     a = a_t + φ_N,
 
-into what the tasks make of it and the self-motion (`self_motion.py`). Two things
+into the tasks' part and the self-motion (`self_motion.py`). Two things
 change, as far as a is beyond a limit, so that the step is a continuous function of the
 state:
 
-*The tasks are damped.* An arm that is held at its edge, or rushes to it, asks for more
+*The tasks are damped.* An arm that is held at its edge, or rushes to it, commands more
 than its motors give, from one side and then from the other: the nearest step within the
-limits would swing with it. So as far as a_t alone is beyond the limits, the step comes
-near to the damped law instead (`shares.py`), wholly from E_t = 2 on.
+limits would oscillate. So as far as a_t alone is beyond the limits, the step approaches
+the damped law instead (`shares.py`), and reaches it at E_t = 2.
 
-*What a field asks for is bounded.* That is φ_N + P K_N P v, the self-motion without
-what brakes it. A field may ask for anything; at most what the limits permit far from
-them is passed to the QP; damping is not scaled: else it would swing at the limits.
+*The field's command is bounded.* That is φ_N + P K_N P v, the self-motion without its
+brake. A field may command anything; at most what the limits permit far from them is
+passed to the QP; damping is not scaled: else the null space would oscillate at the
+limits.
 
 An excess E is relative to what the limit permits: of an effort, the maximum; of an
 acceleration, what the barriers of `Limits` permit far from them. A field keeps at least
-1/(1 + E): what is cut by more than it is beyond a limit swings there. The limit on the
-effort's rate does not count: it depends on the last effort, and a step that waits for
-it would wait for ever.
+1/(1 + E): what is cut by more than its excess oscillates there. The limit on the
+effort's rate is ignored: it depends on the last effort, and a step that waits for it
+would wait for ever.
 """
 
 from typing import NamedTuple, Self
@@ -33,12 +34,12 @@ from hsp_control.common.arrays import Array
 from hsp_control.engine.plans import PartCall
 
 LARGE = 2.0
-"""Excess of the tasks from which on the damped law applies wholly: where they ask for
+"""Excess of the tasks from which on the damped law applies wholly: where they command
 three times what the limits permit."""
 
 
 class Permitted(NamedTuple):
-    """What limits permit far from them, shape (nv,) each; inf where there is none."""
+    """The bounds far from all limits, shape (nv,) each; inf where there is none."""
 
     effort: Array  # [N·m or N]
     acceleration: Array  # [rad/s² or m/s²]
@@ -61,7 +62,7 @@ class Permitted(NamedTuple):
 
 
 class Parts(NamedTuple):
-    """The law's acceleration and the damped law's, and what they are made of."""
+    """The law's acceleration and the damped law's, and their components."""
 
     law: Array  # shape (nv,) each
     damped: Array
@@ -79,7 +80,7 @@ class Within(NamedTuple):
 
 
 class Barred(NamedTuple):
-    """Rows of barriers: A δ ≥ lower for a deviation δ from what is wanted."""
+    """Rows of barriers: A δ ≥ lower for a deviation δ from the unconstrained a."""
 
     A: Array  # shape (k, at least nv)
     lower: Array  # shape (k,)
@@ -94,15 +95,15 @@ def limited_target(
     permitted: Permitted,
     barred: Barred,
 ) -> PartCall:
-    """Return the call that overwrites what is wanted by what the step comes near to.
+    """Return the call that overwrites the unconstrained a by the limited target.
 
     Args:
         M: Mass matrix, shape (nv, nv).
-        a: The law's acceleration, and what compensators add, shape (nv,).
-        effort: M a + N, and what compensators add, shape (nv,).
-        parts: The law's acceleration, and what it is made of.
+        a: The law's acceleration, and that of compensators, shape (nv,).
+        effort: M a + N, and the compensators' effort, shape (nv,).
+        parts: The law's acceleration, and its components.
         bounds: Bounds on the acceleration.
-        permitted: What excesses are relative to.
+        permitted: The bounds to which excesses are relative.
         barred: Rows of barriers; ``lower`` then is for deviations from the new a.
     """
     return PartCall(

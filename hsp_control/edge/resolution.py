@@ -1,7 +1,7 @@
 """The law with its edge and its memory: from tasks and a field to an acceleration.
 
-The mathematics is in the engine: ``engine/law`` is the theorem, ``engine/edge`` what is
-done where tasks cannot be met.
+The mathematics is in the engine: ``engine/law`` is the theorem, ``engine/edge`` the
+bounds where tasks cannot be met.
 """
 
 from collections.abc import Sequence
@@ -30,12 +30,12 @@ class Resolution:
         thresholds: ε of each level, as `call` wrote it last, shape (levels,).
         acceleration: a, as `call` wrote it last, shape (nv,).
         null_space_error: e_N, as `call` wrote it last, shape (nv,).
-        outcome: What became of the law then.
-        edge: What the two laws of the edge left then.
+        outcome: The outcome of the law then.
+        edge: The results of the two laws of the edge then.
         edge_level: The first level whose inverse the damped law bounds, from 1 on,
-            shape (1,); 0: none, or it is left out.
+            shape (1,); 0: none, or the damped law is not computed.
         factors: The stack's pseudo-inverse then.
-        alone: Whether the tasks of one level are resolved at once, whatever happens.
+        alone: Whether the tasks of one level are always resolved at once.
         projectors: The levels' projectors then, if the damped law bounds an inverse and
             the level is not alone.
     """
@@ -67,11 +67,11 @@ class Resolution:
         self.edge_level: Indices
         self.edge_level, self._left_out = np.zeros((2, 1), dtype=np.int64)
         self._self_motions, self._brakings = np.zeros((2, 2, nv))
-        # Only a fixed base has a law beside the damped one. Who stands keeps the
+        # Only a fixed base has a law beside the damped one. A robot on feet keeps its
         # balance by tasks that nothing damps.
         legs = following.modest > 0.0
         self._exact_beside = following.size > 0.0 and m <= nv and not legs
-        # A conflict takes two levels, or more rows than degrees of freedom.
+        # A conflict needs two levels, or more rows than degrees of freedom.
         self.alone = len(self.ends) == 1 and m <= nv
         self.acceleration = self.problem.record.acceleration
         self.null_space_error = self.problem.record.null_space_error
@@ -119,14 +119,14 @@ class Resolution:
         return OnlyIf([self.call(v, beside=True)], self._left_out)
 
     def self_motions(self, v: Array) -> tuple[PartCall, tuple[Array, Array]]:
-        """Return the call that writes what the null space contributes, after `call`.
+        """Return the call that writes the null space's contributions, after `call`.
 
         Args:
             v: Velocity, shape (nv,).
 
         Returns:
             The call, and what it writes: φ_N of a and of a_damped, shape (2, nv), and
-            P K_N P v, what brakes them, shape (2, nv).
+            their brake P K_N P v, shape (2, nv).
         """
         task, metric = self.problem.task, self.problem.metric
         written = self._self_motions, self._brakings
@@ -152,15 +152,15 @@ class Resolution:
         return call, written
 
     def by_levels(self, v: Array) -> tuple[PartCall, tuple[Array, Factors]]:
-        """Return the call that writes what levels contribute, after `self_motions`.
+        """Return the call that writes the levels' contributions, after `self_motions`.
 
         Args:
             v: Velocity, shape (nv,).
 
         Returns:
-            The call, and what it writes: what the first k levels make of a_damped for
-            each level k but the last, and all that the tasks make of a, shape (levels,
-            nv); orthonormal rows Q = X J L⁻ᵀ of the stack, X lower triangular.
+            The call, and what it writes: the part of the first k levels in a_damped for
+            each level k but the last, and that of all tasks in a, shape (levels, nv);
+            orthonormal rows Q = X J L⁻ᵀ of the stack, X lower triangular.
         """
         task, m = self.problem.task, len(self.problem.demand)
         made = np.zeros((len(self.ends), len(v)))

@@ -2,12 +2,12 @@
 
     a = a_exact + μ (a_damped - a_exact),      0 ≤ μ ≤ 1
 
-Out of reach an error persists, and with it what the feedback asks for. Near a singular
+Out of reach an error persists, and with it the feedback's command. Near a singular
 posture the exact inverse of that changes faster than a sampled loop can follow, so the
 inverse of a_damped is bounded by thresholds that follow what is commanded
-(`threshold.py`). But a threshold cannot tell an error that persists from a step within
-reach. What can is where the arm is held, and how: singular, or far away, or at a limit.
-So μ is the largest of three shares, each of them 0 in the middle:
+(`threshold.py`). But a threshold cannot distinguish an error that persists from a step
+within reach. Where the arm is held does: at a singularity, far away, or at a limit. So
+μ is the largest of three shares, each of them 0 in the middle:
 
     near    σ ≥ σ_x: 0;  σ ≤ σ_x/2: 1.    σ_x is a tenth of the robot's size
     far     |e| ≤ 0.85 ℓ: 0;  |e| ≥ ℓ: 1.      ℓ is the largest error that is fed back
@@ -22,7 +22,7 @@ All are continuous, so a is.
 
 NEAR = 0.1
 """σ_x over the robot's size: the law is exact in every posture that is farther from a
-singular one, whatever a step asks for."""
+singular one, whatever a step commands."""
 
 FAR = 0.85
 """Part of ℓ up to which errors are far from being those of a hand that is held."""

@@ -1,4 +1,4 @@
-"""What the law and its edge leave in each step."""
+"""The results of the law and its edge in each step."""
 
 from typing import NamedTuple, Self
 
@@ -15,7 +15,7 @@ class Factors(NamedTuple):
 
 
 class Projectors(NamedTuple):
-    """What the damped law of several levels leaves of its projectors.
+    """The projectors of the damped law of several levels.
 
     Level k takes Q_{k-1} J_kᵀ q(G_k) J_k Q_{k-1} of W⁻¹, and leaves Q_k.
     """
@@ -31,7 +31,7 @@ class Projectors(NamedTuple):
 
 
 class EdgeMemory(NamedTuple):
-    """What the two laws leave, between the steps of the law."""
+    """The results of the two laws, between the calls of a step."""
 
     Q: Array  # factors of the exact inverse, (m, nv)
     X: Array  # (m, m)

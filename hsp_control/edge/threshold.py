@@ -1,32 +1,32 @@
-"""Where an inverse begins to be bounded: the constants, and where each is from.
+"""Where an inverse begins to be bounded: the constants, and their origin.
 
 The mathematics is in the engine, ``engine/edge/threshold.hpp``.
 
-A level asks for J a = d. Along a direction of the singular value s it gets d/s where s
+A level commands J a = d. Along a direction of the singular value s it gets d/s where s
 is above the threshold ε, and s (2 - s²/ε²) d/ε² below. The steepest of both is 2 d/ε²,
-at s = 0. Let f = Kp s(e) be what the feedback asks for at rest, the part of d that
+at s = 0. Let f = Kp s(e) be the feedback's command at rest, the part of d that
 persists while a task cannot be met. With
 
     ε² = max(ε_0², ‖f‖/L)
 
 the acceleration that it causes changes by at most 2 L for each unit of s, whatever the
 target. A task that is tracked has f = 0 nearly, at any speed: for it the law is exact
-down to ε_0. ``docs/edge.md`` has the propositions and where each constant is from.
+down to ε_0. ``docs/edge.md`` has the propositions and the origin of each constant.
 
-How hard the spring at the edge draws is 2 L |∂s/∂q|. At a stretched elbow |∂s/∂q| is up
-to a quarter of the robot's size. Where only a height is controlled, or x and y, it is
-up to the whole size, and the spring moves the whole arm. So an error of one component
-gets a third of L, one of two components half.
+The stiffness of the spring at the edge is 2 L |∂s/∂q|. At a stretched elbow |∂s/∂q| is
+up to a quarter of the robot's size. Where only a height is controlled, or x and y, it
+is up to the whole size, and the spring moves the whole arm. So an error of one
+component gets a third of L, one of two components half.
 
 Below a level of the singular value s_1 the null space turns by up to |∂J/∂q|/s_1, and
 what is commanded there with it. A level follows with L s_1/size where that is less; a
 field costs a spring above it an ε that grows with g, as far as the spring slips.
 
-A level that is held at its edge leaves to those below the very directions in which it
-is drawn there: along them its spring must outweigh what they ask for. They ask for
-f - J a_f, with a_f what those above draw at rest: a task that is met undoes it. So a
-level below follows that with an L that is a fortieth, as far as the one above lacks
-what it asks for.
+A level that is held at its edge releases to those below the very directions in which it
+is drawn there: along them its spring must outweigh their commands. They command f - J
+a_f, with a_f the acceleration of those above at rest: a task that is met compensates
+it. So a level below follows that with an L that is a fortieth, as far as the one above
+misses its command.
 
 All but ε_0 is meant for the identity as metric. Another one that makes J L⁻ᵀ longer
 than J makes the same arm as steep at an ε that is larger.
@@ -51,12 +51,12 @@ BELOW = 40.0
 most 1/40 of the spring of the level above."""
 MODEST_ON_LEGS = 10.0
 """f_0 over the robot's size [1/s²] with a floating base: ε follows ‖f‖ - f_0 there,
-since feet ask for that much where they land."""
+since feet command that much where they land."""
 
 TURNING, QUICKEST = 50.0, 7.0
-"""How fast what a field asks for may change as its null space turns [1/s]: what is held
-for a period h is stable below 2/h, and periods are up to 10 ms. No field is used for
-more than 7 rad/s: none costs a spring all that it has."""
+"""How fast a field's command may change as its null space turns [1/s]: held for a
+period h it is stable below 2/h, and periods are up to 10 ms. At most 7 rad/s of a field
+are used: a larger field would damp a spring in all directions."""
 
 
 class Following(NamedTuple):

@@ -1,4 +1,4 @@
-"""What encloses points, meshes and ellipsoids: convex hulls and capsules."""
+"""Convex hulls and capsules that enclose points, meshes and ellipsoids."""
 
 from collections.abc import Callable
 from functools import partial

@@ -1,8 +1,8 @@
 """Find a posture from which a robot can work: regular, within limits and clear.
 
-Of the postures that qualify, the nearest to the middle of the joints' limits is taken.
-The candidates come from a Halton sequence, so that the result depends on nothing but
-the robot and the task.
+Of the postures that qualify, the nearest to the middle of the joints' limits is chosen.
+The candidates are a Halton sequence, so that the result depends on the robot and the
+task alone.
 """
 
 import logging
@@ -36,7 +36,7 @@ _SHARE = 0.5
 _ARM = 3
 """Fewest joints of an arm; fingers have fewer."""
 _EACH, _TOGETHER = 12, 60
-"""Most postures of one arm, and of all together, where arms are looked at alone."""
+"""Most postures of one arm, and of all together, where arms are searched separately."""
 _PRIMES = (2, 3, 5, 7, 11, 13, 17, 19, 23, 29, 31, 37, 41, 43, 47, 53, 59, 61, 67, 71)
 
 _log = logging.getLogger(__name__)
@@ -157,7 +157,7 @@ class PostureSearch:
         return self.judge(self._at(np.round(self.robot.joint_positions(found.q), 3)))
 
     def start_line(self, found: Judgement) -> str:
-        """Return what a configuration says under ``start`` to begin at a posture."""
+        """Return the value of ``start`` in a configuration that begins at a posture."""
         positions = self.robot.joint_positions(found.q) + 0.0  # no -0.000
         return f"{{joints: [{', '.join(f'{x:.3f}' for x in positions)}]}}"
 
@@ -169,7 +169,7 @@ class PostureSearch:
         if not reached:
             raise ConfigurationError(_too_far(found, target))
         good, _ = self._qualified(reached, least)
-        if not good:  # then the others stay where they are good
+        if not good:  # then the others stay in their good posture
             starts = [(x, x) for x in self._assembled(least)]
             good, _ = self._qualified(self._reached(target, starts)[1], least)
         if not good:
@@ -184,7 +184,8 @@ class PostureSearch:
     ) -> tuple[list[Reached], list[Judgement]]:
         """Return where inverse kinematics end, and those postures that are there.
 
-        ``starts``: where each begins, and what it goes towards, shape (nv,) each.
+        ``starts``: where each begins, and the posture that attracts it, shape (nv,)
+        each.
         """
         bounds = self._lower, self._upper
         found = [
@@ -196,7 +197,7 @@ class PostureSearch:
     def _qualified(
         self, seen: Sequence[Judgement], least: float
     ) -> tuple[list[Judgement], float]:
-        """Return those that are clear and regular, and how regular they must be."""
+        """Return those that are clear and regular, and their least singular value."""
         clear = [each for each in seen if each.clear]
         best = max((each.regularity for each in clear), default=0.0)
         needed = max(least, _SHARE * best) if np.isfinite(best) else least
@@ -229,7 +230,7 @@ class PostureSearch:
         return np.asarray(lower + share * (upper - lower))
 
     def _assembled(self, least: float) -> Iterator[Array]:
-        """Yield displacements whose arms are each good alone, shape (nv,).
+        """Yield displacements in which each arm is good by itself, shape (nv,).
 
         Where one posture in five is good for an arm, one in 25 is for two of them, but
         they hardly depend on one another. All else is at home.
@@ -244,7 +245,7 @@ class PostureSearch:
             yield x
 
     def _alone(self, dofs: Indices, home: Array, least: float) -> list[Array]:
-        """Return an arm's displacements that are good whatever other arms do."""
+        """Return an arm's displacements that are good independently of other arms."""
         pairs = self._pairs_of(dofs)
         found = []
         drawn = (self._drawn(k, dofs) for k in range(1, _SAMPLES + 1))
@@ -351,7 +352,7 @@ def _halton(number: int, dimension: int) -> float:
 
 
 def _nearest(seen: Sequence[Judgement], least: float) -> str:
-    """Return how near postures that do not qualify came to doing so."""
+    """Return in words how near the rejected postures are to qualifying."""
     clear = [each for each in seen if each.clear]
     if not clear:
         best = max(seen, key=lambda each: each.distance)

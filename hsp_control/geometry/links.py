@@ -1,4 +1,4 @@
-"""Shapes of the robot's links for distances, and which of their pairs can collide."""
+"""Shapes of the robot's links for distances, and the pairs that can collide."""
 
 import logging
 from collections.abc import Mapping, Sequence
@@ -78,7 +78,7 @@ def link_shapes(robot: Robot, proxy: Proxy = "capsules") -> list[LinkShape]:
 
 
 def _own_shapes(robot: Robot) -> list[LinkShape]:
-    """Return the collision geometry of the links as it is, or what replaces it."""
+    """Return the collision geometry of the links as it is, or its replacement."""
     own = {part.prefix: _collision_shapes(robot, part) for part in robot.parts}
     without = [part for part in robot.parts if not own[part.prefix]]
     if without:
@@ -101,7 +101,7 @@ def _approximated(shapes: Sequence[LinkShape], proxy: Proxy) -> list[LinkShape]:
 
 
 def part_of(robot: Robot, name: str) -> RobotPart:
-    """Return the part of a combined robot that a joint or link name belongs to."""
+    """Return the part of a combined robot to which a joint or link name belongs."""
     parts = [part for part in robot.parts if name.startswith(part.prefix)]
     return max(parts, key=lambda part: len(part.prefix))
 
@@ -388,7 +388,8 @@ def _replaced(shape: LinkShape, geometry: Any) -> LinkShape:
 def self_pairs(robot: Robot, links: Sequence[LinkShape]) -> list[tuple[int, int]]:
     """Return the pairs of link shapes that can collide, as indices into ``links``.
 
-    Neighbours, which always touch, and pairs that the SRDF or MJCF disables are none.
+    Neighbours, which always touch, and pairs that the SRDF or MJCF disables are left
+    out.
     """
     disabled = _disabled(robot)
     parents = list(robot.model.parents)

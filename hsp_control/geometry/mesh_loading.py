@@ -1,4 +1,4 @@
-"""Read a mesh file of any format that Assimp knows, in metres and with z up."""
+"""Read a mesh file of any format that Assimp supports, in metres and with z up."""
 
 from pathlib import Path
 from typing import Any

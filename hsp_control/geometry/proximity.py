@@ -152,7 +152,7 @@ class Proximity:
 
     def measure(self, state: RobotState) -> Array:
         """Return all distances at a state, shape (k,) [m]; computed once per state."""
-        # The array is the state's, and of all that show it: ids are reused.
+        # The array belongs to the state, and to all that show it: ids are reused.
         if self._measured is state.stamp_array and (
             self._stamp == self._stamp_of(state)
         ):
@@ -179,7 +179,7 @@ class Proximity:
             state: The state.
             near: Whether a pair has a row, shape (k,).
             least: What each row needs, shape (k,).
-            rows: What they are added to: how many there are, A and least.
+            rows: The rows to which they are added: their number, A and least.
         """
         if self.closed_form is not None and self.coal is None:
             return self.closed_form.row_call(state, near, least, rows)
@@ -194,7 +194,7 @@ class Proximity:
         return PartCall(add)
 
     def _stamp_of(self, state: RobotState) -> tuple[int, int]:
-        """Return a value that changes when anything is measured at another state."""
+        """Return a value that changes with every measurement at another state."""
         count = 0 if self.closed_form is None else int(self.closed_form.measurements[0])
         return state.stamp, count
 

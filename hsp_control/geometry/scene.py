@@ -1,4 +1,4 @@
-"""Obstacles in the robot's world, fixed or moving, and where it starts there."""
+"""Obstacles in the robot's world, fixed or moving, and the robot's start there."""
 
 from collections.abc import Iterable, Iterator, Mapping
 from functools import cached_property
@@ -119,7 +119,7 @@ class Scene(Part, Mapping[str, Obstacle], error=SceneError):
 
 
 class Start(NamedTuple):
-    """What parts are placed at: relative points and names of obstacles refer to it.
+    """The start at which parts are placed: relative points and obstacles refer to it.
 
     Attributes:
         state: The robot's state at the start.

@@ -1,4 +1,4 @@
-"""How near the law is to a singular posture."""
+"""The distance of the law from a singular posture."""
 
 from math import isqrt
 

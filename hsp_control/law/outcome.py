@@ -1,4 +1,4 @@
-"""Whether the law's equations hold, and how the engine says it."""
+"""Whether the law's equations hold, as the engine reports it."""
 
 from enum import IntEnum
 from typing import NamedTuple, Self
@@ -24,7 +24,7 @@ EXACT, DAMPED, NOT_FINITE = tuple(Outcome)
 
 
 class LawOutcome(NamedTuple):
-    """What became of the law in a step: the engine writes it, shape (1,) each."""
+    """The law's outcome in a step, which the engine writes, shape (1,) each."""
 
     damped_level: Indices
     """The first level whose inverse is bounded, from 1 on; 0: none is."""
@@ -33,7 +33,7 @@ class LawOutcome(NamedTuple):
 
     @classmethod
     def allocate(cls) -> Self:
-        """Return that of a law that was not resolved yet."""
+        """Return the outcome of a law that is not resolved yet."""
         return cls(*np.zeros((2, 1), dtype=np.int64))
 
     @property

@@ -9,7 +9,7 @@ from hsp_control.law.samples import FieldSample, MetricSample, TaskSample
 
 
 class Record(NamedTuple):
-    """What explains a step, in one block of memory, so that one copy keeps it all.
+    """The quantities of a step, in one block of memory, so that one copy keeps all.
 
     Attributes:
         task: All tasks, level after level: J, J', e, e', a_x.
@@ -55,16 +55,16 @@ class Problem:
         field: g and g'.
         metric: W, its Cholesky factor and W'; the identity until it is written.
         gain: K_N, shape (nv, nv) [1/s].
-        demand: Kp s(e), what the feedback commands at rest in the coordinates of e,
+        demand: Kp s(e), the feedback's command at rest in the coordinates of e,
             shape (m,); zero in rows without one, such as those of contacts.
-        yields: How much the threshold of a row's level yields to what the row asks
-            for, shape (m,): 0 where no bound is on its error, so that it follows only
-            below a held level; see `write_thresholds`.
-        pulls: With how much of its largest force a spring pulls along a row, shape
-            (m,); 0 for other rows.
-        stretched: How long the part of the error is to which a row belongs, relative to
-            its largest length, shape (m,); 0 for rows without one.
-        springs: Whether a row is that of a spring, shape (m,). The law itself treats
+        yields: How much the threshold of a row's level follows the row's demand, shape
+            (m,): 0 where no bound is on its error, so that it follows only below a held
+            level; see `write_thresholds`.
+        pulls: Force of a spring along a row over its largest force, shape (m,); 0 for
+            other rows.
+        stretched: Length of the part of the error to which a row belongs, over its
+            largest length, shape (m,); 0 for rows without one.
+        springs: Whether a row belongs to a spring, shape (m,). The law itself treats
             all rows alike; where limits bind, a spring yields as a body would.
     """
 
@@ -83,6 +83,6 @@ class Problem:
 
     @property
     def rows(self) -> dict[str, Array | Flags]:
-        """What is commanded in each row, by name."""
+        """The commands of each row, by name."""
         names = "demand", "yields", "pulls", "springs", "stretched"
         return {name: getattr(self, name) for name in names}

@@ -1,4 +1,4 @@
-"""What the law reads at one state: tasks, a field and a metric."""
+"""The law's inputs at one state: tasks, a field and a metric."""
 
 from typing import NamedTuple
 

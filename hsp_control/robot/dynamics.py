@@ -22,7 +22,7 @@ _ALONG_AN_AXIS = {
     "RevoluteUnboundedUnaligned": "RevoluteUnbounded",
     "HelicalUnaligned": "Helical",
 }
-"""What the engine calls the joints that have an axis, but RX, RY and RZ."""
+"""The engine's names of joints with an axis, except RX, RY and RZ."""
 
 
 class JointNumbers(NamedTuple):
@@ -44,7 +44,7 @@ class JointNumbers(NamedTuple):
 
 
 ModelNumbers = tuple[tuple[JointNumbers, ...], tuple[float, ...], tuple[float, ...]]
-"""The joints in order, gravity [m/s²], and what rotors add to the diagonal of M."""
+"""The joints in order, gravity [m/s²], and the rotors' part of the diagonal of M."""
 
 
 def model_numbers(model: pin.Model) -> ModelNumbers:

@@ -1,4 +1,4 @@
-"""What gravity asks of the motors at a posture, and how that changes."""
+"""The efforts against gravity at a posture, and their derivatives."""
 
 import numpy as np
 import pinocchio as pin
@@ -11,7 +11,7 @@ from hsp_control.robot.kinematics import WorldKinematics, joint_support
 
 
 class Gravity:
-    """The efforts that gravity takes, their slope, and their drift along the motion.
+    """The efforts against gravity, their slope, and their drift along the motion.
 
     Attributes:
         calls: Bring the attributes below up to date, after the state has moved.

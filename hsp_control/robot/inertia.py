@@ -29,11 +29,11 @@ class CentroidalMotion:
     Attributes:
         calls: Bring the attributes below up to date, if they are not.
         position: The centre of mass c [m], shape (3,).
-        velocity: c' [m/s], shape (3,): J v, and what masses that come or go add.
+        velocity: c' [m/s], shape (3,): J v, and the part of masses that change.
         jacobian: J, shape (3, nv).
         jacobian_dot: J' = dJ/dt along v, exact, shape (3, nv).
-        own_acceleration: What these add to c'' = J a + J' v [m/s²], shape (3,).
-        own_momentum: What they add to the rate of A v/m [m²/s²], shape (3,).
+        own_acceleration: Their part of c'' beside J a + J' v [m/s²], shape (3,).
+        own_momentum: Their part of the rate of A v/m [m²/s²], shape (3,).
         momentum_matrix: A, where A v is the angular momentum about c [kg·m²/s], shape
             (3, nv).
         momentum_matrix_dot: A' = dA/dt along v, exact, shape (3, nv).

@@ -95,7 +95,7 @@ class Integrator(Part, ABC, family="integrators", error=SimulationError):
 
     @abstractmethod
     def begin(self, robot: Robot, bind_dynamics: Bind) -> Advance:
-        """Return what integrates the motion of a robot, in memory of its own.
+        """Return an integration of a robot's motion, with its own memory.
 
         Args:
             robot: The robot.
@@ -105,7 +105,7 @@ class Integrator(Part, ABC, family="integrators", error=SimulationError):
     def advance(
         self, robot: Robot, dynamics: Dynamics, t: float, end: float, q: Array, v: Array
     ) -> tuple[Array, Array]:
-        """Return (q, v) at time ``end`` [s]; `begin` is faster where there is more.
+        """Return (q, v) at time ``end`` [s]; `begin` is faster for several intervals.
 
         Args:
             robot: The robot.
@@ -124,7 +124,7 @@ class Integrator(Part, ABC, family="integrators", error=SimulationError):
 
 
 def bound(dynamics: Dynamics) -> Bind:
-    """Return dynamics as integrators call them: of arrays that stay the same."""
+    """Return dynamics as integrators call them: of the same arrays each time."""
 
     def bind_dynamics(q: Array, v: Array) -> Term:
         value = np.zeros_like(v)
@@ -178,7 +178,7 @@ class Steps(ABC):
         q: Configuration where v' is computed, shape (nq,).
         v: Velocity there, shape (nv,).
         acceleration: v' there.
-        interval: Beginning and end of what is integrated [s], shape (2,).
+        interval: Beginning and end of the integration [s], shape (2,).
         now: Beginning of the present step [s], shape (1,).
         h: The step [s], shape (1,).
         take: Integrates q and v over the interval.
@@ -324,7 +324,7 @@ class Dop853(Integrator, type="dop853"):
 
 
 def _of_new_arrays(robot: Robot, bind_dynamics: Bind) -> Dynamics:
-    """Return dynamics that copy their arguments to where they are bound."""
+    """Return dynamics that copy their arguments to the bound arrays."""
     q, v = robot.neutral(), np.zeros(robot.nv)
     acceleration = bind_dynamics(q, v)
     compute = planned(acceleration.calls)

@@ -14,14 +14,14 @@ _STEPS = 200
 _LONGEST = 0.5
 """Longest step of a joint [rad or m]; the linear model does not hold farther."""
 _PULL = 0.2
-"""Share of the way to the preferred configuration that is taken in each step."""
+"""Share of the way to the preferred configuration in each step."""
 _CONVERGED = 1e-9
 """Error at which the target is reached [m and rad]."""
 _STILL = 1e-3
 """Step in the null space at which the search ends [rad or m]."""
 _HELD = 10.0
-"""Weight of what is held, beside the target's: at the nearest place it slips by 1 % of
-the distance that remains."""
+"""Weight of held frames, relative to the target's: at the nearest place it slips by 1 %
+of the distance that remains."""
 
 
 class Target(NamedTuple):
@@ -59,8 +59,8 @@ def reach(
 
     Levenberg and Marquardt's method: each step solves (Jᵀ J + λ 1) δ = Jᵀ e, with the
     error e of position and rotation vector in world axes, and a λ that falls with e. In
-    the null space of J it goes towards the preferred configuration. A joint at a limit
-    that would go beyond it takes no part in a step. The result depends on the arguments
+    the null space of J it moves towards the preferred configuration. A joint at a limit
+    that would go beyond it is fixed in a step. The result depends on the arguments
     only. ``preferred``, ``lower`` and ``upper`` are displacements from neutral, (nv,).
     Frames that are ``held`` meanwhile, such as feet, have targets of their own.
     """
@@ -99,7 +99,7 @@ def reach(
 
 
 def _linear(state: RobotState, target: Target) -> tuple[Array, Array]:
-    """Return e and J of the rows that count, world axes: to first order J δ = e."""
+    """Return e and J of the selected rows, world axes: to first order J δ = e."""
     frame, rows = state.frame(target.frame), target.rows
     if isinstance(rows, int):
         rows = np.arange(rows)

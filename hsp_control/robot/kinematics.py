@@ -14,7 +14,7 @@ from hsp_control.engine.plans import PartCall, PartCalls
 class FrameMotion(NamedTuple):
     """A frame's placement, Jacobian and motion, as one argument of a call.
 
-    In the axes of the frame that it is relative to: the world's, unless said otherwise.
+    In the axes of the frame to which it is relative: the world's by default.
     Linear rows come before angular rows.
     """
 
@@ -83,7 +83,7 @@ class LocalMotion(NamedTuple):
     def fixed(cls, placement: pin.SE3) -> "LocalMotion":
         """Return that of a frame that does not move in its joint."""
         R = np.ascontiguousarray(placement.rotation)
-        # not rows of one array: a copy of each would lie otherwise to a packet
+        # not rows of one array: copies would be aligned otherwise to a packet
         rest = (np.zeros(3) for _ in range(4))
         return cls(R, placement.translation.copy(), *rest)
 
@@ -120,8 +120,9 @@ class FrameKinematics:
         jacobian_dot: J' = dJ/dt along v, exact, shape (6, nv).
         velocity: J v, shape (6,) [m/s, rad/s]; while a change moves the frame in its
             joint plus ``own_velocity``.
-        own_velocity: What that motion adds to J v, shape (6,).
-        own_acceleration: What it adds to J v' + J' v, shape (6,) [m/s², rad/s²].
+        own_velocity: The part of that motion in the velocity, shape (6,).
+        own_acceleration: Its part of the acceleration, beside J v' + J' v, shape (6,)
+            [m/s², rad/s²].
         drift: The classical acceleration for v' = 0, shape (6,) [m/s², rad/s²]: J' v.
     """
 

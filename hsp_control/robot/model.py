@@ -1,4 +1,4 @@
-"""A robot's model: its sizes and its dynamics, whatever it was loaded from."""
+"""A robot's model: its sizes and its dynamics, independent of its source."""
 
 from collections.abc import Sequence
 from functools import cached_property
@@ -21,7 +21,7 @@ whose contacts change."""
 
 
 class RobotModel(Structure):
-    """A robot's model: what is derived from it for defaults, and its dynamics."""
+    """A robot's model: sizes for defaults, and its dynamics."""
 
     def __init__(
         self, model: pin.Model, name: str, home: Sequence[float] | None = None
@@ -63,7 +63,7 @@ class RobotModel(Structure):
 
     @cached_property
     def largest_gravity(self) -> Array:
-        """What gravity takes of each motor at most, shape (nv,) [N·m or N].
+        """Largest effort against gravity of each motor, shape (nv,) [N·m or N].
 
         It is as if all that a joint carries were stretched level: a bound, which an arm
         does not reach.
@@ -100,7 +100,7 @@ class RobotModel(Structure):
 
         No URDF has one. It is 11 times the largest maximum effort each second, for all
         joints of the same unit, a little less than a Panda may at 87 N·m: a light wrist
-        has to answer a push as quickly as a shoulder. It is 500 times where legs meet
+        has to react to a push as quickly as a shoulder. It is 500 times where legs meet
         the ground.
         """
         effort = self._largest_effort()
@@ -124,9 +124,9 @@ class RobotModel(Structure):
         """The largest force and moment of springs by default [N, N·m]; inf for none.
 
         The force is what the strongest motor holds at half of `size`, the moment half
-        of that motor's effort. Only motors that slide are taken as they are. Without a
-        maximum effort it is what moves the robot's mass as gains of 100 1/s² do at 0.3
-        of its size.
+        of that motor's effort. Of prismatic joints the force is used directly. Without
+        a maximum effort it is what moves the robot's mass as gains of 100 1/s² do at
+        0.3 of its size.
         """
         effort, lever = self._largest_effort(), 0.5 * self.size
         turns = np.array(self.units) == "rad"
@@ -150,7 +150,7 @@ class RobotModel(Structure):
     def largest_inertias(self) -> Array:
         """Largest M_ii in any posture, nearly, shape (nv,) [kg·m² or kg].
 
-        It is the largest of home and 64 postures, drawn once and for all.
+        It is the largest of home and 64 random postures, which are always the same.
         """
         rng, largest = np.random.default_rng(0), np.zeros(self.nv)
         q = self.home()
@@ -173,8 +173,8 @@ class RobotModel(Structure):
     def dynamics(self) -> Dynamics:
         """Return the dynamics with memory of their own, as an argument of calls.
 
-        They are those of the model as it is now: who changes its masses does so before
-        states, controllers and plants are made of it.
+        They are those of the model as it is now: change its masses before states,
+        controllers and plants are made of it.
         """
         return dynamics_of(self.model)
 
@@ -224,7 +224,7 @@ class RobotModel(Structure):
     def bind_forward_dynamics(
         self, q: Array, v: Array, tau: Array, dynamics: Dynamics | None = None
     ) -> Term:
-        """Return `forward_dynamics` for what these arrays hold when it is computed."""
+        """Return `forward_dynamics` of what these arrays hold at its computation."""
         acceleration = np.zeros(self.nv)
         call = PartCall(
             engine.ForwardDynamics,

@@ -1,4 +1,4 @@
-"""The robot of a log: what is written of it, and the robot made of that again."""
+"""The robot of a log: its record, and the robot made from it."""
 
 import logging
 from collections.abc import Mapping
@@ -41,10 +41,10 @@ _log = logging.getLogger(__name__)
 
 
 def robot_record(robot: Robot) -> dict[str, Any]:
-    """Return what a log says of its robot, so that it is there without its files.
+    """Return the record of a robot for a log, from which it is made without its files.
 
     It is the text of each URDF and the arguments of `Robot.load`, or the model itself
-    if there is no such text. Where a robot cannot be written, it says why.
+    if there is no such text. Where a robot cannot be recorded, it gives the reason.
     """
     try:
         description = robot.description
@@ -60,7 +60,7 @@ def robot_record(robot: Robot) -> dict[str, Any]:
 
 
 def usable_record(meta: Mapping[str, Any]) -> Mapping[str, Any] | None:
-    """Return what a log says of its robot; None if that is not enough to make it."""
+    """Return a log's record of its robot; None if that is not enough to make it."""
     robot = meta.get("robot")
     record = robot.get("record") if isinstance(robot, Mapping) else None
     if not isinstance(record, Mapping) or "missing" in record:
@@ -113,7 +113,7 @@ def text_of(source: RobotSource) -> bytes:
 
 
 def _excluded(source: RobotSource) -> frozenset[frozenset[str]]:
-    """Return which links never collide, also those of the SRDF."""
+    """Return the links that never collide, including those of the SRDF."""
     found = set(source.excluded)
     if source.srdf is not None:
         try:
@@ -128,9 +128,9 @@ def _excluded(source: RobotSource) -> frozenset[frozenset[str]]:
 def recorded_robot(record: Any, access: Access = ANYWHERE) -> Robot:
     """Return the robot of a log.
 
-    It is the one that the log was made with: where the file of its URDF says something
-    else today, a warning names it, and so it is with the meshes that the log contains.
-    Others are looked up beside that file, or in the robot's package.
+    It is the one that the log was made with: where the file of its URDF has changed
+    since, a warning names it, as for the meshes that the log contains. Others are
+    looked up beside that file, or in the robot's package.
 
     Args:
         record: What `robot_record` returned.
@@ -239,7 +239,7 @@ def _source(record: Mapping[str, Any], told: OneRobot, access: Access) -> RobotS
 
 
 def _name_what_differs(source: RobotSource, record: Mapping[str, Any]) -> None:
-    """Warn of meshes that have changed since, and of those that nobody has."""
+    """Warn of meshes that have changed since, and of missing ones."""
     changed = [
         name
         for name, recorded in source.meshes

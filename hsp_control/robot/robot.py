@@ -31,11 +31,11 @@ from hsp_control.robot.state import RobotState
 
 
 class Robot(RobotModel):
-    """A robot: its `RobotModel`, where that comes from, and states of it.
+    """A robot: its `RobotModel`, the source of that, and states of it.
 
     Attributes:
         source: Where it was loaded from.
-        description: What `load` was given; None for a robot made otherwise.
+        description: The arguments of `load`; None for a robot made otherwise.
         parts: The robots that it consists of: itself only, unless it was combined.
     """
 
@@ -76,24 +76,24 @@ class Robot(RobotModel):
             name: For example ``"panda"``, ``"talos_arm"``, ``"gen3_description"`` or
                 ``"my_arm/arm.urdf"``; or a whole description, and then nothing else.
             root: How its base is attached to the world: ``fixed``, ``planar``
-                (x, y, yaw) or ``free_flyer``. None: as its source says; ``fixed`` for a
-                file.
-            locked: Joints to lock, name to value [rad or m]. None: as its source says
-                (the bundled Panda locks its fingers); ``{}``: none.
+                (x, y, yaw) or ``free_flyer``. None: as its source defines; ``fixed``
+                for a file.
+            locked: Joints to lock, name to value [rad or m]. None: as its source
+                defines (the bundled Panda locks its fingers); ``{}``: none.
             tool_frames: Frames to add, by name.
             gravity: Acceleration of gravity in the world [m/s²], shape (3,). None:
                 -9.81 along z.
             mimic: Whether ``<mimic>`` joints follow their leader. False: they are
                 independent joints.
-            project_inertias: Whether inertias that no body can have are replaced by the
-                nearest that one can have; mass and centre of mass stay.
+            project_inertias: Whether physically inconsistent inertias are replaced by
+                the nearest consistent ones; mass and centre of mass are kept.
             xacro_args: Arguments of a xacro file, by name.
-            srdf: An SRDF whose disabled pairs of links never collide. None: the one
-                beside the URDF that is called like it, if there is one.
+            srdf: An SRDF whose disabled pairs of links never collide. None: the one of
+                the same name beside the URDF, if there is one.
             motor_inertia: Inertia of the rotors as the joints feel it [kg·m² or kg]:
                 one number, 0 for the bare links, one for each joint, by name, or
-                ``bundled``: what the README of a bundled robot gives. None: what the
-                URDF's transmissions say.
+                ``bundled``: those in the README of a bundled robot. None: those of the
+                URDF's transmissions.
             access: Which files may be read: a URDF given by path, and the meshes that
                 it names. Use `access.only_within` for untrusted files.
 
@@ -143,8 +143,8 @@ class Robot(RobotModel):
         """Return a robot in a compiled MuJoCo model: with the numbers MuJoCo uses.
 
         Bodies and sites are its frames, under their names. Bodies that are not below
-        the root are no part of it; those above the root stand still. What MuJoCo has
-        and the robot lacks, such as a closed loop, is in `source.omitted`, and logged
+        the root are not part of it; those above the root stand still. MuJoCo's features
+        that the robot lacks, such as a closed loop, is in `source.omitted`, and logged
         once as a warning. `MujocoCoordinates` converts states.
 
         Args:
@@ -185,16 +185,16 @@ class Robot(RobotModel):
         """Return the robot of a Pinocchio model, of which it keeps a copy.
 
         ``hsp.Robot.from_pinocchio(*pin.buildModelsFromUrdf(urdf, folders))`` is the
-        robot with its shapes. Without ``collision``, distances see capsules between its
+        robot with its shapes. Without ``collision``, distances use capsules between its
         joints; without ``visual``, the viewer draws its joints and links. YAML can only
         name a robot that `Robot.load` reads.
 
         Args:
             model: The model; gravity, friction and limits are its own. Lock joints with
                 ``pin.buildReducedModel``.
-            collision: What distances see. If it has collision pairs, only their links
-                can collide with one another.
-            visual: What is drawn.
+            collision: The shapes for distances. If it has collision pairs, only their
+                links can collide with one another.
+            visual: The shapes that are drawn.
             home: The home posture, a configuration of shape (nq,); None: see `home`.
             end_effector: The frame of the hand; None: see `end_effector`.
             tool_frames: Frames to add, by name.
@@ -288,12 +288,12 @@ class Robot(RobotModel):
 
     @property
     def end_effector(self) -> str:
-        """The frame of the hand: as the source says, or else the likeliest."""
+        """The frame of the hand: as the source defines, or else the likeliest."""
         return self.hand.frame
 
     @cached_property
     def hand(self) -> Hand:
-        """The frame of the hand, and why it is this one; see `find_hand`."""
+        """The frame of the hand, and the reason for this choice; see `find_hand`."""
         named = self.source.end_effector
         if named is not None and named in self._frame_ids:
             return Hand(named, "the robot's source names it")
@@ -313,7 +313,7 @@ class Robot(RobotModel):
 
 
 def _reader(kind: str) -> Callable[..., tuple[pin.Model, RobotSource]]:
-    """Return what reads a kind of model that a companion knows."""
+    """Return the reader of a kind of model that a companion supports."""
     entry = entry_points("robots").get(kind)
     if entry is None:
         raise ModelError(f"the companion that reads {kind} models is not here")

@@ -2,8 +2,8 @@
 
 The controller gets its kinematics and dynamics from `RobotState`, by calls of the
 engine, which has Pinocchio's algorithms. Other modules call Pinocchio's bindings only
-for what a state does not offer: loading and checks of models, integration, collision
-geometry, and the viewer.
+for tasks that a state does not cover: loading and checks of models, integration,
+collision geometry, and the viewer.
 """
 
 from collections.abc import Callable, Sequence
@@ -60,12 +60,12 @@ class RobotState:
         v: Velocity, shape (nv,).
         time: `t` as an array of shape (1,), for calls.
         stamp_array: `stamp` as an array of shape (1,), for calls.
-        dynamics: What computes the terms, as an argument of calls.
+        dynamics: The dynamics that compute the terms, as an argument of calls.
         world: Placements and Jacobians of all joints, as an argument of calls.
         inertia: M(q) as an argument of calls; see `mass_matrix`.
         inertia_rate: M' as an argument of calls; see `mass_matrix_rate`.
         effects: N as an argument of calls; see `nonlinear_effects`.
-        effort: What `inverse_dynamics` wrote last, shape (nv,) [N·m or N].
+        effort: The last result of `inverse_dynamics`, shape (nv,) [N·m or N].
     """
 
     def __init__(
@@ -148,7 +148,7 @@ class RobotState:
         """Pinocchio's data at (q, v), for terms that this class does not offer.
 
         They have the placements of the joints, and their Jacobians J with the rate, and
-        are nobody else's: nothing here is computed with them.
+        belong to the caller: nothing here is computed with them.
         """
         stamp, model = self.stamp, self.robot.model
         if self._shown_data is None or not _fits(self._shown_data[0], self.world):
@@ -194,8 +194,8 @@ class RobotState:
 
         Args:
             calls: What is called after it, with the time of the state.
-            origin: What the clock of `advance` reads at time 0, shape (1,) [s]; None:
-                it is no clock, but the time of the state.
+            origin: The clock of `advance` at time 0, shape (1,) [s]; None: it is the
+                time of the state.
         """
         jacobians = PartCall(
             engine.JointJacobians,
@@ -250,7 +250,7 @@ class RobotState:
         return found
 
     def move_frame(self, frame: str, motion: LocalMotion) -> None:
-        """Let a frame be elsewhere in its joint than in the model, or move there.
+        """Place a frame elsewhere in its joint than in the model, or let it move there.
 
         Raises:
             FrameNotFoundError: If the robot has no such frame.
@@ -300,7 +300,7 @@ class RobotState:
         return self.effort
 
     def rnea(self, acceleration: Array) -> PartCall:
-        """Return a call that writes `effort` for what this array (nv,) then holds."""
+        """Return a call that writes `effort` for the values of this array (nv,)."""
         return PartCall(
             engine.InverseDynamics,
             **self._at,
@@ -316,11 +316,11 @@ class RobotState:
     def cached(self, part: object, what: str, make: Callable[[], Made]) -> Made:
         """Return what ``make`` returned for a part and this state; it is called once.
 
-        ``what`` tells apart what a class and its subclasses keep.
+        ``what`` distinguishes the memories of a class and its subclasses.
 
-        Parts are values and have no memory. What they compute with at a state, such as
-        buffers and bound calls, is kept here, so that one part may serve many
-        states, in many threads.
+        Parts are values and have no memory. Their memory at a state, such as buffers
+        and bound calls, is kept here, so that one part may serve many states, in many
+        threads.
         """
         key = id(part), what
         found = self._made.get(key)
@@ -389,7 +389,7 @@ class RobotState:
         return RobotState(self.robot, self.dynamics, self._local)
 
     def snapshot(self) -> "RobotState":
-        """Return a state that stays as this one is now; it carries no payload."""
+        """Return a copy of this state, which does not change; it has no payload."""
         other = RobotState(self.robot, None, deepcopy(self._local))
         return other.update(self.t, self.q, self.v)
 
@@ -445,8 +445,8 @@ def as_given(part: object, state: RobotState) -> RobotState:
 class ReadOnlyState(SeenState):
     """A state that cannot be moved, whose arrays cannot be written.
 
-    The plain Python of a part gets it: what it changed would be the robot of the
-    controller that called it, silently.
+    The plain Python of a part gets it: otherwise it would silently change the robot of
+    the controller that called it.
     """
 
     __slots__ = ("_frames_shown",)
@@ -496,7 +496,7 @@ _FIXED = {
 
 
 def _fits(data: pin.Data, world: WorldKinematics) -> bool:
-    """Return whether what Pinocchio computes into data still has its size."""
+    """Return whether the arrays of Pinocchio's data still have their size."""
     sizes = data.J.size, data.dJ.size, len(data.oMi)
     return sizes == (world.jacobian.size,) * 2 + (len(world.placements),)
 

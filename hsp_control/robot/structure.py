@@ -183,9 +183,9 @@ class Structure:
     def position_limits(self) -> tuple[Array, Array]:
         """Return lower and upper joint position limits, shape (nv,) [rad or m].
 
-        They are ±inf where there is no limit: for continuous joints and the root,
-        whatever the model says, and for a joint whose two limits are equal, which
-        means that its URDF gives none.
+        They are ±inf where there is no limit: for continuous joints and the root, also
+        if the model has limits, and for a joint whose two limits are equal, which means
+        that its URDF gives none.
         """
         i = np.flatnonzero(self.dof_indices >= 0)
         lower, upper = np.full(self.nv, -np.inf), np.full(self.nv, np.inf)
@@ -340,7 +340,7 @@ def _slides(joint: Any) -> bool:
 
 
 def _dof_labels(joint: Any) -> tuple[str, ...]:
-    """Return what tells apart a joint's degrees of freedom; of one: an empty text."""
+    """Return suffixes of the names of a joint's degrees of freedom; of one: empty."""
     if joint.nv == 1:
         return ("",)
     if _is_ball(joint):
@@ -352,7 +352,7 @@ def _dof_labels(joint: Any) -> tuple[str, ...]:
 
 
 def _coordinates(joint: Any) -> list[tuple[int, int, int]]:
-    """Return (index in v, start in q, size in q) of each coordinate of its own."""
+    """Return (index in v, start in q, size in q) of each separate coordinate."""
     if joint.nv == 1:
         return [(joint.idx_v, joint.idx_q, joint.nq)]
     if joint.nq != joint.nv:  # a ball, a plane, a root

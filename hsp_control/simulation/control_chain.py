@@ -1,4 +1,4 @@
-"""What one control period computes: estimators, then the plan, then the effort."""
+"""The computation of a control period: estimators, then the plan, then the effort."""
 
 from collections.abc import Mapping, Sequence
 from typing import Generic, Protocol, TypeVar
@@ -45,10 +45,10 @@ class EffortSource(Protocol):
         """
 
     def applied(self, tau: Array, period: float) -> None:
-        """Record the effort, shape (nv,), that the motors really apply."""
+        """Record the effort, shape (nv,), that the motors actually apply."""
 
     def log_channels(self) -> Mapping[str, LogChannel]:
-        """Return what it logs of the last effort besides the controller, by name."""
+        """Return its log of the last effort besides the controller's, by name."""
 
 
 Source_co = TypeVar("Source_co", bound=EffortSource, covariant=True)
@@ -72,7 +72,7 @@ class ControlChain(Generic[Source_co]):
         # whether more is needed of a measurement than q and v
         self.needs_sensors = plan is not None or bool(estimators) or self._feels
         self._estimating: list[RunningEstimator] = []
-        # what runs of the plan; None without one, or before `begin`
+        # the run of the plan; None without one, or before `begin`
         self.plan: RunningPlan | None = None
         self._status = 0.0
 
@@ -82,7 +82,7 @@ class ControlChain(Generic[Source_co]):
         return not (self.needs_sensors or self._estimators)
 
     def begin(self, inertial: Inertial | None, state: RobotState | None = None) -> None:
-        """Begin a run: nothing is remembered of an earlier one.
+        """Begin a run: the memory of an earlier one is cleared.
 
         ``inertial``, a reading of the inertial measurement unit, says where that is. A
         plan starts at ``state``; without one it starts with the first effort.
@@ -109,7 +109,7 @@ class ControlChain(Generic[Source_co]):
         return tau
 
     def log_channels(self, q: Array, v: Array) -> Mapping[str, LogChannel]:
-        """Return what is logged, estimates with their errors from the true q and v."""
+        """Return the values to log, estimates with errors from the true q and v."""
         channels = self.command.log_channels()
         if self.plan is not None:
             channels = {**channels, **self.plan.log_channels()}

@@ -1,4 +1,4 @@
-"""Whether targets can be reached and commanded forces had, as known before a run."""
+"""Whether targets and commanded forces are feasible, as known before a run."""
 
 from collections.abc import Iterable, Iterator, Sequence
 from typing import NamedTuple
@@ -23,12 +23,12 @@ from hsp_control.tasks import CenterOfMass, FramePose, FramePosition, Task
 from hsp_control.tasks.frame_position import axis_indices
 
 _TIMES = 40
-"""At how many times of a run a target is looked at."""
+"""Number of times of a run at which a target is checked."""
 _UNEVEN = 1.1
-"""The times are powers of even ones, so that a target that goes round in a whole part
-of the run is not looked at in one place alone."""
+"""The times are powers of even ones, so that a target whose cycle divides the run is
+not checked in one place alone."""
 _STARTS = 4
-"""From how many random postures inverse kinematics begins where it failed."""
+"""Number of random postures from which inverse kinematics is tried again."""
 _REACHED = 1e-3
 """Distance at which a target is reached [m and rad]."""
 
@@ -39,12 +39,12 @@ class OutOfReach(NamedTuple):
     task: str  # the task's name
     first: float  # the first time at which it is out of reach [s]
     worst: float  # the time at which it is farthest [s]
-    distance: float  # how far from the nearest place it is then [m]
+    distance: float  # its distance from the nearest place then [m]
     turned: bool  # whether the position alone could be reached
 
     @property
     def message(self) -> str:
-        """What a user should know."""
+        """The warning."""
         when = f"from t = {self.first:.3g} s"
         if self.first == self.worst == 0.0:
             when = "at the start"
@@ -72,8 +72,8 @@ def not_followed(
     """Yield the tasks whose targets leave the reach, or are too fast, during a run.
 
     By inverse kinematics of each frame by itself, within position limits, for targets
-    known before the run; of a robot with a floating base whose contacts stay where they
-    are, whatever its balance asks. Speeds are looked at where the base does not move.
+    known before the run; of a robot with a floating base whose contacts do not move,
+    regardless of its balance. Speeds are checked where the base does not move.
     """
     held = _held(robot, contacts, q0)
     if robot.unactuated and not held:
@@ -113,12 +113,12 @@ def _held(robot: Robot, contacts: Sequence[Contact], q0: Array) -> list[Target]:
 
 
 class _Search(NamedTuple):
-    """Looks for postures in which a robot reaches its targets."""
+    """Searches postures in which a robot reaches its targets."""
 
     robot: Robot
     q0: Array
     duration: float  # of the run [s]
-    held: Sequence[Target]  # what stays where it is
+    held: Sequence[Target]  # frames that do not move
     lower: Array  # lower joint position limit, shape (nv,) [rad or m]
     upper: Array  # upper joint position limit, shape (nv,) [rad or m]
 
@@ -190,7 +190,8 @@ def too_weak(robot: Robot, q: Array, limits: Array) -> Iterator[tuple[str, str]]
         unit = "N·m" if robot.units[k] == "rad" else "N"
         yield (
             f"joint {robot.dof_names[k]!r}",
-            f"gravity asks {static[k]:.3g} {unit} of it, its limit is {limits[k]:.3g}",
+            f"gravity requires {static[k]:.3g} {unit} of it, its limit is "
+            f"{limits[k]:.3g}",
         )
 
 
@@ -198,7 +199,7 @@ def too_weak(robot: Robot, q: Array, limits: Array) -> Iterator[tuple[str, str]]
 
 
 _LOOKS = 41
-"""At how many times of a run commands are looked at."""
+"""Number of times of a run at which commands are checked."""
 _KEPT = 0.99
 """Share of a command from which on it is kept."""
 
@@ -206,9 +207,9 @@ _KEPT = 0.99
 def missed_forces(
     controller: Controller, q0: Array, duration: float, push_off: float = 0.0
 ) -> Iterator[str]:
-    """Yield what there is to say of commanded forces that will be missed.
+    """Yield warnings of commanded forces that will be missed.
 
-    A force that the robot cannot have at rest: within efforts, friction and balance, in
+    A force that is infeasible at rest, within efforts, friction and balance, in
     the posture of the start, with its centre of mass where a task moves it. And a slide
     that the plant's surface pushes off (`PlantPart.push_off`). ``controller`` is not
     changed.
@@ -216,7 +217,7 @@ def missed_forces(
     if all(contact.force is None for contact in controller.contacts):
         return
     controller, rest = controller.preview(), np.zeros(controller.robot.nv)
-    least: dict[str, tuple[float, str]] = {}  # share of a command and what to say of it
+    least: dict[str, tuple[float, str]] = {}  # share of a command and its warning
     for t in map(float, np.linspace(0.0, duration, _LOOKS)):
         controller.compute(t, q0, rest)  # what is commanded then
         support = controller.active_stack.support

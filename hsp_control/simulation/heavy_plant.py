@@ -1,4 +1,4 @@
-"""Simulated robots that are too heavy for their motors, and what would not be."""
+"""Simulated robots that are too heavy for their motors, and feasible values."""
 
 from collections.abc import Iterator
 from dataclasses import replace
@@ -18,10 +18,11 @@ SLOW = 10.0
 
 
 def heavy_plant(plant: PlantPart, robot: Robot, q: Array) -> Iterator[str]:
-    """Yield which field of a plant makes it too heavy for the motors, and what is not.
+    """Yield fields of a plant that are too heavy for the motors, and feasible values.
 
-    Too heavy is what gravity asks at a configuration, and inertia with which a motor
-    takes `SLOW` to reach its speed limit. Only motors with limits are looked at.
+    Too heavy are an effort against gravity at a configuration, and an inertia with
+    which a motor takes `SLOW` to reach its speed limit. Only motors with limits are
+    checked.
     """
     if robot.unactuated:
         return
@@ -45,7 +46,7 @@ def heavy_plant(plant: PlantPart, robot: Robot, q: Array) -> Iterator[str]:
 def _too_heavy(
     plant: PlantPart, field: str, before: Robot, after: Robot, q: Array
 ) -> str:
-    """Return which joint gravity overloads most, and what its motor could hold."""
+    """Return the joint that gravity overloads most, and the load that it can hold."""
     if field == "motor_inertia":
         return ""
     limit, had, has = after.model.effortLimit, _gravity(before, q), _gravity(after, q)
@@ -53,8 +54,9 @@ def _too_heavy(
     if (np.abs(had) > limit).any() or not (np.abs(has) > limit).any():
         return ""
     j = int(np.argmax(np.abs(has) / limit))
-    asks = f"gravity asks {abs(has[j]):.3g} {_unit(after, j)} of {after.dof_names[j]!r}"
-    start = f"{asks} at the start, its limit is {limit[j]:.3g}"
+    unit, name = _unit(after, j), after.dof_names[j]
+    requires = f"gravity requires {abs(has[j]):.3g} {unit} of {name!r}"
+    start = f"{requires} at the start, its limit is {limit[j]:.3g}"
     if field == "payload" and plant.payload is not None:
         mass, change = plant.payload.mass, has - had
         room = np.where(change > 0.0, limit - had, limit + had)
@@ -68,7 +70,7 @@ def _too_heavy(
 def _too_slow(
     plant: PlantPart, field: str, before: Robot, after: Robot, q: Array
 ) -> str:
-    """Return which joint takes longest to reach its speed, and what would do."""
+    """Return the joint that takes longest to reach its speed, and a feasible value."""
     if field == "payload":
         return ""
     effort, speed = after.model.effortLimit, after.model.velocityLimit

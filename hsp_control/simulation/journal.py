@@ -57,7 +57,7 @@ _writers: "WeakSet[JournalWriter]" = WeakSet()
 
 
 class JournalWriter:
-    """Writes a journal; nobody else can meanwhile, until it is closed or forgotten."""
+    """Writes a journal; no other writer can, until it is closed or deleted."""
 
     def __init__(self, path: Path, resumed: "JournalReader | None" = None) -> None:
         """Begin a journal, or go on after what a reader of it has read.
@@ -127,11 +127,11 @@ class JournalWriter:
             _writers.discard(self)
 
     def __del__(self) -> None:
-        """Close the file of a writer that nobody has closed."""
+        """Close the file of a writer that was not closed."""
         self.close()
 
     def _frame(self, kind: bytes, payload: bytes) -> None:
-        """Write a frame, whole or not at all: what cuts it short takes it back."""
+        """Write a frame, whole or not at all: an incomplete one is removed."""
         check = zlib.crc32(payload, zlib.crc32(kind))
         data = _FRAME.pack(kind, len(payload), check) + payload
         try:

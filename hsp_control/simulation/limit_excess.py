@@ -1,4 +1,4 @@
-"""How far a robot is beyond its limits, whatever the law says of them."""
+"""The excess of a robot beyond its limits, independent of the law's status."""
 
 from typing import Any
 
@@ -17,11 +17,11 @@ BEYOND_SPEED = "beyond the speed limit, most since the row before"
 
 
 class LimitExcess:
-    """The farthest that each joint was beyond its limits since that was last taken.
+    """The largest excess of each joint beyond its limits since it was last read.
 
-    The law keeps limits for its model, and `Status` says so much. A push that the model
-    does not know, or a plant that differs, can take a joint beyond them: only the state
-    tells. It is seen once a control period, so that no row of a log misses it.
+    The law keeps limits for its model, and `Status` reports that. An unknown push, or a
+    plant that differs, can take a joint beyond them: only the state shows it. It is
+    checked once a control period, so that no row of a log misses it.
     """
 
     def __init__(self, robot: Robot) -> None:

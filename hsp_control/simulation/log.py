@@ -1,4 +1,4 @@
-"""What the summaries of a run need of its log: `Rollout` is one."""
+"""The interface of a log for the summaries of a run: `Rollout` is one."""
 
 from typing import Any, Protocol
 

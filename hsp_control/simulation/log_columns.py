@@ -1,4 +1,4 @@
-"""The columns of a log: what is written of tasks, fields and contacts in each row."""
+"""The columns of a log: values of tasks, fields and contacts in each row."""
 
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
@@ -124,11 +124,11 @@ STREAM_CHANNELS = {
     "late": "of these, messages that came too late to count",
     "rejected": "invalid messages",
 }
-"""What is logged of a stream; see `StreamRun.counts`."""
+"""The columns of a stream; see `StreamRun.counts`."""
 
 
 class TaskColumns:
-    """The columns of all tasks of a run; a task that is removed keeps its own."""
+    """The columns of all tasks of a run; those of a removed task are kept."""
 
     def __init__(self, controller: Controller, columns: LogColumns) -> None:
         self._controller, self._columns = controller, columns
@@ -164,7 +164,7 @@ class TaskColumns:
                 self._add(name, task, len(task.measure(probe.read_only)[0]))
 
     def _log_name(self, task: Task) -> str:
-        """Return the name in the log of a task that comes."""
+        """Return the name in the log of a new task."""
         # It goes on with the columns of one that has gone, if they are the same.
         name, k, taken = task.name, 2, {*self._names.values()}
         while name in taken or (
@@ -183,7 +183,7 @@ class TaskColumns:
         column(f"{prefix}.error", (m,), unit, f"error e: {what}")
         column(f"{prefix}.error_rate", (m,), rate_unit, "error rate e'")
         column(f"{prefix}.bounded", (), unit, "length of an error that counts for less")
-        # To look for streams in every row would cost more than the row.
+        # To search for streams in every row would cost more than the row.
         self._streams[name] = list(_streams_of(task, name))
         for stream, _ in self._streams[name]:
             for what, meaning in STREAM_CHANNELS.items():
@@ -206,7 +206,7 @@ class TaskColumns:
                     row[f"{prefix}.{what}"][...] = value
 
     def write_law(self, active: ActiveStack, output: ControlOutput) -> None:
-        """Write what counts of the active tasks: far targets, and stiffnesses."""
+        """Write errors beyond the largest, and stiffnesses, of the active tasks."""
         row, away = self._columns.row, output.bounded
         for each in active.placed:
             prefix = f"task.{self._names[each.planned.key]}"
@@ -216,14 +216,14 @@ class TaskColumns:
                 row[f"{prefix}.stiffness"][:] = np.diag(stiffness)
 
     def sources(self, active: ActiveStack, law: Record) -> Sources:
-        """Yield what the law writes of the active tasks."""
+        """Yield the law's arrays of the active tasks."""
         for each in active.placed:
             prefix = f"task.{self._names[each.planned.key]}"
             yield f"{prefix}.error", law.task.error[each.rows]
             yield f"{prefix}.error_rate", law.task.error_rate[each.rows]
 
     def meta(self) -> dict[str, Any]:
-        """Return what the log says of all tasks that there have been, as JSON data."""
+        """Return the log's description of all tasks of the run, as JSON data."""
         return {
             name: {**task_meta(task), "level": self._levels[name]}
             for name, task in self.logged.items()
@@ -231,7 +231,7 @@ class TaskColumns:
 
 
 def task_meta(task: Task) -> dict[str, Any]:
-    """Return what a log says of a task."""
+    """Return the log's description of a task."""
     return {
         "type": type(task).__name__,
         "rows": task.rows,
@@ -243,7 +243,7 @@ def task_meta(task: Task) -> dict[str, Any]:
 
 
 def _present_state(controller: Controller) -> RobotState:
-    """Return a state at the present time: streams would go on to any later one."""
+    """Return a state at the present time: streams would advance to any later one."""
     robot = controller.robot
     return robot.state(controller.state.t, robot.neutral(), np.zeros(robot.nv))
 
@@ -289,7 +289,7 @@ class TermColumns:
             row[name][...] = term.minimum_distance(state.read_only)
 
     def sources(self, active: ActiveStack) -> Sources:
-        """Yield what the law writes of the terms."""
+        """Yield the law's arrays of the terms."""
         for name, sample in zip(self._terms, active.term_samples, strict=True):
             yield f"field.{name}.g", sample.g
 
@@ -305,7 +305,7 @@ def logged_terms(controller: Controller) -> dict[str, NullSpaceField]:
 
 
 class BarrierColumns:
-    """The columns of the barriers that limits keep; those that go keep theirs."""
+    """The columns of the limits' barriers; those of removed ones are kept."""
 
     def __init__(self, controller: Controller, columns: LogColumns) -> None:
         self._controller, self._columns = controller, columns
@@ -396,7 +396,7 @@ class ContactColumns:
 
 
 def write_channels(columns: LogColumns, channels: Mapping[str, LogChannel]) -> None:
-    """Write what the parts of a run report; a new name is a new column."""
+    """Write the values that the parts of a run report; a new name is a new column."""
     for name, channel in channels.items():
         if name not in columns.row:
             shape = np.shape(channel.value)

@@ -1,4 +1,4 @@
-"""What the columns of a log must be, so that all who read them can rely on it."""
+"""The required form of a log's columns, on which all readers can rely."""
 
 from collections.abc import Iterator, Mapping
 from typing import Any

@@ -88,7 +88,7 @@ class LogWriter:
         self._streams: dict[int, StreamRun] = {}
         self._law: Record | None = None  # of the present row
         self._active: ActiveStack | None = None  # what `_sources` are of
-        self._sources: list[tuple[str, Array]] = []  # what the law writes for columns
+        self._sources: list[tuple[str, Array]] = []  # the law's arrays for columns
         robot, column = controller.robot, columns.add
         nv, units = robot.nv, dict.fromkeys(robot.units)
         joint_unit = " or ".join(units)
@@ -198,7 +198,7 @@ class LogWriter:
         columns.keep_row()
 
     def warm_up(self, *row: Any) -> None:
-        """Do all for a row but write it; the heading is written."""
+        """Do everything for a row except writing it; the heading is written."""
         self.record(*row, keep=False)
 
     def _fill_law(self, state: RobotState, output: ControlOutput) -> None:
@@ -230,7 +230,7 @@ class LogWriter:
     def _find_sources(
         self, active: ActiveStack, law: Record
     ) -> list[tuple[str, Array]]:
-        """Return what the law writes for each column."""
+        """Return the law's array for each column."""
         return [
             ("acceleration", law.acceleration),
             ("field.g", law.field.g),
@@ -324,7 +324,7 @@ class LogWriter:
         }
 
     def _keep_messages(self) -> None:
-        """Keep changes, which a controller forgets; let streams record all they take.
+        """Keep changes, which a controller discards; let streams record all messages.
 
         A log repeats both.
         """
@@ -354,7 +354,7 @@ class LogWriter:
         return {"changes": changes}
 
     def _repeated(self, change: Change) -> Change:
-        """Return a change whose streams repeat what they took."""
+        """Return a change whose streams repeat their messages."""
 
         def declared(stream: Streamed) -> Streamed:
             return self._streams[id(stream)].repeated()
@@ -367,7 +367,7 @@ class LogWriter:
         return made
 
     def _came_during_run(self) -> dict[str, Any]:
-        """Return changes that were made, and what streams have taken, as JSON data.
+        """Return changes that were made, and the streams' messages, as JSON data.
 
         With them, a run can be repeated from its log.
         """
@@ -395,7 +395,7 @@ def _meshes_of(scene: Scene) -> dict[str, Any]:
 
 
 def _obstacle_meta(obstacle: Obstacle) -> dict[str, Any]:
-    """Return what a log says of an obstacle."""
+    """Return the log's description of an obstacle."""
     radius = obstacle.shape.bounding_radius
     return {
         "shape": type(obstacle.shape).__name__,

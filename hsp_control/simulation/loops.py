@@ -114,7 +114,7 @@ def sampled_loop(
 def _native_loop(
     chain: ControlChain[Command], plant: SampledPlant, excess: LimitExcess
 ) -> "NativeLoop | None":
-    """Return what moves on many periods at once; None where each must be made alone."""
+    """Return the loop of many periods at once; None where each must be made alone."""
     command = chain.command
     bare = chain.is_bare and type(command) is Command and not command.stages
     if not bare or type(plant) is not IntegratedPlant:  # not a subclass of either

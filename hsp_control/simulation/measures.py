@@ -1,4 +1,4 @@
-"""What a log says of a run: errors, forces, units, and the numbers that sum it up."""
+"""Measures of a run from its log: errors, forces, units, and summary numbers."""
 
 from collections.abc import Iterator, Mapping
 from typing import Any, NamedTuple
@@ -75,9 +75,9 @@ def effort_unit(rollout: Log) -> str:
 
 
 def rows_compare(rollout: Log) -> bool:
-    """Return whether the tasks' rows are as many all the time.
+    """Return whether the number of the tasks' rows is constant.
 
-    Between determinants of different sizes there is nothing to compare.
+    Determinants of different sizes cannot be compared.
     """
     sizes = np.isfinite(rollout["singular_values"]).sum(axis=1)
     return len(np.unique(sizes)) == 1
@@ -104,15 +104,15 @@ def column_unit(rollout: Log, name: str) -> str:
 # --- targets that are far away or out of reach ---------------------------------------
 
 PULL_COLUMN, PULLED = "pull.force", 1.0
-"""Column of the force by which somebody pulls at a link, and what counts of it [N]."""
+"""Column of the force on a pulled link, and the least that is reported [N]."""
 FAR, OUT = "target far away", "target out of reach"
 """Their words in every summary."""
 REACHED = 0.01
-"""An error up to this length is not spoken of [m, rad or N]."""
+"""An error up to this length is not reported [m, rad or N]."""
 RESTING = 0.1
 """An error rests if it changes by less than this share of itself in a second [1/s]."""
 STAYS = 0.3
-"""Time that it has to rest: a step begins at rest, too [s]."""
+"""Duration of that: a step begins at rest, too [s]."""
 LIMITED = 2  # the log's status from which on a limit changes the motion
 
 
@@ -129,11 +129,11 @@ class Unreached(NamedTuple):
     unit: NDArray[np.object_]  # of each number of ``out``, shape (N,)
 
     def length(self, row: int) -> str:
-        """Return the error that stays in a row."""
+        """Return the error that remains in a row."""
         return f"{self.out[row]:.2f} {self.unit[row]}"
 
     def words(self, row: int) -> str:
-        """Return what there is to say of a row; nothing if it is on the way there."""
+        """Return a row's message; empty if the hand is still moving there."""
         if self.out[row] > 0.0:
             return f"{OUT}, {self.length(row)}"
         return FAR if self.far[row] else ""
@@ -146,9 +146,9 @@ def unreached(
 ) -> Iterator[Unreached]:
     """Yield the tasks of a log, with the rows in which they do not reach their targets.
 
-    A target is out of reach, of this robot within its limits, if an error stays that
-    the law would remove: it rests, and the law is damped at a singularity or a limit
-    binds. What friction or a load leaves, where the law is exact, is not meant; nor is
+    A target is out of reach, of this robot within its limits, if an error remains that
+    the law would remove: it rests, and the law is damped at a singularity or a limit is
+    active. An error of friction or a load, where the law is exact, is not meant; nor is
     a target that moves on while the robot follows as near as it can. ``moved``, when
     each part of an error moved last [s], is kept from these rows to the next ones.
     """
@@ -175,7 +175,7 @@ def unreached(
             moved[key] = float(since[-1])
             here = rests & (times - since >= STAYS) & (out == 0.0)
             out[here], units[here] = length[here], unit
-        # A log that says little has no such column.
+        # A log with few columns lacks this one.
         far = columns.get(f"task.{task}.bounded", none) > 0.0
         yield Unreached(task, far & (out == 0.0), out, units)
 
@@ -184,12 +184,12 @@ def unreached(
 
 
 class ForceKept(NamedTuple):
-    """What becomes of a contact's commanded force, in the rows that command one."""
+    """How a contact's commanded force is tracked, in the rows that command one."""
 
     contact: str  # its name
     wanted: Array  # the commanded normal force, without feedback, shape (n,) [N]
     planned: Array  # the planned one, likewise
-    actual: Array  # what the plant says of it, or else the planned one, shape (n,) [N]
+    actual: Array  # the plant's force, or else the planned one, shape (n,) [N]
     lost: int  # in how many rows nothing is touched any more
 
 

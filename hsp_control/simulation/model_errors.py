@@ -1,7 +1,7 @@
 """Which errors of its model a loop tolerates, linearised about a posture.
 
 The loop of the whole robot (`linear_loop.py: LoadedLoop`) with other masses, rotors,
-delays and lags: its growing modes, and what an unknown effort does to the tasks.
+delays and lags: its growing modes, and the effect of an unknown effort on the tasks.
 """
 
 from collections.abc import Callable, Sequence
@@ -31,7 +31,7 @@ from hsp_control.simulation.plants.model_changes import (
 )
 
 ERROR = 0.2
-"""Relative error of masses and inertias that the loop is to tolerate [-]."""
+"""Relative error of masses and inertias that the loop shall tolerate [-]."""
 _BODIES: Sequence[tuple[Inertias, int]] = [
     (Inertias(mass_factor=1.0 + ERROR), 0),
     (Inertias(mass_factor=1.0 - ERROR), 0),
@@ -45,10 +45,10 @@ _LONGEST = 0.05
 _LARGEST_ROTOR = 10.0
 """Largest inertia of a rotor that is tried [kg·m²]."""
 USUAL_ROTOR = 0.05
-"""What the joint of a light wrist feels of its motor: a rotor of 5e-6 kg·m² behind a
+"""Inertia of a light wrist's motor at its joint: a rotor of 5e-6 kg·m² behind a
 gear of 100 [kg·m²]."""
 _STEP_RESPONSE = 0.5
-"""How long the response to an effort is followed [s]."""
+"""Duration of the response to an effort that is computed [s]."""
 
 
 class _HiddenRotors(ModelChange):
@@ -60,7 +60,7 @@ class _HiddenRotors(ModelChange):
 
 
 class Moved(NamedTuple):
-    """How far one part of a task moves for 1 N·m, or N, that the model lacks."""
+    """Displacement of one part of a task by an unmodelled effort of 1 N·m, or N."""
 
     task: str
     part: str  # such as ``position``
@@ -70,7 +70,7 @@ class Moved(NamedTuple):
 
 
 class ModelErrors(NamedTuple):
-    """What the loop tolerates at a posture; rates and times are of the linear loop."""
+    """The model errors that the loop tolerates at a posture, from the linear loop."""
 
     moved: tuple[Moved, ...]  # of the tasks
     joints: tuple[str, ...]  # the degrees of freedom
@@ -97,7 +97,7 @@ def model_errors(
     sensor_delay: int = 0,
     effort_lag: float = 0.0,
 ) -> ModelErrors | None:
-    """Return what the loop tolerates at a posture.
+    """Return the model errors that the loop tolerates at a posture.
 
     None for a floating base and contacts, where the law is damped, and where nothing
     controls the null space.
@@ -106,7 +106,7 @@ def model_errors(
         controller: The controller.
         q: The posture, shape (nq,).
         period: The control period [s].
-        compensation: The compensators; ``auto`` is what it is on a real robot.
+        compensation: The compensators; ``auto`` as on a real robot.
         effort_delay: Delay of the efforts that is known [control periods].
         sensor_delay: Delay of the measurements that is known [control periods].
         effort_lag: Time constant of the drives that is known [s].
@@ -158,7 +158,7 @@ def model_errors(
 
 
 def lines(found: ModelErrors) -> dict[str, str]:
-    """Return what the loop tolerates in words, by what it is about."""
+    """Return the tolerated model errors in words, by their kind."""
     texts: dict[str, str] = {}
     for each in found.moved:
         scale, unit = (1e3, "mm") if each.unit == "m" else (180.0 / np.pi, "°")

@@ -1,9 +1,9 @@
 """Many control periods of a simulation as one native call.
 
-Between two rows of a log nothing of a period is looked at, and in Python a period costs
-more than its law and its dynamics. So they are left to a compiled loop, as long as no
-limit is violated and nothing comes from outside. It makes the calls that a single
-period makes, by their addresses: the motion is the same, to the last bit.
+Between two rows of a log nothing of a period is recorded, and in Python a period costs
+more than its law and its dynamics. So a compiled loop runs them, as long as no limit is
+violated and there is no input from outside. It makes the calls that a single period
+makes, by their addresses: the motion is the same, to the last bit.
 """
 
 from functools import partial
@@ -22,7 +22,7 @@ from hsp_control.simulation.limit_excess import LimitExcess
 from hsp_control.simulation.plants import IntegratedPlant
 
 MOST = 100
-"""Most periods of one call: then Ctrl-C is noticed, and other threads go on."""
+"""Most periods of one call: then Ctrl-C is noticed, and other threads run."""
 
 
 class _Timing(NamedTuple):

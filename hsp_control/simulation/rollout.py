@@ -32,7 +32,7 @@ _UNREADABLE = (
     OSError, ValueError, EOFError, KeyError, NotImplementedError,
     zipfile.BadZipFile, zlib.error, RecursionError, MemoryError, TypeError,
 )  # fmt: skip
-"""What a file raises that is cut, spoilt or something else."""
+"""The errors of a file that is truncated, damaged or something else."""
 
 
 class Rollout:

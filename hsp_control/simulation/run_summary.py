@@ -1,4 +1,4 @@
-"""What a run did, in words: its tasks, what limits did to it, where it was damped."""
+"""The summary of a run in words: its tasks, active limits, damped steps."""
 
 from collections.abc import Iterator, Mapping
 
@@ -23,13 +23,13 @@ from hsp_control.simulation.measures import (
 )
 
 LOST, STILL = 0.5, 0.05
-"""Share of a field, and a speed [rad/s or m/s], from which on limits keep it off."""
+"""Share of a field, and a speed [rad/s or m/s], above which limits prevent it."""
 GIVEN_UP = 0.01
-"""Share of a commanded force from which on its plan does not keep it."""
+"""Share of a commanded force above which its plan misses it."""
 
 
 def summary_rows(rollout: Log) -> Iterator[tuple[str, str]]:
-    """Yield what a run did, as rows of a table: a name and a text.
+    """Yield the summary of a run, as rows of a table: a name and a text.
 
     An empty name continues the row before.
     """
@@ -86,7 +86,7 @@ def damped_rows(rollout: Log) -> int:
 
 
 def damped_words(rollout: Log) -> str:
-    """Return what to say of a run that was damped most of the time; else nothing."""
+    """Return the warning of a run that was damped most of the time; else nothing."""
     rows = damped_rows(rollout)
     if 2 * rows <= len(rollout):
         return ""
@@ -142,7 +142,7 @@ def beyond_limits(rollout: Log) -> str:
 
 
 def force_rows(rollout: Log) -> Iterator[tuple[str, str]]:
-    """Yield what became of commanded forces, as rows of the table."""
+    """Yield the tracking of commanded forces, as rows of the table."""
     for contact, wanted, planned, actual, lost in forces_kept(rollout):
         missed = np.sqrt(np.mean((actual - wanted) ** 2))
         text = f"{actual[-1]:.3g} of {wanted[-1]:.3g} N at the end, "
@@ -156,7 +156,7 @@ def force_rows(rollout: Log) -> Iterator[tuple[str, str]]:
 
 
 def unexplained_rows(rollout: Log) -> Iterator[str]:
-    """Yield what an observer found that the model does not explain, one sentence."""
+    """Yield the effort that an observer finds unexplained, one sentence."""
     found = rollout.columns.get("observer.disturbance")
     if found is None:
         return

@@ -52,7 +52,7 @@ from hsp_control.simulation.rollout import Rollout
 from hsp_control.simulation.run_summary import damped_words
 
 LOG_PERIOD = 0.01
-"""Time between two rows where nothing else is said [s]."""
+"""Time between two rows by default [s]."""
 MAX_ROWS = 10_000_000
 """Most rows of a log; see also `log_columns.MAX_SIZE`."""
 MAX_STEPS = 1e9
@@ -99,13 +99,13 @@ def simulate(
             controller's robot, or one that was built; None: rigid bodies, the
             controller's own model. A sampled plant has its own integrator, and needs a
             control period.
-        compensation: Compensators for what the model lacks; they need a control
-            period. None: a momentum observer, where the plant is not the controller's
-            own model (`Compensation.momentum_observer`).
-        plan: What writes references and switches contacts; the controller is made of
-            its `Plan.parts`. It needs a control period.
-        estimators: What completes each measurement, for the plan and the controller;
-            they need a control period.
+        compensation: Compensators for model errors; they need a control period. None: a
+            momentum observer, where the plant is not the controller's own model
+            (`Compensation.momentum_observer`).
+        plan: The plan that writes references and switches contacts; the controller is
+            made of its `Plan.parts`. It needs a control period.
+        estimators: Estimators that complete each measurement, for the plan and the
+            controller; they need a control period.
         scene: Obstacles to log; None: those of the controller.
         check_rate: Whether gains, impedances and fields with which the loop would be
             unstable at its control period are refused, and high ones warned about.
@@ -249,7 +249,7 @@ def simulate(
 
 
 class RunWarning(RuntimeWarning):
-    """A run was not what the law promises, most of the time."""
+    """A run was not exact most of the time."""
 
 
 def _no_period(who_needs: str) -> SimulationError:
@@ -262,8 +262,8 @@ def default_integrator(
     """Return the integrator where none is given.
 
     Rigid bodies under efforts that are held move so smoothly that `Rk4`, in steps of at
-    most 1 ms, differs from `Dop853` by 1e-11 rad, in a tenth of the time. All else, and
-    what has no control period, is integrated by `Dop853`.
+    most 1 ms, differs from `Dop853` by 1e-11 rad, in a tenth of the time. Everything
+    else, and runs without a control period, are integrated by `Dop853`.
     """
     rigid = plant is None or type(plant) in (RigidBody, RigidBodyPlant)
     return Rk4() if rigid and control_period is not None else Dop853()

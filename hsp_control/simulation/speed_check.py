@@ -11,7 +11,7 @@ from hsp_control.tasks import FramePose, FramePosition
 from hsp_control.tasks.frame_position import axis_indices
 
 _FAST = 1.01
-"""Share of its largest speed above which a joint counts as too slow."""
+"""Share of its largest speed above which a joint is too slow."""
 
 
 class Passed(NamedTuple):
@@ -23,18 +23,18 @@ class Passed(NamedTuple):
 
 
 class TooFast(NamedTuple):
-    """A task whose reference asks for more than the speeds of joints."""
+    """A task whose reference exceeds the speeds of joints."""
 
     task: str  # the task's name
-    t: float  # the time at which it asks for most [s]
+    t: float  # the time at which it exceeds them most [s]
     speed: float  # of the reference then [m/s, or rad/s]
     unit: str
-    share: float  # what the joint needs beside its limit
+    share: float  # the speed that the joint needs over its limit
     joint: str
 
     @property
     def message(self) -> str:
-        """What a user should know."""
+        """The warning."""
         return (
             f"task {self.task!r}: its reference moves at {self.speed:.3g} {self.unit} "
             f"at t = {self.t:.3g} s, for which {self.joint!r} would need "
@@ -49,7 +49,7 @@ def too_fast(
     passed: Sequence[Passed],
     limit: Array,
 ) -> TooFast | None:
-    """Return where a reference is fastest, beside what joints give, if it is too fast.
+    """Return where a reference is fastest, relative to the joints, if it is too fast.
 
     The least share max |v_i|/limit_i with which J v is the reference's rate, in each of
     the postures: one with another self-motion may need less.
@@ -91,7 +91,7 @@ def _share(
     scaled = J * limited  # of shares v/limit
     least = np.linalg.pinv(scaled, rcond=1e-9) @ rate
     if np.linalg.norm(scaled @ least - rate) > 1e-6 * np.linalg.norm(rate):
-        return 0.0, 0  # singular: that is said by others
+        return 0.0, 0  # singular: reported elsewhere
     if np.abs(least).max() <= _FAST:
         return float(np.abs(least).max()), int(np.abs(least).argmax())
     from scipy.optimize import linprog  # here: SciPy takes long to import

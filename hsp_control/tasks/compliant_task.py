@@ -47,8 +47,8 @@ class CompliantTask(SecondOrderTask):
     _: KW_ONLY
     impedance: Impedance | None = None
     """Stiffness and damping of the rows [N/m and N·s/m, or N·m/rad and N·m·s/rad],
-    instead of `gains`; none by default. Its spring has a largest force of its own, and
-    fades by itself where the hand cannot move: `largest_error` does not count."""
+    instead of `gains`; none by default. Its spring has its own largest force, and fades
+    where the hand cannot move: `largest_error` is ignored."""
 
     def __post_init__(self) -> None:
         """Check that there are not both gains and an impedance."""
@@ -130,7 +130,7 @@ class CompliantTask(SecondOrderTask):
         return self._at(state, numbers)
 
     def _at(self, state: RobotState, numbers: Array) -> Feedback:
-        """Return Kp and Kv of the numbers of an impedance at a state."""
+        """Return Kp and Kv of an impedance at a state."""
 
         def make() -> tuple[InForce, PartCalls]:
             mobility = np.zeros((self.rows, self.rows))

@@ -52,10 +52,10 @@ def _packed(x: ArrayLike) -> Array:
 
 
 class InForce(NamedTuple):
-    """What a task's feedback is made of while it runs: the controller owns it."""
+    """The arrays of a task's feedback while it runs; the controller owns them."""
 
-    # What changes change: Kp and Kv, (2, m, m), or what another kind of feedback is
-    # made of.
+    # Parameters that change at run time: Kp and Kv, (2, m, m), or those of another kind
+    # of feedback.
     numbers: Array
     feedback: Feedback  # what the task reads
     # Λ⁻¹ in the coordinates of the error, (m, m), of the last step; only of a task with
@@ -80,7 +80,7 @@ class ErrorPart(NamedTuple):
 
     @property
     def yields(self) -> float:
-        """By how much L is less for it; see `hsp_control.edge.threshold`."""
+        """The factor by which L is less for it; see `hsp_control.edge.threshold`."""
         return 1.0 if self.unit == "rad" else max(WHOLE + 1.0 - self.size, 1.0)
 
 

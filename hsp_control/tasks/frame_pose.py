@@ -143,8 +143,8 @@ class FramePose(FrameTask, PoseTask, CompliantTask, type="frame_pose"):
     errors are decoupled and exactly linear, and the origin returns on a straight line.
     With the logarithm on SE(3) it would return on a screw (docs/law.md).
 
-    Python may give what is held as it is: ``FramePose("hand", pin.SE3(...))``, or x, y,
-    z and a quaternion (x, y, z, w), or x, y, z.
+    In Python a pose that is held may be given directly: ``FramePose("hand",
+    pin.SE3(...))``, or x, y, z and a quaternion (x, y, z, w), or x, y, z.
     """
 
     drawn: ClassVar[tuple[Drawn, ...]] = ("position", "orientation")

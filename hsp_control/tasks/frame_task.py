@@ -1,4 +1,4 @@
-"""Base classes of tasks that follow a trajectory, or track a frame; its placing."""
+"""Base classes of tasks that follow a trajectory, or track a frame."""
 
 from abc import abstractmethod
 from dataclasses import KW_ONLY, replace

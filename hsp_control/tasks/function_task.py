@@ -28,8 +28,8 @@ class FunctionTask(TrackingTask, type="function_task"):
     the error equation e'' + Kv e' + Kp e = 0 is J a + J'v = a_x with
     a_x = x_d'' - (∂y/∂t)' + Kv e' + Kp e + offset.
 
-    What is not given is taken by fourth-order differences, of which J' has an error of
-    about 1e-9 and needs 16 nv evaluations of the function. YAML gives the names of
+    What is not given is computed by fourth-order differences; that of J' has an error
+    of about 1e-9 and needs 16 nv evaluations of the function. YAML gives the names of
     functions; see `FunctionCost`.
     """
 

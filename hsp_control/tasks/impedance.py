@@ -1,4 +1,4 @@
-"""Mechanical impedance of a task: stiffness and damping, the task's inertia kept."""
+"""Mechanical impedance of a task: stiffness and damping, without inertia shaping."""
 
 from collections.abc import Sequence
 from dataclasses import KW_ONLY, replace
@@ -16,7 +16,7 @@ from hsp_control.tasks.feedback import ErrorPart, LargestError, each_part
 from hsp_control.tasks.gains import as_matrix, as_numbers
 
 _ROUNDING = 1e-9
-"""Relative rounding errors of a matrix that somebody typed or turned."""
+"""Relative rounding errors of a matrix that was typed or rotated."""
 
 
 class Impedance(Part, error=GainError):
@@ -25,28 +25,28 @@ class Impedance(Part, error=GainError):
     s(e) = K e, up to the spring's largest force.
 
     Λ(q) = (J M⁻¹ Jᵀ)⁻¹ is the inertia that the robot has at the task, and f the
-    external force there. The robot's own inertia is kept, so no force has to be
+    external force there. The robot's own inertia is not shaped, so no force has to be
     measured, and ½ e'ᵀΛe' plus the energy of the spring never grows by itself
     (docs/compliance.md).
     """
 
     stiffness: Semidefinite
     """K [N/m or N·m/rad]: a number, one for each row, or a symmetric matrix without
-    negative eigenvalues; along a direction of stiffness 0 the hand may be led. Forces
-    are along the world's axes, moments along those of the desired frame.
+    negative eigenvalues; along a direction of stiffness 0 the hand can be guided.
+    Forces are along the world's axes, moments along those of the desired frame.
     """
     _: KW_ONLY
     damping: Semidefinite | None = None
-    """D [N·s/m or N·m·s/rad], as the stiffness; instead of a ratio. Whatever is stiff
-    must be damped."""
+    """D [N·s/m or N·m·s/rad], as the stiffness; instead of a ratio. Every stiff
+    direction must be damped."""
     damping_ratio: Positive | None = None
     """ζ of every mode of the task's inertia and K [-]; 1, critical damping, by default.
     D then follows the inertia. It damps nothing where there is no stiffness."""
     largest_force: LargestError = "robot"
-    """Largest force and moment of the spring [N or N·m]: it yields to more as if it
-    slipped, so that a target far away, or out of reach, does not pull with more. One
-    number, or one for each part of the error; "none": no bound. By default the
-    robot's (`Robot.spring_force`), and none for joints."""
+    """Largest force and moment of the spring [N or N·m]: beyond it the spring slips, so
+    that a target far away, or out of reach, does not pull harder. One number, or one
+    for each part of the error; "none": no bound. By default the robot's
+    (`Robot.spring_force`), and none for joints."""
 
     def __post_init__(self) -> None:
         """Check that the damping is given one way, and that energies are positive."""
@@ -78,7 +78,7 @@ class Impedance(Part, error=GainError):
         """Return K, D, ζ and 1/largest force in one array.
 
         Numbers between those of two impedances are those of an impedance as well, so
-        that one may change into the other. `parts_of` takes it apart.
+        that one may change into the other. `parts_of` is the inverse.
         """
         rows = sum(part.size for part in parts)
         out = np.zeros((2 * rows + 2, rows))
@@ -136,7 +136,7 @@ def _not_negative(value: ArrayLike, name: str) -> Array:
 
 
 def _check_damped(K: Array, D: Array) -> None:
-    """Check that whatever a spring moves is damped: it would swing for ever."""
+    """Check that every direction of a spring is damped: it would oscillate for ever."""
     size = max(K.shape[0] if K.ndim else 1, D.shape[0] if D.ndim else 1)
     if {len(each) for each in (K, D) if each.ndim} - {size}:
         return  # of different sizes, which the task says

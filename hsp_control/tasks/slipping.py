@@ -1,4 +1,4 @@
-"""A spring whose force is bounded, as if it slipped where it pulls with the most.
+"""A spring whose force is bounded, as if it slipped at its largest force.
 
 The mathematics is that of ``engine/tasks/slipping.hpp``.
 """
@@ -25,7 +25,7 @@ def spring_force(numbers: Array, ends: Indices, e: Array) -> Array:
 
 
 def slipped(numbers: Array, ends: Indices, e: Array) -> float:
-    """Return how long the error is where the spring slips, of its longest part.
+    """Return the length of the longest part of the error where the spring slips.
 
     Returns:
         Its length [m or rad]; 0 if the force is K e.

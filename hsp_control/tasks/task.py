@@ -30,7 +30,7 @@ from hsp_control.trajectories.crossfade import AnyReference
 from hsp_control.trajectories.streams.followed import FollowedStream
 
 Drawn = Literal["position", "orientation", "direction"]
-"""What can be drawn in the world; see `Task`."""
+"""Quantities that can be drawn in the world; see `Task`."""
 
 
 class Task(Part, ABC, family="tasks", error=TaskError):
@@ -38,7 +38,7 @@ class Task(Part, ABC, family="tasks", error=TaskError):
 
     A subclass declares its parameters as fields (see `Part`) and implements:
 
-    * `error_parts` names the components of e, and so says how many rows there are.
+    * `error_parts` names the components of e, and so gives the number of rows.
     * `call` returns what writes J, J', e, e' and a_x; or `evaluate`, in plain Python,
       writes them itself. The error equation must follow *exactly* from
       J a + J'v = a_x, in the coordinates of e.
@@ -51,8 +51,8 @@ class Task(Part, ABC, family="tasks", error=TaskError):
     coordinates of e, e' and offset may be others, in which the error equation is linear
     (a rotation vector, for example).
 
-    A task has no memory: the controller owns the feedback, and the state keeps what a
-    computation needs (see `RobotState.cached`).
+    A task has no memory: the controller owns the feedback, and the state keeps the
+    buffers of a computation (see `RobotState.cached`).
 
     Most tasks derive from `SecondOrderTask`, which has gains.
 
@@ -70,8 +70,8 @@ class Task(Part, ABC, family="tasks", error=TaskError):
     _: KW_ONLY
     priority: PositiveCount | None = None
     """Priority [-]; 1 is the highest, and tasks of the same priority form one level. By
-    default 1; on a floating base 1 for what keeps the balance (centre of mass, angular
-    momentum, the trunk) and 2 for all else."""
+    default 1; on a floating base 1 for tasks that keep the balance (centre of mass,
+    angular momentum, the trunk) and 2 for all else."""
     schedule: Schedule | None = None
     """When the task is active [-]; always by default."""
     name: str = ""
@@ -142,8 +142,8 @@ class Task(Part, ABC, family="tasks", error=TaskError):
     def placed(self, start: Start) -> Self:
         """Return the task for a robot and a start, checked.
 
-        What is relative to the start, and what is omitted because the robot knows it,
-        is replaced by numbers and names. A subclass ends with ``return
+        Values that are relative to the start, and omitted ones that the robot defines,
+        are replaced by numbers and names. A subclass ends with ``return
         replaced.checked(start.state.robot)``.
 
         Raises:
@@ -182,7 +182,7 @@ class Task(Part, ABC, family="tasks", error=TaskError):
 
     @property
     def remembers(self) -> bool:
-        """Whether it follows a stream, which takes messages and moves by itself."""
+        """Whether it follows a stream, whose targets are messages."""
         return any(True for _ in parts_within(self, FollowedStream))
 
     def following(self, trajectory: AnyReference) -> Self:
@@ -204,8 +204,8 @@ class Task(Part, ABC, family="tasks", error=TaskError):
         """Return a kind of call with its arguments, without ``feedback`` and ``out``.
 
         With these two, a `Feedback` and a `TaskSample`, it writes what `evaluate`
-        describes. Arguments are numbers, arrays and records of them, which
-        may be memory of the state; and what is brought up to date before each call:
+        describes. Arguments are numbers, arrays and records of them, which may be
+        memory of the state; and values that are updated before each call:
         ``state.frame(name)`` becomes a `FrameMotion`, a trajectory its sample.
 
         Args:
@@ -282,7 +282,7 @@ class Task(Part, ABC, family="tasks", error=TaskError):
 
     @abstractmethod
     def reference_rate(self, state: RobotState) -> Array:
-        """Return J v of a robot that is on its reference and stays there, shape (m,).
+        """Return J v of a robot that tracks its reference exactly, shape (m,).
 
         In the rows and units of J v. Friction feed-forward uses it, for example.
         """
@@ -292,7 +292,7 @@ class Task(Part, ABC, family="tasks", error=TaskError):
         """Return (reference, actual) for logs and plots, two arrays of one shape (k,).
 
         Choose coordinates that are easy to read, for example a quaternion; k need not
-        be m. `drawn` says what they are.
+        be m. `drawn` names them.
         """
 
 
@@ -306,11 +306,11 @@ class SecondOrderTask(Task):
     gains: Gains = Gains(natural_frequency=10.0)
     """Kp and Kv of the rows [1/s², 1/s]; critically damped at 10 rad/s by default."""
     largest_error: LargestError = "robot"
-    """Error whose feedback is the largest: a longer one counts as if it were as long,
-    so that a target far away, or out of reach, asks for no more [m or rad]. One number,
-    or one for each part of the error; "none": no bound, and near a singularity the
-    paper's law down to the controller's threshold. By default 0.35 of the robot's size
-    for a position (`Robot.size`), 1.25 rad for an orientation, and none for joints."""
+    """Error beyond which the feedback does not grow, so that a target far away, or out
+    of reach, commands no more [m or rad]. One number, or one for each part of the
+    error; "none": no bound, and near a singularity the paper's law down to the
+    controller's threshold. By default 0.35 of the robot's size for a position
+    (`Robot.size`), 1.25 rad for an orientation, and none for joints."""
 
     def feedback(self) -> Feedback:
         """Return new arrays of feedback; see `Task.feedback`."""

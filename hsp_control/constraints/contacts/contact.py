@@ -30,11 +30,11 @@ from hsp_control.trajectories.schedule import Schedule
 from hsp_control.trajectories.streams.streamed import Streamed
 
 NORMAL, FORCE, WRENCH = 1, 3, 6
-"""What is commanded, by the number of coordinates."""
+"""The kind of a command, by the number of its coordinates."""
 
 
 class CommandedForce(Part, error=ContactError):
-    """A force that the world is to exert on the robot at a contact, in time.
+    """A force that the environment shall exert on the robot at a contact, in time.
 
     It is given in the axes of the contact: two tangents and the normal, so that a
     positive normal force presses. One number is the normal force alone, three are the
@@ -43,7 +43,7 @@ class CommandedForce(Part, error=ContactError):
     pressure if no moment is commanded.
 
     The command is the reference of the contact forces in every step, see
-    `ActiveStack.support`: what it asks of the base the other contacts balance.
+    `ActiveStack.support`: the other contacts balance its effect on the base.
     """
 
     value: Annotated[ArrayLike, ArrayField(Number | list[Number], read_only)] | None = (
@@ -150,7 +150,7 @@ class Contact(Part, ABC, family="contacts", error=ContactError):
     """A part of the robot that rests on a plane of the world.
 
     Its rows keep it still, J a + J'v = -Kd J v: damping without stiffness, since
-    stiffness would fight the small slip of a real contact. Forces act at its points.
+    stiffness would oppose the small slip of a real contact. Forces act at its points.
     Each force lies within a friction pyramid inscribed in the Coulomb friction cone, so
     it pushes and never pulls.
 
@@ -173,12 +173,12 @@ class Contact(Part, ABC, family="contacts", error=ContactError):
     normal: Annotated[Vector3, AfterValidator(_direction)] = (0.0, 0.0, 1.0)
     """Normal of the plane in the world, of any length but zero, shape (3,) [-]."""
     damping: Positive = 40.0
-    """Kd, the rate at which a remaining velocity of the contact decays [1/s]."""
+    """Kd, the rate at which a residual velocity of the contact decays [1/s]."""
     schedule: Schedule | None = None
     """When the contact is active [-]; always by default."""
     force: CommandedForce | None = None
-    """The force that the world is to exert here [N]; by default it is what the balance
-    needs."""
+    """The force that the environment shall exert here [N]; by default that which the
+    balance requires."""
     name: str = ""
     """Name of the contact in the log [-]; that of its frame by default."""
 
@@ -298,9 +298,9 @@ class UnactuatedRows:
     """The rows Uᵀ(M a + N) = 0, with U the base motions that all contacts permit.
 
     Contacts may leave some base motions free (two point feet: the rotation about the
-    line between them; in the air: all six). Nothing can produce an effort along such a
-    motion, so the law must not require one. The rows UᵀM are divided by the robot's
-    mass, which makes them comparable with those of tasks.
+    line between them; in the air: all six). No force can act along such a motion, so
+    the law must not require one. The rows UᵀM are divided by the robot's mass, which
+    makes them comparable with those of tasks.
     """
 
     def __init__(self, robot: Robot, base: Indices, count: int) -> None:

@@ -1,4 +1,4 @@
-"""The kinds of contacts: points, balls, surfaces, and what slides."""
+"""The kinds of contacts: points, balls, surfaces and sliding contacts."""
 
 from dataclasses import KW_ONLY
 from functools import cached_property
@@ -85,9 +85,8 @@ class SlidingContact(Contact, type="sliding"):
 
     with u the tangential velocity of the point once the errors of all tasks are zero.
     So the tangential force belongs to the command, and the friction pyramid contains
-    the cone instead of being inscribed. If three numbers are commanded, the point
-    carries what it presses on along with it, and the tangential force is what that
-    weighs.
+    the cone instead of being inscribed. If three components are commanded, the point
+    carries the object on which it presses, and the tangential force is its weight.
     """
 
     rows: ClassVar[int] = 1
@@ -96,7 +95,7 @@ class SlidingContact(Contact, type="sliding"):
     point: Vector3 = (0.0, 0.0, 0.0)
     """The point in the frame, shape (3,) [m]."""
     offset: Vector3 = (0.0, 0.0, 0.0)
-    """From that point to where the plane is touched, in world axes: -r n for a ball of
+    """From that point to the point of contact, in world axes: -r n for a ball of
     radius r [m]."""
     smoothing: Positive = 0.01
     """Speed u_s at which three quarters of the friction are expected [m/s]."""
@@ -132,7 +131,7 @@ class SlidingContact(Contact, type="sliding"):
 
     @property
     def shift(self) -> Array:
-        """From the point to where the plane is touched, shape (3,) [m]."""
+        """From the point to the point of contact, shape (3,) [m]."""
         return np.asarray(self.offset, dtype=float)
 
     def call(self, state: RobotState) -> PartCall:

@@ -5,14 +5,14 @@ from typing import NamedTuple
 from hsp_control.common.arrays import Array
 
 BEYOND_POSITION = 1e-3
-"""A joint that is so far behind the end of its range is beyond it [rad or m]."""
+"""Tolerance beyond the end of a joint's range [rad or m]."""
 BEYOND_SPEED = 0.02
-"""A joint that is faster by this part of its speed limit is beyond that: the noise of
-a measured velocity is less."""
+"""Tolerance beyond a speed limit, as a part of it: more than the noise of a measured
+velocity."""
 
 
 class MotionLimits(NamedTuple):
-    """The limits that the barriers keep, margins included."""
+    """The limits that the barriers enforce, margins included."""
 
     lower: Array  # lower position limit, shape (nv,) [rad or m]
     upper: Array  # upper position limit, shape (nv,) [rad or m]
@@ -25,7 +25,7 @@ class MotionLimits(NamedTuple):
 
 
 class Ends(NamedTuple):
-    """Where a joint is beyond its limits, however it got there."""
+    """The values beyond which a joint violates its limits."""
 
     lower: Array  # lower position, shape (nv,) [rad or m]
     upper: Array  # upper position, shape (nv,) [rad or m]

@@ -25,16 +25,16 @@ from hsp_control.robot.differences import gradient
 from hsp_control.robot.gravity import Gravity
 
 _SPAN = 3e-3
-"""Step of those of a barrier's values [s]. The curvature of a capsule jumps where its
-side ends, and so would efforts: this far ahead and behind makes a ramp of it, at an
-error of a hundredth of a m/s² at 2 m/s, 0.1 m away."""
+"""Step of the differences of a barrier's values [s]. The curvature of a capsule jumps
+where its side ends, and so would efforts: this far ahead and behind makes a ramp of it,
+at an error of a hundredth of a m/s² at 2 m/s, 0.1 m away."""
 _TURN = 1e-4
-"""How far joints turn to see what an acceleration does to distances [rad]."""
+"""Displacement of joints for the effect of an acceleration on distances [rad]."""
 _AHEAD = 0.5
 """A pair gets a row if its distance may come close to the minimum within this time [s]
 at its present rate."""
 _NEAR = 0.5
-"""A motor gets one if gravity takes more than this part of what it may take, now or
+"""A motor gets one if gravity uses more than this part of its permitted share, now or
 within the time `_AHEAD` at the present rate."""
 
 
@@ -47,7 +47,7 @@ class BarrierRows(NamedTuple):
 
     @classmethod
     def allocate(cls, rows: int, nv: int) -> Self:
-        """Return room for a number of rows."""
+        """Return memory for a number of rows."""
         return cls(np.zeros(1, dtype=np.int64), np.zeros((rows, nv)), np.zeros(rows))
 
     @property
@@ -74,9 +74,9 @@ class Barrier(Part, ABC, family="barriers", error=LimitError):
             def values(self, state: RobotState) -> float:
                 return state.position(self.frame)[2]
 
-    It may override `gradients`, which uses differences. h depends on q and t only. Its
-    unit should be one in which it is about as large as a distance in metres: where
-    limits contradict each other, their violations are compared. `rows` and
+    It may override `gradients`, which uses differences by default. h depends on q and t
+    only. Its unit should be one in which it is about as large as a distance in metres:
+    where limits contradict each other, their violations are compared. `rows` and
     `check_start` are for placed ones.
     """
 
@@ -114,8 +114,8 @@ class Barrier(Part, ABC, family="barriers", error=LimitError):
         Args:
             state: The state.
             bandwidth: α [1/s].
-            wanted: The acceleration without them, shape (nv,); it may
-                show which rows are needed.
+            wanted: The unconstrained acceleration, shape (nv,); it may show which rows
+                are needed.
         """
         least = self._least_acceleration(state, bandwidth)
         return self.gradients(state.read_only), least
@@ -132,7 +132,7 @@ class Barrier(Part, ABC, family="barriers", error=LimitError):
         Args:
             state: The state.
             bandwidth: α [1/s].
-            wanted: Where the acceleration without them stands, shape (nv,).
+            wanted: The array of the unconstrained acceleration, shape (nv,).
             rows: What is added to.
         """
         raise NotImplementedError
@@ -220,9 +220,9 @@ class MinimumDistance(Barrier):
     ) -> PartCalls:
         """Return the calls that add rows of pairs close or approaching.
 
-        Others have one as soon as the wanted acceleration takes half of what b leaves:
-        an effort with a limited rate could not follow a row that is violated where it
-        appears.
+        Others have one as soon as the unconstrained acceleration uses half of what b
+        permits: an effort with a limited rate could not follow a row that is violated
+        where it appears.
         """
         robot, turning = state.robot, {"turn": _TURN, "size": state.robot.size}
         here = self.clearance.proximity(state)
@@ -278,7 +278,7 @@ class MinimumDistance(Barrier):
 
 
 def barrier_names(barriers: Sequence[Barrier]) -> list[str]:
-    """Return what a log calls barriers: their types, several of one type numbered."""
+    """Return the names of barriers in a log: their types, numbered if several."""
     types = [each.yaml_type or type(each).__name__ for each in barriers]
     return [
         name if types.count(name) == 1 else f"{name}_{k}"
@@ -287,7 +287,7 @@ def barrier_names(barriers: Sequence[Barrier]) -> list[str]:
 
 
 class _Elsewhere:
-    """Distances where a displacement leads, at a later time."""
+    """Distances at a displaced posture, at a later time."""
 
     def __init__(self, state: RobotState, clearance: Clearance) -> None:
         self._state, companion = state, state.companion
@@ -359,9 +359,9 @@ class SelfDistance(MinimumDistance, type="self_distance"):
 
 @dataclass(frozen=True, eq=False)
 class StaticEffort:
-    """Gravity takes at most a part of every motor's effort.
+    """Gravity uses at most a part of every motor's effort.
 
-    Else an arm reaches postures in which its motors cannot hold it, and falls. A
+    Otherwise an arm reaches postures in which its motors cannot hold it, and falls. A
     motor's gravity effort, G_i(q), depends on the posture only, so this is a limit on
     postures: with h = share - |G_i|/effort_i, the rows require h'' + 2α h' + α² h ≥ 0,
     with G_i'' = ∇G_i·a + the drift of G_i' at constant velocity.

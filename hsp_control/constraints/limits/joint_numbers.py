@@ -175,8 +175,8 @@ def own_maximum(own: Array, robot: Robot) -> Array:
 def own_speeds(robot: Robot) -> Array:
     """Return a URDF's largest speeds (nv,), inf where it has none.
 
-    A joint without one gets the largest of the others of its unit: what these cannot do
-    for a task, it would do instead, at any speed.
+    A joint without one gets the largest of the others of its unit: otherwise it would
+    compensate for their limits at any speed.
     """
     speeds = own_maximum(robot.model.velocityLimit, robot)
     for unit in ("rad", "m"):
@@ -189,7 +189,7 @@ def own_speeds(robot: Robot) -> Array:
 class PositionRange(Part, error=LimitError):
     """Joint position limits in numbers.
 
-    Joints without a single coordinate (roots, continuous joints) can have none.
+    Joints with more than one coordinate (roots, continuous joints) can have none.
     """
 
     lower: Numbers

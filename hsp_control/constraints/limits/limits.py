@@ -1,4 +1,4 @@
-"""Limits of a robot: what is declared, and what it is for one robot."""
+"""Limits of a robot: their declaration, and their numbers for one robot."""
 
 from collections.abc import Sequence
 from dataclasses import KW_ONLY, dataclass
@@ -47,8 +47,8 @@ class RobotLimits:
         velocity: Maximum speed, shape (nv,) [rad/s or m/s].
         lower: Lower joint position limit, shape (nv,) [rad or m].
         upper: Upper joint position limit, shape (nv,) [rad or m].
-        motion: What the barriers keep: position and velocity limits less their margins,
-            the maximum acceleration and α, as a record for calls.
+        motion: The limits that the barriers enforce: position and velocity limits less
+            their margins, the maximum acceleration and α, as a record for calls.
         barriers: Minimum distances, and other barriers.
         static_effort: The limit on the effort against gravity, if any.
     """
@@ -109,7 +109,7 @@ _NEAR = 1.0
 def in_degrees(unit: str, lower: float, upper: float, position: float) -> bool:
     """Return whether a joint's position is so far from its range that it is degrees.
 
-    Continuous and sliding joints are not looked at.
+    Continuous and sliding joints are not checked.
     """
     if unit != "rad" or not np.isfinite(upper - lower):
         return False
@@ -121,11 +121,11 @@ BANDWIDTH = 10.0
 """α of the barriers where nothing else is given [1/s]."""
 
 _HELD = 0.95
-"""Part of a motor that gravity may take by default: what is left brakes the arm."""
+"""Part of a motor's effort that gravity may use by default: the rest brakes the arm."""
 
 
 class Limits(Part, error=LimitError):
-    """Limits on effort, joint motion and barriers, which the controller keeps.
+    """Limits on effort, joint motion and barriers, which the controller enforces.
 
     The limits on efforts and their rate are hard. Those on position, velocity and
     acceleration become bounds on the acceleration, by barriers that let the robot
@@ -137,13 +137,13 @@ class Limits(Part, error=LimitError):
         acceleration    a ≤ a_max
 
     and likewise from below; the velocity barrier is four times as steep within its
-    margin. j is what the effort's rate can do to the acceleration. Distances and the
-    effort against gravity have barriers of their own. Where limits contradict each
+    margin. j is the largest rate of the acceleration at the effort's rate. Distances
+    and the effort against gravity have their own barriers. Where limits contradict each
     other they are relaxed in this order: static effort, acceleration, velocity,
     position, barriers. Effort limits are never relaxed.
 
-    Where a limit binds, the null space deviates from the law first, and then the tasks,
-    the lowest priority first.
+    Where a limit is active, the null space deviates from the law first, and then the
+    tasks, the lowest priority first.
 
     "robot" is the robot's own limit, from its URDF, and "none" is no limit. Numbers are
     one for all joints, or nv, with None where there is no limit.
@@ -173,21 +173,22 @@ class Limits(Part, error=LimitError):
     position_margin: NonNegative | None = None
     """Margin inside the position limits [rad or m]: 0.005 by default, at most a tenth
     of a joint's range. A barrier may be crossed by an error of the acceleration over
-    α², but not by its mean of late, once `Controller.applied` tells the period."""
+    α², but not by its recent mean, once `Controller.applied` reports the period."""
     velocity_margin: Share = 0.02
     """Margin inside the speed limits, as a fraction of the limit [-]."""
     barriers: Annotated[Sequence[Barrier], AfterValidator(tuple)] = ()
     """Minimum distances, and other functions of the posture that have a minimum [-]."""
     bandwidth: Positive | None = None
-    """Bandwidth α of the barriers [1/s]: 10 by default, or what a plan needs. Motors
+    """Bandwidth α of the barriers [1/s]: 10 by default, or as a plan requires. Motors
     can follow 5 to 20: faster barriers act so late that they need more than the effort
-    rate permits. A joint at rest is allowed α² times what is left to its limit."""
+    rate permits. A joint at rest may accelerate by α² times its distance from the
+    limit."""
     static_effort: Annotated[
         Literal["robot", "none"] | Fraction | None, BeforeValidator(none_for_nothing)
     ] = "robot"
     """Fraction of the effort limit that gravity may use [-], so that an arm stays where
     its motors can hold it; for motors that carry no contact. By default 0.95 for an arm
-    that gravity may ask for more than a motor has; none where the base floats."""
+    on which gravity may exceed a motor's effort; none where the base floats."""
 
     def placed(self, start: Start) -> RobotLimits:
         """Return the limits in numbers, for one robot and one scene."""

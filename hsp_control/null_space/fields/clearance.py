@@ -166,7 +166,7 @@ class Clearance(Cost):
 
 
 class _Work(NamedTuple):
-    """What a clearance computes with at one state."""
+    """The memory of a clearance at one state."""
 
     proximity: Proximity  # the pairs of shapes and their distances
     slopes: Array  # ∂f/∂d of each pair, written by ``barrier``
@@ -212,7 +212,7 @@ class ObstacleClearance(Clearance, type="obstacle_clearance"):
         return replace(self, obstacles=tuple(found))
 
     def _pairs(self, robot: Robot) -> Proximity:
-        given = dict.fromkeys(self.obstacles or ())  # the same one twice counts once
+        given = dict.fromkeys(self.obstacles or ())  # each obstacle is used once
         obstacles = [each for each in given if isinstance(each, Obstacle)]
         if not obstacles or len(obstacles) < len(given):
             raise self._not_placed("obstacles")
@@ -257,13 +257,13 @@ def _moving_shapes(
 class SelfClearance(Clearance, type="self_clearance"):
     """f = Σ b(d_k / influence) over pairs of shapes of different links.
 
-    Neighbouring links and pairs that the SRDF disables do not count. Pairs that overlap
-    at the robot's home configuration do not count either, because the approximating
-    shapes are larger than the links.
+    Neighbouring links and pairs that the SRDF disables are ignored. So are pairs that
+    overlap at the robot's home configuration, because the approximating shapes are
+    larger than the links.
 
     The gradient between two capsules jumps when they become parallel. This is rare in
     space, but not for a planar arm. With ``spheres`` it does not jump, but the
-    computation takes longer.
+    computation is slower.
     """
 
     influence: Positive = 0.1

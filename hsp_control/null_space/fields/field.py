@@ -37,8 +37,8 @@ class NullSpaceField(Part, ABC, family="fields", error=FieldError):
     * `value` returns one number to plot.
 
     It may override `placed` if it refers to the start, to obstacles or to frames, and
-    `minimum_distance` if it measures distances. A field has no memory: what a
-    computation needs is kept by the state (see `RobotState.cached`).
+    `minimum_distance` if it measures distances. A field has no memory: the buffers of a
+    computation are kept by the state (see `RobotState.cached`).
 
     All methods are about the field without its weight. The sum applies the weight.
 
@@ -74,8 +74,8 @@ class NullSpaceField(Part, ABC, family="fields", error=FieldError):
     def placed(self, start: Start) -> Self:
         """Return the field for a robot and a start, checked.
 
-        What is relative to the start, and what is omitted because the robot knows it,
-        is replaced by numbers and names. By default nothing is.
+        Values that are relative to the start, and omitted ones that the robot defines,
+        are replaced by numbers and names; by default there are none.
 
         Raises:
             HspControlError: If the field does not fit the robot or the scene.

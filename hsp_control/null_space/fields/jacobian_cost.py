@@ -54,7 +54,7 @@ class JacobianCost(Cost):
 
     @property
     def rows(self) -> Rows:
-        """Which rows of the Jacobian count."""
+        """Which rows of the Jacobian are used."""
         return "position"
 
     @property
@@ -80,7 +80,7 @@ class JacobianCost(Cost):
         return robot.end_effector if self.frame is None else self.frame
 
     def _selected(self) -> Indices:
-        """Return the indices of the rows that count, shape (k,)."""
+        """Return the indices of the selected rows, shape (k,)."""
         kept = [i for i, axis in enumerate("xyz") if axis in self.axes]
         if self.rows != "position":
             kept = (kept if self.rows == "pose" else []) + [3, 4, 5]

@@ -21,7 +21,7 @@ from hsp_control.trajectories import Hold, Trajectory
 
 
 class LimitedJointsCost(Cost):
-    """A cost of the joints that have limits; others do not count."""
+    """A cost of the joints that have limits; others are ignored."""
 
     _: KW_ONLY
     weights: Weights = 1.0
@@ -42,10 +42,10 @@ class LimitedJointsCost(Cost):
 class JointCentering(LimitedJointsCost, type="joint_centering"):
     """f = ½ Σ w_i ((q_i - m_i)/r_i)², m_i the middle and r_i half of the range.
 
-    Joints without limits, continuous joints and a floating root do not count. After
+    Joints without limits, continuous joints and a floating root are ignored. After
     Liégeois (1977), equation (11), scaled such that (q_i - m_i)/r_i is ±1 at a limit.
-    Half a range of less than 1 rad or 1 m counts as that: else a finger that opens by
-    4 cm would be drawn back at 2500 1/s, faster than any control period can follow.
+    Half a range of less than 1 rad or 1 m is replaced by that: else a finger that opens
+    by 4 cm would be drawn back at 2500 1/s, faster than any control period can follow.
     """
 
     def call(self, state: RobotState) -> PartCall:
@@ -89,7 +89,7 @@ class TargetPosture(Cost, type="target_posture"):
 
     The two forms differ by terms of fourth order. The second is smooth at all angles,
     whereas ½d² has a kink at an angle of π from the target. Joints with several degrees
-    of freedom, such as a floating root, do not count: use a task for them.
+    of freedom, such as a floating root, are ignored: use a task for them.
     """
 
     target: Posture = "start"
@@ -100,7 +100,7 @@ class TargetPosture(Cost, type="target_posture"):
     """w_i of the joints [1/s], one number or nv."""
     displacement: Trajectory | None = None
     """Motion of the target: nv numbers that are added to it [rad or m]; none by
-    default. A stream leads it only in a change of the running controller."""
+    default. A stream moves it only in a change of the running controller."""
 
     def placed(self, start: Start) -> Self:
         """Return the cost with its posture as a configuration, checked."""
@@ -145,7 +145,7 @@ class EqualJointAngles(Cost, type="equal_joint_angles"):
 
     The paper's third simulation has the weight 5 and the joints 2 and 3 of the planar
     arm, whose positions are the paper's relative angles θ̃2 and θ̃3. Differences are
-    wrapped to [-π, π), so that full turns of continuous joints do not count.
+    wrapped to [-π, π), so that full turns of continuous joints make no difference.
     """
 
     joints: Annotated[Names, Field(min_length=2)]
@@ -182,7 +182,7 @@ class LimitBarrier(LimitedJointsCost, type="limit_barrier"):
 
     u_i is ``zone`` times half the range, and b(s) = -(1 - s)² ln s below 1, 0 beyond: a
     joint adds to f only within the distance u_i of a limit. Joints without limits,
-    continuous joints and a floating root do not count.
+    continuous joints and a floating root are ignored.
     """
 
     zone: Fraction = 0.3

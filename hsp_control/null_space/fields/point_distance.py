@@ -27,7 +27,7 @@ class PointDistance(Cost, type="point_distance"):
     frames: Annotated[Names, Field(min_length=1)]
     """Names of the frames that move away from the obstacle [-]."""
     obstacle: Annotated[str | Obstacle, OrInstance(Name, Obstacle)]
-    """Name of the obstacle in the scene, of which only the centre counts [-]; or, in
+    """Name of the obstacle in the scene, of which only the centre is used [-]; or, in
     Python, the obstacle itself."""
 
     def placed(self, start: Start) -> Self:

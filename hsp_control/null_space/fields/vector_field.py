@@ -1,4 +1,4 @@
-"""Fields that are no gradients: given by a function, rest, or none."""
+"""Fields that are not gradients: given by a function, rest, or none."""
 
 from abc import abstractmethod
 from collections.abc import Callable

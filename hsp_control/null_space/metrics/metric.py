@@ -37,7 +37,7 @@ class Metric(Part, ABC, family="metrics", error=MetricError):
     A subclass declares its parameters as fields (see `Part`), sets `form` to CONSTANT
     or VARYING and implements `evaluate`, or `call`, which makes a step faster; if W
     is constant, derive from `FixedMetric` instead. It may override `placed`. A metric
-    has no memory: what a computation needs is kept by the state (see
+    has no memory: the buffers of a computation are kept by the state (see
     `RobotState.cached`).
 
     Attributes:
@@ -49,8 +49,8 @@ class Metric(Part, ABC, family="metrics", error=MetricError):
     def placed(self, start: Start) -> Self:
         """Return the metric for a robot and a start, checked.
 
-        What is omitted because the robot knows it is replaced by numbers. By default
-        nothing is, and every robot fits.
+        Omitted values that the robot defines are replaced by numbers. By default there
+        are none, and every robot fits.
 
         Raises:
             MetricError: If the metric does not fit the robot.
@@ -183,7 +183,7 @@ class FixedMetric(Metric):
 
 
 class IdentityMetric(Metric, type="identity"):
-    """W = I: the motions of all joints count the same. The default."""
+    """W = I: the motions of all joints are weighted equally. The default."""
 
     form: ClassVar[int] = IDENTITY
 

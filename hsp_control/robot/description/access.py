@@ -1,4 +1,4 @@
-"""What is read of files that others wrote: which of them, and how much.
+"""Limits on reading untrusted files: which files, and how much of them.
 
 A configuration, a URDF, a mesh or a log names other files. Strict reading opens only
 files in folders that the user allowed. Paths are compared after ``..`` and symbolic
@@ -115,7 +115,7 @@ def parse_xml(data: bytes) -> Element:
 
 
 def check_no_document_type(data: bytes) -> None:
-    """Check that XML has no document type; it stands before the top element."""
+    """Check that XML has no document type; it is before the top element."""
     _check_limits(data, only_prolog=True)
 
 

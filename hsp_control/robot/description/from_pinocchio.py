@@ -129,7 +129,7 @@ def _shapes(model: pin.Model, geometry: Any, role: str) -> Iterator[BodyShape]:
 
 
 def _frame(model: pin.Model, item: Any, role: str) -> pin.Frame:
-    """Return the frame by whose name a shape's body is known."""
+    """Return the frame that gives a shape's body its name."""
     joint, index = int(item.parentJoint), int(item.parentFrame)
     if index < model.nframes and model.frames[index].parentJoint == joint:
         return model.frames[index]
@@ -172,7 +172,7 @@ def _triangles(given: Iterable[Any]) -> Indices:
 
 
 def _excluded(model: pin.Model, collision: Any) -> frozenset[frozenset[str]]:
-    """Return which links never collide: if any pairs are given, all others do not."""
+    """Return the links that never collide: all but the given pairs, if any."""
     if collision is None or not len(collision.collisionPairs):
         return frozenset()
     items = collision.geometryObjects

@@ -1,4 +1,4 @@
-"""Which frame of a robot is most likely its hand, and why."""
+"""The frame of a robot that is most likely its hand, and the reason."""
 
 import re
 from collections.abc import Sequence
@@ -10,7 +10,7 @@ from hsp_control.common.suggestions import listing
 
 _GRIPPER = re.compile("finger|thumb|jaw|gripper|knuckle|claw")
 _ARM = re.compile("wrist|roll|pitch|yaw|rotat|flex")
-"""Names of joints that move a gripper; not if they also name what an arm does."""
+"""Names of joints that move a gripper, unless they also name an arm's joint."""
 _NO_HAND = re.compile(
     "finger|thumb|camera|imu|sensor|range|accelerometer|laser|optical|force|(^|_)ft_frame"
 )
@@ -21,7 +21,7 @@ _HANDS = (
     ("a place to grasp", re.compile("grasp|gripper_frame")),
     ("an end effector", re.compile("end_?effector|(^|_)eef?(_|$)")),
 )
-"""What links are called that were put there as the hand, the likeliest first."""
+"""Names of links that are meant as the hand, the likeliest first."""
 
 
 class Hand(NamedTuple):
@@ -37,10 +37,10 @@ def find_hand(model: pin.Model) -> Hand:
     It is a link on the last joint of the longest chain of joints. Joints at the end of
     a chain that are called a jaw's, finger's or gripper's are no part of the arm. Where
     the chain branches in its second half into three or more, or into two of similar
-    lengths, these are fingers, and it ends there. One much shorter branch is none: it
-    is a part of the arm's own mechanism. Of the links on that joint one that is called
-    a TCP, a place to grasp, a tool or an end effector comes first, then the last one,
-    no finger or sensor if possible.
+    lengths, these are fingers, and it ends there. One much shorter branch does not end
+    it: it is a part of the arm's mechanism. Of the links on that joint one that is
+    called a TCP, a place to grasp, a tool or an end effector comes first, then the last
+    one, no finger or sensor if possible.
     """
     whole: list[list[int]] = [[]]
     for joint in range(1, model.njoints):

@@ -1,4 +1,4 @@
-"""Inertias that no body can have, and the nearest ones that a body can have.
+"""Physically inconsistent inertias, and the nearest consistent ones.
 
 About its centre of mass, a body of density ρ has the second moments Σ = ∫ ρ x xᵀ, which
 are positive semidefinite, and the inertia I = tr(Σ) 1 - Σ. So a tensor I belongs to a
@@ -10,7 +10,8 @@ and Slotine, Linear matrix inequalities for physically consistent inertial param
 identification, IEEE Robotics and Automation Letters 3(1), 2018). At the centre of mass
 it is diag(Σ, m). It does not change if its fourth axis is reflected, and so neither
 does the nearest positive semidefinite matrix in the Frobenius norm, because that is
-unique. It is therefore diag(Σ*, m), with Σ* nearest to Σ: mass and centre of mass stay.
+unique. It is therefore diag(Σ*, m), with Σ* nearest to Σ: mass and centre of mass are
+kept.
 """
 
 from collections.abc import Iterator
@@ -39,7 +40,7 @@ _PLACES = ((0, 0), (0, 1), (0, 2), (1, 1), (1, 2), (2, 2))
 
 
 class ImpossibleInertia(NamedTuple):
-    """The inertia of a link that no body can have."""
+    """The physically inconsistent inertia of a link."""
 
     link: str  # name of the link
     element: Element  # its element ``<inertia>``
@@ -61,7 +62,7 @@ class ImpossibleInertia(NamedTuple):
 
 
 def impossible_inertias(robot: Element) -> Iterator[ImpossibleInertia]:
-    """Yield the links of a URDF whose inertia no body can have, in its order."""
+    """Yield the links of a URDF with inconsistent inertias, in its order."""
     masses = (float(mass.get("value", 0.0)) for mass in robot.iter("mass"))
     slack = NEGLIGIBLE * sum(masses)
     for link in robot.findall("link"):
@@ -77,7 +78,7 @@ def impossible_inertias(robot: Element) -> Iterator[ImpossibleInertia]:
 
 
 def project_inertias(robot: Element) -> None:
-    """Replace the inertias that no body can have by the nearest possible, in place."""
+    """Replace inconsistent inertias by the nearest consistent ones, in place."""
     for found in list(impossible_inertias(robot)):
         for entry, place in zip(ENTRIES, _PLACES, strict=True):
             found.element.set(entry, repr(float(found.nearest[place])))
@@ -94,7 +95,8 @@ def nearest_possible(tensor: Array) -> Array:
 
     The nearest matrix has the same axes, so that only the second moments σ about them
     are projected: onto the cone σᵢ ≥ FLOOR Σⱼ σⱼ. With σ = A⁻¹ μ and A = 1 - FLOOR 11ᵀ
-    this is a problem of non-negative least squares in μ. What a body can have stays.
+    this is a problem of non-negative least squares in μ. A consistent inertia is
+    unchanged.
     """
     if is_possible(tensor):
         return tensor

@@ -1,4 +1,4 @@
-"""What a joint of a Pinocchio model is made of, as data: its type, its axis."""
+"""A joint of a Pinocchio model as data: its type, its axis."""
 
 from typing import Any
 
@@ -19,15 +19,15 @@ _KNOWN = {
 
 
 def joint_data(model: pin.Model, k: int) -> dict[str, Any]:
-    """Return what a joint's own model is made of.
+    """Return the data of a joint's own model.
 
     Raises:
-        ModelError: If the joint is of a type that is not known here.
+        ModelError: If the type of the joint is not supported.
     """
     joint = model.joints[k]
     if joint.shortname() == "JointModelMimic":
         return _follower_data(model, k)
-    if joint.shortname() == TURNING:  # Pinocchio does not tell its axis (seen with 4.1)
+    if joint.shortname() == TURNING:  # Pinocchio does not give its axis (seen with 4.1)
         axis = _motion(model, k, k, 0.5)[3:] / 0.5
         return {"type": TURNING, "axis": _unit(axis), "pitch": 0.0}
     return _kind_data(joint, model.names[k])
@@ -48,9 +48,9 @@ def _kind_data(joint: Any, name: str) -> dict[str, Any]:
 
 
 def _follower_data(model: pin.Model, k: int) -> dict[str, Any]:
-    """Return what a joint that mimics another one is made of.
+    """Return the data of a joint that mimics another one.
 
-    Pinocchio does not tell which joint it was: its motion does.
+    Pinocchio does not give the leader: it is found from the motion.
     """
     own = model.joints[k].extract()
     # `model.mimicked_joints` is not in the order of the followers (seen with 4.1).
@@ -82,7 +82,7 @@ def _follower_data(model: pin.Model, k: int) -> dict[str, Any]:
 
 
 def _motion(model: pin.Model, moved: int, k: int, by: float) -> Array:
-    """Return by which twist joint k moves if another one does [m and rad]."""
+    """Return the twist of joint k for a motion of another one [m and rad]."""
     data, neutral = model.createData(), pin.neutral(model)
     step = np.zeros(model.nv)
     step[model.joints[moved].idx_v] = by
@@ -101,7 +101,7 @@ def _unit(axis: Array) -> list[float]:
 
 _ABOUT_X = np.array([0.0, 0.0, 0.0, 1.0, 0.0, 0.0])
 _LEAST, _DIGITS = 1e-9, 14
-"""What is a rounding of nothing, and the digits of an axis."""
+"""Tolerance of zeros, and the digits of an axis."""
 
 
 def pose_numbers(placement: pin.SE3) -> list[float]:

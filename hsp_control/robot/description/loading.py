@@ -55,7 +55,7 @@ def load_model(
     settings: OneRobot | None = None,
     gravity: ArrayLike | None = None,
 ) -> pin.Model:
-    """Return the Pinocchio model of a URDF; what mimics a locked joint is locked."""
+    """Return the Pinocchio model of a URDF; followers of a locked joint are locked."""
     if settings is None:
         settings = RobotDescription(source.name)
     xml = read_urdf(source)
@@ -79,7 +79,7 @@ def completed(
     tool_frames: Mapping[str, ToolFrame],
     gravity: ArrayLike | None,
 ) -> pin.Model:
-    """Return a checked model, with frames and gravity of one's own."""
+    """Return a checked model, with the user's own frames and gravity."""
     for name, tool in tool_frames.items():
         _add_frame(model, name, tool)
     if gravity is not None:
@@ -106,7 +106,7 @@ def frames_by_name(model: pin.Model) -> dict[str, int]:
 
 
 def guarded(model: pin.Model) -> pin.Model:
-    """Return a model that gets no more joints; a copy of it can get some.
+    """Return a model to which no joints can be added; they can be added to a copy.
 
     Data that were made for it would not fit: Pinocchio would write beyond them and end
     the process.
@@ -174,7 +174,7 @@ def _parse(source: RobotSource, settings: OneRobot, xml: Element) -> pin.Model:
 
 
 def _write_for_pinocchio(xml: Element, source: RobotSource, *, mimic: bool) -> None:
-    """Write what Pinocchio would skip or refuse in words that it reads, in place."""
+    """Rewrite elements that Pinocchio would skip or refuse, in place."""
     try:
         write_soft_limits(xml)
         write_planar_axes(xml)
@@ -198,7 +198,7 @@ def _check_inertias(xml: Element, source: RobotSource) -> None:
 def _collect_parser_errors(errors: list[str]) -> Iterator[None]:
     """Collect the "Error:" lines that the URDF parser writes to the process's stderr.
 
-    Its exceptions say only that a URDF is invalid; these lines say why.
+    Its exceptions report only that a URDF is invalid; these lines give the reason.
     """
     sys.stderr.flush()
     own_stderr = os.dup(2)

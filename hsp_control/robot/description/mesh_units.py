@@ -1,7 +1,7 @@
-"""The unit of a mesh file and the axis that points up in it, where the file says them.
+"""The unit of a mesh file and its up axis, where the file gives them.
 
-A Collada file has ``<unit>`` and ``<up_axis>``, and glTF is in metres with y up. What
-reads meshes here, Coal and Meshcat's page, leaves vertices as they are in the file.
+A Collada file has ``<unit>`` and ``<up_axis>``, and glTF is in metres with y up. The
+readers of meshes, Coal and Meshcat's page, leave vertices as they are in the file.
 """
 
 import math
@@ -23,7 +23,7 @@ _TURNS = {
 
 
 class MeshUnits(NamedTuple):
-    """How a mesh file's numbers are meant."""
+    """The unit and the axes of a mesh file."""
 
     unit: float = 1.0  # the length of the file's unit [m]
     up: str = "Z_UP"  # ``X_UP``, ``Y_UP`` or ``Z_UP``
@@ -39,7 +39,7 @@ class MeshUnits(NamedTuple):
 
 
 def mesh_units(file: Path) -> MeshUnits:
-    """Return what a mesh file says; without a word it is in metres, with z up.
+    """Return a mesh file's unit and axes; by default metres, with z up.
 
     Raises:
         ValueError: If the unit is no positive length, or there is no such axis.
@@ -55,7 +55,7 @@ class _EndError(Exception):
 
 
 def _of_collada(data: bytes) -> MeshUnits:
-    """Return what the first ``<asset>`` says, which is the whole file's."""
+    """Return those of the first ``<asset>``, which are the whole file's."""
     parser = expat.ParserCreate()
     unit, up = "1", ""
     within = ""

@@ -1,11 +1,11 @@
 """Mimic joints of a URDF, written so that Pinocchio reads them.
 
-A follower is at q_f = m q_l + o where its leader is at q_l. Pinocchio knows no follower
-of a follower, none that comes before its leader in the tree, and none of another kind
-of configuration; and it has no limits and no friction of a follower. So a chain is
-written as followers of its first joint, a leader that comes too late as a coordinate of
-its own, which it follows itself, and what bounds or brakes a follower as what bounds or
-brakes its leader. All of this is the same motion.
+A follower is at q_f = m q_l + o where its leader is at q_l. Pinocchio supports no
+follower of a follower, none that precedes its leader in the tree, and none of another
+kind of configuration; and it ignores limits and friction of a follower. So a chain is
+written as followers of its first joint, a leader that comes too late as a separate
+coordinate, which it follows itself, and limits and friction of a follower as those of
+its leader. All of this is the same motion.
 """
 
 import logging
@@ -20,14 +20,14 @@ import pinocchio as pin
 from hsp_control.common.exceptions import ModelError
 
 _SINGLE = ("revolute", "continuous", "prismatic")
-"""Types of joints with one degree of freedom: what can lead and follow."""
+"""Types of joints with one degree of freedom, which can lead and follow."""
 _NEEDED = {"limit": ("effort", "velocity"), "dynamics": ("damping", "friction")}
 """Attributes without which the parser refuses an element."""
 _FIRST = "!"
-"""What the name of a coordinate begins with while Pinocchio reads it. Joints of a link
+"""Prefix of a coordinate's name while Pinocchio reads it. Joints of a link
 come in the order of their names: so it is the first."""
 _COORDINATE, _DRIVEN = ".coordinate", ".driven"
-"""What the names of a coordinate's frames, and of the joint that follows it, end in."""
+"""Suffix of the names of a coordinate's frames, and of the joint that follows it."""
 _HINT = "load its mimic joints as independent joints with mimic=False"
 
 _log = logging.getLogger(__name__)
@@ -46,7 +46,7 @@ class Follower(NamedTuple):
         return _range(joints[self.leader])
 
     def bounds(self, joint: Element) -> tuple[float, float]:
-        """Return between what the follower's own limits allow the leader to be."""
+        """Return the range of the leader that the follower's own limits allow."""
         ends = [(x - self.offset) / self.multiplier for x in _range(joint)]
         return min(ends), max(ends)
 
@@ -114,8 +114,8 @@ def write_for_pinocchio(robot: Element) -> None:
 def name_coordinates(model: pin.Model) -> None:
     """Give a coordinate its leader's name, and that joint another one.
 
-    Joints are locked by these names. Until `name_frames`, the frames of both joints are
-    called as they are: Pinocchio finds one by the other's name.
+    Joints are locked by these names. Until `name_frames`, the frames of both joints
+    have their names: Pinocchio finds one by the other's name.
     """
     names = list(model.names)
     for name in names:
@@ -146,7 +146,7 @@ def name_frames(model: pin.Model) -> None:
 def _unite_kinds(joints: dict[str, Element], own: Sequence[Follower]) -> None:
     """Let a leader and its followers measure their angles in the same way.
 
-    Of a continuous leader (cos, sin) is known, not how often it has turned: that is
+    Of a continuous leader (cos, sin) is known, not the number of turns: that is
     enough for continuous followers at a whole multiple.
     """
     leader = joints[own[0].leader]
@@ -164,7 +164,7 @@ def _unite_kinds(joints: dict[str, Element], own: Sequence[Follower]) -> None:
 def _bound_by_followers(
     joints: dict[str, Element], own: Sequence[Follower]
 ) -> Iterator[str]:
-    """Bound and brake a leader by what its followers are; yield what cannot be kept."""
+    """Apply followers' limits and friction to a leader; yield impossible ones."""
     leader = joints[own[0].leader]
     for each in own:
         follower, ratio = joints[each.name], abs(each.multiplier)
@@ -259,7 +259,7 @@ def _range(joint: Element) -> tuple[float, float]:
 
 
 def _set(joint: Element, tag: str, name: str, value: float) -> None:
-    """Set an attribute of a joint's element, which gets what the parser asks for."""
+    """Set an attribute of a joint's element, which gets those that are required."""
     if (element := joint.find(tag)) is None:
         if tag == "limit" and joint.get("type") == "prismatic":
             return  # it has to have limits, and the parser says so

@@ -1,10 +1,10 @@
-"""Rotor inertias: what the motors add to the diagonal of the mass matrix.
+"""Rotor inertias, which motors add to the diagonal of the mass matrix.
 
 A rotor of inertia I behind a gear of reduction k turns k times as fast as its joint,
 and adds I k² [kg·m²] to it: on a light wrist most of its inertia. A URDF's links do not
-contain it. Some URDFs say it in a ``<transmission>``: the ``<mechanicalReduction>`` and
-the rotor's inertia of its ``<actuator>``, which Drake calls ``drake:gear_ratio`` and
-``drake:rotor_inertia``.
+contain it. Some URDFs give it in a ``<transmission>``: the ``<mechanicalReduction>``
+and the rotor's inertia of its ``<actuator>``, which Drake calls ``drake:gear_ratio``
+and ``drake:rotor_inertia``.
 """
 
 from collections.abc import Mapping
@@ -54,7 +54,7 @@ def write_motor_inertia(
     source: RobotSource,
     of_file: Mapping[str, float],
 ) -> None:
-    """Set a model's armature: as given, else as its file says, by joint.
+    """Set a model's armature: as given, else from its file, by joint.
 
     Joints of several degrees of freedom, such as a root, have no motor.
     """
@@ -97,7 +97,7 @@ def write_motor_inertia(
 
 
 def rotors_of_urdf(robot: Element) -> dict[str, float]:
-    """Return I k² of each joint whose ``<transmission>`` says it [kg·m² or kg].
+    """Return I k² of each joint whose ``<transmission>`` gives it [kg·m² or kg].
 
     Raises:
         ModelError: If a number is none, or negative.

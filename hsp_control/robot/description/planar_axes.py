@@ -1,7 +1,7 @@
 """The axes of a URDF's planar joints, written as Pinocchio reads them.
 
 An ``<axis>`` is the normal of the plane, about which the joint turns. Pinocchio's plane
-is always x-y: so the joint gets a link of its own in between, whose z axis is the
+is always x-y: so the joint gets an extra link in between, whose z axis is the
 normal, and to which the child is fixed as it was.
 """
 

@@ -1,8 +1,7 @@
-"""The meshes of a log: what is written of their files, and files made of it again.
+"""The meshes of a log: their data, and the files made from these.
 
-A mesh is written with what is drawn of it: the pictures of a Collada file and the
-buffers of a glTF file, which are files of their own. A material library of an OBJ file
-is drawn by nothing here.
+A mesh is written with the pictures of a Collada file and the buffers of a glTF file,
+which are separate files. A material library of an OBJ file is drawn by nothing here.
 """
 
 import json
@@ -76,7 +75,7 @@ def _size(named: tuple[str, Path]) -> tuple[int, str]:
 
 
 def mesh_data(owner: str, files: Mapping[str, Path]) -> dict[str, Any]:
-    """Return meshes as JSON data; a warning names those that there is no room for.
+    """Return meshes as JSON data; a warning names those that do not fit.
 
     Args:
         owner: Whose meshes they are, for the warning.
@@ -113,7 +112,7 @@ def mesh_data(owner: str, files: Mapping[str, Path]) -> dict[str, Any]:
 
 @lru_cache(maxsize=100)
 def _warn(owner: str, left_out: tuple[tuple[str, str], ...]) -> None:
-    """Say once in a process what its logs lack."""
+    """Report once in a process which meshes its logs lack."""
     names = listing(f"{name} ({why})" for name, why in left_out)
     _log.warning(
         "logs of %s have no room for %d of its meshes (at most %g MB, packed): %s; "
@@ -221,7 +220,7 @@ def recorded_meshes(data: Any) -> dict[str, Path]:
 
 
 def is_recorded(file: Path, recorded: Path) -> bool:
-    """Return whether a file is still what a log says of it."""
+    """Return whether a file is the same as in the log."""
     if find_problem(file):
         return False
     return _named(_whole(file)[0]) == recorded.stem

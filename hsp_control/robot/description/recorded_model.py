@@ -165,7 +165,7 @@ def _joint_of(data: Mapping[str, Any]) -> Any:
 
 
 def _turning(axis: Sequence[float]) -> Any:
-    """Return a joint that turns often about an axis, which only a URDF can say."""
+    """Return a continuous joint about an axis, which only a URDF can declare."""
     xyz = " ".join(repr(float(each)) for each in axis)
     text = (
         '<robot name="one"><link name="a"/><link name="b"/>'

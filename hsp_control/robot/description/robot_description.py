@@ -1,4 +1,4 @@
-"""What a person says about a robot: its name or file, and how to load it."""
+"""The description of a robot: its name or file, and how to load it."""
 
 from collections.abc import Mapping
 from dataclasses import KW_ONLY, field, replace
@@ -42,7 +42,7 @@ class ToolFrame(Part, error=ModelError):
     """A frame to add to the robot, fixed to one of its frames."""
 
     parent: str
-    """Name of the robot's frame that it is fixed to."""
+    """Name of the robot's frame to which it is fixed."""
     translation: Vector3 = _ZERO
     """Its origin in the parent frame [m]."""
     rotation: Rotation = _ZERO
@@ -72,20 +72,20 @@ class OneRobot(Part, error=ModelError):
     mimic: Flag = True
     """Whether mimic joints follow their leading joints; if not, they move freely."""
     project_inertias: Flag = False
-    """Whether inertias that no body can have are replaced by the nearest that one can
-    have; mass and centre of mass stay."""
+    """Whether physically inconsistent inertias are replaced by the nearest consistent
+    ones; mass and centre of mass are kept."""
     xacro_args: Annotated[Mapping[str, str | bool | Number], READ_ONLY] = field(
         default_factory=ReadOnlyDict
     )
     """Arguments of a xacro file, by name; others have their defaults [-]."""
     srdf: FileName | None = None
-    """SRDF file whose disabled pairs of links never collide; by default the one beside
-    the URDF that is called like it, if there is one."""
+    """SRDF file whose disabled pairs of links never collide; by default the one of the
+    same name beside the URDF, if there is one."""
     motor_inertia: MotorInertias | None = None
     """Inertia of the rotors as the joints feel it, times their reductions squared
     [kg·m² or kg]: one number, or one for each joint in a list or by name; 0: the bare
-    links. ``bundled``: what the README of a bundled robot gives. By default what the
-    ``<transmission>`` elements of the URDF say."""
+    links. ``bundled``: those in the README of a bundled robot. By default those in the
+    ``<transmission>`` elements of the URDF."""
 
     def find(self, access: Access = ANYWHERE) -> RobotSource:
         """Return where it comes from; see `find_robot` and `find_description`.

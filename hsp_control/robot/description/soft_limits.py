@@ -1,7 +1,7 @@
 """The soft limits of a URDF's ``<safety_controller>``, written as a joint's limits.
 
-Pinocchio does not read them. A robot's own controller keeps its joints within them, so
-that nothing beyond them can be commanded.
+Pinocchio does not read them. A robot's own controller enforces them, so that no
+position beyond them can be commanded.
 """
 
 from xml.etree.ElementTree import Element

@@ -47,7 +47,7 @@ ShapeKind = Literal["box", "sphere", "capsule", "cylinder", "ellipsoid", "mesh"]
 
 @dataclass(frozen=True, eq=False)
 class BodyShape:
-    """A shape that is fixed to a body, as it is seen or as it collides."""
+    """A shape that is fixed to a body, visual or for collisions."""
 
     body: str  # name of the body's frame
     kind: ShapeKind  # what it is

@@ -61,7 +61,7 @@ _SINGLE = {
         "safety_controller",
     },
 }
-"""Elements of which others may contain one; parsers use one of several, silently."""
+"""Elements that others may contain once; parsers silently use one of several."""
 _OF_MJCF = "; an MJCF's robot is robot: {mjcf: FILE} in a configuration"
 _WITH_AXIS = {"revolute", "continuous", "prismatic", "planar"}
 
@@ -129,7 +129,7 @@ def problems(robot: Element) -> Iterator[tuple[str, str]]:
 
 
 def _hidden(robot: Element) -> Iterator[tuple[str, str]]:
-    """Yield the links and joints that are written where parsers do not look."""
+    """Yield the links and joints in places that parsers ignore."""
     for child in robot:
         if child.tag == "gazebo":
             continue
@@ -146,7 +146,7 @@ def _hidden(robot: Element) -> Iterator[tuple[str, str]]:
 
 
 def _no_tree(robot: Element) -> Iterator[tuple[str, str]]:
-    """Yield what makes the links no tree; parsers then drop a part, silently."""
+    """Yield why the links are no tree; parsers then silently drop a part."""
     links = [link.get("name") for link in robot.findall("link")]
     above: dict[str | None, tuple[str, str | None]] = {}  # its joint, and parent link
     for joint in robot.findall("joint"):

@@ -55,7 +55,7 @@ def is_xacro(file: Path) -> bool:
         check_ends(file)
         with file.open("rb") as opened:
             text = _COMMENT.sub(b"", opened.read(MAX_SIZE))
-    except OSError:  # reported by who reads the URDF
+    except OSError:  # reported by the reader of the URDF
         return False
     return _MACRO.search(text) is not None
 
@@ -70,7 +70,7 @@ def xacro_text(value: str | bool | float) -> str:
 
 
 class _Asked(dict[str, str]):
-    """Arguments that remember for which names xacro has asked."""
+    """Arguments that record the names that xacro has requested."""
 
     def __init__(self, arguments: Mapping[str, str]) -> None:
         super().__init__(arguments)
@@ -126,7 +126,7 @@ def expand(
 def _packages_found(
     substitution_args: Any, package_dirs: Sequence[Path]
 ) -> Iterator[None]:
-    """Let ``$(find package)`` look in folders; xacro itself asks an installed ROS 2."""
+    """Let ``$(find package)`` search folders; xacro itself uses an installed ROS 2."""
 
     def find(package: str) -> str:
         for folder in package_folders(package, package_dirs):

@@ -37,7 +37,7 @@ class Drive(Imperfection, family="drives", error=SimulationError):
 
     @abstractmethod
     def begin(self, robot: Robot, random: np.random.Generator) -> Driving:
-        """Return what drives in one run: a function with a memory of its own.
+        """Return the drive in one run: a function with its own memory.
 
         Args:
             robot: The simulated robot.
@@ -63,7 +63,7 @@ class DroppedPeriods(Drive, type="dropped"):
     never lost."""
 
     def begin(self, robot: Robot, random: np.random.Generator) -> Driving:
-        """Return what keeps the last effort that arrived; see `Drive.begin`."""
+        """Return a function that keeps the last effort; see `Drive.begin`."""
         last: Array | None = None
 
         def drive(tau: Array) -> tuple[Array, float]:
@@ -112,7 +112,7 @@ class EffortLag(Drive, type="lag"):
         return float(self.time_constant)
 
     def begin(self, robot: Robot, random: np.random.Generator) -> Driving:
-        """Return what follows, at first at the first effort; see `Drive.begin`."""
+        """Return the lag, which begins at the first effort; see `Drive.begin`."""
         return RunningLag(self.lag)
 
 
@@ -143,7 +143,7 @@ class EffortNoise(Drive, type="noise"):
     """Standard deviation of effort noise [N·m or N], one number or nv."""
 
     def begin(self, robot: Robot, random: np.random.Generator) -> Driving:
-        """Return what adds noise to the effort; see `Drive.begin`."""
+        """Return a function that adds noise to the effort; see `Drive.begin`."""
         with within("std"):
             std = robot.per_dof(self.std)
         return lambda tau: (tau + std * random.standard_normal(std.shape), 0.0)
@@ -160,7 +160,7 @@ class Jitter(Drive, type="jitter"):
     the end of its period at the latest."""
 
     def begin(self, robot: Robot, random: np.random.Generator) -> Driving:
-        """Return what draws a delay for each effort; see `Drive.begin`."""
+        """Return a function that draws a delay for each effort; see `Drive.begin`."""
         return lambda tau: (tau, float(random.uniform(0.0, self.longest)))
 
 
@@ -174,7 +174,7 @@ class Saturation(Drive, type="saturation"):
     from the URDF, where that has one."""
 
     def begin(self, robot: Robot, random: np.random.Generator) -> Driving:
-        """Return what clips the effort; see `Drive.begin`."""
+        """Return a function that clips the effort; see `Drive.begin`."""
         with within("limit"):
             limit = self._limit(robot)
         limit = np.where(limit > 0.0, limit, np.inf)

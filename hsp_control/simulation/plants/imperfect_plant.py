@@ -132,7 +132,7 @@ class ImperfectPlant(SampledPlant):
         return {**vars(self), "_sensing": [], "_driving": []}
 
     def _begin(self, q: Array, v: Array) -> None:
-        """Make what runs of all sensors and drives, for a start at (q, v)."""
+        """Begin all sensors and drives, for a start at (q, v)."""
         self._sensing: list[Sensing] = []
         self._driving: list[Driving] = []
         for sensor in self.sensors:

@@ -1,4 +1,4 @@
-"""What a simulated robot's model has otherwise than the controller's."""
+"""Differences of a simulated robot's model from the controller's."""
 
 from abc import ABC, abstractmethod
 from collections.abc import Iterable
@@ -49,9 +49,9 @@ def changed(robot: Robot, changes: Iterable[ModelChange], seed: int = 0) -> Robo
 class Inertias(ModelChange):
     """Differences of the bodies from the controller's model.
 
-    Every body that has mass is scaled and shifted, and then gets uniform random errors
-    of its own. The inertias stay physically consistent: the second moments of mass
-    along the principal axes change, each by its own random factor.
+    Every body that has mass is scaled and shifted, and then gets its own uniform random
+    errors. The inertias stay physically consistent: the second moments of mass along
+    the principal axes change, each by its own random factor.
     """
 
     mass_factor: Positive = 1.0
@@ -129,10 +129,10 @@ class MotorInertia(ModelChange):
 
 
 class Payload(ModelChange):
-    """A solid ball at a frame, which the controller does not know about."""
+    """A solid ball at a frame, which the controller's model lacks."""
 
     frame: str
-    """Name of the frame that the payload is fixed to [-]."""
+    """Name of the frame to which the payload is fixed [-]."""
     mass: Positive
     """Mass of the payload [kg]."""
     center: Vector3 = (0.0, 0.0, 0.0)

@@ -1,4 +1,4 @@
-"""What plants are, simulated robots that an effort moves, and what they share."""
+"""Plants: simulated robots that an effort moves; their common interface."""
 
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
@@ -41,7 +41,7 @@ class Plant:
 
     @property
     def dynamics(self) -> Dynamics | None:
-        """The engine's dynamics that move it, which may carry what a controller says.
+        """The engine's dynamics that move it, with a controller's declared payload.
 
         None if it is moved by something else.
         """
@@ -50,7 +50,7 @@ class Plant:
     def log_channels(
         self, t: float, q: Array, v: Array, tau: Array
     ) -> Mapping[str, LogChannel]:
-        """Return what to log of the plant, by name of the column.
+        """Return the plant's values to log, by name of the column.
 
         Contact forces are named ``plant.contact.<name>.force``.
 
@@ -69,7 +69,7 @@ class Plant:
     def contact_wrenches(
         self, t: float, q: Array, v: Array, tau: Array
     ) -> Mapping[str, Array]:
-        """Return what sensors in the contacts measure, by the name of the frame.
+        """Return the measurements of sensors in the contacts, by the name of the frame.
 
         Force and moment of the world on the robot, the moment about the frame's origin,
         in world axes, shape (6,) [N, N·m]; by default there are no sensors. An engine
@@ -84,7 +84,7 @@ class Plant:
         return NO_WRENCHES
 
     def inertial(self) -> Inertial | None:
-        """Return what an inertial measurement unit reported in the last measurement.
+        """Return the last measurement of an inertial measurement unit.
 
         None if there is no such unit.
         """
@@ -102,11 +102,11 @@ class ContinuousPlant(Plant, ABC):
     def acceleration(self, t: float, q: Array, v: Array, tau: Array) -> Array:
         """Return v' at time t [s], shape (nv,), for an effort of shape (nv,).
 
-        The arrays may be overwritten after the call: copy what is to be kept.
+        The arrays may be overwritten after the call: copy them to keep them.
         """
 
     def bind(self, q: Array, v: Array, tau: Array) -> Term:
-        """Return v' for what these arrays hold when it is computed."""
+        """Return v' for the values of these arrays when it is computed."""
         value = np.zeros(self.robot.nv)
 
         def compute(t: float) -> None:
@@ -116,7 +116,7 @@ class ContinuousPlant(Plant, ABC):
 
 
 class SampledPlant(Plant, ABC):
-    """A plant with a state of its own, which moves on under an effort that is held.
+    """A plant with its own state, which moves on under an effort that is held.
 
     Examples are an engine with its own integrator, joints with stiction, drives with
     delays, and a real robot. A run is one `reset`, then one `measure` and one `advance`
@@ -225,11 +225,11 @@ class IntegratedPlant(SampledPlant):
 
 
 class Imperfection(Part, ABC, error=SimulationError):
-    """What a sensor and a drive have in common: its place in a chain of them.
+    """The common base of sensors and drives: their place in a chain.
 
     A subclass declares its parameters as fields (see `Part`) and implements ``begin``.
-    It knows no robot and has no memory: ``begin`` makes what runs. A plant applies
-    those of a chain in the order of their stages, however they are given.
+    It refers to no robot and has no memory: ``begin`` returns the running part. A plant
+    applies those of a chain in the order of their stages, however they are given.
 
     Attributes:
         stage: The place in the chain; by default behind all of this package.

@@ -1,4 +1,4 @@
-"""Plants as values: what a configuration says about the simulated system."""
+"""Plants as values: a configuration's declaration of the simulated system."""
 
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
@@ -40,7 +40,7 @@ from hsp_control.simulation.plants.sensors import Sensors
 
 
 class PlantPart(Part, ABC, family="plants", error=SimulationError):
-    """What Python and YAML say about a plant; `build` makes what runs.
+    """The declaration of a plant in Python and YAML; `build` returns the plant.
 
     A subclass declares the parameters of its engine as fields (see `Part`) and
     implements `engine`. The fields below and what they do are common to all plants. A
@@ -53,11 +53,11 @@ class PlantPart(Part, ABC, family="plants", error=SimulationError):
     _: KW_ONLY
     robot: RobotDescription | None = None
     """The simulated robot [-], with the same joints; the controller's robot by
-    default. What it does not say is as in the controller's robot."""
+    default. Its omitted settings are those of the controller's robot."""
     inertias: Inertias = Inertias()
     """Differences of masses and inertias from the controller's model [-]."""
     payload: Payload | None = None
-    """A payload that the controller does not know about [-]."""
+    """A payload that the controller's model lacks [-]."""
     motor_inertia: Weights = 0.0
     """Rotor inertia times gear ratio squared [kg·m² or kg], one number or nv."""
     pushes: Annotated[Sequence[Push], AfterValidator(tuple)] = ()
@@ -91,7 +91,7 @@ class PlantPart(Part, ABC, family="plants", error=SimulationError):
     def push_off(self) -> float:
         """Acceleration with which its surfaces push off what slides, by its speed.
 
-        What is pressed with less comes loose [1/s]; 0: nothing is pushed off.
+        A contact pressed with less is lost [1/s]; 0: nothing is pushed off.
         """
         return 0.0
 

@@ -55,9 +55,9 @@ class Pushes:
     def __init__(self, robot: Robot, pushes: Sequence[Push] = ()) -> None:
         self.robot = robot
         self.pushes = tuple(pushes)  # the pushes that were declared
-        # that of somebody who pulls now; None: nobody does
+        # the present pull of a user; None: there is none
         self.spring: Spring | None = None
-        # whether somebody may pull, so that an integrator must ask again
+        # whether a user may pull, so that an integrator must query again
         self.reachable = False
         self._frames = {}
         for k, push in enumerate(pushes):

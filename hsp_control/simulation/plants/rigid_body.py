@@ -64,7 +64,7 @@ class RigidBodyPlant(ContinuousPlant):
 def is_exact(plant: Plant, robot: Robot) -> bool:
     """Return whether a plant is a controller's own model, and nothing else.
 
-    Pushes are no difference of the robot. What another class does is not known.
+    Pushes are no difference of the robot. Of another class it is not known.
     """
     if type(plant) is IntegratedPlant:
         plant = plant.plant

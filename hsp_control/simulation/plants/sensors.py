@@ -36,7 +36,7 @@ class Sensor(Imperfection, family="sensors", error=SimulationError):
     def begin(
         self, robot: Robot, q: Array, v: Array, random: np.random.Generator
     ) -> Sensing:
-        """Return what measures in one run: a function with a memory of its own.
+        """Return the sensor in one run: a function with its own memory.
 
         Args:
             robot: The simulated robot.
@@ -65,7 +65,7 @@ class DifferencedVelocity(Sensor, type="differenced_velocity"):
     def begin(
         self, robot: Robot, q: Array, v: Array, random: np.random.Generator
     ) -> Sensing:
-        """Return what replaces the joints' velocities; see `Sensor.begin`."""
+        """Return a function that replaces joint velocities; see `Sensor.begin`."""
         joints = robot.is_single_dof()
         last: tuple[float, Array] | None = None
 
@@ -93,7 +93,7 @@ class Encoder(Sensor, type="encoder_resolution"):
     def begin(
         self, robot: Robot, q: Array, v: Array, random: np.random.Generator
     ) -> Sensing:
-        """Return what rounds to the nearest count; see `Sensor.begin`."""
+        """Return a function that rounds to the nearest count; see `Sensor.begin`."""
         with within("resolution"):
             given = robot.per_dof(self.resolution)
         rounded = given > 0.0
@@ -119,7 +119,7 @@ class PositionNoise(Sensor, type="position_noise"):
     def begin(
         self, robot: Robot, q: Array, v: Array, random: np.random.Generator
     ) -> Sensing:
-        """Return what moves q by a random tangent vector; see `Sensor.begin`."""
+        """Return a function that adds a random tangent vector to q; `Sensor.begin`."""
         with within("std"):
             std = robot.per_dof(self.std)
         return lambda t, q, v: (
@@ -140,7 +140,7 @@ class VelocityNoise(Sensor, type="velocity_noise"):
     def begin(
         self, robot: Robot, q: Array, v: Array, random: np.random.Generator
     ) -> Sensing:
-        """Return what adds noise to the velocity; see `Sensor.begin`."""
+        """Return a function that adds noise to the velocity; see `Sensor.begin`."""
         with within("std"):
             std = robot.per_dof(self.std)
         return lambda t, q, v: (q, v + std * random.standard_normal(std.shape))
@@ -169,7 +169,7 @@ class SensorDelay(Sensor, type="delay"):
 
 
 class Imu(Sensor, type="imu"):
-    """A gyroscope and an accelerometer at a frame; q and v stay as they are.
+    """A gyroscope and an accelerometer at a frame; q and v are not changed.
 
     It reports means over a period: by how much the orientation R and the velocity v of
     the frame have changed from one measurement to the next, in the axes of the first,
@@ -177,7 +177,7 @@ class Imu(Sensor, type="imu"):
         ω = log(R₀ᵀ R) / h + b_g + n_g,    f = R₀ᵀ ((v - v₀) / h - g) + b_a + n_a,
 
     as units do that sample fast and integrate. So it works with every engine, and no
-    impact is lost. At the first measurement the frame counts as unaccelerated.
+    impact is lost. At the first measurement the frame is taken as unaccelerated.
 
     The white noise n of density σ has the standard deviation σ / √h; the biases b are
     drawn at the start, and walk. The defaults are those of the ADIS16448, as in the
@@ -187,7 +187,7 @@ class Imu(Sensor, type="imu"):
     stage: ClassVar[float] = 15.0
 
     frame: str
-    """Name of the frame that it is fixed to [-]."""
+    """Name of the frame to which it is fixed [-]."""
     _: KW_ONLY
     gyroscope_noise: NonNegative = 1.7e-4
     """Density of the gyroscope's white noise [rad/s/√Hz]."""

@@ -125,7 +125,7 @@ def test_a_mass_matrix_that_is_nearly_singular(look: Look) -> None:
 
 
 def test_motors_that_cannot_hold_the_robot_at_home(look: Look, tmp_path: Path) -> None:
-    """What gravity asks is the slope of the potential energy."""
+    """What gravity requires is the slope of the potential energy."""
     assert "effort" not in look(ARM)
     robot = Robot.load(tmp_path / "arm.urdf")
     model, home = robot.model, robot.home()
@@ -140,7 +140,7 @@ def test_motors_that_cannot_hold_the_robot_at_home(look: Look, tmp_path: Path) -
     weak = ARM.replace('effort="9"', f'effort="{limit}"')
     (found,) = look(weak)["effort"]
     assert found.element == f"joint {robot.dof_names[int(np.argmax(slope))]!r}"
-    asked = f"gravity asks {max(slope):.3g} N·m of it, its limit is {limit:.3g}"
+    asked = f"gravity requires {max(slope):.3g} N·m of it, its limit is {limit:.3g}"
     assert found.message == f"at home {asked}"
     assert "effort" not in look(ARM.replace('effort="9"', 'effort="0"'))  # none is kept
 

@@ -223,7 +223,7 @@ def test_check_tells_of_targets_along_some_axes_and_of_hands_on_legs(
 def test_check_warns_of_motors_that_cannot_hold_the_robot(
     capsys: pytest.CaptureFixture[str],
 ) -> None:
-    """At the start of this run gravity asks 23 N·m of joint 2."""
+    """At the start of this run gravity requires 23 N·m of joint 2."""
     assert main(["check", "panda_obstacle"]) == 0
     assert "none binds at the start" in capsys.readouterr().out
     weak = ["--set", "limits={effort: {joints: {panda_joint2: 20}}}"]
@@ -232,8 +232,8 @@ def test_check_warns_of_motors_that_cannot_hold_the_robot(
     assert "bind at the start: the law is not exact there" in text
     (line,) = [line for line in text.splitlines() if "cannot hold" in line]
     assert line == (
-        "At the start joint 'panda_joint2' cannot hold the robot: gravity asks 23.2 "
-        "N·m of it, its limit is 20."
+        "At the start joint 'panda_joint2' cannot hold the robot: gravity requires "
+        "23.2 N·m of it, its limit is 20."
     )
     assert main(["check", "panda_obstacle", *weak, "--json"]) == 0
     told = json.loads(capsys.readouterr().out)

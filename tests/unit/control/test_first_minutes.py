@@ -161,7 +161,7 @@ def test_a_jump_of_a_tenth_of_a_limit_is_warned_of(seed: int, name: str) -> None
 
 
 FIRST_EFFORT = (
-    r"the first effort of joint 'panda_joint2' is 21.1 N·m, but gravity asks for "
+    r"the first effort of joint 'panda_joint2' is 21.1 N·m, but gravity requires "
     r"-3\.99 N·m: a jump of 29 % of its limit of 87 N·m; let tasks begin gently with "
     r"blend(=|: )1\.0, or start on the trajectory with its velocity$"
 )
