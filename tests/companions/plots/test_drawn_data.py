@@ -30,7 +30,7 @@ from hsp_control import (
     simulate,
 )
 from hsp_control.companions.plots import log_series, palette, world
-from hsp_control.companions.plots.log_series import predicted_decay
+from hsp_control.companions.plots.log_series import decay_power, predicted_decay
 from hsp_control.companions.viewer.targets import read_targets
 from hsp_control.geometry import Scene, shapes
 from hsp_control.null_space.metrics import CoordinatesMetric
@@ -246,6 +246,9 @@ def test_a_scalar_gain_predicts_a_line_and_the_log_lies_on_it(
     predicted = named(drawn(plots.draw_null_space_error, log), "predicted")
     np.testing.assert_allclose(predicted[:, 1], norm[0] * np.exp(-10.0 * log.t))
     np.testing.assert_allclose(predicted[:, 1], norm, rtol=1e-3)
+    power = decay_power(log)  # of V = ‖e_N‖²/2
+    assert power is not None
+    np.testing.assert_allclose(power, 10.0 * norm**2, rtol=1e-12)
     late = changed(log, columns={"t": log.t + 5.0})  # the clock need not start at 0
     np.testing.assert_allclose(predicted_decay(late).slow, predicted[:, 1])
     g = log["field.g"].copy()

@@ -55,6 +55,26 @@ def test_a_recorded_loop_is_repeated(tmp_path: Path) -> None:
         recorder.record(output)
 
 
+def test_what_was_sent_is_recorded_and_for_how_long_it_was_held(
+    tmp_path: Path,
+) -> None:
+    """Five periods a row; the robot got half of each effort."""
+    path, controller = tmp_path / "sent.npz", law(hsp.JointCentering())
+    q, v, efforts = controller.robot.home(), np.zeros(7), []
+    with hsp.Recorder(controller, path, log_period=5 * PERIOD) as recorder:
+        for k in range(21):
+            output = controller.compute(PERIOD * k, q, v)
+            efforts.append(0.5 * output.tau)
+            recorder.record(output, 0.5 * output.tau)
+    log = hsp.Rollout.load(path)
+    np.testing.assert_array_equal(log.tau, efforts[::5])
+    assert log.config is not None
+    simulation = log.config["simulation"]
+    assert simulation["control_period"] == pytest.approx(PERIOD)
+    assert simulation["log_period"] == 5 * PERIOD
+    assert simulation["duration"] == 4 * 5 * PERIOD
+
+
 def test_what_cannot_be_repeated_says_why_and_an_error_ends_the_log(
     tmp_path: Path,
 ) -> None:

@@ -7,7 +7,12 @@ import pytest
 
 import hsp_control as hsp
 from hsp_control.common.arrays import Array
-from hsp_control.simulation.measures import PULL_COLUMN, measures, unreached
+from hsp_control.simulation.measures import (
+    PULL_COLUMN,
+    forces_kept,
+    measures,
+    unreached,
+)
 
 
 @cache
@@ -96,3 +101,43 @@ def test_a_robot_that_stands_needs_the_effort_of_gravity() -> None:
     assert found["effort.rms"].value == pytest.approx(np.linalg.norm(gravity), rel=1e-6)
     assert found["effort.max"].value == pytest.approx(np.abs(gravity).max(), rel=1e-6)
     assert found["effort.rms"].unit == "N·m"
+
+
+def test_rows_that_come_later_go_on_where_the_others_ended() -> None:
+    """As in a play: an error that rests all the time is not new in each piece."""
+    t = np.arange(0.0, 1.0, 0.01)
+    error = np.tile([0.3, 0.0, 0.0], (len(t), 1))
+    columns = {"t": t, "task.hand.error": error, "damped": np.ones(len(t))}
+    columns["task.hand.error_rate"] = np.where((t < 0.2)[:, None], 1.0, 0.0 * error)
+    tasks = {"hand": {"error": [["position", "m", "m/s", 3]]}}
+    (whole,) = unreached(columns, tasks)
+    assert 0.0 in whole.out
+    assert 0.3 in whole.out
+    moved: dict[str, float] = {}
+    found = []
+    for first in range(0, len(t), 10):
+        rows = {name: column[first : first + 10] for name, column in columns.items()}
+        (piece,) = unreached(rows, tasks, moved)
+        found.append(piece.out)
+    np.testing.assert_array_equal(np.concatenate(found), whole.out)
+
+
+def test_a_kept_force_is_without_its_feedback_and_lost_after_it_was_touched() -> None:
+    normal = np.array([0.0, 0.6, 0.8])
+    wanted = np.array([np.nan, 20.0, 20.0, 20.0, 20.0, 20.0])
+    actual = np.array([0.0, 0.0, 18.0, 19.0, 0.0, 20.5])
+    added = np.array([0.0, 0.0, 1.0, 2.0, 3.0, 3.0])
+    columns = {
+        "contact.tool.commanded": (wanted + added)[:, None] * normal,
+        "contact.tool.force": (wanted + added - 0.5)[:, None] * normal,
+        "contact.tool.integral": added,
+        "plant.contact.tip.force": actual[:, None] * normal,
+    }
+    about = {"normal": normal.tolist(), "frame": "tip"}
+    meta = {"columns": {"contact.tool.commanded": about, "contact.tool.force": {}}}
+    (kept,) = forces_kept(hsp.Rollout(columns, meta))
+    assert kept.contact == "tool"
+    np.testing.assert_allclose(kept.wanted, np.full(5, 20.0), rtol=1e-14)
+    np.testing.assert_allclose(kept.planned, np.full(5, 19.5), rtol=1e-14)
+    np.testing.assert_allclose(kept.actual, actual[1:], rtol=1e-14)
+    assert kept.lost == 1  # before it was touched nothing was lost
