@@ -13,7 +13,8 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
 
-from PIL import Image
+import numpy as np
+from PIL import Image, ImageChops
 
 from hsp_control.companions.film import FilmStyle, export_film
 from hsp_control.simulation import Rollout
@@ -21,10 +22,11 @@ from hsp_control.simulation import Rollout
 ROOT = Path(__file__).resolve().parents[1]
 FOLDER = ROOT / "docs" / "figures" / "examples"
 SIZE = (480, 320)
-RUNS = {  # example: its log, and the moment [s]
+RUNS: dict[str, tuple[str, *tuple[float, ...]]] = {
+    # example: its log, and the moment [s], or several side by side
     "own_urdf.py": ("own_urdf", 1.8),
-    "xacro_gripper.yaml": ("xacro_gripper", 1.6),
-    "two_arms.yaml": ("two_arms", 3.0),
+    "xacro_gripper.yaml": ("xacro_gripper", 1.57, 2.62),
+    "two_arms.yaml": ("two_arms", 2.4, 4.0),
     "own_cost.py": ("own_cost_function", 2.9),
     "own_cost.yaml": ("own_cost", 1.2),
     "moving_obstacle.yaml": ("moving_obstacle", 2.2),
@@ -40,8 +42,26 @@ RUNS = {  # example: its log, and the moment [s]
     "mujoco_model.py": ("mujoco_model", 2.0),
     "franka_arm.py": ("franka_arm", 1.5),
 }
+VIEWS: dict[str, dict[str, Any]] = {  # where the run's own view hides the idea
+    "xacro_gripper.yaml": {
+        "camera": [0.75, 0.16, 1.12],
+        "target": [0.02, 0.0, 0.98],
+        "show": {"targets": False, "paths": False},
+    },
+    "two_arms.yaml": {
+        "camera": [1.9, 0.25, 0.95],
+        "target": [0.3, 0.0, 0.48],
+        "show": {"frames": True},
+    },
+}
+OVERLAID = ("two_arms.yaml",)  # the second moment pale behind the first one
 FIGURES = ("paper_figure.py", "sweep.py", "lesson.ipynb", "gymnasium_pusher.py")
 """Examples that draw, or that are drawn here otherwise."""
+LIT = """
+light = env.unwrapped.model.vis.headlight
+light.ambient[:], light.diffuse[:] = 0.45, 0.5
+picture = env.render()
+"""
 
 
 def main() -> None:
@@ -62,7 +82,7 @@ def main() -> None:
 
 def photograph(name: str, folder: Path, file: Path) -> None:
     """Run an example, and show its log at a moment."""
-    log, moment = RUNS[name]
+    log, *moments = RUNS[name]
     if name == "franka_arm.py":
         words = ["hsp_control", "franka-box", "panda_obstacle", "--lockstep"]
         box = subprocess.Popen(
@@ -80,9 +100,22 @@ def photograph(name: str, folder: Path, file: Path) -> None:
     else:
         run_python(name, folder)
     found = next(folder.glob(f"out/{log}.*"))
-    style = FilmStyle(SIZE, 1.0, plots=False, caption=False, start=moment, end=moment)
+    view = {"background": "#FFFFFF", **VIEWS.get(name, {})}
+    wide = SIZE[0] if name in OVERLAID else SIZE[0] // len(moments)
     os.chdir(folder)  # where the log's own code is
-    export_film(Rollout.load(found), file, style=style, background="#FFFFFF")
+    picture = Image.new("RGB", SIZE, "white")
+    for k, moment in enumerate(moments):
+        at = {"start": moment, "end": moment}
+        style = FilmStyle((wide, SIZE[1]), 1.0, plots=False, caption=False, **at)
+        export_film(Rollout.load(found), file, style=style, **view)
+        taken = Image.open(file).convert("RGB")
+        if k and name in OVERLAID:
+            white = Image.new("RGB", SIZE, "white")
+            picture = ImageChops.darker(picture, Image.blend(white, taken, 0.35))
+        else:
+            picture.paste(taken, (k * wide, 0))
+    if len(moments) > 1:
+        picture.save(file, quality=80, method=6)
 
 
 def draw(name: str, folder: Path, file: Path) -> None:
@@ -100,12 +133,20 @@ def draw(name: str, folder: Path, file: Path) -> None:
     os.chdir(folder)
     (folder / "out").mkdir(exist_ok=True)
     if name == "gymnasium_pusher.py":
-        script = script.replace('"Pusher-v5"', '"Pusher-v5", render_mode="rgb_array"')
-        script = script.replace("env.close()", "picture = env.render()\nenv.close()")
+        near = {"distance": 1.9, "azimuth": 150.0, "elevation": -28.0}
+        near["lookat"] = np.array([0.15, -0.35, -0.2])
+        space |= {"size": {"width": 2 * SIZE[0], "height": 2 * SIZE[1]}, "near": near}
+        script = script.replace(
+            '"Pusher-v5"',
+            '"Pusher-v5", render_mode="rgb_array", default_camera_config=near, **size',
+        )
+        script = script.replace("env.close()", f"{LIT}\nenv.close()")
         os.environ.setdefault("MUJOCO_GL", "egl")
     exec(compile(script, name, "exec"), space)
     if "picture" in space:
-        Image.fromarray(space["picture"]).save(picture)
+        pixels = space["picture"].copy()
+        pixels[(pixels < 2).all(axis=2)] = 255  # there is nothing
+        Image.fromarray(pixels).save(picture)
     else:
         space["figure"].savefig(picture, dpi=160)
     image = Image.open(picture).convert("RGB")

@@ -11,7 +11,7 @@ from hsp_control.common.arrays import Array
 Json = dict[str, Any]
 
 CAMERA, CAPTION, CLIP, PLAY = "/camera", "/caption", "/clip", "/play"
-PLOTS = "/plots"
+PLOTS, MESHES = "/plots", "/meshes"
 _SEPARATOR = "\0"
 _STAGE = {"Background", "camera", "caption", "floor", "lights"}
 
@@ -48,6 +48,8 @@ class LatestCommands:
         for command in commands:
             if command.deletes:
                 self._drop(command.path)
+            if command.path == MESHES and command.key in self._packed:
+                continue  # the same file; what is drawn from it comes later
             self._packed.pop(command.key, None)  # the new one comes last
             if deletions or not command.deletes:
                 self._packed[command.key] = command.packed

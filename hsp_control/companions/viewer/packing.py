@@ -15,6 +15,7 @@ from numpy.typing import ArrayLike, NDArray
 from hsp_control.common.arrays import Array, Indices
 from hsp_control.common.exceptions import ExportError
 from hsp_control.companions.viewer.commands import Json, typed_array
+from hsp_control.companions.viewer.mesh_files import with_files
 from hsp_control.companions.viewer.threejs import material, matrix, unique_name
 
 CLOCK_STEP = 1e-6  # resolution of times [s]
@@ -270,7 +271,7 @@ _TRAIL_STEP = 5e-5  # resolution of a trail's points [m]
 
 def reduce_scene(commands: Iterable[Json], arrays: ArrayTable) -> list[Json]:
     """Return commands that show the same scene in fewer bytes."""
-    return [_reduced(command, arrays) for command in commands]
+    return [_reduced(command, arrays) for command in with_files(commands)]
 
 
 def _reduced(command: Json, arrays: ArrayTable) -> Json:

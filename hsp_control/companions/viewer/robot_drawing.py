@@ -21,6 +21,7 @@ from hsp_control.companions.viewer.commands import (
     set_object,
     set_transform,
 )
+from hsp_control.companions.viewer.mesh_files import MeshFiles
 from hsp_control.companions.viewer.motion import RunMotion, Track, pose_tracks
 from hsp_control.geometry.links import part_of
 from hsp_control.geometry.mesh_loading import facets, load_mesh
@@ -311,10 +312,13 @@ class RobotDrawing:
             if body is not None:
                 yield set_object(f"{self._nodes[joint]}/placeholder", body)
         links: dict[tuple[int, str], list[Json]] = {}
+        files = MeshFiles()
         for visual in self._visuals:
             thing = _thing(visual)
             if thing is not None:
-                links.setdefault((visual.joint, visual.link), []).append(thing)
+                own = links.setdefault((visual.joint, visual.link), [])
+                own.append(files.taken_from(thing))
+        yield from files.commands()
         for (joint, link), things in links.items():
             path = f"{self._nodes[joint]}/{path_element(link)}"
             yield set_object(path, threejs.group(things))

@@ -12,9 +12,12 @@ from clips import Clip, Recorder, told
 from hsp_control import Obstacle, Robot, Rollout, load_experiment
 from hsp_control.common.exceptions import ViewerError
 from hsp_control.companions.viewer import Viewer, robot_of, view_logs
-from hsp_control.companions.viewer.commands import CAMERA, CAPTION, CLIP
+from hsp_control.companions.viewer.commands import CAMERA, CAPTION, CLIP, unpack
+from hsp_control.companions.viewer.mesh_files import with_files
 from hsp_control.companions.viewer.motion import motion_of
+from hsp_control.companions.viewer.robot_drawing import RobotDrawing
 from hsp_control.companions.viewer.threejs import _Y_TO_Z
+from hsp_control.companions.viewer.transport import SceneRecorder
 from hsp_control.geometry import Scene, shapes
 from hsp_control.trajectories import Hold
 
@@ -284,3 +287,37 @@ def test_a_log_whose_robot_is_gone_says_so(run: Rollout) -> None:
     lost = Rollout(run.columns, {**meta, "config": config})
     with pytest.raises(ViewerError, match=r"cannot be rebuilt.*planar4r"):
         robot_of(lost)
+
+
+def from_files(command: dict[str, Any]) -> list[dict[str, Any]]:
+    """Return what of an object is drawn from mesh files."""
+    if command["type"] != "set_object":
+        return []
+    thing = command["object"]
+    things = [*thing.get("geometries", []), thing["object"]]
+    things += thing["object"].get("children", [])
+    return [each for each in things if "file" in each]
+
+
+def test_a_mesh_file_comes_once_and_before_what_is_drawn_from_it() -> None:
+    robot, recorder = load_experiment("dual_panda").robot, SceneRecorder()
+    Viewer(robot, transport=recorder)
+    one = SceneRecorder()
+    Viewer(Robot.load("panda"), transport=one)
+    recorder.send(RobotDrawing(robot, "/again").draw())  # as of a second run
+    commands = [unpack(packed) for *_, packed in recorder.scene.items()]
+    known: set[str] = set()
+    for command in commands:
+        if command["type"] == "mesh_file":
+            assert command["file"] not in known
+            known.add(command["file"])
+        assert {each["file"] for each in from_files(command)} <= known
+    other = [unpack(packed) for *_, packed in one.scene.items()]
+    files = {each["file"] for each in other if each["type"] == "mesh_file"}
+    assert known == files
+    # An export has them where their names were.
+    shown = [*with_files(commands)]
+    assert not any(command["type"] == "mesh_file" for command in shown)
+    drawn = [each for command in shown for each in from_files(command)]
+    assert len(drawn) > 2 * len(known)
+    assert all("data" in each for each in drawn)

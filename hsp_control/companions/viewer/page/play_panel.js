@@ -261,10 +261,19 @@ class PlayBars {
     this.box.hidden = !names.length;
     this.rows = names.map((name) => ["q", "v", "τ"].map((what) =>
       make("i", {className: what === "q" ? "position" : "", title: `${what} of ${name}`})));
+    const short = PlayBars.short(names);
     const cells = names.flatMap((name, k) =>
-      [make("span", {}, name), ...this.rows[k].map((bar) => make("b", {}, bar))]);
+      [make("span", {title: name}, short[k]), ...this.rows[k].map((bar) => make("b", {}, bar))]);
     const heads = ["", "q", "v", "τ"].map((text) => make("small", {}, text));
     part("div", this.box).replaceChildren(...heads, ...cells);
+  }
+
+  // Names without the words that all have: there is little space.
+  static short(names) {
+    const words = names.map((name) => name.split("_"));
+    const own = (word) => !words.every((others) => others.includes(word));
+    const found = words.map((each) => each.filter(own).join("_"));
+    return found.every(Boolean) ? found : names;
   }
 
   show({q, v, tau}) {

@@ -42,6 +42,7 @@ const commandHandlers = {
   status({text}) { part("#caption .status").textContent = text; },
   ghost({path, color, opacity}) { makeGhost(node(path), color, opacity); },
   trail(command) { viewer.set_object(elements(command.path), trailMesh(command)); },
+  mesh_file({file, data, resources}) { meshFiles.set(file, {data, resources}); },
   length_label({path}) { lengthLabels.paths.add(path); },
   clip(command) { if (command.begins) player.load(command, command.keep); else player.extend(command); },
   still() { player.unload(); },
@@ -281,7 +282,7 @@ function set_object(command) {
     return apply.call(this, matrix);
   };
   try {
-    meshcat(command);
+    meshcat(withFiles(command));
   } finally {
     BufferGeometry.prototype.applyMatrix4 = apply;
   }
@@ -295,6 +296,19 @@ function set_object(command) {
       ? object.material.map(lit) : lit(object.material);
     if (drawsLightly) simplify(object);
   });
+}
+
+// The content of mesh files, which come once each; objects name them.
+const meshFiles = new Map();
+
+function withFiles(command) {
+  const fill = (owner) => {
+    Object.assign(owner, meshFiles.get(owner.file));
+    owner.children?.forEach(fill);
+  };
+  const {geometries = [], object} = command.object;
+  [...geometries, object].forEach(fill);
+  return command;
 }
 
 // One geometry for all meshes of a name, in whichever robot or run: its normals are computed once, and
