@@ -37,7 +37,7 @@ from hsp_control.live import (
 from hsp_control.live.hardware import AdaptingHardware, LocatedHardware
 from hsp_control.live.operator_requests import stop_signals
 from hsp_control.simulation import Rollout
-from hsp_control.simulation.run_summary import excess_rows, unexplained_rows
+from hsp_control.simulation.run_summary import summary_rows
 
 _DRY_RUN = 0.5  # duration of the run before, in which all is done once [s]
 _DRY_RUN_OF_A_PLAN = 3.0  # the same with a plan, which has to come to its steps [s]
@@ -200,6 +200,15 @@ def _times(report: LoopReport, experiment: Experiment) -> Table:
     return table
 
 
+def _summary(rollout: Rollout) -> Table:
+    """Return what a log says of the run, as ``hsp run`` prints it."""
+    title = str(rollout.meta.get("name", ""))
+    table = Table(title=title, box=None, pad_edge=False, show_header=False)
+    for row in summary_rows(rollout):
+        table.add_row(*row)
+    return table
+
+
 def _packets(
     counts: dict[str, int],
     injected: dict[str, int],
@@ -254,7 +263,6 @@ def _convert(journal: Path, **meta: Any) -> bool:
         print(f"hsp: {error}", file=sys.stderr)
         return False
     journal.unlink(missing_ok=True)
-    for row in [*excess_rows(rollout), *unexplained_rows(rollout)]:
-        out.print(f"{log.stem}: {row}", highlight=False)
+    out.print(_summary(rollout))
     out.print(f"Log: {log}")
     return True

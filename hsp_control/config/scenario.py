@@ -118,6 +118,8 @@ class ShownItems(Part, error=ViewerError):
     most [-]."""
     contacts: Flag = True
     """The contacts and their forces [-]."""
+    frames: Flag = False
+    """The axes of the tasks' frames, at the robot and at their targets [-]."""
     grid: Flag = True
     """The grid on the floor [-]."""
 

@@ -15,7 +15,7 @@ import numpy as np
 
 from hsp_control.common.arrays import Array
 from hsp_control.control.active_stack import ActiveStack
-from hsp_control.control.actuation import Actuation, Delivered
+from hsp_control.control.actuation import Actuation, Delivered, Status
 from hsp_control.control.actuation.limits_in_force import LimitSet, LimitsInForce
 from hsp_control.control.actuation.support import Support
 from hsp_control.control.bound_step import BoundStep
@@ -158,7 +158,8 @@ class Mixture:
         sets = self._limits.sets
         single = len(self._parts) == len(sets) == 1
         shares: list[float] = []
-        parts: list[Delivered] = []
+        parts: list[Array] = []
+        worst, relaxation = Status.EXACT, 0.0
         whole = self._parts[-1].support
         for active in self._parts:
             a, offset = active.acceleration, None
@@ -170,16 +171,14 @@ class Mixture:
                     return one
                 shares.append(active.share * share)
                 forces = _placed(one.forces, active.support, whole)
-                # The next part overwrites them.
-                copies = one.effort.copy(), one.acceleration.copy(), forces
-                parts.append(Delivered(*copies, one.status, one.relaxation))
-        efforts, accelerations, forces_of, statuses, relaxations = zip(
-            *parts, strict=True
+                # A copy: the next part overwrites them.
+                parts.append(np.concatenate((one.effort, one.acceleration, forces)))
+                worst = max(worst, one.status)
+                relaxation = max(relaxation, one.relaxation)
+        mean, nv = _mean(shares, parts), len(one.effort)
+        return Delivered(
+            mean[:nv], mean[nv : 2 * nv], mean[2 * nv :], worst, relaxation
         )
-        effort, a, force = (
-            _mean(shares, each) for each in (efforts, accelerations, forces_of)
-        )
-        return Delivered(effort, a, force, max(statuses), max(relaxations))
 
     def bound_step(self, origin: Array) -> BoundStep | None:
         """Return a step as one call; None if it may change.
@@ -244,13 +243,14 @@ class Mixture:
 def _mean(shares: Sequence[float], parts: Sequence[Array]) -> Array:
     """Return the weighted mean; not even by rounding does it leave their range."""
     x = np.array(parts)
-    return np.asarray(np.clip(shares @ x, x.min(axis=0), x.max(axis=0)))
+    mean = np.maximum(np.array(shares) @ x, x.min(axis=0))
+    return np.asarray(np.minimum(mean, x.max(axis=0)))
 
 
 def _placed(forces: Array, support: Support, whole: Support) -> Array:
-    """Return forces of some contacts at their places among those of all, as a copy."""
-    if support.contacts == whole.contacts:
-        return forces.copy()
+    """Return forces of some contacts at their places among those of all."""
+    if support is whole or support.contacts == whole.contacts:
+        return forces
     placed = np.zeros((whole.size // 3, 3))
     for contact, points in zip(support.contacts, support.points, strict=True):
         place = whole.points[whole.contacts.index(contact)]

@@ -1,6 +1,6 @@
 """What a controller returns: an effort, and everything that explains it."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -64,7 +64,7 @@ class ControlOutput:
         delivered: Delivered,
         stack: ActiveStack,
         damped: str,
-        measured: Sequence[tuple[str, Array]],
+        measured: Sequence[tuple[str, Callable[[], Array]]],
     ) -> None:
         """Copy what a step wrote: its effort, its memory, the distances it measured."""
         tau, a, forces, self.status, self.relaxation = delivered
@@ -74,14 +74,16 @@ class ControlOutput:
         self.forces = forces.copy() if stack.has_forces else forces
         self._distances = ()
         if measured:
-            self._distances = [(name, found.tobytes()) for name, found in measured]
+            self._distances = [(name, found().tobytes()) for name, found in measured]
 
     @property
     def distances(self) -> dict[str, float]:
         """The smallest distance that each barrier measured [m], by its name.
 
-        The names are those of the types, such as ``obstacle_distance``; of one type
-        they are numbered. The distance of shapes that overlap is negative.
+        Of a barrier of one's own: its smallest value, in its unit. The names are those
+        of the log's columns ``distance.NAME`` and ``barrier.NAME``: the types, such as
+        ``obstacle_distance``; of one type they are numbered. The distance of shapes
+        that overlap is negative.
         """
         return {n: float(np.frombuffer(d).min()) for n, d in self._distances}
 
@@ -149,7 +151,7 @@ class ControlOutput:
             f"|{name}| = {np.linalg.norm(each):.3g}" for name, each in sizes.items()
         ]
         for name, distance in self.distances.items():
-            notes.append(f"{name} = {distance:.3g} m")
+            notes.append(f"{name} = {distance:.3g}")
         if self.damped:
             notes.append(f"damped: {self.damped}")
         tau = np.round(self.tau, 3).tolist()

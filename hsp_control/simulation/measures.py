@@ -89,6 +89,12 @@ def distances(rollout: Log) -> list[str]:
     return [name.removeprefix("distance.") for name in names]
 
 
+def barriers(rollout: Log) -> list[str]:
+    """Return the names of the barriers of one's own whose value is in the log."""
+    names = (name for name in rollout.columns if name.startswith("barrier."))
+    return [name.removeprefix("barrier.") for name in names]
+
+
 def column_unit(rollout: Log, name: str) -> str:
     """Return the unit of a column in the log; a dash if it has none."""
     unit = str(rollout.meta.get("columns", {}).get(name, {}).get("unit", "-"))
@@ -264,8 +270,8 @@ def measures(rollout: Log) -> dict[str, Measure]:
     for field in distances(rollout):
         name, meaning = f"distance.{field}", f"minimum distance of {field}"
         add(f"{name}.min", _smallest(rollout[name]), "m", meaning)
-    for name in (each for each in rollout.columns if each.startswith("barrier.")):
-        meaning = f"smallest value of {name.removeprefix('barrier.')}"
+    for own in barriers(rollout):
+        name, meaning = f"barrier.{own}", f"smallest value of {own}"
         add(f"{name}.min", _smallest(rollout[name]), "–", meaning)
     tau, unit = rollout.tau, effort_unit(rollout)
     add("effort.max", _largest(np.abs(tau)), unit, "largest effort")

@@ -11,6 +11,7 @@ from hsp_control.simulation.measures import (
     FAR,
     OUT,
     Measure,
+    barriers,
     distances,
     effort_units,
     forces_kept,
@@ -64,6 +65,11 @@ def summary_rows(rollout: Log) -> Iterator[tuple[str, str]]:
         words = name.replace("_", " ")
         words = words if words.endswith("distance") else f"distance {words}"
         yield words, text + kept
+    for name in barriers(rollout):
+        least = rollout.meta["columns"][f"barrier.{name}"].get("minimum")
+        text = f"minimum {found[f'barrier.{name}.min'].value:.3g}"
+        kept = "" if least is None else f", to be at least {least:g}"
+        yield f"barrier {name}", text + kept
     largest = found["effort.max"].value
     dof = np.nanargmax(np.nanmax(np.abs(rollout.tau), axis=0))
     yield "effort", f"largest {largest:.3g} {effort_units(rollout)[dof]}"
@@ -126,7 +132,7 @@ def beyond_limits(rollout: Log) -> str:
     asked = np.linalg.norm(rollout["field.g"][-1])
     missing = rollout["null_space_norm"][-1]
     held = np.isin(rollout["status"][last], (2, 4)).all()
-    if not held or missing < LOST * asked or missing < STILL:
+    if not (held and missing >= LOST * asked and missing >= STILL):  # or NaN
         return ""
     unit = rate_unit(rollout)
     return (

@@ -14,7 +14,7 @@ import hsp_control as hsp
 pytestmark = pytest.mark.slow
 
 TIME_LIMIT = 1200.0  # s; only ends what hangs
-ROOMS = ["tasks", "config", "declaration", "cli"]
+ROOMS = ["config", "declaration", "cli"]
 """Whose tests run in the copy, but for thorough runs: those that meet companions."""
 COMPANIONS = {each.name for each in (ROOT / "hsp_control/companions").glob("[a-z]*")}
 

@@ -102,6 +102,9 @@ class LegendEntry(NamedTuple):
     # Whether the row is only a switch, as what it names explains itself: films leave it
     # out.
     plain: bool = False
+    # A short name: the switch is beside the views instead of in a row of its own.
+    short: str = ""
+    key: str = ""  # the key of the keyboard that does the same, if any
 
 
 def translucent(color: str, opacity: float) -> str:

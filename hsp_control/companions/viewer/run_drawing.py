@@ -16,6 +16,7 @@ from hsp_control.companions.viewer.commands import (
     delete,
     set_property,
 )
+from hsp_control.companions.viewer.frame_axes import frame_axes
 from hsp_control.companions.viewer.motion import Layer, RunMotion, Track
 from hsp_control.companions.viewer.obstacles import (
     logged_shapes,
@@ -49,6 +50,7 @@ def all_layers(
         "solids": solid_layer(motion, f"{root}/solids"),
         "ellipsoid": ellipsoid(robot, controller, f"{root}/ellipsoid"),
         "contacts": contacts(robot, motion, f"{root}/contacts"),
+        "frames": frame_axes(robot, motion, f"{root}/frames"),
     }
     if controller is not None:
         controller = from_the_start(controller, motion.rows)

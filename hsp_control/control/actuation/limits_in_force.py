@@ -8,6 +8,7 @@ import numpy as np
 from hsp_control import engine
 from hsp_control.common.arrays import Array
 from hsp_control.constraints.limits import (
+    Barrier,
     MinimumDistance,
     RobotLimits,
     barrier_names,
@@ -72,8 +73,10 @@ class LimitsInForce:
         self.sent = SentEffort(state, memory)
         self._rate = True  # the last effort in the memory limits the next one
         self._all: list[tuple[LimitSet, Evolution[float]]] = []
-        # where the steps write the distances of barriers [m], by the barriers' names
-        self.measured: list[tuple[str, Array]] = []
+        # each set in force, and its share in (0, 1]
+        self.sets: list[tuple[LimitSet, float]] = []
+        # what returns the distances of barriers in a step, by the barriers' names
+        self.measured: list[tuple[str, Callable[[], Array]]] = []
         self.plan(planned, -np.inf)
 
     def plan(self, planned: PlannedLimits, t: float) -> None:
@@ -92,18 +95,21 @@ class LimitsInForce:
         """Find the sets that are in force at a time [s]."""
         if always or len(self._all) > 1:
             shares = [(each, share.at(t)) for each, share in self._all]
-            # each set in force, and its share in (0, 1]
+            before = [] if always else [each for each, _ in self.sets]
             self.sets = [pair for pair in shares if pair[1] > 0.0]
-            self.measured = self._measured()
+            if [each for each, _ in self.sets] != before:
+                self.measured = self._measured()
 
-    def _measured(self) -> list[tuple[str, Array]]:
-        """Return where each step writes the distances of barriers, by their names."""
+    def _measured(self) -> list[tuple[str, Callable[[], Array]]]:
+        """Return what returns the distances of barriers, by their names.
+
+        The engine's steps write those of shapes; an own barrier is evaluated again.
+        """
         limits, state = [each.limits for each, _ in self.sets], self._state
         barriers = [b for each in limits if each is not None for b in each.barriers]
         return [
-            (name, each.clearance.proximity(state).distances)
+            (name, _distances(each, state))
             for name, each in zip(barrier_names(barriers), barriers, strict=True)
-            if isinstance(each, MinimumDistance)
         ]
 
     @property
@@ -204,3 +210,11 @@ def _numbers(limits: RobotLimits | None, nv: int) -> Array:
     x = limits
     rows = x.effort, x.effort_rate, x.velocity, x.lower, x.upper, *x.motion
     return np.asarray(np.concatenate(rows))
+
+
+def _distances(barrier: Barrier, state: RobotState) -> Callable[[], Array]:
+    """Return what returns the distances of a barrier at the step's state."""
+    if isinstance(barrier, MinimumDistance):
+        written = barrier.clearance.proximity(state).distances
+        return lambda: written
+    return lambda: np.atleast_1d(np.array(barrier.values(state.read_only), dtype=float))

@@ -608,6 +608,11 @@ def test_it_fits_a_phone(chromium: Any, viewer: Viewer) -> None:
         has_touch=True,
     )
     begin(page)
+    tell(page, "play_laws", laws=["no field"], law="")
+    bar = page.locator(".play-bar")
+    acts = "reset", "save", "page", "other", "preview", "back", "picture", "film"
+    for name in acts:
+        assert bar.locator(f".{name}").is_visible(), name
     assert page.locator(".play-panel").is_hidden()
     page.locator(".play-bar .panel").tap()
     until(

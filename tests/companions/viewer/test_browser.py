@@ -370,6 +370,7 @@ def test_a_row_of_the_legend_switches_what_it_names(
         "distance to the obstacle's centre": True,
         "manipulability": False,
         "self-motion in 0.2 s (pale: the field's)": True,
+        "axes": False,  # of the frames
         "robot": True,
         "grid": True,
         "shadow": True,
@@ -392,6 +393,9 @@ def test_a_row_of_the_legend_switches_what_it_names(
         assert states(watched)["manipulability"] is not was
         assert page.evaluate("node('/ellipsoid/tip').visible") is not was
         assert not page.evaluate("player.playing")
+    page.keyboard.press("f")
+    assert states(watched)["axes"]
+    assert page.evaluate("node('/frames/here/tip').visible")
 
 
 # -- the live view --------------------------------------------------------------------

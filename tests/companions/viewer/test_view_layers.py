@@ -541,3 +541,24 @@ def test_the_axes_of_an_ellipsoid_are_a_rotation_that_does_not_jump() -> None:
         squares = axes @ np.diag(lengths**2) @ axes.T
         np.testing.assert_allclose(squares, J @ J.T, atol=1e-10)
         last = axes
+
+
+def test_the_frame_axes_are_those_of_the_tasks_frames(
+    spatial: tuple[Experiment, Rollout], recorder: Recorder
+) -> None:
+    experiment, rollout = spatial
+    clip = drawn(experiment, rollout, recorder)
+    data, model = experiment.robot.model.createData(), experiment.robot.model
+    frame = experiment.robot.frame_id("panda_tcp")
+    target = rollout["task.hand.reference"]
+    for row in (0, len(rollout) - 1):
+        pin.forwardKinematics(model, data, rollout.q[row])
+        place = pin.updateFramePlacement(model, data, frame).homogeneous
+        here = clip.pose("/frames/here/panda_tcp", rollout.t[row])
+        np.testing.assert_allclose(here, place, atol=1e-9)
+        there = clip.pose("/frames/target/hand", rollout.t[row])
+        wanted = pin.XYZQUATToSE3(target[row]).homogeneous
+        np.testing.assert_allclose(there, wanted, atol=1e-9)
+    (row,) = (entry for entry in legend(recorder) if entry["key"] == "f")
+    assert row["name"] == "Frame axes: panda_tcp"
+    assert not row["shown"]

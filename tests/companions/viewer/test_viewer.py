@@ -120,14 +120,14 @@ def test_paths_target_and_obstacle_follow_the_log(
     assert caption["title"] == run.meta["title"]
     assert [entry["name"] for entry in caption["legend"]] == [
         "desired path", "actual path", "target", "obstacle disk", "manipulability",
-        "robot", "grid", "shadow",
+        "Frame axes: tip", "robot", "grid", "shadow",
     ]  # fmt: skip
     rows = {entry["name"]: entry for entry in caption["legend"]}
     assert rows["actual path"]["paths"] == ["/paths/tip/actual"]
     assert rows["obstacle disk"]["paths"] == ["/obstacles"]
     assert [name for name, row in rows.items() if not row["shown"]] == [
-        "manipulability"
-    ]
+        "manipulability", "Frame axes: tip",
+    ]  # fmt: skip
 
 
 def test_a_state_is_shown_with_what_the_run_did_then(

@@ -12,6 +12,7 @@ from hsp_control.cli.live_experiment import simulated_robot
 from hsp_control.live import InProcessRobot
 from hsp_control.live import hardware as live_hardware
 from hsp_control.live.hardware import AdaptingHardware, LocatedHardware
+from hsp_control.simulation.run_summary import summary_rows
 
 AWAY = 0.1
 
@@ -48,7 +49,9 @@ def command(tmp_path: Path, address: str) -> list[str]:
 
 
 @pytest.mark.system
-def test_it_begins_where_the_robot_is(tmp_path: Path) -> None:
+def test_it_begins_where_the_robot_is(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     hardware = Somewhere("hold", Robot.load("panda"), 0.001)
     assert isinstance(hardware, LocatedHardware)
     assert not isinstance(hardware, AdaptingHardware)
@@ -56,6 +59,10 @@ def test_it_begins_where_the_robot_is(tmp_path: Path) -> None:
     run = Rollout.load(tmp_path / "panda_obstacle-live.npz")
     assert run["q"][0] == pytest.approx(hardware.q, abs=1e-6)
     assert np.abs(run["task.hand.error"][run.t < 0.1]).max() < 1e-5
+    # What became of it is said as `hsp run` says it.
+    printed = " ".join(capsys.readouterr().out.split())
+    for name, words in summary_rows(run):
+        assert " ".join(f"{name} {words}".split()) in printed
 
 
 @pytest.mark.system

@@ -125,3 +125,16 @@ def test_an_own_barrier_is_logged_by_its_type() -> None:
     height = run["task.panda_tcp.actual"][:, 2]
     assert run["barrier.Height_0"] == pytest.approx(height, abs=1e-12)
     assert run.meta["columns"]["barrier.Height_1"]["minimum"] == 0.2
+    fresh = hsp.Controller(panda, [hsp.FramePosition("panda_tcp")], limits=limits)
+    for row in (0, 1):  # the second is bound: one call of the engine
+        output = fresh.compute(run.t[row], run.q[row], run.v[row])
+        now = pytest.approx(height[row], abs=1e-12)
+        assert output.distances == {"Height_0": now, "Height_1": now}
+    assert f"minimum {height.min():.3g}, to be at least 0.2" in str(run)
+
+
+def test_a_field_that_is_not_known_at_the_end_is_not_beyond_the_limits() -> None:
+    run = damped_run()
+    run.columns["status"][:] = 2.0
+    run.columns["null_space_norm"][:] = np.nan
+    assert run_summary.beyond_limits(run) == ""

@@ -17,6 +17,10 @@ class Legend {
       if (key === "Escape" && this.small.matches) this.setOpen(false);
     });
     on(this.small, "change", () => this.fit());
+    onKey(({key, repeat}) => {
+      const found = !repeat && this.rows.find(([entry]) => entry.key === key);
+      return found && (() => found[1].click());
+    });
     this.fit();
   }
 
@@ -37,16 +41,20 @@ class Legend {
     this.told = told;
     this.rows = entries.map((entry) => [entry, this.row(entry)]);
     this.toggle.hidden = !entries.length;
-    this.list.replaceChildren(this.views, ...this.rows.map(([{plain}, row]) =>
+    const own = this.rows.filter(([{short}]) => !short);
+    this.list.replaceChildren(this.views, ...own.map(([{plain}, row]) =>
       make("li", {className: plain ? "plain" : ""}, row)));
+    part(".beside", this.views).replaceChildren(
+      ...this.rows.filter(([{short}]) => short).map(([, row]) => row));
   }
 
-  row({name, color, paths}) {
-    return makeButton({style: `--color: ${color}`}, ({currentTarget: {ariaPressed}}) => {
+  row({name, color, paths, short, key}) {
+    const title = key ? `${name} (${key})` : "";
+    return makeButton({style: `--color: ${color}`, title}, ({currentTarget: {ariaPressed}}) => {
       for (const path of paths) this.choices.set(path, ariaPressed !== "true");
       this.apply();
       this.viewer.set_dirty();
-    }, name);
+    }, short || name);
   }
 
   // Bring the user's choices into the scene, and the scene's state into the rows.

@@ -52,7 +52,7 @@ class Plot {
     this.chart = null;  // what is told while the next one is made is not for the last one
     this.chart = new uPlot({
       width: clientWidth || 300, height: clientHeight || Plot.HEIGHT,
-      padding: [6, 12, 0, label ? 0 : 14], legend: {show: false}, scales, hooks,
+      padding: [6, 20, 0, label ? 0 : 14], legend: {show: false}, scales, hooks,
       series: [{}, ...series.map((each) => ({points: {show: false}, pxAlign: 0, ...each}))],
       axes: [
         {...axis, size: 20, gap: 2, space: 45, grid: {show: false}, values: Plot.numbers(" s"),
