@@ -212,6 +212,17 @@ $(STAMP): pyproject.toml constraints.txt
 # $(call install,.[extra,...]): this checkout with its extras, by uv where it is there, else
 # by pip. An environment that is broken is made anew.
 define install
+$(install-needs); \
+$$install --no-build-isolation --editable '$(1)'
+endef
+
+# An environment, and in it what the engine is built with: no more is needed to compile it.
+.venv/.needs: pyproject.toml constraints.txt
+	@echo "Installing what the engine is built with into .venv ..."
+	@$(install-needs)
+	@touch $@
+
+define install-needs
 $(find-python); \
 if command -v uv > /dev/null; then \
   $(BIN)/python -c '' 2> /dev/null || uv venv --quiet --clear --seed --python "$$python" .venv; \
@@ -220,8 +231,7 @@ else \
   $(BIN)/python -m pip --version > /dev/null 2>&1 || { $(call new-venv,"$$python",.venv); }; \
   install="env -u PIP_BUILD_CONSTRAINT $(BIN)/python -m pip install --quiet"; \
 fi; \
-$$install $$("$$python" hatch_build.py needs); \
-$$install --no-build-isolation --editable '$(1)'
+$$install $$("$$python" hatch_build.py needs)
 endef
 
 $(ENGINE): $(USE) hatch_build.py engine/CMakeLists.txt $(shell find engine -name '*.?pp')

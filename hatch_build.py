@@ -15,6 +15,8 @@ import subprocess
 import sys
 import sysconfig
 import tomllib
+from collections.abc import Iterator
+from contextlib import contextmanager
 from importlib.machinery import EXTENSION_SUFFIXES
 from pathlib import Path
 from typing import Any
@@ -90,6 +92,19 @@ def zig(folder: Path) -> list[str]:
     return options
 
 
+@contextmanager
+def alone(place: Path) -> Iterator[None]:
+    """Wait until no other process builds in a folder; it finds little left to do."""
+    try:
+        from fcntl import LOCK_EX, flock
+    except ImportError:  # Windows
+        yield
+        return
+    with (place / ".lock").open("w") as lock:
+        flock(lock, LOCK_EX)
+        yield
+
+
 def build(kind: str = "Release", folder: Path = ROOT / "build") -> Path:
     """Build the library, and return where it is.
 
@@ -101,6 +116,12 @@ def build(kind: str = "Release", folder: Path = ROOT / "build") -> Path:
     by = "" if compiler() else "-zig"
     place = folder / f"{kind}-{sysconfig.get_config_var('SOABI')}{by}".lower()
     place.mkdir(parents=True, exist_ok=True)
+    with alone(place):
+        return _built(kind, place)
+
+
+def _built(kind: str, place: Path) -> Path:
+    """Build in a folder that is ours alone."""
     # What was found last time may have been a build environment that is gone.
     (place / "CMakeCache.txt").unlink(missing_ok=True)
     options = [f"-DCMAKE_BUILD_TYPE={kind}", f"-DPython_EXECUTABLE={sys.executable}"]

@@ -26,15 +26,45 @@ void Dynamics::inverse_dynamics(const ConstVector& q, const ConstVector& v, cons
   effort = pin::rnea(pinocchio_->model, pinocchio_->data, q, v, a);
 }
 
-// Of models with followers CRBA adds to what it does not clear (seen with Pinocchio 4.1).
 const Dynamics::Pinocchio::Data::MatrixXs& Dynamics::Pinocchio::mass_matrix(const ConstVector& q) {
   if (has_followers()) {
-    for (auto& each : data.Fcrb) each.setZero();
-    data.M.setZero();
+    write_mass_matrix_of_followers(q);
+    return data.M;
   }
   pin::impl::crbaLocalConvention(model, data, q);  // `pin::crba` compiles another one, too
   data.M.triangularView<Eigen::StrictlyLower>() = data.M.transpose();
   return data.M;
+}
+
+// Pinocchio's own (4.1) adds to what it does not clear, and leaves out what joints of several
+// freedoms between a leader and its follower share with them. Here Jᵀ I J of each joint and all
+// that carry it, with the inertia I of all that the joint carries, at the world's origin; those of
+// a follower count for its leader.
+void Dynamics::Pinocchio::write_mass_matrix_of_followers(const ConstVector& q) {
+  pin::computeJointJacobians(model, data, q);
+  auto& carried_by = data.oYcrb;
+  for (int i = 1; i < model.njoints; ++i) carried_by[i] = data.oMi[i].act(model.inertias[i]);
+  data.M.setZero();
+  data.M.diagonal() = model.armature;
+  for (int i = model.njoints - 1; i > 0; --i) {
+    const auto& joint = model.joints[i];
+    const Eigen::Matrix<double, 6, 6> I = carried_by[i].matrix();
+    for (int k = 0; k < joint.nvExtended(); ++k) {
+      const Eigen::Matrix<double, 6, 1> momentum = I * data.J.col(joint.idx_vExtended() + k);
+      const int row = joint.idx_v() + k;
+      for (int j = i; j > 0; j = model.parents[j]) {
+        const auto& bearer = model.joints[j];
+        for (int l = 0; l < bearer.nvExtended(); ++l) {
+          const int column = bearer.idx_v() + l;
+          const double shared = momentum.dot(data.J.col(bearer.idx_vExtended() + l));
+          data.M(row, column) += shared;
+          if (j != i) data.M(column, row) += shared;
+        }
+      }
+    }
+    if (model.parents[i] > 0) carried_by[model.parents[i]] += carried_by[i];
+  }
+  data.M.triangularView<Eigen::StrictlyLower>() = data.M.transpose();  // to the last bit
 }
 
 void Dynamics::mass_matrix(const ConstVector& q, Square M) { M = pinocchio_->mass_matrix(q); }

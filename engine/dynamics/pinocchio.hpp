@@ -60,6 +60,7 @@ struct Dynamics::Pinocchio {
 
   bool has_followers() const { return !model.mimicking_joints.empty(); }
   const Data::MatrixXs& mass_matrix(const ConstVector& q);  // both triangles
+  void write_mass_matrix_of_followers(const ConstVector& q);
   void write_rate_by_differences(const ConstVector& q, const ConstVector& v, Square M_dot);
   // A and A' of `centroidal_map`, of models with followers; returns the centre of mass.
   Vector3 map_of_followers(const ConstVector& q, const ConstVector& v, Jacobian A, Jacobian A_dot);

@@ -52,6 +52,9 @@ TEXTS = {
         *_ARM,
     ),
     "planar joint": chain(("cart", "planar", ""), *_ARM),
+    "follower first on a cart": chain(
+        ("cart", "planar", ""), ("boom", _TURNS, follow("shoulder", -0.5, 0.1)), *_ARM
+    ),
 }  # fmt: skip
 """URDFs by kind."""
 
@@ -62,6 +65,23 @@ def _of_pinocchio() -> Robot:
     rng = np.random.default_rng(3)
     joints = pin.JointModelSpherical(), pin.JointModelRX(), pin.JointModelRUBZ()
     for k, kind in enumerate(joints):
+        place = pin.SE3(
+            pin.rpy.rpyToMatrix(*rng.uniform(-1, 1, 3)), rng.uniform(size=3)
+        )
+        parent = model.addJoint(parent, kind, place, f"joint{k}")
+        inertia = pin.Inertia.FromBox(2.0, 0.3, 0.2, 0.1)
+        model.appendBodyToJoint(parent, inertia, pin.SE3.Identity())
+        model.addBodyFrame(f"link{k}", parent, pin.SE3.Identity(), 0)
+    model.armature[:] = rng.uniform(0.1, 0.5, model.nv)
+    return Robot.from_pinocchio(model)
+
+
+def _ball_between() -> Robot:
+    """Return a follower that a joint of several freedoms separates from its leader."""
+    model, rng = pin.Model(), np.random.default_rng(4)
+    parent, kinds = 0, [pin.JointModelRY(), pin.JointModelSpherical(), None]
+    for k, given in enumerate([*kinds, pin.JointModelPX()]):
+        kind = given or pin.JointModelMimic(model.joints[1], -0.5, 0.1)
         place = pin.SE3(
             pin.rpy.rpyToMatrix(*rng.uniform(-1, 1, 3)), rng.uniform(size=3)
         )
@@ -93,5 +113,6 @@ KINDS: dict[str, Callable[[Path], Robot]] = {
     "locked below mimics": _of_text("chain of mimics", locked={"elbow": 0.4}),
     "locked leader": _of_text("lift below an arm", locked={"lift": 0.1}),
     "ball, rotors": lambda folder: _of_pinocchio(),
+    "ball between leader and follower": lambda folder: _ball_between(),
 }
 """What loads a robot of a kind, anew each time; its file is in the given folder."""

@@ -9,20 +9,24 @@ import time
 from contextlib import chdir, redirect_stderr, redirect_stdout
 from pathlib import Path
 
+from ready_commands import ReadyCommands
+
 from hsp_control.cli import main
 
 PATIENCE = "--set live.missing=2000 --set live.watchdog=2000 --set live.age=60"
 """What `hsp live` is given on a busy computer."""
 
 
+READY = ReadyCommands()
+
+
 def hsp(line: str, folder: Path, status: int = 0) -> str:
     """Type a command in a folder, and return what it prints; Ctrl-C ends a play."""
-    command = [sys.executable, "-m", "hsp_control", *line.split()]
-    return (
-        played(command, folder)
-        if line.startswith("play ")
-        else typed(command, folder, status)
-    )
+    if line.startswith("play "):
+        return played([sys.executable, "-m", "hsp_control", *line.split()], folder)
+    found, printed = READY.run(line.split(), folder, without_display())
+    assert found == status, f"hsp {line}\n{printed}"
+    return printed
 
 
 def played(command: list[str], folder: Path) -> str:

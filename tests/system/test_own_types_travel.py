@@ -27,10 +27,14 @@ class Nod(hsp.Cost, type="nod"):
 """
 CONFIG = """
 robot: {name: panda}
-tasks: {hand: {type: frame_position}}
-null_space: {fields: [{type: function_cost, function: elbow}, {type: nod, height: 1}]}
+tasks: {hand: {type: frame_position, trajectory: {type: hold}, blend: 1}}
+null_space:
+  fields:
+    - {type: function_cost, function: elbow, weight: 0.001}
+    - {type: nod, height: 1, weight: 0.001}
 simulation: {duration: 0.05, control_period: 0.001}
 """
+"""At rest: a live loop that is given few periods finds no wrong effort."""
 WITH_CONFIGURATION = {
     "run": "run mine.yaml",
     "check": "check mine.yaml",
@@ -50,38 +54,37 @@ WITH_LOG = {
 WITHOUT_CONTROLLER = "no controller, only the log's columns are drawn"
 
 
-WAYS = {
-    "parts.py": ([*WITH_CONFIGURATION], [*WITH_LOG]),
-    "own_package.parts": (["run", "sweep"], ["view"]),  # workers import it, too
-    "--import": ([*WITH_CONFIGURATION], ["view", "run", "of a play"]),
-}
-"""How code is named, with the commands where that may differ."""
-
-
-@pytest.fixture(scope="module", params=WAYS)
+@pytest.fixture(scope="module", params=["parts.py", "--import"])
 def folder(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory):
-    """Return a folder with a configuration and its logs, and how it names its code."""
+    """Return a folder with logs, whose types a list names, or an option."""
     folder = tmp_path_factory.mktemp("own")
-    package = folder / "own_package"
-    package.mkdir()
-    (package / "__init__.py").touch()
     (folder / "parts.py").write_text(PARTS)
+    listed = request.param != "--import"
+    imports = f"imports: [{request.param}]\n" if listed else ""
+    (folder / "mine.yaml").write_text(CONFIG + imports)
+    option = "" if listed else " --import parts.py"
+    for line in WITH_CONFIGURATION.values():
+        hsp(line + option, folder)
+    return folder
+
+
+@pytest.mark.parametrize("what", WITH_LOG)
+def test_a_log_is_read_with_its_own_types(folder: Path, what: str) -> None:
+    assert WITHOUT_CONTROLLER not in hsp(WITH_LOG[what], folder)
+
+
+def test_a_module_of_a_package_is_found_on_the_path(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Who reads the log asks the same function as for a file."""
+    package = tmp_path / "elsewhere" / "own_package"
+    package.mkdir(parents=True)
+    (package / "__init__.py").touch()
     (package / "parts.py").write_text(PARTS)
-    named = request.param
-    listed = "" if named == "--import" else f"imports: [{named}]\n"
-    (folder / "mine.yaml").write_text(CONFIG + listed)
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setenv("PYTHONPATH", str(folder))
-        option = " --import parts.py" if named == "--import" else ""
-        for command in WAYS[named][0]:
-            hsp(WITH_CONFIGURATION[command] + option, folder)
-        yield folder, named
-
-
-def test_logs_are_read_with_their_own_types(folder: tuple[Path, str]) -> None:
-    where, named = folder
-    for what in WAYS[named][1]:
-        assert WITHOUT_CONTROLLER not in hsp(WITH_LOG[what], where), what
+    (tmp_path / "mine.yaml").write_text(f"{CONFIG}imports: [own_package.parts]\n")
+    monkeypatch.setenv("PYTHONPATH", str(package.parent))
+    hsp("run mine.yaml", tmp_path)
+    assert WITHOUT_CONTROLLER not in hsp(WITH_LOG["view"], tmp_path)
 
 
 def test_what_was_edited_is_not_run_again(tmp_path: Path) -> None:
@@ -103,7 +106,7 @@ def test_strict_reading_runs_no_code(tmp_path: Path) -> None:
     (tmp_path / "parts.py").write_text(f"{PARTS}\nopen('run', 'w').close()\n")
     (tmp_path / "mine.yaml").write_text(f"{CONFIG}imports: [parts.py]\n")
     said = hsp("run mine.yaml --strict", tmp_path, status=2)
-    assert "mine.yaml:6: imports.0: parts.py is code, which --strict does not run" in (
+    assert "mine.yaml:9: imports.0: parts.py is code, which --strict does not run" in (
         said
     )
     assert not (tmp_path / "run").exists()
@@ -121,7 +124,10 @@ def test_a_script_s_log_names_the_module_of_its_types(tmp_path: Path) -> None:
 robot = hsp.Robot.load("panda")
 arm = hsp.Controller(robot, [hsp.FramePosition("panda_tcp")], Nod())
 hsp.simulate(arm, robot.home(), duration=0.05).save("out/own.npz")
-experiment = hsp.Experiment("panda", [hsp.FramePosition("panda_tcp")], Nod())
+short = hsp.simulation.SimulationSettings(duration=0.05)
+experiment = hsp.Experiment(
+    "panda", [hsp.FramePosition("panda_tcp")], Nod(), simulation=short
+)
 experiment.run().save("out/experiment.npz")
 open("experiment.yaml", "w").write(experiment.to_yaml())
 with hsp.Recorder(arm, "out/recorded.npz") as recorder:
@@ -138,10 +144,10 @@ with hsp.Recorder(arm, "out/recorded.npz") as recorder:
             said = hsp(f"view out/{log}.npz --no-browser", tmp_path)
             known = name == "one" or log == "own"
             assert (WITHOUT_CONTROLLER not in said) == known, (name, log)
-        if name == "two":  # without a controller the columns are drawn
-            hsp("export out/experiment.npz --html out/experiment.html", tmp_path)
-            hsp("plot out/recorded.npz", tmp_path)
-        else:
+        # A log with a controller, and one without; test_every_log.py has the others.
+        hsp("export out/experiment.npz --html out/experiment.html", tmp_path)
+        hsp("plot out/own.npz", tmp_path)
+        if name == "one":
             hsp("run experiment.yaml --set simulation.duration=0.05", tmp_path)
             hsp("run out/recorded.npz", tmp_path)
 

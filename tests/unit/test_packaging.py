@@ -136,6 +136,16 @@ def hatch_build() -> ModuleType:
     return module
 
 
+def test_one_process_builds_at_a_time(hatch_build: ModuleType, tmp_path: Path) -> None:
+    """CI compiles while pip fetches packages; pip builds in the same folder then."""
+    fcntl = pytest.importorskip("fcntl")
+    at_once = fcntl.LOCK_EX | fcntl.LOCK_NB
+    with (tmp_path / ".lock").open("w") as other:
+        with hatch_build.alone(tmp_path), pytest.raises(BlockingIOError):
+            fcntl.flock(other, at_once)
+        fcntl.flock(other, at_once)
+
+
 @pytest.mark.parametrize(
     ("compiler", "library", "tag"),
     [

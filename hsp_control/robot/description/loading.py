@@ -316,7 +316,12 @@ def _check_mass_matrix(model: pin.Model, source: RobotSource) -> None:
         raise ModelError(f"{source.urdf}: the robot has no moving joint")
     spread = np.random.default_rng(0).uniform(-1.0, 1.0, model.nv)
     configuration = pin.integrate(model, pin.neutral(model), spread)
-    mass_matrix = pin.crba(model, model.createData(), configuration)
+    # Not by CRBA, which is wrong for some mimic joints (seen with Pinocchio 4.1).
+    data, rest = model.createData(), np.zeros(model.nv)
+    gravity = pin.rnea(model, data, configuration, rest, rest).copy()
+    unit = np.eye(model.nv)
+    columns = [pin.rnea(model, data, configuration, rest, a) - gravity for a in unit]
+    mass_matrix = 0.5 * (np.array(columns) + np.transpose(columns))
     values, vectors = np.linalg.eigh(mass_matrix)
     if values[0] > 1e-12 * values[-1]:
         return

@@ -50,7 +50,6 @@ from hsp_control.live import (
 from hsp_control.live.simulated_robot import sampled
 
 pytest.importorskip("pylibfranka")
-pytestmark = pytest.mark.process
 PERIOD = 0.001
 PUSH = {"frame": "panda_link6", "force": [0, 150, 0], "start": 0.2, "duration": 0.1}
 """Both an external torque and an external force: which is felt first is the box's."""
@@ -64,6 +63,7 @@ def moved(arm: FrankaHardware, experiment: Any = None, **options: Any) -> LoopRe
     return run_loop(experiment.controller, Patiently(arm), **defaults | options)
 
 
+@pytest.mark.process
 def test_the_arm_moves_as_the_simulated_robot(tmp_path: Path) -> None:
     """The states come in single precision; else the two runs are the same."""
     experiment, logs = circle(), (tmp_path / "arm.journal", tmp_path / "sim.journal")
@@ -94,6 +94,7 @@ def test_the_arm_moves_as_the_simulated_robot(tmp_path: Path) -> None:
     assert np.abs(real["task.hand.error"][circling]).max() < 1e-3
 
 
+@pytest.mark.process
 def test_a_reflex_is_told_and_reset_only_when_asked(tmp_path: Path) -> None:
     experiment = circle(plant={"type": "rigid_body", "pushes": [PUSH]})
     with serving(experiment) as box:
@@ -115,6 +116,7 @@ def test_a_reflex_is_told_and_reset_only_when_asked(tmp_path: Path) -> None:
         connect(box.address, experiment.robot, PERIOD).close()
 
 
+@pytest.mark.process
 def test_the_operator_s_stop_finishes_the_motion() -> None:
     experiment, requests = circle(), OperatorRequests()
     with serving(experiment) as box:
@@ -131,6 +133,7 @@ def test_the_operator_s_stop_finishes_the_motion() -> None:
         assert box.said("motion ended: the client has finished it")
 
 
+@pytest.mark.process
 def test_a_killed_box_ends_the_loop() -> None:
     address = host(1)
     command = [sys.executable, "-m", "hsp_control", "franka-box", "panda"]
@@ -158,6 +161,7 @@ def test_a_killed_box_ends_the_loop() -> None:
             box.kill()
 
 
+@pytest.mark.process
 @pytest.mark.smoke
 def test_a_client_that_dies_is_told() -> None:
     experiment = circle()
@@ -175,6 +179,7 @@ def test_a_client_that_dies_is_told() -> None:
         assert box.said("motion ended")
 
 
+@pytest.mark.process
 def test_a_client_that_hangs_is_killed(monkeypatch: pytest.MonkeyPatch) -> None:
     """libfranka waits without end where a box closes the line without an answer."""
     monkeypatch.setattr(connection, "_TIMEOUT", 1.0)
@@ -193,6 +198,7 @@ def test_a_client_that_hangs_is_killed(monkeypatch: pytest.MonkeyPatch) -> None:
         thread.join()
 
 
+@pytest.mark.process
 def test_who_only_reads_sets_no_thresholds(tmp_path: Path) -> None:
     with served() as rig:
         address = f"{rig.host}?realtime=ignore"
@@ -202,6 +208,7 @@ def test_who_only_reads_sets_no_thresholds(tmp_path: Path) -> None:
         assert np.isfinite(rig.box.thresholds.upper_effort).all()
 
 
+@pytest.mark.process
 def test_the_load_is_in_both_models(tmp_path: Path) -> None:
     """A load in one model only is refused; in both, the arm follows its path."""
     load = {"mass": 0.8, "center": [0.02, 0.0, 0.15]}
@@ -227,6 +234,7 @@ def test_the_load_is_in_both_models(tmp_path: Path) -> None:
     assert np.abs(run["task.hand.error"][circling]).max() < 1e-3
 
 
+@pytest.mark.process
 def test_the_gripper_goes_where_openings_say_and_tells_where_it_is() -> None:
     said: list[str] = []
     with serving(circle()) as box, closing(udp()) as policy, closing(udp()) as other:
@@ -307,6 +315,7 @@ def test_the_arm_has_seven_joints_and_a_millisecond() -> None:
         connect("127.0.0.1", Robot.load("panda"), 0.002)
 
 
+@pytest.mark.process
 def test_the_command_line_drives_the_arm(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -341,6 +350,7 @@ def test_the_command_line_drives_the_arm(
     assert "did you mean 'realtime'" in capsys.readouterr().err
 
 
+@pytest.mark.process
 def test_the_page_is_true(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     text = (ROOT / "docs/companions/franka.md").read_text(encoding="utf-8")
     told = dict(re.findall(r"^\| `(\w+)` \|.*\| ([^|]*)\|$", text, re.MULTILINE))

@@ -13,8 +13,6 @@ from played import Played, wait_until
 import hsp_control as hsp
 from hsp_control.cli import main
 
-pytestmark = pytest.mark.process
-
 
 @pytest.fixture
 def played(tmp_path: Path) -> Iterator[Played]:
@@ -28,6 +26,7 @@ def last(page: Steering, kind: str) -> dict[str, Any] | None:
     return found[-1] if found else None
 
 
+@pytest.mark.process
 def test_a_page_steers_and_the_log_repeats_it(played: Played, tmp_path: Path) -> None:
     page = Steering(played.url)
     wait_until(lambda: last(page, "play_targets"))
@@ -62,6 +61,7 @@ def test_a_page_steers_and_the_log_repeats_it(played: Played, tmp_path: Path) ->
     np.testing.assert_array_equal(again.q, log.q)
 
 
+@pytest.mark.process
 def test_a_page_that_stalls_or_leaves_holds_nothing_up(
     played: Played, tmp_path: Path
 ) -> None:
@@ -85,6 +85,7 @@ def test_a_page_that_stalls_or_leaves_holds_nothing_up(
     assert (tmp_path / "panda_obstacle-play.npz").is_file()
 
 
+@pytest.mark.process
 @pytest.mark.smoke
 @pytest.mark.parametrize(("arguments", "message"), [
     (["whole_body"], "no configuration 'whole_body'"),

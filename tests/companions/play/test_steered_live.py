@@ -16,8 +16,6 @@ from played import wait_until
 import hsp_control as hsp
 from hsp_control.cli import main
 
-pytestmark = pytest.mark.process
-
 # On a machine with much else to do, processes wait for one another.
 PATIENT = [
     "--set=live.missing=5000",
@@ -60,6 +58,7 @@ def moving(page: Steering) -> bool:
     return bool(found) and found[-1]["t"] > 0.1
 
 
+@pytest.mark.process
 def test_a_page_moves_the_hand_and_stops_the_robot(
     arguments: list[str], tmp_path: Path
 ) -> None:
@@ -84,6 +83,7 @@ def test_a_page_moves_the_hand_and_stops_the_robot(
     assert log["task.hand.reference"][-1, 2] == pytest.approx(pose[2])
 
 
+@pytest.mark.process
 def test_a_robot_moves_while_the_key_is_held(
     arguments: list[str], tmp_path: Path
 ) -> None:
@@ -109,6 +109,7 @@ def test_a_robot_moves_while_the_key_is_held(
     assert (tmp_path / "panda_obstacle-live.npz").is_file()
 
 
+@pytest.mark.process
 def test_it_fails_if_its_page_dies(arguments: list[str]) -> None:
     live = SteeredLive("--steer", *arguments)
     page = Steering(live.url)

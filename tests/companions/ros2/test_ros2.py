@@ -21,8 +21,6 @@ from hsp_control.companions.ros2 import robot as ros2_robot
 from hsp_control.companions.ros2.hardware import Ros2Hardware
 from hsp_control.live import LiveSettings, Measurement, run_loop
 
-pytestmark = pytest.mark.process
-
 LONG = 120.0
 COUNT = 200
 SETTINGS = ["live.watchdog=100000", "live.compensates_gravity=true"]
@@ -36,6 +34,7 @@ def signals() -> Iterator[None]:
         signal.signal(kind, handler)
 
 
+@pytest.mark.process
 def test_a_client_drives_the_simulated_robot(
     capsys: pytest.CaptureFixture[str], tmp_path: Path
 ) -> None:
@@ -67,6 +66,7 @@ def test_a_client_drives_the_simulated_robot(
     assert np.abs(reached[last][7:14]).max() > 0.01  # it moved
 
 
+@pytest.mark.process
 def test_the_status_of_a_robot_that_a_fault_stopped_says_so(
     capsys: pytest.CaptureFixture[str], tmp_path: Path
 ) -> None:
@@ -103,6 +103,7 @@ class Recording:
         self._hardware.close()
 
 
+@pytest.mark.process
 def test_the_loop_drives_a_client_that_is_a_robot(tmp_path: Path) -> None:
     controller, states, address = fresh()
     joints = [

@@ -26,8 +26,6 @@ from hsp_control.companions.sweeps import Sweep, cluster, sweep_runs
 from hsp_control.companions.sweeps.one_run import computed
 from hsp_control.companions.sweeps.row_files import RowFiles, read_rows
 
-pytestmark = [pytest.mark.process, pytest.mark.slow]
-
 # Some tenths of a second each.
 SECONDS = 3
 SLOWER = [QUICK[1], f"simulation.duration={SECONDS}"]
@@ -100,6 +98,8 @@ def whole(scheduler: str) -> Sweep:
 # --- what is in it -------------------------------------------------------------------
 
 
+@pytest.mark.process
+@pytest.mark.slow
 @pytest.mark.smoke
 def test_a_row_is_what_a_single_run_gives(swept: Sweep) -> None:
     row = 7
@@ -124,6 +124,8 @@ def test_a_row_is_what_a_single_run_gives(swept: Sweep) -> None:
     np.testing.assert_array_equal(again.q, rollout.q)
 
 
+@pytest.mark.process
+@pytest.mark.slow
 def test_the_file_is_parquet_that_describes_itself(file: Path, swept: Sweep) -> None:
     (written,) = file.iterdir()
     table = pq.read_table(file)
@@ -136,6 +138,8 @@ def test_the_file_is_parquet_that_describes_itself(file: Path, swept: Sweep) -> 
     same(Sweep.load(written), swept)
 
 
+@pytest.mark.process
+@pytest.mark.slow
 def test_anything_in_the_configuration_can_vary() -> None:
     over = {
         "start.velocity": ["rest", "flow"],
@@ -152,6 +156,8 @@ def test_anything_in_the_configuration_can_vary() -> None:
     assert last["start"]["velocity"] == "flow"
 
 
+@pytest.mark.process
+@pytest.mark.slow
 def test_failures_are_rows_with_their_reason() -> None:
     over = {"null_space.gain": [10.0, -1.0, 900.0]}
     held = [*QUICK, "simulation.control_period=0.01", "simulation.check_rate=false"]
@@ -167,6 +173,8 @@ def test_failures_are_rows_with_their_reason() -> None:
 # --- the same bits, nothing twice ----------------------------------------------------
 
 
+@pytest.mark.process
+@pytest.mark.slow
 def test_neither_workers_nor_a_cluster_change_a_bit(
     swept: Sweep, scheduler: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -223,6 +231,8 @@ def finish(out: Path, kept: Sweep, whole: Sweep, scheduler: str) -> None:
     assert again.tobytes() == kept["wall_time"].tobytes()
 
 
+@pytest.mark.process
+@pytest.mark.slow
 def test_a_killed_sweep_goes_on_where_it_was(
     tmp_path: Path, whole: Sweep, scheduler: str
 ) -> None:
@@ -240,6 +250,8 @@ def test_a_killed_sweep_goes_on_where_it_was(
     finish(out, kept, whole, scheduler)
 
 
+@pytest.mark.process
+@pytest.mark.slow
 def test_ctrl_c_keeps_the_rows_and_the_same_command_ends_it(
     tmp_path: Path, whole: Sweep, scheduler: str
 ) -> None:
@@ -254,6 +266,8 @@ def test_ctrl_c_keeps_the_rows_and_the_same_command_ends_it(
     finish(out, Sweep.load(out), whole, scheduler)
 
 
+@pytest.mark.process
+@pytest.mark.slow
 def test_a_dead_scheduler_keeps_the_rows_and_the_same_command_ends_it(
     tmp_path: Path, whole: Sweep, scheduler: str
 ) -> None:
@@ -292,6 +306,8 @@ def running(word: str, parent: psutil.Process) -> list[psutil.Process]:
     return found
 
 
+@pytest.mark.process
+@pytest.mark.slow
 def test_a_killed_worker_is_replaced(whole: Sweep) -> None:
     killed: list[int] = []
 
@@ -325,6 +341,8 @@ class Deadly(hsp.Cost, type="deadly"):
 """
 
 
+@pytest.mark.process
+@pytest.mark.slow
 def test_a_run_that_kills_three_workers_is_a_row_and_tried_again_another_time(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -363,6 +381,8 @@ print(found["status"].tolist(), found["message"].tolist())
 """
 
 
+@pytest.mark.process
+@pytest.mark.slow
 def test_a_script_needs_no_guard_and_its_types_travel(tmp_path: Path) -> None:
     script = tmp_path / "mine.py"
     script.write_text(SCRIPT.format(configuration=MOVING, more=QUICK))
@@ -373,6 +393,8 @@ def test_a_script_needs_no_guard_and_its_types_travel(tmp_path: Path) -> None:
     assert told.stdout == "['completed', 'completed'] ['', '']\n", told.stderr
 
 
+@pytest.mark.process
+@pytest.mark.slow
 def test_files_travel_where_no_worker_has_them(tmp_path: Path, scheduler: str) -> None:
     """Those of the configuration are in a folder that is gone when runs begin."""
     folder = tmp_path / "mine"
@@ -423,7 +445,6 @@ simulation: {duration: 0.02, log_period: 0.01}
 """
 
 
-@pytest.mark.smoke
 def test_a_computer_that_is_not_fit_ends_the_sweep() -> None:
     def unfit(_: object) -> None:
         raise SweepError("a worker has numpy 1 instead of 2")
@@ -435,6 +456,8 @@ def test_a_computer_that_is_not_fit_ends_the_sweep() -> None:
 # --- what ends no sweep --------------------------------------------------------------
 
 
+@pytest.mark.process
+@pytest.mark.slow
 def test_a_run_that_takes_too_long_is_a_row_and_tried_again_another_time(
     tmp_path: Path,
 ) -> None:
@@ -459,14 +482,12 @@ def test_a_run_that_takes_too_long_is_a_row_and_tried_again_another_time(
     assert done == [0, 1, 2, 0, 1, 2]
 
 
-@pytest.mark.smoke
 @pytest.mark.parametrize("limit", [0.0, -1.0, np.nan])
 def test_a_time_limit_is_positive(limit: float) -> None:
     with pytest.raises(SweepError, match=r"time_limit is .* must be positive"):
         hsp.sweeps.sweep(MOVING, {"null_space.gain": [1, 2]}, time_limit=limit)
 
 
-@pytest.mark.smoke
 def test_what_is_no_exception_is_a_row() -> None:
     for error in (GeneratorExit("x"), SystemExit(3)):
 
@@ -478,6 +499,8 @@ def test_what_is_no_exception_is_a_row() -> None:
         assert row.message.startswith(type(error).__name__)
 
 
+@pytest.mark.process
+@pytest.mark.slow
 def test_workers_that_cannot_start_are_an_error(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
@@ -486,6 +509,8 @@ def test_workers_that_cannot_start_are_an_error(
         hsp.sweeps.sweep(MOVING, {"null_space.gain": [1, 2]}, overrides=QUICK)
 
 
+@pytest.mark.process
+@pytest.mark.slow
 def test_a_scheduler_that_does_not_answer_is_an_error(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
@@ -501,6 +526,8 @@ def test_a_scheduler_that_does_not_answer_is_an_error(
 # --- files of others -----------------------------------------------------------------
 
 
+@pytest.mark.process
+@pytest.mark.slow
 @pytest.mark.smoke
 def test_another_sweep_is_not_overwritten(file: Path, swept: Sweep) -> None:
     before = [each.read_bytes() for each in file.iterdir()]
@@ -512,6 +539,8 @@ def test_another_sweep_is_not_overwritten(file: Path, swept: Sweep) -> None:
     assert [each.read_bytes() for each in file.iterdir()] == before
 
 
+@pytest.mark.process
+@pytest.mark.slow
 def test_a_urdf_that_changed_is_another_sweep(tmp_path: Path, scheduler: str) -> None:
     source = hsp.Robot.load("planar3r").source
     urdf = tmp_path / "arm.urdf"
@@ -534,6 +563,8 @@ def test_a_urdf_that_changed_is_another_sweep(tmp_path: Path, scheduler: str) ->
     assert fresh.completed.all()
 
 
+@pytest.mark.process
+@pytest.mark.slow
 @pytest.mark.smoke
 def test_one_process_at_a_time(file: Path, swept: Sweep, tmp_path: Path) -> None:
     _, meta = read_rows(file)
@@ -548,7 +579,6 @@ def test_one_process_at_a_time(file: Path, swept: Sweep, tmp_path: Path) -> None
     assert not out.exists()  # it had no rows
 
 
-@pytest.mark.smoke
 @pytest.mark.parametrize("content", [b"nonsense", b"PAR1", b""])
 def test_files_that_are_no_sweep_are_refused(tmp_path: Path, content: bytes) -> None:
     out = tmp_path / "x.parquet"
@@ -566,7 +596,6 @@ def test_files_that_are_no_sweep_are_refused(tmp_path: Path, content: bytes) -> 
     assert [each.read_bytes() for each in out.iterdir()] == [content]
 
 
-@pytest.mark.smoke
 def test_another_program_s_parquet_is_refused(tmp_path: Path) -> None:
     pq.write_table(pa.table({"a": [1]}), tmp_path / "a.parquet")
     with pytest.raises(SweepError, match="but not a sweep"):
@@ -575,7 +604,6 @@ def test_another_program_s_parquet_is_refused(tmp_path: Path) -> None:
         Sweep.load(tmp_path / "b.parquet")
 
 
-@pytest.mark.smoke
 def test_a_bad_key_is_found_before_any_worker_is_asked() -> None:
     with pytest.raises(ConfigError, match=r"null_space.gian"):
         hsp.sweeps.sweep(MOVING, {"null_space.gian": [1]})
@@ -583,6 +611,8 @@ def test_a_bad_key_is_found_before_any_worker_is_asked() -> None:
         hsp.sweeps.sweep(MOVING, OVER, overrides=["x"])
 
 
+@pytest.mark.process
+@pytest.mark.slow
 def test_whatever_raises_in_the_parent_leaves_the_folder_free(
     tmp_path: Path, scheduler: str
 ) -> None:
@@ -599,7 +629,6 @@ def test_whatever_raises_in_the_parent_leaves_the_folder_free(
     assert hsp.sweeps.sweep(MOVING, OVER, **options).complete
 
 
-@pytest.mark.smoke
 @pytest.mark.parametrize("kind", ["fifo", "device"])
 def test_what_never_ends_is_no_table(kind: str, tmp_path: Path) -> None:
     path = tmp_path / "a.parquet"

@@ -18,8 +18,6 @@ from hsp_control.companions.viewer.threejs import _Y_TO_Z
 from hsp_control.geometry import Scene, shapes
 from hsp_control.trajectories import Hold
 
-pytestmark = pytest.mark.process
-
 
 @pytest.fixture
 def recorder() -> Recorder:

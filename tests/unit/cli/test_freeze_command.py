@@ -64,6 +64,7 @@ def test_where_the_library_is(
 PAGE = Path(__file__).parents[3] / "docs/how_to/without_python.md"
 
 
+@pytest.mark.process
 @pytest.mark.smoke
 def test_the_page_is_a_program_that_runs(tmp_path: Path) -> None:
     """Its first commands and its C, in a shell, in an empty folder."""

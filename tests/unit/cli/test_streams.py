@@ -32,6 +32,7 @@ sys.exit(7 if descriptor > 2 and sys.stdin.read() == "" else 3)
 
 @pytest.mark.parametrize("closed", [(), (1,), (2,), (1, 2), (0, 1, 2)])
 @pytest.mark.parametrize("encoding", ["ascii", "utf-8", "latin-1"])
+@pytest.mark.process
 @pytest.mark.smoke
 def test_any_text_can_be_written(closed: tuple[int, ...], encoding: str) -> None:
     def close() -> None:
@@ -64,6 +65,8 @@ print("done", lost_text(), file=sys.stderr)
 
 
 @pytest.mark.parametrize("where", ["pipe", "/dev/full"])
+@pytest.mark.process
+@pytest.mark.smoke
 def test_a_command_goes_on_where_nobody_takes_its_text(where: str) -> None:
     """A run must not be lost with the reader of its summary."""
     if where == "pipe":
@@ -83,6 +86,8 @@ def test_a_command_goes_on_where_nobody_takes_its_text(where: str) -> None:
 
 
 @pytest.mark.parametrize(("where", "status"), [("/dev/full", 2), ("/dev/null", 0)])
+@pytest.mark.process
+@pytest.mark.smoke
 def test_the_status_tells_whether_all_was_written(where: str, status: int) -> None:
     with Path(where).open("w") as file:
         command = [sys.executable, "-m", "hsp_control", "robots", "panda"]
@@ -91,6 +96,7 @@ def test_the_status_tells_whether_all_was_written(where: str, status: int) -> No
     assert (done.returncode, done.stderr.strip()) == (status, said)
 
 
+@pytest.mark.process
 @pytest.mark.smoke
 def test_the_schema_needs_no_docstrings() -> None:
     code = "from hsp_control.config.scenario import json_schema; json_schema()"

@@ -4,7 +4,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from live_rigs import PERIOD, Rig, Trick, law, watched
+from live_rigs import PERIOD, Rig, Trick, always, law, missing, watched
 
 import hsp_control as hsp
 from hsp_control.common.arrays import Array
@@ -119,6 +119,25 @@ def test_a_phase_begins_with_a_row(tmp_path: Path) -> None:
 
 
 EFFORT = np.array([45.0, 45.0, 45.0, 45.0, 12.0, 12.0, 12.0])
+
+
+def test_a_stop_without_states_is_logged_as_predicted(tmp_path: Path) -> None:
+    robot = Rig(watched(), always(missing, 40))
+    settings = LiveSettings(missing=5, prediction_time=0.05)
+    report = run_loop(
+        law(),
+        robot,
+        duration=1.0,
+        settings=settings,
+        log=tmp_path / "blind.journal",
+        log_period=PERIOD,
+    )
+    assert report.ended == "fault"
+    run = hsp.Rollout.load(tmp_path / "blind.journal")
+    stops = run["live.phase"] > Phase.RUNNING
+    assert stops.sum() > 20
+    assert (run["live.measured"] == ~stops).all()
+    assert np.isnan(run["live.age"][stops]).all()
 
 
 def test_efforts_follow_limits_that_fall_in_a_run() -> None:

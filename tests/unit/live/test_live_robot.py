@@ -219,6 +219,34 @@ def test_the_limiter_keeps_the_rate_from_both(seed: int, compensates: bool) -> N
     np.testing.assert_array_equal(limiter.sent, before)
 
 
+def test_nothing_presses_while_brakes_hold_a_robot(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    robot, pressed = watched(), np.arange(6.0)
+    felt = {"panda_hand": pressed}
+    monkeypatch.setattr(robot.plant, "contact_wrenches", lambda *_: felt)
+    np.testing.assert_array_equal(robot.measured().wrenches["panda_hand"], np.zeros(6))
+    robot.advance([robot.tau])
+    assert robot.measured().wrenches["panda_hand"] is pressed
+
+
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+def test_a_stop_keeps_the_limits_of_motors_that_bear_gravity_themselves(
+    sign: float,
+) -> None:
+    """What is sent is tau - g: the limits of tau, and not of that, hold for it."""
+    q, limit = start(), 40.0
+    chosen = LiveSettings(effort_rate=4e4, effort=limit, compensates_gravity=True)
+    limiter = EffortLimiter(panda(), chosen, PERIOD)
+    limiter.reset(q)
+    inertia = panda().state(0.0, q, np.zeros(7)).mass_matrix
+    assert np.abs(limiter.gravity).max() > 20.0
+    for _ in range(5):  # some joints' rates bind, and the others reach their limits
+        assert limiter.apply(np.full(7, sign * 1e3), q, inertia)
+        assert (np.abs(limiter.applied) <= limit + 1e-9).all()
+    np.testing.assert_allclose(limiter.applied, sign * limit, atol=1e-6)
+
+
 def test_a_lost_effort_corrects_the_momentum_observer() -> None:
     """What is compensated counts from the applied effort, not from the sent one."""
     observer = Compensation(momentum_observer=MomentumObserver(200.0, cancel=False))

@@ -18,6 +18,7 @@ from hsp_control.live import (
     Phase,
     UdpHardware,
     serve,
+    udp,
 )
 from hsp_control.live.link import (
     AgeEstimator,
@@ -274,6 +275,27 @@ def test_a_robot_that_nobody_wants_or_whose_parent_dies_ends() -> None:
     serve(robot, link, stop_reason=dies)
     assert robot.reason == "its parent is gone"
     assert robot.phase is Phase.HOLDING
+    hardware.close()
+    hardware.drain()
+    link.close()
+
+
+def test_a_robot_that_is_held_up_says_for_how_long(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    now, periods = [0.0], iter(range(1000))
+    monkeypatch.setattr(udp, "monotonic", lambda: now[0])
+    monkeypatch.setattr(udp, "sleep", lambda s: now.append(now.pop() + s))
+
+    def pilot() -> str | None:
+        k = next(periods)
+        now[0] += 0.3 * (k in {5, 9})
+        return "enough" if k == 20 else None
+
+    hardware = UdpHardware(panda(), PERIOD)
+    link = Link(hardware.session, peer=hardware.address)
+    served = serve(watched(), link, stop_reason=pilot)
+    assert served.overrun == pytest.approx(2 * (0.3 - PERIOD))
     hardware.close()
     hardware.drain()
     link.close()

@@ -9,23 +9,25 @@ from hsp_control.live.effort_limiter import EffortLimiter
 from hsp_control.live.sent_efforts import SentEfforts
 
 
-def test_its_own_effort_lasts_five_answers_and_then_fades() -> None:
-    """It has 0 where -10 is sent: its brakes, or another load, hold it at first."""
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+def test_its_own_effort_lasts_five_answers_and_then_fades(sign: float) -> None:
+    """It has 0 where -10 is sent, or 10: brakes, or another load, hold it at first."""
     sent = SentEfforts(np.array([5.0]), 4)
-    sent.restart(np.array([-10.0]))
-    has = np.array([0.0])
+    held, has = np.array([-10.0 * sign]), np.array([0.0])
+    sent.restart(held)
     for _ in range(5):
-        sent.add(np.array([-10.0]))
+        sent.add(held)
         least, most, spare = sent.bounds_of(has)
-        assert (least, most, spare) == (-10.0, 0.0, 0.5)
+        assert (least, most) == (min(held, has), max(held, has))
+        assert spare == 0.5
     for k in range(1, 20):  # what is beyond comes nearer by a part in a hundred
-        _, most, spare = sent.bounds_of(has)
-        assert spare == 0.05
-        assert most[0] == pytest.approx(-10.0 + 10.0 * 0.99**k, abs=1e-12)
-        has = most
-    sent.bounds_of(np.array([-10.0]))
-    _, most, _ = sent.bounds_of(np.array([0.0]))
-    assert most == -10.0
+        bounds = sent.bounds_of(has)
+        assert bounds[2] == 0.05
+        has = bounds[1] if sign > 0.0 else bounds[0]
+        assert has[0] == pytest.approx(sign * (-10.0 + 10.0 * 0.99**k), abs=1e-12)
+    sent.bounds_of(held)
+    least, most, _ = sent.bounds_of(np.array([0.0]))
+    assert least == most == held
 
 
 @pytest.mark.parametrize(("missing", "watchdog"), [(1, 30), (30, 1)])

@@ -2,10 +2,10 @@
 
 import numpy as np
 import pytest
-from live_rigs import PERIOD, panda, start
+from live_rigs import PERIOD, Rig, law, missing, panda, start, watched
 
 from hsp_control.common.arrays import Array
-from hsp_control.live import LiveSettings, Measurement
+from hsp_control.live import LiveSettings, Measurement, StopSettings, run_loop
 from hsp_control.live.state_reader import StateReader
 
 
@@ -79,3 +79,12 @@ def test_the_speed_of_a_robot_that_says_nothing_is_that_of_the_model() -> None:
         reader.read(pushes, None)
     assert reader.speed == np.abs(reader.state.v).max()
     assert reader.speed == pytest.approx(0.01 + 20 * PERIOD * 20.0, rel=0.2)
+
+
+def test_what_was_predicted_before_a_state_came_does_not_count() -> None:
+    """Every second state is lost, in all for ten times what is allowed at once."""
+    lost = dict.fromkeys(range(41, 20_000, 2), missing)
+    settings = LiveSettings(prediction_time=0.02, stop=StopSettings(hold=0.2))
+    report = run_loop(law(), Rig(watched(), lost), duration=0.1, settings=settings)
+    assert report.ended == "completed", report.reason
+    assert not report.silent

@@ -1,0 +1,105 @@
+"""A process that has imported `hsp_control` forks one for every command.
+
+Each command still begins with no types, robots or logs of another one, and ends on its
+own: what is saved is the CPU of its imports, half a second to one. How `hsp` itself
+starts is seen where pages and plays run (`page_runner.py`, `played`).
+"""
+
+import atexit
+import json
+import os
+import signal
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any
+
+PARTS = (
+    *("hsp_control.cli.commands", "hsp_control.cli.live"),
+    *("hsp_control.companions.viewer.command", "hsp_control.companions.plots"),
+    *("matplotlib.pyplot", "matplotlib.backends.backend_agg", "trimesh"),
+)
+"""What the process imports first, where it is there. Nothing of it starts a thread."""
+
+
+class ReadyCommands:
+    """Runs commands of `hsp`, each in a fork of one process."""
+
+    def __init__(self) -> None:
+        self._process: subprocess.Popen[str] | None = None
+        atexit.register(self.close)
+
+    def run(
+        self, arguments: list[str], folder: Path, environment: dict[str, str]
+    ) -> tuple[int, str]:
+        """Return a command's status, and what it printed."""
+        try:
+            return self._asked(
+                {"arguments": arguments, "folder": str(folder), "env": environment}
+            )
+        except BaseException:  # a time limit: the next one would get its answer
+            self.close()
+            raise
+
+    def _asked(self, request: dict[str, Any]) -> tuple[int, str]:
+        if self._process is None:
+            self._process = subprocess.Popen(
+                [sys.executable, "-P", __file__], text=True, start_new_session=True,
+                stdin=subprocess.PIPE, stdout=subprocess.PIPE,
+            )  # fmt: skip
+        stdin, stdout = self._process.stdin, self._process.stdout
+        assert stdin is not None
+        assert stdout is not None
+        print(json.dumps(request), file=stdin, flush=True)
+        status, printed = json.loads(stdout.readline())
+        return status, printed
+
+    def close(self) -> None:
+        """End the process, and the command that it waits for."""
+        if self._process is not None:
+            os.killpg(self._process.pid, signal.SIGKILL)
+            self._process.communicate()
+            self._process = None
+
+
+def serve() -> None:
+    """Answer requests until there are no more."""
+    from contextlib import suppress
+    from importlib import import_module
+
+    sys.argv[0] = "hsp"  # as which Ctrl-C ends it during imports, too
+    import_module("hsp_control.cli")
+    for part in PARTS:
+        with suppress(ImportError):  # a companion that was taken away
+            import_module(part)
+    from tempfile import TemporaryFile
+
+    requests, answers = os.fdopen(os.dup(0)), os.fdopen(os.dup(1), "w")
+    for line in requests:
+        with TemporaryFile() as printed:
+            child = os.fork()
+            if child == 0:
+                _become(json.loads(line), printed.fileno())
+            status = os.waitstatus_to_exitcode(os.waitpid(child, 0)[1])
+            printed.seek(0)
+            said = printed.read().decode()
+        print(json.dumps([status, said]), file=answers, flush=True)
+
+
+def _become(request: dict[str, Any], output: int) -> None:
+    """Do what `python -m hsp_control` does in a folder, and end."""
+    from hsp_control.cli import main
+
+    os.chdir(request["folder"])
+    os.environ.clear()
+    os.environ.update(request["env"])
+    path = os.environ.get("PYTHONPATH", "").split(os.pathsep)
+    sys.path[:0] = [request["folder"], *filter(None, path)]
+    os.dup2(os.open(os.devnull, os.O_RDONLY), 0)
+    os.dup2(output, 1)
+    os.dup2(output, 2)
+    sys.exit(main(request["arguments"]))
+
+
+if __name__ == "__main__":
+    serve()
