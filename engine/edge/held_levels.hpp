@@ -1,14 +1,14 @@
 // What yielding costs where limits hold the tasks, level by level.
 //
-// Where a limit binds, the step deviates from what is wanted by δ, and what is below a level yields
-// before it does (`qp/deviation_cost.hpp`). Let c δ ≥ x be the limit, in whitened coordinates with
-// |c| = 1, n the length of the part of c that is left to what is below, and ρ what that costs.
-// Below the level δ has the length
+// Where a limit is active, the step deviates from the unconstrained a by δ, and what is below a
+// level yields before it does (`qp/deviation_cost.hpp`). Let c δ ≥ x be the limit, in whitened
+// coordinates with |c| = 1, n the length of the part of c that is left to what is below, and ρ what
+// that costs. Below the level δ has the length
 //
 //   x n/(n² + ρ (1 - n²)),
 //
 // whose slope in n is at most x/(n² + ρ): n turns with the posture, and δ with it. A task that
-// cannot be met asks for x forever. So ρ has to follow x as ε follows f (`threshold.hpp`), unless
+// cannot be met demands x forever. So ρ has to follow x as ε follows f (`threshold.hpp`), unless
 // what is below can give x easily:
 //
 //   ρ = max_c (A/K - n²),      A = x max_j ‖L⁻¹e_j‖

@@ -1,28 +1,28 @@
-// What a step comes near to where a limit binds.
+// The acceleration that a step approximates where a limit is active.
 //
-// The law promises nothing where a limit binds. Then it is taken apart,
+// Where a limit is active the law's equations cannot hold. Then it is decomposed,
 //
 //   a = a_t + φ_N,
 //
 // into what moves the tasks and the self-motion. Two things change, each as far as a is beyond a
 // limit, so that the step is a continuous function of the state. With E the excess, relative to
-// what the limit permits, 1/(1 + E) is the part of what is commanded that is within it.
+// what the limit permits, 1/(1 + E) is the part of the command that is within it.
 //
-// *The tasks are damped.* An arm that is held at its edge, or rushes to it, asks for more than its
+// *The tasks are damped.* An arm that is held at its edge, or rushes to it, commands more than its
 // motors give, from one side and then from the other: the nearest step within the limits would
-// swing with it. So as far as a_t alone is beyond the limits, by an excess E_t, the step comes near
-// to the damped law, and is wholly that from E_t = `large` on.
+// oscillate. So as far as a_t alone is beyond the limits, by an excess E_t, the step approaches the
+// damped law, and reaches it at E_t = `large`.
 //
-// *What a field asks for is bounded.* That is φ_N + P K_N P v, the self-motion without what brakes
-// it. A field may ask for anything, r times what the limits permit far from them; 1/(1 + E) of it
-// is left, and never less than 1/r. What brakes stays whole: else it would swing.
+// *The field's command is bounded.* That is φ_N + P K_N P v, the self-motion without its brake. A
+// field may command anything, r times what the limits permit far from them; 1/(1 + E) of it is
+// left, and never less than 1/r. The brake is not scaled: else the null space would oscillate.
 //
-// Both begin slowly: a step that loses more than what it is beyond a limit asks for the opposite
-// where it begins to violate one, and swings from one side of the limit to the other
+// Both begin slowly: a step that loses more than its excess beyond a limit commands the opposite
+// where it begins to violate one, and oscillates from one side of the limit to the other
 // (docs/edge.md).
 //
 // What a limit permits is, of an effort, the maximum; of an acceleration, what the barriers of
-// `Limits` permit far from them. The limit on the effort's rate does not count: it depends on the
+// `Limits` permit far from them. The limit on the effort's rate is ignored: it depends on the
 // last effort, and a step that waits for it would wait for ever.
 #pragma once
 #include <hsp/indices.hpp>

@@ -116,8 +116,8 @@ struct Resolve {
                                     memory.spectrum));
   }
 
-  // All tasks at once. Their level counts as bounded, by `exact_inverse`, also where rounding makes
-  // its smallest singular value the threshold: Q then has the rows of a spectrum.
+  // All tasks at once. Their level is marked as bounded, by `exact_inverse`, also where rounding
+  // makes its smallest singular value the threshold: Q then has the rows of a spectrum.
   int damped_at_once(double threshold) {
     auto& [Q, X] = factors;
     damped_inverse(memory.B, threshold, Q, X);

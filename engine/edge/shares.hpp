@@ -2,11 +2,11 @@
 //
 //   a = a_exact + μ (a_damped - a_exact),      0 ≤ μ ≤ 1
 //
-// Out of reach an error persists, and with it what the feedback asks for. Near a singular posture
+// Out of reach an error persists, and with it the feedback's command. Near a singular posture
 // the exact inverse of that changes faster than a sampled loop can follow, so the inverse of
 // a_damped is bounded by thresholds that follow what is commanded (`threshold.hpp`). But a
-// threshold cannot tell an error that persists from a step within reach. What can is where the arm
-// is held, and how: singular, or far away, or at a limit. So μ is the largest of three shares, each
+// threshold cannot distinguish an error that persists from a step within reach. Where the arm is
+// held does: at a singularity, far away, or at a limit. So μ is the largest of three shares, each
 // of them 0 in the middle:
 //
 //   near    σ ≥ σ_x: 0;  σ ≤ σ_x/2: 1.    σ_x is a tenth of the robot's size

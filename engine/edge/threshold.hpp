@@ -1,6 +1,6 @@
 // Where an inverse begins to be bounded: a threshold that follows the errors.
 //
-// A level asks for J a = d. Along a direction of the singular value s it gets d/s where s is above
+// A level commands J a = d. Along a direction of the singular value s it gets d/s where s is above
 // the threshold ε, and s (2 - s²/ε²) d/ε² below. The steepest of both is 2 d/ε², at s = 0. Let
 // f = Kp s(e) be what the feedback commands at rest, the part of d that persists while a task
 // cannot be met. With
@@ -8,7 +8,7 @@
 //   ε² = max(ε_0², ‖f‖/L)
 //
 // the acceleration that it causes changes by at most 2 L for each unit of s, whatever the target.
-// docs/edge.md has the propositions, and where each constant is from.
+// docs/edge.md has the propositions, and the origin of each constant.
 #pragma once
 #include <hsp/indices.hpp>
 #include <hsp/records.hpp>
@@ -89,7 +89,7 @@ double write_thresholds(const J& jacobian, const B& whitened, const Demand& rows
   return largest;
 }
 
-// The ε that a level below others has at least. What it asks for is f - J a_f; `held` is how much
+// The ε that a level below others has at least. It commands f - J a_f; `held` is how much
 // those above are held, and `above` their least singular value in their scale, inf if none turns.
 template <class F>
 double threshold_below(const F& demand, double held, double above, Index level,
@@ -100,9 +100,9 @@ double threshold_below(const F& demand, double held, double above, Index level,
   return std::sqrt(square + follows * follows * following.size / above);
 }
 
-// How much a level is held at the edge, from 0 (exact) to nearly 1, by ‖f - J a_f‖², what it does
-// not get of what it asks for at rest, and ‖f‖². It grows slowly as the level begins to ask for
-// what its threshold follows: as fast as the level is lost to what is below it, both would swing.
+// How much a level is held at the edge, from 0 (exact) to nearly 1, by ‖f - J a_f‖², its unmet
+// command at rest, and ‖f‖². It grows slowly with the command that its threshold follows: as fast
+// as the level is lost to what is below it, both would oscillate.
 inline double how_held(double lacking, double wanted, double least, const Following& following) {
   const double beyond = std::sqrt(wanted) - following.modest;
   if (beyond <= 0.0) return 0.0;

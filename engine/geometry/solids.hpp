@@ -19,7 +19,7 @@ struct SolidDistance {
 
 inline double signum(double x) { return x > 0.0 ? 1.0 : -1.0; }
 
-// |x| - size is how far the point is beyond each pair of faces; inside, the nearest face counts.
+// |x| - size is how far the point is beyond each pair of faces; inside, the nearest face is used.
 // Outside, H = (I - n nᵀ)/d in the coordinates in which it is beyond.
 inline SolidDistance distance_to_box(const Vector3& half_edges, const Vector3& x,
                                      const Vector3& x_dot) {

@@ -4,7 +4,7 @@
 // its rate g' (n), the metric W (n, n), the gain K_N (n, n) [1/s], the acceleration a = v' (n). J#
 // is the pseudo-inverse of `pseudo_inverse.hpp` in the metric, and P = I - J#J.
 //
-//   x = g - v                          the self-motion that the field still asks for
+//   x = g - v                          the self-motion that the field still commands
 //   e_N = (I - J#J) x                                            the null-space error
 //   u = g' + K_N e_N - W⁻¹[ J'ᵀ w - W'(x - e_N/2) ],  w = J#ᵀ W x     φ_N = P u is (13)
 //   a = J#(a_x - J'v) + (I - J#J) u                                               (7)

@@ -34,7 +34,7 @@ constexpr double steeper = 4.0;
 constexpr double most_shift = 0.1;
 
 // What the effort's rate can do in this time [s] is held against a force that lasts, where that
-// is more: a light wrist with a tool that nobody declared.
+// is more: a light wrist with an undeclared tool.
 constexpr double held_time = 0.002;
 
 // The accelerations that a position limit permits.

@@ -1,4 +1,4 @@
-// Gravity takes at most a share of every motor's effort: rows A a ≥ b for the motors near it.
+// Gravity uses at most a share of every motor's effort: rows A a ≥ b for the motors near it.
 //
 //   h = share - |G|/limit,      h'' + 2α h' + α² h ≥ 0,      G'' = ∇G·a + its drift
 #pragma once

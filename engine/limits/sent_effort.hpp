@@ -48,7 +48,7 @@ constexpr double window = 0.01;
 // A mean error that a position limit has to hold against is taken over this time [s]: noise of a
 // velocity is then that over this time, 0.3 rad/s² for 0.01 rad/s.
 constexpr double quick_time = 0.03;
-// An error counts less after this time; over it the error that persists is averaged [s].
+// An error is weighted less after this time; over it the error that persists is averaged [s].
 constexpr double memory = 0.1;
 
 // What two numbers have in common: the nearer to 0 of one sign, or 0.

@@ -278,7 +278,7 @@ class DualActiveSet {
   }
 
   // The constraint that x is farthest from, marked as held, and by how much it is violated. The
-  // distance is the violation divided by the length of the row. A row that contains NaN counts as
+  // distance is the violation divided by the length of the row. A row that contains NaN is
   // violated.
   Violation most_violated(double tolerance) {
     double farthest = tolerance * (1.0 + x.lpNorm<Eigen::Infinity>());

@@ -1,4 +1,4 @@
-// What gravity asks of the motors, how that changes with the posture, and along the motion.
+// The efforts against gravity, and their derivatives by the posture and along the motion.
 #pragma once
 #include <hsp/indices.hpp>
 #include <hsp/records.hpp>
@@ -7,7 +7,7 @@ namespace hsp {
 
 // A column of the Jacobian of all joints, (l, w) at the world's origin, moves the bodies beyond
 // it, of mass m, with s = Σ m c of their centres of mass. To Σ m c it adds x = m l + w × s, so
-// gravity g asks for the effort
+// gravity g requires the effort
 //
 //   G_k = -g·x_k,   ∂G_k/∂q_i = w_i·(g × x_k) where i carries k or is of the same joint,
 //                             = w_k·(g × x_i) where i is beyond k,

@@ -56,7 +56,7 @@ struct PlanObject : Runnable {
   Plan plan;
 };
 
-// A function of Python, of the time or of nothing. What it returns counts if it is a number.
+// A function of Python, of the time or of nothing. Its result is used if it is a number.
 struct PythonCall : Runnable {
   PythonCall(nanobind::object f, bool t) : function(std::move(f)), timed(t) {
     row = {[](void* self, double t) { return static_cast<PythonCall*>(self)->made(t); }, this};

@@ -12,7 +12,7 @@ struct OwnBounds {
   Vector speed, acceleration, jerk;
 };
 
-// What is asked for, in a frame that moves with the target.
+// The request, in a frame that moves with the target.
 struct FastestTask {
   Vector x, rate, acceleration;  // at the start; x is counted from the target
   Vector target_rate;            // x' at the end

@@ -1,5 +1,5 @@
-// A streamed reference without Python: what is sent is a target, or a velocity in world axes, and
-// only the newest counts.
+// A streamed reference without Python: a message is a target, or a velocity in world axes, and only
+// the newest is used.
 #pragma once
 #include <limits>
 

@@ -27,7 +27,7 @@ template <int m = 'm'> struct Feedback {
     add_pull_to(a, e);
   }
 
-  // a += Kp s(e), what the feedback asks for at rest
+  // a += Kp s(e), the feedback's command at rest
   template <class E, class A> void add_pull_to(A& a, const E& e) const {
     a += Kp.lazyProduct(e);
     for (Index part = 0; part < largest.rows(); ++part) {

@@ -169,7 +169,7 @@ struct AlongPose {
   PoseSample<In> own;
   ArcLength arc;
   TimeScaling scaling;
-  bool by_angle;  // where the origin stays
+  bool by_angle;  // where the origin does not move
   PoseSample<Out> out;
 
   void operator()(double t) {

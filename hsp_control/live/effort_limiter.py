@@ -14,7 +14,7 @@ _TOLERANCE = 0.5
 them: its own stop, or another load, may need more."""
 
 _SURE = 5
-"""Periods in a row without a measurement that a bad line may have."""
+"""Periods in a row without a measurement that a bad connection may have."""
 
 
 class EffortLimiter:
@@ -42,7 +42,8 @@ class EffortLimiter:
         self.gravity: Array = np.zeros(robot.nv)
         kept = max(settings.missing, settings.watchdog) + _SURE
         self._recent = SentEfforts(self._largest, kept)
-        # What the robot may have, at least and at most; and before the last effort.
+        # The least and greatest effort that the robot may have; and before the last
+        # effort.
         self._least: Array = np.zeros(robot.nv)
         self._most: Array = np.zeros(robot.nv)
         self._before = self._least, self._most
@@ -98,10 +99,11 @@ class EffortLimiter:
         )
 
     def robot_has(self, effort: Array | None) -> bool:
-        """Use the effort that the robot has, as it says; return whether it is another.
+        """Use the effort that the robot reports; return whether it is another.
 
-        What was sent last may be lost, or still under way: the robot may have both,
-        unless they are too far apart for one step from both. None: it does not say.
+        The last one that was sent may be lost, or still under way: the robot may have
+        both, unless they are too far apart for one step from both. None: it reports
+        none.
         """
         self._unanswered, self._says = 0, effort is not None
         if effort is None or np.array_equal(effort, self.sent):
@@ -133,7 +135,7 @@ class EffortLimiter:
         With the mass matrix ``inertia``, shape (nv, nv), a joint whose effort can
         follow at once holds its own acceleration where a heavier one's lags behind
         (`nearest_effort`). Clipped joint by joint, an arm that must stop while it
-        accelerates would throw its wrist.
+        accelerates would accelerate its wrist.
         """
         if not np.isfinite(tau).all():
             return False

@@ -1,4 +1,4 @@
-"""What a robot must offer to be controlled, what it may, and how it is connected."""
+"""The interface of a robot: required and optional methods, and its connection."""
 
 from collections.abc import Callable, Sequence
 from importlib.metadata import EntryPoint
@@ -26,7 +26,7 @@ class Hardware(Protocol):
     Once the first effort is out, whatever the methods raise ends in the report, also
     what is no `Exception`. What
     `read` raises means that no state can arrive any more: the loop sends nothing more.
-    After what `write` raises it goes on trying, with the safe stop.
+    If `write` raises, it continues with the safe stop.
 
     One that runs in real time may have an attribute ``real_time`` that is true: its
     clock is then compared with this computer's.
@@ -85,9 +85,9 @@ class LocatedHardware(Hardware, Protocol):
 
 @runtime_checkable
 class AdaptingHardware(LocatedHardware, Protocol):
-    """`Hardware` that corrects the settings of its loop, and tells what it found."""
+    """`Hardware` that corrects the settings of its loop, and reports its findings."""
 
-    lines: Sequence[str]  # what the user should know of the robot, one sentence each
+    lines: Sequence[str]  # notes on the robot for the user, one sentence each
 
     @property
     def fault(self) -> str | None:
@@ -118,21 +118,21 @@ def connect(url: str, robot: Robot, period: float) -> Hardware:
 
 
 class Publisher(Protocol):
-    """Tells others the state of a loop; `run_loop` calls it as ``on_period``."""
+    """Publishes the state of a loop; `run_loop` calls it as ``on_period``."""
 
     def __call__(self, t: float) -> object:
-        """Tell the state at the controller's time t [s], if it is time again."""
+        """Publish the state at the controller's time t [s], if it is due."""
 
     def ended(self, ended: str, reason: str) -> object:
-        """Tell how the run ended, as `LoopReport` says it."""
+        """Publish how the run ended, as in `LoopReport`."""
 
 
 def publish(url: str, source: EffortSource) -> Publisher:
-    """Return what publishes a loop, once a period, to those who watch at an address.
+    """Return the publisher of a loop, once a period, to listeners at an address.
 
     Args:
         url: ``name://address``; an entry point of ``hsp_control.publishers`` has it.
-        source: What computes the efforts.
+        source: The source of the efforts.
 
     Raises:
         LiveError: If no package provides the name.

@@ -240,7 +240,7 @@ class Link:
             peer: The other end's address; None: that of its first packet.
             faults: Faults to inject into packets sent.
             stream: Number of the stream of random numbers.
-            hears: What the other end sends besides BYE; None: anything.
+            hears: The kind that the other end sends besides BYE; None: any.
         """
         self.session, self.peer = session, peer
         self._hears = hears

@@ -1,4 +1,4 @@
-"""The log of a live loop: which rows are due, and what stands in them."""
+"""The log of a live loop: which rows are due, and their contents."""
 
 from collections.abc import Mapping
 from math import floor, inf, nan
@@ -31,7 +31,7 @@ _CHANNELS = {
 
 
 def live_channels(**values: Array | float) -> dict[str, LogChannel]:
-    """Return what a live loop logs, by the names of its columns."""
+    """Return the columns that a live loop logs, by their names."""
     return {
         f"live.{name}": LogChannel(value, *_CHANNELS[name])
         for name, value in values.items()

@@ -264,14 +264,14 @@ class LiveRun:
                 else:
                     self.log.controller_failed = True
                     self.stop("operator", reason)
-            except BaseException as error:  # nobody knows what to send now
+            except BaseException as error:  # the effort to send is unknown now
                 self.silent = self.done = True
                 self.fail(error)
 
     def abandon(self, request: BaseException) -> None:
         """Leave the safe stop to the robot, because the operator asks again."""
         self.abandoned = True
-        if self.ended == "completed":  # it is not: nobody knows whether it rests
+        if self.ended == "completed":  # it is not: whether it rests is unknown
             self.ended = "operator"
             self.reason += (
                 f"; the safe stop was cut short by the operator ({_called(request)})"
@@ -331,7 +331,7 @@ class LiveRun:
         if measurement is None:
             return None
         try:
-            # What the motors have counts, with the gravity that the robot adds.
+            # The effort of the motors is used, with the gravity that the robot adds.
             has = None if measurement.applied is None else self.limiter.applied.copy()
             measured = measurement._replace(t=t, applied=has)
             effort = self.chain.effort(measured, self.hardware.period)
@@ -390,14 +390,14 @@ class LiveRun:
         self.reader.stop()
 
     def fail(self, error: BaseException) -> None:
-        """Stop because of what a user's code or the law raised."""
+        """Stop because a user's code or the law raised an error."""
         name = type(error).__name__
         text = described(error)
         message = text if text.startswith(name) else f"{name}: {text}"
         self.stop("fault", message, error)
 
     def check_applied_effort(self) -> None:
-        """Tell the controller which effort the robot has: one may be lost."""
+        """Report to the controller which effort the robot has: one may be lost."""
         if (measurement := self.reader.measurement) is None:
             self.limiter.no_measurement()
             return
@@ -411,7 +411,7 @@ class LiveRun:
             self.report_applied_effort()
 
     def report_applied_effort(self) -> None:
-        """Tell the controller which effort the motors apply."""
+        """Report to the controller which effort the motors apply."""
         if self.log.controller_failed:
             return
         try:

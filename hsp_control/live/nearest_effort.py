@@ -6,9 +6,9 @@ from hsp_control import engine
 from hsp_control.common.arrays import Array
 
 _SWEEPS = 30
-"""How often each joint's effort is adapted to those of the others, at most."""
+"""Most sweeps in which each joint's effort is adapted to those of the others."""
 _NEAR = 1e-10
-"""Change of a sweep that does not count, relative to the first one."""
+"""Change of a sweep that is negligible, relative to the first one."""
 
 
 def nearest_effort(
@@ -17,11 +17,11 @@ def nearest_effort(
     """Return the effort within bounds whose acceleration is nearest to that of another.
 
     It minimizes aᵀ M a, where a = M⁻¹ (tau - wanted) is the acceleration that is wrong.
-    Where a heavy joint's effort lags behind, a light one's, which can follow, keeps the
-    acceleration that it was to have; clipped joint by joint it would be thrown.
+    Where a heavy joint's effort lags behind, a light one's, which can follow, keeps its
+    desired acceleration; clipped joint by joint it would be accelerated.
 
     Args:
-        wanted: The effort that is wanted, shape (nv,) [N·m or N].
+        wanted: The unlimited effort, shape (nv,) [N·m or N].
         least: The least effort of each joint, shape (nv,).
         most: The greatest, shape (nv,).
         inertia: The mass matrix M, shape (nv, nv).

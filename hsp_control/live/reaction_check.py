@@ -1,4 +1,4 @@
-"""Finds joints that move though their sensors say nothing, by what the others feel."""
+"""Detects moving joints with silent sensors, by the other joints' motion."""
 
 from math import exp
 
@@ -11,23 +11,23 @@ _WASHOUT = 0.1
 _MEMORY = 0.1
 """Time constant of the mean squares that are compared [s]."""
 _FELT, _MOST = 0.5, 1.6
-"""Which part of the reaction is felt at least, and at most: masses may be wrong, and
+"""Least and largest part of the reaction that is measured: masses may be wrong, and
 friction may brake the joint."""
 _EXPLAINED = 0.8
-"""Which part of what the others do beyond their own motion the reaction explains."""
+"""Part of the others' unexpected motion that the reaction explains."""
 _LEAST = 0.1
 """Smallest reaction that is judged, relative to the error of velocities."""
 _HELD = 0.03
-"""How long that must last [s]."""
+"""Duration of that [s]."""
 
 
 class ReactionCheck:
     """Compares the other joints' motion with a silent joint at rest, and in motion.
 
-    Some joints s say the same to the last bit, under efforts that friction could hold.
-    If they stand, the others o accelerate by M_oo⁻¹ (tau - h)_o; if they move, by the
-    rows of M⁻¹ (tau - h). Where the others do what they would if the silent ones moved,
-    and not what they would if those stood, the sensors of the silent ones are dead.
+    Some joints s report the same to the last bit, under efforts that friction could
+    hold. If they stand, the others o accelerate by M_oo⁻¹ (tau - h)_o; if they move, by
+    the rows of M⁻¹ (tau - h). Where the others move as if the silent ones moved, and
+    not as if those stood, the sensors of the silent ones are dead.
 
     Attributes:
         felt: Whether the others feel that the silent joints move.
@@ -59,7 +59,7 @@ class ReactionCheck:
         """Record what is expected from now on.
 
         Args:
-            silent: Joints that say nothing, shape (nv,).
+            silent: Joints whose readings do not change, shape (nv,).
             inertia: The mass matrix M, shape (nv, nv).
             free: The acceleration if all joints move, M⁻¹ (tau - h), shape (nv,).
         """

@@ -1,4 +1,4 @@
-"""Finds joints that go the other way than their efforts drive them."""
+"""Detects joints that move against the direction of their efforts."""
 
 from math import exp
 
@@ -14,7 +14,7 @@ _CONTRARY = 0.1
 """How much of a joint's motion may differ from the contrary of what is expected: for a
 wrong sign a few hundredths; for a push that a controller yields to at least 0.13."""
 _HELD = 0.03
-"""How long that must last [s]."""
+"""Duration of that [s]."""
 _LEAST = 0.1
 """Smallest change of velocity that is judged, relative to the error of velocities."""
 
@@ -23,10 +23,10 @@ class ResponseCheck:
     """Compares changes of the measured velocity with what the efforts would cause.
 
     A joint may follow its effort by less than the model expects, or not at all: its
-    friction, its rotor and what it leans on are unknown. A person may push it for a
-    while. But where velocity and positions agree and a joint does, again and again, the
-    very contrary of what it is driven to do, it is measured with the wrong sign, or its
-    motor has it. Feedback then drives it ever faster.
+    friction, its rotor and its contacts are unknown. A person may push it for a while.
+    But where velocity and positions agree and a joint repeatedly moves opposite to its
+    effort, it is measured with the wrong sign, or its motor has it. Feedback then
+    drives it ever faster.
 
     Attributes:
         contrary: These joints, shape (nv,).

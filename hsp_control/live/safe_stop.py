@@ -22,7 +22,7 @@ class Phase(IntEnum):
 
 
 _STEEPEST = 0.5
-"""Smallest upward part of the normal of what carries weight [-]: a plane of 60°.
+"""Smallest upward part of the normal of a plane that carries weight [-]: one of 60°.
 Steeper ones, such as a wall, may only be pushed: the joints that are held do it."""
 _SMALLEST = 1e-6
 """Singular values below this share of the largest are directions that feet cannot push
@@ -32,7 +32,7 @@ in, such as the turning about the line between two points."""
 class StandingFeet:
     """The active contacts, and the efforts that they let the joints deliver.
 
-    A generalized force x, shape (nv,), is the sum of what joints and feet exert,
+    A generalized force x, shape (nv,), is the sum of the forces of joints and feet,
     x = Sᵀ tau + Jᵀ f. Its rows without motors determine the forces f at the feet's
     points, of minimum norm; then tau = S (x - Jᵀ f). While the feet stand still,
     J v = 0, these efforts do the work of x: vᵀ Sᵀ tau = vᵀ x.
@@ -100,10 +100,10 @@ class SafeStop:
     the robot came to rest: the PD control with gravity compensation of Takegaki and
     Arimoto (1981), stable for any inertia.
 
-    A robot with a floating base stands on its feet meanwhile: what these two exert on
-    its base goes through the feet that stand (`StandingFeet`). If none stands, or after
-    a fall, nothing can hold it. Then its joints are damped only, tau_j = -k M_jj v_j:
-    the robot sinks, and does not thrash.
+    A robot with a floating base stands on its feet meanwhile: the share of damping and
+    hold on its base is exerted through the feet that stand (`StandingFeet`). If none
+    stands, or after a fall, nothing can hold it. Then its joints are damped only, tau_j
+    = -k M_jj v_j: the robot sinks, and does not thrash.
 
     Attributes:
         feet: What the robot stands on.

@@ -8,11 +8,12 @@ _ROUNDING, _LARGEST_ROUNDING = 0.01, 1.0
 """By how much an effort may be beyond what was sent: a part of the limit, and the most
 [N·m or N]. Motors have steps."""
 _START, _LARGEST_START = 0.1, 10.0
-"""The same at the start, when the robot has held itself: it may know another load."""
+"""The same at the start, when the robot has held itself: its model may have another
+load."""
 _START_PERIODS = 5
 """How long its own effort may last after that [periods]."""
 _FADES = 0.99
-"""By which factor what is beyond all that was sent must come nearer each period: a
+"""Factor by which an excess beyond all sent efforts must decrease each period: a
 filter of 1.6 Hz at 1 kHz."""
 
 
@@ -44,7 +45,7 @@ class SentEfforts:
         """Return the least and the most that it can have, and what rounding adds.
 
         Args:
-            effort: What the robot says that it has, shape (nv,).
+            effort: The effort that the robot reports, shape (nv,).
 
         Returns:
             Three arrays, shape (nv,).

@@ -41,8 +41,8 @@ class StopSettings(Part, error=LiveError):
     """Maximum duration of a plan's last steps, after which it stands [s]; they precede
     the safe stop of a run that ends without a fault."""
     standstill: Positive = 0.1
-    """Largest joint speed at the end with which a run counts as completed [rad/s or
-    m/s]; above ``rest_speed``, because of noise."""
+    """Largest joint speed at the end with which a run is completed [rad/s or m/s];
+    above ``rest_speed``, because of noise."""
 
     def check_period(self, period: float) -> None:
         """Check that the sampled safe stop is stable at this period [s].
@@ -95,7 +95,8 @@ class LiveSettings(Part, error=LiveError):
     last 50 ms [rad/s or m/s]: six times its noise."""
     friction: NonNegative = 0.1
     """Largest friction that may hold a joint at rest, relative to its effort limit. A
-    joint that stands to the last bit under more than that has a dead sensor [-]."""
+    joint whose readings do not change by a bit under more than that has a dead sensor
+    [-]."""
     start_timeout: Positive = 10.0
     """Maximum time to wait for the first state [s]."""
     watchdog: PositiveCount = 20

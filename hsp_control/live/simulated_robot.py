@@ -1,4 +1,4 @@
-"""A simulated robot behind the interface of a real one; it checks what it is sent."""
+"""A simulated robot behind the interface of a real one; it checks its commands."""
 
 from collections.abc import Callable, Sequence
 

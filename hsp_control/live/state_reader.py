@@ -1,4 +1,4 @@
-"""Reads the robot's state each period, checks it, and goes on without for a while."""
+"""Reads the robot's state each period, checks it, and predicts missing ones."""
 
 from collections.abc import Callable
 from contextlib import nullcontext
@@ -24,8 +24,8 @@ from hsp_control.robot import Robot, RobotState
 class DeadReckoning:
     """The last measured state, integrated with the model under the applied efforts.
 
-    Of a robot with a floating base the velocity is kept: nobody knows what its feet
-    push meanwhile, and without them the model would fall.
+    Of a robot with a floating base the velocity is kept: the forces at its feet are
+    unknown meanwhile, and without them the model would fall.
     """
 
     def __init__(
@@ -68,7 +68,7 @@ _RESOLUTION = 1e-3
 
 
 def valid_measurement(raw: object, robot: Robot, period: float) -> Measurement:
-    """Return a measurement of finite plain types in arrays that nobody else writes."""
+    """Return a measurement of finite plain types in arrays of its own."""
     if not isinstance(raw, Measurement):
         raise HardwareError(
             f"read returned an object of type {type(raw).__name__}; needs a "
@@ -174,7 +174,7 @@ class FrozenState:
 
     New measurements with the same q and v to the last bit are right for a robot that
     stands. If they have a velocity that is not 0, or come from a sensor with noise, the
-    model says how far the robot went meanwhile under the efforts applied.
+    model predicts how far the robot moved meanwhile under the efforts applied.
 
     Such a state must not be used: damping a velocity that is long gone drives the robot
     backwards. A state with v = 0 in all joints is not judged: a robot that its brakes
@@ -215,7 +215,7 @@ class FrozenState:
 
 
 class MeasurementMonitor:
-    """Returns what is wrong with a measurement: a reason to stop, or None."""
+    """Checks measurements: returns a reason to stop, or None."""
 
     def __init__(
         self,
@@ -305,12 +305,12 @@ class MeasurementMonitor:
 class RobotClock:
     """Converts the robot's time to the controller's, and judges its steps.
 
-    Between two measurements the robot's clock may advance by the periods that their
-    sequence numbers tell, or by the tolerated number of missing states. It may stand
-    before the robot starts, and for the tolerated number of states later. In some
-    hundred states it may not gain or lose more than that either. Of a robot in real
-    time it may not run faster than ours; a slower one shows in the numbers of states,
-    or is a robot that was held up.
+    Between two measurements the robot's clock may advance by the periods given by their
+    sequence numbers, or by the tolerated number of missing states. It may stand before
+    the robot starts, and for the tolerated number of states later. In some hundred
+    states it may not gain or lose more than that either. Of a robot in real time it may
+    not run faster than ours; a slower one shows in the numbers of states, or is a robot
+    that was held up.
 
     After a jump the controller's time goes on by one period: the safe stop that follows
     needs no other.
@@ -409,7 +409,7 @@ class RobotClock:
 
 
 _CLOCK_STATES = 100
-"""States after which what the robot's clock has gained counts for less."""
+"""States after which the gain of the robot's clock is weighted less."""
 _CLOCK_WINDOW = 2.0
 """How long a robot's clock is compared with ours [s]."""
 _LARGEST_LEAD = 0.1
@@ -419,7 +419,7 @@ _LARGEST_LEAD = 0.1
 _FEW = 5
 """Missing states in a row after which a speed is that of the model, not of the last."""
 _READ_MARGIN = 0.5
-"""How late a state may be before its period counts as one without a state [periods]."""
+"""How late a state may be before its period is one without a state [periods]."""
 
 
 class StateReader:
@@ -498,7 +498,7 @@ class StateReader:
         )
 
     def start(self) -> None:
-        """Start real-time operation; states skipped before do not count."""
+        """Start real-time operation; states skipped before are ignored."""
         self._monitor.last = None
         self._motion.restart()
         self._robot_clock.restart()
@@ -561,7 +561,7 @@ class StateReader:
         return trusted
 
     def _trusted(self, new: Measurement) -> Measurement | None:
-        """Return what can be trusted of a measurement; None: not used, no fault yet."""
+        """Return the trusted part of a measurement; None: not used, no fault yet."""
         motion = self._motion
         last = motion.last
         passed = 0.0 if last is None else self._robot_clock.passed(new, last)

@@ -1,4 +1,4 @@
-"""Finds a joint's sensor that died while the joint was at rest."""
+"""Detects a joint's sensor that died while the joint was at rest."""
 
 from math import ceil, exp
 
@@ -10,14 +10,14 @@ from hsp_control.live.settings import LiveSettings
 from hsp_control.robot import Robot
 
 _QUIET, _FEWEST = 0.05, 5
-"""How long a sensor says the same to the last bit before it is judged [s], and the
-fewest states."""
+"""Time for which a sensor's reading is the same to the last bit before it is judged
+[s], and the fewest states."""
 _REST = 0.05
 """Speed below which what changes is noise [rad/s or m/s]."""
 _NOISE = 1e-9
 """Smallest change that is noise: those of a simulated robot at rest are rounding."""
 _MEMORY, _ALIVE = 1.0, 0.3
-"""Time over which noise is counted [s], and in which part of the states it is seen."""
+"""Time over which noise is counted [s], and the part of the states that have it."""
 _GRAVITY = 0.2
 """Part of a joint's gravity that the model may have wrong."""
 
@@ -27,15 +27,15 @@ _EFFORT = {"rad": "N·m", "m": "N"}
 class StillSensors:
     """Judges joints whose position and velocity stay the same to the last bit.
 
-    A joint at rest may well say the same for ever. Its sensor is dead if it had noise
-    before: changes to and fro, of different sizes, so that a coarse encoder on the edge
-    of a step is none. Or if the effort is beyond what holds the joint by more than
-    friction (`LiveSettings.friction`) and the model's errors: a live joint would move.
-    Or if the other joints move as they do where this one moves (`ReactionCheck`).
+    The reading of a joint at rest may be constant for ever. Its sensor is dead if it
+    had noise before: changes to and fro, of different sizes, so that a coarse encoder
+    on the edge of a step is none. Or if the effort exceeds the holding effort by more
+    than friction (`LiveSettings.friction`) and the model's errors: a live joint would
+    move. Or if the other joints move as they do where this one moves (`ReactionCheck`).
 
     Attributes:
-        dead: Joints whose sensor says nothing any more, shape (nv,).
-        beyond: What each joint's effort is beyond what holds it, shape (nv,) [N·m].
+        dead: Joints whose sensor is dead, shape (nv,).
+        beyond: Each joint's effort beyond its holding effort, shape (nv,) [N·m].
     """
 
     def __init__(
@@ -81,7 +81,7 @@ class StillSensors:
         still = (np.abs(way) < 1e-12) & (changes[1] == 0.0)
         self._count = np.where(still, self._count + 1, 0)
         self._reaction.update(mean, passed)
-        # A joint that says nothing any more keeps what is known of its noise.
+        # A silent joint keeps the record of its noise.
         part = 1.0 - exp(-passed / _MEMORY)
         self._alive = np.where(
             still, self._alive, self._alive + part * (noise - self._alive)
@@ -121,9 +121,10 @@ class StillSensors:
 
 
 def _holding(silent: Indices, inertia: Array, free: Array) -> Array:
-    """Return what must hold some joints, so that they stand under an effort.
+    """Return the force that must hold some joints, so that they stand under an effort.
 
-    By Gauss's principle M⁻¹ of these joints times the force is what they lack.
+    By Gauss's principle M⁻¹ of these joints times the force is the missing
+    acceleration.
     """
     among = np.linalg.inv(inertia)[np.ix_(silent, silent)]
     held: Array = np.linalg.solve(among, free[silent])

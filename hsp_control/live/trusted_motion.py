@@ -1,4 +1,4 @@
-"""What can be trusted of a joint's measured motion: velocity, positions, or neither."""
+"""The trusted part of a joint's measured motion: velocity, positions, or neither."""
 
 from math import exp, inf
 
@@ -16,11 +16,12 @@ from hsp_control.robot import Robot
 _BANDWIDTH = 30.0
 """With which an expected velocity follows a source [1/s]."""
 _ALONE = 3.0
-"""The same if the other source was wrong: a joint that is braked must obey [1/s]."""
+"""The same if the other source was wrong: a braked joint must follow its effort
+[1/s]."""
 _MEMORY = 0.2
 """Time constant with which a surprise is forgotten [s]."""
 _CLEARLY = 0.5
-"""One source is right, and the other wrong, if it surprised by so much less."""
+"""One source is right, and the other wrong, if its surprise is so much smaller."""
 _SPREAD = 0.25
 """A joint's velocity may be further from what is expected by this part of that."""
 _LAST = 20
@@ -30,16 +31,17 @@ _SMALL = 2.0
 
 
 class ExpectedMotion:
-    """What the model expects of a joint's velocity, from each source that tells it.
+    """The velocity of a joint that the model expects, from each of its sources.
 
     The sources are the rows of all arrays: the measured velocity, the slope of the
-    positions, and their mean. Each expectation goes on with the model under the efforts
-    applied, and follows its source by a limited step, so that a sensor that jumps is
-    not followed at once; a second state learns the acceleration that the model misses.
+    positions, and their mean. Each expectation is integrated with the model under the
+    efforts applied, and follows its source by a limited step, so that a sensor that
+    jumps is not followed at once; a second state learns the acceleration that the model
+    misses.
 
     Attributes:
         v: The velocities that are expected, shape (3, nv) [rad/s or m/s].
-        surprise: The largest differences of late, shape (3, nv).
+        surprise: The largest recent differences, shape (3, nv).
         acceleration: What the efforts applied cause by the model, shape (nv,).
     """
 
@@ -59,7 +61,7 @@ class ExpectedMotion:
 
     def apply(self, q: Array, v: Array, tau: Array) -> None:
         """Record the effort that acts from now on, shape (nv,), at a state."""
-        if self._robot.unactuated:  # nobody knows what the feet push
+        if self._robot.unactuated:  # the forces at the feet are unknown
             return
         try:
             acceleration = self._robot.forward_dynamics(q, v, tau)
@@ -94,23 +96,23 @@ class ExpectedMotion:
 
 
 class TrustedMotion:
-    """Judges measured positions and velocities; says which of them can be used.
+    """Judges measured positions and velocities, and selects those to use.
 
     Where they contradict each other, that one is wrong which did what the model did not
     expect. If that is not clear, both are wrong where they differ much, else it is the
     velocity. Where both are wrong, or the sensor is dead, the expectation is used. What
     was wrong once is not used again.
 
-    Where both agree and are wrong, the efforts tell: a joint that says nothing though
-    it is pushed (`StillSensors`), one that goes the other way (`ResponseCheck`), and in
-    the safe stop one that is braked and speeds up. Then no effort of ours is of use,
-    and the loop leaves it to the robot.
+    Where both agree and are wrong, the efforts reveal it: a joint whose readings do not
+    change though it is pushed (`StillSensors`), one that goes the other way
+    (`ResponseCheck`), and in the safe stop one that is braked and speeds up. Then no
+    effort of ours is of use, and the loop leaves it to the robot.
 
     Attributes:
-        fault: What contradicts what, or None.
+        fault: The contradiction, or None.
         doubtful: Whether the last measurement should not be used, though it is no fault
             yet.
-        complete: Whether all that is measured is trusted.
+        complete: Whether all measurements are trusted.
         unknown_for: Time since which some joint was only expected, not measured [s].
         last: The last measurement, as it came; None before the first.
     """
@@ -136,7 +138,7 @@ class TrustedMotion:
         self.last: Measurement | None = None
         self._q: Array = np.zeros(0)  # the last trusted configuration
         self.complete = True
-        self._useless = False  # whether efforts do not what they should
+        self._useless = False  # whether joints do not follow their efforts
         self._stopping = False  # whether the joints are braked
         self._moving = False  # whether the robot's clock has begun
         self._positions = np.ones(self._robot.nv, dtype=bool)

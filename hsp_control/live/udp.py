@@ -26,11 +26,11 @@ from hsp_control.live.simulated_robot import SimulatedRobot
 from hsp_control.robot import Robot
 
 _EACH = 6
-"""Numbers of a wrench, and of what an inertial measurement unit reports."""
+"""Numbers of a wrench, and of a reading of an inertial measurement unit."""
 
 
 class SensorLayout(NamedTuple):
-    """The sensors that both ends of a connection know.
+    """The sensors on which both ends of a connection agree.
 
     The numbers of a state are q, v, then six of each wrench in this order, then those
     of the inertial measurement unit (angular velocity, specific force), and at the end
@@ -115,7 +115,7 @@ class UdpHardware:
             robot: The model; gives the sizes nq and nv.
             period: Time between two states [s].
             address: Where to listen; port 0: any free port.
-            session: A number that the robot knows; None: a random one.
+            session: A number that the robot uses, too; None: a random one.
             faults: Faults to inject into the efforts sent.
             sensors: What the robot measures besides q and v; None: nothing.
 
@@ -193,7 +193,7 @@ and whether it is the last one."""
 
 @contextmanager
 def _halting(robot: SimulatedRobot, what: str) -> Iterator[None]:
-    """Stop the robot at whatever is raised: nobody else would."""
+    """Stop the robot at any error: nothing else would."""
     try:
         yield
     except BaseException as error:
@@ -215,7 +215,7 @@ def serve(
     computed in no time; a later one acts from the next period on.
 
     If this process overruns by more than a period, the robot's time stands still
-    meanwhile, so that the loop's efforts do not count as late.
+    meanwhile, so that the loop's efforts are not late.
 
     Whatever the connection or ``on_rows`` raises stops the robot, too; none of
     ``on_rows`` is called after that.

@@ -9,7 +9,7 @@ from hsp_control.live.settings import LiveSettings
 from hsp_control.robot import Robot
 
 _WINDOW = 0.05
-"""How old the motion may be that a velocity tells of [s]: a delay of 5 ms and a filter
+"""How old the motion may be that a velocity reports [s]: a delay of 5 ms and a filter
 of 20 Hz, whose step response ends after 40 ms."""
 _MEAN_TIME, _MEAN_ERROR = 0.012, 0.3
 """Time constant of the mean of what is beyond [s], and how large that may be besides
@@ -48,9 +48,9 @@ _STEPS = 2.5
 
 
 class VelocityCheck:
-    """Finds joints whose measured velocity contradicts their measured positions.
+    """Detects joints whose measured velocity contradicts their positions.
 
-    What is delayed and filtered is a mean of earlier velocities: it lies between the
+    What is delayed and filtered is a mean of earlier velocities: it is between the
     least and the greatest slope of positions in a window. The velocity may be beyond
     them by `LiveSettings.velocity_error`, and its mean of some milliseconds by less. A
     smaller difference that stays is found by a leaky sum of dq - v h, which noise and
@@ -64,7 +64,7 @@ class VelocityCheck:
     Attributes:
         doubtful: Joints whose last velocity is not used yet, shape (nv,).
         contradicted: Joints whose velocity contradicts their positions, shape (nv,).
-        dead: Joints whose sensor says nothing any more, shape (nv,).
+        dead: Joints whose sensor is dead, shape (nv,).
         slope: Slope of the last positions, shape (nv,) [rad/s or m/s].
         difference: Between velocity and slope at the last one, shape (nv,).
         mean: Mean velocity in the same time, shape (nv,).

@@ -28,7 +28,7 @@ PERIOD = 1e-3
 ROUNDING = 1e-9
 """Of an effort beside its limit, as a part of it."""
 OWN_EFFORTS = {"planar3r": (60.0, 40.0, 20.0)}
-"""For the robot whose URDF has none [N·m]: a little more and less than gravity asks."""
+"""For the robot whose URDF has none [N·m]: a little above and below gravity's."""
 OTHERS = (
     "dual_panda", "tiago_reach", "ur5_position", "whole_body/baxter_two_hands",
     "whole_body/solo12_trunk", "whole_body/talos_circle",

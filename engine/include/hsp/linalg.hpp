@@ -27,7 +27,7 @@ template <class L, class X> void solve_rows_transposed(const L& factor, X&& rows
 }
 
 // L of A = L Lᵀ, of which the lower triangle is read; whether A is positive definite. (Eigen's
-// LLT has memory of its own; this writes where it is told.)
+// LLT has its own memory; this writes into the caller's.)
 template <class A, class L> bool cholesky(const A& matrix, L& factor) {
   const Index n = matrix.rows();
   for (Index j = 0; j < n; ++j) {

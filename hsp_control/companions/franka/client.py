@@ -36,7 +36,7 @@ _SAME = 0.001
 _SILENCE = 2.0
 """Silence after which another sender is accepted [s]."""
 ALIVE = b"L"
-"""What the gripper's process says without being asked, while it lives."""
+"""Unsolicited messages of the gripper's process while it runs."""
 _BEAT = 0.5
 """Time between two of these [s]; a motion of the fingers takes longer."""
 
@@ -142,8 +142,8 @@ def described(state: Any) -> dict[str, Any]:
 class GripperClient:
     """Moves the gripper as JSON datagrams say, ``{"value": [0.02]}``: a finger [m].
 
-    Of what comes during a motion the newest counts. A smaller opening grasps what is
-    there. Who sends, or asks by ``{}``, hears how it stands.
+    Of messages during a motion the newest is used. A smaller opening grasps what is
+    there. The sender, also of a query ``{}``, receives its state.
     """
 
     def __init__(self, address: str, host: str, port: int) -> None:
@@ -201,7 +201,7 @@ class GripperClient:
                 link.send(ALIVE, socket.MSG_DONTWAIT)
 
     def read(self, message: Any, sender: tuple[str, int], wanted: float) -> float:
-        """Return the opening that a message asks for, if it does."""
+        """Return the opening that a message commands, if any."""
         if not isinstance(message, dict):
             raise ValueError("it needs a mapping with value: [OPENING]")
         value = message["values"][-1] if "values" in message else message.get("value")
@@ -226,7 +226,7 @@ class GripperClient:
                 self.gripper.grasp(2.0 * opening, SPEED, FORCE, 0.1, 0.1)
             else:
                 self.gripper.move(2.0 * opening, SPEED)
-            self.opening = opening  # what failed is tried again when it is asked for
+            self.opening = opening  # a failed motion is tried again on command
 
     def say(self, line: str) -> None:
         """Print a line once."""

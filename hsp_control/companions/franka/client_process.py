@@ -32,7 +32,7 @@ class ClientProcess:
 
     Attributes:
         waiting: Whether a request has no answer yet.
-        fault: What the process said last that ends the connection, or None.
+        fault: The last message of the process that ends the connection, or None.
     """
 
     def __init__(self) -> None:
@@ -106,7 +106,7 @@ class ClientProcess:
             self._errors.close()
 
     def trouble(self) -> str:
-        """Return why nobody does what this process should, "" if it lives.
+        """Return why the process fails, "" if it runs.
 
         While nothing is asked it says now and then that it lives. The time in which
         this process was stopped itself does not count.

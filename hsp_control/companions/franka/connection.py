@@ -1,4 +1,4 @@
-"""Connect to a Franka arm, check it, and set what the settings say."""
+"""Connect to a Franka arm, check it, and apply the settings."""
 
 import json
 from pathlib import Path
@@ -74,11 +74,11 @@ def connect(
 def reached(
     settings: FrankaSettings, chosen: Array, *, moves: bool
 ) -> tuple[ClientProcess, dict[str, Any]]:
-    """Return a connection to an arm that is ready, and what it said (`client`).
+    """Return a connection to an arm that is ready, and its reports (`client`).
 
     Args:
         settings: What is set there.
-        chosen: Postures at which the robot's model is asked, shape (n, 7).
+        chosen: Postures at which the robot's model is queried, shape (n, 7).
         moves: Whether the arm is to move; otherwise its collision behaviour stays.
 
     Raises:

@@ -16,14 +16,14 @@ from hsp_control.live.settings import LiveSettings
 from hsp_control.robot import Robot
 
 EFFORT_RATE = 999.0
-"""Greatest rate of what is sent [N·m/s].
+"""Greatest rate of the sent effort [N·m/s].
 
-The arm accepts 1000, counted from an effort that it tells in single precision: 100 N·m
-are told to 4e-6, which is 0.004 N·m/s."""
+The arm accepts 1000, counted from an effort that it reports in single precision: 100
+N·m are reported to 4e-6, which is 0.004 N·m/s."""
 _START = 5.0
-"""Longest time that starting or ending the torque control takes [s]."""
+"""Longest time to start or end the torque control [s]."""
 _LAST_WORDS = 1.5
-"""Time to wait for what the client says when it hears nothing for 1 s [s]."""
+"""Time to wait for the client's message when it receives nothing for 1 s [s]."""
 
 
 class FrankaHardware:

@@ -11,9 +11,9 @@ from hsp_control.robot import Robot
 GRAVITY = 2.0
 """Largest difference of g(q) with which the loop starts [N·m].
 
-What the arm adds for gravity minus what the loop takes off moves the arm. The bundled
-Panda and libfranka's Research 3 with the same hand differ by 1.1 N·m at these postures;
-if the robot does not know of its hand, by 3.5."""
+The gravity that the arm adds minus the one that the loop subtracts moves the arm. The
+bundled Panda and libfranka's Research 3 with the same hand differ by 1.1 N·m at these
+postures; if the robot does not know of its hand, by 3.5."""
 FREQUENCIES = (0.5, 2.0)
 """Range of the factors by which natural frequencies may change [-].
 

@@ -27,7 +27,7 @@ def robot_urdf(address: str) -> str:
     """Return the URDF of the robot at an address: the arm, without its end effector.
 
     A box serves one client, and may take a moment to notice that the last one has gone:
-    for two seconds this asks again.
+    for two seconds this tries again.
     """
     end = monotonic() + _OTHER_CLIENT
     while True:

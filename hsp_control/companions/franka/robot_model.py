@@ -20,10 +20,10 @@ _OF_A_JOINT = ("origin", "axis", "limit")
 
 
 def own_model(urdf: str, carried: dict[str, Any], tool: list[float]) -> str:
-    """Return the robot's URDF with what it carries.
+    """Return the robot's URDF with its load.
 
     Two links are added to the flange: ``carried`` has the mass of end effector and
-    load, ``end_effector`` is the frame that Desk knows.
+    load, ``end_effector`` is the frame that is set in Desk.
     """
     top = _parsed(urdf)
     _carry(top, _flange(top), carried)

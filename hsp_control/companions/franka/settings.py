@@ -42,7 +42,7 @@ _FURTHEST = 2.0
 
 
 class Load(Part, error=LiveError):
-    """What the hand holds, beyond the end effector that Desk knows (``set_load``)."""
+    """The load of the hand, beyond the end effector set in Desk (``set_load``)."""
 
     mass: NonNegative
     """Its mass [kg]."""
@@ -78,7 +78,7 @@ class Load(Part, error=LiveError):
 
 
 class FrankaSettings(Part, error=LiveError):
-    """How the loop connects to a Franka arm, and what it sets there."""
+    """How the loop connects to a Franka arm, and its settings there."""
 
     address: Annotated[str, Field(min_length=1)]
     """Address of the control box, a number or a name."""
@@ -90,7 +90,7 @@ class FrankaSettings(Part, error=LiveError):
     """Whether a reflex that is still there from before is reset when connecting. A
     reflex during the run is never reset."""
     load: Load | None = None
-    """What the hand holds; None: the robot's own setting stays."""
+    """The load of the hand; None: the robot's own setting is kept."""
     collision_torque: _Positive7 = (20.0, 20.0, 18.0, 18.0, 16.0, 14.0, 12.0)
     """External torque at which a joint stops the robot [N·m], seven numbers."""
     collision_force: _Positive6 = (20.0, 20.0, 20.0, 25.0, 25.0, 25.0)
@@ -98,14 +98,14 @@ class FrankaSettings(Part, error=LiveError):
     cutoff_frequency: Positive | None = None
     """Of a first-order filter between loop and robot [Hz]; None: no filter."""
     gripper: Annotated[str, Field(pattern=r"^udp://[^/:]+:\d+$")] | None = None
-    """Where it hears openings of a finger, ``udp://HOST:PORT``; None: nowhere."""
+    """Where it receives openings of a finger, ``udp://HOST:PORT``; None: nowhere."""
 
     @classmethod
     def parse(cls, text: str) -> Self:
         """Return what ``ADDRESS?name=value&...`` says, or ``FILE.yaml?...``.
 
-        Values are written as in YAML; ``load.mass`` is a key inside ``load``. What
-        stands in the text counts more than the file.
+        Values are written as in YAML; ``load.mass`` is a key inside ``load``. The text
+        overrides the file.
 
         Raises:
             LiveError: If a name or a value is wrong, or the file cannot be read.

@@ -1,4 +1,4 @@
-"""The arm as the box knows it: its model, its limits and its end effector."""
+"""The arm of the box: its model, its limits and its end effector."""
 
 from dataclasses import dataclass
 from xml.etree import ElementTree

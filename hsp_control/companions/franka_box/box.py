@@ -1,4 +1,4 @@
-"""The box: an arm, its modes and its reflexes. It knows no sockets and no clock."""
+"""The box: an arm, its modes and its reflexes. It has no sockets and no clock."""
 
 from collections.abc import Callable, Sequence
 
@@ -234,7 +234,7 @@ class ControlBox:
         self.model.state.update(self.t, *self._measured)
 
     def gravity_with(self, load: pin.Inertia) -> Array:
-        """Return what gravity would ask of the joints with a load, shape (7,) [N·m]."""
+        """Return the joints' efforts against gravity with a load, shape (7,) [N·m]."""
         robot, rest = self.arm.carrying(load), np.zeros(JOINTS)
         return robot.inverse_dynamics(self.model.state.q, rest, rest)
 

@@ -57,7 +57,7 @@ class Generator(ABC):
         return found
 
     def extrapolate(self) -> None:
-        """Go on without a command: the acceleration stays."""
+        """Continue without a command: the acceleration is kept."""
         self._extrapolate()
         if self._under_way is not None:
             begun = self.reference, self.hand

@@ -1,4 +1,4 @@
-"""A Franka Hand, as libfranka knows it: its fingers open, close and hold something.
+"""A Franka Hand with libfranka's interface: its fingers open, close and hold something.
 
 Transcribed from libfranka-common (Apache-2.0, Franka Robotics),
 ``research_interface/gripper/types.h``.

@@ -18,7 +18,7 @@ _SINGULAR = 1e-3
 class Model:
     """The arm with its end effector and the load that a client has set.
 
-    It does not know what the simulated arm has besides: friction, a payload.
+    It lacks what the simulated arm has besides: friction, a payload.
 
     Attributes:
         arm: The arm.

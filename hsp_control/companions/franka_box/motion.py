@@ -33,9 +33,9 @@ SERVED = {(ControllerMode.EXTERNAL, MotionGenerator.NONE)} | {
 
 
 class Motion:
-    """What a client commands, from the start of a motion to its end.
+    """The commands of a client, from the start of a motion to its end.
 
-    Until the first command nothing counts as lost: a client needs a while from the
+    Until the first command none is lost: a client needs a while from the
     answer that its motion has started to its first state.
 
     Attributes:

@@ -36,7 +36,7 @@ class BipedPlan(MovingPlan):
 
     _: KW_ONLY
     steps: PositiveCount | None = None
-    """How many steps it takes before it slows down and stands [-]; by default it walks
+    """Number of steps before it slows down and stands [-]; by default it walks
     until the end."""
     footsteps: Points | None = None
     """Instead of a velocity: where the feet go, one after the other; x, y and yaw from
@@ -64,7 +64,7 @@ class BipedPlan(MovingPlan):
     adjusts: Flag = True
     """Whether a push moves the next step [-]."""
     contact_force: Positive = 0.03
-    """Normal force at which a swing foot counts as landed, in robot weights [-]."""
+    """Normal force at which a swing foot has landed, in robot weights [-]."""
 
     def _complete(self) -> None:
         super()._complete()

@@ -55,7 +55,7 @@ class Switch(Written, Schedule):
         return bool(self.memory[3] > 0.0)
 
     def active(self, t: float) -> bool:
-        """Return whether it counts at time t [s]."""
+        """Return whether it is active at time t [s]."""
         start, ramp, _, target = self._last
         return target > 0.0 or t < start + ramp
 
@@ -108,5 +108,5 @@ class Switched:
         self.contact.set(True, t, ramp)
 
     def rests(self, t: float) -> bool:
-        """Return whether the contact alone counts at time t [s], and its task ends."""
+        """Return whether the contact alone is active at t [s], and its task ends."""
         return self.contact.is_on and self.contact.weight(t) >= HELD

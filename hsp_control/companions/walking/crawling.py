@@ -47,12 +47,12 @@ class Crawl(QuadrupedPlan, type="crawl"):
     [-]."""
 
     def begin(self, controller: Controller) -> "RunningCrawl":
-        """Return what crawls; see `Plan.begin`."""
+        """Return the crawl of a run; see `Plan.begin`."""
         return RunningCrawl(self.begun(), controller, self.margin)
 
 
 class RunningCrawl(RunningQuadruped):
-    """What a `Crawl` became for one run."""
+    """A `Crawl` in one run."""
 
     _mode: Literal["standing", "four", "three"]
 

@@ -28,7 +28,7 @@ from hsp_control.robot import RobotState
 LATE = 0.12
 """How long a foot without ground under it is waited for [s]."""
 EARLY = 0.6
-"""Share of a swing before which no force counts as touchdown."""
+"""Share of a swing before which no force is taken as touchdown."""
 RISE = 0.3
 """How long the trunk takes to rise or sink with the ground [s]."""
 _PRESS = 0.002
@@ -101,7 +101,7 @@ class PointFoot(Switched):
 
 
 class RunningQuadruped(RunningPlan):
-    """What a plan of four feet became for one run."""
+    """A plan of four feet in one run."""
 
     _mode: str
     """What it does; "standing" in each gait."""
@@ -293,7 +293,7 @@ class RunningQuadruped(RunningPlan):
         return wanted if excess <= 1.0 else Velocity(*(v / excess for v in wanted))
 
     def _accelerate(self, t: float) -> None:
-        """Bring the velocity nearer to what is wanted, and turn with it."""
+        """Bring the velocity nearer to the desired one, and turn with it."""
         h = t - self._last
         most = self.gait.acceleration * h
         # A metre per second and a radian per second change equally fast.

@@ -1,4 +1,4 @@
-"""What legs do to the centre of pressure, and how a plan makes up for it.
+"""The effect of legs on the centre of pressure, and how a plan compensates it.
 
 A leg that swings has an angular momentum L about the centre of mass. Where the trunk
 does not turn, the feet must push beside the repellent point p, at

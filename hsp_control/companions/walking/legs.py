@@ -1,4 +1,4 @@
-"""What a plan asks of a robot: its trunk, and how far its legs reach."""
+"""A plan's requirements of a robot: its trunk, and the reach of its legs."""
 
 import numpy as np
 import pinocchio as pin

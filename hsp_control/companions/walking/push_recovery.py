@@ -1,4 +1,4 @@
-"""What a biped does about a push: another step, or none.
+"""The reaction of a biped to a push: another step, or none.
 
 What the sole of the standing foot cannot bring back moves the next step, in place and
 in time (`step_adjustment.py`). Across the standing foot no leg can step: a

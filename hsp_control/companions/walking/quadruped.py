@@ -60,7 +60,7 @@ class QuadrupedPlan(MovingPlan):
     acceleration: Positive = 0.5
     """How fast the velocity changes [m/s²]."""
     contact_force: Positive = 0.01
-    """Normal force at which a swing foot counts as landed, in robot weights [-]."""
+    """Normal force at which a swing foot has landed, in robot weights [-]."""
 
     def _complete(self) -> None:
         super()._complete()

@@ -1,4 +1,4 @@
-"""Contacts that begin and end when a force or a height says so."""
+"""Contacts that begin and end by a force or a height."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import KW_ONLY, replace
@@ -64,7 +64,7 @@ class SensedContact(Part, error=PlanError):
     starts: Flag = False
     """Whether it is active at the start, before anything is measured [-]."""
     task: str | None = None
-    """Name of a task that counts while it is not active [-]: what moves its link."""
+    """Name of a task that is active while it is not [-]: it moves its link."""
     name: str = ""
     """Name of the contact [-]. In YAML, its key."""
 
@@ -96,7 +96,7 @@ class SensedContact(Part, error=PlanError):
 
 
 class Sensed(Plan, type="sensed"):
-    """Contacts are switched by what is sensed: measured or estimated forces, or height.
+    """Contacts are switched by detection: measured or estimated forces, or height.
 
     Everything else, tasks and their references, is as it is declared. A contact rises
     and fades over its ramp, so that efforts stay continuous.
@@ -157,7 +157,7 @@ class Sensed(Plan, type="sensed"):
         )
 
     def begin(self, controller: Controller) -> "RunningSensed":
-        """Return what switches; see `Plan.begin`."""
+        """Return the switches of a run; see `Plan.begin`."""
         return RunningSensed(self, controller)
 
 
@@ -263,7 +263,7 @@ class FeltContact(Switched):
 
 
 class RunningSensed(RunningPlan):
-    """What a `Sensed` became for one run."""
+    """A `Sensed` in one run."""
 
     def __init__(self, sensed: Sensed, controller: Controller) -> None:
         """Find the switches.

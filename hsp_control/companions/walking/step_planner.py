@@ -142,7 +142,7 @@ class StepPlanner:
         return Next(velocity, None if stands else target)
 
     def _next_velocity(self, now: Velocity, t: float, taken: int) -> Velocity:
-        """Return the velocity of a step, as near to what is wanted as it may be."""
+        """Return the velocity of a step, as near to the desired one as possible."""
         wanted = self.wanted(t, taken)
         largest = self._walk.acceleration * self.period
         bounds = largest, largest, largest / max(0.5 * self._stance.width, 0.1)

@@ -42,12 +42,12 @@ class Trot(QuadrupedPlan, type="trot"):
     center_gains: ClassVar[Gains] = Gains(6.0, 5.0)
 
     def begin(self, controller: Controller) -> "RunningTrot":
-        """Return what trots; see `Plan.begin`."""
+        """Return the trot of a run; see `Plan.begin`."""
         return RunningTrot(self.begun(), controller)
 
 
 class RunningTrot(RunningQuadruped):
-    """What a `Trot` became for one run."""
+    """A `Trot` in one run."""
 
     _mode: Literal["standing", "ready", "four", "two"]
 
@@ -94,7 +94,7 @@ class RunningTrot(RunningQuadruped):
         self._line = self._line + 0.5 * h * (before + now)
         away = self._state.centroidal.position[:2] - self._reference
         far = float(np.hypot(*away))
-        if far > LEASH:  # somebody pushes it: the reference comes along
+        if far > LEASH:  # it is pushed: the reference follows
             pulled = away * (1.0 - LEASH / far)
             self._reference = self._reference + pulled
             speed = float(np.hypot(*now))

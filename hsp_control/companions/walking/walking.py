@@ -43,7 +43,7 @@ FIRST_SHIFT = (0.4, 0.6)
 LATE = 0.2
 """How long a foot without ground under it is waited for [s]."""
 EARLY = 0.6
-"""Share of a swing before which no force counts as touchdown."""
+"""Share of a swing before which no force is taken as touchdown."""
 LANDING = 0.5
 """How long the force of a foot that lands takes to rise, in double supports [-]."""
 _SHIFTS = 0.5, 2.0
@@ -74,13 +74,13 @@ class Walk(BipedPlan, type="walk"):
     """
 
     def begin(self, controller: Controller) -> "RunningWalk":
-        """Return what walks; see `Plan.begin`."""
+        """Return the walk of a run; see `Plan.begin`."""
         names = self._feet(controller.contacts)
         return RunningWalk(self.begun(), controller, names, BODY, TRUNK)
 
 
 class RunningWalk(RunningPlan):
-    """What a `Walk` became for one run: phases, footsteps and feedback.
+    """A `Walk` in one run: phases, footsteps and feedback.
 
     On two feet the repellent point moves from sole to sole while the force of the foot
     that is to swing fades; on one foot it rests there. The references are those of the
@@ -408,7 +408,7 @@ class RunningWalk(RunningPlan):
         return self._legs.lead(side, places[-side], way)
 
     def _react(self, t: float) -> None:
-        """Make up for what the leg will do that swings."""
+        """Compensate the momentum of the swing leg."""
         assert self._swing is not None
         standing = self._feet[-self._side].place
         self._reaction = self._legs.of(self._swing, t, self._side, standing)

@@ -30,8 +30,8 @@ def scaled(**factors: float) -> dict[str, Any]:
 
 
 HEAVY: dict[str, tuple[Any, Any]] = {
-    "plant.payload.mass is 1e+06 kg: gravity asks": (payload(1e6), payload),
-    "plant.inertias.mass_factor is 1e+06: gravity asks": (
+    "plant.payload.mass is 1e+06 kg: gravity requires": (payload(1e6), payload),
+    "plant.inertias.mass_factor is 1e+06: gravity requires": (
         scaled(mass_factor=1e6),
         lambda x: scaled(mass_factor=x),
     ),

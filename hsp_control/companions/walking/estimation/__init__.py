@@ -1,1 +1,1 @@
-"""Estimation: what is not measured of a walking robot, from what is."""
+"""Estimation of a walking robot's unmeasured states from measured ones."""

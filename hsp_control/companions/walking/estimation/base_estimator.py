@@ -1,4 +1,4 @@
-"""The pose and the velocity of a floating base, from what is measured on board."""
+"""The pose and the velocity of a floating base, from on-board measurements."""
 
 from collections.abc import Mapping
 from typing import ClassVar
@@ -45,8 +45,8 @@ class BaseEstimator(Estimator, type="base"):
     """The base is estimated from an inertial measurement unit and the legs' joints.
 
     By the contact-aided invariant extended Kalman filter
-    (`estimation/invariant_filter.py`). A contact counts while the world presses on it;
-    one without a force counts while it is fully active.
+    (`estimation/invariant_filter.py`). A contact is used while a force presses on it;
+    one without a measured force while it is fully active.
 
     It begins where the robot is measured first. Heading and place drift from there:
     nothing on board observes them. The noise is that of a small industrial unit, the
@@ -68,13 +68,13 @@ class BaseEstimator(Estimator, type="base"):
     joint_noise: NonNegative = 1.0e-4
     """Standard deviation of the joints' measured positions [rad or m]."""
     leg_noise: Positive = 1.0e-3
-    """What is uncertain of a point of contact besides: the links bend, and the ground
+    """Further uncertainty of a point of contact: the links bend, and the ground
     is soft [m]."""
     contacts: Names | None = None
     """Names of the contacts that stand still while they are pressed [-]; all that do
     not slide by default."""
     contact_force: Positive = 0.1
-    """Normal force from which a contact counts, in robot weights [-]."""
+    """Normal force from which a contact is used, in robot weights [-]."""
     start_tilt: NonNegative = 0.02
     """How uncertain the tilt is at the start [rad]."""
     start_velocity: NonNegative = 0.05
@@ -152,7 +152,7 @@ class RunningBaseEstimator(RunningEstimator):
         """Return a measurement whose base is estimated.
 
         Args:
-            measured: What is measured; of its base only the first one counts.
+            measured: What is measured; of its base only the first one is used.
 
         Raises:
             EstimationError: If the unit reported nothing.
