@@ -117,7 +117,7 @@ def test_a_dead_sensor_does_not_drive_the_arm(opened: Opened) -> None:
     for k in range(300):
         dead = k >= 50
         status = opened.step(H * k, np.nan * q if dead else q, v)
-        assert status == WRONG_STATE if dead else status >= OK
+        assert status < 0 if dead else status >= OK
         if k == 50:
             last = opened.tau.copy()
         elif 50 < k < 50 + REPEATED:
