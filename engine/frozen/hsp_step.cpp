@@ -1,6 +1,7 @@
 // The functions of `hsp_step.h`. No exception leaves them.
 #include <hsp_step.h>
 
+#include <algorithm>
 #include <atomic>
 #include <cmath>
 #include <cstdio>
@@ -18,6 +19,7 @@ using hsp::frozen::Port;
 
 constexpr double infinite = std::numeric_limits<double>::infinity();
 constexpr double most_periods = 100.0;  // from one step to the next
+constexpr int most_repeated = 5;        // periods in a row with the last effort
 thread_local char opening[1024] = "";   // why `hsp_open` returned null
 
 void write(char* to, std::size_t size, const char* text) { std::snprintf(to, size, "%s", text); }
@@ -32,10 +34,13 @@ struct hsp_controller {
         delivered(plan.array<std::int64_t>("delivered", 1)),
         period(plan.array<double>("period", 1)),
         origin(plan.array<double>("origin", 1)),
-        stops(&plan.stop() != &plan.move()) {
+        stops(&plan.stop() != &plan.move()),
+        expected_q(plan.move().q),
+        expected_v(plan.move().v) {
     if (stops) {
       stop_tau = plan.array<double>("stop.tau", plan.move().v.size());
       holding = plan.array<std::int64_t>("stop.holding", 1);
+      damping = plan.array<double>("stop.damping", 1);
     }
     for (const Port& each : plan.ports())
       ports.push_back({each.name.c_str(), each.unit.c_str(), each.meaning.c_str(),
@@ -51,8 +56,12 @@ struct hsp_controller {
   std::optional<double> last;  // time of the last step [s]
   const bool stops;            // whether hsp_stop brakes
   const double* stop_tau = nullptr;
-  const std::int64_t* holding = nullptr;
+  std::int64_t* holding = nullptr;
+  const double* damping = nullptr;  // [1/s]
   bool stopping = false;
+  int refused = 0;                     // periods in a row without a new effort
+  hsp::Vector expected_q, expected_v;  // the last state that was accepted, and what follows from it
+  bool blind = false;                  // whether hsp_stop goes by what is expected
   std::atomic<hsp_status> error = HSP_OK;  // of the last request
   char failure[512] = "";                  // what an exception said
   std::atomic_flag busy = ATOMIC_FLAG_INIT;
@@ -77,6 +86,12 @@ template <class Request> hsp_status made(hsp_controller* controller, Request req
   return status;
 }
 
+void accept(hsp_controller& of, double t, const hsp::Move& move) {
+  of.last = t;
+  of.expected_q = move.q;
+  of.expected_v = move.v;
+}
+
 // Make a step; its effort, or the last one, is then `of.tau`.
 hsp_status moved(hsp_controller& of, double t, const double* q, const double* v) {
   hsp::Move& move = of.plan.move();
@@ -85,8 +100,24 @@ hsp_status moved(hsp_controller& of, double t, const double* q, const double* v)
   if (!of.last) *of.origin = t;  // times count from the first step, whatever the clock reads
   else if (t < *of.last || t > *of.last + most_periods * *of.period) return HSP_WRONG_CLOCK;
   if (!move.to(t, q_in, v_in)) return HSP_WRONG_STATE;
-  of.last = t;
+  accept(of, t, move);
   return *of.delivered ? static_cast<hsp_status>(*of.status) : HSP_NOT_FINITE;
+}
+
+// Brake, or hold, at the state that the stop has moved to.
+hsp_status braked(hsp_controller& of) {
+  const Eigen::Map<const hsp::Vector> found(of.stop_tau, of.plan.stop().v.size());
+  if (!found.allFinite()) return HSP_NOT_FINITE;
+  Eigen::Map<hsp::Vector>(of.tau, found.size()) = found;
+  return *of.holding ? HSP_HOLDING : HSP_BRAKING;
+}
+
+// A period whose state is not known: it moves on as fast as before while the last effort is
+// repeated, and then more and more slowly, as a robot does that is braked by -k M v.
+void expect(hsp_controller& of) {
+  hsp::Vector &q = of.expected_q, &v = of.expected_v;
+  if (q.size() == v.size()) q += *of.period * v;  // joints that are counted from zero
+  if (of.refused >= most_repeated && of.stops) v *= std::max(1.0 - *of.damping * *of.period, 0.0);
 }
 
 // Brake, or hold: the effort, or the last one, is then `of.tau`. No clock is wrong here.
@@ -95,21 +126,34 @@ hsp_status stopped(hsp_controller& of, double t, const double* q, const double* 
   hsp::Move& stop = of.plan.stop();
   const Eigen::Map<const hsp::Vector> q_in(q, stop.q.size()), v_in(v, stop.v.size());
   of.stopping = true;
-  if (!std::isfinite(t)) return HSP_WRONG_STATE;
-  if (!of.last) *of.origin = t;
-  if (!stop.to(t, q_in, v_in)) return HSP_WRONG_STATE;
-  of.last = t;
-  const Eigen::Map<const hsp::Vector> found(of.stop_tau, v_in.size());
-  if (!found.allFinite()) return HSP_NOT_FINITE;
-  Eigen::Map<hsp::Vector>(of.tau, v_in.size()) = found;
-  return *of.holding ? HSP_HOLDING : HSP_BRAKING;
+  if (stop.is_valid(t, q_in, v_in)) {
+    if (!of.last) *of.origin = t;
+    if (of.blind) *of.holding = 0;  // where it was expected to come to rest it need not be
+    of.blind = false;
+    stop.to(t, q_in, v_in);
+    accept(of, t, stop);
+    return braked(of);
+  }
+  if (of.refused >= most_repeated && of.last) {
+    of.blind = true;
+    if (stop.to(*of.last, of.expected_q, of.expected_v)) braked(of);
+  }
+  return HSP_WRONG_STATE;
 }
 
 hsp_status step(hsp_controller& of, double t, const double* q, const double* v, double* tau,
                 bool stops) {
-  const hsp_status status = stops         ? stopped(of, t, q, v)
-                            : of.stopping ? HSP_STOPPED
-                                          : moved(of, t, q, v);
+  hsp_status status = HSP_STOPPED;
+  if (!stops && !of.stopping) status = moved(of, t, q, v);
+  // One wrong state is passed over. An effort that is repeated for long drives the robot.
+  const bool lasts = status < 0 && of.refused >= most_repeated && of.last && of.stops;
+  if (stops || of.stopping || lasts) {
+    const hsp_status stop = stopped(of, t, q, v);
+    status = stops || stop < 0 ? stop : HSP_STOPPED;
+    if (stop >= 0) of.refused = 0;
+  } else if (status >= 0) of.refused = 0;
+  if (status == HSP_WRONG_STATE || status == HSP_WRONG_CLOCK) expect(of);
+  if (status < 0 && status != HSP_STOPPED) of.refused = std::min(of.refused + 1, most_repeated);
   for (Index i = 0; i < of.plan.move().v.size(); ++i) tau[i] = of.tau[i];
   return status;
 }
@@ -155,7 +199,7 @@ const char* sentence(hsp_status status) {
     case HSP_HOLDING:
       return "the robot is held where it came to rest";
     case HSP_STOPPED:
-      return "the robot is being stopped: call hsp_stop, or hsp_restart for a new run";
+      return "the robot is being stopped, as by hsp_stop; hsp_restart begins a new run";
     case HSP_WRONG_STATE:
       return "t, q or v is not finite, or a quaternion or (cos, sin) pair in q has not norm 1";
     case HSP_WRONG_CLOCK:
@@ -232,7 +276,8 @@ hsp_status hsp_restart(hsp_controller* controller) noexcept {
   return made(controller, [](hsp_controller& of) {
     of.plan.restart();
     of.last.reset();
-    of.stopping = false;
+    of.stopping = of.blind = false;
+    of.refused = 0;
     return HSP_OK;
   });
 }

@@ -4,7 +4,7 @@
  *   if (!arm) fail(hsp_last_error(NULL));
  *   while (running) {                                 // at the control period
  *     hsp_status status = stopping ? hsp_stop(arm, t, q, v, tau) : hsp_step(arm, t, q, v, tau);
- *     if (status < 0) warn(hsp_last_error(arm));      // tau is the last one delivered
+ *     if (status < 0) warn(hsp_last_error(arm));      // tau is still one that may be sent
  *     stopping |= status < 0;                         // brake from the next state on
  *     send(tau);
  *   }
@@ -33,8 +33,14 @@ extern "C" {
 #define HSP_NOEXCEPT
 #endif
 
-/* What became of a step, or of a request. From 0 on there is a new effort; below, nothing was done,
- * and tau is the effort that was delivered last, or 0 if there was none yet. */
+/* What became of a step, or of a request. From 0 on it was done, and tau is a new effort; below, it
+ * was refused. Of a step or a stop that was refused, tau is the effort that was delivered last, or 0
+ * if there was none yet, but for no more than 5 periods in a row: an effort that is repeated for long
+ * drives the robot. From the sixth on the robot is stopped, as by hsp_stop and for good. Where t, q
+ * and v are finite the stop goes by them. Where they are not, it goes by the last ones that were, and
+ * by how fast they would change under its own braking: the effort fades to g(q). Nobody measures
+ * whether that is so: let the robot's own brakes take over. A robot on feet is not stopped by it; the
+ * last effort stays. */
 typedef enum hsp_status {
   HSP_OK = 0,            /* the law's own effort */
   HSP_REDISTRIBUTED = 1, /* with contact forces chosen by a QP */
@@ -52,7 +58,7 @@ typedef enum hsp_status {
   HSP_WRONG_VALUE = -7,  /* a value is not finite, or outside of its bounds */
   HSP_TOO_MANY = -8,     /* more than 8 ramps of one input at a time */
   HSP_FAILED = -9,       /* something else, which `hsp_last_error` says */
-  HSP_STOPPED = -10      /* hsp_stop has begun: no more steps until hsp_restart */
+  HSP_STOPPED = -10      /* of hsp_step: the stop has begun, tau is its effort; see hsp_restart */
 } hsp_status;
 
 typedef struct hsp_controller hsp_controller;
@@ -84,7 +90,8 @@ HSP_API hsp_status hsp_step(hsp_controller* controller, double t, const double* 
 /* Stop the robot: call it each period instead of hsp_step, once a step is refused or the run is to
  * end. It brakes all joints alike, tau = g(q) - s k M(q) v, until they are slow, and then holds them,
  * as `hsp live` does; the law, its limits and its clock are not asked. Efforts keep their limits, but
- * not those on their rate. What frames carry counts. hsp_step is refused from then on. */
+ * not those on their rate. What frames carry counts. hsp_step makes no step from then on: it does
+ * the same, and returns HSP_STOPPED. */
 HSP_API hsp_status hsp_stop(hsp_controller* controller, double t, const double* q, const double* v,
                             double* tau) HSP_NOEXCEPT;
 

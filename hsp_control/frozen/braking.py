@@ -95,4 +95,5 @@ def stopping(
     }
     effort = Port("stop.tau", "N·m or N", "the effort that brakes, or holds", tau)
     held = Port("stop.holding", "-", "whether it holds", holding)
-    return engine.Move(**values), [effort, held]
+    rate = Port("stop.damping", "1/s", "how it brakes", np.array([gains.damping]))
+    return engine.Move(**values), [effort, held, rate]

@@ -100,3 +100,68 @@ def test_it_can_be_the_first_that_is_asked(opened: Opened) -> None:
     assert opened.stop(100.0, q, np.zeros(7)) == HOLDING
     rest = hsp.Robot.load("panda").inverse_dynamics(q, np.zeros(7), np.zeros(7))
     np.testing.assert_array_equal(opened.tau, rest)
+
+
+# -- nothing is known ---------------------------------------------------------------
+
+REPEATED = 5
+"""Periods in a row with the last effort, as `hsp_step.h` says."""
+
+
+def test_a_dead_sensor_does_not_drive_the_arm(opened: Opened) -> None:
+    """The arm is accelerated when q turns into NaN for good: it comes to rest."""
+    experiment = hsp.load_experiment("panda_limits")
+    robot, q = experiment.robot, experiment.q0.copy()
+    v = np.linspace(-0.5, 0.5, 7)
+    speeds = []
+    for k in range(300):
+        dead = k >= 50
+        status = opened.step(H * k, np.nan * q if dead else q, v)
+        assert status < 0 if dead else status >= OK
+        if k == 50:
+            last = opened.tau.copy()
+        elif 50 < k < 50 + REPEATED:
+            np.testing.assert_array_equal(opened.tau, last)
+        v = v + H * robot.forward_dynamics(q, v, opened.tau)
+        q = robot.integrate(q, H * v)
+        speeds.append(np.abs(v).max())
+    assert speeds[50] > 0.25
+    # Not braked is what the expected velocity lacks: what the repeated efforts change,
+    # and the Coriolis terms.
+    assert speeds[-1] < 0.15 * speeds[50]
+    assert opened.step(0.3, q, v) == STOPPED  # no law again without a restart
+    assert opened.stop(0.301, q, v) == BRAKING
+
+
+def test_one_wrong_state_is_passed_over(opened: Opened) -> None:
+    q, v = hsp.load_experiment("panda_limits").q0, np.zeros(7)
+    assert opened.step(0.0, q, v) >= OK
+    for k in range(1, 100):
+        wrong = k % (REPEATED + 1) != 0
+        status = opened.step(H * k, np.nan * q if wrong else q, v)
+        assert status == WRONG_STATE if wrong else status >= OK
+
+
+def test_steps_of_a_wrong_clock_end_in_the_stop(opened: Opened) -> None:
+    q, v = hsp.load_experiment("panda_limits").q0, 0.1 * np.ones(7)
+    assert opened.step(5.0, q, v) >= OK
+    last = opened.tau.copy()
+    for _ in range(REPEATED):
+        assert opened.step(4.0, q, v) == WRONG_CLOCK
+        np.testing.assert_array_equal(opened.tau, last)
+    assert opened.step(4.0, q, v) == STOPPED
+    braked = opened.tau.copy()
+    assert opened.stop(4.001, q, v) == BRAKING
+    np.testing.assert_array_equal(opened.tau, braked)
+
+
+def test_a_stop_that_sees_again_holds_where_the_robot_is(opened: Opened) -> None:
+    q, v = hsp.load_experiment("panda_limits").q0, np.zeros(7)
+    robot = hsp.Robot.load("panda")
+    assert opened.step(0.0, q, v) >= OK
+    for k in range(1, 100):
+        assert opened.stop(H * k, np.nan * q, v) == WRONG_STATE
+    moved = q + 0.1
+    assert opened.stop(0.1, moved, v) == HOLDING
+    rest = robot.inverse_dynamics(moved, v, v)  # no pull to where it was expected
+    np.testing.assert_allclose(opened.tau, rest, rtol=0.0, atol=1e-12)
