@@ -10,9 +10,10 @@
  *   }
  *   hsp_close(arm);
  *
- * The effort is that of the controller in Python, to the last bit. `hsp_step`, `hsp_stop`, `hsp_set`,
- * `hsp_ramp`, `hsp_get` and `hsp_restart` allocate nothing, take no lock and make no system call.
- * A handle belongs to one thread at a time; different handles do not know of each other.
+ * The effort is that of the controller in Python, to the last bit. `hsp_step`, `hsp_stop`,
+ * `hsp_set`, `hsp_ramp`, `hsp_get` and `hsp_restart` allocate nothing, take no lock and make no
+ * system call. A handle belongs to one thread at a time; different handles do not know of each
+ * other.
  *
  * Units are SI, axes those of the world, linear rows before angular rows. */
 #ifndef HSP_STEP_H
@@ -34,12 +35,12 @@ extern "C" {
 #endif
 
 /* What became of a step, or of a request. From 0 on it was done, and tau is a new effort; below, it
- * was refused. Of a step or a stop that was refused, tau is the effort that was delivered last, or 0
- * if there was none yet, but for no more than 5 periods in a row: an effort that is repeated for long
- * drives the robot. From the sixth on the robot is stopped, as by hsp_stop and for good. Where t, q
- * and v are finite the stop goes by them. Where they are not, it goes by the last ones that were, and
- * by how fast they would change under its own braking: the effort fades to g(q). Nobody measures
- * whether that is so: let the robot's own brakes take over. A robot on feet is not stopped by it; the
+ * was refused. Of a step or a stop that was refused, tau is the effort that was delivered last, or
+ * 0 if there was none yet, but for no more than 5 periods in a row: an effort that is repeated for
+ * long drives the robot. From the sixth on the robot is stopped, as by hsp_stop and for good. Where
+ * t, q and v are finite the stop goes by them. Where they are not, it goes by the last ones that
+ * were, and by how fast they would change under its own braking: the effort fades to g(q). This is
+ * not measured: let the robot's own brakes take over. A robot on feet is not stopped by it; the
  * last effort stays. */
 typedef enum hsp_status {
   HSP_OK = 0,            /* the law's own effort */
@@ -88,10 +89,10 @@ HSP_API hsp_status hsp_step(hsp_controller* controller, double t, const double* 
                             double* tau) HSP_NOEXCEPT;
 
 /* Stop the robot: call it each period instead of hsp_step, once a step is refused or the run is to
- * end. It brakes all joints alike, tau = g(q) - s k M(q) v, until they are slow, and then holds them,
- * as `hsp live` does; the law, its limits and its clock are not asked. Efforts keep their limits, but
- * not those on their rate. What frames carry counts. hsp_step makes no step from then on: it does
- * the same, and returns HSP_STOPPED. */
+ * end. It brakes all joints alike, tau = g(q) - s k M(q) v, until they are slow, and then holds
+ * them, as `hsp live` does; the law, its limits and its clock are not evaluated. Efforts keep their
+ * limits, but not those on their rate. Payloads are included. hsp_step makes no step from then
+ * on: it does the same, and returns HSP_STOPPED. */
 HSP_API hsp_status hsp_stop(hsp_controller* controller, double t, const double* q, const double* v,
                             double* tau) HSP_NOEXCEPT;
 
