@@ -30,6 +30,11 @@ class StopGains(NamedTuple):
 LIKE_LIVE = StopGains()
 """Those that `hsp live` has by default."""
 
+LARGEST = {"damping": 0.5, "natural_frequency": 0.2}
+"""Largest products of these with the period h. With one period of delay a rate k is
+stable for k h < 1 and a natural frequency ω for ω h < 0.43 (docs/robustness.md); half
+of it is the margin for model errors."""
+
 
 def stopping(
     own: Controller,

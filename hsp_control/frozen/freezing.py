@@ -18,7 +18,7 @@ from hsp_control.control.controller import Controller
 from hsp_control.declaration import within
 from hsp_control.engine import Move, Plan
 from hsp_control.engine.plans import OnlyIf, PartCalls
-from hsp_control.frozen.braking import LIKE_LIVE, StopGains, stopping
+from hsp_control.frozen.braking import LARGEST, LIKE_LIVE, StopGains, stopping
 from hsp_control.frozen.compensated_step import CompensatedStep
 from hsp_control.frozen.image import Image, Port
 from hsp_control.frozen.inputs import inputs_of, model_inputs, streams_of, targets_of
@@ -63,9 +63,16 @@ def freeze(
 
     Raises:
         FreezeError: If a part of it cannot run without Python; the message has its key.
+            Or if the stop is too fast for the period.
     """
     if not 0.0 < period < np.inf:
         raise FreezeError(f"period is {period}; needs a positive number of seconds")
+    for name, most in LARGEST.items():
+        if (value := getattr(stop, name)) * period > most:
+            raise FreezeError(
+                f"stop.{name} is {value:g}; at a period of {period:g} s it may be "
+                f"{most / period:g} at most"
+            )
     own = controller.without_python()
     image = _image(own, compensation, period, start, payloads, stop)
     file = Path(path)

@@ -18,6 +18,7 @@ from hsp_control.declaration.quantities import (
     Positive,
     PositiveCount,
 )
+from hsp_control.frozen.braking import LARGEST
 from hsp_control.robot import Robot
 
 
@@ -45,13 +46,8 @@ class StopSettings(Part, error=LiveError):
     above ``rest_speed``, because of noise."""
 
     def check_period(self, period: float) -> None:
-        """Check that the sampled safe stop is stable at this period [s].
-
-        With one period of delay a rate k is stable for k h < 1 and a natural frequency
-        ω for ω h < 0.43 (docs/robustness.md); half of it is the margin for model
-        errors.
-        """
-        for name, upper in (("damping", 0.5), ("natural_frequency", 0.2)):
+        """Check that the sampled safe stop is stable at this period [s]."""
+        for name, upper in LARGEST.items():
             value = getattr(self, name)
             if value * period > upper:
                 raise LiveError(

@@ -16,6 +16,7 @@ from frozen_library import (
 )
 
 import hsp_control as hsp
+from hsp_control.common.exceptions import FreezeError
 from hsp_control.frozen.braking import StopGains
 from hsp_control.live.safe_stop import SafeStop
 from hsp_control.live.settings import StopSettings
@@ -38,6 +39,16 @@ def test_its_gains_are_those_of_a_live_loop() -> None:
     live = StopSettings()
     for name, value in StopGains()._asdict().items():
         assert getattr(live, name) == value
+
+
+def test_gains_that_are_too_fast_for_the_period_are_refused(tmp_path: Path) -> None:
+    controller = hsp.load_experiment("panda_limits").controller
+    for gains, message in {
+        StopGains(damping=600.0): "stop.damping is 600; at a period of 0.001 s it may",
+        StopGains(natural_frequency=201.0): "stop.natural_frequency is 201; .* 200 at",
+    }.items():
+        with pytest.raises(FreezeError, match=message):
+            hsp.freeze(controller, tmp_path / "panda.hsp", stop=gains)
 
 
 @pytest.mark.smoke
