@@ -44,7 +44,10 @@ class Change(Part, ABC, family="changes", error=ControllerError):
 
     Changes apply in the order of their times, whatever the order in which they are
     made. Each continues from what is then in force, so that several may overlap. A
-    subclass implements `apply`.
+    subclass implements `apply`, and `Controller.change` makes it. What has a ramp is an
+    `Evolution` of the `Setup`: ``gain``, ``gravity``, and each task's ``gains`` and
+    ``presence``; ``setup.gain.then(self.at, self.ramp, target)`` is the next one. All
+    else that is replaced acts at once; for a reference apply a `ChangeReference`.
     """
 
     _: KW_ONLY

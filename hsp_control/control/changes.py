@@ -4,11 +4,14 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import takewhile
-from typing import Self
+from typing import TYPE_CHECKING, Self
 
+import numpy as np
 from numpy.typing import ArrayLike
 
 from hsp_control.common.entry_points import own_names
+from hsp_control.common.exceptions import ControllerError
+from hsp_control.common.suggestions import did_you_mean
 from hsp_control.constraints.contacts import CommandedForce
 from hsp_control.constraints.limits import Limits
 from hsp_control.control.change import (
@@ -28,7 +31,7 @@ from hsp_control.control.change import (
     RemoveTask,
 )
 from hsp_control.control.change_model import ChangeGravity, ChangePayload, ChangeTool
-from hsp_control.control.setup import Setup
+from hsp_control.control.setup import Setup, checked_gain
 from hsp_control.declaration import within
 from hsp_control.declaration.nested import parts_within
 from hsp_control.declaration.quantities import Gain
@@ -159,6 +162,16 @@ class Changes:
         """Change gravity in the world [m/s²]; see `ChangeGravity`."""
         return self._do(ChangeGravity(gravity, at=self._at, ramp=self._ramp))
 
+    if not TYPE_CHECKING:
+
+        def __getattr__(self, name: str) -> None:
+            """Raise for a kind of change that there is not."""
+            known = [each for each in vars(type(self)) if not each.startswith("_")]
+            raise AttributeError(
+                f"at(t) has no {name!r}{did_you_mean(name, known)}; a change of a "
+                "class of your own is made by controller.change(...)"
+            )
+
     def _do(self, change: Change) -> Self:
         self._make(change)
         return self
@@ -184,7 +197,7 @@ class TimeLine:
             with within("changes", k):
                 given[k] = given[k].understood(later)
                 placed.append(given[k].placed(setup.start, later))
-                later = placed[-1].apply(later)
+                later = _checked(placed[-1], later)
         return cls(setup.start, tuple(given), setup, tuple(placed))
 
     @property
@@ -212,6 +225,7 @@ class TimeLine:
         before = _applied(earlier, self.settled)
         change = change.understood(before)
         placed = change.placed(here or self.start, before)
+        _checked(placed, before)
         opened = sorted((*self.open, placed), key=lambda each: each.at)
         if here is None:
             declared = (*self.declared, change)
@@ -228,6 +242,30 @@ class TimeLine:
         made = tuple(each for each in self.made if id(each) not in gone)
         opened = self.open[len(done) :]
         return replace(self, settled=settled, open=opened, made=made)
+
+
+def _checked(change: Change, setup: Setup) -> Setup:
+    """Return a setup with a change, whose `apply` may be the user's own."""
+    name, after = f"{type(change).__name__}.apply", change.apply(setup)
+    if not isinstance(after, Setup):
+        raise ControllerError(
+            f"{name} returns {type(after).__name__}; needs the changed Setup: "
+            "return replace(setup, ...)"
+        )
+    if after.metric is not setup.metric:
+        raise ControllerError(
+            f"{name} replaces the metric, which has no ramp: build another controller"
+        )
+    if after.gain is not setup.gain:
+        checked_gain(after.gain.target, after.start.state.robot, after.metric)
+    for task in after.tasks:
+        found, needed = np.shape(task.gains.target), np.shape(task.gains.initial)
+        if found != needed:
+            raise ControllerError(
+                f"{name} changes the gains of task {task.task.name!r} to an array of "
+                f"shape {found}; needs {needed}, that of Task.in_force().numbers"
+            )
+    return after
 
 
 def _applied(changes: Iterable[Change], setup: Setup) -> Setup:
