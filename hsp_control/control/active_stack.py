@@ -26,7 +26,7 @@ from hsp_control.robot import Robot, RobotState
 from hsp_control.robot.state import as_given
 from hsp_control.tasks import Task
 from hsp_control.tasks.compliant_task import impedance_of
-from hsp_control.tasks.feedback import InForce, beyond_largest
+from hsp_control.tasks.feedback import FeedbackInForce, beyond_largest
 from hsp_control.tasks.impedance import parts_of
 from hsp_control.tasks.slipping import slipped
 from hsp_control.trajectories.streams.followed import FollowedStream
@@ -47,7 +47,7 @@ class PlacedTask(NamedTuple):
     planned: PlannedTask
     name: str  # the task's own; while a newer one of the same name fades in, another
     rows: slice
-    in_force: InForce
+    in_force: FeedbackInForce
 
 
 class ActiveStack:
@@ -65,7 +65,7 @@ class ActiveStack:
         state: RobotState,
         support: Support,
         levels: Sequence[Sequence[PlannedTask]],
-        feedback: Mapping[int, InForce],
+        feedback: Mapping[int, FeedbackInForce],
         metric: Metric,
         field: NullSpaceField,
         gain: Array,
@@ -289,7 +289,7 @@ class ActiveStack:
 
 
 def _placed(
-    tasks: Sequence[PlannedTask], start: int, feedback: Mapping[int, InForce]
+    tasks: Sequence[PlannedTask], start: int, feedback: Mapping[int, FeedbackInForce]
 ) -> list[PlacedTask]:
     """Return tasks one below the other, from a row on."""
     placed, row = list[PlacedTask](), start

@@ -12,7 +12,7 @@ from hsp_control.control.actuation import Actuation, Delivered
 from hsp_control.control.actuation.actuation import LimitsOutcome
 from hsp_control.control.actuation.limited_step import BEYOND, RELAXED
 from hsp_control.control.actuation.limits_in_force import LimitsInForce
-from hsp_control.engine import Move
+from hsp_control.engine import Move, Plan
 from hsp_control.engine.plans import Step
 from hsp_control.law.outcome import LawOutcome
 from hsp_control.robot import RobotState
@@ -36,7 +36,9 @@ class BoundStep:
         self.damped = ""  # tasks of the first level with a bounded inverse, by name
         # whether the effort is M a + N wherever no limit is violated
         self.direct = actuation.direct
-        self.move = state.bind_move([*active.calls, *actuation.calls()], origin)
+        calls = [*active.calls, *actuation.calls()]
+        self.move = state.bind_move(calls, origin)
+        self._here = Plan(calls)  # the same, without what moves the state
         self._move = self.move.__call__  # bound once: half the time of a look-up
         self._own = actuation.own  # what is delivered of the law's own acceleration
         self._nearest, self._is_nearest = actuation.nearest, actuation.is_nearest
@@ -55,8 +57,16 @@ class BoundStep:
         if plain is None:  # refused: lists, for example, or what is not valid
             plain = self.state.advance(self.move, t, q, v)
         self.damped = ""
-        if plain and self.direct:
-            return self._own
+        return self._own if plain and self.direct else self._looked_at()
+
+    def make_here(self, t: float) -> Delivered:
+        """Return what is delivered where the state was moved to, at its time t [s]."""
+        plain = self._here(t)
+        self.damped = ""
+        return self._own if plain and self.direct else self._looked_at()
+
+    def _looked_at(self) -> Delivered:
+        """Return what is delivered of a step that is not simply the law's own."""
         if self._is_nearest.item():
             return self._nearest
         active, law, limits = self.active, self._law_outcome, self._limits_outcome

@@ -82,12 +82,15 @@ class Controller(Composition):
             now = self._in_force
             whole = modifier is None and q is not None and v is not None
             step = now.step if whole else None
-            if step is None or now.later is not None:
+            moved = step is None or now.later is not None
+            if moved:
                 self._observe(t, q, v)  # the state
                 self._advance()  # to what is in force at its time
                 step = now.step if whole else None
             if step is not None:  # all that follows is one call
-                delivered = step.make(t, q, v)  # type: ignore[arg-type]
+                delivered = (
+                    step.make_here(self._state.t) if moved else step.make(t, q, v)  # type: ignore[arg-type]
+                )
                 stack, damped = step.active, step.damped
             else:
                 mixture = now.mixture

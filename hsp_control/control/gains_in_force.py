@@ -30,7 +30,7 @@ from hsp_control.declaration import within
 from hsp_control.robot import RobotState
 from hsp_control.tasks import Task
 from hsp_control.tasks.compliant_task import impedance_of
-from hsp_control.tasks.feedback import InForce
+from hsp_control.tasks.feedback import FeedbackInForce
 from hsp_control.tasks.impedance import parts_of
 from hsp_control.tasks.slipping import spring_force
 
@@ -46,7 +46,7 @@ class GainsInForce:
     def __init__(self, nv: int, memory: Memory) -> None:
         self._memory, self._waiting = memory, memory.waiting
         # feedback of each task, by key; the arrays stay where they are
-        self.feedback: dict[int, InForce] = {}
+        self.feedback: dict[int, FeedbackInForce] = {}
         self.null_space = np.zeros((nv, nv))  # K_N, shape (nv, nv) [1/s]
         self._tasks: dict[int, Task] = {}
 
@@ -72,7 +72,7 @@ class GainsInForce:
         self._written: set[int] = set()
         self.write(t)
 
-    def _feedback_of(self, key: int, task: Task) -> InForce:
+    def _feedback_of(self, key: int, task: Task) -> FeedbackInForce:
         """Return the feedback of a task that is new, or follows a new trajectory."""
         old = self._tasks.get(key)
         if old is not None and old.name == task.name and old.rows == task.rows:

@@ -12,7 +12,7 @@ from hsp_control.declaration import within
 from hsp_control.engine.plans import PartCall, PartCalls
 from hsp_control.law import TaskSample
 from hsp_control.robot import Robot, RobotState
-from hsp_control.tasks.feedback import Feedback, InForce
+from hsp_control.tasks.feedback import Feedback, FeedbackInForce
 from hsp_control.tasks.gains import Gains
 from hsp_control.tasks.impedance import Impedance, parts_of
 from hsp_control.tasks.task import SecondOrderTask, Task
@@ -85,16 +85,16 @@ class CompliantTask(SecondOrderTask):
         zeros = np.zeros((2, rows, rows))
         return Feedback(zeros[0], zeros[1], np.zeros(rows))
 
-    def in_force(self) -> InForce:
+    def in_force(self) -> FeedbackInForce:
         """Return new arrays of the task's own feedback; see `Task.in_force`."""
         if self.impedance is None:
             return super().in_force()
         mobility = np.zeros((self.rows, self.rows))
         numbers = self.impedance.numbers(self.error_parts)
-        return InForce(numbers, self.feedback(), mobility)
+        return FeedbackInForce(numbers, self.feedback(), mobility)
 
     def calls_in_force(
-        self, state: RobotState, in_force: InForce, out: TaskSample
+        self, state: RobotState, in_force: FeedbackInForce, out: TaskSample
     ) -> PartCalls:
         """Return the calls: the task, its gains, the task with these gains."""
         task = self.calls(state, in_force.feedback, out)
@@ -121,7 +121,7 @@ class CompliantTask(SecondOrderTask):
             return super().feedback_at(state)
         return self._at(state, self.in_force().numbers)
 
-    def linear_feedback(self, state: RobotState, in_force: InForce) -> Feedback:
+    def linear_feedback(self, state: RobotState, in_force: FeedbackInForce) -> Feedback:
         """Return the feedback for small errors: no spring is at its largest force."""
         if self.impedance is None:
             return super().linear_feedback(state, in_force)
@@ -132,9 +132,11 @@ class CompliantTask(SecondOrderTask):
     def _at(self, state: RobotState, numbers: Array) -> Feedback:
         """Return Kp and Kv of an impedance at a state."""
 
-        def make() -> tuple[InForce, PartCalls]:
+        def make() -> tuple[FeedbackInForce, PartCalls]:
             mobility = np.zeros((self.rows, self.rows))
-            in_force = InForce(np.zeros_like(numbers), self.feedback(), mobility)
+            in_force = FeedbackInForce(
+                np.zeros_like(numbers), self.feedback(), mobility
+            )
             sample = TaskSample.allocate(self.rows, state.robot.nv)
             return in_force, self.calls_in_force(state, in_force, sample)
 

@@ -51,7 +51,7 @@ def _packed(x: ArrayLike) -> Array:
     return np.ascontiguousarray(x, dtype=float)
 
 
-class InForce(NamedTuple):
+class FeedbackInForce(NamedTuple):
     """The arrays of a task's feedback while it runs; the controller owns them."""
 
     # Parameters that change at run time: Kp and Kv, (2, m, m), or those of another kind

@@ -20,7 +20,7 @@ from hsp_control.tasks.feedback import (
     UNBOUNDED,
     ErrorPart,
     Feedback,
-    InForce,
+    FeedbackInForce,
     LargestError,
     largest_errors,
 )
@@ -118,15 +118,15 @@ class Task(Part, ABC, family="tasks", error=TaskError):
             GainError: If the gains do not fit the rows, or the error would not decay.
         """
 
-    def in_force(self) -> InForce:
+    def in_force(self) -> FeedbackInForce:
         """Return new arrays of the task's own feedback, for a run."""
         own = self.feedback()
         numbers = np.stack([own.Kp, own.Kv])
         feedback = own._replace(Kp=numbers[0], Kv=numbers[1])
-        return InForce(numbers, feedback, np.zeros((0, 0)))
+        return FeedbackInForce(numbers, feedback, np.zeros((0, 0)))
 
     def calls_in_force(
-        self, state: RobotState, in_force: InForce, out: TaskSample
+        self, state: RobotState, in_force: FeedbackInForce, out: TaskSample
     ) -> PartCalls:
         """Return the calls with a feedback that may change; see `calls`."""
         return self.calls(state, in_force.feedback, out)
@@ -135,7 +135,7 @@ class Task(Part, ABC, family="tasks", error=TaskError):
         """Return new arrays of the task's own feedback at a state, without offset."""
         return self.feedback()
 
-    def linear_feedback(self, state: RobotState, in_force: InForce) -> Feedback:
+    def linear_feedback(self, state: RobotState, in_force: FeedbackInForce) -> Feedback:
         """Return the feedback for small errors at a state, for the rate check."""
         return in_force.feedback
 
