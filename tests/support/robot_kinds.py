@@ -59,19 +59,26 @@ TEXTS = {
 """URDFs by kind."""
 
 
+def _with_box(
+    model: pin.Model, parent: int, kind: pin.JointModel, rng: np.random.Generator
+) -> int:
+    """Add a joint somewhere on its parent, with a box; return its number."""
+    k = model.njoints - 1
+    place = pin.SE3(pin.rpy.rpyToMatrix(*rng.uniform(-1, 1, 3)), rng.uniform(size=3))
+    joint: int = model.addJoint(parent, kind, place, f"joint{k}")
+    inertia = pin.Inertia.FromBox(2.0, 0.3, 0.2, 0.1)
+    model.appendBodyToJoint(joint, inertia, pin.SE3.Identity())
+    model.addBodyFrame(f"link{k}", joint, pin.SE3.Identity(), 0)
+    return joint
+
+
 def _of_pinocchio() -> Robot:
     """Return an arm on a ball, with rotors."""
     model, parent = pin.Model(), 0
     rng = np.random.default_rng(3)
     joints = pin.JointModelSpherical(), pin.JointModelRX(), pin.JointModelRUBZ()
-    for k, kind in enumerate(joints):
-        place = pin.SE3(
-            pin.rpy.rpyToMatrix(*rng.uniform(-1, 1, 3)), rng.uniform(size=3)
-        )
-        parent = model.addJoint(parent, kind, place, f"joint{k}")
-        inertia = pin.Inertia.FromBox(2.0, 0.3, 0.2, 0.1)
-        model.appendBodyToJoint(parent, inertia, pin.SE3.Identity())
-        model.addBodyFrame(f"link{k}", parent, pin.SE3.Identity(), 0)
+    for kind in joints:
+        parent = _with_box(model, parent, kind, rng)
     model.armature[:] = rng.uniform(0.1, 0.5, model.nv)
     return Robot.from_pinocchio(model)
 
@@ -80,15 +87,9 @@ def _ball_between() -> Robot:
     """Return a follower that a joint of several freedoms separates from its leader."""
     model, rng = pin.Model(), np.random.default_rng(4)
     parent, kinds = 0, [pin.JointModelRY(), pin.JointModelSpherical(), None]
-    for k, given in enumerate([*kinds, pin.JointModelPX()]):
+    for given in (*kinds, pin.JointModelPX()):
         kind = given or pin.JointModelMimic(model.joints[1], -0.5, 0.1)
-        place = pin.SE3(
-            pin.rpy.rpyToMatrix(*rng.uniform(-1, 1, 3)), rng.uniform(size=3)
-        )
-        parent = model.addJoint(parent, kind, place, f"joint{k}")
-        inertia = pin.Inertia.FromBox(2.0, 0.3, 0.2, 0.1)
-        model.appendBodyToJoint(parent, inertia, pin.SE3.Identity())
-        model.addBodyFrame(f"link{k}", parent, pin.SE3.Identity(), 0)
+        parent = _with_box(model, parent, kind, rng)
     model.armature[:] = rng.uniform(0.1, 0.5, model.nv)
     return Robot.from_pinocchio(model)
 
