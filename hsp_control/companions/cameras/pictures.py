@@ -24,6 +24,7 @@ from PIL import Image
 from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import HardwareError
 from hsp_control.common.host_names import check_host_name
+from hsp_control.common.silence import Silence
 from hsp_control.common.suggestions import did_you_mean, listing
 from hsp_control.companions.mujoco.plant import MujocoEngine
 from hsp_control.simulation.plants import ImperfectPlant, Plant
@@ -42,8 +43,6 @@ _PATIENCE = 60.0
 _HANGS = 20.0
 """After how much silence the process that draws hangs [s]: a large picture without a
 graphics card, the first of its size, takes some seconds."""
-_LOOK = 0.1
-"""Longest time between two steps that counts [s]: who simulates may stand, too."""
 _INSTALL = "(pip install 'hsp_control[cameras]'; on Debian and Ubuntu also libegl1)"
 
 
@@ -90,12 +89,14 @@ def show(address: str, plant: Plant) -> Callable[..., object]:
     alive = anew.RawValue(ctypes.c_ulonglong)  # who draws counts it up
     arguments = (host, port, compiled.tobytes(), memory, lock, theirs, alive)
     drawing = anew.Process(target=_serve, args=arguments, name="cameras", daemon=True)
-    silence = _Silence()
+    silence, counted = Silence(monotonic()), 0
 
     def tell(*_: object) -> None:
+        nonlocal counted
         if drawing.exitcode is not None:
             raise HardwareError(f"{where}: the process that draws there has ended")
-        if silence.after(alive.value, monotonic()) > _HANGS:
+        before, counted = counted, alive.value
+        if silence.look(monotonic(), heard=counted != before) > _HANGS:
             raise HardwareError(
                 f"{where}: the process that draws there has done nothing for "
                 f"{_HANGS:g} s"
@@ -123,21 +124,6 @@ def show(address: str, plant: Plant) -> Callable[..., object]:
         drawing.kill()
         raise HardwareError(f"{where}: no pictures there: {fault}")
     return tell
-
-
-class _Silence:
-    """For how long a count has not changed, by looks at it."""
-
-    def __init__(self) -> None:
-        self._count, self._looked, self._lasts = -1, 0.0, 0.0
-
-    def after(self, count: int, now: float) -> float:
-        """Return that time [s] after a look at the count, now [s]."""
-        self._lasts += min(now - self._looked, _LOOK)
-        if count != self._count:
-            self._lasts = 0.0
-        self._count, self._looked = count, now
-        return self._lasts
 
 
 def _serve(

@@ -13,6 +13,7 @@ from time import monotonic
 from typing import Any
 
 from hsp_control.common.exceptions import HardwareError
+from hsp_control.common.silence import Silence
 from hsp_control.companions.franka import client
 from hsp_control.companions.franka.reflexes import explained
 
@@ -20,8 +21,6 @@ INSTALL = "pip install 'hsp_control[franka]'"
 _HANGS = 5.0
 """After how much silence a process hangs [s]: a motion of the fingers, in which it is
 silent, takes less than two."""
-_LOOK = 0.1
-"""Longest time between two looks that counts [s]."""
 
 
 class ClientProcess:
@@ -49,7 +48,7 @@ class ClientProcess:
             start_new_session=True,
         )
         theirs.close()
-        self._looked, self._silent_for = monotonic(), 0.0
+        self._silence = Silence(monotonic())
         self.waiting = False
         self.fault: str | None = None
 
@@ -108,12 +107,9 @@ class ClientProcess:
     def trouble(self) -> str:
         """Return why the process fails, "" if it runs.
 
-        While nothing is asked it says now and then that it lives. The time in which
-        this process was stopped itself does not count.
+        While nothing is asked it says now and then that it lives.
         """
-        now = monotonic()
-        self._silent_for += min(now - self._looked, _LOOK)
-        self._looked = now
+        heard = False
         while select([self._link], [], [], 0.0)[0]:
             try:
                 said = self._link.recv(client.LONGEST)
@@ -121,8 +117,8 @@ class ClientProcess:
                 said = b""
             if not said:
                 return "has ended"
-            self._silent_for = 0.0
-        hangs = self._silent_for > _HANGS
+            heard = True
+        hangs = self._silence.look(monotonic(), heard=heard) > _HANGS
         return f"has said nothing for {_HANGS:g} s" if hangs else ""
 
     def _ended(self) -> str:

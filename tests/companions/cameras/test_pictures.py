@@ -22,7 +22,6 @@ import hsp_control as hsp
 from hsp_control.cli.robot_process import RobotProcess
 from hsp_control.common.exceptions import HardwareError
 from hsp_control.companions.cameras import show
-from hsp_control.companions.cameras.pictures import _Silence
 from hsp_control.live import run_loop
 
 pytest.importorskip("mujoco")
@@ -154,14 +153,6 @@ def test_who_draws_and_hangs_is_noticed_and_ended(
     assert what.endswith("the process that draws there has done nothing for 1 s")
     with pytest.raises(ProcessLookupError):
         os.kill(int(number), 0)
-
-
-def test_a_step_that_takes_long_is_no_silence() -> None:
-    """Whoever simulates was stopped itself."""
-    silence = _Silence()
-    for k in range(10):
-        assert silence.after(7, 900.0 * k) == pytest.approx(0.1 * k)
-    assert silence.after(8, 9000.0) == 0.0
 
 
 @pytest.mark.parametrize(

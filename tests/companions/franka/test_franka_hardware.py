@@ -15,6 +15,7 @@ import pytest
 from hsp_control import Robot
 from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import HardwareError
+from hsp_control.common.silence import Silence
 from hsp_control.companions.franka import (
     FrankaHardware,
     FrankaSettings,
@@ -149,7 +150,7 @@ def test_without_the_gripper_s_process_the_arm_stops() -> None:
     hardware, _ = arm()
     gripper = hardware._gripper = ClientProcess.__new__(ClientProcess)
     gripper._link, theirs = socket.socketpair()
-    gripper._looked, gripper._silent_for = 0.0, 0.0
+    gripper._silence = Silence(0.0)
     state(hardware)
     assert not state(hardware).fault
     theirs.close()  # as the system does for a process that dies
@@ -165,7 +166,7 @@ def test_a_gripper_s_process_that_hangs_is_noticed(
     monkeypatch.setattr(client_process, "monotonic", lambda: now)
     process = ClientProcess.__new__(ClientProcess)
     process._link, theirs = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
-    process._looked, process._silent_for = now, 0.0
+    process._silence = Silence(now)
     with closing(theirs), closing(process._link):
         for step in 30 * [0.1] + [900.0] + 10 * [0.1]:
             now += step

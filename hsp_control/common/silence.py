@@ -1,0 +1,23 @@
+"""For how long another process has given no sign of life."""
+
+_LOOK = 0.1
+"""Longest time between two looks that is added [s]: this process may stand, too."""
+
+
+class Silence:
+    """The time without a sign, but for the time in which this process itself stood."""
+
+    def __init__(self, now: float) -> None:
+        """Begin at a time [s]."""
+        self._looked, self._lasts = now, 0.0
+
+    def look(self, now: float, *, heard: bool) -> float:
+        """Return how long it lasts [s].
+
+        Args:
+            now: The time of this look [s].
+            heard: Whether there was a sign since the last look.
+        """
+        self._lasts = 0.0 if heard else self._lasts + min(now - self._looked, _LOOK)
+        self._looked = now
+        return self._lasts
