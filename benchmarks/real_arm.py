@@ -23,7 +23,7 @@ from rich.progress import track
 
 import hsp_control as hsp
 from hsp_control.common.arrays import Array
-from hsp_control.control.compensation import Command, Compensation
+from hsp_control.control.compensation import CompensatedController, Compensation
 from hsp_control.simulation.plants import SampledPlant
 
 TESTS = Path(__file__).resolve().parents[1] / "tests" / "support"
@@ -94,7 +94,7 @@ def ours(
     compensation: Compensation,
     impedance: bool = False,
     rotors: float | None = None,
-) -> Command:
+) -> CompensatedController:
     """Return the chain of this law: the default gains, and a posture to return to."""
     robot = hsp.Robot.load(case.robot.name, motor_inertia=rotors)
     options: dict[str, Any] = {}
@@ -109,7 +109,7 @@ def ours(
         task = hsp.FramePose(case.frame, both, blend=1.0, name="hand", **options)
     field = hsp.TargetPosture(case.q0) if case.robot.nv > case.rows else None
     made = hsp.Controller(robot, [task], field, start=case.q0)
-    return Command(made, compensation)
+    return CompensatedController(made, compensation)
 
 
 def wrong_arm(case: Case, kind: str, seed: int, delay: int = 0) -> SampledPlant:

@@ -25,7 +25,7 @@ from shared.marked_sections import RESULTS, replace_section
 from shared.robustness_figure import draw_figure
 
 from hsp_control import load_experiment
-from hsp_control.control.compensation import Command
+from hsp_control.control.compensation import CompensatedController
 from hsp_control.simulation.plants import (
     ContinuousPlant,
     IntegratedPlant,
@@ -240,7 +240,7 @@ def measured(config: dict[str, Any]) -> tuple[float, float, float]:
     if isinstance(plant, ContinuousPlant):
         plant = IntegratedPlant(plant, made.integrator)
     assert isinstance(plant, SampledPlant)
-    command = Command(made.controller, made.compensation)
+    command = CompensatedController(made.controller, made.compensation)
     q, v, last = made.q0, made.v0, np.zeros(made.robot.nv)
     plant.reset(0.0, q, v)
     sums, efforts, rows = np.zeros(2), 0.0, 0

@@ -178,9 +178,9 @@ def parts_table(case: Standing, states: list[State]) -> str:
     for t, q, v in states:
         timed("kinematics, one pass of Pinocchio", lambda: state.update(t, q, v))  # noqa: B023
         timed("contacts, tasks, field, metric and law", law)
-        a = active.resolution.acceleration
+        a = active.law.acceleration
         wanted = timed("inverse dynamics", lambda: state.inverse_dynamics(a).copy())  # noqa: B023
-        timed("map of the corner forces", lambda: support.update(active.resolution))
+        timed("map of the corner forces", lambda: support.update(active.law))
         timed(
             "minimum-norm forces",
             lambda: support.minimum_norm_forces(wanted),  # noqa: B023

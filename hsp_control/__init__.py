@@ -54,7 +54,7 @@ if TYPE_CHECKING:  # what a type checker reads; the names are looked up below
     from .control import changes as changes
     from .control import compensation as compensation
     from .control import estimator as estimation  # noqa: F401 (a namespace)
-    from .control import plan as plans  # noqa: F401 (a namespace)
+    from .control import motion_plan as plans  # noqa: F401 (a namespace)
     from .frozen import freeze as freeze
     from .geometry import Obstacle as Obstacle
     from .geometry import Sphere as Sphere
@@ -128,7 +128,7 @@ _NAMESPACES = {
     "limits": "constraints.limits",
     "live": "live",
     "metrics": "null_space.metrics",
-    "plans": "control.plan",
+    "plans": "control.motion_plan",
     "plants": "simulation.plants",
     "robot": "robot",
     "shapes": "geometry.shapes",

@@ -22,7 +22,7 @@ from hsp_control.cli.robot_process import RobotProcess
 from hsp_control.common.exceptions import LiveError, LogError
 from hsp_control.config import Experiment
 from hsp_control.config.loaded_scenario import load_scenario
-from hsp_control.control.compensation import Command
+from hsp_control.control.compensation import CompensatedController
 from hsp_control.live import (
     Faults,
     Hardware,
@@ -69,7 +69,7 @@ def live(options: argparse.Namespace) -> int:
         check_live(experiment)
         stack.enter_context(stop_signals(requests, takes_over=True))
         real = options.robot is not None
-        command = _command(experiment, real=real)
+        compensated = _compensated(experiment, real=real)
         plan = experiment.scenario.plan
         options_of_loop: dict[str, Any] = {
             "plan": plan,
@@ -82,7 +82,7 @@ def live(options: argparse.Namespace) -> int:
 
         def run(hardware: Hardware) -> LoopReport:
             report = run_loop(
-                command,
+                compensated,
                 hardware,
                 duration=None if duration == inf else duration,
                 log=loop_log,
@@ -103,7 +103,7 @@ def live(options: argparse.Namespace) -> int:
         # A dry run binds everything, before there is a clock
         dry_run_robot = InProcessRobot(simulated_robot(experiment))
         run_loop(
-            command,
+            compensated,
             dry_run_robot,
             duration=min(duration, _DRY_RUN if plan is None else _DRY_RUN_OF_A_PLAN),
             **options_of_loop,
@@ -118,13 +118,13 @@ def live(options: argparse.Namespace) -> int:
         if isinstance(hardware, LocatedHardware):
             experiment = begun_where_it_is(experiment, options, hardware.q)
             options_of_loop["scene"] = experiment.scene
-            command = _command(experiment, real=real)
+            compensated = _compensated(experiment, real=real)
         if isinstance(hardware, AdaptingHardware):
             options_of_loop["settings"] = hardware.adapted(experiment.scenario.live)
             for line in hardware.lines:
                 out.print(line, highlight=False)
         if options.publish is not None:
-            publisher = publish(options.publish, command)
+            publisher = publish(options.publish, compensated)
             on_period.append(publisher)
         if page is not None:
             on_period.append(page.let_steer(experiment, requests, loop_log))
@@ -165,10 +165,10 @@ def live(options: argparse.Namespace) -> int:
     return 0 if regular and robot_report is not None and kept else 2
 
 
-def _command(experiment: Experiment, *, real: bool) -> Command:
+def _compensated(experiment: Experiment, *, real: bool) -> CompensatedController:
     """Return the chain to the effort; what ``auto`` is depends on what moves."""
     own = experiment.scenario.compensation if real else experiment.compensation
-    return Command(experiment.controller, own)
+    return CompensatedController(experiment.controller, own)
 
 
 def _on_observer(experiment: Experiment, *, real: bool) -> str:

@@ -30,7 +30,7 @@ from hsp_control.control.changes import Change
 from hsp_control.control.compensation import Compensation, RateFinding, check_rate
 from hsp_control.control.controller import Controller
 from hsp_control.control.estimator import Estimator, begun
-from hsp_control.control.plan import Plan
+from hsp_control.control.motion_plan import MotionPlan
 from hsp_control.control.setup import Base
 from hsp_control.declaration.nested import keyed, parts_within, with_parts_replaced
 from hsp_control.declaration.plain_data import plain_data
@@ -96,7 +96,7 @@ class Experiment:
         limits: Limits | None = Limits(),
         contacts: Sequence[Contact] = (),
         base: Base | None = None,
-        plan: Plan | None = None,
+        plan: MotionPlan | None = None,
         scene: Scene | Iterable[Obstacle] = (),
         changes: Sequence[Change] = (),
         start: InitialState | Literal["auto"] | None = None,

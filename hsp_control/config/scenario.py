@@ -18,7 +18,7 @@ from hsp_control.constraints.limits import Limits, LimitsOrNone
 from hsp_control.control.changes import Change
 from hsp_control.control.compensation import Compensation
 from hsp_control.control.estimator import Estimators
-from hsp_control.control.plan import Plan
+from hsp_control.control.motion_plan import MotionPlan
 from hsp_control.declaration import Part, within
 from hsp_control.declaration.nested import BY_NAME
 from hsp_control.declaration.plain_data import plain_data
@@ -168,7 +168,7 @@ class Scenario(Part, error=ConfigError):
     )
     """The tasks, by name; tasks of the same priority form one level. A plan adds
     its own. Without any, the arm follows the field alone, with gravity compensated."""
-    plan: Plan | None = None
+    plan: MotionPlan | None = None
     """The plan that writes references and switches contacts while the robot moves; none
     by default."""
     contacts: Annotated[

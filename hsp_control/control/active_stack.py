@@ -16,7 +16,7 @@ from hsp_control.constraints.contacts.contact import UnactuatedRows, unactuated_
 from hsp_control.control.actuation.support import Support
 from hsp_control.control.setup import PlannedTask
 from hsp_control.declaration.nested import parts_within
-from hsp_control.edge import Resolution
+from hsp_control.edge import BoundLaw
 from hsp_control.edge.threshold import Following
 from hsp_control.engine.plans import AnyCall, PartCall
 from hsp_control.law import CONSTANT, FieldSample, Outcome, TaskSample
@@ -41,7 +41,7 @@ class Layout(NamedTuple):
     bounds: Sequence[tuple[str, slice, Callable[[Array], float]]]
 
 
-class PlacedTask(NamedTuple):
+class StackedTask(NamedTuple):
     """A task in a stack."""
 
     planned: PlannedTask
@@ -82,7 +82,7 @@ class ActiveStack:
         )
         first = [held + free] if held + free else []
         sizes = [sum(task.rows for task in level) for level in self.levels]
-        self.resolution = Resolution(
+        self.law = BoundLaw(
             first + sizes,
             robot.nv,
             metric.form,
@@ -91,20 +91,20 @@ class ActiveStack:
             Following.of(robot.size, on_legs=bool(robot.unactuated)),
             controls=field.controls,
         )
-        self.rows = self.resolution.problem.task  # all rows stacked: J, J', e, e', a_x
+        self.rows = self.law.problem.task  # all rows stacked: J, J', e, e', a_x
         self.streamed = any(
             True for _ in parts_within([*self.levels, field], FollowedStream)
         )
         self.forces, self.has_forces = support.forces, support.size > 0
-        # rows, the field and the law's results, in one block: see `Record`
-        self.memory = self.resolution.problem.record.memory
-        self.acceleration = self.resolution.acceleration
+        # rows, the field and the law's results, in one block: see `StepRecord`
+        self.memory = self.law.problem.record.memory
+        self.acceleration = self.law.acceleration
         self.contact_rows = _places(self.contacts, 0)  # rows of each contact, by name
         self.first_task_row = held + free
         tasks = [each for level in planned for each in level]
         below = {each.key for level in planned[1:] for each in level}
-        self.placed = _placed(tasks, self.first_task_row, feedback)
-        self.task_rows = {each.name: each.rows for each in self.placed}
+        self.stacked = _stacked(tasks, self.first_task_row, feedback)
+        self.task_rows = {each.name: each.rows for each in self.stacked}
         bounds: list[tuple[str, slice, Callable[[Array], float]]] = []
         self.layout = Layout(len(self.rows.error), self.task_rows, bounds)
         self._parts: list[tuple[Task | Contact, TaskSample]] = []
@@ -115,17 +115,17 @@ class ActiveStack:
             self._parts.append((contact, sample))
             self._calls += contact.calls(state, sample)
             row += contact.rows
-        for each, name, here, in_force in self.placed:
+        for each, name, here, in_force in self.stacked:
             sample = self.rows.rows(here.start, here.stop)
             self._parts.append((each.task, sample))
             self._calls += each.task.calls_in_force(state, in_force, sample)
-            demand = self.resolution.problem.demand[here]
+            demand = self.law.problem.demand[here]
             spring = impedance_of(each.task) is not None
-            self.resolution.problem.springs[here] = spring
+            self.law.problem.springs[here] = spring
             if spring:
                 ends = each.task.part_ends()
                 away = partial(slipped, in_force.numbers, ends)
-                pulls = self.resolution.problem.pulls[here]
+                pulls = self.law.problem.pulls[here]
                 call = PartCall(
                     engine.SpringPulls,
                     impedance=parts_of(in_force.numbers),
@@ -140,14 +140,14 @@ class ActiveStack:
                 bounds.append((name, here, away))
                 parts = each.task.error_parts
                 yields = [part.yields for part in parts for _ in range(part.size)]
-                self.resolution.problem.yields[here] = yields
+                self.law.problem.yields[here] = yields
             # Who is about to fall needs the balance whatever it costs.
             balances = robot.unactuated and each.task.keeps_balance(robot)
             follows = each.key in below or len(in_force.feedback.largest)
             draws = spring and below  # from those below it
             if (follows or draws) and not balances:
                 # at rest: what damps is not lost, at any speed
-                stretched = self.resolution.problem.stretched[here]
+                stretched = self.law.problem.stretched[here]
                 call = PartCall(
                     engine.DemandAtRest,
                     feedback=in_force.feedback,
@@ -170,14 +170,14 @@ class ActiveStack:
         self.term_samples: tuple[FieldSample, ...] = ()
 
     def resolve(self, t: float) -> Outcome:
-        """Resolve contacts, tasks and field at the state, into `resolution`."""
+        """Resolve contacts, tasks and field at the state, into `law`."""
         self._plan(t)
-        return self.resolution.outcome.outcome
+        return self.law.outcome.outcome
 
     @property
     def damped_level(self) -> int:
         """The first level with a bounded inverse in the last `resolve`; 0: none."""
-        return int(self.resolution.outcome.damped_level[0])
+        return int(self.law.outcome.damped_level[0])
 
     @property
     def damped(self) -> str:
@@ -206,7 +206,7 @@ class ActiveStack:
     def calls(self) -> list[Callable[[float], Any]]:
         """The calls of `resolve`, each of the time [s]; bound when first read."""
         state, metric, field = self._state, self._metric, self._field
-        problem = self.resolution.problem
+        problem = self.law.problem
         calls = [*self._calls]
         if self._rest is not None:
             held = self.rows.rows(0, self._held)
@@ -223,7 +223,7 @@ class ActiveStack:
         else:
             self.term_samples = (sample,)
             calls += field.calls(state, problem.metric, form, sample)
-        calls.append(self.resolution.call(state.v))
+        calls.append(self.law.call(state.v))
         return state.plan(calls).steps()
 
     def field_value(self) -> float:
@@ -241,18 +241,18 @@ class ActiveStack:
 
     @cached_property
     def _diagnosis(self) -> tuple[Callable[[], float], Array, Array]:
-        call, triangle, length = self.resolution.diagnosis(self.first_task_row)
+        call, triangle, length = self.law.diagnosis(self.first_task_row)
         return self._state.plan([call]).call(), triangle, length
 
     def flow(self) -> Array:
         """Return J# x_d' + P g, shape (nv,), where it was resolved, at rest."""
-        law, state = self.resolution, self._state
+        law, state = self.law, self._state
         # At rest, without drift and with unit gain the law's acceleration is the flow.
         nv, form = state.robot.nv, min(self._metric.form, CONSTANT)
         sizes = np.diff(law.ends, prepend=0).tolist()
-        flow = Resolution(sizes, nv, form, np.eye(nv), law.threshold)
+        flow = BoundLaw(sizes, nv, form, np.eye(nv), law.threshold)
         flow.problem.task.jacobian[:] = self.rows.jacobian
-        for each in self.placed:
+        for each in self.stacked:
             rate = each.planned.task.reference_rate(state.read_only)
             flow.problem.task.acceleration[each.rows] = rate
         flow.problem.field.g[:] = law.problem.field.g
@@ -267,7 +267,7 @@ class ActiveStack:
 
     def raise_not_finite(self) -> NoReturn:
         """Raise for what made a step's effort NaN or infinite."""
-        state, problem = self._state, self.resolution.problem
+        state, problem = self._state, self.law.problem
         for part, sample in self._parts:
             if not all(np.isfinite(array).all() for array in sample):
                 kind = "task" if isinstance(part, Task) else "contact"
@@ -288,20 +288,20 @@ class ActiveStack:
         )
 
 
-def _placed(
+def _stacked(
     tasks: Sequence[PlannedTask], start: int, feedback: Mapping[int, FeedbackInForce]
-) -> list[PlacedTask]:
+) -> list[StackedTask]:
     """Return tasks one below the other, from a row on."""
-    placed, row = list[PlacedTask](), start
+    stacked, row = list[StackedTask](), start
     for each in tasks:
         name = each.task.name
         newer = sum(one.task.name == name and one.key > each.key for one in tasks)
         if newer:
             name += " (old)" if newer == 1 else f" (old, {newer})"
         rows = slice(row, row + each.task.rows)
-        placed.append(PlacedTask(each, name, rows, feedback[each.key]))
+        stacked.append(StackedTask(each, name, rows, feedback[each.key]))
         row = rows.stop
-    return placed
+    return stacked
 
 
 def _places(contacts: Sequence[Contact], start: int) -> dict[str, slice]:

@@ -43,7 +43,7 @@ class BoundStep:
         self._own = actuation.own  # what is delivered of the law's own acceleration
         self._nearest, self._is_nearest = actuation.nearest, actuation.is_nearest
         self.state, self.actuation, self.limits = state, actuation, limits
-        self._law_outcome = active.resolution.outcome
+        self._law_outcome = active.law.outcome
         self._limits_outcome = actuation.outcome
 
     def make(self, t: float, q: ArrayLike, v: ArrayLike) -> Delivered:

@@ -18,7 +18,7 @@ from hsp_control.control.declared_rates import check_field, check_metric
 from hsp_control.control.first_state import warn_of_far_target
 from hsp_control.control.gains_in_force import check_held
 from hsp_control.control.in_force import InForce
-from hsp_control.control.memory import Memory
+from hsp_control.control.memory import RunMemory
 from hsp_control.control.setup import (
     Base,
     DeclaredController,
@@ -104,14 +104,14 @@ class Composition:
         law = tasks, field, null_space_gain, metric, singularity_threshold
         around = limits, contacts, base, scene, start
         self._declared = DeclaredController(robot, *law, *around)
-        self._bind_to(RobotState(robot), Memory.of(robot.nv))
+        self._bind_to(RobotState(robot), RunMemory.of(robot.nv))
         given = self._declared.start
         q = robot.home() if given is None else given
         state = robot.state(0.0, q, np.zeros(robot.nv))
         here = Start(state, self._declared.scene, known=given is not None)
         self._compose(here, changes)
 
-    def _bind_to(self, state: RobotState, memory: Memory) -> None:
+    def _bind_to(self, state: RobotState, memory: RunMemory) -> None:
         """Compute with a state, and remember in a memory."""
         self._lock = StepLock()  # held while something is computed
         self._state, self._memory = state, memory

@@ -32,7 +32,7 @@ class Controller(Composition):
 
     Wherever the stacked Jacobian keeps its rank and no limit binds: every task's error
     obeys e'' + Kv e' + Kp e = 0, and V = ½ e_NᵀW e_N obeys V' = -e_NᵀW K_N e_N. The
-    same state gives the same effort, but for what is remembered of a run (`Memory`):
+    same state gives the same effort, but for what is remembered of a run (`RunMemory`):
     the last effort, used where the effort rate or the speed is limited (see `applied`),
     and how long changes of impedances wait.
 

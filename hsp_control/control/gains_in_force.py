@@ -24,7 +24,7 @@ from hsp_control.common.arrays import Array, Indices
 from hsp_control.common.exceptions import UnstableRateError
 from hsp_control.control.active_stack import ActiveStack
 from hsp_control.control.evolution import Evolution
-from hsp_control.control.memory import Memory
+from hsp_control.control.memory import RunMemory
 from hsp_control.control.setup import PlannedTask, Setup
 from hsp_control.declaration import within
 from hsp_control.robot import RobotState
@@ -43,7 +43,7 @@ _ROUNDING = 1e-7
 class GainsInForce:
     """Gains and impedances of the tasks, their offsets, and K_N, now."""
 
-    def __init__(self, nv: int, memory: Memory) -> None:
+    def __init__(self, nv: int, memory: RunMemory) -> None:
         self._memory, self._waiting = memory, memory.waiting
         # feedback of each task, by key; the arrays stay where they are
         self.feedback: dict[int, FeedbackInForce] = {}
@@ -101,7 +101,7 @@ class GainsInForce:
     def delay(self, active: ActiveStack, t: float, period: float) -> None:
         """Let changes of impedances wait where they would add energy."""
         planned = {each.key: each for each in self._setup.tasks}
-        for each in active.placed:
+        for each in active.stacked:
             now = planned.get(each.planned.key)
             if now is None:  # a change has ended it since
                 continue

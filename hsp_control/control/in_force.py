@@ -8,7 +8,7 @@ from hsp_control.control.actuation.limits_in_force import LimitsInForce
 from hsp_control.control.bound_step import BoundStep
 from hsp_control.control.changes import TimeLine
 from hsp_control.control.gains_in_force import GainsInForce
-from hsp_control.control.memory import Memory
+from hsp_control.control.memory import RunMemory
 from hsp_control.control.mixture import Mixture
 from hsp_control.control.model_in_force import ModelInForce
 from hsp_control.control.setup import DeclaredController, Setup
@@ -34,10 +34,10 @@ class InForce:
     mixture: Mixture
     # the step as one call, while the same tasks and contacts are active
     step: BoundStep | None
-    later: "Settled | None"  # once all changes are over; None: nothing changes
+    later: "AfterChanges | None"  # once all changes are over; None: nothing changes
 
     def __init__(
-        self, declared: DeclaredController, state: RobotState, memory: Memory
+        self, declared: DeclaredController, state: RobotState, memory: RunMemory
     ) -> None:
         self._declared, self._state, self._memory = declared, state, memory
         self.gains = GainsInForce(state.robot.nv, memory)
@@ -90,7 +90,7 @@ class InForce:
         following = mixture.following(over.setup)
         following.prepare([end])
         step = following.bound_step(self._memory.origin)
-        self.later = Settled(end + MEMORY, over, following, step)
+        self.later = AfterChanges(end + MEMORY, over, following, step)
 
     def advance(self, t: float) -> None:
         """Write what is in force at a time [s]."""
@@ -144,7 +144,7 @@ class InForce:
             self.mixture.active = step.active
 
 
-class Settled(NamedTuple):
+class AfterChanges(NamedTuple):
     """What a controller goes on with once all changes are over."""
 
     at: float  # from when on [s]

@@ -1,8 +1,8 @@
 """What a plan, an estimator or another part of its own may know of this room.
 
 Walking imports from nowhere else here, and so a contract keeps it: what is not named
-below may move. A `Plan` gives a controller its tasks and contacts step by step, an
-`Estimator` the state that it computes with; both read a `Measurement`, write
+below may move. A `MotionPlan` gives a controller its tasks and contacts step by step,
+an `Estimator` the state that it computes with; both read a `Measurement`, write
 `LogChannel` columns, and may ask a `FallDetector` or a `RunningObserver`.
 """
 
@@ -15,6 +15,6 @@ from .falling import FallDetector as FallDetector
 from .measurement import Inertial as Inertial
 from .measurement import LogChannel as LogChannel
 from .measurement import Measurement as Measurement
-from .plan import Plan as Plan
-from .plan import PlanParts as PlanParts
-from .plan import RunningPlan as RunningPlan
+from .motion_plan import MotionPlan as MotionPlan
+from .motion_plan import PlanParts as PlanParts
+from .motion_plan import RunningPlan as RunningPlan

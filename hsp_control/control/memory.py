@@ -13,7 +13,7 @@ from hsp_control.trajectories.streams.run import StreamRun
 
 
 @dataclass
-class Memory:
+class RunMemory:
     """All that a controller remembers of its run.
 
     A controller is what is declared, its time line, the state of its robot, and this.
@@ -41,7 +41,7 @@ class Memory:
     runs: int = 0  # how many times it was cleared
 
     @classmethod
-    def of(cls, nv: int) -> "Memory":
+    def of(cls, nv: int) -> "RunMemory":
         """Return that of a controller before its first run."""
         return cls(np.zeros(nv), SentMemory.of(nv))
 

@@ -210,7 +210,7 @@ class Mixture:
         """Return what delivers the law of a stack within a set of limits."""
         found = self._actuations.get((stack, limits))
         if found is None:
-            found = Actuation(self._state, stack.resolution, stack.support, limits)
+            found = Actuation(self._state, stack.law, stack.support, limits)
             self._actuations[stack, limits] = found
         return found
 

@@ -11,7 +11,7 @@ from hsp_control.common.suggestions import did_you_mean, listing
 from hsp_control.control.active_stack import ActiveStack, Layout
 from hsp_control.control.actuation import Delivered, Status
 from hsp_control.law import FieldSample, TaskSample, singular_values
-from hsp_control.law.problem import Record
+from hsp_control.law.problem import StepRecord
 
 
 class ControlOutput:
@@ -57,7 +57,7 @@ class ControlOutput:
     _distances: Sequence[tuple[str, bytes]]  # of each barrier, of all its pairs
     _layout: Layout  # of the memory
     _memory: bytes  # see `ActiveStack.memory`
-    _views: Record | None  # of the memory, once they were read
+    _views: StepRecord | None  # of the memory, once they were read
 
     def __init__(
         self,
@@ -157,7 +157,7 @@ class ControlOutput:
         tau = np.round(self.tau, 3).tolist()
         return f"ControlOutput(tau={tau}, {self.status.name}; {', '.join(notes)})"
 
-    def explanation(self, own: Record | None) -> Record:
+    def explanation(self, own: StepRecord | None) -> StepRecord:
         """Return a copy of tasks, field, null-space error and `acceleration`.
 
         Args:
@@ -165,17 +165,17 @@ class ControlOutput:
         """
         rows = self._layout.rows
         if own is None or len(own.task.error) != rows:
-            own = Record.allocate(rows, len(self.tau))
+            own = StepRecord.allocate(rows, len(self.tau))
         own.memory[:] = np.frombuffer(self._memory)
         if self._acceleration is not None:
             own.acceleration[:] = np.frombuffer(self._acceleration)
         return own
 
     @property
-    def _record(self) -> Record:
+    def _record(self) -> StepRecord:
         if self._views is None:
             memory = np.frombuffer(self._memory)
-            self._views = Record.over(memory, self._layout.rows, len(self.tau))
+            self._views = StepRecord.over(memory, self._layout.rows, len(self.tau))
         return self._views
 
 

@@ -1,3 +1,3 @@
 """The edge: bounds where tasks cannot be met, so that no arm oscillates."""
 
-from .resolution import Resolution as Resolution
+from .bound_law import BoundLaw as BoundLaw

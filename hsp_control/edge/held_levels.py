@@ -12,8 +12,8 @@ import numpy as np
 
 from hsp_control import engine
 from hsp_control.common.arrays import Array
+from hsp_control.edge.bound_law import BoundLaw
 from hsp_control.edge.limited_target import Barred, Within
-from hsp_control.edge.resolution import Resolution
 from hsp_control.edge.step import Factors
 from hsp_control.engine.plans import PartCall
 
@@ -27,7 +27,7 @@ def held_levels(
     M: Array,
     a: Array,
     effort: Array,
-    resolution: Resolution,
+    law: BoundLaw,
     by_levels: Array,
     factors: Factors,
     bounds: Within,
@@ -40,7 +40,7 @@ def held_levels(
         M: Mass matrix, shape (nv, nv).
         a: The law's acceleration, and that of compensators, shape (nv,).
         effort: M a + N, and the compensators' effort, shape (nv,).
-        resolution: The law.
+        law: The law.
         by_levels: The part of the first k levels in it, shape (levels, nv).
         factors: Orthonormal rows Q = X J L⁻ᵀ of all levels, X lower triangular.
         bounds: Bounds on the acceleration.
@@ -51,19 +51,19 @@ def held_levels(
         The call, and what it writes, shape (levels,): ρ for what the first levels
         command beyond limits, 0 if that is nothing. It may be more than 1.
     """
-    held, metric = np.zeros(len(by_levels)), resolution.problem.metric
+    held, metric = np.zeros(len(by_levels)), law.problem.metric
     call = PartCall(
         engine.HeldLevels,
         M=M,
         L=metric.L,
-        form=resolution.form,
+        form=law.form,
         a=a,
         effort=effort,
-        law=resolution.acceleration,
+        law=law.acceleration,
         by_levels=by_levels,
         factors=factors,
-        ends=resolution.ends,
-        thresholds=resolution.thresholds,
+        ends=law.ends,
+        thresholds=law.thresholds,
         bounds=bounds,
         permitted=permitted,
         barred=barred,

@@ -1,4 +1,4 @@
-"""A step with compensators, as one move: what `Command.effort` does.
+"""A step with compensators, as one move: what `CompensatedController.effort` does.
 
     measured t, q, v → velocity filter → state → observer → law → start-up ramp
                      → offset of the effort → limits → effort → integral action
@@ -68,7 +68,7 @@ class CompensatedStep:
             acted=np.zeros(nv),
             disturbance=caused,
             starting=np.zeros(1, dtype=np.int64),
-            damped=bound.active.resolution.outcome.damped_level,
+            damped=bound.active.law.outcome.damped_level,
             status=delivered.status,
         )
         self.stages: list[AloneCalls] = []
@@ -98,7 +98,7 @@ class CompensatedStep:
         ]
         before = [*_all(each.measure for each in self.stages), *moved]
         observe = [*_all(each.observe for each in self.stages)]
-        law: Array = bound.active.resolution.acceleration
+        law: Array = bound.active.law.acceleration
         nothing = np.zeros(len(shared.effort))
         given = shared.a, shared.effort, self._delivered
         act = [

@@ -44,8 +44,8 @@ def freeze(
     """Write a controller for a program without Python, which ``hsp_step.h`` runs.
 
     Its step is `Controller.compute` followed by `Controller.applied`, or with
-    compensators `Command.effort`, to the last bit. The controller itself is not
-    changed, and its run is not continued: the file begins anew.
+    compensators `CompensatedController.effort`, to the last bit. The controller itself
+    is not changed, and its run is not continued: the file begins anew.
 
     Args:
         controller: The controller.
@@ -159,7 +159,7 @@ def _ports(
     yield Port("status", "-", "what became of the step", delivered.status)
     yield Port("delivered", "-", "whether there is an effort", delivered.delivered)
     yield Port("period", "s", "how long an effort is held", period)
-    damped = bound.active.resolution.outcome.damped_level
+    damped = bound.active.law.outcome.damped_level
     yield Port("damped_level", "-", "first level with a bounded inverse, or 0", damped)
     rows = bound.active.rows
     for task in own.tasks:

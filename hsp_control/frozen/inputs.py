@@ -51,7 +51,7 @@ def inputs_of(own: Controller, bound: BoundStep, period: float) -> Iterator[Inpu
         yield _matrix(f"{task.name}.Kp", "1/s²", meaning, Kp, most)
         meaning, most = "damping of the error equation", 2.0 / period
         yield _matrix(f"{task.name}.Kv", "1/s", meaning, Kv, most)
-    K_N = bound.active.resolution.problem.gain
+    K_N = bound.active.law.problem.gain
     meaning = "K_N, rate of the null-space error"
     name, most = "null_space_gain", min(2.0 / period, LARGEST)
     if own.metric.form != VARYING:

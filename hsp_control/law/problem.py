@@ -8,7 +8,7 @@ from hsp_control.common.arrays import Array, Flags
 from hsp_control.law.samples import FieldSample, MetricSample, TaskSample
 
 
-class Record(NamedTuple):
+class StepRecord(NamedTuple):
     """The quantities of a step, in one block of memory, so that one copy keeps all.
 
     Attributes:
@@ -26,12 +26,12 @@ class Record(NamedTuple):
     memory: Array
 
     @classmethod
-    def allocate(cls, rows: int, nv: int) -> "Record":
+    def allocate(cls, rows: int, nv: int) -> "StepRecord":
         """Return a record of zeros."""
         return cls.over(np.zeros(2 * rows * nv + 3 * rows + 4 * nv), rows, nv)
 
     @classmethod
-    def over(cls, memory: Array, rows: int, nv: int) -> "Record":
+    def over(cls, memory: Array, rows: int, nv: int) -> "StepRecord":
         """Return the record of m = ``rows`` rows; its arrays view ``memory``."""
         square, ends = rows * nv, 2 * rows * nv + 3 * rows
         vectors = memory[2 * square : ends].reshape(3, rows)
@@ -70,7 +70,7 @@ class Problem:
 
     def __init__(self, rows: int, nv: int, gain: Array) -> None:
         """Allocate for a number of rows and of degrees of freedom."""
-        self.record = Record.allocate(rows, nv)
+        self.record = StepRecord.allocate(rows, nv)
         self.task = self.record.task
         self.field = self.record.field
         self.metric = MetricSample.allocate(nv)

@@ -70,7 +70,7 @@ class LoopLog:
     ) -> None:
         self._chain, self._due = chain, DueRows(period)
         self._failed = False
-        controller = chain.command.controller
+        controller = chain.compensated.controller
         self._excess = LimitExcess(controller.robot)
         self.path = None if path is None else Path(path)
         # whether the controller has raised; it is not called again
@@ -93,7 +93,7 @@ class LoopLog:
         if self._log is None or self._failed:
             return
         if measurement is not None:
-            limits = self._chain.command.controller.limits
+            limits = self._chain.compensated.controller.limits
             self._excess.record(limits, measurement.q, measurement.v)
         if measurement is None and phase == Phase.RUNNING:
             return  # no measurement, so no effort was computed
@@ -160,7 +160,7 @@ class LoopLog:
         if phase == Phase.RUNNING and not self.controller_failed:
             own = self._chain.log_channels(state.q, state.v)
             log_channels = {**own, **log_channels}
-        limits = self._chain.command.controller.limits
+        limits = self._chain.compensated.controller.limits
         log_channels |= self._excess.collect(limits)
         return state, self._output(phase, state), limiter.applied, log_channels
 
@@ -169,9 +169,9 @@ class LoopLog:
         if self.controller_failed:
             return None
         if phase == Phase.RUNNING:
-            return self._chain.command.output
+            return self._chain.compensated.output
         try:
-            return self._chain.command.controller.compute(state)
+            return self._chain.compensated.controller.compute(state)
         except KeyboardInterrupt:
             raise
         except BaseException:  # its effort is not used any more: log without it

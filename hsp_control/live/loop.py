@@ -13,12 +13,12 @@ import pinocchio as pin
 from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import FallError, LiveError
 from hsp_control.common.keywords import suggesting
-from hsp_control.control.compensation import Command, Compensation
+from hsp_control.control.compensation import CompensatedController, Compensation
 from hsp_control.control.controller import Controller
 from hsp_control.control.estimator import Estimator
 from hsp_control.control.falling import FallDetector
 from hsp_control.control.first_state import warn_of_slow_efforts
-from hsp_control.control.plan import Plan
+from hsp_control.control.motion_plan import MotionPlan
 from hsp_control.geometry.scene import Scene
 from hsp_control.live.effort_limiter import EffortLimiter
 from hsp_control.live.hardware import Hardware, described
@@ -48,7 +48,7 @@ def run_loop(
     hardware: Hardware,
     *,
     duration: float | None = None,
-    plan: Plan | None = None,
+    plan: MotionPlan | None = None,
     estimators: Sequence[Estimator] = (),
     settings: LiveSettings | None = None,
     requests: OperatorRequests | None = None,
@@ -82,7 +82,7 @@ def run_loop(
         duration: Time from the first state to the stop [s]; None: until the operator
             stops.
         plan: What writes references and switches contacts; the controller is made of
-            its `Plan.parts`.
+            its `MotionPlan.parts`.
         estimators: What completes each measurement, for the plan and the controller.
         settings: Which efforts the robot accepts, the faults that are tolerated, and
             how the safe stop brakes and holds; None: the defaults.
@@ -109,7 +109,7 @@ def run_loop(
             state: what it needs may not be measured.
     """
     source = (
-        Command(controller, _compensation(controller, hardware))
+        CompensatedController(controller, _compensation(controller, hardware))
         if isinstance(controller, Controller)
         else controller
     )
@@ -280,7 +280,7 @@ class LiveRun:
     def one_period(self, on_period: Callable[[float], object] | None) -> None:
         """Read a state, send an effort, then log and make the requested changes."""
         reader, limiter = self.reader, self.limiter
-        reader.read(limiter.applied, self.chain.command.controller.limits)
+        reader.read(limiter.applied, self.chain.compensated.controller.limits)
         if reader.fault is not None:
             self.stop("fault", reader.fault, reader.error)
         elif self.requests.reason is not None:
@@ -294,7 +294,7 @@ class LiveRun:
         tau = self.controller_effort() if self.phase == Phase.RUNNING else None
         if self.phase != Phase.RUNNING:
             tau = self.stop_effort()
-        limiter.follow(self.chain.command.controller.limits)
+        limiter.follow(self.chain.compensated.controller.limits)
         before = limiter.sent.copy()
         # The stop must brake all joints at once, and the law's effort is sent as it is.
         stops = self.phase != Phase.RUNNING
@@ -415,7 +415,7 @@ class LiveRun:
         if self.log.controller_failed:
             return
         try:
-            self.chain.command.applied(self.limiter.applied, self.hardware.period)
+            self.chain.compensated.applied(self.limiter.applied, self.hardware.period)
         except OPERATOR:
             raise
         except BaseException as error:

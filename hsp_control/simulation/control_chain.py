@@ -7,13 +7,13 @@ from hsp_control.common.arrays import Array
 from hsp_control.control.controller import Controller
 from hsp_control.control.estimator import Estimator, RunningEstimator, begun
 from hsp_control.control.measurement import Inertial, LogChannel, Measurement
+from hsp_control.control.motion_plan import MotionPlan, RunningPlan
 from hsp_control.control.output import ControlOutput
-from hsp_control.control.plan import Plan, RunningPlan
 from hsp_control.robot import RobotState
 
 
 class EffortSource(Protocol):
-    """Computes the efforts of a loop: a `Command`, or a wrapper around one.
+    """Computes the efforts of a loop: a `CompensatedController` or what wraps one.
 
     One that has an attribute ``feels_contacts`` which is true gets the wrenches of
     `Measurement` as a fifth argument of `effort`.
@@ -57,18 +57,18 @@ Source_co = TypeVar("Source_co", bound=EffortSource, covariant=True)
 class ControlChain(Generic[Source_co]):
     """From a measurement to an effort, in simulations and on robots alike.
 
-    measurement → estimators → plan → command → effort
+    measurement → estimators → plan → compensated controller → effort
     """
 
     def __init__(
         self,
-        command: Source_co,
-        plan: Plan | None = None,
+        compensated: Source_co,
+        plan: MotionPlan | None = None,
         estimators: Sequence[Estimator] = (),
     ) -> None:
-        self.command = command  # what computes the efforts
+        self.compensated = compensated  # what computes the efforts
         self._plan, self._estimators = plan, tuple(estimators)
-        self._feels = bool(getattr(command, "feels_contacts", False))
+        self._feels = bool(getattr(compensated, "feels_contacts", False))
         # whether more is needed of a measurement than q and v
         self.needs_sensors = plan is not None or bool(estimators) or self._feels
         self._estimating: list[RunningEstimator] = []
@@ -78,7 +78,7 @@ class ControlChain(Generic[Source_co]):
 
     @property
     def is_bare(self) -> bool:
-        """Whether the command gets measurements as they are, with no plan before it."""
+        """Whether the controller gets measurements as they are, without a plan."""
         return not (self.needs_sensors or self._estimators)
 
     def begin(self, inertial: Inertial | None, state: RobotState | None = None) -> None:
@@ -87,11 +87,11 @@ class ControlChain(Generic[Source_co]):
         ``inertial``, a reading of the inertial measurement unit, says where that is. A
         plan starts at ``state``; without one it starts with the first effort.
         """
-        controller = self.command.controller
+        controller = self.compensated.controller
         if self._plan is not None:
             self.plan = self._plan.begin(controller)
         self._estimating = begun(self._estimators, controller, inertial)
-        self.command.restart(origin=0.0)
+        self.compensated.restart(origin=0.0)
         if self.plan is not None and state is not None:
             self.plan.start(state)
 
@@ -103,14 +103,14 @@ class ControlChain(Generic[Source_co]):
             self.plan.update(measured)
         given = measured.t, measured.q, measured.v, period
         wrenches = (measured.wrenches,) if self._feels else ()
-        tau = self.command.effort(*given, *wrenches)
+        tau = self.compensated.effort(*given, *wrenches)
         if self._estimating:
-            self._status = float(self.command.output.status)
+            self._status = float(self.compensated.output.status)
         return tau
 
     def log_channels(self, q: Array, v: Array) -> Mapping[str, LogChannel]:
         """Return the values to log, estimates with errors from the true q and v."""
-        channels = self.command.log_channels()
+        channels = self.compensated.log_channels()
         if self.plan is not None:
             channels = {**channels, **self.plan.log_channels()}
         for each in self._estimating:

@@ -19,7 +19,7 @@ from hsp_control.control.measurement import LogChannel
 from hsp_control.control.output import ControlOutput
 from hsp_control.declaration.nested import parts_within
 from hsp_control.geometry.scene import Obstacle
-from hsp_control.law.problem import Record
+from hsp_control.law.problem import StepRecord
 from hsp_control.null_space.fields import NullSpaceField, PointDistance
 from hsp_control.null_space.fields.field import terms_of
 from hsp_control.robot import RobotState
@@ -208,16 +208,16 @@ class TaskColumns:
     def write_law(self, active: ActiveStack, output: ControlOutput) -> None:
         """Write errors beyond the largest, and stiffnesses, of the active tasks."""
         row, away = self._columns.row, output.bounded
-        for each in active.placed:
+        for each in active.stacked:
             prefix = f"task.{self._names[each.planned.key]}"
             row[f"{prefix}.bounded"][...] = away.get(each.name, 0.0)
             if impedance_of(each.planned.task) is not None:
                 stiffness = parts_of(each.in_force.numbers).K
                 row[f"{prefix}.stiffness"][:] = np.diag(stiffness)
 
-    def sources(self, active: ActiveStack, law: Record) -> Sources:
+    def sources(self, active: ActiveStack, law: StepRecord) -> Sources:
         """Yield the law's arrays of the active tasks."""
-        for each in active.placed:
+        for each in active.stacked:
             prefix = f"task.{self._names[each.planned.key]}"
             yield f"{prefix}.error", law.task.error[each.rows]
             yield f"{prefix}.error_rate", law.task.error_rate[each.rows]

@@ -16,14 +16,14 @@ from hsp_control.control.active_stack import ActiveStack
 from hsp_control.control.change import Change
 from hsp_control.control.controller import Controller
 from hsp_control.control.measurement import LogChannel
+from hsp_control.control.motion_plan import RunningPlan
 from hsp_control.control.output import ControlOutput
-from hsp_control.control.plan import RunningPlan
 from hsp_control.declaration.imported import fingerprints
 from hsp_control.declaration.nested import with_parts_replaced
 from hsp_control.declaration.plain_data import plain_data
 from hsp_control.geometry.scene import Obstacle, Scene
 from hsp_control.geometry.shapes import Mesh, shape_to_log
-from hsp_control.law.problem import Record
+from hsp_control.law.problem import StepRecord
 from hsp_control.null_space.metrics import FixedMetric
 from hsp_control.robot import Robot, RobotState
 from hsp_control.robot.description.recorded_meshes import mesh_data
@@ -86,7 +86,7 @@ class LogWriter:
         self._made: dict[int, Change] = {}  # all changes of the run, by identity
         # the latest run of each stream that there was, by its declaration's identity
         self._streams: dict[int, StreamRun] = {}
-        self._law: Record | None = None  # of the present row
+        self._law: StepRecord | None = None  # of the present row
         self._active: ActiveStack | None = None  # what `_sources` are of
         self._sources: list[tuple[str, Array]] = []  # the law's arrays for columns
         robot, column = controller.robot, columns.add
@@ -228,7 +228,7 @@ class LogWriter:
         self._barriers.write(state)
 
     def _find_sources(
-        self, active: ActiveStack, law: Record
+        self, active: ActiveStack, law: StepRecord
     ) -> list[tuple[str, Array]]:
         """Return the law's array for each column."""
         return [

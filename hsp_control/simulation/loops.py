@@ -8,7 +8,7 @@ import numpy as np
 
 from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import SimulationError
-from hsp_control.control.compensation import Command
+from hsp_control.control.compensation import CompensatedController
 from hsp_control.control.controller import Controller
 from hsp_control.control.measurement import LogChannel, Measurement
 from hsp_control.control.output import ControlOutput
@@ -31,7 +31,9 @@ class Instant(NamedTuple):
     state: RobotState  # the true state
     output: ControlOutput  # the controller's output for the true state
     tau: Array  # the commanded effort, computed from the measured state, shape (nv,)
-    log_channels: Mapping[str, LogChannel]  # what the command and the plan log, by name
+    log_channels: Mapping[
+        str, LogChannel
+    ]  # what the controller and the plan log, by name
 
 
 def continuous_loop(
@@ -60,7 +62,7 @@ def continuous_loop(
 
 
 def sampled_loop(
-    chain: ControlChain[Command],
+    chain: ControlChain[CompensatedController],
     plant: SampledPlant,
     periods: int,
     times: Sequence[float],
@@ -69,8 +71,8 @@ def sampled_loop(
 ) -> Iterator[Instant]:
     """Yield the instants of a loop that holds each effort for a control period."""
     plant.reset(times[0], q, v)
-    command, excess = chain.command, LimitExcess(plant.robot)
-    controller = command.controller
+    compensated, excess = chain.compensated, LimitExcess(plant.robot)
+    controller = compensated.controller
     period = (times[1] - times[0]) / periods
     native = _native_loop(chain, plant, excess)
     tau, count = np.zeros(plant.robot.nv), 0
@@ -90,9 +92,9 @@ def sampled_loop(
                 )
             tau = chain.effort(measured, period).copy()
             if k == 0:
-                output, state = command.output, command.state
+                output, state = compensated.output, compensated.state
                 if not (t == state.t and _same(state.q, state.v, q, v)):
-                    output = command.evaluate(t, q, v)
+                    output = compensated.evaluate(t, q, v)
                 channels = {
                     **chain.log_channels(q, v),
                     **excess.collect(controller.limits),
@@ -112,11 +114,15 @@ def sampled_loop(
 
 
 def _native_loop(
-    chain: ControlChain[Command], plant: SampledPlant, excess: LimitExcess
+    chain: ControlChain[CompensatedController], plant: SampledPlant, excess: LimitExcess
 ) -> "NativeLoop | None":
     """Return the loop of many periods at once; None where each must be made alone."""
-    command = chain.command
-    bare = chain.is_bare and type(command) is Command and not command.stages
+    compensated = chain.compensated
+    bare = (
+        chain.is_bare
+        and type(compensated) is CompensatedController
+        and not compensated.stages
+    )
     if not bare or type(plant) is not IntegratedPlant:  # not a subclass of either
         return None
     steps = plant.native_steps()
@@ -124,7 +130,7 @@ def _native_loop(
         return None
     from hsp_control.simulation.native_loop import NativeLoop
 
-    return NativeLoop(command.controller, plant, steps, excess)
+    return NativeLoop(compensated.controller, plant, steps, excess)
 
 
 def _check_divergence(t: float, q: Array, v: Array) -> None:

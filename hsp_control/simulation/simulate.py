@@ -17,7 +17,7 @@ from hsp_control.common.exceptions import (
 )
 from hsp_control.common.keywords import suggesting
 from hsp_control.control.change_model import ChangeGravity, ChangePayload
-from hsp_control.control.compensation import Command, Compensation
+from hsp_control.control.compensation import CompensatedController, Compensation
 from hsp_control.control.compensation import check_rate as check_loop
 from hsp_control.control.controller import Controller
 from hsp_control.control.estimator import Estimator
@@ -26,7 +26,7 @@ from hsp_control.control.first_state import (
     warn_of_jump,
     warn_of_slow_efforts,
 )
-from hsp_control.control.plan import Plan, RunningPlan
+from hsp_control.control.motion_plan import MotionPlan, RunningPlan
 from hsp_control.declaration import Part, within
 from hsp_control.declaration.language import check_kind
 from hsp_control.declaration.quantities import Flag, Positive
@@ -71,7 +71,7 @@ def simulate(
     integrator: Integrator | None = None,
     plant: Plant | PlantPart | None = None,
     compensation: Compensation | None = None,
-    plan: Plan | None = None,
+    plan: MotionPlan | None = None,
     estimators: Sequence[Estimator] = (),
     scene: Scene | None = None,
     check_rate: bool = True,
@@ -103,7 +103,7 @@ def simulate(
             momentum observer, where the plant is not the controller's own model
             (`Compensation.momentum_observer`).
         plan: The plan that writes references and switches contacts; the controller is
-            made of its `Plan.parts`. It needs a control period.
+            made of its `MotionPlan.parts`. It needs a control period.
         estimators: Estimators that complete each measurement, for the plan and the
             controller; they need a control period.
         scene: Obstacles to log; None: those of the controller.
@@ -193,7 +193,9 @@ def simulate(
             for each in high:
                 warning = f"{'.'.join(each.path)}: {each.message}"
                 warnings.warn(warning, StartWarning, stacklevel=2)
-        chain = ControlChain(Command(controller, compensation), plan, estimators)
+        chain = ControlChain(
+            CompensatedController(controller, compensation), plan, estimators
+        )
         chain.begin(plant.inertial())
         running = chain.plan
         loop = sampled_loop(chain, plant, periods, times, q, v)

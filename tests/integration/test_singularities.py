@@ -342,9 +342,9 @@ def test_random_starts(name: str, largest: Any) -> None:
         assert np.isfinite(output.tau).all()
         assert np.linalg.norm(a) <= limit
         values = controller.diagnose().singular_values
-        (threshold,) = controller.active_stack.resolution.thresholds
+        (threshold,) = controller.active_stack.law.thresholds
         # In the middle the law is exact, whatever the threshold follows.
-        stretched = controller.active_stack.resolution.problem.stretched
+        stretched = controller.active_stack.law.problem.stretched
         near = max(NEAR * robot.size, 2.0 * DEFAULT)
         middle = values[-1] > near and stretched.max() < FAR
         if largest == "robot":

@@ -95,7 +95,7 @@ def commanded(
     period: float = 0.001,
 ) -> Rows:
     """Return status and tau of a controller with compensators, from its start."""
-    command = hsp.compensation.Command(controller.preview(), compensation)
+    command = hsp.compensation.CompensatedController(controller.preview(), compensation)
     nq, found = controller.robot.nq, []
     for t, *x in states:
         tau = command.effort(t, np.array(x[:nq]), np.array(x[nq:]), period)

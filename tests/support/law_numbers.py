@@ -6,7 +6,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from hsp_control.common.arrays import Array
-from hsp_control.edge import Resolution
+from hsp_control.edge import BoundLaw
 from hsp_control.engine.plans import planned
 from hsp_control.law import IDENTITY, VARYING, Outcome, Problem
 
@@ -85,8 +85,8 @@ def resolve(
     """Return the package's acceleration and e_N, and whether it was damped."""
     m, n = x.J.shape
     sizes = levels or [m]
-    resolution = Resolution(sizes, n, form, x.K_N, threshold, controls=controls)
-    fill(resolution.problem, x)
-    planned([resolution.call(x.v)]).run(0.0)
-    a, e_N = resolution.acceleration, resolution.null_space_error
-    return a.copy(), e_N.copy(), resolution.outcome.outcome is Outcome.DAMPED
+    law = BoundLaw(sizes, n, form, x.K_N, threshold, controls=controls)
+    fill(law.problem, x)
+    planned([law.call(x.v)]).run(0.0)
+    a, e_N = law.acceleration, law.null_space_error
+    return a.copy(), e_N.copy(), law.outcome.outcome is Outcome.DAMPED

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from hsp_control.common.arrays import Array
 from hsp_control.control.actuation.support import Support
-from hsp_control.edge import Resolution
+from hsp_control.edge import BoundLaw
 
 _EQUALITY, _INEQUALITY = 5, 0
 _FORCE_COST = 1e-6
@@ -42,9 +42,7 @@ def stacked(*rows: Rows) -> Rows:
     return Rows(*(np.concatenate(parts) for parts in zip(*rows, strict=True)))
 
 
-def level_costs(
-    resolution: Resolution, supported: bool, size: float, held: Array
-) -> Array:
+def level_costs(law: BoundLaw, supported: bool, size: float, held: Array) -> Array:
     """Return ρ of each level, then of the null space, shape (levels + 1,).
 
     What is below a level costs a part of the level's error over the robot's size, but
@@ -53,34 +51,32 @@ def level_costs(
     least, whatever the error. Contacts cost as much as the level below them, and so do
     springs where there are none.
     """
-    count = len(resolution.ends) - supported
+    count = len(law.ends) - supported
     least = 1e-6 ** (1.0 / max(count, 1))
     costs, start = [1.0], 0
-    for k, end in enumerate(resolution.ends):
-        error = np.linalg.norm(resolution.problem.task.error[start:end])
-        of_error = 0.2 if k == len(resolution.ends) - 1 else 1.0
+    for k, end in enumerate(law.ends):
+        error = np.linalg.norm(law.problem.task.error[start:end])
+        of_error = 0.2 if k == len(law.ends) - 1 else 1.0
         below = max(min(of_error * error / size, 0.1), held[k])
         below = np.clip(0.0 if supported else below, least, 1.0)
-        springs = resolution.problem.springs[start:end].all() and not supported
+        springs = law.problem.springs[start:end].all() and not supported
         equal = springs or (supported and k == 0)
         costs.append(costs[-1] * (1.0 if equal else below))
         start = end
     return np.array(costs)
 
 
-def deviation_cost(
-    resolution: Resolution, supported: bool, size: float, held: Array
-) -> Array:
+def deviation_cost(law: BoundLaw, supported: bool, size: float, held: Array) -> Array:
     """Return H, shape (nv, nv), also where levels share directions.
 
     log H = Σ log ρ_k (P_{k-1} - P_k), with P_k from the spectra of the levels.
     """
-    J, L = resolution.problem.task.jacobian, resolution.problem.metric.L
+    J, L = law.problem.task.jacobian, law.problem.metric.L
     whitened, n = np.linalg.solve(L, J.T).T, len(L)
-    logs = np.log(level_costs(resolution, supported, size, held))
+    logs = np.log(level_costs(law, supported, size, held))
     P, T, start = np.eye(n), np.zeros((n, n)), 0
-    for k, end in enumerate(resolution.ends):
-        B, floor = whitened[start:end], resolution.thresholds[k] ** 2
+    for k, end in enumerate(law.ends):
+        B, floor = whitened[start:end], law.thresholds[k] ** 2
         sizes, U = np.linalg.eigh(B @ P @ B.T)
         above = np.maximum(sizes, floor)
         inverse = np.where(sizes < floor, (2.0 - sizes / floor) / floor, 1.0 / above)
@@ -106,7 +102,7 @@ def limited_step(
     wanted: Array,
     tau: tuple[Array, Array],
     motion: tuple[Array, Array],
-    resolution: Resolution,
+    law: BoundLaw,
     support: Support,
     base: NDArray[np.int64],
     weight: float,
@@ -121,7 +117,7 @@ def limited_step(
         wanted: M a + N.
         tau: Bounds on the effort.
         motion: Bounds on the acceleration.
-        resolution: The resolved law.
+        law: The resolved law.
         support: The active contacts, with forces of minimum norm.
         base: Degrees of freedom without a motor.
         weight: The robot's weight [N].
@@ -130,7 +126,7 @@ def limited_step(
     """
     n, p = len(a), support.size
     H = np.zeros((n + p, n + p))
-    H[:n, :n] = deviation_cost(resolution, p > 0, size, costs)
+    H[:n, :n] = deviation_cost(law, p > 0, size, costs)
     cost = _FORCE_COST / np.maximum(support.inverse_cost, 1e-6)
     H[range(n, n + p), range(n, n + p)] = cost
     f = np.zeros(n + p)
@@ -140,7 +136,7 @@ def limited_step(
     mass = weight / 9.81
     held = sum(contact.rows for contact in support.contacts)
     J = np.zeros((held, n + p))
-    J[:, :n] = resolution.problem.task.jacobian[:held]
+    J[:, :n] = law.problem.task.jacobian[:held]
     cone = np.zeros((len(support.cone), n + p))
     cone[:, n:] = support.cone
     rows = [

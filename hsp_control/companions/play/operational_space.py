@@ -13,13 +13,13 @@ import numpy as np
 
 from hsp_control.common.arrays import Array
 from hsp_control.control.active_stack import ActiveStack
-from hsp_control.control.compensation import Command
+from hsp_control.control.compensation import CompensatedController
 from hsp_control.control.output import ControlOutput
 from hsp_control.robot import RobotState
 
 
-class ComparedCommand(Command):
-    """A command that can follow the operational-space law instead."""
+class ComparedController(CompensatedController):
+    """A controller that can follow the operational-space law instead."""
 
     operational = False
 
@@ -37,7 +37,7 @@ class ComparedCommand(Command):
 def operational_space(state: RobotState, active: ActiveStack) -> Array:
     """Return the law's acceleration, (nv,), all priorities alike, without damping."""
     J, J_dot = active.rows.jacobian, active.rows.jacobian_dot
-    problem = active.resolution.problem
+    problem = active.law.problem
     W_inv_Jt = np.linalg.solve(problem.metric.W, J.T)
     inverse = W_inv_Jt @ np.linalg.pinv(J @ W_inv_Jt, rcond=1e-9)
     wanted = active.rows.acceleration - J_dot @ state.v

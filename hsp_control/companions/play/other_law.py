@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 from hsp_control.common.arrays import Array
 from hsp_control.companions.play.handles import Handles
 from hsp_control.companions.play.knobs import FieldSwitch
-from hsp_control.companions.play.operational_space import ComparedCommand
+from hsp_control.companions.play.operational_space import ComparedController
 from hsp_control.control.controller import Controller
 from hsp_control.control.measurement import NO_WRENCHES
 from hsp_control.simulation.control_chain import ControlChain
@@ -34,7 +34,7 @@ def laws_beside(controller: Controller, *, operational: bool) -> list[str]:
 class Playing(NamedTuple):
     """What a play steps: the parts of which the other law has copies."""
 
-    command: ComparedCommand
+    compensated: ComparedController
     handles: Handles
     plant: SampledPlant
 
@@ -66,18 +66,18 @@ class OtherLaw:
             shared: Who may be named in what is copied, and is not: the play.
         """
         self.law = law
-        state = playing.command.controller.state
-        kept = playing.command.controller.robot, NO_WRENCHES, shared
+        state = playing.compensated.controller.state
+        kept = playing.compensated.controller.robot, NO_WRENCHES, shared
         memo: dict[int, Any] = {id(each): each for each in kept}
-        command, self.handles, self.plant = deepcopy(playing, memo)
-        self.controller = command.controller
+        compensated, self.handles, self.plant = deepcopy(playing, memo)
+        self.controller = compensated.controller
         if law == WITHOUT_FIELD:
             switch = FieldSwitch(self.controller.field)
             switch.turn(self.controller.at(times[0]), on=False)
         else:
-            command.operational = law == OPERATIONAL
+            compensated.operational = law == OPERATIONAL
         self._loop: Iterator[Instant] = sampled_loop(
-            ControlChain(command), self.plant, periods, times,
+            ControlChain(compensated), self.plant, periods, times,
             state.q.copy(), state.v.copy(),
         )  # fmt: skip
         self.advance()

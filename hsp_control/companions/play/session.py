@@ -13,7 +13,7 @@ from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import SimulationError
 from hsp_control.companions.play.handles import Handles
 from hsp_control.companions.play.knobs import Knob
-from hsp_control.companions.play.operational_space import ComparedCommand
+from hsp_control.companions.play.operational_space import ComparedController
 from hsp_control.companions.play.other_law import OtherLaw, Playing, laws_beside
 from hsp_control.companions.viewer.commands import path_element
 from hsp_control.config import Experiment
@@ -73,13 +73,13 @@ class Session:
         experiment, robot = self.experiment, self.experiment.robot
         memo: dict[int, Any] = {id(robot): robot}
         self.controller: Controller = deepcopy(experiment.controller, memo)
-        self.command = ComparedCommand(self.controller, experiment.compensation)
+        self.compensated = ComparedController(self.controller, experiment.compensation)
         self.other: OtherLaw | None = None
         self.let_go()
         self._unrepeatable = ""
         rows, plan = self._rows(), experiment.scenario.plan
         times = [k * self.row for k in range(rows)]
-        chain = ControlChain(self.command, plan, experiment.scenario.estimators)
+        chain = ControlChain(self.compensated, plan, experiment.scenario.estimators)
         chain.begin(self.plant.inertial())
         self._loop: Iterator[Instant] = sampled_loop(
             chain, self.plant, round(self.row / self.period), times,
@@ -152,7 +152,7 @@ class Session:
         """The laws that can be stepped beside it; none of what has a plan."""
         if self.experiment.scenario.plan is not None:
             return []
-        operational = self.command.operational
+        operational = self.compensated.operational
         return laws_beside(self.controller, operational=operational)
 
     def compare_with(self, law: str | None) -> None:
@@ -162,7 +162,7 @@ class Session:
         if law is None:
             self.other = None
             return
-        playing = Playing(self.command, self.handles, self.plant)
+        playing = Playing(self.compensated, self.handles, self.plant)
         times = [self.t + k * self.row for k in range(self.rows_left)]
         periods = round(self.row / self.period)
         self.other = OtherLaw(law, playing, times, periods, shared=self)
@@ -208,7 +208,7 @@ class Session:
 
     def _compare(self, _at: Changes, operational: bool) -> None:
         """Follow another law; it is no part of the controller, nor of its log."""
-        self.command.operational = operational
+        self.compensated.operational = operational
         self.other = None  # its law may be the same now
         if operational:
             self._unrepeatable = "the operational-space law was tried"

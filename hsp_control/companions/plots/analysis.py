@@ -54,7 +54,7 @@ def null_space_projector(controller: Controller, state: RobotState) -> Array:
     """
     controller.compute(state.t, state.q, state.v)
     stack, nv = controller.active_stack, controller.robot.nv
-    J, metric = stack.rows.jacobian, stack.resolution.problem.metric
+    J, metric = stack.rows.jacobian, stack.law.problem.metric
     # With W = L Lᵀ, P = L⁻ᵀ (I - B⁺B) Lᵀ for B = J L⁻ᵀ.
     B = np.linalg.solve(metric.L, J.T).T
     projector = np.eye(nv) - np.linalg.pinv(B, rcond=1e-9) @ B

@@ -11,7 +11,7 @@ from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import NonFiniteError
 from hsp_control.companions.simulators.hand_settings import Source, read_settings
 from hsp_control.companions.simulators.held_goal import HeldPoint, HeldRotation
-from hsp_control.control.compensation import Command
+from hsp_control.control.compensation import CompensatedController
 from hsp_control.control.controller import Controller
 from hsp_control.robot import Robot
 from hsp_control.tasks import FramePose, FramePosition, Gains, Task
@@ -31,7 +31,7 @@ class HandControl:
         robot: The arm.
         frame: The hand's frame.
         axes: The tracked axes of the world; None: the whole pose.
-        command: The controller and its compensators.
+        compensated: The controller and its compensators.
     """
 
     def __init__(
@@ -74,7 +74,7 @@ class HandControl:
             )
             # The robot is the simulator's own, and what it touches is no error of it.
             own = settings.compensation.suited(controller, None, exact=True)
-            self.command = Command(controller, own)
+            self.compensated = CompensatedController(controller, own)
         self._indices = axis_indices(axes or "")  # now that the task has checked them
         self._strongest = robot.model.upperEffortLimit
         self._expected, self._period = nan, nan
@@ -87,8 +87,8 @@ class HandControl:
             q: Configuration, shape (nq,).
             v: Velocity, shape (nv,).
         """
-        self.command.restart(origin=0.0)
-        self.command.controller.compute(t, q, v)  # places what refers to the start
+        self.compensated.restart(origin=0.0)
+        self.compensated.controller.compute(t, q, v)  # places what refers to the start
         self._expected = nan
 
     def has_jumped(self, t: float) -> bool:
@@ -115,7 +115,7 @@ class HandControl:
         if self._streams:
             pose = pin.SE3(rotation, point)
             target = point[self._indices] if self.axes else pose
-            self.command.controller.stream("hand").send(target, t=t)
+            self.compensated.controller.stream("hand").send(target, t=t)
             return
         self._point.aim(point[self._indices] if self.axes else point)
         self._rotation.aim(rotation)
@@ -126,12 +126,12 @@ class HandControl:
         It is clipped to what the motors can give.
 
         Raises:
-            HspControlError: See `Command.effort`.
+            HspControlError: See `CompensatedController.effort`.
         """
-        wanted = self.command.effort(t, q, v, period)
+        wanted = self.compensated.effort(t, q, v, period)
         effort = np.clip(wanted, -self._strongest, self._strongest)
         if (effort != wanted).any():
-            self.command.applied(effort, period)
+            self.compensated.applied(effort, period)
         self._expected, self._period = t + period, period
         return effort
 

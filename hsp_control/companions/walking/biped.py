@@ -77,7 +77,7 @@ class BipedPlan(MovingPlan):
     def parts(
         self, robot: Robot, tasks: Sequence[Task], contacts: Sequence[Contact]
     ) -> PlanParts:
-        """Return the parts of a controller that walks; see `Plan.parts`."""
+        """Return the parts of a controller that walks; see `MotionPlan.parts`."""
         with within("plan"):
             if not robot.unactuated:
                 raise PlanError(

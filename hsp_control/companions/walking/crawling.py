@@ -47,7 +47,7 @@ class Crawl(QuadrupedPlan, type="crawl"):
     [-]."""
 
     def begin(self, controller: Controller) -> "RunningCrawl":
-        """Return the crawl of a run; see `Plan.begin`."""
+        """Return the crawl of a run; see `MotionPlan.begin`."""
         return RunningCrawl(self.begun(), controller, self.margin)
 
 

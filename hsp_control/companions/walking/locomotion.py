@@ -7,13 +7,13 @@ import numpy as np
 
 from hsp_control.common.exceptions import PlanError
 from hsp_control.companions.walking.footsteps import Velocity
-from hsp_control.control.interface import Plan
+from hsp_control.control.interface import MotionPlan
 from hsp_control.declaration import within
 from hsp_control.declaration.quantities import Number
 from hsp_control.trajectories import Trajectory
 
 
-class MovingPlan(Plan):
+class MovingPlan(MotionPlan):
     """A plan that follows a velocity: three numbers, or a function of time."""
 
     speed: Number = 0.0

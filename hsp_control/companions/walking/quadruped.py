@@ -79,7 +79,7 @@ class QuadrupedPlan(MovingPlan):
     def parts(
         self, robot: Robot, tasks: Sequence[Task], contacts: Sequence[Contact]
     ) -> PlanParts:
-        """Return the parts of a controller that follows it; see `Plan.parts`."""
+        """Return the parts of a controller that follows it; see `MotionPlan.parts`."""
         with within("plan"):
             if not robot.unactuated:
                 raise PlanError(
@@ -116,7 +116,7 @@ class QuadrupedPlan(MovingPlan):
         return composed(own, tasks, contacts, names)
 
     def limits(self, limits: Limits | None) -> Limits | None:
-        """Return limits whose barriers let legs swing; see `Plan.limits`."""
+        """Return limits whose barriers let legs swing; see `MotionPlan.limits`."""
         if limits is None or limits.bandwidth is not None:
             return limits
         return replace(limits, bandwidth=BANDWIDTH)

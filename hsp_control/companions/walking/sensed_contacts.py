@@ -16,7 +16,7 @@ from hsp_control.control.interface import (
     Controller,
     LogChannel,
     Measurement,
-    Plan,
+    MotionPlan,
     PlanParts,
     RunningPlan,
 )
@@ -95,7 +95,7 @@ class SensedContact(Part, error=PlanError):
         return Schedule(self.wanted, ramp=0.0)
 
 
-class Sensed(Plan, type="sensed"):
+class Sensed(MotionPlan, type="sensed"):
     """Contacts are switched by detection: measured or estimated forces, or height.
 
     Everything else, tasks and their references, is as it is declared. A contact rises
@@ -110,7 +110,7 @@ class Sensed(Plan, type="sensed"):
     def parts(
         self, robot: Robot, tasks: Sequence[Task], contacts: Sequence[Contact]
     ) -> PlanParts:
-        """Return the parts with switches as schedules; see `Plan.parts`."""
+        """Return the parts with switches as schedules; see `MotionPlan.parts`."""
         there = {each.name: each for each in contacts}
         known = {each.name: each for each in tasks}
         moves: dict[str, SensedContact] = {}
@@ -157,7 +157,7 @@ class Sensed(Plan, type="sensed"):
         )
 
     def begin(self, controller: Controller) -> "RunningSensed":
-        """Return the switches of a run; see `Plan.begin`."""
+        """Return the switches of a run; see `MotionPlan.begin`."""
         return RunningSensed(self, controller)
 
 

@@ -42,7 +42,7 @@ class Trot(QuadrupedPlan, type="trot"):
     center_gains: ClassVar[Gains] = Gains(6.0, 5.0)
 
     def begin(self, controller: Controller) -> "RunningTrot":
-        """Return the trot of a run; see `Plan.begin`."""
+        """Return the trot of a run; see `MotionPlan.begin`."""
         return RunningTrot(self.begun(), controller)
 
 

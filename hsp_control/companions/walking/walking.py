@@ -74,7 +74,7 @@ class Walk(BipedPlan, type="walk"):
     """
 
     def begin(self, controller: Controller) -> "RunningWalk":
-        """Return the walk of a run; see `Plan.begin`."""
+        """Return the walk of a run; see `MotionPlan.begin`."""
         names = self._feet(controller.contacts)
         return RunningWalk(self.begun(), controller, names, BODY, TRUNK)
 

@@ -33,7 +33,7 @@ from hsp_control.control.actuation.limited_step import (
 )
 from hsp_control.control.actuation.limits_in_force import LimitSet
 from hsp_control.control.actuation.support import Support
-from hsp_control.edge import Resolution
+from hsp_control.edge import BoundLaw
 from hsp_control.edge.limited_target import Permitted
 from hsp_control.engine.plans import AnyCall, PartCall, PartCalls
 from hsp_control.robot import RobotState
@@ -88,7 +88,7 @@ class Actuation:
     """Computes efforts and contact forces for one law, within one set of limits."""
 
     def __init__(
-        self, state: RobotState, law: Resolution, support: Support, limits: LimitSet
+        self, state: RobotState, law: BoundLaw, support: Support, limits: LimitSet
     ) -> None:
         """Bind what every step calls, also where a limit binds."""
         nv = state.robot.nv

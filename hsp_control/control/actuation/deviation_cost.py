@@ -11,7 +11,7 @@ import numpy as np
 
 from hsp_control import engine
 from hsp_control.common.arrays import Array, Flags, Indices
-from hsp_control.edge import Resolution
+from hsp_control.edge import BoundLaw
 from hsp_control.edge.step import Factors, Projectors
 from hsp_control.engine.plans import PartCall
 
@@ -39,32 +39,30 @@ class Levels(NamedTuple):
     thresholds: Array
     factors: Factors  # law's pseudo-inverse of the stack
     projectors: Projectors  # what its levels left, where it went level by level
-    edge_level: Indices  # see `Resolution`, shape (1,)
-    alone: bool  # see `Resolution`
+    edge_level: Indices  # see `BoundLaw`, shape (1,)
+    alone: bool  # see `BoundLaw`
 
     @classmethod
-    def of(
-        cls, resolution: Resolution, supported: bool, size: float, held: Array
-    ) -> Self:
+    def of(cls, law: BoundLaw, supported: bool, size: float, held: Array) -> Self:
         """Return those of a law; ``supported``: its first level is that of contacts."""
-        levels = len(resolution.ends) - supported
-        problem = resolution.problem
+        levels = len(law.ends) - supported
+        problem = law.problem
         return cls(
             problem.task.jacobian,
             problem.metric.L,
-            resolution.form,
-            resolution.ends,
+            law.form,
+            law.ends,
             problem.task.error,
             problem.springs,
             size,
             int(supported),
             _LEAST ** (1.0 / max(levels, 1)),
             held,
-            resolution.thresholds,
-            resolution.factors,
-            resolution.projectors,
-            resolution.edge_level,
-            resolution.alone,
+            law.thresholds,
+            law.factors,
+            law.projectors,
+            law.edge_level,
+            law.alone,
         )
 
 

@@ -32,7 +32,7 @@ from hsp_control.control.actuation.deviation_cost import (
 )
 from hsp_control.control.actuation.dual_active_set import QP, Workspace
 from hsp_control.control.actuation.support import Support
-from hsp_control.edge import Resolution
+from hsp_control.edge import BoundLaw
 from hsp_control.edge.held_levels import held_levels
 from hsp_control.edge.limited_target import (
     Barred,
@@ -139,26 +139,25 @@ Barriers = Mapping[str, tuple[Array, Array]]
 
 def _at_the_edge(
     state: RobotState,
-    resolution: Resolution,
+    law: BoundLaw,
     wanted: Wanted,
     within: Within,
     permitted: Permitted,
     barred: Barred,
 ) -> tuple[PartCalls, Array]:
     """Return what writes what a step comes near to, and what yielding costs there."""
-    law, damped = resolution.acceleration, resolution.edge.damped
-    taken, (self_motions, brakings) = resolution.self_motions(state.v)
-    parted, (by_levels, factors) = resolution.by_levels(state.v)
+    taken, (self_motions, brakings) = law.self_motions(state.v)
+    parted, (by_levels, factors) = law.by_levels(state.v)
     holding, held = held_levels(
         *wanted,
-        resolution,
+        law,
         by_levels,
         factors,
         within,
         permitted.effort,
         barred,
     )
-    parts = Parts(law, damped, *self_motions, *brakings)
+    parts = Parts(law.acceleration, law.edge.damped, *self_motions, *brakings)
     target = limited_target(*wanted, parts, within, permitted, barred)
     return [taken, parted, holding, target], held
 
@@ -169,7 +168,7 @@ class LimitedStep:
     def __init__(
         self,
         state: RobotState,
-        resolution: Resolution,
+        law: BoundLaw,
         support: Support,
         bounds: Bounds,
         wanted: Wanted,
@@ -277,16 +276,16 @@ class LimitedStep:
                 levels, directions, standing, self._rows.JT, moving
             )
 
-        rows: list[AnyCall] = [*state.inertia.calls, resolution.damped_beside(state.v)]
+        rows: list[AnyCall] = [*state.inertia.calls, law.damped_beside(state.v)]
         # What yielding costs at least; with a floating base priorities are strict.
-        self.held = zeros(len(resolution.ends))
+        self.held = zeros(len(law.ends))
         if permitted is not None:
             kept = slice(barriers, contacts)
             barred = Barred(A[kept], lower[kept])
-            given = state, resolution, wanted, Within(*bounds[:2]), permitted, barred
+            given = state, law, wanted, Within(*bounds[:2]), permitted, barred
             target, self.held = _at_the_edge(*given)
             rows += target
-        levels = Levels.of(resolution, p > 0, state.robot.size or 1.0, self.held)
+        levels = Levels.of(law, p > 0, state.robot.size or 1.0, self.held)
         rows.append(
             PartCall(engine.LimitedRows, **around, A=A, lower=lower, upper=upper)
         )
@@ -300,7 +299,7 @@ class LimitedStep:
             lower=lower,
             upper=upper,
             end=end,
-            J=resolution.problem.task.jacobian[:held],
+            J=law.problem.task.jacobian[:held],
             first=contacts,
             A=A,
             relaxed_lower=relaxed.lower,

@@ -11,7 +11,7 @@ from hsp_control.common.arrays import Array, Indices
 from hsp_control.constraints.contacts import Contact, SlidingContact
 from hsp_control.constraints.contacts.contact import NORMAL, WRENCH, shares
 from hsp_control.control.evolution import PlannedContact
-from hsp_control.edge import Resolution
+from hsp_control.edge import BoundLaw
 from hsp_control.engine.plans import AnyCall, PartCall, PartCalls
 from hsp_control.robot import Robot, RobotState
 from hsp_control.trajectories import TrajectorySample
@@ -85,7 +85,7 @@ class Support:
         self._wanted, self.tau = np.zeros(nv), np.zeros(nv)
         self.forces = np.zeros(self.size)
 
-    def update(self, resolution: Resolution) -> None:
+    def update(self, law: BoundLaw) -> None:
         """Compute the map, the positions, the bounds of schedules, and the commands."""
         state = self._state
         self._write_maps()
@@ -94,7 +94,7 @@ class Support:
             self.upper[columns][2::3] = on * _MAX_FORCE * self.weight
             self.inverse_cost[columns] = on * full
         for planned, command, own in self._commanded:
-            command.write(state, planned.weight(state.t), resolution, own)
+            command.write(state, planned.weight(state.t), law, own)
 
     @cached_property
     def _write_maps(self) -> Callable[[], object]:
@@ -215,7 +215,7 @@ class CommandedForces:
         self._normal = 0 if n == NORMAL else 2
 
     def write(
-        self, state: RobotState, weight: float, resolution: Resolution, out: Array
+        self, state: RobotState, weight: float, law: BoundLaw, out: Array
     ) -> None:
         """Write f_ref."""
         self._follow(state.t)
@@ -227,7 +227,7 @@ class CommandedForces:
             self._shares[:] = shares(WRENCH, arms)
         out[:] = weight * (self._shares @ command)
         if isinstance(contact, SlidingContact) and contact.slides:
-            slip = _slip(contact, state, intended_velocity(state, resolution))
+            slip = _slip(contact, state, intended_velocity(state, law))
             speed = float(np.hypot(slip[0], slip[1]))
             if speed > 0.0:
                 share = np.tanh(speed / contact.smoothing) / speed
@@ -241,13 +241,13 @@ def _slip(contact: Contact, state: RobotState, v: Array) -> Array:
     return np.asarray((twist[:3] + np.cross(twist[3:], arm)) @ contact.axes)
 
 
-def intended_velocity(state: RobotState, resolution: Resolution) -> Array:
+def intended_velocity(state: RobotState, law: BoundLaw) -> Array:
     """Return v + e_N + J# e', shape (nv,): the velocity once both errors are zero."""
     # Measurement noise cancels in it, and a hand that sticks is pushed where it is to
     # go.
-    problem = resolution.problem
+    problem = law.problem
     L, J = problem.metric.L, problem.task.jacobian
     whitened = np.linalg.solve(L, J.T)
     motion = np.linalg.pinv(whitened.T, rcond=1e-6) @ problem.task.error_rate
     raised = np.linalg.solve(L.T, motion)
-    return np.asarray(state.v + resolution.null_space_error + raised)
+    return np.asarray(state.v + law.null_space_error + raised)

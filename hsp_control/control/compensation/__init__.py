@@ -2,7 +2,7 @@
 
 from hsp_control.common.entry_points import own_names
 
-from .command import Command as Command
+from .compensated_controller import CompensatedController as CompensatedController
 from .compensation import Compensation as Compensation
 from .force_feedback import ForceFeedback as ForceFeedback
 from .friction_feed_forward import FrictionFeedForward as FrictionFeedForward

@@ -41,8 +41,8 @@ class Compensation(Part, error=CompensationError):
     """Compensators for the differences between the robot and its model.
 
     Each is off unless it is given, but for the momentum observer, which is on where it
-    makes sense; None turns it off. They have no memory: a `Command` makes what runs, so
-    one set serves many controllers, runs and threads.
+    makes sense; None turns it off. They have no memory: what runs is made by a
+    `CompensatedController`, so one set serves many controllers, runs and threads.
     """
 
     _: KW_ONLY
@@ -94,7 +94,7 @@ class Compensation(Part, error=CompensationError):
     def suited(
         self, controller: Controller, period: float | None, exact: bool
     ) -> "Compensation":
-        """Return what a `Command` runs in a loop: None for ``auto`` where that is off.
+        """Return the compensators of a loop: None for ``auto`` where that is off.
 
         Elsewhere ``auto`` stays, since the tasks of a running loop may change.
         """
@@ -116,7 +116,7 @@ class Compensation(Part, error=CompensationError):
         return f"on, {rate}" if own.cancel else f"only estimates, {rate}"
 
     def begin(self, controller: Controller) -> list[Stage]:
-        """Return what runs on a robot, in the order of the chain; see `Command`."""
+        """Return what runs on a robot, in the order of the `CompensatedController`."""
         running = [
             begin(getattr(self, name), controller)
             for name, begin in STAGES.items()

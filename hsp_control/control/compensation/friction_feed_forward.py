@@ -89,26 +89,26 @@ def desired_velocity(state: RobotState, active: ActiveStack) -> Array:
     """Return v_d = J# x_d' + P g = v + e_N + J#(x_d' - J v), shape (nv,)."""
     # J# is that of the law, bounded near singularities by the law's threshold. The rows
     # of unactuated base motions have no desired rate.
-    resolution, v, state = active.resolution, state.v, state.read_only
-    task, metric = resolution.problem.task, resolution.problem.metric
+    law, v, state = active.law, state.v, state.read_only
+    task, metric = law.problem.task, law.problem.metric
     rate_error = -task.jacobian @ v
     contact_rows = sum(contact.rows for contact in active.contacts)
     rate_error[contact_rows : active.first_task_row] = 0.0
-    for each in active.placed:
+    for each in active.stacked:
         rate_error[each.rows] += each.planned.task.reference_rate(state)
     m, n = task.jacobian.shape
     if m > n:  # conflicting levels: least squares over all of them
         B = np.linalg.solve(metric.L, task.jacobian.T)
-        minimal = np.linalg.pinv(B.T, rcond=resolution.threshold) @ rate_error
+        minimal = np.linalg.pinv(B.T, rcond=law.threshold) @ rate_error
         raised = np.linalg.solve(metric.L.T, minimal)
-        return np.asarray(v + resolution.null_space_error + raised)
+        return np.asarray(v + law.null_space_error + raised)
     motion = np.zeros(n)
     engine.SmallestMotion(
         J=task.jacobian,
         L=metric.L,
         form=VARYING,
-        threshold=resolution.threshold,
+        threshold=law.threshold,
         x=rate_error,
         motion=motion,
     )()
-    return np.asarray(v + resolution.null_space_error + motion)
+    return np.asarray(v + law.null_space_error + motion)

@@ -63,7 +63,8 @@ class LinearLoop:
 
     x is the error of a task, or that of the null space, with Kp = K_N A, Kv = K_N + A
     for a field g of slope -A. The loop includes delays and compensators, in the order
-    of `Command`. The robot equals its model, or performs a part of each acceleration.
+    of `CompensatedController`. The robot equals its model, or performs a part of each
+    acceleration.
     """
 
     kp: Array  # Kp, shape (m, m) [1/s²]
@@ -215,10 +216,10 @@ def null_space_rates(controller: Controller, state: RobotState) -> tuple[Array, 
     if not controller.field.controls:
         return nothing, nothing
     stack = controller.stack_at(state)
-    J, L = stack.rows.jacobian, stack.resolution.problem.metric.L
+    J, L = stack.rows.jacobian, stack.law.problem.metric.L
     across = np.linalg.solve(L, J.T).T  # J L⁻ᵀ
     _, values, Vt = np.linalg.svd(across)
-    rank = int((values > stack.resolution.threshold).sum())
+    rank = int((values > stack.law.threshold).sum())
     Z = Vt[rank:].T
     if not Z.size:
         return nothing, nothing
@@ -318,10 +319,10 @@ def whole_loop(
     if robot.unactuated or controller.contacts:
         return None
     stack = controller.stack_at(state)
-    J, L = stack.rows.jacobian, stack.resolution.problem.metric.L
+    J, L = stack.rows.jacobian, stack.law.problem.metric.L
     U, S, Vt = np.linalg.svd(np.linalg.solve(L, J.T).T)
     m, n = J.shape
-    if m > n or S.min(initial=np.inf) <= stack.resolution.threshold:
+    if m > n or S.min(initial=np.inf) <= stack.law.threshold:
         return None
     if m < n and not controller.field.controls:
         return None

@@ -27,7 +27,11 @@ from hsp_control.trajectories.streams.segments import (
     Segment,
     coast,
 )
-from hsp_control.trajectories.streams.velocities import Axes, Command, Velocities
+from hsp_control.trajectories.streams.velocities import (
+    Axes,
+    Velocities,
+    VelocityCommand,
+)
 from hsp_control.trajectories.streams.waypoints import KEPT, Waypoints, derivatives
 
 _CONSIDERED = 256  # the reference joins one of the next waypoints, at most this many
@@ -65,7 +69,7 @@ class Planner:
         self._heard = -inf
         self._silent = False
         # the velocity that is commanded, until it fades, unless it is repeated
-        self._command: Command | None = None
+        self._command: VelocityCommand | None = None
         self._fades_at = inf
         self._segments: list[Segment] = [coast(0.0, inf, start)]
         self._starts = [-inf]
@@ -152,7 +156,7 @@ class Planner:
         if message.values is None:
             assert message.velocities is not None
             axes = message.axes or policy.axes
-            self._command = Command(message.velocities[0], axes)
+            self._command = VelocityCommand(message.velocities[0], axes)
             self._fades_at = t + policy.dead_man
             return self._silent or not self._command.same(before)
         return True
@@ -232,7 +236,7 @@ class Planner:
 
     def _to_rest(self, t: float, state: State) -> Segment:
         """Return a piece that brakes, or stays."""
-        still = Command(np.zeros_like(state.x), "world")
+        still = VelocityCommand(np.zeros_like(state.x), "world")
         return self._velocities.follow(t, state, still, self._policy.delay)
 
     def _forget(self, t: float) -> None:

@@ -33,13 +33,13 @@ Axes = Literal["world", "tool"]
 """The axes in which a velocity is commanded: the world's, or the moving body's."""
 
 
-class Command(NamedTuple):
+class VelocityCommand(NamedTuple):
     """A velocity to reach and to keep."""
 
     velocity: Array  # linear, then angular, (n,) [1/s]
     axes: Axes
 
-    def same(self, other: "Command | None") -> bool:
+    def same(self, other: "VelocityCommand | None") -> bool:
         """Return whether another command is the same."""
         return (
             other is not None
@@ -55,7 +55,9 @@ class Velocities:
         """Set the coordinates, and the bounds in them."""
         self._chart, self._bounds = chart, bounds
 
-    def follow(self, t: float, state: State, command: Command, delay: float) -> Segment:
+    def follow(
+        self, t: float, state: State, command: VelocityCommand, delay: float
+    ) -> Segment:
         """Return what reaches a velocity, in ``delay`` [s] if the bounds permit.
 
         The state is at the base of its chart. A velocity beyond the bounds keeps its

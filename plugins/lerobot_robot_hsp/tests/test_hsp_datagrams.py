@@ -14,7 +14,7 @@ from live_rigs import Rig, panda, start
 
 import hsp_control as hsp
 from hsp_control.companions.datagrams import publish
-from hsp_control.control.compensation import Command
+from hsp_control.control.compensation import CompensatedController
 from hsp_control.live import run_loop
 
 
@@ -46,7 +46,7 @@ def test_it_hears_the_loop_and_moves_its_hand(states: str, loop: Loop) -> None:
     targets = f"127.0.0.1:{free_port()}"
     stream = hsp.StreamPose(source=f"udp://{targets}", delay=0.02)
     task = hsp.FramePose("panda_tcp", stream, name="hand")
-    source = Command(hsp.Controller(panda(), [task]))
+    source = CompensatedController(hsp.Controller(panda(), [task]))
     told = publish(f"{states}?rate=50", source)
     hand = source.controller.tasks[0].trajectory
     first: list[float] = []

@@ -18,7 +18,11 @@ from places import ROOT
 import hsp_control as hsp
 from hsp_control.common.exceptions import HardwareError
 from hsp_control.companions.datagrams import publish
-from hsp_control.control.compensation import Command, Compensation, MomentumObserver
+from hsp_control.control.compensation import (
+    CompensatedController,
+    Compensation,
+    MomentumObserver,
+)
 from hsp_control.live import run_loop
 
 FAR = [2.0, 0.0, 0.5, 1.0, 0.0, 0.0, 0.0]
@@ -32,12 +36,12 @@ def states() -> Iterator[socket.socket]:
         yield heard
 
 
-def command() -> Command:
+def command() -> CompensatedController:
     stream = hsp.StreamPose(speed=50.0, acceleration=1e4, jerk=1e6, delay=0.0)
     task = hsp.FramePose("panda_tcp", stream, largest_error=[0.01, None], name="hand")
     controller = hsp.Controller(panda(), [task], limits=hsp.Limits())
     observer = Compensation(momentum_observer=MomentumObserver())
-    return Command(controller, observer)
+    return CompensatedController(controller, observer)
 
 
 def test_it_tells_what_a_policy_needs(states: socket.socket) -> None:

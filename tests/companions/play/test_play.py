@@ -560,7 +560,7 @@ def test_whatever_a_field_raises_ends_the_run_and_not_the_session(
         raise error
 
     with monkeypatch.context() as patch:
-        patch.setattr(type(session.command), "effort", fail)
+        patch.setattr(type(session.compensated), "effort", fail)
         session.advance()
     assert session.over.startswith(type(error).__name__)
     assert len(session.rollout()) >= 5

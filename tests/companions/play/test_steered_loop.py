@@ -20,7 +20,7 @@ from hsp_control.companions.play.live_loop import (
 )
 from hsp_control.companions.viewer import SceneRecorder, Viewer
 from hsp_control.companions.viewer.live_picture import Picture
-from hsp_control.control.compensation import Command
+from hsp_control.control.compensation import CompensatedController
 from hsp_control.live import InProcessRobot, LoopReport, OperatorRequests, run_loop
 from hsp_control.null_space.fields.field import terms_of
 from hsp_control.null_space.fields.weight import sample_weight
@@ -63,7 +63,7 @@ class Steered:
     def run(self, duration: float) -> LoopReport:
         experiment = self.experiment
         return run_loop(
-            Command(experiment.controller, experiment.compensation),
+            CompensatedController(experiment.controller, experiment.compensation),
             InProcessRobot(simulated_robot(experiment)),
             duration=duration,
             requests=self.requests,

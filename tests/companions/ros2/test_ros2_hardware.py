@@ -17,7 +17,7 @@ from hsp_control.companions.ros2.joints import Joints
 from hsp_control.companions.ros2.messages import Float64MultiArray
 from hsp_control.companions.ros2.node import Node, ReceivedMessage, Subscription
 from hsp_control.companions.ros2.stamps import Stamps
-from hsp_control.control.compensation import Command, Compensation
+from hsp_control.control.compensation import CompensatedController, Compensation
 from hsp_control.live import LiveSettings, run_loop
 from hsp_control.live.link import AgeEstimator
 
@@ -223,7 +223,7 @@ def test_the_loop_stops_safely(
     hardware = Faulty(*rig, **wrong)
     settings = LiveSettings(age=1e9)
     # No observer: this robot stands whatever it is sent.
-    plain = Command(law(), Compensation(momentum_observer=None))
+    plain = CompensatedController(law(), Compensation(momentum_observer=None))
     report = run_loop(plain, hardware, settings=settings)  # type: ignore[arg-type]
     assert report.ended == "fault"
     assert reason.replace("\\", "") in report.reason

@@ -10,7 +10,7 @@ from hsp_control.common.exceptions import HardwareError
 from hsp_control.companions.ros2 import publish
 from hsp_control.companions.ros2.messages import JointState, PoseStamped
 from hsp_control.companions.ros2.node import Node, Subscription
-from hsp_control.control.compensation import Command
+from hsp_control.control.compensation import CompensatedController
 
 REST = np.zeros(7)
 
@@ -21,7 +21,7 @@ def heard(topic: str) -> Subscription[PoseStamped]:
 
 def test_watchers_hear_state_effort_and_poses() -> None:
     prefix, states, _ = fresh()
-    command = Command(law())
+    command = CompensatedController(law())
     watched = publish(f"ros2:/{prefix}?domain={DOMAIN}&rate=100", command)
     joints = Node(DOMAIN).subscription(states, JointState)
     actual, reference = (
@@ -50,7 +50,7 @@ def test_a_pose_has_its_orientation_and_a_plane_is_no_pose() -> None:
     gains = Gains(natural_frequency=5.0)
     pose = FramePose("panda_tcp", StreamPose(), gains=gains, name="whole-hand")
     plane = FramePosition("panda_link5", Stream(), axes="x", gains=gains, name="plane")
-    command = Command(Controller(panda(), [pose, plane]))
+    command = CompensatedController(Controller(panda(), [pose, plane]))
     watched = publish(f"ros2:/{prefix}?domain={DOMAIN}", command)
     hand, flat = heard(f"{prefix}/whole_hand/actual"), heard(f"{prefix}/plane/actual")
     command.effort(0.0, start(), REST, 0.001)
@@ -69,4 +69,4 @@ def test_a_pose_has_its_orientation_and_a_plane_is_no_pose() -> None:
 ])  # fmt: skip
 def test_mistakes_are_named(address: str, message: str) -> None:
     with pytest.raises(HardwareError, match=message):
-        publish(address, Command(law()))
+        publish(address, CompensatedController(law()))

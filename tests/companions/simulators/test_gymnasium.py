@@ -59,7 +59,7 @@ def test_the_engine_does_what_the_law_wants(arm: ArmEnv) -> None:
     model, data = arm.model, arm.data
     tau = env.hand.effort(data.time, data.qpos[:7], data.qvel[:7], 0.001)
     assert np.abs(tau).max() < STRONGEST
-    wanted = env.hand.command.output.acceleration
+    wanted = env.hand.compensated.output.acceleration
     # With the finger where the arm's model has it; the arm's joints alone accelerate.
     data.ctrl[:7], data.qpos[7], data.qvel[7] = tau, 0.0, 0.0
     mujoco.mj_forward(model, data)

@@ -52,7 +52,7 @@ def test_between_jumps_the_error_equation_holds(
     hand.effort(0.0, q, v, PERIOD)
     state = robot.state(0.0, q, v)
     frame = state.frame("panda_tcp")
-    a = hand.command.output.acceleration
+    a = hand.compensated.output.acceleration
     linear = frame.jacobian[:3] @ a + frame.jacobian_dot[:3] @ v
     wanted = 150.0 * (goal.translation - frame.position) - 24.0 * frame.velocity[:3]
     tracked = ["xyz".index(axis) for axis in axes or "xyz"]
@@ -71,7 +71,9 @@ def test_by_default_the_posture_obeys_the_simulator_s_equation(
     q, v = start + small * free, 0.5 * small * free
     hand.effort(0.0, q, v, PERIOD)
     wanted = -2.0 * np.sqrt(10.0) * 0.5 * small - 10.0 * small
-    assert free @ hand.command.output.acceleration == pytest.approx(wanted, rel=1e-3)
+    assert free @ hand.compensated.output.acceleration == pytest.approx(
+        wanted, rel=1e-3
+    )
 
 
 @pytest.mark.parametrize("axes", ["", "xw", "xx"])
@@ -98,7 +100,7 @@ def test_efforts_are_clipped_and_the_observer_knows(robot: hsp.Robot) -> None:
     state = robot.state(0.0, q, rest)
     acceleration = np.linalg.solve(state.mass_matrix, effort - state.nonlinear_effects)
     hand.effort(PERIOD, q, PERIOD * acceleration, PERIOD)
-    channels = hand.command.log_channels()
+    channels = hand.compensated.log_channels()
     assert np.abs(channels["observer.disturbance"].value).max() < 0.5
 
 

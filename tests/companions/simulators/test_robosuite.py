@@ -104,8 +104,8 @@ def test_the_model_is_the_simulation_s() -> None:
             for k in (1, 2)
         ]
         mujoco.mj_forward(model, data)
-        tau = arm.hand.command.effort(data.time, *arm._state, 0.002)
-        wanted = arm.hand.command.output.acceleration
+        tau = arm.hand.compensated.effort(data.time, *arm._state, 0.002)
+        wanted = arm.hand.compensated.output.acceleration
         M = np.zeros((model.nv, model.nv))
         mujoco.mj_fullM(model, M, data.qM)
         given = np.linalg.solve(M[:7, :7], tau - data.qfrc_bias[:7])

@@ -14,7 +14,7 @@ from hsp_control.common.exceptions import (
 from hsp_control.companions.walking import BaseEstimator
 from hsp_control.companions.walking.estimation.invariant_filter import ROTATION
 from hsp_control.control.measurement import Inertial
-from hsp_control.control.plan import Plan, RunningPlan
+from hsp_control.control.motion_plan import MotionPlan, RunningPlan
 from hsp_control.simulation import simulate
 from hsp_control.simulation.plants import Imu, RigidContact, RigidContacts
 
@@ -49,7 +49,7 @@ class Listening(RunningPlan):
         return {}
 
 
-class Listens(Plan):
+class Listens(MotionPlan):
     """A plan that only listens."""
 
     def parts(self, robot, tasks, contacts):

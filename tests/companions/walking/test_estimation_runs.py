@@ -9,7 +9,7 @@ import yaml
 from places import ROOT
 
 from hsp_control import load_experiment
-from hsp_control.control.compensation import Command
+from hsp_control.control.compensation import CompensatedController
 
 pytest.importorskip("example_robot_data")
 pytest.importorskip("mujoco")
@@ -44,14 +44,14 @@ def test_talos_takes_a_step_on_an_estimated_base():
 @pytest.mark.slow
 def test_solo_trots_on_an_estimated_base_and_again_the_same(tmp_path):
     given = ("estimators.base=true", "plan.until=0.6", "simulation.duration=1.2")
-    effort, sent = Command.effort, []
+    effort, sent = CompensatedController.effort, []
 
     def spy(command, t, *rest):
         tau = effort(command, t, *rest)
         sent.append(float(command.output.status))
         return tau
 
-    with patch.object(Command, "effort", spy):
+    with patch.object(CompensatedController, "effort", spy):
         run = load_experiment("walking/solo12_trot", *given).run()
     assert run.status == "completed"
     assert run["plan.steps"][-1] >= 3

@@ -19,7 +19,7 @@ from hsp_control.common.exceptions import (
     PlanError,
 )
 from hsp_control.config import Experiment
-from hsp_control.control.compensation import Command
+from hsp_control.control.compensation import CompensatedController
 from hsp_control.control.measurement import Inertial
 from hsp_control.live import (
     InProcessRobot,
@@ -64,7 +64,7 @@ def live(
 ) -> tuple[LoopReport, Watched]:
     robot, scenario = Watched(experiment), experiment.scenario
     report = run_loop(
-        Command(experiment.controller, experiment.compensation),
+        CompensatedController(experiment.controller, experiment.compensation),
         robot,
         plan=scenario.plan,
         estimators=scenario.estimators,
@@ -200,7 +200,8 @@ def test_what_a_plan_or_an_estimator_misses_is_said_before_the_run() -> None:
     wipes = hsp.load_experiment("forces/panda_wipe")
     with pytest.raises(CompensationError, match="no sensor measures the force at"):
         run_loop(
-            Command(wipes.controller, wipes.compensation), Deaf(simulated_robot(wipes))
+            CompensatedController(wipes.controller, wipes.compensation),
+            Deaf(simulated_robot(wipes)),
         )
 
 

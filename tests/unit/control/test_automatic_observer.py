@@ -10,7 +10,11 @@ from wrong_arms import ARMS, WrongArm, held
 
 import hsp_control as hsp
 from hsp_control.common.arrays import Array
-from hsp_control.control.compensation import Command, Compensation, MomentumObserver
+from hsp_control.control.compensation import (
+    CompensatedController,
+    Compensation,
+    MomentumObserver,
+)
 from hsp_control.robot.integrators import Rk4
 from hsp_control.simulation.plants import (
     ImperfectPlant,
@@ -52,8 +56,8 @@ def test_it_is_on_at_a_rate_that_suits_the_period(period: float, rate: float) ->
     assert own.clip == tuple(0.5 * PANDA.model.effortLimit)
     # What runs on a robot learns the period from its periods, and is the same.
     command, declared = (
-        Command(controller()),
-        Command(controller(), Compensation(momentum_observer=own)),
+        CompensatedController(controller()),
+        CompensatedController(controller(), Compensation(momentum_observer=own)),
     )
     rng = np.random.default_rng(0)
     for k in range(20):
@@ -91,7 +95,7 @@ def test_it_says_why_it_is_off() -> None:
         assert own.on_observer(made, period, exact) == f"off: {reason}"
         assert own.decided(made, period, exact).momentum_observer is None
     for made in (spring, floating, wiping):
-        assert not Command(made).stages
+        assert not CompensatedController(made).stages
     none = Compensation(momentum_observer=None)
     assert none.on_observer(stiff, H, exact=False) == "off"
     only = Compensation(momentum_observer=MomentumObserver(30.0, cancel=False))
@@ -130,7 +134,7 @@ def test_in_a_simulation_it_is_on_where_the_plant_is_not_the_model(name: str) ->
 def test_a_spring_that_comes_while_it_runs_yields() -> None:
     """What is cancelled fades while a task with an impedance counts."""
     made = hsp.Controller(PANDA, [hsp.FrameOrientation("panda_tcp", name="turn")])
-    command = Command(made)
+    command = CompensatedController(made)
     push = np.zeros(7)
     plant = IntegratedPlant(Pushed(PANDA, push), Rk4(H))
     q, v = Q0, np.zeros(7)

@@ -15,7 +15,7 @@ from places import THOROUGH
 import hsp_control as hsp
 from hsp_control.common.arrays import Array
 from hsp_control.control.actuation import Status, actuation
-from hsp_control.control.compensation import Command, FrictionFeedForward
+from hsp_control.control.compensation import CompensatedController, FrictionFeedForward
 from hsp_control.trajectories import HoldOrientation, Schedule
 
 # One of each kind: with 1, 4 and 3 joints more than the hand has directions.
@@ -386,7 +386,7 @@ def test_what_opposes_friction_fades_with_the_tasks() -> None:
     case = Case("panda", 0)
     controller = a_task_is_added(case)
     friction = FrictionFeedForward(coulomb=1.0, viscous=0.5)
-    command = Command(controller, only(friction_feed_forward=friction))
+    command = CompensatedController(controller, only(friction_feed_forward=friction))
     columns = command.log_channels
     times = START + np.array([-1e-9, 1e-9, RAMP - 1e-9, RAMP + 1e-9])
     tau, sent = [], []

@@ -16,7 +16,7 @@ import hsp_control as hsp
 from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import SimulationError
 from hsp_control.control.compensation import (
-    Command,
+    CompensatedController,
     Compensation,
     FrictionFeedForward,
     IntegralAction,
@@ -137,7 +137,7 @@ def test_what_is_cancelled_is_clipped() -> None:
     assert errors[0] > 10.0 * errors[1]
     state = hsp.RobotState(PANDA)
     own = MomentumObserver(50.0, [1.0] * 7)
-    command = Command(controller(), Compensation(momentum_observer=own))
+    command = CompensatedController(controller(), Compensation(momentum_observer=own))
     for k in range(5):
         command.effort(k * H, Q0, np.zeros(7), H)
     disturbance = np.asarray(command.log_channels()["observer.disturbance"].value)

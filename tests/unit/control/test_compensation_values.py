@@ -14,7 +14,7 @@ from hsp_control import Robot
 from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import CompensationError, ImmutableError
 from hsp_control.control.compensation import (
-    Command,
+    CompensatedController,
     Compensation,
     FrictionFeedForward,
     IntegralAction,
@@ -28,20 +28,23 @@ from hsp_control.control.compensation import (
 def test_one_compensation_serves_many_commands_at_once() -> None:
     """Two in turns, and four in threads, beside each one by itself."""
 
-    def efforts(q: Array, command: Command) -> Iterator[Array]:
+    def efforts(q: Array, command: CompensatedController) -> Iterator[Array]:
         command.restart()
         for k in range(40):
             v = np.full(7, 1.0 * (k > 0))
             yield command.effort(k * H, q + 1e-3 * k, v, H).copy()
 
     starts = [Q0 + 0.02 * k for k in range(4)]
-    alone = [np.array([*efforts(q, Command(controller(), ALL))]) for q in starts]
+    alone = [
+        np.array([*efforts(q, CompensatedController(controller(), ALL))])
+        for q in starts
+    ]
     assert np.abs(alone[0] - alone[1]).max() > 0.1
-    pair = [efforts(q, Command(controller(), ALL)) for q in starts[:2]]
+    pair = [efforts(q, CompensatedController(controller(), ALL)) for q in starts[:2]]
     for k, both in enumerate(zip(*pair, strict=True)):
         for tau, expected in zip(both, alone[:2], strict=True):
             np.testing.assert_array_equal(tau, expected[k])
-    made = [Command(controller(), ALL) for _ in starts]
+    made = [CompensatedController(controller(), ALL) for _ in starts]
     with ThreadPoolExecutor(4) as threads:
         found = threads.map(lambda q, own: np.array([*efforts(q, own)]), starts, made)
         for each, expected in zip(found, alone, strict=True):

@@ -22,7 +22,7 @@ from hsp_control.control.actuation.deviation_cost import (
     write_directions,
     write_inverse_root,
 )
-from hsp_control.edge import Resolution
+from hsp_control.edge import BoundLaw
 from hsp_control.engine.plans import planned
 
 seeds = st.integers(0, 2**32 - 1)
@@ -44,10 +44,10 @@ METRICS: dict[str, hsp.metrics.Metric] = {
 }
 
 
-def inverse_cost(resolution: Resolution, held: Array) -> Array:
+def inverse_cost(law: BoundLaw, held: Array) -> Array:
     """Return J Jᵀ, which is to be H⁻¹."""
     levels, directions = (
-        Levels.of(resolution, False, panda().size, held),
+        Levels.of(law, False, panda().size, held),
         Directions.of(7),
     )
     JT, moving = np.zeros((7, 7)), np.zeros(1, dtype=np.int64)
@@ -97,11 +97,11 @@ def test_levels_share_directions_as_the_law_does(
         controller = computed(threshold * values[-1], "none")
     else:
         controller = computed(threshold, "robot")
-    resolution = controller.active_stack.resolution
-    planned([resolution.damped_beside(state.v)]).run(0.0)  # as where a limit binds
+    law = controller.active_stack.law
+    planned([law.damped_beside(state.v)]).run(0.0)  # as where a limit binds
     held = 10.0 ** rng.uniform(-7.0, 1.0, size=levels)  # from strict to as dear
-    H = limit_oracle.deviation_cost(resolution, False, robot.size, held)
-    np.testing.assert_allclose(inverse_cost(resolution, held) @ H, np.eye(7), atol=1e-5)
+    H = limit_oracle.deviation_cost(law, False, robot.size, held)
+    np.testing.assert_allclose(inverse_cost(law, held) @ H, np.eye(7), atol=1e-5)
 
 
 FIELD = 0.01 * hsp.JointCentering()

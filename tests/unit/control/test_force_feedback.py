@@ -11,7 +11,7 @@ from hsp_control import Controller, FrameOrientation, Gains, Limits
 from hsp_control.common.exceptions import CompensationError
 from hsp_control.constraints.contacts import CommandedForce, PointContact
 from hsp_control.control.compensation import (
-    Command,
+    CompensatedController,
     Compensation,
     ForceFeedback,
     MomentumObserver,
@@ -124,4 +124,4 @@ def test_what_cannot_be_fed_back(
     newtons: float | None, parts: dict[str, Any], message: str
 ) -> None:
     with pytest.raises(CompensationError, match=message):
-        Command(pressing(newtons), Compensation(**parts))
+        CompensatedController(pressing(newtons), Compensation(**parts))

@@ -82,10 +82,10 @@ def actuation_of(made: hsp.Controller) -> Actuation:
 def repeated(made: hsp.Controller, barriers: Barriers | None = None) -> Delivered:
     """Return the nearest step at the controller's state, with rows of barriers."""
     stack, state, actuation = made.active_stack, made.state, actuation_of(made)
-    a, wanted = stack.resolution.acceleration, actuation._wanted
+    a, wanted = stack.law.acceleration, actuation._wanted
     wanted.acceleration[:], wanted.effort[:] = a, state.inverse_dynamics(a)
     if stack.support.size:
-        stack.support.update(stack.resolution)
+        stack.support.update(stack.law)
         stack.support.minimum_norm_forces(wanted.effort)
     return actuation._nearest(a, False, barriers or {})
 
@@ -120,7 +120,7 @@ def test_it_is_the_optimum(name: str, spread: float, seed: int) -> None:
         state.inverse_dynamics(wanted),
         (bounds.tau_lower, bounds.tau_upper),
         (bounds.a_lower, bounds.a_upper),
-        stack.resolution,
+        stack.law,
         stack.support,
         stack.support.base,
         weight,
@@ -159,7 +159,7 @@ def test_least_violation_is_the_least(seed: int) -> None:
         return
     assert (np.abs(out.tau) <= 2.0).all()
     M, bounds = made.state.mass_matrix, actuation_of(made)._limits.bounds
-    a = made.active_stack.resolution.acceleration
+    a = made.active_stack.law.acceleration
     tau = made.state.inverse_dynamics(a)
     H = np.diag(np.concatenate([np.full(7, 1e-9), np.ones(7)]))
     effort, motion = np.hstack([M, 0.0 * M]), np.hstack([np.eye(7), np.eye(7)])
@@ -207,8 +207,8 @@ def test_a_violation_does_not_depend_on_how_far_what_is_wanted_is() -> None:
 def test_contacts_are_relaxed_less_than_distances() -> None:
     made = drawn("whole_body/solo12_trunk", 1, 0.0)
     stack = made.active_stack
-    rise = stack.resolution.problem.task.jacobian[2]
-    a = stack.resolution.acceleration
+    rise = stack.law.problem.task.jacobian[2]
+    a = stack.law.acceleration
     asked = row(rise, float(rise @ a) + 4.0)
     _, found, _, status, _ = repeated(made, {"barriers": asked})
     assert status == Status.RELAXED

@@ -11,7 +11,7 @@ import pytest
 import hsp_control as hsp
 from hsp_control.control.clock_check import ClockWarning
 from hsp_control.control.first_state import StartWarning
-from hsp_control.control.memory import Memory
+from hsp_control.control.memory import RunMemory
 
 ROBOT = hsp.Robot.load("panda")
 H = 1e-3
@@ -94,10 +94,10 @@ def test_a_restart_remembers_nothing() -> None:
     made._memory.runs = 0
     before, after = _plain(new._memory), _plain(made._memory)
     assert before == after
-    assert [*_plain(Memory.of(7))] == [*before]
+    assert [*_plain(RunMemory.of(7))] == [*before]
 
 
-def _plain(memory: Memory) -> dict[str, object]:
+def _plain(memory: RunMemory) -> dict[str, object]:
     """Return what a memory contains, so that it can be compared."""
     fields = vars(memory) | {"sent": vars(memory.sent), "clock": vars(memory.clock)}
     return {name: pickle.dumps(each) for name, each in fields.items()}

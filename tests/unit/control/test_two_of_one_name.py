@@ -89,6 +89,6 @@ def test_impedances_of_one_name_wait_by_themselves() -> None:
     made.at(0.1).ramp(0.4).remove("hand").add(second)
     for k in range(300):
         made.applied(made.compute(k * H, ROBOT.home(), REST).tau, H)
-    placed = {each.name: each.in_force for each in made.active_stack.placed}
+    placed = {each.name: each.in_force for each in made.active_stack.stacked}
     found = {name: parts_of(each.numbers).K[0, 0] for name, each in placed.items()}
     assert found == {"hand (old)": 800.0, "hand": 200.0}

@@ -64,7 +64,7 @@ def drawn(seed: int, size: float, L: Array | None = None) -> dict[str, Any]:
         "M": M,
         "a": a,
         "effort": M @ a + rng.normal(size=NV),
-        "resolution": Law(Problem(Metric(L)), law, CONSTANT, ends, thresholds),
+        "law": Law(Problem(Metric(L)), law, CONSTANT, ends, thresholds),
         "by_levels": size * rng.normal(size=(len(ENDS), NV)),
         "factors": Factors(triangle @ B, triangle),
         "bounds": Within(-away[0], away[1]),
@@ -86,7 +86,7 @@ def excesses(given: dict[str, Any], change: Array) -> Array:
 
 def costs(given: dict[str, Any]) -> list[float]:
     """Return the largest A/K - n² of each level, as the page has it."""
-    law = given["resolution"]
+    law = given["law"]
     L_inverse = np.linalg.inv(law.problem.metric.L)
     joint = np.linalg.norm(L_inverse, axis=0).max()
     E, M = np.eye(NV), given["M"]
@@ -122,7 +122,7 @@ def test_the_identity_is_a_metric_as_others(seed: int) -> None:
     found = []
     for form in (IDENTITY, CONSTANT):
         asked = drawn(seed, 1e5, np.eye(NV))
-        asked["resolution"] = asked["resolution"]._replace(form=form)
+        asked["law"] = asked["law"]._replace(form=form)
         call, held = held_levels(**asked)
         planned([call]).run(0.0)
         found.append(held)
@@ -154,7 +154,7 @@ def test_what_a_level_asks_for_does_not_know_those_below(
         weight = hsp.metrics.MassMatrixMetric() if metric == "mass" else None
         made = hsp.Controller(robot, tasks[:count], metric=weight, start=robot.home())
         made.compute(0.0, q, v)
-        law = made.active_stack.resolution
+        law = made.active_stack.law
         assert far or law.edge_level[0] == 0
         calls = [law.call(v, beside=True), law.self_motions(v)[0]]
         parted, (by_levels, _) = law.by_levels(v)

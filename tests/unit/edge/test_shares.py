@@ -25,17 +25,17 @@ def test_near_share_is_that_of_the_smallest_singular_value() -> None:
         )
         controller = Controller(robot, [target], JointCentering(), limits=None)
         controller.compute(0.0, q, v)
-        resolution = controller.active_stack.resolution
+        law = controller.active_stack.law
         resolve = next(
             call.values
             for call in calls(controller.step_plan)
             if isinstance(call, engine.Call) and call.kind.name == "Resolve"
         )
         edge = max(resolve["following.near"], 2.0 * resolve["least"])
-        J = resolution.problem.task.jacobian
+        J = law.problem.task.jacobian
         x = np.clip(2.0 - 2.0 * np.linalg.svd(J, compute_uv=False)[-1] / edge, 0.0, 1.0)
         expected = x * x * (3.0 - 2.0 * x)
-        if resolution.edge_level[0]:
+        if law.edge_level[0]:
             seen.append(expected)
-            np.testing.assert_allclose(resolution.edge.share, expected, atol=1e-10)
+            np.testing.assert_allclose(law.edge.share, expected, atol=1e-10)
     assert sum(0.0 < share < 1.0 for share in seen) > 10

@@ -288,8 +288,8 @@ def test_no_target_makes_it_steep_in_v(name: str, seed: int) -> None:
     g = controller.compute(0.0, q, v).field.g
     _, tensor = position_jacobian(robot, q, FRAMES[name])
     bends = np.linalg.norm(tensor.reshape(robot.nv, -1), 2)
-    resolution = controller.active_stack.resolution
-    (epsilon,) = resolution.thresholds
+    law = controller.active_stack.law
+    (epsilon,) = law.thresholds
     speeds = 3.0 * np.linalg.norm(v) + np.linalg.norm(g - v)
     bound = max(Kv, K_N) + 1.0 + 1.09 * speeds * bends / epsilon  # ∂g/∂q = -1
     assert np.linalg.norm(slope_in_v(controller, q, v), 2) <= bound * (1.0 + 1e-6)

@@ -1,4 +1,4 @@
-"""Compensators without Python: the efforts of `Command`, to the last bit."""
+"""Compensators without Python: efforts of `CompensatedController` to the last bit."""
 
 from pathlib import Path
 from typing import Any

@@ -199,7 +199,7 @@ def test_an_observer_has_the_model_of_the_step(tmp_path: Path) -> None:
     hsp.freeze(experiment.controller, frozen, compensation=observed, period=H)
     opened = Opened(frozen)
     controller = experiment.controller.preview()
-    command = hsp.compensation.Command(controller, observed)
+    command = hsp.compensation.CompensatedController(controller, observed)
     command.restart(origin=0.0)
     place = next(at for at in opened.ports if at.endswith(".payload"))
     body = said(1.0, [0.0, 0.0, 0.1], [0.0, 0.0, 0.0])

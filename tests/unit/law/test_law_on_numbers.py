@@ -9,7 +9,7 @@ from law_cases import pseudo_inverse
 from law_numbers import Numbers, jacobian, numbers, positive, resolve
 
 from hsp_control.common.arrays import Array
-from hsp_control.edge import Resolution
+from hsp_control.edge import BoundLaw
 from hsp_control.engine.plans import planned
 from hsp_control.law import CONSTANT, IDENTITY, VARYING, singular_values
 
@@ -86,12 +86,12 @@ def test_singular_values_of_stacks_of_any_shape(
     """Also with more rows than joints, and of any rank."""
     x, rng = numbers(seed, 6, 7, form), np.random.default_rng(seed)
     J = rng.standard_normal((m, rank)) @ rng.standard_normal((rank, 7))
-    resolution = Resolution([m], 7, form, x.K_N, 0.01)
-    resolution.problem.task.jacobian[:] = J
-    resolution.problem.metric.W[:] = x.W
-    resolution.problem.metric.L[:] = np.linalg.cholesky(x.W)
-    resolution.null_space_error[:] = x.g
-    call, triangle, length = resolution.diagnosis(0)
+    law = BoundLaw([m], 7, form, x.K_N, 0.01)
+    law.problem.task.jacobian[:] = J
+    law.problem.metric.W[:] = x.W
+    law.problem.metric.L[:] = np.linalg.cholesky(x.W)
+    law.null_space_error[:] = x.g
+    call, triangle, length = law.diagnosis(0)
     determinant = planned([call]).run(0.0)
     expected = np.linalg.svd(J @ np.linalg.inv(np.linalg.cholesky(x.W)).T)[1]
     np.testing.assert_allclose(

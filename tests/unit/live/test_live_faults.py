@@ -33,7 +33,7 @@ import hsp_control as hsp
 from hsp_control import Rollout
 from hsp_control.common.exceptions import HardwareError, HspControlError
 from hsp_control.constraints.limits import own_limits
-from hsp_control.control.compensation import Command
+from hsp_control.control.compensation import CompensatedController
 from hsp_control.live import (
     LiveSettings,
     LoopReport,
@@ -472,7 +472,7 @@ def test_a_run_that_cannot_begin_leaves_the_log_free(
     "given_", [RuntimeError("mine"), None, np.zeros(3), np.full(7, np.nan), "tau"]
 )
 def test_whatever_an_effort_source_does(what: str, given_: Any, tmp_path: Path) -> None:
-    class Mine(Command):
+    class Mine(CompensatedController):
         calls = 0
 
         def _odd(self, usual: Callable[[], Any]) -> Any:
@@ -533,7 +533,7 @@ def test_a_signal_is_the_operator_s_stop(kind: signal.Signals) -> None:
 def test_a_second_signal_leaves_it_to_the_robot() -> None:
     robot = rig()
 
-    class Impatient(Command):
+    class Impatient(CompensatedController):
         def applied(self, tau: Array, period: float) -> None:
             if self.state.t > 0.05:
                 os.kill(os.getpid(), signal.SIGTERM)

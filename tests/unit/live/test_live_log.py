@@ -8,7 +8,7 @@ from live_rigs import PERIOD, Rig, Trick, always, law, missing, watched
 
 import hsp_control as hsp
 from hsp_control.common.arrays import Array
-from hsp_control.control.compensation import Command
+from hsp_control.control.compensation import CompensatedController
 from hsp_control.live import LiveSettings, LoopReport, Measurement, Phase, run_loop
 
 RESPONSE, LATE = 0.0003, 0.0017
@@ -143,7 +143,7 @@ def test_a_stop_without_states_is_logged_as_predicted(tmp_path: Path) -> None:
 def test_efforts_follow_limits_that_fall_in_a_run() -> None:
     """Also of a source that asks for more than its controller may."""
 
-    class Strong(Command):
+    class Strong(CompensatedController):
         def effort(self, t: float, q: Array, v: Array, period: float) -> Array:
             tau = super().effort(t, q, v, period)
             return tau + 70.0 * np.sin(300.0 * t) * np.eye(7)[0]
@@ -175,7 +175,7 @@ def test_after_an_effort_that_was_not_sent_the_rate_counts_from_the_last_one() -
 
         failed = False
 
-    class Rising(Command):
+    class Rising(CompensatedController):
         def effort(self, t: float, q: Array, v: Array, period: float) -> Array:
             tau = super().effort(t, q, v, period)
             return tau + 9.0 * (t > 0.04) * np.eye(7)[1]

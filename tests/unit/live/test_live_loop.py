@@ -34,7 +34,7 @@ from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import HardwareError, LiveError
 from hsp_control.constraints.limits import PositionRange
 from hsp_control.control.changes import Changes
-from hsp_control.control.compensation import Command
+from hsp_control.control.compensation import CompensatedController
 from hsp_control.control.first_state import StartWarning
 from hsp_control.live import (
     Hardware,
@@ -296,7 +296,7 @@ def test_the_monitor_follows_limits_that_change(at_first: Limits | None) -> None
     narrow = PositionRange(q - 0.05, q + 0.05)
     unaware = law()
 
-    class Beyond(Command):
+    class Beyond(CompensatedController):
         def effort(self, t: float, q: Array, v: Array, period: float) -> Array:
             super().effort(t, q, v, period)
             return unaware.compute(t, q, v).tau

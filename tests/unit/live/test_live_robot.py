@@ -10,7 +10,11 @@ from live_rigs import PERIOD, Array, Rig, gravity, law, panda, start, watched
 from places import THOROUGH
 
 from hsp_control import Gains, Robot
-from hsp_control.control.compensation import Command, Compensation, MomentumObserver
+from hsp_control.control.compensation import (
+    CompensatedController,
+    Compensation,
+    MomentumObserver,
+)
 from hsp_control.live import LiveSettings, Measurement, Phase, SimulatedRobot, run_loop
 from hsp_control.live.effort_limiter import EffortLimiter
 from hsp_control.robot.integrators import SemiImplicitEuler
@@ -138,7 +142,7 @@ def test_lost_efforts_do_not_add_up_where_the_robot_says_what_it_has(
         effort_rate=RATE, compensates_gravity=compensates, velocity_margin=9.0
     )
 
-    class Sawtooth(Command):
+    class Sawtooth(CompensatedController):
         def effort(self, t: float, q: Array, v: Array, period: float) -> Array:
             super().effort(t, q, v, period)
             side = 1.0 if int(t / 0.02) % 2 else -1.0
@@ -251,7 +255,7 @@ def test_a_lost_effort_corrects_the_momentum_observer() -> None:
     """What is compensated counts from the applied effort, not from the sent one."""
     observer = Compensation(momentum_observer=MomentumObserver(200.0, cancel=False))
 
-    class Watching(Command):
+    class Watching(CompensatedController):
         largest = 0.0
 
         def effort(self, t: float, q: Array, v: Array, period: float) -> Array:

@@ -5,9 +5,9 @@ import pytest
 
 from hsp_control import load_experiment
 from hsp_control.common.exceptions import FallError, SimulationError
-from hsp_control.control.compensation import Command
+from hsp_control.control.compensation import CompensatedController
 from hsp_control.control.measurement import Measurement
-from hsp_control.control.plan import Plan, PlanParts, RunningPlan
+from hsp_control.control.motion_plan import MotionPlan, PlanParts, RunningPlan
 from hsp_control.robot.integrators import Rk4
 from hsp_control.simulation import simulate
 from hsp_control.simulation.control_chain import ControlChain
@@ -38,7 +38,7 @@ class Listening(RunningPlan):
         return {}
 
 
-class Falls(Plan):
+class Falls(MotionPlan):
     """A plan that only falls."""
 
     def parts(self, robot, tasks, contacts):
@@ -60,7 +60,7 @@ def momentum_balance(plant, tolerance):
     experiment = load_experiment("whole_body/solo12_trunk")
     robot, h = experiment.robot, 0.001
     times = np.arange(60) * h
-    chain = ControlChain(Command(experiment.controller), Listens())
+    chain = ControlChain(CompensatedController(experiment.controller), Listens())
     chain.begin(None)
     plan = chain.plan
     for _ in sampled_loop(chain, plant, 1, times, experiment.q0, experiment.v0):

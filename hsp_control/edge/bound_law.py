@@ -17,7 +17,7 @@ from hsp_control.law.outcome import LawOutcome
 from hsp_control.law.problem import Problem
 
 
-class Resolution:
+class BoundLaw:
     """The law for levels of tasks: its calls and their memory.
 
     It has scratch memory but no state: the same input gives the same output.

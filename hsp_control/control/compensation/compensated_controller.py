@@ -26,13 +26,13 @@ from hsp_control.control.output import ControlOutput
 from hsp_control.robot import RobotState
 
 
-class Command:
+class CompensatedController:
     """A controller with its compensators: computes one effort per period.
 
     Without compensators (`Compensation(momentum_observer=None)`) it returns the
     controller's effort, bit for bit. A run is one `restart`, then one `effort` per
     period, in order of time. What the compensators remember during a run is the
-    command's own.
+    this object's own.
 
     Attributes:
         controller: The controller.

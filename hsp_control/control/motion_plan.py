@@ -30,7 +30,7 @@ class PlanParts(NamedTuple):
     contacts: tuple[Contact, ...]
 
 
-class Plan(Part, ABC, family="plans", error=PlanError):
+class MotionPlan(Part, ABC, family="plans", error=PlanError):
     """What a robot is to do, decided once a control period from what is measured.
 
     A plan writes references of tasks and switches contacts; it owns no part of the law.
@@ -85,7 +85,7 @@ class RunningPlan(ABC):
         stopping: Whether it was commanded to come to rest.
     """
 
-    def __init__(self, plan: Plan) -> None:
+    def __init__(self, plan: MotionPlan) -> None:
         """Set the plan."""
         self.plan = plan
         self.stopping = False
