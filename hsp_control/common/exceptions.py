@@ -95,7 +95,7 @@ class FieldError(HspControlError, ValueError):
 
 
 class RateError(HspControlError, ValueError):
-    """A rate or a gradient that a field, a weight or a metric declares is wrong."""
+    """A rate, a gradient or an error equation that a part declares is wrong."""
 
 
 class MetricError(HspControlError, ValueError):

@@ -14,7 +14,7 @@ from hsp_control.common.keywords import suggesting
 from hsp_control.constraints.contacts import Contact
 from hsp_control.constraints.limits import Limits, RobotLimits
 from hsp_control.control.changes import Change, Changes, TimeLine
-from hsp_control.control.declared_rates import check_field, check_metric
+from hsp_control.control.declared_rates import check_rates
 from hsp_control.control.first_state import warn_of_far_target
 from hsp_control.control.gains_in_force import check_held
 from hsp_control.control.in_force import InForce
@@ -23,13 +23,11 @@ from hsp_control.control.setup import (
     Base,
     DeclaredController,
     PlannedTask,
-    PlannedTerm,
     Setup,
 )
 from hsp_control.control.step_lock import StepLock
 from hsp_control.control.stream_handle import StreamHandle
 from hsp_control.control.targets import RAMP, followed_stream, new_stream, target_of
-from hsp_control.declaration import within
 from hsp_control.geometry.scene import Obstacle, Scene, Start
 from hsp_control.null_space.fields import NullSpaceField
 from hsp_control.null_space.fields.field import terms_of
@@ -253,7 +251,7 @@ class Composition:
             ControllerError: If it names something that does not exist at its time.
             UnstableRateError: If gains that follow make the running loop unstable at
                 its period, without delays, where the robot is now.
-            RateError: If a rate that somebody has written of a new field is wrong.
+            RateError: If a rate that somebody has written of a new part is wrong.
             HspControlError: If its parts do not fit the robot.
         """
         with self._lock:
@@ -269,35 +267,22 @@ class Composition:
                 state = (here or time_line.start).state
                 check_held(self.setup, time_line.setup, state, period)
             if begun:
-                self._check_terms(time_line.setup, self.setup.terms, self._state)
+                check_rates(time_line.setup, self.setup, self._state)
             self._in_force.go_over_to(time_line)
             if begun:
                 self._memory.made(now, given)
 
     def check_derivatives(self, state: RobotState) -> None:
-        """Check what somebody has written of the field and the metric, at a state.
+        """Check the derivatives that somebody has written of the parts, at a state.
 
         The first step of a run does; see `hsp_control.control.declared_rates`.
 
         Raises:
-            RateError: If a rate or a gradient is wrong, or the field depends on v.
+            RateError: If a rate or a gradient is wrong, a field, an error or a Jacobian
+                depends on v, or the error equation of a task does not follow.
         """
-        with within("null_space", "metric"):
-            check_metric(self.setup.metric, state)
-        self._check_terms(self.setup, (), state)
-
-    def _check_terms(
-        self, setup: Setup, known: Sequence[PlannedTerm], state: RobotState
-    ) -> None:
-        """Check what somebody has written of the terms that are not known yet."""
-        checked = {id(each.field) for each in known}
-        # Those of the start come first; what a change brings has no place.
-        places = 0 if known else len(terms_of(self._declared.field))
-        for k, each in enumerate(setup.terms):
-            if id(each.field) in checked:
-                continue
-            with within(*(("null_space", "fields", k) if k < places else ())):
-                check_field(each.field, state)
+        places = len(terms_of(self._declared.field))
+        check_rates(self.setup, None, state, places)
 
     # -- what it is made of -----------------------------------------------------------
 

@@ -54,6 +54,8 @@ class Evolution(Generic[Value]):
 
     def then(self, start: float, ramp: float, target: Value) -> "Evolution[Value]":
         """Return the evolution with one more transition."""
+        if isinstance(self.initial, np.ndarray):
+            target = np.asarray(target, dtype=float)  # a user's may be a list
         ordered = list(self.transitions)
         insort(ordered, Transition(start, ramp, target), key=lambda each: each.start)
         return Evolution(self.initial, tuple(ordered))

@@ -22,6 +22,15 @@ class Calm(hsp.changes.Change):
         return replace(setup, gain=gain)
 
 
+class Softer(hsp.changes.Change):
+    """Gains as the two matrices that `Gains.matrices` returns."""
+
+    def apply(self, setup: Any) -> Any:
+        (task,) = setup.tasks
+        target = hsp.Gains(natural_frequency=5.0).matrices(task.task.rows)
+        return setup.with_task(task, gains=task.gains.then(self.at, self.ramp, target))
+
+
 class Forgetful(hsp.changes.Change):
     """A `return` is missing."""
 
@@ -64,6 +73,15 @@ def test_it_ramps_as_ours_do() -> None:
     for t, gain in ((0.9, 10.0), (1.5, 7.5), (2.1, 5.0)):
         made.compute(t, ROBOT.home(), REST)
         np.testing.assert_allclose(made.null_space_gain, gain * np.eye(3), atol=1e-9)
+
+
+def test_gains_may_be_a_pair_of_matrices() -> None:
+    made = controller()
+    made.compute(0.0, ROBOT.home(), REST)
+    made.change(Softer(at=1.0, ramp=1.0))
+    for t in (1.5, 2.5):
+        made.compute(t, ROBOT.home(), REST)
+    np.testing.assert_array_equal(made.feedback("hand").Kp, 25.0 * np.eye(2))
 
 
 @pytest.mark.parametrize("begun", [False, True])

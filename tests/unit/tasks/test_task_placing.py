@@ -324,7 +324,8 @@ class Doubled(FramePosition):
         self, state: RobotState, out: TaskSample | None = None, feedback: Any = None
     ) -> TaskSample:
         out = super().evaluate(state, out, feedback)
-        out.acceleration[:] *= 2.0
+        for array in out:
+            array *= 2.0
         return out
 
 
