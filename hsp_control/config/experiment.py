@@ -30,8 +30,8 @@ from hsp_control.control.changes import Change
 from hsp_control.control.compensation import Compensation, RateFinding, check_rate
 from hsp_control.control.controller import Controller
 from hsp_control.control.estimator import Estimator, begun
+from hsp_control.control.fitting import Base
 from hsp_control.control.motion_plan import MotionPlan
-from hsp_control.control.setup import Base
 from hsp_control.declaration.nested import keyed, parts_within, with_parts_replaced
 from hsp_control.declaration.plain_data import plain_data
 from hsp_control.geometry.scene import Obstacle, Scene

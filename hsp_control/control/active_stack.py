@@ -14,7 +14,7 @@ from hsp_control.common.exceptions import NonFiniteError
 from hsp_control.constraints.contacts import Contact
 from hsp_control.constraints.contacts.contact import UnactuatedRows, unactuated_count
 from hsp_control.control.actuation.support import Support
-from hsp_control.control.setup import PlannedTask
+from hsp_control.control.planned import PlannedTask
 from hsp_control.declaration.nested import parts_within
 from hsp_control.edge import BoundLaw
 from hsp_control.edge.threshold import Following

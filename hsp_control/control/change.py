@@ -12,15 +12,15 @@ from hsp_control.common.exceptions import ContactError, ControllerError
 from hsp_control.common.suggestions import did_you_mean, listing
 from hsp_control.constraints.contacts import CommandedForce
 from hsp_control.constraints.limits import LimitsOrNone, RobotLimits
-from hsp_control.control.evolution import ABSENT, PlannedLimits
-from hsp_control.control.setup import (
+from hsp_control.control.evolution import ABSENT
+from hsp_control.control.fitting import check_tasks, checked_gain
+from hsp_control.control.planned import (
+    PlannedLimits,
     PlannedTerm,
-    Setup,
-    check_tasks,
-    checked_gain,
     planned_task,
     planned_terms,
 )
+from hsp_control.control.setup import Setup
 from hsp_control.declaration import AnyOf, Part, within
 from hsp_control.declaration.nested import parts_within
 from hsp_control.declaration.quantities import Flag, Gain, NonNegative, Number

@@ -31,7 +31,8 @@ from hsp_control.control.change import (
     RemoveTask,
 )
 from hsp_control.control.change_model import ChangeGravity, ChangePayload, ChangeTool
-from hsp_control.control.setup import Setup, checked_gain
+from hsp_control.control.fitting import checked_gain
+from hsp_control.control.setup import Setup
 from hsp_control.declaration import within
 from hsp_control.declaration.nested import parts_within
 from hsp_control.declaration.quantities import Gain

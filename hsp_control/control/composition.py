@@ -1,11 +1,9 @@
 """What a controller is composed of, and what of it is active at a time."""
 
 from collections.abc import Iterable, Sequence
-from dataclasses import replace
 from typing import Any
 
 import numpy as np
-import pinocchio as pin
 from numpy.typing import ArrayLike
 
 from hsp_control.common.arrays import Array
@@ -13,21 +11,15 @@ from hsp_control.common.exceptions import ControllerError, ImmutableError
 from hsp_control.common.keywords import suggesting
 from hsp_control.constraints.contacts import Contact
 from hsp_control.constraints.limits import Limits, RobotLimits
-from hsp_control.control.changes import Change, Changes, TimeLine
+from hsp_control.control.changes import Change, TimeLine
+from hsp_control.control.declared import DeclaredController
 from hsp_control.control.declared_rates import check_rates
-from hsp_control.control.first_state import warn_of_far_target
-from hsp_control.control.gains_in_force import check_held
+from hsp_control.control.fitting import Base
 from hsp_control.control.in_force import InForce
 from hsp_control.control.memory import RunMemory
-from hsp_control.control.setup import (
-    Base,
-    DeclaredController,
-    PlannedTask,
-    Setup,
-)
+from hsp_control.control.planned import PlannedTask
+from hsp_control.control.setup import Setup
 from hsp_control.control.step_lock import StepLock
-from hsp_control.control.stream_handle import StreamHandle
-from hsp_control.control.targets import RAMP, followed_stream, new_stream, target_of
 from hsp_control.geometry.scene import Obstacle, Scene, Start
 from hsp_control.null_space.fields import NullSpaceField
 from hsp_control.null_space.fields.field import terms_of
@@ -37,11 +29,7 @@ from hsp_control.tasks import Task
 from hsp_control.tasks.compliant_task import impedance_of
 from hsp_control.tasks.feedback import Feedback
 from hsp_control.tasks.impedance import parts_of
-from hsp_control.trajectories.crossfade import settled
-from hsp_control.trajectories.streams.followed import FollowedStream
 from hsp_control.trajectories.streams.run import StreamRun
-from hsp_control.trajectories.streams.streamed import Streamed
-from hsp_control.trajectories.streams.velocities import Axes
 
 
 class Composition:
@@ -123,154 +111,6 @@ class Composition:
     def _here(self) -> Start:
         """Return where the robot was at the last step."""
         return Start(self._state.snapshot(), self.setup.start.scene)
-
-    # -- changes while running --------------------------------------------------------
-
-    def at(self, t: float) -> Changes:
-        """Return what makes changes that begin at a time [s].
-
-        ``controller.at(2.0).ramp(0.5).gains("hand", hsp.Gains(natural_frequency=20))``.
-        Changes apply in the order of their times, whatever the order of the calls; each
-        continues from what is then in force, so that several may overlap, and efforts
-        stay continuous. A time that has passed means now, with the whole ramp.
-        """
-        return Changes(self.change, t)
-
-    def set_target(self, task: str, target: ArrayLike | pin.SE3) -> StreamHandle:
-        """Let a task go to a target from now on, smoothly, until the next one is set.
-
-        ``controller.set_target("hand", pose)``, at any time and as often as needed. A
-        stream takes over from the task's trajectory, with a crossfade, and goes there
-        as fast as it may: at 0.5 m/s and 3 m/s², 1.5 rad/s and 8 rad/s². A task that
-        was given a stream, with bounds of its own, goes on with that.
-        ``controller.at(t).reference(task, trajectory)`` ends it.
-
-        Args:
-            task: Name of the task.
-            target: For a pose a pin.SE3, x, y, z and a quaternion (x, y, z, w), or a
-                matrix; for an orientation a quaternion or a matrix; for a pointing task
-                also a direction, three numbers; else the numbers of the task's
-                trajectory [m, or the task's unit].
-
-        Returns:
-            The task's stream; see `stream`.
-
-        Raises:
-            ControllerError: If there is no such task, it follows no trajectory, or the
-                target is of another kind.
-            StreamError: If the target is not valid.
-        """
-        followed = self._followed(task)
-        value = target_of(followed, target, lambda: self._here().state)
-        if not np.abs(value).max() < self._declared.robot.size:  # else it is in reach
-            warn_of_far_target(self._here().state, followed, value)
-        return self._sent(task, value=value)
-
-    def stream(self, of: str | Streamed) -> StreamHandle:
-        """Return what commands a stream: ``controller.stream("hand").send(pose)``.
-
-        Args:
-            of: The name of a task: the stream is the one that it follows once all
-                changes are over. Or a stream that was given to the controller, for an
-                obstacle, say, or for the position of a pose.
-
-        Raises:
-            ControllerError: If there is no such task, or it follows no stream, or
-                nothing follows the given one.
-        """
-        self._run_of(of)
-        return StreamHandle(lambda: self._run_of(of))
-
-    def _run_of(self, of: str | Streamed) -> StreamRun:
-        """Return the stream of a task, or of a declaration, in the present run."""
-        if isinstance(of, Streamed):
-            for run in reversed(self._memory.streams):
-                if run.declared is of:
-                    return run
-            raise ControllerError(
-                f"nothing of this controller follows this {type(of).__name__}: give it "
-                "to a task, or to controller.at(t)"
-            )
-        followed = settled(self._followed(of).followed, np.inf)
-        if isinstance(followed, FollowedStream):
-            return followed.run
-        raise ControllerError(
-            f"task {of!r} follows no stream, but {type(followed).__name__}; give it "
-            "one, such as StreamPose(), or set_target"
-        )
-
-    def set_velocity(
-        self, task: str, velocity: ArrayLike, axes: Axes = "world"
-    ) -> StreamHandle:
-        """Let a task move at a velocity from now on, as with a joystick.
-
-        ``controller.set_velocity("hand", twist, axes="tool")``, again and again: if no
-        other velocity or target comes for 0.2 s, it fades to zero. The reference is its
-        integral. As with `set_target`, a stream takes over from the task's trajectory;
-        a task that was given a stream goes on with that, and its ``dead_man``.
-
-        Args:
-            task: Name of the task.
-            velocity: For a pose the linear velocity and the angular one, shape (6,)
-                [m/s, rad/s]; for an orientation or a direction the angular one, (3,);
-                else those of the coordinates of the task's trajectory.
-            axes: ``world``, in a relative task those of its reference, or ``tool``,
-                the axes of the moving body.
-
-        Returns:
-            The task's stream; see `stream`.
-
-        Raises:
-            ControllerError: If there is no such task, or it follows no trajectory.
-            StreamError: If the velocity is not valid.
-        """
-        return self._sent(task, velocity=velocity, axes=axes)
-
-    def _sent(self, task: str, **message: Any) -> StreamHandle:
-        """Send a message to a task's stream, which takes over if there is none yet."""
-        present = self._followed(task)
-        if followed_stream(present) is None:
-            reference: Any = new_stream(present.followed)
-            reference.check(getattr(present.followed, "dimension", None), **message)
-            self.at(self._state.t).ramp(RAMP).reference(task, reference)
-        stream = self.stream(task)
-        stream.send(**message)
-        return stream
-
-    def _followed(self, task: str) -> Task:
-        """Return a task that follows a trajectory."""
-        present = self.setup.task(task).task
-        if present.followed is None:
-            raise ControllerError(f"task {task!r} follows no trajectory")
-        return present
-
-    def change(self, change: Change) -> None:
-        """Make a change; `at` is the shorter way.
-
-        Raises:
-            ControllerError: If it names something that does not exist at its time.
-            UnstableRateError: If gains that follow make the running loop unstable at
-                its period, without delays, where the robot is now.
-            RateError: If a rate that somebody has written of a new part is wrong.
-            HspControlError: If its parts do not fit the robot.
-        """
-        with self._lock:
-            here, now, given = None, self._in_force.latest, change
-            begun = self._memory.begun
-            self._memory.clock.change(change.at, max(now, 0.0))
-            if begun:
-                change = replace(change, at=max(change.at, now))
-                here = self._here()
-            known = self._in_force.kept
-            time_line = known.with_change(change, here)
-            if period := self._memory.sent.period:
-                state = (here or time_line.start).state
-                check_held(self.setup, time_line.setup, state, period)
-            if begun:
-                check_rates(time_line.setup, self.setup, self._state)
-            self._in_force.go_over_to(time_line)
-            if begun:
-                self._memory.made(now, given)
 
     def check_derivatives(self, state: RobotState) -> None:
         """Check the derivatives that somebody has written of the parts, at a state.

@@ -13,7 +13,7 @@ from hsp_control.common.exceptions import ControllerError, NonFiniteError
 from hsp_control.control.active_stack import ActiveStack
 from hsp_control.control.bound_step import BoundStep, FreeStep
 from hsp_control.control.changes import Change
-from hsp_control.control.composition import Composition
+from hsp_control.control.commanded import Commanded
 from hsp_control.control.first_state import (
     check_angles,
     warn_of_far_targets,
@@ -27,7 +27,7 @@ from hsp_control.law import TaskSample
 from hsp_control.robot import RobotState
 
 
-class Controller(Composition):
+class Controller(Commanded):
     """Computes tau = M a + N with the law of Hsu, Hauser and Sastry over a metric.
 
     Wherever the stacked Jacobian keeps its rank and no limit binds: every task's error

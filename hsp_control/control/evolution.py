@@ -1,17 +1,14 @@
-"""Values, contacts and limits as functions of time."""
+"""Values as functions of time."""
 
 from bisect import insort
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Generic, TypeVar
 
 import numpy as np
 
 from hsp_control.common.arrays import Array
-from hsp_control.constraints.contacts import Contact
-from hsp_control.constraints.limits import RobotLimits
 from hsp_control.null_space.fields.weight import Weight
 from hsp_control.robot import RobotState
-from hsp_control.trajectories.crossfade import settled
 from hsp_control.trajectories.schedule import smooth_step
 
 Value = TypeVar("Value", float, Array)
@@ -131,91 +128,3 @@ PRESENT: Evolution[float] = Evolution(1.0)
 """Of a part that is there at all times."""
 ABSENT: Evolution[float] = Evolution(0.0)
 """Of a part that is not there; a transition adds it."""
-
-
-HELD = 0.1
-"""A contact whose weight is this or more is kept at rest. With 1, a foot would move
-while it is active; with 0, its motion would be set free, or stopped, with a jump."""
-
-
-@dataclass(frozen=True)
-class PlannedContact:
-    """A contact, and when it is part of the controller."""
-
-    contact: Contact
-    presence: Evolution[float]  # 1 while it is active, 0 while it is lifted
-
-    @property
-    def always(self) -> bool:
-        """Whether the contact is active at all times."""
-        return self.contact.always and self.presence == PRESENT
-
-    def active(self, t: float) -> bool:
-        """Return whether the contact is kept at rest at time t [s]."""
-        return self.contact.active(t) and self.presence.at(t) > 0.0
-
-    def weight(self, t: float) -> float:
-        """Return how active it is at time t [s], in [0, 1]."""
-        return self.contact.weight(t) * self.presence.at(t)
-
-    def share(self, t: float) -> float:
-        """Return how much it is kept at rest at time t [s], in [0, 1]."""
-        # It is 1 - (1 - x)³ with x the weight over `HELD`: C² in time, as the weight.
-        if not self.active(t):
-            return 0.0
-        x = min(self.weight(t) / HELD, 1.0)
-        return x * (3.0 - x * (3.0 - x))
-
-    def edge(self, t: float) -> float:
-        """Return when its schedule, near t, lifts it, or lifted it last [s]."""
-        schedule = self.contact.schedule
-        return t if schedule is None else schedule.edge(t)
-
-
-@dataclass(frozen=True)
-class PlannedLimits:
-    """The limits of a controller: sets that follow one another.
-
-    While one follows another, both count, and what each delivers is mixed; see
-    `Mixture.deliver`. So a limit can go to infinity, or come from there.
-    """
-
-    # each set of limits, None for none, in order of time; and its share, in [0, 1]. The
-    # sum of the shares is 1.
-    sets: tuple[tuple[RobotLimits | None, Evolution[float]], ...]
-
-    @classmethod
-    def of(cls, limits: RobotLimits | None) -> "PlannedLimits":
-        """Return limits that do not change."""
-        return cls(((limits, PRESENT),))
-
-    @property
-    def last(self) -> RobotLimits | None:
-        """The limits after all changes."""
-        return self.sets[-1][0]
-
-    @property
-    def end(self) -> float:
-        """When the last change is complete [s]; -inf without changes."""
-        return max(share.end for _, share in self.sets)
-
-    def then(
-        self, start: float, ramp: float, limits: RobotLimits | None
-    ) -> "PlannedLimits":
-        """Return the limits with a change to other ones."""
-        before = [(each, share.then(start, ramp, 0.0)) for each, share in self.sets]
-        return PlannedLimits((*before, (limits, ABSENT.then(start, ramp, 1.0))))
-
-    def settled(self, t: float) -> "PlannedLimits":
-        """Return the limits for times from t on: complete changes are folded."""
-        folded = [(_settled(each, t), share.settled(t)) for each, share in self.sets]
-        return PlannedLimits(tuple(pair for pair in folded if pair[1] != ABSENT))
-
-
-def _settled(limits: RobotLimits | None, t: float) -> RobotLimits | None:
-    """Return limits whose obstacles move as they do from a time on [s]."""
-    if limits is None:
-        return None
-    barriers = settled(limits.barriers, t)
-    same = barriers is limits.barriers
-    return limits if same else replace(limits, barriers=barriers)

@@ -25,7 +25,8 @@ from hsp_control.common.exceptions import UnstableRateError
 from hsp_control.control.active_stack import ActiveStack
 from hsp_control.control.evolution import Evolution
 from hsp_control.control.memory import RunMemory
-from hsp_control.control.setup import PlannedTask, Setup
+from hsp_control.control.planned import PlannedTask
+from hsp_control.control.setup import Setup
 from hsp_control.declaration import within
 from hsp_control.robot import RobotState
 from hsp_control.tasks import Task

@@ -7,11 +7,12 @@ import numpy as np
 from hsp_control.control.actuation.limits_in_force import LimitsInForce
 from hsp_control.control.bound_step import BoundStep
 from hsp_control.control.changes import TimeLine
+from hsp_control.control.declared import DeclaredController
 from hsp_control.control.gains_in_force import GainsInForce
 from hsp_control.control.memory import RunMemory
 from hsp_control.control.mixture import Mixture
 from hsp_control.control.model_in_force import ModelInForce
-from hsp_control.control.setup import DeclaredController, Setup
+from hsp_control.control.setup import Setup
 from hsp_control.control.tools_in_force import ToolsInForce
 from hsp_control.robot import RobotState
 

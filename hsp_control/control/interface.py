@@ -10,7 +10,6 @@ from .compensation.momentum_observer import RunningObserver as RunningObserver
 from .controller import Controller as Controller
 from .estimator import Estimator as Estimator
 from .estimator import RunningEstimator as RunningEstimator
-from .evolution import HELD as HELD
 from .falling import FallDetector as FallDetector
 from .measurement import Inertial as Inertial
 from .measurement import LogChannel as LogChannel
@@ -18,3 +17,4 @@ from .measurement import Measurement as Measurement
 from .motion_plan import MotionPlan as MotionPlan
 from .motion_plan import PlanParts as PlanParts
 from .motion_plan import RunningPlan as RunningPlan
+from .planned import HELD as HELD

@@ -19,11 +19,12 @@ from hsp_control.control.actuation import Actuation, Delivered, Status
 from hsp_control.control.actuation.limits_in_force import LimitSet, LimitsInForce
 from hsp_control.control.actuation.support import Support
 from hsp_control.control.bound_step import BoundStep
-from hsp_control.control.evolution import PlannedContact
+from hsp_control.control.fitting import priority_of
 from hsp_control.control.gains_in_force import GainsInForce
-from hsp_control.control.setup import PlannedTask, Setup, levels_of
+from hsp_control.control.planned import PlannedContact, PlannedTask
+from hsp_control.control.setup import Setup
 from hsp_control.law.outcome import DAMPED, NOT_FINITE
-from hsp_control.robot import RobotState
+from hsp_control.robot import Robot, RobotState
 
 AccelerationModifier = Callable[
     [RobotState, ActiveStack, Array], tuple[Array, Array | None]
@@ -104,7 +105,7 @@ class Mixture:
             if stack in alive and id(limits.limits) in sets
         }
         self._fading = [each for each in setup.tasks if not each.always]
-        self.levels = levels_of(setup.tasks, self._state.robot)
+        self.levels = _levels(setup.tasks, self._state.robot)
         self.steady = setup.steady and setup.limits.end == -np.inf
         self._parts: list[ActiveStack] = []
         # tasks of the first level with a bounded inverse in the last `resolve`, by
@@ -256,3 +257,13 @@ def _placed(forces: Array, support: Support, whole: Support) -> Array:
         place = whole.points[whole.contacts.index(contact)]
         placed[place] = forces.reshape(-1, 3)[points]
     return placed.ravel()
+
+
+def _levels(
+    tasks: Sequence[PlannedTask], robot: Robot
+) -> tuple[tuple[PlannedTask, ...], ...]:
+    """Return the tasks of each level, the highest priority first."""
+    levels: dict[int, list[PlannedTask]] = {}
+    for each in tasks:
+        levels.setdefault(priority_of(each.task, robot), []).append(each)
+    return tuple(tuple(levels[priority]) for priority in sorted(levels))

@@ -1,229 +1,33 @@
-"""What a controller is made of, how that evolves, and whether it fits together."""
+"""All parts of a controller as a function of time."""
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 from itertools import pairwise
 from math import isfinite
-from pathlib import Path
-from typing import Any, Literal, TypeVar
-
-import numpy as np
-import pinocchio as pin
-from numpy.typing import ArrayLike
+from typing import Any, TypeVar
 
 from hsp_control.common.arrays import Array
-from hsp_control.common.exceptions import (
-    ContactError,
-    ControllerError,
-    FieldError,
-    GainError,
-)
+from hsp_control.common.exceptions import ControllerError
 from hsp_control.common.suggestions import did_you_mean, listing
-from hsp_control.constraints.contacts import Contact
-from hsp_control.constraints.limits import Limits, RobotLimits
-from hsp_control.control.evolution import (
-    ABSENT,
-    PRESENT,
-    Evolution,
-    EvolvingWeight,
+from hsp_control.control.evolution import ABSENT, Evolution
+from hsp_control.control.model_in_force import PlannedPayload
+from hsp_control.control.planned import (
     PlannedContact,
     PlannedLimits,
+    PlannedTask,
+    PlannedTerm,
 )
-from hsp_control.control.model_in_force import PlannedPayload
 from hsp_control.control.tools_in_force import PlannedTool
-from hsp_control.declaration import Part, within
-from hsp_control.declaration.language import check_kind, shortened
-from hsp_control.declaration.nested import parts_within
-from hsp_control.declaration.quantities import LARGEST
-from hsp_control.geometry.scene import Obstacle, Scene, Start
-from hsp_control.law import VARYING, MetricSample
-from hsp_control.null_space.fields import FieldSum, NullSpaceField, Rest
-from hsp_control.null_space.fields.field import terms_of
-from hsp_control.null_space.fields.weight import product
-from hsp_control.null_space.metrics import IdentityMetric, MassMatrixMetric, Metric
-from hsp_control.robot import Robot
-from hsp_control.robot.state import as_given
-from hsp_control.tasks import Task
-from hsp_control.tasks.compliant_task import impedance_of
-from hsp_control.tasks.gains import as_gain, as_matrix
+from hsp_control.geometry.scene import Start
+from hsp_control.null_space.fields import FieldSum, NullSpaceField
+from hsp_control.null_space.metrics import Metric
 from hsp_control.trajectories.crossfade import settled
 from hsp_control.trajectories.schedule import Schedule
-from hsp_control.trajectories.streams.streamed import Streamed
 
 _MOST = 500
 """Events that are looked at: a schedule may repeat itself for hours."""
 _BETWEEN = 6
 """Times that are looked at between two of them."""
-
-Base = Literal["flying", "driven"]
-"""What else than contacts acts on a free-flyer root: nothing, or an outside device."""
-
-
-def _check_parts(what: str, parts: object, kind: type[Part]) -> None:
-    """Check that an argument is several parts of a kind."""
-    if isinstance(parts, kind | Mapping | str) or not isinstance(parts, Iterable):
-        raise ControllerError(
-            f"{what} is {shortened(repr(parts))}; needs several, such as "
-            f"[{kind.__name__.lower()}]"
-        )
-    for part in parts:
-        if isinstance(part, list | tuple):
-            raise ControllerError(
-                f"{what} contains lists; write the level as priority=1, 2, ... of each "
-                "task"
-            )
-        check_kind(f"{what} contains", part, kind, ControllerError)
-
-
-def check_tasks(tasks: Sequence[Task], robot: Robot) -> None:
-    """Check that tasks have different names, and that no level is large."""
-    names = [task.name for task in tasks]
-    twice = sorted({name for name in names if names.count(name) > 1})
-    if twice:
-        raise ControllerError(
-            f"two tasks are called {twice[0]!r}; give them distinct names"
-        )
-    for priority in sorted({priority_of(task, robot) for task in tasks}):
-        level = [task for task in tasks if priority_of(task, robot) == priority]
-        rows = sum(task.rows for task in level)
-        if rows > robot.nv:
-            each_of = ", ".join(f"{task.name}: {task.rows}" for task in level)
-            where = "" if len(level) == len(tasks) else f" of priority {priority}"
-            raise ControllerError(
-                f"the tasks{where} have {rows} rows ({each_of}); "
-                f"{robot.name} has only {robot.nv} degrees of freedom"
-            )
-
-
-def priority_of(task: Task, robot: Robot) -> int:
-    """Return the priority of a placed task, 1 the highest."""
-    # Without one of its own it is 1; on a floating base 1 for what keeps the balance,
-    # and 2 for all else, so that no hand that reaches too far makes the robot fall.
-    if task.priority is not None:
-        return task.priority
-    return 2 if robot.unactuated and not task.keeps_balance(robot) else 1
-
-
-def checked_gain(gain: ArrayLike, robot: Robot, metric: Metric) -> Array:
-    """Return K_N as a matrix, checked for V' = -e_NᵀW K_N e_N < 0.
-
-    So W K_N + K_NᵀW must be positive definite. Where W is constant that is looked at.
-    Where W changes with q it must hold for every W(q): for multiples of the identity it
-    does, since then V' = -2 K_N V, and other gains are refused. A diagonal of positive
-    numbers is not enough: over the mass matrix some let e_N grow at some
-    configurations.
-    """
-    K_N = as_matrix(np.asarray(gain, dtype=float), robot.nv, "null_space_gain")
-    if np.abs(K_N).max() > LARGEST:
-        raise GainError(
-            f"null_space_gain contains {np.abs(K_N).max():g}, which is absurdly large; "
-            f"its size must be {LARGEST:g} at most"
-        )
-    if metric.form == VARYING:
-        if not np.array_equal(K_N, K_N[0, 0] * np.eye(robot.nv)):
-            raise GainError(
-                "null_space_gain is no multiple of the identity, and the metric "
-                f"({type(metric).__name__}) changes with the configuration: at some "
-                "configurations the null-space error could grow instead of decay; "
-                f"needs one number, for example {np.diag(K_N).min():g}, or a metric "
-                "that does not change"
-            )
-        return K_N
-    state = robot.state(0.0, robot.neutral(), np.zeros(robot.nv))
-    state = as_given(metric, state)
-    W = metric.evaluate(state, MetricSample.allocate(robot.nv)).W
-    decay = W @ K_N
-    smallest = float(np.linalg.eigvalsh(0.5 * (decay + decay.T))[0])
-    if smallest <= 0.0:
-        raise GainError(
-            "null_space_gain does not make the null-space error decay: the smallest "
-            f"eigenvalue of W K_N is {smallest:.3g}; must be greater than 0"
-        )
-    return K_N
-
-
-def check_support(robot: Robot, contacts: Sequence[Contact], base: Base | None) -> None:
-    """Check that contacts and ``base`` are given exactly where the robot needs them."""
-    if base not in {None, "flying", "driven"}:
-        raise ContactError(f"base is {base!r}; needs 'flying', 'driven' or None")
-    if not robot.unactuated and base is not None:
-        with within("base"):
-            raise ContactError(
-                f"{robot.name} has no free-flyer root: base is only for robots with a "
-                "floating base"
-            )
-    if robot.unactuated and not contacts and base is None:
-        raise ContactError(
-            f"no motor moves the free-flyer root of {robot.name}: declare contacts, or "
-            "base='flying' (nothing acts on it), or base='driven' (something else "
-            "moves it)"
-        )
-    if contacts and base == "driven":
-        with within("base"):
-            raise ContactError(
-                "base='driven' needs no contacts, but contacts are given"
-            )
-    names = [contact.name for contact in contacts]
-    twice = sorted({name for name in names if names.count(name) > 1})
-    if twice:
-        raise ContactError(
-            f"two contacts are called {twice[0]!r}; give them distinct names"
-        )
-
-
-@dataclass(frozen=True)
-class PlannedTask:
-    """A task, when it is active, and its gains."""
-
-    key: int  # tells it from every other task of the controller, also of the same name
-    task: Task  # placed
-    presence: Evolution[float]  # 1 while it is part of the controller, 0 while not
-    # numbers of its feedback: Kp and Kv, shape (2, m, m) [1/s², 1/s], or those of an
-    # impedance; see `Task.in_force`
-    gains: Evolution[Array]
-
-    def weight(self, t: float) -> float:
-        """Return the weight of the task at time t [s], in [0, 1]."""
-        present = self.presence.at(t)
-        schedule = self.task.schedule
-        return present if schedule is None else present * schedule.weight(t)
-
-    def weight_beyond(self, t: float, edges: Sequence[float]) -> float:
-        """Return its weight at time t where some contacts are lifted.
-
-        A task without a ramp that begins where a contact ends moves what the contact
-        kept at rest. So it is active before, in proportion as the contact is not; so is
-        one that ends where a contact begins.
-        """
-        now, schedule = self.weight(t), self.task.schedule
-        if schedule is None or schedule.ramp or 0.0 < now < 1.0:
-            return now
-        present = self.presence.at(t)
-        there = (present * schedule.weight(edge) for edge in edges)
-        return next((each for each in there if each != now), now)
-
-    @property
-    def always(self) -> bool:
-        """Whether its weight is 1 at all times."""
-        schedule = self.task.schedule
-        unscheduled = schedule is None or (schedule.constant and not schedule.ramp)
-        return unscheduled and self.presence == PRESENT
-
-
-@dataclass(frozen=True)
-class PlannedTerm:
-    """A term of the field, and when it is active."""
-
-    field: NullSpaceField  # placed, with its own weight
-    presence: Evolution[float]  # factor of its weight
-
-    @property
-    def weighted(self) -> NullSpaceField:
-        """The term with both weights."""
-        if self.presence == PRESENT:
-            return self.field
-        weight = product(EvolvingWeight(self.presence), self.field.weight)
-        return replace(self.field, weight=weight)
 
 
 @dataclass(frozen=True)
@@ -395,126 +199,3 @@ def _changed(planned: Planned, **changes: Any) -> Planned:
     if all(getattr(planned, name) is value for name, value in changes.items()):
         return planned
     return replace(planned, **changes)
-
-
-def planned_task(key: int, task: Task, presence: Evolution[float]) -> PlannedTask:
-    """Return a placed task with its own gains."""
-    return PlannedTask(key, task, presence, Evolution(task.in_force().numbers))
-
-
-def planned_terms(
-    field: NullSpaceField, presence: Evolution[float]
-) -> tuple[PlannedTerm, ...]:
-    """Return the terms of a placed field."""
-    return tuple(PlannedTerm(term, presence) for term in terms_of(field))
-
-
-def levels_of(
-    tasks: Sequence[PlannedTask], robot: Robot
-) -> tuple[tuple[PlannedTask, ...], ...]:
-    """Return the tasks of each level, the highest priority first."""
-    levels: dict[int, list[PlannedTask]] = {}
-    for each in tasks:
-        levels.setdefault(priority_of(each.task, robot), []).append(each)
-    return tuple(tuple(levels[priority]) for priority in sorted(levels))
-
-
-class DeclaredController:
-    """What a controller is made of before anything relative in it is placed."""
-
-    def __init__(
-        self,
-        robot: Robot,
-        tasks: Sequence[Task],
-        field: NullSpaceField | None,
-        null_space_gain: ArrayLike,
-        metric: Metric | None,
-        singularity_threshold: float,
-        limits: Limits | None,
-        contacts: Sequence[Contact],
-        base: Base | None,
-        scene: Scene | Iterable[Obstacle],
-        start: ArrayLike | None,
-    ) -> None:
-        """Check each part by itself; see `Controller` for what they mean."""
-        if isinstance(robot, str | Path):
-            raise ControllerError(f"robot is {robot!r}; needs Robot.load({robot!r})")
-        if isinstance(robot, pin.Model):
-            raise ControllerError(
-                "robot is a pinocchio.Model; needs Robot.from_pinocchio(model)"
-            )
-        check_kind("robot is", robot, Robot, ControllerError)
-        if not 0.0 < singularity_threshold < np.inf:
-            raise ControllerError(
-                f"singularity_threshold is {singularity_threshold}; must be positive"
-            )
-        self.robot, self.limits, self.base = robot, limits, base
-        self.threshold = float(singularity_threshold)
-        self.field = Rest() if field is None else field
-        _check_parts("tasks", tasks, Task)
-        self.tasks = tuple(tasks)
-        if metric is None:
-            yields = any(impedance_of(task) is not None for task in tasks)
-            own = MassMatrixMetric(inertia="robot")
-            metric = own if yields else IdentityMetric()
-        _check_parts("contacts", contacts, Contact)
-        self.contacts = tuple(contacts)
-        check_kind("field is", self.field, NullSpaceField, ControllerError)
-        self.metric: Metric = check_kind("metric is", metric, Metric, ControllerError)
-        if limits is not None:
-            if limits == "none":
-                raise ControllerError("limits is 'none'; in Python it is None")
-            check_kind("limits is", limits, Limits, ControllerError)
-        self.scene = scene if isinstance(scene, Scene) else Scene(scene)
-        # that of the first step where it is None
-        self.start = None if start is None else robot.check_configuration(start).copy()
-        check_support(robot, contacts, base)
-        with within("null_space", "gain"):
-            self.gain = as_gain(null_space_gain, "null_space_gain")
-
-    def placed(self, start: Start) -> Setup:
-        """Return the setup with all parts placed where the robot starts."""
-        robot = self.robot
-        tasks = []
-        for task in self.tasks:
-            with within("tasks", task.name):
-                tasks.append(task.placed(start))
-        with within("tasks"):
-            check_tasks(tasks, robot)
-        with within("null_space", "metric"):
-            metric = self.metric.placed(start)
-        with within("null_space", "gain"):
-            gain = checked_gain(self.gain, robot, metric)
-        fields = []
-        for k, term in enumerate(terms_of(self.field)):
-            with within("null_space", "fields", k):
-                _refuse_streams(term)
-                fields.append(PlannedTerm(term.placed(start), PRESENT))
-        contacts = []
-        for contact in self.contacts:
-            with within("contacts", contact.name):
-                contacts.append(PlannedContact(contact.placed(start), PRESENT))
-        limits: RobotLimits | None = None
-        if self.limits is not None:
-            with within("limits"):
-                limits = self.limits.placed(start)
-        return Setup(
-            start,
-            metric,
-            tuple(planned_task(k, task, PRESENT) for k, task in enumerate(tasks)),
-            tuple(fields),
-            Evolution(gain),
-            tuple(contacts),
-            PlannedLimits.of(limits),
-            len(tasks),
-            Evolution(np.array(robot.model.gravity.linear)),
-        )
-
-
-def _refuse_streams(field: NullSpaceField) -> None:
-    """Raise for a field that a stream leads: only that of a change is logged."""
-    if any(True for _ in parts_within(field, Streamed)):
-        raise FieldError(
-            "a stream cannot lead a field from the start; while the controller runs, "
-            "controller.at(t).field(...) with a stream does"
-        )

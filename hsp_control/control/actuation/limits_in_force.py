@@ -19,7 +19,8 @@ from hsp_control.constraints.limits.acceleration_bounds import (
     MotionLimits,
 )
 from hsp_control.control.actuation.sent_effort import SentEffort, SentMemory
-from hsp_control.control.evolution import Evolution, PlannedLimits
+from hsp_control.control.evolution import Evolution
+from hsp_control.control.planned import PlannedLimits
 from hsp_control.engine.plans import PartCall, PartCalls
 from hsp_control.robot import Robot, RobotState
 

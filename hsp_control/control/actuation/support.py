@@ -10,7 +10,7 @@ from hsp_control import engine
 from hsp_control.common.arrays import Array, Indices
 from hsp_control.constraints.contacts import Contact, SlidingContact
 from hsp_control.constraints.contacts.contact import NORMAL, WRENCH, shares
-from hsp_control.control.evolution import PlannedContact
+from hsp_control.control.planned import PlannedContact
 from hsp_control.edge import BoundLaw
 from hsp_control.engine.plans import AnyCall, PartCall, PartCalls
 from hsp_control.robot import Robot, RobotState

@@ -22,7 +22,8 @@ from hsp_control.common.exceptions import ContactError, FrameNotFoundError
 from hsp_control.constraints.contacts.contact import UnactuatedRows
 from hsp_control.control.actuation import Status
 from hsp_control.control.actuation.support import Support
-from hsp_control.control.evolution import PRESENT, PlannedContact
+from hsp_control.control.evolution import PRESENT
+from hsp_control.control.planned import PlannedContact
 from hsp_control.geometry.scene import Scene, Start
 from hsp_control.simulation.plants import ContactPlant, RigidContact
 from hsp_control.tasks import TaskSample

@@ -17,7 +17,7 @@ import hsp_control as hsp
 from hsp_control import Controller, FramePosition, Robot, TargetPosture
 from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import GainError
-from hsp_control.control.setup import checked_gain
+from hsp_control.control.fitting import checked_gain
 
 COUNT = 2500
 """Gains for each of four robots."""

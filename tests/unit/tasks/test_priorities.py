@@ -16,7 +16,7 @@ from hsp_control import (
     Robot,
     Task,
 )
-from hsp_control.control.setup import priority_of
+from hsp_control.control.fitting import priority_of
 from hsp_control.tasks import AngularMomentum, RelativePose
 
 UP = (0.0, 0.0, 1.0)

@@ -1,0 +1,174 @@
+"""Tasks, fields, contacts and limits, and when they are part of a controller."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+from hsp_control.common.arrays import Array
+from hsp_control.constraints.contacts import Contact
+from hsp_control.constraints.limits import RobotLimits
+from hsp_control.control.evolution import (
+    ABSENT,
+    PRESENT,
+    Evolution,
+    EvolvingWeight,
+)
+from hsp_control.null_space.fields import NullSpaceField
+from hsp_control.null_space.fields.field import terms_of
+from hsp_control.null_space.fields.weight import product
+from hsp_control.tasks import Task
+from hsp_control.trajectories.crossfade import settled
+
+
+@dataclass(frozen=True)
+class PlannedTask:
+    """A task, when it is active, and its gains."""
+
+    key: int  # tells it from every other task of the controller, also of the same name
+    task: Task  # placed
+    presence: Evolution[float]  # 1 while it is part of the controller, 0 while not
+    # numbers of its feedback: Kp and Kv, shape (2, m, m) [1/s², 1/s], or those of an
+    # impedance; see `Task.in_force`
+    gains: Evolution[Array]
+
+    def weight(self, t: float) -> float:
+        """Return the weight of the task at time t [s], in [0, 1]."""
+        present = self.presence.at(t)
+        schedule = self.task.schedule
+        return present if schedule is None else present * schedule.weight(t)
+
+    def weight_beyond(self, t: float, edges: Sequence[float]) -> float:
+        """Return its weight at time t where some contacts are lifted.
+
+        A task without a ramp that begins where a contact ends moves what the contact
+        kept at rest. So it is active before, in proportion as the contact is not; so is
+        one that ends where a contact begins.
+        """
+        now, schedule = self.weight(t), self.task.schedule
+        if schedule is None or schedule.ramp or 0.0 < now < 1.0:
+            return now
+        present = self.presence.at(t)
+        there = (present * schedule.weight(edge) for edge in edges)
+        return next((each for each in there if each != now), now)
+
+    @property
+    def always(self) -> bool:
+        """Whether its weight is 1 at all times."""
+        schedule = self.task.schedule
+        unscheduled = schedule is None or (schedule.constant and not schedule.ramp)
+        return unscheduled and self.presence == PRESENT
+
+
+@dataclass(frozen=True)
+class PlannedTerm:
+    """A term of the field, and when it is active."""
+
+    field: NullSpaceField  # placed, with its own weight
+    presence: Evolution[float]  # factor of its weight
+
+    @property
+    def weighted(self) -> NullSpaceField:
+        """The term with both weights."""
+        if self.presence == PRESENT:
+            return self.field
+        weight = product(EvolvingWeight(self.presence), self.field.weight)
+        return replace(self.field, weight=weight)
+
+
+def planned_task(key: int, task: Task, presence: Evolution[float]) -> PlannedTask:
+    """Return a placed task with its own gains."""
+    return PlannedTask(key, task, presence, Evolution(task.in_force().numbers))
+
+
+def planned_terms(
+    field: NullSpaceField, presence: Evolution[float]
+) -> tuple[PlannedTerm, ...]:
+    """Return the terms of a placed field."""
+    return tuple(PlannedTerm(term, presence) for term in terms_of(field))
+
+
+HELD = 0.1
+"""A contact whose weight is this or more is kept at rest. With 1, a foot would move
+while it is active; with 0, its motion would be set free, or stopped, with a jump."""
+
+
+@dataclass(frozen=True)
+class PlannedContact:
+    """A contact, and when it is part of the controller."""
+
+    contact: Contact
+    presence: Evolution[float]  # 1 while it is active, 0 while it is lifted
+
+    @property
+    def always(self) -> bool:
+        """Whether the contact is active at all times."""
+        return self.contact.always and self.presence == PRESENT
+
+    def active(self, t: float) -> bool:
+        """Return whether the contact is kept at rest at time t [s]."""
+        return self.contact.active(t) and self.presence.at(t) > 0.0
+
+    def weight(self, t: float) -> float:
+        """Return how active it is at time t [s], in [0, 1]."""
+        return self.contact.weight(t) * self.presence.at(t)
+
+    def share(self, t: float) -> float:
+        """Return how much it is kept at rest at time t [s], in [0, 1]."""
+        # It is 1 - (1 - x)³ with x the weight over `HELD`: C² in time, as the weight.
+        if not self.active(t):
+            return 0.0
+        x = min(self.weight(t) / HELD, 1.0)
+        return x * (3.0 - x * (3.0 - x))
+
+    def edge(self, t: float) -> float:
+        """Return when its schedule, near t, lifts it, or lifted it last [s]."""
+        schedule = self.contact.schedule
+        return t if schedule is None else schedule.edge(t)
+
+
+@dataclass(frozen=True)
+class PlannedLimits:
+    """The limits of a controller: sets that follow one another.
+
+    While one follows another, both count, and what each delivers is mixed; see
+    `Mixture.deliver`. So a limit can go to infinity, or come from there.
+    """
+
+    # each set of limits, None for none, in order of time; and its share, in [0, 1]. The
+    # sum of the shares is 1.
+    sets: tuple[tuple[RobotLimits | None, Evolution[float]], ...]
+
+    @classmethod
+    def of(cls, limits: RobotLimits | None) -> "PlannedLimits":
+        """Return limits that do not change."""
+        return cls(((limits, PRESENT),))
+
+    @property
+    def last(self) -> RobotLimits | None:
+        """The limits after all changes."""
+        return self.sets[-1][0]
+
+    @property
+    def end(self) -> float:
+        """When the last change is complete [s]; -inf without changes."""
+        return max(share.end for _, share in self.sets)
+
+    def then(
+        self, start: float, ramp: float, limits: RobotLimits | None
+    ) -> "PlannedLimits":
+        """Return the limits with a change to other ones."""
+        before = [(each, share.then(start, ramp, 0.0)) for each, share in self.sets]
+        return PlannedLimits((*before, (limits, ABSENT.then(start, ramp, 1.0))))
+
+    def settled(self, t: float) -> "PlannedLimits":
+        """Return the limits for times from t on: complete changes are folded."""
+        folded = [(_settled(each, t), share.settled(t)) for each, share in self.sets]
+        return PlannedLimits(tuple(pair for pair in folded if pair[1] != ABSENT))
+
+
+def _settled(limits: RobotLimits | None, t: float) -> RobotLimits | None:
+    """Return limits whose obstacles move as they do from a time on [s]."""
+    if limits is None:
+        return None
+    barriers = settled(limits.barriers, t)
+    same = barriers is limits.barriers
+    return limits if same else replace(limits, barriers=barriers)
