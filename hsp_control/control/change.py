@@ -397,7 +397,7 @@ class MoveObstacle(Change, type="obstacle"):
             old.center, self.center, start_time=self.at, duration=self.ramp
         )
         new = replace(old, center=center)
-        moved = Scene([new if each == old else each for each in scene.values()])
+        moved = Scene([new if each is old else each for each in scene.values()])
         terms = tuple(
             replace(each, field=_exchanged(each.field, old, new))
             for each in setup.terms
@@ -438,7 +438,7 @@ def _elsewhere(limits: RobotLimits, old: Obstacle, new: Obstacle) -> RobotLimits
 
 def _is(value: object, obstacle: Obstacle) -> bool:
     # Not `==` alone: values that hold arrays have no truth of being equal.
-    return isinstance(value, Obstacle) and value == obstacle
+    return isinstance(value, Obstacle) and (value is obstacle or value == obstacle)
 
 
 class ChangeLimits(Change, type="limits"):

@@ -122,8 +122,12 @@ class InForce:
 
     @property
     def kept(self) -> TimeLine:
-        """The time line without the changes that are over and forgotten."""
-        return self.time_line.settled_at(self.latest - MEMORY)
+        """The time line without the changes that are over, for one more change.
+
+        An integrator that asks for earlier times than the last one does so within one
+        of its steps, and changes are made between them.
+        """
+        return self.time_line.settled_at(self.latest)
 
     @property
     def latest(self) -> float:

@@ -28,6 +28,10 @@ from hsp_control.trajectories.trajectory import (
 
 AnyReference = Trajectory | OrientationTrajectory | PoseTrajectory
 
+MOST_OVERLAPPING = 64
+"""Changes of one reference that may overlap: the next one takes 40 ms then, and parts
+that contain a few hundred of one another are beyond Python's own limit."""
+
 
 class Crossfade(Trajectory, type="crossfade"):
     """x(t) = (1 - s) x_0(t) + s x_1(t), with s the `smooth_step`; C² if both are."""
@@ -43,7 +47,8 @@ class Crossfade(Trajectory, type="crossfade"):
     """Duration of the change [s]; 0 is a jump."""
 
     def __post_init__(self) -> None:
-        """Check that both have one dimension."""
+        """Check that both have one dimension, and how many changes overlap."""
+        _check_overlapping(self)
         if self.relative:
             return
         if self.before.dimension != self.after.dimension:
@@ -107,6 +112,10 @@ class CrossfadeOrientation(OrientationTrajectory, type="crossfade"):
     """Time at which the change begins [s]."""
     duration: NonNegative = 0.3
     """Duration of the change [s]; 0 is a jump."""
+
+    def __post_init__(self) -> None:
+        """Check how many changes overlap."""
+        _check_overlapping(self)
 
     @property
     def relative(self) -> bool:
@@ -239,6 +248,19 @@ def _copied(calls: PartCalls, sample: Any, out: Any) -> PartCalls:
         for own, other in zip(out, sample, strict=True)
     ]
     return [*calls, *copies]
+
+
+def _check_overlapping(part: Crossfade | CrossfadeOrientation) -> None:
+    """Check that not too many changes of one reference overlap."""
+    count: int = 1
+    before: Any = part
+    while isinstance(before := before.before, Crossfade | CrossfadeOrientation):
+        count += 1
+    if count > MOST_OVERLAPPING:
+        raise TrajectoryError(
+            f"{count} changes of one reference overlap; at most {MOST_OVERLAPPING}. "
+            "What changes this often is a stream, such as set_target(task, target)"
+        )
 
 
 def _calls(part: Crossfade | CrossfadeOrientation, out: Any) -> PartCalls:
