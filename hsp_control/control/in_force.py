@@ -60,6 +60,8 @@ class InForce:
         """Follow a time line from now on; what its steps call is bound."""
         self._memory.follow(time_line.streams())
         self._plan(time_line)
+        self.model.plan(self.setup.payloads, self.setup.gravity, self.latest)
+        self.tools.plan(self.setup.tools, self.latest)
         self.mixture = self.mixture.following(self.setup)
         self.later, step = None, None
         if self._memory.begun:
@@ -102,7 +104,10 @@ class InForce:
         if memory.now <= later.at:
             self.write(t)
             return
-        # All changes are over: go on without them.
+        # All changes are over: go on without them. What the model and the tools have
+        # come to stays written; their calls are bound anew with the next change.
+        self.model.write(t)
+        self.tools.write(t)
         self._plan(later.time_line)
         later.mixture.active = self.mixture.active
         self.mixture, self.later = later.mixture, None
@@ -140,8 +145,6 @@ class InForce:
         self.time_line, self.setup = time_line, setup
         self.gains.plan(setup, t)
         self.limits.plan(setup.limits, t)
-        self.model.plan(setup.payloads, setup.gravity, t)
-        self.tools.plan(setup.tools, t)
 
     def _go_on(self, step: BoundStep | None) -> None:
         self.step = step

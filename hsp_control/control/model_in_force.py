@@ -59,7 +59,7 @@ class ModelInForce:
     ) -> None:
         """Follow other changes from now on; t is the present time [s]."""
         self._gravity = gravity
-        if payloads != self._payloads:
+        if [*map(id, payloads)] != [*map(id, self._payloads)]:
             self._payloads = payloads
             self._bind()
         self.write(t)

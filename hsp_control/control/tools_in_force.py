@@ -8,13 +8,15 @@ while a tool is exchanged, and no effort jumps.
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+import numpy as np
 import pinocchio as pin
 
-from hsp_control.common.arrays import Array
+from hsp_control import engine
+from hsp_control.engine import Plan
+from hsp_control.engine.plans import PartCall, planned
 from hsp_control.robot import RobotState
 from hsp_control.robot.kinematics import LocalMotion
 from hsp_control.trajectories import PoseTrajectory
-from hsp_control.trajectories.pose import PoseSample
 
 
 @dataclass(frozen=True)
@@ -31,6 +33,7 @@ class ToolsInForce:
     def __init__(self, state: RobotState) -> None:
         self._state, self._model = state, state.robot.model
         self._tools: Sequence[PlannedTool] = ()
+        self._move = Plan()  # writes the motions of all tools at a time [s]
 
     def plan(self, tools: Sequence[PlannedTool], t: float) -> None:
         """Follow other changes from now on; t is the present time [s]."""
@@ -39,28 +42,32 @@ class ToolsInForce:
             if each.frame not in there:
                 placement = _placement(self._model, each.frame)
                 self._state.move_frame(each.frame, LocalMotion.fixed(placement))
-        self._tools = tools
+        if [*map(id, tools)] != [*map(id, self._tools)]:
+            self._tools = tools
+            self._move = self._bound()
         self.write(t)
 
     def write(self, t: float) -> None:
         """Let the frames be where they are at a time [s], and move as they do then."""
+        if not self._tools:
+            return
+        self._move(t)
+        for each in self._tools:
+            self._state.forget_frame(each.frame)
+
+    def _bound(self) -> Plan:
+        calls = []
         for each in self._tools:
             own = _placement(self._model, each.frame)
-            motion = _motion(own.rotation, own.translation, each.placement.sample(t))
-            self._state.move_frame(each.frame, motion)
-
-
-def _motion(R: Array, p: Array, placement: PoseSample) -> LocalMotion:
-    """Return the motion in its joint of a frame that the model places at (R, p)."""
-    at, turned = placement
-    return LocalMotion(
-        R @ turned.rotation,
-        p + R @ at.position,
-        R @ at.velocity,
-        R @ at.acceleration,
-        R @ turned.angular_velocity,
-        R @ turned.angular_acceleration,
-    )
+            call = PartCall(
+                engine.ToolInJoint,
+                rotation=np.ascontiguousarray(own.rotation),
+                position=own.translation.copy(),
+                pose=each.placement,
+                out=self._state.local_motion(each.frame),
+            )
+            calls.append(call)
+        return Plan(planned(calls).steps())
 
 
 def _placement(model: pin.Model, frame: str) -> pin.SE3:

@@ -230,7 +230,7 @@ class RobotState:
         """
         found = self._frames.get(name)
         if found is None:
-            joint, local = self._joint_of(name), self._local_of(name)
+            joint, local = self._joint_of(name), self.local_motion(name)
             around = self.world, self.stamp_array
             frame = FrameKinematics(self.robot.model, *around, joint, local)
             self._frames[name] = found = frame, self._bound(*frame.calls)
@@ -242,7 +242,12 @@ class RobotState:
         model = self.robot.model
         return int(model.frames[self.robot.frame_id(frame)].parentJoint)
 
-    def _local_of(self, frame: str) -> LocalMotion:
+    def local_motion(self, frame: str) -> LocalMotion:
+        """Return the motion of a frame in its joint; who writes it forgets the frame.
+
+        Raises:
+            FrameNotFoundError: If the robot has no such frame.
+        """
         found = self._local.get(frame)
         if found is None:
             placement = self.robot.model.frames[self.robot.frame_id(frame)].placement
@@ -255,8 +260,12 @@ class RobotState:
         Raises:
             FrameNotFoundError: If the robot has no such frame.
         """
-        for own, given in zip(self._local_of(frame), motion, strict=True):
+        for own, given in zip(self.local_motion(frame), motion, strict=True):
             own[:] = given
+        self.forget_frame(frame)
+
+    def forget_frame(self, frame: str) -> None:
+        """Compute a frame anew whose motion in its joint was written."""
         if frame in self._frames:
             self._frames[frame][0].forget()
 

@@ -14,7 +14,10 @@ from hsp_control.declaration.rotation import Rotation, matrix_of
 from hsp_control.engine.plans import PartCall
 from hsp_control.engine.rotations import jexp3_dot, jlog3, log3
 from hsp_control.trajectories import checks
-from hsp_control.trajectories.orientation import OrientationTrajectory
+from hsp_control.trajectories.orientation import (
+    OrientationSample,
+    OrientationTrajectory,
+)
 from hsp_control.trajectories.piecewise_polynomial import QUINTIC
 from hsp_control.trajectories.trajectory import Trajectory
 
@@ -123,23 +126,11 @@ class BlendOrientation(OrientationTrajectory, type="blend"):
     @cached_property
     def coefficients(self) -> Array:
         """Those of y, a polynomial of (t - t0)/T, shape (6, 3)."""
-        T, rest = self.duration, np.zeros(3)
-        y, y_dot, y_ddot = self._start_offset()
-        return QUINTIC @ np.stack([y, T * y_dot, T * T * y_ddot, rest, rest, rest])
-
-    def _start_offset(self) -> tuple[Array, Array, Array]:
-        """Return y, y' and y'' at t0, with which ω = ω_d + R w = ω0 and ω' = ω0'.
-
-        w = Jexp(y) y' is the angular velocity relative to R_d, in the body frame.
-        """
-        R_d, omega_d, omega_d_dot = self.trajectory.sample(self.start_time)
-        R, omega = self._start, np.asarray(self.start_angular_velocity)
-        w = R.T @ (omega - omega_d)
+        omega = np.asarray(self.start_angular_velocity)
         omega_dot = np.asarray(self.start_angular_acceleration)
-        w_dot = R.T @ (omega_dot - omega_d_dot - np.cross(omega, R @ w))
-        y = log3(R_d.T @ R)
-        y_dot = jlog3(y) @ w
-        return y, y_dot, jlog3(y) @ (w_dot - jexp3_dot(y, y_dot) @ y_dot)
+        start = OrientationSample(self._start, omega, omega_dot)
+        desired = self.trajectory.sample(self.start_time)
+        return offset_coefficients(start, desired, self.duration)
 
     def call(self) -> PartCall:
         """Return the call; see `Trajectory.call`."""
@@ -151,3 +142,26 @@ class BlendOrientation(OrientationTrajectory, type="blend"):
             coefficients=self.coefficients,
             desired=self.trajectory,
         )
+
+
+def offset_coefficients(
+    start: OrientationSample, desired: OrientationSample, duration: float
+) -> Array:
+    """Return the coefficients of y, with R_d exp(y), ω and ω' those of a start.
+
+    w = Jexp(y) y' is the angular velocity relative to R_d, in the body frame.
+
+    Args:
+        start: R0, ω0 and ω0'.
+        desired: R_d, ω_d and ω_d' at the same time.
+        duration: T [s], after which y is zero.
+    """
+    (R, omega, omega_dot), (R_d, omega_d, omega_d_dot) = start, desired
+    w = R.T @ (omega - omega_d)
+    w_dot = R.T @ (omega_dot - omega_d_dot - np.cross(omega, R @ w))
+    y = log3(R_d.T @ R)
+    y_dot = jlog3(y) @ w
+    y_ddot = jlog3(y) @ (w_dot - jexp3_dot(y, y_dot) @ y_dot)
+    T, rest = duration, np.zeros(3)
+    rows = np.stack([y, T * y_dot, T * T * y_ddot, rest, rest, rest])
+    return np.asarray(QUINTIC @ rows)

@@ -1,5 +1,6 @@
 """A smooth change from one reference to another, both of which may move."""
 
+from copy import deepcopy
 from dataclasses import KW_ONLY, replace
 from functools import cached_property
 from typing import Any, TypeVar
@@ -12,8 +13,9 @@ from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import TrajectoryError
 from hsp_control.declaration.nested import parts_within, with_parts_replaced
 from hsp_control.declaration.quantities import NonNegative, Number
-from hsp_control.engine.plans import TIME, PartCall, PartCalls
-from hsp_control.trajectories.blend import BlendOrientation
+from hsp_control.engine import Plan
+from hsp_control.engine.plans import TIME, PartCall, PartCalls, planned
+from hsp_control.trajectories.blend import offset_coefficients
 from hsp_control.trajectories.orientation import (
     OrientationSample,
     OrientationTrajectory,
@@ -180,16 +182,10 @@ class CrossfadeOrientation(OrientationTrajectory, type="crossfade"):
         """Those of y, which begins with R_0's derivatives; shape (6, 3)."""
         if self.duration == 0.0:
             return np.zeros((6, 3))
-        R, omega, omega_dot = self.before.sample(self.start_time)
-        blend = BlendOrientation(
-            self.after,
-            self.duration,
-            rotation=R,
-            start_angular_velocity=omega,
-            start_angular_acceleration=omega_dot,
-            start_time=self.start_time,
+        start = self.before.sample(self.start_time)
+        return offset_coefficients(
+            start, self.after.sample(self.start_time), self.duration
         )
-        return blend.coefficients
 
 
 class PositionOf(Trajectory):
@@ -266,8 +262,46 @@ def _check_overlapping(part: Crossfade | CrossfadeOrientation) -> None:
 def _calls(part: Crossfade | CrossfadeOrientation, out: Any) -> PartCalls:
     """Return the calls of a change that streams follow: their past is forgotten."""
     if any(True for _ in parts_within(part, FollowedStream)):
-        return [PartCall(write_sample, sampler=part.sample, out=out, t=TIME)]
+        return [PartCall(_ChangeOfStreams(part, out), t=TIME)]
     return []
+
+
+class _ChangeOfStreams:
+    """Writes the sample of a change that streams follow; its mixing is bound ahead."""
+
+    def __init__(self, part: Crossfade | CrossfadeOrientation, out: Any) -> None:
+        self._part, self._out = part, out
+        self._before, self._after = deepcopy(out), deepcopy(out)
+        given = {"before": self._before, "after": self._after, "out": out}
+        kind: Any = engine.Crossfade
+        self._coefficients = np.zeros((6, 3))
+        self._turns = isinstance(part, CrossfadeOrientation)
+        if self._turns:
+            kind = engine.CrossfadeOrientation
+            given["coefficients"] = self._coefficients
+        self._known = False  # whether these are: in the change, and not before
+        times = {"start_time": part.start_time, "duration": part.duration}
+        call = PartCall(kind, **times, **given, t=TIME)
+        self._mix = Plan(planned([call]).steps())
+
+    def __call__(self, t: float) -> None:
+        """Write the sample at a time [s]; see `CrossfadeOrientation.sample`."""
+        part, out = self._part, self._out
+        before: Any = part.before
+        after: Any = part.after
+        end = part.start_time + part.duration
+        if t >= end:  # a stream may know the past no more
+            write_sample(t, after.sample, out)
+            return
+        if isinstance(part, CrossfadeOrientation):
+            part.keep_start(end)
+            if t >= part.start_time and not self._known:
+                self._coefficients[:] = part._coefficients
+                self._known = True
+        write_sample(t, before.sample, self._before if t >= part.start_time else out)
+        if t >= part.start_time:
+            write_sample(t, after.sample, self._after)
+            self._mix(t)
 
 
 def crossfade(

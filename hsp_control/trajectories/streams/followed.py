@@ -28,6 +28,7 @@ class FollowedStream(Remembering):
         """Return the calls that write a sample; see `Trajectory.calls`."""
         if self.run.alone is not None:
             return self.run.alone.calls(out)
+        self.run.prepare()
         calls: PartCalls = super().calls(out)  # type: ignore[misc]
         return calls
 

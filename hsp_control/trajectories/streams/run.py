@@ -202,8 +202,13 @@ class StreamRun:
         """
         planner = self._planned
         if t > planner.now:
-            planner.advance(t, self.reader.take(t) if planner.begun else [])
+            reader = self.reader  # one that cannot be opened raises in the first step
+            planner.advance(t, reader.take(t) if planner.begun else [])
         return planner.at(t)
+
+    def prepare(self) -> None:
+        """Make what plans, now instead of in the first step."""
+        _ = self._planned
 
     def keep(self, since: float, until: float) -> None:
         """Know the reference from a time on until a later one [s]."""
@@ -212,7 +217,6 @@ class StreamRun:
     @property
     def _planned(self) -> Planner:
         if self._planner is None:
-            _ = self.reader  # a source that cannot be opened raises in the first step
             bounds, how = self.stream.bounds(), self.stream.how
             self._planner = Planner(self.chart, bounds, how, self._start)
         return self._planner

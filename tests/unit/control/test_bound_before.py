@@ -10,8 +10,9 @@ import pytest
 import hsp_control as hsp
 from hsp_control.common.arrays import Array
 from hsp_control.control.changes import Changes
+from hsp_control.engine import plans
 from hsp_control.robot import RobotState
-from hsp_control.trajectories import Schedule
+from hsp_control.trajectories import Schedule, trajectory
 
 H, AT, RAMP = 1e-3, 0.02, 0.005
 ROBOT = hsp.Robot.load("panda")
@@ -61,6 +62,8 @@ def nothing_bound(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
     with monkeypatch.context() as patched:
         for name in ("plan", "bind_move"):
             patched.setattr(RobotState, name, refused)
+        for module in (plans, trajectory):  # all calls are bound by it
+            patched.setattr(module, "bind", refused)
         yield
 
 
