@@ -73,7 +73,7 @@ def freeze(
                 f"stop.{name} is {value:g}; at a period of {period:g} s it may be "
                 f"{most / period:g} at most"
             )
-    own = controller.without_python()
+    own = controller.without_python(period)
     image = _image(own, compensation, period, start, payloads, stop)
     file = Path(path)
     file.parent.mkdir(parents=True, exist_ok=True)

@@ -134,7 +134,7 @@ def streams_of(own: Controller) -> dict[str, StreamAlone]:
 def targets_of(own: Controller, streams: Mapping[str, StreamAlone]) -> Iterator[Port]:
     """Yield the targets and velocities that a program sends.
 
-    They count from the next step on: the newest one, as of a stream's ``latest``.
+    They have no time of their own: they are sent when the next step is made.
     """
     for task in own.tasks:
         if task.name not in streams:
@@ -142,7 +142,7 @@ def targets_of(own: Controller, streams: Mapping[str, StreamAlone]) -> Iterator[
         stream = streams[task.name]
         turns = len(stream.target) > len(stream.velocity)
         unit = "m or the task's, and a quaternion x, y, z, w" if turns else "the task's"
-        meaning = "where the reference goes, and rests"
+        meaning = "where the reference goes"
         at = f"{task.name}.target"
         yield Port(at, unit, meaning, stream.target, stream.call, TARGET)
         meaning = "how it moves until it fades: linear, then angular, in world axes"

@@ -87,7 +87,6 @@ def check_streams(own: Controller) -> None:
         for each in parts_within(task, FollowedStream):
             stream = each.run.stream
             asked = {
-                "policy": stream.policy == "latest" or "only 'latest' can",
                 "source": stream.source is None or "the program sets targets instead",
                 "messages": stream.messages is None or "a recording is Python's",
                 "axes": stream.axes == "world" or "velocities are in world axes",
