@@ -39,7 +39,12 @@ from hsp_control.geometry.scene import Obstacle, Scene, Start
 from hsp_control.law import VARYING, MetricSample
 from hsp_control.null_space.fields import FieldSum, NullSpaceField, Rest
 from hsp_control.null_space.fields.field import terms_of
-from hsp_control.null_space.fields.weight import product
+from hsp_control.null_space.fields.weight import (
+    ConstantWeight,
+    SetWeight,
+    Weight,
+    product,
+)
 from hsp_control.null_space.metrics import IdentityMetric, MassMatrixMetric, Metric
 from hsp_control.robot import Robot
 from hsp_control.robot.state import as_given
@@ -225,6 +230,30 @@ class PlannedTerm:
         weight = product(EvolvingWeight(self.presence), self.field.weight)
         return replace(self.field, weight=weight)
 
+    @property
+    def weight(self) -> Evolution[float] | None:
+        """The term's own weight in time; None: it is a ramp, or of the state."""
+        own = self.field.weight
+        if isinstance(own, EvolvingWeight):
+            return own.evolution
+        if isinstance(own, ConstantWeight):
+            return Evolution(own.value)
+        return None if isinstance(own, Weight) else Evolution(float(own))
+
+    def with_weight(self, weight: Evolution[float]) -> "PlannedTerm":
+        """Return the term with another weight of its own."""
+        own = weight.initial if weight.constant else EvolvingWeight(weight)
+        return replace(self, field=replace(self.field, weight=own))
+
+    def settled(self, t: float) -> "PlannedTerm":
+        """Return the term for times from t on: complete changes are folded."""
+        field, presence = settled(self.field, t), self.presence.settled(t)
+        term = _changed(self, field=field, presence=presence)
+        weight = term.weight
+        if weight is None or (later := weight.settled(t)) is weight:
+            return term
+        return term.with_weight(later)
+
 
 @dataclass(frozen=True)
 class Setup:
@@ -250,6 +279,10 @@ class Setup:
             return terms[0]
         return FieldSum(terms)
 
+    def with_set_weights(self) -> "Setup":
+        """Return the setup in which weights that are numbers are written elsewhere."""
+        return replace(self, terms=tuple(_set_weight(each) for each in self.terms))
+
     @property
     def end(self) -> float:
         """When the last change is complete [s]; -inf without changes."""
@@ -259,6 +292,7 @@ class Setup:
             *(task.presence for task in self.tasks),
             *(task.gains for task in self.tasks),
             *(term.presence for term in self.terms),
+            *(term.weight for term in self.terms if term.weight is not None),
             *(contact.presence for contact in self.contacts),
             *(payload.share for payload in self.payloads),
         ]
@@ -325,12 +359,7 @@ class Setup:
             )
             for each in self.tasks
         ]
-        terms = [
-            _changed(
-                each, field=settled(each.field, t), presence=each.presence.settled(t)
-            )
-            for each in self.terms
-        ]
+        terms = [each.settled(t) for each in self.terms]
         contacts = [
             _changed(
                 each,
@@ -358,6 +387,13 @@ class Setup:
             tuple(each for each in payloads if each.share != ABSENT),
             tuple(tools),
         )
+
+
+def _set_weight(term: PlannedTerm) -> PlannedTerm:
+    if term.weight is None or not term.field.controls:
+        return term
+    numbers = np.array([term.weight.target, 0.0])
+    return replace(term, field=replace(term.field, weight=SetWeight(numbers)))
 
 
 def _events(presence: Evolution[float], schedule: Schedule | None) -> set[float]:

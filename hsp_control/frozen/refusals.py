@@ -15,7 +15,7 @@ from hsp_control.engine.plans import PartCall, StepPlan, planned, supplied
 from hsp_control.frozen.image import refusal
 from hsp_control.law import FieldSample, MetricSample, TaskSample
 from hsp_control.null_space.fields.field import terms_of
-from hsp_control.null_space.fields.weight import Ramp, Weight
+from hsp_control.null_space.fields.weight import Ramp, SetWeight, Weight
 from hsp_control.robot import RobotState
 from hsp_control.trajectories.streams.followed import FollowedStream
 
@@ -32,8 +32,8 @@ def check_steady(own: Controller) -> None:
     if own.changes:
         with within("changes"):
             raise FreezeError(
-                "a frozen controller follows no time line: remove the changes; gains "
-                "and K_N are inputs, which hsp_ramp changes"
+                "a frozen controller follows no time line: remove the changes; gains, "
+                "K_N and weights are inputs, which hsp_ramp changes"
             )
     for each in setup.tasks:
         if not each.always:
@@ -134,7 +134,7 @@ def _plans_of(own: Controller, state: RobotState) -> Iterator[tuple[Path, StepPl
     for k, term in enumerate(terms_of(own.field)):
         path = "null_space", "fields", k
         yield path, planned(term.calls(state, metric, form, sample))
-        known = type(term.weight) is Ramp
+        known = type(term.weight) in (Ramp, SetWeight)
         if isinstance(term.weight, Weight) and not (known or term.weight.constant):
             weight = PartCall(term.weight.sample, state=state)
             yield (*path, "weight"), planned([weight])
