@@ -22,6 +22,7 @@ from hsp_control.common.exceptions import FreezeError, HspControlError
 from hsp_control.common.resources import bundled_configs
 
 PERIOD = 1e-3
+"""Of a configuration whose law is evaluated at all times [s]."""
 DURATION = 10.0
 """Of each run [s]."""
 DRAWN = 100_000
@@ -56,8 +57,10 @@ class Tally:
 class Pair:
     """A controller in Python, and the same without."""
 
-    def __init__(self, controller: hsp.Controller, file: Path, tally: Tally) -> None:
-        self._declared, self._tally = controller, tally
+    def __init__(
+        self, controller: hsp.Controller, file: Path, period: float, tally: Tally
+    ) -> None:
+        self._declared, self._period, self._tally = controller, period, tally
         self._opened = Opened(file)
         self.begin()
 
@@ -78,7 +81,7 @@ class Pair:
             # A library that is refused for long stops the robot; Python goes on.
             self._raised += 1
             return
-        self._own.applied(output.tau, PERIOD)
+        self._own.applied(output.tau, self._period)
         self._raised = 0
         same = status == output.status and np.array_equal(self._opened.tau, output.tau)
         self._tally.different += not same
@@ -93,17 +96,19 @@ class Pair:
 def compared(name: str, drawn: int, duration: float, seed: int) -> Iterator[Tally]:
     """Yield what came of a configuration so far."""
     tally = Tally()
-    given = f"simulation.duration={duration}", f"simulation.log_period={PERIOD}"
+    period = hsp.load_experiment(name).scenario.simulation.control_period or PERIOD
+    given = f"simulation.duration={duration}", f"simulation.log_period={period}"
     experiment = hsp.load_experiment(name, *given)
     with tempfile.TemporaryDirectory() as folder:
         file = Path(folder) / "frozen.hsp"
         try:
-            hsp.freeze(experiment.controller, file, start=experiment.q0)
+            start = experiment.q0
+            hsp.freeze(experiment.controller, file, period=period, start=start)
         except FreezeError as error:
             tally.refused = str(error)
             yield tally
             return
-        pair = Pair(experiment.controller, file, tally)
+        pair = Pair(experiment.controller, file, period, tally)
         run = experiment.run()
         for t, q, v in zip(run.t, run.q, run.v, strict=True):
             pair.step(float(t), q, v)
@@ -117,11 +122,11 @@ def compared(name: str, drawn: int, duration: float, seed: int) -> Iterator[Tall
             for k in range(1, BATCH + 1):
                 moved = rng.uniform(-away, away, robot.nv)
                 q = robot.integrate(experiment.q0, moved)
-                pair.step(k * PERIOD, q, rng.normal(0.0, fast, robot.nv))
+                pair.step(k * period, q, rng.normal(0.0, fast, robot.nv))
                 tally.drawn += 1
                 if pair.lost:
                     pair.begin()
-                    pair.step(k * PERIOD, experiment.q0, np.zeros(robot.nv))
+                    pair.step(k * period, experiment.q0, np.zeros(robot.nv))
             yield tally
 
 
