@@ -21,8 +21,8 @@ struct Evolve {
   InOutInts<1> count;       // how many there are
   double least, most;       // bounds of what may be asked for
   std::int64_t definite;    // size of x as a matrix that has to be positive definite; 0: it is none
-  Out<'n'> x, rate;     // x' of the ramps [1/s]
-  Scratch<'n'> factor;  // of such a matrix
+  Out<'n'> x, rate;         // x' of the ramps [1/s]
+  Scratch<'n'> factor;      // of such a matrix
 
   void check() const {
     if (definite < 0 || (definite != 0 && definite * definite != x.size()))

@@ -86,14 +86,14 @@ def check_streams(own: Controller) -> None:
     for task in own.tasks:
         for each in parts_within(task, FollowedStream):
             stream = each.run.stream
-            asked = {
+            reasons = {
                 "source": stream.source is None or "the program sets targets instead",
                 "messages": stream.messages is None or "a recording is Python's",
                 "axes": stream.axes == "world" or "velocities are in world axes",
                 "stop_after": stream.stop_after is None
                 or "the program stops the robot; hold_after brings it to rest",
             }
-            for name, reason in asked.items():
+            for name, reason in reasons.items():
                 if reason is not True:
                     with within("tasks", task.name, "trajectory", name):
                         raise FreezeError(

@@ -18,7 +18,10 @@ Policy = Literal["latest", "interpolate", "extrapolate"]
 
 @pytest.mark.smoke
 @pytest.mark.skipif(sys.platform != "linux", reason="glibc's names, Linux' seccomp")
-@pytest.mark.parametrize("name", ["panda_obstacle", "panda_limits", "ur5_position"])
+@pytest.mark.parametrize(
+    "name",
+    ["panda_obstacle", "panda_limits", "ur5_position", "whole_body/solo12_trunk"],
+)
 def test_no_allocation_no_lock_no_system_call(name: str, tmp_path: Path) -> None:
     experiment = hsp.load_experiment(name)
     inputs = ("limit_barrier.weight",) if name == "panda_limits" else ()
