@@ -104,7 +104,7 @@ bench: $(STAMP) $(ENGINE) ## compare with other controllers, in .venv-peers
 	@.venv-peers/bin/python -W "ignore:to-Python converter" benchmarks/scaling.py
 
 fuzz: $(STAMP) $(ENGINE) ## random states, mutated files, faults, soak: hours
-	@PYTHONPATH=tests nice $(BIN)/python -m campaigns $(ARGS)
+	@PYTHONPATH=tests:tests/support nice $(BIN)/python -m campaigns $(ARGS)
 
 mutants: $(STAMP) $(ENGINE) ## break the code at random, say what share the tests notice
 	@$(BIN)/python tools/mutants.py $(ARGS)

@@ -97,6 +97,16 @@ struct JointJacobians {
   void operator()() { dynamics->joint_jacobians(q, v, jacobian, jacobian_dot, placements); }
 };
 
+struct Difference {
+  static constexpr const char* doc = "end ⊖ start, the displacement between configurations.";
+  Shared<Dynamics> dynamics;
+  In<'q'> start, end;
+  Out<'n'> displacement;
+
+  void check() const { check_sizes(*dynamics.object, start.size(), displacement.size()); }
+  void operator()() { dynamics->difference(start, end, displacement); }
+};
+
 struct InverseDynamics {
   static constexpr const char* doc = "The effort M a + N (RNEA).";
   Shared<Dynamics> dynamics;

@@ -75,6 +75,9 @@ class Dynamics {
   double mass() const;  // of all bodies [kg]
   void body_masses(Eigen::Map<Vector> mass, Centers center) const;
 
+  // end ⊖ start: the displacement from one configuration to another.
+  void difference(const ConstVector& start, const ConstVector& end,
+                  Eigen::Map<Vector> displacement) const;
   // J and J' of all joints in world axes at the world's origin, and the joints' placements: R,
   // column by column, and the origin.
   void joint_jacobians(const ConstVector& q, const ConstVector& v, Jacobian J, Jacobian J_dot,

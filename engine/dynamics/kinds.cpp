@@ -2,7 +2,7 @@
 
 namespace hsp {
 const Kind* const* dynamics_kinds() {
-  return kinds<JointJacobians, Carry, ChangeGravity, Weights, InverseDynamics, ForwardDynamics,
-               MassMatrix, MassMatrixRate, CentroidalMotion>();
+  return kinds<JointJacobians, Carry, ChangeGravity, Weights, Difference, InverseDynamics,
+               ForwardDynamics, MassMatrix, MassMatrixRate, CentroidalMotion>();
 }
 }  // namespace hsp

@@ -8,6 +8,11 @@
 
 namespace hsp {
 
+void Dynamics::difference(const ConstVector& start, const ConstVector& end,
+                          Eigen::Map<Vector> displacement) const {
+  pin::difference(pinocchio_->model, start, end, displacement);
+}
+
 ConstVector Dynamics::Pinocchio::moved(const ConstVector& q, const ConstVector& v, double h) {
   step = h * v;
   pin::integrate(model, q, step, there);

@@ -21,8 +21,8 @@ struct Evolve {
   InOutInts<1> count;       // how many there are
   double least, most;       // bounds of what may be asked for
   std::int64_t definite;    // size of x as a matrix that has to be positive definite; 0: it is none
-  Out<'n'> x;
-  Scratch<'n'> factor;  // of such a matrix
+  Out<'n'> x, rate;         // x' of the ramps [1/s]
+  Scratch<'n'> factor;      // of such a matrix
 
   void check() const {
     if (definite < 0 || (definite != 0 && definite * definite != x.size()))
@@ -31,10 +31,20 @@ struct Evolve {
 
   void operator()(double t) {
     x = initial;
+    rate.setZero();
     for (Index k = 0; k < used(); ++k) {
-      const double s = share(k, t);
-      if (s == 1.0) x = targets.row(k).transpose();
-      else if (s > 0.0) x = (1.0 - s) * x + s * targets.row(k).transpose();
+      const double start = times(k, 0), ramp = times(k, 1);
+      if (start > t) break;
+      const auto [s, s_dot, s_ddot] =
+          ramp == 0.0 ? SmoothStep{1.0, 0.0, 0.0} : smooth_step(t, start, ramp);
+      const auto target = targets.row(k).transpose();
+      if (s == 1.0) {
+        x = target;
+        rate.setZero();
+      } else if (s > 0.0) {
+        rate = (1.0 - s) * rate + s_dot * (target - x);
+        x = (1.0 - s) * x + s * target;
+      }
     }
   }
 
@@ -61,11 +71,6 @@ struct Evolve {
 
  private:
   Index used() const { return std::clamp<Index>(count[0], 0, targets.rows()); }
-
-  double share(Index k, double t) const {
-    const double start = times(k, 0), ramp = times(k, 1);
-    return ramp == 0.0 ? (t >= start ? 1.0 : 0.0) : smooth_step(t, start, ramp).s;
-  }
 
   // Forget what is over: x is the target of the last transition that is complete.
   void settle(double t) {

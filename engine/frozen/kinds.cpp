@@ -8,6 +8,6 @@
 namespace hsp {
 const Kind* const* frozen_kinds() {
   return kinds<Deliver, ForcesWithin, DeliverWithForces, OffsetEffort, Subtract, HasMoved, Evolve,
-               ScaledIdentity, BodyInJoint, Payloads, SafeStop>();
+               ScaledIdentity, BodyInJoint, Payloads, Brake, ScaleIntoLimits>();
 }
 }  // namespace hsp

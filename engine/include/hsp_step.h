@@ -39,9 +39,8 @@ extern "C" {
  * 0 if there was none yet, but for no more than 5 periods in a row: an effort that is repeated for
  * long drives the robot. From the sixth on the robot is stopped, as by hsp_stop and for good. Where
  * t, q and v are finite the stop goes by them. Where they are not, it goes by the last ones that
- * were, and by how fast they would change under its own braking: the effort fades to g(q). This is
- * not measured: let the robot's own brakes take over. A robot on feet is not stopped by it; the
- * last effort stays. */
+ * were, and by how fast they would change under its own braking: the effort fades to that which
+ * carries the robot. This is not measured: let the robot's own brakes take over. */
 typedef enum hsp_status {
   HSP_OK = 0,            /* the law's own effort */
   HSP_REDISTRIBUTED = 1, /* with contact forces chosen by a QP */
@@ -84,15 +83,17 @@ HSP_API size_t hsp_size_v(const hsp_controller* controller) HSP_NOEXCEPT;
 HSP_API double hsp_period(const hsp_controller* controller) HSP_NOEXCEPT;
 
 /* Compute the effort tau at a time t [s], a configuration q and a velocity v, which is sent now and
- * held for a period. The clock may begin anywhere: times count from the first step. */
+ * held for a period. The clock may begin anywhere: times are relative to the first step. */
 HSP_API hsp_status hsp_step(hsp_controller* controller, double t, const double* q, const double* v,
                             double* tau) HSP_NOEXCEPT;
 
 /* Stop the robot: call it each period instead of hsp_step, once a step is refused or the run is to
  * end. It brakes all joints alike, tau = g(q) - s k M(q) v, until they are slow, and then holds
- * them, as `hsp live` does; the law, its limits and its clock are not evaluated. Efforts keep their
- * limits, but not those on their rate. Payloads are included. hsp_step makes no step from then
- * on: it does the same, and returns HSP_STOPPED. */
+ * them, as `hsp live` does, by the same code; the law, its limits and its clock are not evaluated.
+ * Efforts keep their limits, but not those on their rate. Payloads are included. A robot on feet
+ * stands on its contacts meanwhile, except on those steeper than 60°: they carry it and the braking
+ * of its base. Whether they do is not measured: after a fall, switch the motors off. hsp_step makes
+ * no step from then on: it does the same, and returns HSP_STOPPED. */
 HSP_API hsp_status hsp_stop(hsp_controller* controller, double t, const double* q, const double* v,
                             double* tau) HSP_NOEXCEPT;
 

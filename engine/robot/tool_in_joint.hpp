@@ -13,7 +13,8 @@ template <template <int...> class As> struct LocalMotion {
 
 struct ToolInJoint {
   static constexpr const char* doc =
-      "The motion of a frame in its joint, from a pose in the axes that the frame has in the model.";
+      "The motion of a frame in its joint, from a pose in the axes that the frame has in the "
+      "model.";
   In<3, 3> rotation;  // of these axes in the joint
   In<3> position;     // of their origin
   PoseSample<In> pose;

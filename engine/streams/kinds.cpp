@@ -3,7 +3,6 @@
 
 namespace hsp {
 const Kind* const* stream_kinds() {
-  return kinds<PieceState, RebasedState, SmoothPiece, FastestPiece, TargetPiece, VelocityPiece,
-               StreamAlone>();
+  return kinds<PieceState, RebasedState, WaypointPiece, VelocityPiece, StreamAlone>();
 }
 }  // namespace hsp

@@ -2,20 +2,12 @@
 #pragma once
 #include <hsp/indices.hpp>
 
-#include "planner.hpp"
+#include "waypoints.hpp"
 
 namespace hsp {
 
 // Bounds of the magnitudes of x', x'' and x''', for each coordinate.
-template <template <int...> class As> struct MotionBounds {
-  As<'n'> speed, acceleration, jerk;
-};
-
-// Where the reference should be at a time, and how it moves there.
-template <template <int...> class As> struct StreamGoal {
-  double time;
-  As<'n'> x, rate, acceleration;
-};
+template <template <int...> class As> struct MotionBounds { As<'n'> speed, acceleration, jerk; };
 
 struct StateMemory : OwnState {
   void prepare(const Sizes& size) { resize(size('n')); }
@@ -32,19 +24,27 @@ struct StateMemory : OwnState {
 struct PlannerMemory {
   Planner planner;
   StateMemory state;
-  OwnGoal goal;
   Vector velocity;
 
   void prepare(const Sizes& size) {
     const Index n = size('n');
     planner.resize(n);
     state.resize(n);
-    for (Vector* each : {&goal.x, &goal.rate, &goal.acceleration, &velocity}) each->setZero(n);
+    velocity.setZero(n);
   }
   template <class Bounds> void set(double linear, const Bounds& bounds) {
     planner.set(static_cast<Index>(linear), bounds.speed, bounds.acceleration, bounds.jerk);
   }
 };
+
+// Room for so many waypoints.
+template <int most> struct PassingMemory : Passing {
+  void prepare(const Sizes& size) { resize(size(most), size('n')); }
+};
+
+inline void check_values(Index width, double linear, Index n) {
+  check_at_least("values", width, linear == n ? n : n + 1);
+}
 
 inline void check_linear(double linear, Index n) {
   if (n < 1 || (linear != n && (n < 3 || linear != n - 3)))
@@ -80,73 +80,41 @@ struct RebasedState {
   }
 };
 
-struct SmoothPiece {
+struct WaypointPiece {
   static constexpr const char* doc =
-      "The quintic that reaches a goal in time; whether the bounds permit it.";
-  double t, linear;
+      "On through waypoints, each with the derivatives that it was given, or that it shows with "
+      "its "
+      "neighbours; whether there is a way.";
+  double t, linear, delay, smoothing, extrapolation;
+  double more, rests;  // 1 or 0; see `Waypoints`
   MotionBounds<In> bounds;
   ChartState<In> state;
-  StreamGoal<In> goal;
+  In<'m'> times;        // increasing [s]
+  In<'m', 'w'> values;  // linear coordinates, then perhaps a quaternion (x, y, z, w)
+  In<'m', 'n'> velocities;
+  Flags<'m'> given;  // which velocities count
   Out<'p'> piece;
   PlannerMemory memory;
+  PassingMemory<'m'> passing;
 
   void check() const {
     check_piece(piece.size(), state.x.size());
     check_linear(linear, state.x.size());
+    check_at_least("times", times.size(), 1);
+    check_values(values.cols(), linear, state.x.size());
   }
   bool operator()() {
     memory.set(linear, bounds);
     memory.state = state;
-    memory.goal = {goal.time, goal.x, goal.rate, goal.acceleration};
+    const Waypoints way{{times.data(), times.size()},
+                        {values.data(), values.rows(), values.cols()},
+                        {velocities.data(), velocities.rows(), velocities.cols()},
+                        given.data(),
+                        more != 0.0,
+                        rests != 0.0};
     Piece out(piece.data(), state.x.size());
-    return memory.planner.smooth(t, memory.state, memory.goal, out);
-  }
-};
-
-struct FastestPiece {
-  static constexpr const char* doc =
-      "The fastest way to a goal, which goes on moving at its velocity; whether there is one.";
-  double t, linear;
-  MotionBounds<In> bounds;
-  ChartState<In> state;
-  StreamGoal<In> goal;
-  Out<'p'> piece;
-  PlannerMemory memory;
-
-  void check() const {
-    check_piece(piece.size(), state.x.size());
-    check_linear(linear, state.x.size());
-  }
-  bool operator()() {
-    memory.set(linear, bounds);
-    memory.state = state;
-    memory.goal = {goal.time, goal.x, goal.rate, goal.acceleration};
-    Piece out(piece.data(), state.x.size());
-    return memory.planner.fastest(t, memory.state, memory.goal, out);
-  }
-};
-
-struct TargetPiece {
-  static constexpr const char* doc =
-      "To rest at a value, at a time or as soon as the bounds permit; whether there is a way.";
-  double t, linear, time, delay;
-  MotionBounds<In> bounds;
-  ChartState<In> state;
-  In<'w'> value;  // linear coordinates, then perhaps a quaternion (x, y, z, w)
-  Out<'p'> piece;
-  PlannerMemory memory;
-
-  void check() const {
-    check_piece(piece.size(), state.x.size());
-    check_linear(linear, state.x.size());
-    check_at_least("value", value.size(),
-                   linear == state.x.size() ? state.x.size() : state.x.size() + 1);
-  }
-  bool operator()() {
-    memory.set(linear, bounds);
-    memory.state = state;
-    Piece out(piece.data(), state.x.size());
-    return memory.planner.to_target(t, memory.state, value.data(), time, delay, out);
+    return passing.plan(memory.planner, t, memory.state, way, {delay, smoothing, extrapolation},
+                        out);
   }
 };
 

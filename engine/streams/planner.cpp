@@ -2,6 +2,7 @@
 
 #include <array>
 #include <limits>
+#include <numbers>
 
 #include "../trajectories/orientations.hpp"
 #include "../trajectories/polynomials.hpp"
@@ -131,6 +132,23 @@ void Planner::local(const double* value, const Matrix3& base, Vector& x) const {
   if (!turns()) return;
   const Eigen::Vector4d quaternion(value[n_], value[n_ + 1], value[n_ + 2], value[n_ + 3]);
   x.segment<3>(n_) = log3(base.transpose() * rotation_from_quaternion(quaternion));
+}
+
+// y and y (1 - 2π/|y|) are the same rotation.
+void Planner::continue_from(const Vector& before, Vector& x) const {
+  if (!turns()) return;
+  constexpr double turn = 2.0 * std::numbers::pi;
+  auto y = x.segment<3>(n_);
+  const double angle = y.norm();
+  if (angle == 0.0) return;
+  const double along = y.dot(before.segment<3>(n_)) / angle;
+  y *= 1.0 - turn * std::nearbyint((angle - along) / turn) / angle;
+}
+
+void Planner::local_rate(const Vector& x, const Matrix3& base, Vector& rate) const {
+  if (!turns()) return;
+  const Vector3 y = x.segment<3>(n_), omega = rate.segment<3>(n_);
+  rate.segment<3>(n_) = jlog3(y) * ((base * exp3(y)).transpose() * omega);
 }
 
 bool Planner::smooth(double t, const OwnState& state, const OwnGoal& goal, Piece& piece) {

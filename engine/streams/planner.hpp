@@ -42,6 +42,10 @@ class Planner {
 
   // A value in coordinates about a base.
   void local(const double* value, const Matrix3& base, Vector& x) const;
+  // The rotation vector of the same orientation that is nearest to that of other coordinates.
+  void continue_from(const Vector& before, Vector& x) const;
+  // x' at x for a velocity in world axes; a rotation vector's is y' = Jlog(y) exp(y)ᵀ R_bᵀ ω.
+  void local_rate(const Vector& x, const Matrix3& base, Vector& rate) const;
 
   // The quintic that reaches a goal in time; whether the bounds permit it.
   bool smooth(double t, const OwnState& state, const OwnGoal& goal, Piece& piece);

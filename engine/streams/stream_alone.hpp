@@ -1,42 +1,50 @@
-// A streamed reference without Python: a message is a target, or a velocity in world axes, and only
-// the newest is used.
+// A streamed reference without Python: a message is a target, or a velocity in world axes.
 #pragma once
+#include <algorithm>
 #include <limits>
 
 #include "pieces.hpp"
 
 namespace hsp {
 
-// What `RunningStream` does with the policy "latest", to the last bit.
+// What `StreamRun` does with messages that have no time of their own, to the last bit.
 struct StreamAlone {
   static constexpr const char* doc =
-      "A reference that goes to the newest target or velocity, whatever is sent and when.";
+      "A reference that follows targets and velocities, whatever is sent and when.";
   double linear;
-  double delay, dead_man, hold_after;  // [s]
+  double policy;                                                 // `Policy`
+  double delay, smoothing, extrapolation, dead_man, hold_after;  // [s]
   MotionBounds<In> bounds;
   InOut<'p'> piece;
-  InOut<'w'> target;                                  // what is followed
-  InOut<'n'> velocity;                                // linear, then angular, in world axes
-  InOutInts<1> follows;                               // `Follows`
-  InOut<1> now, begun, heard, fades_at, target_time;  // [s]
+  InOut<'k'> times;  // of waypoints, in order [s]
+  InOut<'k', 'w'> values;
+  InOutInts<1> count;                    // how many there are
+  InOut<'n'> velocity;                   // the command: linear, then angular, in world axes
+  InOutInts<1> commanded;                // whether it is followed, instead of waypoints
+  InOut<1> now, begun, heard, fades_at;  // [s]
   InOutInts<1> silent;
   InOut<'w'> sent_target;  // what comes to count in the next step
   InOut<'n'> sent_velocity;
-  InOutInts<1> sent;     // `Follows`
-  InOutInts<1> differs;  // whether it says something else than what is followed
+  InOutInts<1> sent;     // `Sent`, the last one
+  InOutInts<1> differs;  // whether what was sent differs in itself, or from a velocity
+  InOutInts<1> alone;    // whether a velocity was sent, which ends all waypoints
   ChartState<Out> out;
   PlannerMemory memory;
+  PassingMemory<'k'> passing;
 
-  enum Follows { NOTHING, TARGET, VELOCITY };
+  enum Policy { LATEST, INTERPOLATE, EXTRAPOLATE };
+  enum Sent { NOTHING, TARGET, VELOCITY };
   static constexpr double infinite = std::numeric_limits<double>::infinity();
-  static constexpr double largest = 1e6;  // of a number that is sent: see `message.py`
-  static constexpr double unit = 1e-3;    // deviation of a quaternion's norm from 1
+  static constexpr double largest = 1e6;    // of a number that is sent: see `message.py`
+  static constexpr double unit = 1e-3;      // deviation of a quaternion's norm from 1
+  static constexpr double kept = 1.0;       // how long waypoints that were passed are [s]
+  static constexpr Index considered = 256;  // waypoints before and after a time: see `planner.py`
 
   void check() const {
     check_piece(piece.size(), out.x.size());
     check_linear(linear, out.x.size());
-    check_at_least("target", target.size(),
-                   linear == out.x.size() ? out.x.size() : out.x.size() + 1);
+    check_values(values.cols(), linear, out.x.size());
+    check_at_least("times", times.size(), 1);
   }
 
   void operator()(double t) {
@@ -70,21 +78,34 @@ struct StreamAlone {
   // Take a velocity: whether it is one.
   template <class Values> bool send_velocity(const Values& given) {
     if (!(given.cwiseAbs().array() <= largest).all()) return false;
-    const std::int64_t last = sent[0] == NOTHING ? follows[0] : sent[0];
-    const bool same =
-        last == VELOCITY && (sent[0] == NOTHING ? velocity == given : sent_velocity == given);
-    differs[0] = differs[0] || !same;
+    differs[0] = differs[0] || (sent[0] == VELOCITY && sent_velocity != given);
     sent_velocity = given;
     sent[0] = VELOCITY;
+    alone[0] = true;
     return true;
   }
 
  private:
+  Index used() const { return std::clamp<Index>(count[0], 0, times.size()); }
+  // The first waypoint that is not before a time, and the first after it.
+  Index from(double t) const {
+    return std::lower_bound(times.data(), times.data() + used(), t) - times.data();
+  }
+  Index after(double t) const {
+    return std::upper_bound(times.data(), times.data() + used(), t) - times.data();
+  }
+  // The first one that matters at a time.
+  Index near(double t) const {
+    const Index ahead = after(t);
+    const Index first = std::min(from(t - smoothing), std::max<Index>(ahead - 3, 0));
+    return std::max(first, ahead - considered);
+  }
+
   void advance(double t, Piece& present) {
     now[0] = t;
     double due;
     while ((due = std::min(present.end(), fades_at[0])) <= t) {
-      if (due == fades_at[0] && follows[0] == VELOCITY) {
+      if (due == fades_at[0] && commanded[0]) {
         velocity.setZero();
         fades_at[0] = infinite;
       }
@@ -94,25 +115,46 @@ struct StreamAlone {
     const bool was = silent[0] != 0;
     silent[0] = t - std::max(heard[0], begun[0]) > hold_after;
     if (changed || (silent[0] && !was)) plan(t, present);
+    // The last one stays the goal.
+    const Index old = std::min(from(t - kept), std::max<Index>(used() - 1, 0));
+    forget(std::max(old, near(t)));
   }
 
   // Whether what was sent changes what lies ahead.
   bool take(double t) {
     if (sent[0] == NOTHING) return false;
     heard[0] = t;
-    const bool changed = differs[0] || silent[0];
-    follows[0] = sent[0];
+    const bool same = commanded[0] && !differs[0] && velocity == sent_velocity;
+    const bool changed = !same || silent[0];
+    if (alone[0] || policy == LATEST) count[0] = 0;
+    commanded[0] = sent[0] == VELOCITY;
     fades_at[0] = infinite;
     if (sent[0] == TARGET) {
-      target = sent_target;
-      target_time[0] = t + delay;
+      add(t + delay);
     } else {
       velocity = sent_velocity;
       fades_at[0] = t + dead_man;
     }
     sent[0] = NOTHING;
-    differs[0] = false;
+    differs[0] = alone[0] = false;
     return changed;
+  }
+
+  void add(double time) {
+    if (used() > 0 && times[used() - 1] == time) --count[0];
+    if (used() == times.size()) forget(1);
+    times[used()] = time;
+    values.row(used()) = sent_target.transpose();
+    ++count[0];
+  }
+
+  void forget(Index gone) {
+    if (gone == 0) return;
+    for (Index k = gone; k < used(); ++k) {
+      times[k - gone] = times[k];
+      values.row(k - gone) = values.row(k);
+    }
+    count[0] = used() - gone;
   }
 
   void plan(double t, Piece& present) {
@@ -120,21 +162,29 @@ struct StreamAlone {
     Planner& planner = memory.planner;
     present.state(t, state);
     rebase(state, static_cast<Index>(linear));
-    bool found = false;
-    if (silent[0] || follows[0] == NOTHING) found = planner.to_rest(t, state, delay, present);
-    else if (follows[0] == VELOCITY) {
-      memory.velocity = velocity;
-      found = planner.follow(t, state, memory.velocity, false, delay, present) != Planned::NONE;
-    } else {
-      found = planner.to_target(t, state, target.data(), target_time[0], delay, present);
-    }
-    if (found) return;
-    follows[0] = NOTHING;  // so far away that no motion is found
+    if (next(t, planner, state, present)) return;
+    count[0] = commanded[0] = 0;  // so far away that no motion is found
     fades_at[0] = infinite;
     // Where it cannot even rest, what follows is not finite, and the step is refused.
     if (planner.to_rest(t, state, delay, present)) return;
     present.begin(PieceForm::COAST, t, infinite, state.base);
     present.body().setConstant(std::numeric_limits<double>::quiet_NaN());
+  }
+
+  bool next(double t, Planner& planner, const OwnState& state, Piece& present) {
+    if (commanded[0] && !silent[0]) {
+      memory.velocity = velocity;
+      return planner.follow(t, state, memory.velocity, false, delay, present) != Planned::NONE;
+    }
+    if (silent[0] || used() == 0) return planner.to_rest(t, state, delay, present);
+    const Index first = near(t), end = std::min(after(t) + considered, used());
+    const Waypoints way{{times.data() + first, end - first},
+                        {values.row(first).data(), end - first, values.cols()},
+                        {nullptr, 0, 0},
+                        nullptr,
+                        end < used(),
+                        policy != EXTRAPOLATE};
+    return passing.plan(planner, t, state, way, {delay, smoothing, extrapolation}, present);
   }
 };
 

@@ -10,7 +10,7 @@ namespace hsp {
 const Kind* const* trajectory_kinds() {
   return kinds<Circle, Lissajous, UniformLine, Polynomial, PiecewisePolynomial, Blend, Crossfade,
                OrientationPath, Spin, BlendOrientation, CrossfadeOrientation, Screw,
-               OrientationOfChart, RotationVectors, Extrapolation, ExtrapolatedOrientation, Along,
-               AlongOrientation, AlongPose>();
+               OrientationOfChart, Extrapolation, ExtrapolatedOrientation, Along, AlongOrientation,
+               AlongPose>();
 }
 }  // namespace hsp

@@ -10,7 +10,6 @@ from hsp_control.config import Experiment
 from hsp_control.config.loaded_scenario import load_scenario
 from hsp_control.frozen import cmake_folder, compiler_flags
 from hsp_control.frozen import freeze as write
-from hsp_control.frozen.braking import StopGains
 
 _BUILDING = {"cmake_dir": cmake_folder, "flags": compiler_flags}
 
@@ -35,7 +34,6 @@ def freeze(options: argparse.Namespace) -> int:
             ("estimators",),
             "estimators are Python, which a frozen controller runs without",
         )
-    stop = experiment.scenario.live.stop
     with document.at():
         file = write(
             experiment.controller,
@@ -44,7 +42,7 @@ def freeze(options: argparse.Namespace) -> int:
             period=live_period(experiment),
             start=experiment.q0,
             payloads=options.payload,
-            stop=StopGains(*(getattr(stop, name) for name in StopGains._fields)),
+            stop=experiment.scenario.live.stop.gains,
         )
     out.print(f"Frozen: {file}", highlight=False)
     return 0

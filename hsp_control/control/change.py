@@ -171,10 +171,14 @@ class ChangeWeight(Change, type="weight"):
     def apply(self, setup: Setup) -> Setup:
         """Return the setup with the weight; see `Change.apply`."""
         k = _find_field(setup, self.field)
-        # The old weight fades out, and the same field fades in with the new weight:
-        # so weights that are ramps or functions of the state work alike.
-        new = replace(setup.terms[k].field, weight=self.weight)
-        return _with_field(setup, k, new, self)
+        term = setup.terms[k]
+        if term.weight is None:  # a ramp fades out while the same field fades in
+            new = replace(term.field, weight=self.weight)
+            return _with_field(setup, k, new, self)
+        weight = term.weight.then(self.at, self.ramp, float(self.weight))
+        terms = list(setup.terms)
+        terms[k] = term.with_weight(weight)
+        return replace(setup, terms=tuple(terms))
 
 
 class ExchangeField(Change, type="exchange_field"):

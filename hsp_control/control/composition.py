@@ -35,6 +35,9 @@ from hsp_control.trajectories.streams.run import StreamRun
 class Composition:
     """What a controller is made of, and what of it is active at a time."""
 
+    # whether a program writes what changes; see `Controller.without_python`
+    _without_python = False
+
     @suggesting
     def __init__(
         self,
@@ -106,7 +109,10 @@ class Composition:
 
     def _compose(self, start: Start, changes: Sequence[Change]) -> None:
         """Place all parts, and apply the changes."""
-        self._in_force.begin(TimeLine.of(self._declared.placed(start), changes))
+        setup = self._declared.placed(start)
+        if self._without_python:
+            setup = setup.with_set_weights()
+        self._in_force.begin(TimeLine.of(setup, changes))
 
     def _here(self) -> Start:
         """Return where the robot was at the last step."""

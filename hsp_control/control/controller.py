@@ -349,11 +349,16 @@ class Controller(Commanded):
             raise ControllerError("nothing has been computed yet")
         return active
 
-    def without_python(self) -> "Controller":
-        """Return a preview whose streams are commanded by a program, not by Python."""
+    def without_python(self, period: float) -> "Controller":
+        """Return a preview whose streams and weights a program sets, not Python.
+
+        Args:
+            period: Time between two steps, and so between two messages [s].
+        """
         other = self.preview()
         for stream in other._memory.streams:
-            stream.leave_python()
+            stream.leave_python(period)
+        other._without_python = True
         line = other._in_force.time_line
         other._compose(line.start, line.declared)
         return other

@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import Any, TypeVar
 
 from hsp_control.common.arrays import Array
 from hsp_control.constraints.contacts import Contact
@@ -14,7 +15,7 @@ from hsp_control.control.evolution import (
 )
 from hsp_control.null_space.fields import NullSpaceField
 from hsp_control.null_space.fields.field import terms_of
-from hsp_control.null_space.fields.weight import product
+from hsp_control.null_space.fields.weight import ConstantWeight, Weight, product
 from hsp_control.tasks import Task
 from hsp_control.trajectories.crossfade import settled
 
@@ -72,6 +73,30 @@ class PlannedTerm:
             return self.field
         weight = product(EvolvingWeight(self.presence), self.field.weight)
         return replace(self.field, weight=weight)
+
+    @property
+    def weight(self) -> Evolution[float] | None:
+        """The term's own weight in time; None: it is a ramp, or of the state."""
+        own = self.field.weight
+        if isinstance(own, EvolvingWeight):
+            return own.evolution
+        if isinstance(own, ConstantWeight):
+            return Evolution(own.value)
+        return None if isinstance(own, Weight) else Evolution(float(own))
+
+    def with_weight(self, weight: Evolution[float]) -> "PlannedTerm":
+        """Return the term with another weight of its own."""
+        own = weight.initial if weight.constant else EvolvingWeight(weight)
+        return replace(self, field=replace(self.field, weight=own))
+
+    def settled(self, t: float) -> "PlannedTerm":
+        """Return the term for times from t on: complete changes are folded."""
+        field, presence = settled(self.field, t), self.presence.settled(t)
+        term = changed(self, field=field, presence=presence)
+        weight = term.weight
+        if weight is None or (later := weight.settled(t)) is weight:
+            return term
+        return term.with_weight(later)
 
 
 def planned_task(key: int, task: Task, presence: Evolution[float]) -> PlannedTask:
@@ -172,3 +197,14 @@ def _settled(limits: RobotLimits | None, t: float) -> RobotLimits | None:
     barriers = settled(limits.barriers, t)
     same = barriers is limits.barriers
     return limits if same else replace(limits, barriers=barriers)
+
+
+Planned = TypeVar("Planned")
+
+
+def changed(planned: Planned, **changes: Any) -> Planned:
+    """Return it with some attributes replaced, or itself if they are the same."""
+    if all(getattr(planned, name) is value for name, value in changes.items()):
+        return planned
+    new: Planned = replace(planned, **changes)  # type: ignore[type-var]
+    return new

@@ -6,6 +6,8 @@ from itertools import pairwise
 from math import isfinite
 from typing import Any, TypeVar
 
+import numpy as np
+
 from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import ControllerError
 from hsp_control.common.suggestions import did_you_mean, listing
@@ -16,10 +18,12 @@ from hsp_control.control.planned import (
     PlannedLimits,
     PlannedTask,
     PlannedTerm,
+    changed,
 )
 from hsp_control.control.tools_in_force import PlannedTool
 from hsp_control.geometry.scene import Start
 from hsp_control.null_space.fields import FieldSum, NullSpaceField
+from hsp_control.null_space.fields.weight import SetWeight
 from hsp_control.null_space.metrics import Metric
 from hsp_control.trajectories.crossfade import settled
 from hsp_control.trajectories.schedule import Schedule
@@ -54,6 +58,10 @@ class Setup:
             return terms[0]
         return FieldSum(terms)
 
+    def with_set_weights(self) -> "Setup":
+        """Return the setup in which weights that are numbers are written elsewhere."""
+        return replace(self, terms=tuple(_set_weight(each) for each in self.terms))
+
     @property
     def end(self) -> float:
         """When the last change is complete [s]; -inf without changes."""
@@ -63,6 +71,7 @@ class Setup:
             *(task.presence for task in self.tasks),
             *(task.gains for task in self.tasks),
             *(term.presence for term in self.terms),
+            *(term.weight for term in self.terms if term.weight is not None),
             *(contact.presence for contact in self.contacts),
             *(payload.share for payload in self.payloads),
         ]
@@ -121,7 +130,7 @@ class Setup:
     def settled(self, t: float) -> "Setup":
         """Return the setup for times from t on: complete changes are folded."""
         tasks = [
-            _changed(
+            changed(
                 each,
                 task=settled(each.task, t),
                 presence=each.presence.settled(t),
@@ -129,14 +138,9 @@ class Setup:
             )
             for each in self.tasks
         ]
-        terms = [
-            _changed(
-                each, field=settled(each.field, t), presence=each.presence.settled(t)
-            )
-            for each in self.terms
-        ]
+        terms = [each.settled(t) for each in self.terms]
         contacts = [
-            _changed(
+            changed(
                 each,
                 contact=settled(each.contact, t),
                 presence=each.presence.settled(t),
@@ -144,10 +148,10 @@ class Setup:
             for each in self.contacts
         ]
         tools = [
-            _changed(each, placement=settled(each.placement, t)) for each in self.tools
+            changed(each, placement=settled(each.placement, t)) for each in self.tools
         ]
         payloads = [
-            _changed(each, share=each.share.settled(t)) for each in self.payloads
+            changed(each, share=each.share.settled(t)) for each in self.payloads
         ]
         return Setup(
             self.start._replace(scene=settled(self.start.scene, t)),
@@ -162,6 +166,13 @@ class Setup:
             tuple(each for each in payloads if each.share != ABSENT),
             tuple(tools),
         )
+
+
+def _set_weight(term: PlannedTerm) -> PlannedTerm:
+    if term.weight is None or not term.field.controls:
+        return term
+    numbers = np.array([term.weight.target, 0.0])
+    return replace(term, field=replace(term.field, weight=SetWeight(numbers)))
 
 
 def _events(presence: Evolution[float], schedule: Schedule | None) -> set[float]:
@@ -192,10 +203,3 @@ def _with(
     planned: tuple[Planned, ...], one: Planned, changes: dict[str, Any]
 ) -> tuple[Planned, ...]:
     return tuple(replace(each, **changes) if each is one else each for each in planned)
-
-
-def _changed(planned: Planned, **changes: Any) -> Planned:
-    """Return it with some attributes replaced, or itself if they are the same."""
-    if all(getattr(planned, name) is value for name, value in changes.items()):
-        return planned
-    return replace(planned, **changes)

@@ -3,7 +3,7 @@
     measured t, q, v → velocity filter → state → observer → law → start-up ramp
                      → offset of the effort → limits → effort → integral action
 
-The stages say their calls themselves; here they are put into the order of the chain.
+The stages have their calls themselves; here they are put into the order of the chain.
 """
 
 from collections.abc import Iterable
@@ -51,7 +51,7 @@ class CompensatedStep:
             sending: What records that it was sent.
 
         Raises:
-            FreezeError: If a compensator takes Python.
+            FreezeError: If a compensator is computed in Python.
         """
         state: RobotState = bound.state
         self._state, self._bound = state, bound

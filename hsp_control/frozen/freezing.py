@@ -15,10 +15,11 @@ from hsp_control.control.actuation.actuation import DeliveredAlone
 from hsp_control.control.bound_step import BoundStep
 from hsp_control.control.compensation import Compensation
 from hsp_control.control.controller import Controller
+from hsp_control.control.stop import LARGEST, StopGains
 from hsp_control.declaration import within
 from hsp_control.engine import Move, Plan
 from hsp_control.engine.plans import OnlyIf, PartCalls
-from hsp_control.frozen.braking import LARGEST, LIKE_LIVE, StopGains, stopping
+from hsp_control.frozen.braking import LIKE_LIVE, stopping
 from hsp_control.frozen.compensated_step import CompensatedStep
 from hsp_control.frozen.image import Image, Port
 from hsp_control.frozen.inputs import inputs_of, model_inputs, streams_of, targets_of
@@ -73,7 +74,7 @@ def freeze(
                 f"stop.{name} is {value:g}; at a period of {period:g} s it may be "
                 f"{most / period:g} at most"
             )
-    own = controller.without_python()
+    own = controller.without_python(period)
     image = _image(own, compensation, period, start, payloads, stop)
     file = Path(path)
     file.parent.mkdir(parents=True, exist_ok=True)
@@ -134,10 +135,8 @@ def _image(
     ]
     ports += targets_of(own, streams)
     read = Port("origin", "s", "what the clock read in the first step", origin)
-    if robot.unactuated:  # feet would have to hold it
-        return Image(move, [*ports, read], None)
-    stopped, said = stopping(own, bound, stop, held, origin, first)
-    return Image(move, [*ports, *said, read], stopped)
+    stopped, outputs = stopping(own, bound, stop, held, origin, first)
+    return Image(move, [*ports, *outputs, read], stopped)
 
 
 def _bare(bound: BoundStep, delivered: DeliveredAlone, sending: PartCalls) -> Move:

@@ -21,6 +21,7 @@ from hsp_control.declaration.quantities import LARGEST
 from hsp_control.engine import Call
 from hsp_control.frozen.image import PAYLOAD, TARGET, VELOCITY, Port
 from hsp_control.law import VARYING
+from hsp_control.null_space.fields.weight import SetWeight
 from hsp_control.tasks.compliant_task import impedance_of
 from hsp_control.trajectories.streams.alone import StreamAlone
 from hsp_control.trajectories.streams.followed import FollowedStream
@@ -51,6 +52,7 @@ def inputs_of(own: Controller, bound: BoundStep, period: float) -> Iterator[Inpu
         yield _matrix(f"{task.name}.Kp", "1/s²", meaning, Kp, most)
         meaning, most = "damping of the error equation", 2.0 / period
         yield _matrix(f"{task.name}.Kv", "1/s", meaning, Kv, most)
+    yield from _weights(own)
     K_N = bound.active.law.problem.gain
     meaning = "K_N, rate of the null-space error"
     name, most = "null_space_gain", min(2.0 / period, LARGEST)
@@ -61,6 +63,18 @@ def inputs_of(own: Controller, bound: BoundStep, period: float) -> Iterator[Inpu
     evolve = _evolving(k, np.nextafter(0.0, 1.0), most, 0)
     port = Port(name, "1/s", meaning, k, evolve)
     yield Input(port, (evolve, engine.ScaledIdentity(k=k, out=K_N)))
+
+
+def _weights(own: Controller) -> Iterator[Input]:
+    """Yield the weights of fields that are numbers; of one name that of the last."""
+    terms = {each.field.name: each.field.weight for each in own.setup.terms}
+    for name, weight in terms.items():
+        if not isinstance(weight, SetWeight):
+            continue
+        w, rate = weight.numbers[:1], weight.numbers[1:]
+        evolve = _evolving(w, 0.0, LARGEST, 0, rate)
+        meaning = "weight of the field"
+        yield Input(Port(f"{name}.weight", "-", meaning, w, evolve), (evolve,))
 
 
 def model_inputs(
@@ -134,7 +148,7 @@ def streams_of(own: Controller) -> dict[str, StreamAlone]:
 def targets_of(own: Controller, streams: Mapping[str, StreamAlone]) -> Iterator[Port]:
     """Yield the targets and velocities that a program sends.
 
-    They count from the next step on: the newest one, as of a stream's ``latest``.
+    They have no time of their own: they are sent when the next step is made.
     """
     for task in own.tasks:
         if task.name not in streams:
@@ -142,7 +156,7 @@ def targets_of(own: Controller, streams: Mapping[str, StreamAlone]) -> Iterator[
         stream = streams[task.name]
         turns = len(stream.target) > len(stream.velocity)
         unit = "m or the task's, and a quaternion x, y, z, w" if turns else "the task's"
-        meaning = "where the reference goes, and rests"
+        meaning = "where the reference goes"
         at = f"{task.name}.target"
         yield Port(at, unit, meaning, stream.target, stream.call, TARGET)
         meaning = "how it moves until it fades: linear, then angular, in world axes"
@@ -158,7 +172,9 @@ def _matrix(name: str, unit: str, meaning: str, own: Array, most: float) -> Inpu
     return Input(Port(name, unit, meaning, x, evolve), (evolve,))
 
 
-def _evolving(x: Array, least: float, most: float, definite: int) -> Call:
+def _evolving(
+    x: Array, least: float, most: float, definite: int, rate: Array | None = None
+) -> Call:
     return engine.Evolve(
         initial=x.copy(),
         targets=np.zeros((_MOST, len(x))),
@@ -168,4 +184,5 @@ def _evolving(x: Array, least: float, most: float, definite: int) -> Call:
         most=most,
         definite=definite,
         x=x,
+        rate=np.zeros(len(x)) if rate is None else rate,
     )

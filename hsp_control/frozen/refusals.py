@@ -15,7 +15,7 @@ from hsp_control.engine.plans import PartCall, StepPlan, planned, supplied
 from hsp_control.frozen.image import refusal
 from hsp_control.law import FieldSample, MetricSample, TaskSample
 from hsp_control.null_space.fields.field import terms_of
-from hsp_control.null_space.fields.weight import Ramp, Weight
+from hsp_control.null_space.fields.weight import Ramp, SetWeight, Weight
 from hsp_control.robot import RobotState
 from hsp_control.trajectories.streams.followed import FollowedStream
 
@@ -32,8 +32,8 @@ def check_steady(own: Controller) -> None:
     if own.changes:
         with within("changes"):
             raise FreezeError(
-                "a frozen controller follows no time line: remove the changes; gains "
-                "and K_N are inputs, which hsp_ramp changes"
+                "a frozen controller follows no time line: remove the changes; gains, "
+                "K_N and weights are inputs, which hsp_ramp changes"
             )
     for each in setup.tasks:
         if not each.always:
@@ -86,15 +86,14 @@ def check_streams(own: Controller) -> None:
     for task in own.tasks:
         for each in parts_within(task, FollowedStream):
             stream = each.run.stream
-            asked = {
-                "policy": stream.policy == "latest" or "only 'latest' can",
+            reasons = {
                 "source": stream.source is None or "the program sets targets instead",
                 "messages": stream.messages is None or "a recording is Python's",
                 "axes": stream.axes == "world" or "velocities are in world axes",
                 "stop_after": stream.stop_after is None
                 or "the program stops the robot; hold_after brings it to rest",
             }
-            for name, reason in asked.items():
+            for name, reason in reasons.items():
                 if reason is not True:
                     with within("tasks", task.name, "trajectory", name):
                         raise FreezeError(
@@ -135,7 +134,7 @@ def _plans_of(own: Controller, state: RobotState) -> Iterator[tuple[Path, StepPl
     for k, term in enumerate(terms_of(own.field)):
         path = "null_space", "fields", k
         yield path, planned(term.calls(state, metric, form, sample))
-        known = type(term.weight) is Ramp
+        known = type(term.weight) in (Ramp, SetWeight)
         if isinstance(term.weight, Weight) and not (known or term.weight.constant):
             weight = PartCall(term.weight.sample, state=state)
             yield (*path, "weight"), planned([weight])

@@ -10,6 +10,7 @@ from hsp_control.common.exceptions import LiveError
 from hsp_control.constraints.contacts import Contact
 from hsp_control.constraints.limits import RobotLimits
 from hsp_control.constraints.limits.joint_numbers import Positives, by_dof, own_maximum
+from hsp_control.control.stop import LARGEST, StopGains
 from hsp_control.declaration import Part, within
 from hsp_control.declaration.quantities import (
     Count,
@@ -18,7 +19,6 @@ from hsp_control.declaration.quantities import (
     Positive,
     PositiveCount,
 )
-from hsp_control.frozen.braking import LARGEST
 from hsp_control.robot import Robot
 
 
@@ -44,6 +44,11 @@ class StopSettings(Part, error=LiveError):
     standstill: Positive = 0.1
     """Largest joint speed at the end with which a run is completed [rad/s or m/s];
     above ``rest_speed``, because of noise."""
+
+    @property
+    def gains(self) -> StopGains:
+        """How a robot is braked, and then held."""
+        return StopGains(*(getattr(self, name) for name in StopGains._fields))
 
     def check_period(self, period: float) -> None:
         """Check that the sampled safe stop is stable at this period [s]."""

@@ -12,7 +12,7 @@ from functools import partial
 
 from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
 
-from campaigns import faults, random_states, soak
+from campaigns import faults, frozen, random_states, soak
 from campaigns.cases import KINDS, Count, count_cases, warm_up
 from campaigns.results import keep
 from hsp_control.common.resources import bundled_robots
@@ -63,6 +63,7 @@ def main(arguments: Iterable[str] | None = None) -> int:
         **{kind: partial(cases, kind=kind) for kind in CASES},
         "soak": soak.campaign,
         "faults": faults.campaign,
+        "frozen": frozen.campaign,
     }
     parser = argparse.ArgumentParser(prog="campaigns", description=__doc__)
     parser.add_argument("names", nargs="*", metavar="NAME", help=", ".join(stages))

@@ -6,7 +6,7 @@ from pathlib import Path
 from random import Random
 
 import pytest
-from campaigns import faults, random_states
+from campaigns import faults, frozen, random_states
 from campaigns.cases import KINDS, count_cases
 from campaigns.soak import PROCESS_GROWTH, PYTHON_GROWTH, soak
 from campaigns.worker import Worker
@@ -29,6 +29,14 @@ def test_random_states(robot: str) -> None:
     assert tally.limited > 0
     assert tally.damped > 0
     assert tally.status[2] > 0  # limits were met
+
+
+@pytest.mark.parametrize("config", ["panda_limits", "whole_body/solo12_trunk"])
+def test_frozen_controllers(config: str) -> None:
+    for tally in frozen.compared(config, 3000, 0.2, SEED):
+        assert not tally.different
+    assert (tally.run, tally.drawn) == (201, 3000)
+    assert sum(tally.status.values()) > 3000
 
 
 @pytest.mark.parametrize(

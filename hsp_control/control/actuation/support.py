@@ -99,9 +99,10 @@ class Support:
     @cached_property
     def _write_maps(self) -> Callable[[], object]:
         """The call that writes the map and the positions."""
-        return self._state.plan(self._maps()).call()
+        return self._state.plan(self.maps()).call()
 
-    def _maps(self) -> list[AnyCall]:
+    def maps(self) -> list[AnyCall]:
+        """Return the calls that write the map and the positions."""
         calls: list[AnyCall] = []
         for contact, where in zip(self.contacts, self.points, strict=True):
             frame = self._state.frame(contact.frame)
@@ -129,7 +130,7 @@ class Support:
         assert not self._scheduled
         assert not self._commanded
         copy = PartCall(engine.Copy, x=wanted, out=self._wanted)
-        return [*self._maps(), copy, self._solution()]
+        return [*self.maps(), copy, self._solution()]
 
     def minimum_norm_forces(self, wanted: Array) -> Array:
         """Return the forces of minimum Σ (f - f_ref)²/e, and write `tau`."""

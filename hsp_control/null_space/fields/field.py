@@ -18,7 +18,13 @@ from hsp_control.declaration.quantities import NonNegative, OrInstance
 from hsp_control.engine.plans import AnyCall, PartCall, PartCalls, says
 from hsp_control.geometry.scene import Start
 from hsp_control.law import FieldSample, MetricSample
-from hsp_control.null_space.fields.weight import Ramp, Weight, product, sample_weight
+from hsp_control.null_space.fields.weight import (
+    Ramp,
+    SetWeight,
+    Weight,
+    product,
+    sample_weight,
+)
 from hsp_control.robot import RobotState
 
 
@@ -223,7 +229,9 @@ class FieldSum(NullSpaceField):
         for k, (term, sample) in enumerate(zip(self.terms, samples, strict=True)):
             calls += term.calls(state, metric, form, sample)
             weights = np.zeros(2)
-            if type(term.weight) is Ramp:
+            if isinstance(term.weight, SetWeight):
+                weights = term.weight.numbers
+            elif type(term.weight) is Ramp:
                 update = term.weight.call().given(time=state.time, weight=weights)
                 calls.append(update)
             elif isinstance(term.weight, Weight) and not term.weight.constant:

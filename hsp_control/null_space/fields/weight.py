@@ -98,6 +98,18 @@ class StateWeight(Weight):
         return value, float(rate_along_flow(self.function, state))
 
 
+class SetWeight(Weight):
+    """w and w' that are written elsewhere, while the field is computed."""
+
+    numbers: InstanceOf[np.ndarray]
+    """w [-] and w' [1/s], shape (2,), read in each step."""
+
+    def sample(self, state: RobotState) -> tuple[float, float]:
+        """Return w and w'; see `Weight.sample`."""
+        value, rate = self.numbers.tolist()
+        return value, rate
+
+
 class Product(Weight):
     """w = a b, w' = a' b + a b': the product of two weights."""
 

@@ -1,5 +1,6 @@
 """A stream without Python: what a program sends to a frozen controller."""
 
+from math import ceil
 from typing import Any
 
 import numpy as np
@@ -13,11 +14,12 @@ from hsp_control.trajectories.pose import PoseSample
 from hsp_control.trajectories.streams.chart import Chart, State
 from hsp_control.trajectories.streams.planner import Policy
 from hsp_control.trajectories.streams.segments import MotionBounds, coast
+from hsp_control.trajectories.streams.waypoints import CONSIDERED, KEPT, MOST
 from hsp_control.trajectories.trajectory import TrajectorySample
 
 
 class StreamAlone:
-    """What a `Planner` does with the newest target or velocity, as calls.
+    """What a `Planner` does with targets and velocities that are sent now, as calls.
 
     Attributes:
         target: What is sent next, the start at first: linear coordinates, then perhaps
@@ -27,9 +29,14 @@ class StreamAlone:
     """
 
     def __init__(
-        self, chart: Chart, bounds: MotionBounds, policy: Policy, start: State
+        self,
+        chart: Chart,
+        bounds: MotionBounds,
+        policy: Policy,
+        start: State,
+        period: float,
     ) -> None:
-        """Begin at rest."""
+        """Begin at rest; ``period``: time between two messages, at least [s]."""
         n, linear = chart.size, chart.linear
         self._chart = chart
         self._state = vars(State.allocate(n))
@@ -37,16 +44,17 @@ class StreamAlone:
         if chart.rotational:
             value = np.append(value, pin.Quaternion(start.base).coeffs())
         self.target, self.velocity = value.copy(), np.zeros(n)
-        integers = ("follows", "silent", "sent", "differs")
+        integers = ("count", "commanded", "silent", "sent", "differs", "alone")
+        most = _most_waypoints(policy, period)
         self._memory: dict[str, Any] = {
             "piece": coast(0.0, np.inf, start).numbers,
-            "target": value.copy(),
+            "times": np.zeros(most),
+            "values": np.zeros((most, len(value))),
             "velocity": np.zeros(n),
             "now": np.full(1, -np.inf),
             "begun": np.full(1, -np.inf),
             "heard": np.full(1, -np.inf),
             "fades_at": np.full(1, np.inf),
-            "target_time": np.zeros(1),
             "sent_target": self.target,
             "sent_velocity": self.velocity,
             **{name: np.zeros(1, dtype=np.int64) for name in integers},
@@ -54,7 +62,10 @@ class StreamAlone:
         self._first = {name: array.copy() for name, array in self._memory.items()}
         self._arguments: dict[str, Any] = {
             "linear": linear,
+            "policy": _POLICIES.index(policy.name),
             "delay": policy.delay,
+            "smoothing": policy.smoothing,
+            "extrapolation": policy.extrapolation,
             "dead_man": policy.dead_man,
             "hold_after": policy.hold_after,
             "bounds": bounds,
@@ -83,3 +94,15 @@ class StreamAlone:
                 given = {"base": self._state["base"], "y": y, "out": part}
                 calls.append(PartCall(engine.OrientationOfChart, t=TIME, **given))
         return calls
+
+
+_POLICIES = "latest", "interpolate", "extrapolate"
+
+
+def _most_waypoints(policy: Policy, period: float) -> int:
+    """Return how many waypoints there can be that matter, one each period."""
+    if policy.name == "latest":
+        return 1
+    passed = max(min(policy.smoothing, KEPT) / period, 3.0)
+    found = min(passed, CONSIDERED) + policy.delay / period
+    return min(ceil(1.1 * found) + 2, MOST)  # periods are not exactly alike

@@ -15,7 +15,6 @@ import numpy as np
 
 from hsp_control import engine
 from hsp_control.common.arrays import Array
-from hsp_control.engine.rotations import exp3, jlog3
 from hsp_control.trajectories.orientation import OrientationSample
 from hsp_control.trajectories.trajectory import TrajectorySample
 
@@ -62,29 +61,3 @@ class Chart:
         n = self.linear
         y = TrajectorySample(state.x[n:], state.rate[n:], state.acceleration[n:])
         engine.OrientationOfChart(base=state.base, y=y, out=out)()
-
-    def local(self, values: Array, base: Array) -> Array:
-        """Return values, (k, width), in local coordinates about a base, (k, n).
-
-        Rotation vectors continue each other beyond π.
-        """
-        x = np.empty((len(values), self.size))
-        n = self.linear
-        x[:, :n] = values[:, :n]
-        if self.rotational:
-            y = np.empty((len(values), 3))
-            quaternions = np.ascontiguousarray(values[:, n:])
-            engine.RotationVectors(quaternions=quaternions, base=base, y=y)()
-            x[:, n:] = y
-        return x
-
-    def local_rate(self, x: Array, velocity: Array, base: Array) -> Array:
-        """Return x' at x for a velocity in world axes, each of shape (n,).
-
-        A rotation vector's rate is y' = Jlog(y) Rᵀ ω.
-        """
-        rate = velocity.copy()
-        if self.rotational:
-            y, omega = x[self.linear :], velocity[self.linear :]
-            rate[self.linear :] = jlog3(y) @ (base @ exp3(y)).T @ omega
-        return rate

@@ -15,26 +15,17 @@ from typing import NamedTuple
 
 import numpy as np
 
-from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import StreamError
 from hsp_control.trajectories.streams.chart import Chart, State
 from hsp_control.trajectories.streams.message import Message
-from hsp_control.trajectories.streams.segments import (
-    SAME,
-    Goal,
-    Joiner,
-    MotionBounds,
-    Segment,
-    coast,
-)
+from hsp_control.trajectories.streams.segments import MotionBounds, Segment, coast
 from hsp_control.trajectories.streams.velocities import (
     Axes,
     Velocities,
     VelocityCommand,
 )
-from hsp_control.trajectories.streams.waypoints import KEPT, Waypoints, derivatives
+from hsp_control.trajectories.streams.waypoints import KEPT, Passing, Waypoints
 
-_CONSIDERED = 256  # the reference joins one of the next waypoints, at most this many
 _AT_ONCE = 256  # of more messages that come at once the oldest do not count
 
 
@@ -63,7 +54,7 @@ class Planner:
     ) -> None:
         """Begin at rest."""
         self.chart, self._policy = chart, policy
-        self._joiner = Joiner(bounds, chart.linear)
+        self._passing = Passing(chart, bounds)
         self._velocities = Velocities(chart, bounds)
         self._begin = self.now = self._oldest = -inf
         self._heard = -inf
@@ -189,50 +180,15 @@ class Planner:
             return self._velocities.follow(t, state, self._command, policy.delay)
         if not waypoints.times:
             return self._to_rest(t, state)
-        if len(waypoints.times) == 1 and self._ends_at_rest:
-            to = waypoints.values[0], waypoints.times[0], policy.delay
-            return self._joiner.to_target(t, state, *to)
-        used = waypoints.near(t, policy.smoothing, _CONSIDERED)
-        first = used.start
-        values = np.array(waypoints.values[used])
-        times = np.array(waypoints.times[used])
-        x = self.chart.local(values, state.base)
-        last, ahead = len(times) - 1, int(np.searchsorted(times, t, "right"))
-        goals = _Goals(self.chart, waypoints, times, x, first, state.base)
-        for k in _candidates(ahead, last):
-            goal = goals.passed(k, policy.smoothing)
-            if k == ahead == last and self._ends_at_rest:
-                goal = goal.at_rest()  # no message shows how it goes on
-            if (smooth := self._joiner.smooth(t, state, goal)) is not None:
-                return smooth
-        goal = goals.passed(last, policy.smoothing)
-        end = goal.time + (0.0 if self._ends_at_rest else policy.extrapolation)
-        if goal.rate.any() and not self._ends_at_rest and t >= end:
-            return self._to_rest(t, state)
-        if goal.rate.any() and t < end:
-            return self._meet(t, state, goal, end)
-        if _on_line(state, goal.at_rest(), t):
-            return self._to_rest(t, state)
-        return self._joiner.fastest(t, state, goal.at_rest())
-
-    @property
-    def _ends_at_rest(self) -> bool:
-        """Whether the reference comes to rest at the last waypoint, not beyond it."""
-        given = self.waypoints.velocities[-1] is not None
-        return self._policy.name != "extrapolate" and not given
-
-    def _meet(self, t: float, state: State, goal: Goal, end: float) -> Segment:
-        """Return a piece that meets a goal that moves, in ``delay`` or later."""
-        if _on_line(state, goal, t):
-            return coast(t, end, state)
-        soon = t + self._policy.delay
-        if soon <= end:
-            met = goal._replace(time=soon, x=goal.at(soon))
-            if (smooth := self._joiner.smooth(t, state, met)) is not None:
-                return smooth
-        meeting = self._joiner.fastest(t, state, goal)
-        meeting.end = min(meeting.end, end)  # unless a message shows how it goes on
-        return meeting
+        return self._passing.through(
+            t,
+            state,
+            waypoints,
+            delay=policy.delay,
+            smoothing=policy.smoothing,
+            extrapolation=policy.extrapolation,
+            rests=policy.name != "extrapolate" and waypoints.velocities[-1] is None,
+        )
 
     def _to_rest(self, t: float, state: State) -> Segment:
         """Return a piece that brakes, or stays."""
@@ -252,52 +208,3 @@ class Planner:
         if gone > 0:
             del self._segments[:gone], self._starts[:gone]
             self._oldest = self._starts[0]
-
-
-class _Goals:
-    """Waypoints in local coordinates, with the derivatives that they have there."""
-
-    def __init__(
-        self,
-        chart: Chart,
-        waypoints: Waypoints,
-        times: Array,
-        x: Array,
-        first: int,
-        base: Array,
-    ) -> None:
-        """Keep the waypoints from ``first`` on: times (m,) and coordinates (m, n)."""
-        self._chart, self._times, self._x, self._base = chart, times, x, base
-        self._given = waypoints.velocities[first : first + len(times)]
-        self._more = first + len(times) < len(waypoints.times)
-
-    def passed(self, k: int, smoothing: float) -> Goal:
-        """Return waypoint k with the derivatives that it was given, or shows."""
-        time, x, given = float(self._times[k]), self._x[k], self._given[k]
-        still = np.zeros_like(x)
-        if given is not None:
-            return Goal(time, x, self._chart.local_rate(x, given, self._base), still)
-        if len(self._times) == 1:
-            return Goal(time, x, still, still)
-        x, rate, curve = derivatives(self._times, self._x, k, smoothing)
-        newest = k == len(self._times) - 1 and not self._more
-        return Goal(time, x, rate, still if newest else curve)
-
-
-def _candidates(first: int, last: int) -> list[int]:
-    """Return which waypoints to try: the next ones closely, later ones more widely."""
-    found: list[int] = []
-    while first <= last:
-        found.append(first)
-        first += 1 + len(found) ** 2 // 8
-    return found
-
-
-def _steady(state: State) -> bool:
-    return bool(np.abs(state.acceleration).max() < SAME)
-
-
-def _on_line(state: State, goal: Goal, t: float) -> bool:
-    """Return whether a state moves with a goal already."""
-    apart = np.abs(state.x - goal.at(t)).max(), np.abs(state.rate - goal.rate).max()
-    return max(apart) < SAME and _steady(state)

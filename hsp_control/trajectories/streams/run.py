@@ -45,7 +45,8 @@ class StreamRun:
         self.chart = Chart(len(self._start.x) - 3 * rotational, rotational)
         self._space = Space(self.chart.linear, rotational)
         self._inbox = Inbox(self._space)
-        self._aside = self._logged = self._without_python = False
+        self._aside = self._logged = False
+        self._period_alone: float | None = None  # of a run without Python
         self._reader: Reader | None = None
         self._planner: Planner | None = None
         self._alone: StreamAlone | None = None
@@ -120,7 +121,7 @@ class StreamRun:
             )
         self._inbox = before._inbox
         self._aside, self._logged = before._aside, before._logged
-        self._without_python = before._without_python
+        self._period_alone = before._period_alone
 
     @property
     def inbox(self) -> Inbox:
@@ -223,16 +224,21 @@ class StreamRun:
 
     # -- without Python ---------------------------------------------------------------
 
-    def leave_python(self) -> None:
-        """Take only what a program sends, from the next run on; see `StreamAlone`."""
-        self._without_python = True
+    def leave_python(self, period: float) -> None:
+        """Take only what a program sends, from the next run on; see `StreamAlone`.
+
+        Args:
+            period: Time between two messages, at least [s].
+        """
+        self._period_alone = period
 
     @property
     def alone(self) -> StreamAlone | None:
         """What computes it without Python; None: it takes messages."""
-        if self._without_python and self._alone is None:
+        period = self._period_alone
+        if period is not None and self._alone is None:
             bounds, how = self.stream.bounds(), self.stream.how
-            self._alone = StreamAlone(self.chart, bounds, how, self._start)
+            self._alone = StreamAlone(self.chart, bounds, how, self._start, period)
         return self._alone
 
     def __repr__(self) -> str:

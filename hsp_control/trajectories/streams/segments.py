@@ -70,27 +70,6 @@ PLANNED = 0.95
 """Share of an angular speed up to which motions are planned; see `angular_bounds`."""
 
 
-SAME = 1e-7  # states that differ by less are the same, in x, x' and x''
-
-
-class Goal(NamedTuple):
-    """Where the reference should be at a time, in local coordinates."""
-
-    time: float  # when [s]
-    x: Array  # (n,)
-    rate: Array  # x', (n,) [1/s]
-    acceleration: Array  # x'', (n,) [1/s²]
-
-    def at(self, t: float) -> Array:
-        """Return where it is at another time, at its velocity, shape (n,)."""
-        return self.x + (t - self.time) * self.rate
-
-    def at_rest(self) -> "Goal":
-        """Return the goal as one to stay at."""
-        still = np.zeros_like(self.x)
-        return self._replace(rate=still, acceleration=still)
-
-
 class Segment(ABC):
     """A piece of the reference, from ``start`` to ``end`` [s], about ``base``."""
 
@@ -141,54 +120,6 @@ def coast(start: float, end: float, state: State) -> Piece:
 def room(n: int) -> Array:
     """Return room for the numbers of a piece with n coordinates."""
     return np.zeros(_HEAD + _ROWS * n)
-
-
-class Joiner:
-    """Makes the segments that lead from a state to a goal, within the bounds."""
-
-    def __init__(self, bounds: MotionBounds, linear: int) -> None:
-        """Set the bounds, and how many coordinates are linear."""
-        self.bounds, self._linear = bounds, linear
-
-    def smooth(self, t: float, state: State, goal: Goal) -> Segment | None:
-        """Return the quintic that reaches a goal in time, if the bounds permit."""
-        return self._planned(engine.SmoothPiece, t, state, goal=goal)
-
-    def fastest(self, t: float, state: State, goal: Goal) -> Segment:
-        """Return the fastest way to a goal, which keeps moving at its velocity.
-
-        A goal at rest is reached at its time, or as soon as the bounds permit. Where
-        the goal moves, a position does not wait for an orientation that is behind.
-
-        Raises:
-            StreamError: If no motion within the bounds is found.
-        """
-        return found_motion(self._planned(engine.FastestPiece, t, state, goal=goal))
-
-    def to_target(
-        self, t: float, state: State, value: Array, time: float, delay: float
-    ) -> Segment:
-        """Return what comes to rest at a value, at a time or later.
-
-        Raises:
-            StreamError: If no motion within the bounds is found.
-        """
-        given = {"value": value, "time": float(time), "delay": delay}
-        return found_motion(self._planned(engine.TargetPiece, t, state, **given))
-
-    def _planned(
-        self, kind: engine.Kind, t: float, state: State, **given: object
-    ) -> Segment | None:
-        numbers = room(len(state.x))
-        found = kind(
-            t=float(t),
-            linear=self._linear,
-            bounds=self.bounds,
-            state=vars(state),
-            piece=numbers,
-            **given,
-        )()
-        return Piece(numbers, state.base) if found else None
 
 
 def found_motion(segment: Segment | None) -> Segment:

@@ -1,4 +1,4 @@
-"""Waypoints on the controller's clock, and the derivatives that they show."""
+"""Waypoints on the controller's clock, and the pieces that pass through them."""
 
 from bisect import bisect_left, bisect_right
 from collections import deque
@@ -6,15 +6,25 @@ from copy import copy, deepcopy
 
 import numpy as np
 
+from hsp_control import engine
 from hsp_control.common.arrays import Array
+from hsp_control.trajectories.streams.chart import Chart, State
 from hsp_control.trajectories.streams.message import Message
+from hsp_control.trajectories.streams.segments import (
+    MotionBounds,
+    Piece,
+    Segment,
+    found_motion,
+    room,
+)
 
 _WINDOW = 2.0  # the sender's clock is compared with the controller's over this time [s]
 _NEW_CLOCK = 1.0  # a sender's time that jumps back by more shows another start [s]
 KEPT = 1.0
 """Waypoints that were passed are kept so long, to estimate velocities [s]."""
 MOST = 4096  # most waypoints that are kept
-_APART = 0.01  # between neighbours for derivatives [s]; closer ones differ by noise
+CONSIDERED = 256
+"""The reference joins one of the next waypoints, at most this many."""
 
 
 class SenderClock:
@@ -110,11 +120,11 @@ class Waypoints:
         """Return the index of the first waypoint later than a time [s]."""
         return bisect_right(self.times, t)
 
-    def near(self, t: float, window: float, most: int) -> slice:
-        """Return which waypoints matter at a time: some passed ones, ``most`` ahead."""
+    def near(self, t: float, window: float) -> slice:
+        """Return which waypoints matter at a time: some passed ones, some ahead."""
         ahead = self.ahead(t)
         first = min(bisect_left(self.times, t - window), max(ahead - 3, 0))
-        return slice(max(first, ahead - most), ahead + most)
+        return slice(max(first, ahead - CONSIDERED), ahead + CONSIDERED)
 
     def forget(self, t: float) -> None:
         """Forget waypoints that were passed long before a time [s], and the surplus."""
@@ -141,34 +151,65 @@ class Waypoints:
         self.velocities.insert(k, velocity)
 
 
-def derivatives(times: Array, x: Array, k: int, window: float) -> tuple[Array, ...]:
-    """Return x_k, x_k' and x_k'' of a parabola through waypoints, shape (n,) each.
+class Passing:
+    """Makes the pieces that go on through waypoints, within the bounds.
 
-    Through a waypoint and its two neighbours, at least `_APART` from it; or, with a
-    window, nearest to all waypoints not farther from it in time, which smooths noise
-    (Savitzky and Golay).
-
-    Shapes: times (m,) [s], x (m, n).
+    Each waypoint has the velocity that it was given; or the derivatives that it shows
+    with its neighbours, or of the parabola nearest to those around it; see
+    ``engine/streams/waypoints.cpp``.
     """
-    if window > 0.0:
-        wide = slice(*np.searchsorted(times, [times[k] - window, times[k] + window]))
-        if wide.stop - wide.start > 3:
-            return _nearest_parabola(times[wide] - times[k], x[wide])
-    i = min(int(np.searchsorted(times, times[k] - _APART, "right")) - 1, k - 1)
-    j = max(int(np.searchsorted(times, times[k] + _APART)), k + 1)
-    if i >= 0 and j < len(times):
-        before, after = times[k] - times[i], times[j] - times[k]
-        back, forth = (x[k] - x[i]) / before, (x[j] - x[k]) / after
-        curve = 2.0 * (forth - back) / (before + after)
-        return x[k], (after * back + before * forth) / (before + after), curve
-    i, j = max(i, 0), min(j, len(times) - 1)
-    slope = (x[j] - x[i]) / (times[j] - times[i])
-    return x[k], slope, np.zeros_like(slope)
 
+    def __init__(self, chart: Chart, bounds: MotionBounds) -> None:
+        """Set the coordinates, and the bounds in them."""
+        self._chart, self._bounds = chart, bounds
 
-def _nearest_parabola(tau: Array, x: Array) -> tuple[Array, ...]:
-    """Return the value and derivatives at tau = 0 of the least-squares parabola."""
-    scale = float(np.abs(tau).max())
-    powers = np.vander(tau / scale, 3, increasing=True)
-    c = np.linalg.lstsq(powers, x, rcond=None)[0]
-    return c[0], c[1] / scale, 2.0 * c[2] / scale**2
+    def through(
+        self,
+        t: float,
+        state: State,
+        waypoints: Waypoints,
+        *,
+        delay: float,
+        smoothing: float,
+        extrapolation: float,
+        rests: bool,
+    ) -> Segment:
+        """Return the piece that goes on through waypoints, of which there is one.
+
+        Args:
+            t: When it begins [s].
+            state: Where it begins, at the base of its chart.
+            waypoints: The waypoints.
+            delay: From a waypoint's own time to when the reference is there [s].
+            smoothing: How far in time waypoints are smoothed [s].
+            extrapolation: How long it goes on at the last velocity [s].
+            rests: Whether it comes to rest at the last one, not beyond it.
+
+        Raises:
+            StreamError: If no motion within the bounds is found.
+        """
+        near = waypoints.near(t, smoothing)
+        times = np.array(waypoints.times[near])
+        given = waypoints.velocities[near]
+        velocities = np.zeros((len(times), self._chart.size))
+        for row, velocity in zip(velocities, given, strict=True):
+            if velocity is not None:
+                row[:] = velocity
+        numbers = room(self._chart.size)
+        found = engine.WaypointPiece(
+            t=float(t),
+            linear=self._chart.linear,
+            delay=delay,
+            smoothing=smoothing,
+            extrapolation=extrapolation,
+            more=float(near.stop < len(waypoints.times)),
+            rests=float(rests),
+            bounds=self._bounds,
+            state=vars(state),
+            times=times,
+            values=np.array(waypoints.values[near]),
+            velocities=velocities,
+            given=np.array([velocity is not None for velocity in given]),
+            piece=numbers,
+        )()
+        return found_motion(Piece(numbers, state.base) if found else None)

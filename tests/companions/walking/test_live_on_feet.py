@@ -27,9 +27,10 @@ from hsp_control.live import (
     Measurement,
     OperatorRequests,
     Phase,
+    StopSettings,
     run_loop,
 )
-from hsp_control.live.safe_stop import StandingFeet
+from hsp_control.live.safe_stop import SafeStop, StandingFeet
 from hsp_control.live.state_reader import valid_measurement
 from hsp_control.live.udp import SensorLayout
 
@@ -215,21 +216,25 @@ def test_joints_and_feet_exert_the_force_of_a_safe_stop() -> None:
     robot, contacts = experiment.robot, experiment.controller.contacts
     state = robot.state(0.0, experiment.q0, experiment.v0)
     feet, random = StandingFeet(robot, contacts), np.random.default_rng(3)
+    settings, free = StopSettings(rest_speed=1e-9), np.full(robot.nv, np.inf)
+    rest = np.zeros(robot.nv)
+    gravity = robot.inverse_dynamics(experiment.q0, rest, rest)
     J = np.vstack([state.frame(each.frame).jacobian[:3] for each in contacts])
     arms = [each.arms(state.frame(each.frame))[0] for each in contacts]
     angular = [state.frame(each.frame).jacobian[3:] for each in contacts]
     J -= np.vstack([np.cross(r, w, axis=0) for r, w in zip(arms, angular, strict=True)])
     for _ in range(5):
-        force = random.standard_normal(robot.nv)
-        tau = feet.joint_effort(state, force)
+        v = random.standard_normal(robot.nv)
+        v -= np.linalg.pinv(J) @ (J @ v)
+        state.update(0.0, experiment.q0, v)
+        force = gravity - settings.damping * state.mass_matrix @ v
+        tau = SafeStop(robot, settings, free, 1e-3, feet).effort(state)
         assert not tau[:6].any()
         forces, *_ = np.linalg.lstsq(J.T, force - tau)
         np.testing.assert_allclose(J.T @ forces, force - tau, atol=1e-10)
-        v = random.standard_normal(robot.nv)
-        v -= np.linalg.pinv(J) @ (J @ v)
         assert v @ tau == pytest.approx(v @ force, abs=1e-9)
-    rest = np.zeros(robot.nv)
-    held = feet.joint_effort(state, robot.inverse_dynamics(state.q, rest, rest))
+    state.update(0.0, experiment.q0, experiment.v0)
+    held = SafeStop(robot, settings, free, 1e-3, feet).effort(state)
     law = experiment.controller.compute(state).tau
     assert np.abs(held).max() < 3.0 * np.abs(law).max() + 1.0
 

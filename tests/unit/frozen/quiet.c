@@ -43,7 +43,7 @@ static void send(hsp_controller* controller, const char* name, long k) {
   double values[16];
   const hsp_port* port = hsp_port_of(controller, name);
   if (!port || port->size > 16 || hsp_get(controller, name, values, port->size)) return;
-  values[k % 3] += k % 2 ? 0.3 : -0.3;
+  values[k % (port->size < 3 ? port->size : 3)] += k % 2 ? 0.3 : -0.3;
   hsp_set(controller, name, values, port->size);
 }
 

@@ -5,13 +5,16 @@ from typing import Any
 
 import numpy as np
 import pytest
-from frozen_library import FAILED, OK, Opened
+from frozen_library import BRAKING, FAILED, HOLDING, OK, WRONG_STATE, Opened
 from frozen_runs import EXAMPLE, compiled, computed, random_states, replayed
 
 import hsp_control as hsp
 from hsp_control.common.exceptions import FreezeError
+from hsp_control.live import LiveSettings, SafeStop, StopSettings
+from hsp_control.live.safe_stop import StandingFeet
 
 SEED = 61
+H = 0.001
 
 
 @pytest.fixture(scope="module")
@@ -43,16 +46,58 @@ def test_the_same_bits_on_feet(
     assert met == statuses
 
 
-def test_nothing_brakes_a_robot_on_feet(tmp_path: Path) -> None:
+@pytest.mark.parametrize("name", ["whole_body/solo12_trunk", "whole_body/talos_circle"])
+def test_a_robot_on_feet_is_stopped_as_by_a_live_loop(
+    name: str, tmp_path: Path
+) -> None:
+    experiment = hsp.load_experiment(name)
+    controller, robot = experiment.controller, experiment.robot
+    opened = Opened(hsp.freeze(controller, tmp_path / "frozen.hsp"))
+    limits = LiveSettings().effort_limits(robot, controller.limits)
+    feet = StandingFeet(robot, controller.contacts)
+    expected = SafeStop(robot, StopSettings(), limits, H, feet)
+    state, q = hsp.RobotState(robot), experiment.q0
+    v = np.random.default_rng(SEED).normal(0.0, 0.2, robot.nv)
+    assert opened.step(0.0, q, v) >= OK
+    phases = []
+    for k in range(1, 100):
+        phases.append(opened.stop(k * H, q, v))
+        tau = expected.effort(state.update(k * H, q, v))
+        np.testing.assert_array_equal(opened.tau, tau)
+        q, v = robot.integrate(q, H * v), 0.9 * v
+    assert not tau[:6].any()
+    assert sorted(phases) == phases
+    assert {*phases} == {BRAKING, HOLDING}
+
+
+def test_a_robot_on_feet_that_sees_nothing_any_more_is_stopped(tmp_path: Path) -> None:
     experiment = hsp.load_experiment("whole_body/solo12_trunk")
+    robot, q = experiment.robot, experiment.q0
     opened = Opened(hsp.freeze(experiment.controller, tmp_path / "frozen.hsp"))
-    q, v = experiment.q0, np.zeros(18)
+    v = np.zeros(robot.nv)
+    v[6:] = np.linspace(-0.4, 0.4, robot.nv - 6)
+    assert opened.step(0.0, q, v) >= OK
+    last = opened.tau.copy()
+    for k in range(1, 500):
+        assert opened.step(k * H, np.nan * q, v) == WRONG_STATE
+        if k <= 5:
+            np.testing.assert_array_equal(opened.tau, last)
+    feet = StandingFeet(robot, experiment.controller.contacts)
+    rests = SafeStop(robot, StopSettings(), np.full(robot.nv, np.inf), H, feet)
+    held = rests.effort(robot.state(0.0, q, np.zeros(robot.nv)))
+    assert np.abs(last - held).max() > 0.02
+    np.testing.assert_allclose(opened.tau, held, rtol=0.0, atol=1e-3)
+
+
+def test_what_nothing_carries_is_not_stopped(tmp_path: Path) -> None:
+    controller = solo(contacts=(), base="driven")
+    opened = Opened(hsp.freeze(controller, tmp_path / "frozen.hsp"))
+    q, v = controller.setup.start.state.q, np.zeros(18)
     assert opened.step(0.0, q, v) >= OK
     last = opened.tau.copy()
     assert opened.stop(0.001, q, v) == FAILED
-    assert "on feet" in opened.error
+    assert "nothing carries" in opened.error
     np.testing.assert_array_equal(opened.tau, last)
-    assert "solo12.payload" not in opened.ports
 
 
 def solo(**changes: Any) -> hsp.Controller:

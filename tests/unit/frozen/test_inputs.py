@@ -77,6 +77,39 @@ def test_gains_and_the_null_space_gain(ramp: float, tmp_path: Path) -> None:
     )
 
 
+@pytest.mark.parametrize("ramp", [0.0, 0.02])
+@pytest.mark.parametrize("fields", [1, 2])
+def test_weights_of_fields(fields: int, ramp: float, tmp_path: Path) -> None:
+    """Also while one that goes on is not over, to nothing, and of one field alone."""
+    robot = hsp.Robot.load("panda")
+    reach = hsp.Manipulability("panda_tcp")
+    field = hsp.JointCentering() + 0.3 * reach if fields == 2 else hsp.JointCentering()
+    hand = hsp.FramePosition(
+        "panda_tcp", hsp.Circle(radius=0.1, angular_rate=2.0), name="hand"
+    )
+    declared = hsp.Controller(robot, [hand], field, start=robot.home())
+    opened = Opened(hsp.freeze(declared, tmp_path / "frozen.hsp"))
+    controller = declared.preview()
+
+    def weight(name: str, value: float) -> Callable[[float], object]:
+        def change(t: float) -> None:
+            controller.at(t).ramp(ramp).weight(name, value)
+            assert opened.ramp(f"{name}.weight", value, ramp) == OK
+
+        return change
+
+    last = field.name if fields == 1 else reach.name
+    changes = {
+        3: weight("joint_centering", 2.5),
+        9: weight(last, 0.0),
+        15: weight("joint_centering", 0.7),
+        60: weight(last, 1.0),
+    }
+    run(controller, opened, range(90), changes)
+    np.testing.assert_array_equal(opened.get(f"{last}.weight", 1), 1.0)
+    run(controller, opened, range(90, 1300, 50), {})  # over, and forgotten
+
+
 def test_over_the_mass_matrix_it_is_a_number(tmp_path: Path) -> None:
     controller, opened = pair("compliance/panda_joint_impedance", tmp_path)
     port = opened.ports["null_space_gain"]
@@ -117,6 +150,11 @@ def test_set_is_at_once_and_before_the_first_step_from_the_beginning(
         ("hand.Kp", 1e9 * np.eye(3), 0.1, WRONG_VALUE),
         ("hand.Kv", 2001.0 * np.eye(3), 0.1, WRONG_VALUE),
         ("null_space_gain", np.zeros((7, 7)), 0.1, WRONG_VALUE),
+        ("elbow.weight", [1.0], 0.1, WRONG_NAME),
+        ("limit_barrier.weight", [1.0, 2.0], 0.1, WRONG_SIZE),
+        ("limit_barrier.weight", [-1e-3], 0.1, WRONG_VALUE),
+        ("limit_barrier.weight", [np.nan], 0.1, WRONG_VALUE),
+        ("limit_barrier.weight", [1.0], -0.1, WRONG_VALUE),
         ("hand.Kp", np.eye(3), -0.1, WRONG_VALUE),
         ("hand.Kp", np.eye(3), np.nan, WRONG_VALUE),
         ("hand.Kp", np.eye(3), np.inf, WRONG_VALUE),

@@ -3,6 +3,7 @@
 import subprocess
 import sys
 from pathlib import Path
+from typing import Literal, get_args
 
 import numpy as np
 import pytest
@@ -12,21 +13,27 @@ import hsp_control as hsp
 from hsp_control.trajectories import StreamPose
 
 SEED = 61
+Policy = Literal["latest", "interpolate", "extrapolate"]
 
 
 @pytest.mark.smoke
 @pytest.mark.skipif(sys.platform != "linux", reason="glibc's names, Linux' seccomp")
-@pytest.mark.parametrize("name", ["panda_obstacle", "panda_limits", "ur5_position"])
+@pytest.mark.parametrize(
+    "name",
+    ["panda_obstacle", "panda_limits", "ur5_position", "whole_body/solo12_trunk"],
+)
 def test_no_allocation_no_lock_no_system_call(name: str, tmp_path: Path) -> None:
     experiment = hsp.load_experiment(name)
-    check_quiet(experiment, experiment.controller, tmp_path)
+    inputs = ("limit_barrier.weight",) if name == "panda_limits" else ()
+    check_quiet(experiment, experiment.controller, tmp_path, *inputs)
 
 
 @pytest.mark.smoke
 @pytest.mark.skipif(sys.platform != "linux", reason="glibc's names, Linux' seccomp")
-def test_targets_are_planned_for_without_any(tmp_path: Path) -> None:
+@pytest.mark.parametrize("policy", get_args(Policy))
+def test_targets_are_planned_for_without_any(policy: Policy, tmp_path: Path) -> None:
     experiment = hsp.load_experiment("panda_obstacle")
-    stream = StreamPose(policy="latest", delay=0.03, dead_man=0.02)
+    stream = StreamPose(policy=policy, delay=0.03, smoothing=0.02, dead_man=0.02)
     hand = hsp.FramePose("panda_tcp", stream, name="hand")
     start = experiment.q0
     controller = hsp.Controller(experiment.robot, [hand], start=start)

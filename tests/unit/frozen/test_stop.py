@@ -18,6 +18,7 @@ from frozen_library import (
 import hsp_control as hsp
 from hsp_control.common.exceptions import FreezeError
 from hsp_control.frozen.braking import StopGains
+from hsp_control.live import LiveSettings
 from hsp_control.live.safe_stop import SafeStop
 from hsp_control.live.settings import StopSettings
 
@@ -76,8 +77,7 @@ def test_it_brakes_and_holds(payload: float, opened: Opened) -> None:
         state.update(k * H, q, v)
         tau = expected.effort(state)
         phases.append(opened.stop(k * H, q, v))
-        # BLAS and Eigen sum in different orders
-        np.testing.assert_allclose(opened.tau, tau, rtol=0.0, atol=1e-10)
+        np.testing.assert_array_equal(opened.tau, tau)
         assert (np.abs(tau) <= limits + 1e-9).all()
         a = robot.forward_dynamics(q, v, tau, dynamics)
         v = v + H * a
@@ -85,6 +85,27 @@ def test_it_brakes_and_holds(payload: float, opened: Opened) -> None:
     assert sorted(phases) == phases  # it brakes, and then it holds
     assert {*phases} == {BRAKING, HOLDING}
     assert np.abs(v).max() < 1e-4
+
+
+def test_joints_without_ends_are_held_too(tmp_path: Path) -> None:
+    experiment = hsp.load_experiment("tiago_reach")
+    controller, robot = experiment.controller, experiment.robot
+    assert not robot.linear
+    opened = Opened(hsp.freeze(controller, tmp_path / "tiago.hsp"))
+    limits = LiveSettings().effort_limits(robot, controller.limits)
+    expected = SafeStop(robot, StopSettings(), limits, H)
+    state, q = hsp.RobotState(robot), experiment.q0
+    v = 0.3 * np.random.default_rng(61).normal(size=robot.nv)
+    assert opened.step(0.0, q, v) >= OK
+    phases = []
+    for k in range(1, 1000):
+        phases.append(opened.stop(k * H, q, v))
+        tau = expected.effort(state.update(k * H, q, v))
+        np.testing.assert_array_equal(opened.tau, tau)
+        v = v + H * robot.forward_dynamics(q, v, tau)
+        q = robot.integrate(q, H * v)
+    assert {*phases} == {BRAKING, HOLDING}
+    assert np.abs(v).max() < 1e-3
 
 
 def test_after_a_refused_step_it_brakes_whatever_the_clock_says(opened: Opened) -> None:

@@ -28,13 +28,23 @@ def tasks(kind: str) -> list[hsp.Task]:
     if kind == "falls silent":
         how = {**HOW, "hold_after": 0.02}
         return [hsp.FramePose("panda_tcp", StreamPose(**how), name="hand")]
+    if kind in WAYPOINTS:
+        how = {**HOW, **WAYPOINTS[kind]}
+        return [hsp.FramePose("panda_tcp", StreamPose(**how), name="hand")]
     if kind == "position":
         return [hsp.FramePosition("panda_tcp", Stream(**HOW), name="hand")]
     turn = StreamOrientation(**HOW)
     return [hsp.FrameOrientation("panda_tcp", turn, name="hand")]
 
 
-KINDS = "pose", "falls silent", "position", "orientation"
+WAYPOINTS: dict[str, dict[str, Any]] = {
+    "interpolate": {"policy": "interpolate"},
+    "interpolate at once": {"policy": "interpolate", "delay": 0.0},
+    "interpolate smoothly": {"policy": "interpolate", "smoothing": 0.04},
+    "extrapolate": {"policy": "extrapolate", "extrapolation": 0.05},
+    "extrapolate and rest": {"policy": "extrapolate", "hold_after": 0.07},
+}
+KINDS = "pose", "falls silent", "position", "orientation", *WAYPOINTS
 
 
 class Pair:
@@ -104,6 +114,37 @@ def test_a_velocity_that_is_repeated_fades_when_it_is_not(tmp_path: Path) -> Non
     assert errors[-1, 0] > 0.015  # 0.1 m/s for 0.2 s, and on for what fades
 
 
+@pytest.mark.parametrize("kind", WAYPOINTS)
+@pytest.mark.parametrize("every", [1, 4, 16])
+def test_a_hand_that_moves_is_followed_through_its_waypoints(
+    kind: str, every: int, tmp_path: Path
+) -> None:
+    """Until it stops to send; at each step there may be more than the delay's."""
+    pair = Pair(kind, tmp_path)
+    for k in range(0, 400, every):
+        moved = np.array([0.05 * np.sin(0.005 * k), 1e-4 * k, 0.0, 0.0, 0.001 * k, 0])
+        pair.target(pin.SE3ToXYZQUAT(START * pin.exp6(pin.Motion(moved))))
+        pair.steps(every)
+    there = pair.steps(600)[-1, :3]
+    goal = START * pin.exp6(pin.Motion(moved))
+    beyond = 0.02 if "extrapolate" in kind else 1e-9
+    np.testing.assert_allclose(
+        there, goal.translation - START.translation, rtol=0.0, atol=beyond
+    )
+
+
+def test_a_velocity_that_comes_in_the_very_step_in_which_it_fades(
+    tmp_path: Path,
+) -> None:
+    pair = Pair("pose", tmp_path)
+    pair.steps(2)
+    for _ in range(4):
+        pair.velocity(np.array([0.1, 0.0, 0.0, 0.0, 0.3, 0.0]))
+        pair.steps(100)
+    errors = pair.steps(1)
+    assert errors[-1, 0] > 0.035  # it did not come to rest in between
+
+
 def test_a_target_is_reached_at_rest(tmp_path: Path) -> None:
     pair = Pair("pose", tmp_path)
     goal = pin.SE3(START.rotation, START.translation + np.array([0.05, -0.1, 0.02]))
@@ -161,8 +202,6 @@ def test_a_target_that_no_motion_reaches(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("stream", "key"),
     [
-        (StreamPose(policy="interpolate"), "policy"),
-        (StreamPose(policy="extrapolate"), "policy"),
         (StreamPose(source="udp://127.0.0.1:9", **HOW), "source"),
         (StreamPose(messages=[], **HOW), "messages"),
         (StreamPose(stop_after=1.0, **HOW), "stop_after"),

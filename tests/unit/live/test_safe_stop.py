@@ -6,10 +6,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 from live_rigs import PERIOD, gravity, panda, start, watched
 
+from hsp_control import engine
 from hsp_control.common.arrays import Array
 from hsp_control.live import LiveSettings, Phase, SafeStop, StopSettings
 from hsp_control.live.report import Deadlines
-from hsp_control.live.safe_stop import largest_scale
 from hsp_control.live.state_reader import DeadReckoning
 from hsp_control.robot.integrators import Rk4
 from hsp_control.simulation.plants import IntegratedPlant, RigidBodyPlant
@@ -75,7 +75,7 @@ def test_it_stops_a_robot_that_is_not_the_model(seed: int, factor: float) -> Non
     assert stop.phase is Phase.HOLDING
     assert np.abs(v).max() < 0.01
     # In equilibrium K (q - q0) = (factor - 1) g: the PD's sag, first order in it.
-    sag = np.abs(panda().difference(stop._held_q, q))
+    sag = np.abs(panda().difference(stop.held_q, q))
     assert sag.max() < 0.5 * abs(factor - 1.0) + 1e-6
 
 
@@ -86,7 +86,8 @@ def test_the_share_is_the_greatest_that_fits(seed: int) -> None:
     most[0] = np.inf
     base = rng.uniform(-1.3, 1.3, 6) * np.where(np.isfinite(most), most, 1.0)
     direction = rng.standard_normal(6) * rng.choice([0.0, 0.1, 10.0], 6)
-    s = largest_scale(base, direction, most)
+    given = {"base": base, "direction": direction, "limits": most}
+    s = engine.ScaleIntoLimits(**given, tau=np.zeros(6))()
     assert 0.0 <= s <= 1.0
     inside = (np.abs(base) <= most).all()
     if inside:

@@ -20,7 +20,6 @@ from hsp_control.trajectories import (
     TrajectorySample,
 )
 from hsp_control.trajectories.streams import inbox
-from hsp_control.trajectories.streams.chart import Chart
 from hsp_control.trajectories.streams.followed import (
     FollowedOrientation,
     FollowedPose,
@@ -520,12 +519,18 @@ def test_a_wrong_recording_names_its_line(
 # --- local coordinates ---------------------------------------------------------------
 
 
-def test_rotation_vectors_go_on_beyond_half_a_turn() -> None:
-    """A spin of two turns about a base is one line, whatever the quaternions' signs."""
+def test_a_spin_goes_on_beyond_half_a_turn() -> None:
+    """Waypoints of a spin are one line, whatever the signs of their quaternions."""
     axis, base = np.array([2.0, -1.0, 2.0]) / 3.0, pin.exp3(np.array([0.3, 1.0, -0.2]))
-    angles = np.linspace(0.1, 4.0 * np.pi + 0.1, 41)
+    angles = 2.4 * np.arange(1, 8)
     turns = [pin.Quaternion(base @ pin.exp3(a * axis)).coeffs() for a in angles]
-    values = np.hstack([np.ones((41, 2)), turns])
-    x = Chart(2, True).local(values, base)
-    np.testing.assert_allclose(x[:, 2:], np.outer(angles, axis), rtol=0, atol=1e-13)
-    assert (x[:, :2] == 1.0).all()
+    values = np.hstack([np.zeros((7, 3)), turns])
+    bounds = {"angular_speed": 6.0, "angular_acceleration": 50.0, "angular_jerk": 500.0}
+    stream = StreamPose(policy="interpolate", delay=0.0, **bounds)
+    stream = stream.anchored(pin.SE3(base, np.zeros(3)))
+    feed = at_times((0.1, lambda: stream.run.send_chunk(values, np.arange(1.0, 8.0))))
+    samples = sampled(stream, 7.0, feed)
+    for k in range(6):
+        R, omega, _ = samples[round((1.1 + k) / H)].orientation
+        np.testing.assert_allclose(R, base @ pin.exp3(angles[k] * axis), atol=1e-3)
+        np.testing.assert_allclose(omega, base @ axis * 2.4, atol=1e-2)
