@@ -45,7 +45,7 @@ def test_too_many_that_overlap_are_refused(kind: str) -> None:
     made = controller()
     for k in range(MOST_OVERLAPPING):
         MOVES[kind](made.at(0.0).ramp(1.0 + k), k)
-    words = "65 changes of one reference overlap; at most 64.* is a stream, such as set_"
+    words = "65 changes of one reference overlap; at most 64.* is a stream, such as"
     with pytest.raises(hsp.errors.TrajectoryError, match=words):
         MOVES[kind](made.at(0.0).ramp(100.0), 0)
     assert len(made.changes) == MOST_OVERLAPPING
