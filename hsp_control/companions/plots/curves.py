@@ -112,7 +112,7 @@ def draw_lines(
 ) -> str:
     """Draw one line per column, named in the legend; return the units of what is drawn.
 
-    If the named lines differ in their units, names tell them; lines without a name are
+    If the named lines differ in their units, names show them; lines without a name are
     drawn only if they share a unit with named ones. A lower or upper limit of a named
     line is drawn if it comes near. Shapes: t (N,), values (N, k), limits (k,) each.
     """

@@ -69,7 +69,7 @@ STYLE: dict[str, Any] = {
     "lines.solid_capstyle": "round",
     "mathtext.default": "regular",
     "mathtext.fontset": "dejavusans",
-    "pdf.fonttype": 42,  # TrueType, which journals ask for
+    "pdf.fonttype": 42,  # TrueType, which journals require
     "savefig.dpi": 160,
     "text.color": palette.INK,
     "xtick.color": palette.MUTED,
@@ -141,7 +141,7 @@ def paper_figure(
         absolute: Whether angles of joints are absolute where the robot has such.
         frames: How many frames are drawn, evenly over the run.
         times: Their times instead [s].
-        title: The heading; None: as the log says.
+        title: The heading; None: the log's title.
         width: The width for a paper, such as ``84mm``, or in metres: without heading
             and foot. Below 150 mm the panels of a plane are in two columns, which at
             117 mm may be printed at 84 mm with text of 6 pt; those of space, and all
