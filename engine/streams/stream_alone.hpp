@@ -23,7 +23,7 @@ struct StreamAlone {
   InOut<'w'> sent_target;  // what comes to count in the next step
   InOut<'n'> sent_velocity;
   InOutInts<1> sent;     // `Follows`
-  InOutInts<1> differs;  // whether it says something else than what is followed
+  InOutInts<1> differs;  // whether it differs from what is followed
   ChartState<Out> out;
   PlannerMemory memory;
 
