@@ -28,7 +28,7 @@ from shared.standing import TALOS, Standing
 
 import hsp_control as hsp
 from hsp_control.common.arrays import Array
-from hsp_control.companions.plots import new_figure, styled
+from hsp_control.companions.plots import new_figure, save_for_a_column, styled
 from hsp_control.companions.plots.palette import INK, SERIES
 from hsp_control.config import Experiment
 from hsp_control.constraints.limits import RobotLimits
@@ -330,9 +330,10 @@ def costs_of_others() -> str:
 
 def figure(found: dict[str, tuple[dict[str, Run], RobotLimits]]) -> Figure:
     """Draw limited quantities, tracking error and null-space error."""
-    drawn = new_figure(8.4, 6.4)
+    drawn = new_figure(4.6, 5.6)
     axes = drawn.subplots(3, 2, sharex="col")
     half, towards = NAMES
+    titles = {half: "Half strength", towards: "Towards a limit"}
     styles = {
         SHOWN[0]: {"color": SERIES[0], "lw": 2.0, "label": "with limits"},
         SHOWN[1]: {"color": SERIES[1], "lw": 1.5, "ls": "--", "label": "without"},
@@ -348,13 +349,13 @@ def figure(found: dict[str, tuple[dict[str, Run], RobotLimits]]) -> Figure:
             bottom.semilogy(run.t, run.null_space + 1e-6, **style)
         bound = -limits.effort[1] if name == half else np.rad2deg(limits.upper[3])
         top.axhline(bound, color=INK, lw=1.0, ls=":", label="limit")
-        top.set_ylabel("effort of joint 2 [N·m]" if name == half else "joint 4 [°]")
+        top.set_ylabel("effort of\njoint 2 [N·m]" if name == half else "joint 4 [°]")
         middle.set_ylim(1e-3, 1e2)
         bottom.set_ylim(1e-4, 1e2)
         bottom.set_xlabel("time [s]")
-        top.set_title(f"({'ab'[column]})  limits/{name}")
-    axes[1, 0].set_ylabel("hand error [mm]")
-    axes[2, 0].set_ylabel("null-space error\n‖P(g − v)‖ [rad/s]")
+        top.set_title(f"({'ab'[column]})  {titles[name]}")
+    axes[1, 0].set_ylabel("hand error\n[mm]")
+    axes[2, 0].set_ylabel("null-space error\n" r"$\Vert P(g - v) \Vert$ [rad/s]")
     handles, labels = axes[0, 1].get_legend_handles_labels()
     drawn.legend(handles, labels, loc="outside lower center", ncols=3)
     return drawn
@@ -388,7 +389,7 @@ def main() -> None:
 def draw(found: dict[str, tuple[dict[str, Run], RobotLimits]]) -> None:
     """Save the figure."""
     with styled():
-        figure(found).savefig(FIGURES / "limits.png", dpi=120)
+        save_for_a_column(figure(found), FIGURES / "limits.png")
 
 
 if __name__ == "__main__":

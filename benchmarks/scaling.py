@@ -23,7 +23,7 @@ from shared.timing import Compute, State, step_times
 
 import hsp_control as hsp
 from hsp_control.common.arrays import Array
-from hsp_control.companions.plots import new_figure, styled
+from hsp_control.companions.plots import new_figure, save_for_a_column, styled
 from hsp_control.companions.plots.palette import SERIES as SERIES_COLORS
 from hsp_control.engine.plans import planned
 from hsp_control.geometry.shapes import Sphere
@@ -366,8 +366,8 @@ def draw(everything: dict[str, dict[str, Array]]) -> None:
         "in conflict": (SERIES_COLORS[2], ":", "^"),
     }
     with styled():
-        figure = new_figure(8.4, 5.0)
-        panels = figure.subplots(2, 3).ravel()
+        figure = new_figure(4.6, 6.0)
+        panels = figure.subplots(3, 2).ravel()
         for axes, (what, found) in zip(panels, everything.items(), strict=False):
             for name, rows in found.items():
                 color, dashes, marker = styles[name]
@@ -382,14 +382,14 @@ def draw(everything: dict[str, dict[str, Array]]) -> None:
                 MaxNLocator(6, steps=[1, 2, 5, 10], integer=True)
             )
             axes.legend(loc="upper left")
-        for axes in panels[::3]:
+        for axes in panels[::2]:
             axes.set_ylabel("one step [µs]")
         for axes in panels[len(everything) :]:
             axes.set_axis_off()
             for name, (color, dashes, marker) in styles.items():
                 axes.plot([], [], dashes, marker=marker, color=color, label=name)
-            axes.legend(loc="center", title="medians, and their fit t = a + b nᵖ")
-        figure.savefig(FIGURE, dpi=130)
+            axes.legend(loc="center", title="medians, and their fit\n$t = a + b\\,n^p$")
+        save_for_a_column(figure, FIGURE)
 
 
 def written() -> dict[str, dict[str, Array]]:

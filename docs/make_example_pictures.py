@@ -24,7 +24,7 @@ FOLDER = ROOT / "docs" / "figures" / "examples"
 SIZE = (480, 320)
 RUNS: dict[str, tuple[str, *tuple[float, ...]]] = {
     # example: its log, and the moment [s], or several side by side
-    "own_urdf.py": ("own_urdf", 1.8),
+    "own_urdf.py": ("own_urdf", 1.3, 2.9),
     "xacro_gripper.yaml": ("xacro_gripper", 1.57, 2.62),
     "two_arms.yaml": ("two_arms", 2.4, 4.0),
     "own_cost.py": ("own_cost_function", 2.9),
@@ -43,6 +43,7 @@ RUNS: dict[str, tuple[str, *tuple[float, ...]]] = {
     "franka_arm.py": ("franka_arm", 1.5),
 }
 VIEWS: dict[str, dict[str, Any]] = {  # where the run's own view hides the idea
+    "own_urdf.py": {"camera": [2.1, 1.5, 1.3], "target": [0.1, 0.0, 0.68]},
     "xacro_gripper.yaml": {
         "camera": [0.75, 0.16, 1.12],
         "target": [0.02, 0.0, 0.98],
@@ -54,7 +55,10 @@ VIEWS: dict[str, dict[str, Any]] = {  # where the run's own view hides the idea
         "show": {"frames": True},
     },
 }
-OVERLAID = ("two_arms.yaml",)  # the second moment pale behind the first one
+OVERLAID = (
+    "own_urdf.py",
+    "two_arms.yaml",
+)  # the second moment pale behind the first one
 FIGURES = ("paper_figure.py", "sweep.py", "lesson.ipynb", "gymnasium_pusher.py")
 """Examples that draw, or that are drawn here otherwise."""
 LIT = """

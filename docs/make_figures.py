@@ -11,7 +11,14 @@ from matplotlib.figure import Figure
 
 import hsp_control as hsp
 from hsp_control.common.arrays import Array
-from hsp_control.companions.plots import chosen_rows, new_figure, paper_figure, styled
+from hsp_control.companions.plots import (
+    chosen_rows,
+    new_figure,
+    paper_figure,
+    save_for_a_column,
+    styled,
+)
+from hsp_control.companions.plots.curves import legend_below
 from hsp_control.companions.plots.palette import DESIRED, INK, SERIES
 from hsp_control.companions.sweeps import sweep_figure
 from hsp_control.control.actuation import Status
@@ -50,14 +57,12 @@ class PaperFigure(NamedTuple):
 
     def figure(self, rollout: hsp.Rollout) -> Figure:
         """Return it, of a run of its configuration."""
-        config = rollout.config or {}
-        title = f"Figure {self.number}  ·  {config['title']}"
-        return paper_figure(rollout, times=self.times, title=title)
+        return paper_figure(rollout, times=self.times, width="117mm")
 
     def save(self, rollout: hsp.Rollout) -> None:
         """Write it, with what it was drawn from."""
         about = provenance(rollout, self.times)
-        self.figure(rollout).savefig(self.file, dpi=110, metadata=about)
+        save_for_a_column(self.figure(rollout), self.file, about)
 
 
 PAPER = (
@@ -88,24 +93,27 @@ def main() -> None:
     for one in PAPER:
         one.save(hsp.load_experiment(one.configuration).run())
     with styled():
-        figure = new_figure(11.0, 3.6)
-        left, middle, right = figure.subplots(1, 3)
-        draw_propositions(left, middle)
-        draw_chaos(right)
-        figure.savefig(FOLDER / "propositions.png", dpi=130)
-        figure = new_figure(11.0, 3.6)
-        left, right = figure.subplots(1, 2)
-        draw_null_space_under_a_force(left)
-        draw_observed_force(right)
-        figure.savefig(FOLDER / "compliance.png", dpi=110)
-        figure = new_figure(11.0, 3.6)
-        left, right = figure.subplots(1, 2)
-        draw_walk(left, right)
-        figure.savefig(FOLDER / "walking.png", dpi=110)
+        figure, (top, middle, bottom) = column_figure(3)
+        draw_propositions(top, middle)
+        draw_chaos(bottom)
+        save_for_a_column(figure, FOLDER / "propositions.png")
+        figure, (top, bottom) = column_figure(2)
+        draw_null_space_under_a_force(top)
+        draw_observed_force(bottom)
+        save_for_a_column(figure, FOLDER / "compliance.png")
+        figure, (top, bottom) = column_figure(2)
+        draw_walk(top, bottom)
+        save_for_a_column(figure, FOLDER / "walking.png")
         draw_weak_arm()
     draw_sweep()
     for file in sorted(FOLDER.glob("*.png")):
         print(f"Figure: {file.relative_to(FOLDER.parents[1])}")
+
+
+def column_figure(panels: int) -> tuple[Figure, list[Axes]]:
+    """Return a figure as wide as a column, and its panels one below the other."""
+    figure = new_figure(84.0 / 25.4, 2.3 * panels)
+    return figure, figure.subplots(panels, 1, squeeze=False).ravel().tolist()
 
 
 def draw_sweep() -> None:
@@ -130,9 +138,13 @@ def draw_sweep() -> None:
             "manipulability.min",
             "distance.obstacle_clearance.min",
         )
-        sweep_figure(found, outcomes).savefig(
-            FOLDER / "sweep_panda_obstacle.png", dpi=110
+        parameters = (
+            "null_space.fields.0.weight",
+            "scene.obstacles.ball.shape.radius",
+            "tasks.hand.gains.natural_frequency",
         )
+        figure = sweep_figure(found, outcomes, parameters=parameters, width="117mm")
+        save_for_a_column(figure, FOLDER / "sweep_panda_obstacle.png")
 
 
 def draw_weak_arm() -> None:
@@ -143,7 +155,7 @@ def draw_weak_arm() -> None:
         "without": hsp.load_experiment(name, "limits.static_effort=null").run(),
     }
     shown, (limits, names) = runs["with static_effort"], weak_arm_limits(name)
-    figure = new_figure(8.4, 7.6)
+    figure = new_figure(4.6, 7.0)
     efforts, hand, mass, speed, status = figure.subplots(
         5, 1, sharex=True, height_ratios=(1.0, 1.0, 1.0, 1.0, 0.18)
     )
@@ -151,30 +163,30 @@ def draw_weak_arm() -> None:
     for color, dash, joint in zip(SERIES, dashes, (2, 4, 5), strict=False):
         column = names.index(f"arm_right_{joint}_joint")
         used = 100.0 * np.abs(shown["tau"][:, column]) / limits[column]
-        style = {"color": color, "ls": dash, "lw": 1.6, "label": f"arm_right_{joint}"}
+        style = {"color": color, "ls": dash, "lw": 1.6, "label": f"arm joint {joint}"}
         efforts.plot(shown.t, used, **style)
     efforts.axhline(100, color=INK, lw=1.0, label="limit")
     efforts.set(ylabel="effort\n[% of limit]", ylim=(0.0, 108.0))
-    efforts.set_title("(a)  Efforts of the weak arm, with static_effort")
-    hand.set_title("(b)  With static_effort, and without")
+    efforts.set_title("(a)  Efforts, with static_effort", pad=20.0)
+    hand.set_title("(b)  With static_effort, and without", pad=20.0)
     for color, dash, (label, run) in zip(SERIES, dashes, runs.items(), strict=False):
         style = {"color": color, "ls": dash, "lw": 1.6, "label": label}
         for axes, task in ((hand, "hand"), (mass, "center_of_mass")):
             error = np.linalg.norm(run[f"task.{task}.error"], axis=1)
             axes.semilogy(run.t, 1e3 * error + 1e-3, **style)
         speed.plot(run.t, np.abs(run["v"][:, 6:]).max(axis=1), **style)
-    hand.set(ylabel="hand error\n[mm]", ylim=(1e-2, None))
-    mass.set(ylabel="centre of mass\nerror [mm]", ylim=(1e-2, None))
+    hand.set(ylabel="hand error\n[mm]", ylim=(1e-2, 1e3))
+    mass.set(ylabel="centre of mass\nerror [mm]", ylim=(1e-2, 1e0))
     speed.set_ylabel("fastest joint\n[rad/s]")
     for axes, columns in ((efforts, 4), (hand, 2)):
-        axes.legend(loc="lower right", bbox_to_anchor=(1.0, 1.02), ncols=columns)
+        axes.legend(loc="lower left", bbox_to_anchor=(0.0, 1.02), ncols=columns)
     limited = shown["status"] >= Status.LIMITED
     status.fill_between(shown.t, 0.0, 1.0, where=limited, color=INK, alpha=0.45, lw=0)
     status.set(ylim=(0.0, 1.0), yticks=[], xlabel="time [s]")
     status.set_ylabel("limited", rotation=0, ha="right", va="center")
     status.grid(visible=False)
     figure.align_ylabels([efforts, hand, mass, speed])
-    figure.savefig(FOLDER / "weak_arm.png", dpi=120)
+    save_for_a_column(figure, FOLDER / "weak_arm.png")
 
 
 def weak_arm_limits(name: str) -> tuple[Array, list[str]]:
@@ -212,11 +224,9 @@ def draw_walk(left: Axes, right: Axes) -> None:
         predicted = (share * np.exp(1j * rate * t)).imag * amplitudes[joint]
         left.plot(t, predicted, color=INK, lw=1.0, ls="--")
     left.plot([], [], color=INK, lw=1.0, ls="--", label="predicted by the field")
-    left.set(
-        title="(a)  Arms that swing by a field", ylabel="angle [rad]", ylim=(-0.25, 0.4)
-    )
+    left.set(title="(a)  Arms that swing by a field", ylabel="angle [rad]")
     norm = run["null_space_norm"]
-    right.semilogy(t, norm, color=SERIES[0], label="‖e_N‖")
+    right.semilogy(t, norm, color=SERIES[0], label=r"$\Vert e_N \Vert$")
     limited = run["status"] > 1
     begins = (np.diff(phase) != 0) | (np.diff(limited.astype(int)) != 0)
     for first, last in pairwise([0, *(np.flatnonzero(begins) + 1), len(t)]):
@@ -225,27 +235,29 @@ def draw_walk(left: Axes, right: Axes) -> None:
         part = slice(first, last)
         decay = norm[first] * np.exp(-6.0 * (t[part] - t[first]))
         right.semilogy(t[part], decay, color=INK, lw=1.0, ls="--")
-    right.semilogy([], [], color=INK, lw=1.0, ls="--", label="exp(-K_N t), each phase")
-    right.fill_between(
-        t, 1e-4, 10.0, where=limited, color=DESIRED, alpha=0.25, lw=0, label="limited"
+    right.semilogy(
+        [], [], color=INK, lw=1.0, ls="--", label="exp(−$K_N$ t), each phase"
     )
+    if limited.any():
+        style = {"color": DESIRED, "alpha": 0.25, "lw": 0, "label": "limited"}
+        right.fill_between(t, 1e-4, 10.0, where=limited, **style)
     right.set(
-        title="(b)  Null-space error, phase by phase",
-        ylabel="‖e_N‖ [rad/s]",
-        ylim=(1e-4, 10.0),
+        title="(b)  Null-space error by phases",
+        ylabel=r"$\Vert e_N \Vert$ [rad/s]",
+        ylim=(1e-4, 1.0),
     )
     for axes in (left, right):
         axes.set(xlabel="time [s]")
-        axes.legend(loc="upper left")
+        legend_below(axes)
 
 
 def draw_propositions(left: Axes, middle: Axes) -> None:
     """Draw e and e_N of an iiwa that starts off its path, in three metrics."""
     robot = hsp.Robot.load("iiwa14")
     shown = {
-        "identity": metrics.IdentityMetric(),
-        "constant": metrics.ConstantMetric(np.linspace(1.0, 3.0, 7)),
-        "mass matrix": metrics.MassMatrixMetric(),
+        "$W = I$": metrics.IdentityMetric(),
+        "$W$ constant": metrics.ConstantMetric(np.linspace(1.0, 3.0, 7)),
+        "$W = M$": metrics.MassMatrixMetric(),
     }
     # Wide to narrow: the three lines lie on each other, that is the point.
     for color, width, name in zip(SERIES, (7.0, 4.5, 2.0), shown, strict=False):
@@ -260,14 +272,20 @@ def draw_propositions(left: Axes, middle: Axes) -> None:
     style = {"color": INK, "lw": 1.0, "ls": "--"}
     left.semilogy(rollout.t, np.linalg.norm(exact, axis=1), **style, label="predicted")
     middle.semilogy(rollout.t, np.exp(-GAIN * rollout.t), **style, label="predicted")
-    left.set(title="(a)  The task: pose of an iiwa", ylabel="pose error ‖e‖ [m, rad]")
+    left.set(
+        title="(a)  The task: pose of an iiwa",
+        ylabel=r"pose error $\Vert e \Vert$ [m, rad]",
+    )
     middle.set(
         title="(b)  Its null space, field moving",
         ylabel=RELATIVE,
     )
     for axes in (left, middle):
         axes.set(xlabel="time [s]", ylim=(1e-7, 3.0))
-        for line in axes.legend().get_lines():
+        legend_below(axes)
+        legend = axes.get_legend()
+        assert legend is not None
+        for line in legend.get_lines():
             line.set_linewidth(min(line.get_linewidth(), 3.0))  # beside its name
 
 
@@ -304,7 +322,10 @@ def draw_null_space_under_a_force(axes: Axes) -> None:
     integrator = Rk4(0.001)
     start = robot.integrate(robot.home(), 0.1 * np.cos(1.0 + np.arange(7)))
     away = robot.integrate(start, 0.4 * np.sin(1.0 + np.arange(7)))
-    shown = {"W = I": metrics.IdentityMetric(), "W = M": metrics.MassMatrixMetric()}
+    shown = {
+        "$W = I$": metrics.IdentityMetric(),
+        "$W = M$": metrics.MassMatrixMetric(),
+    }
     axes.axvspan(push.start, push.start + push.duration, color=INK, alpha=0.08)
     for color, width, name in zip(SERIES, (2.0, 4.5), shown, strict=False):
         rollout = hsp.simulate(
@@ -326,11 +347,11 @@ def draw_null_space_under_a_force(axes: Axes) -> None:
     style = {"color": INK, "lw": 1.0, "ls": "--"}
     axes.semilogy(rollout.t, np.exp(-GAIN * rollout.t), **style, label="no force")
     axes.set(
-        title="(a)  33 N at the hand, which nobody expects",
+        title="(a)  An unknown force of 33 N",
         xlabel="time [s]",
         ylabel=RELATIVE,
     )
-    axes.legend()
+    legend_below(axes)
 
 
 def draw_observed_force(axes: Axes) -> None:
@@ -345,16 +366,16 @@ def draw_observed_force(axes: Axes) -> None:
     soft = np.clip((t - 5.0) / 0.5, 0.0, 1.0)
     soft = soft**3 * (10.0 - 15.0 * soft + 6.0 * soft**2)
     spring = -(600.0 - 450.0 * soft) * rollout["task.hand.error"][:, 1]
-    axes.plot(t, spring, color=SERIES[1], lw=2.0, label="spring, K (x - x_d)")
+    axes.plot(t, spring, color=SERIES[1], lw=2.0, label="spring: $K (x - x_d)$")
     observed = rollout["observer.wrench.hand"][:, 1]
     axes.plot(t, observed, color=SERIES[0], lw=2.0, label="observed")
     axes.plot(t, true, color=INK, lw=1.0, ls="--", label="true")
     axes.set(
-        title="(b)  The force along y; from 5 s on the springs are softer",
+        title="(b)  Its spring, softer from 5 s on",
         xlabel="time [s]",
         ylabel="force along y [N]",
     )
-    axes.legend(loc="center left", bbox_to_anchor=(0.29, 0.5))
+    legend_below(axes)
 
 
 def draw_chaos(axes: Axes) -> None:
@@ -382,9 +403,9 @@ def draw_chaos(axes: Axes) -> None:
     axes.set(
         title="(c)  Two starts 1e-9 rad apart",
         xlabel="time [s]",
-        ylabel="largest joint difference [rad]",
+        ylabel="joints' difference [rad]",
     )
-    axes.legend()
+    legend_below(axes)
 
 
 if __name__ == "__main__":

@@ -9,9 +9,9 @@ gains = [4.0, 10.0, 25.0]
 runs = [hsp.load_experiment(*moving, f"null_space.gain={k}").run() for k in gains]
 figure = hsp.plots.diagnostics_figure(
     *runs,
-    names=[f"{k:g} 1/s" for k in gains],
-    panels=["null_space", "errors"],
-    width="84mm",
+    names=[f"$K_N = {k:g}$ 1/s" for k in gains],
+    panels=["null_space", "decay"],
+    width="170mm",  # two columns; of one, 84mm, the panels are one below the other
 )
 Path("out").mkdir(exist_ok=True)
 for ending in ("pdf", "png"):

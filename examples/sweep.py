@@ -1,6 +1,6 @@
 """Which gain keeps the links from a disk? Run one configuration many times."""
 
-from matplotlib.figure import Figure
+from pathlib import Path
 
 import hsp_control as hsp
 
@@ -11,11 +11,15 @@ found = hsp.sweeps.sweep(
     out="out/sweep.parquet",
 )
 columns = ("null_space.gain", "null_space_error.rms", "distance.point_distance.min")
-for gain, error, distance in zip(*(found[name] for name in columns), strict=True):
-    print(f"K_N = {gain:6.2f} 1/s: |e_N| {error:.4f} rad/s rms, {distance:.4f} m away")
+for k, e, d in zip(*(found[name] for name in columns), strict=True):
+    print(f"K_N = {k:6.2f} 1/s: |e_N| {e:.4f} rad/s rms, {d:.4f} m away")
 
-figure = Figure(figsize=(4.8, 3.2), layout="constrained")
-axes = figure.subplots()
-axes.loglog(found["null_space.gain"], found["null_space_error.rms"], "o-")
-axes.set(xlabel="K_N [1/s]", ylabel="rms of |e_N| [rad/s]")
-figure.savefig("out/sweep.png")
+gain, error, distance = (found[name] for name in columns)
+with hsp.plots.styled():
+    figure = hsp.plots.new_figure(4.6, 3.4)
+    upper, lower = figure.subplots(2, 1, sharex=True)
+    upper.loglog(gain, error, "o-")
+    upper.set(ylabel=r"rms $\Vert e_N \Vert$ [rad/s]", title="Null-space error")
+    lower.semilogx(gain, 1e3 * distance, "o-", color="C1")
+    lower.set(xlabel="$K_N$ [1/s]", ylabel="distance [mm]", title="Nearest to the disk")
+hsp.plots.save_for_a_column(figure, Path("out/sweep.png"))

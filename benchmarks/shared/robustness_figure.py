@@ -1,25 +1,27 @@
 """The figure of docs/measurements.md: every plant with every compensator."""
 
+import textwrap
+
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.colors import LogNorm
 from matplotlib.image import AxesImage
 
-from hsp_control.companions.plots import new_figure, styled
-from hsp_control.companions.plots.palette import INK
+from hsp_control.companions.plots import new_figure, save_for_a_column, styled
 from shared.marked_sections import FIGURES
 
 FILE = FIGURES / "robustness.png"
-SHOWN = {"error": "task error [mm]", "e_N": "‖e_N‖ [rad/s]"}
+SHOWN = {"error": "task error [mm]", "e_N": r"$\Vert e_N \Vert$ [rad/s]"}
 RANGES = {"error": (3e-3, 30.0), "e_N": (1e-3, 3.0)}
 ROBOTS = {"panda": "Panda", "iiwa14": "iiwa 14"}
-
+LABEL = 6.2  # font size of rows and columns, where a figure is 84 mm wide [pt]
+LETTERS = 32  # of a row's name, above which it has two lines
 
 Cells = dict[tuple[str, ...], dict[str, float]]
 
 
 def draw_figure(cells: Cells, plants: dict[str, list[str]], columns: list[str]) -> None:
-    """Draw and save the figure.
+    """Draw and save the figure; its numbers are in the page's tables.
 
     Args:
         cells: What was measured, by robot, engine, plant and compensation.
@@ -27,18 +29,22 @@ def draw_figure(cells: Cells, plants: dict[str, list[str]], columns: list[str]) 
         columns: The compensations.
     """
     with styled():
-        figure = new_figure(13.0, 11.5)
+        figure = new_figure(84.0 / 25.4, 7.4)
         panels = figure.subplots(2, 2)
         for row, (robot, title) in zip(panels, ROBOTS.items(), strict=True):
             for axes, measure in zip(row, SHOWN, strict=True):
-                image = draw(axes, cells, robot, measure, plants[robot], columns)
-                axes.set_title(f"{title}: {SHOWN[measure]}")
-                figure.colorbar(image, ax=axes, shrink=0.8)
+                draw(axes, cells, robot, measure, plants[robot], columns)
+                axes.set_title(title)
+        for axes, measure in zip(panels[1], SHOWN, strict=True):
+            image = axes.images[0]
+            bar = figure.colorbar(image, ax=axes, location="bottom", aspect=12.0)
+            bar.set_label(SHOWN[measure], fontsize=7.0)
+            bar.ax.tick_params(labelsize=LABEL)
         for axes in panels[:, 1]:
             axes.set_yticklabels([])
         for axes in panels[0]:
             axes.set_xticklabels([])
-        figure.savefig(FILE, dpi=95)
+        save_for_a_column(figure, FILE)
     print(f"Wrote {FILE}")
 
 
@@ -64,13 +70,9 @@ def draw(
         norm=LogNorm(0.3 * low, high),  # no cell as pale as the paper
         aspect="auto",
     )
-    for (i, j), value in np.ndenumerate(values):
-        if np.isfinite(value):
-            color = "white" if image.norm(value) > 0.65 else INK
-            text = f"{value:.2g}".removeprefix("0")
-            axes.text(j, i, text, ha="center", va="center", fontsize=9, color=color)
-    axes.set_xticks(range(len(columns)), columns, rotation=35, ha="right")
-    axes.set_yticks(range(len(rows)), rows)
+    axes.set_xticks(range(len(columns)), columns, rotation=90, fontsize=LABEL)
+    names = [textwrap.fill(name, LETTERS) for name in rows]
+    axes.set_yticks(range(len(rows)), names, fontsize=LABEL, linespacing=0.9)
     axes.grid(visible=False)
     axes.set_xticks(np.arange(len(columns) - 1) + 0.5, minor=True)
     axes.set_yticks(np.arange(len(rows) - 1) + 0.5, minor=True)

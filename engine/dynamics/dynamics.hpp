@@ -18,7 +18,7 @@ using Square = Eigen::Map<Matrix>;
 using Centers = Eigen::Map<Eigen::Matrix<double, Eigen::Dynamic, 3, Eigen::RowMajor>>;
 using Placements = Eigen::Map<Eigen::Matrix<double, Eigen::Dynamic, 12, Eigen::RowMajor>>;
 
-// A joint and the body that it moves; in axes of its own where nothing else is said.
+// A joint and the body that it moves; in the joint's axes where nothing else is stated.
 struct Joint {
   std::string name, type;            // the type as Pinocchio calls it: "JointModelRZ"
   std::int64_t parent = 0;           // 0: the world
@@ -66,7 +66,7 @@ class Dynamics {
   Index columns() const;             // of the Jacobian of all joints, followers included
   Index joints() const;              // with the world
 
-  // What is carried from now on, besides what the model has; at most as many as `make_room` said.
+  // What is carried from now on, besides what the model has; at most as many as `make_room` allows.
   void make_room(Index bodies);
   void put_down();
   void carry(const Carried& body);

@@ -81,8 +81,8 @@ struct Resolve {
   }
 
   // a = a_exact + μ (a_damped - a_exact); the first two shares count here, see `shares.hpp`. Where
-  // μ = 0 the law is the exact one and the outcome says so. Only limits may come near to the damped
-  // one then, which is left out until they ask for it.
+  // μ = 0 the law is the exact one; the outcome reports it. Only limits may come near to the damped
+  // one then, which is left out until they need it.
   void blend(double threshold) {
     auto& [Q, X, exact, damped, by_tasks, exact_e_N, share] = edge;
     const double mu = exact_beside ? share_of_damped() : 1.0;

@@ -20,7 +20,7 @@ struct Deliver {
   QPOutcome<Ints> qp;
   In<'n'> acceleration, effort;  // the law's own
   In<'n'> nearest_acceleration, nearest_effort;
-  In<'n'> wanted, lower, upper;  // what the QP was asked for, and bounds of the effort
+  In<'n'> wanted, lower, upper;  // the QP's unconstrained solution, and bounds of the effort
   std::int64_t relaxed, beyond;
   Out<'n'> a, tau;
   OutInts<1> status, delivered;

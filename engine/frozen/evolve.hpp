@@ -19,7 +19,7 @@ struct Evolve {
   InOut<'k', 'n'> targets;  // in order of time
   InOut<'k', 2> times;      // when each begins, and how long it takes [s]
   InOutInts<1> count;       // how many there are
-  double least, most;       // bounds of what may be asked for
+  double least, most;       // bounds of what may be commanded
   std::int64_t definite;    // size of x as a matrix that has to be positive definite; 0: it is none
   Out<'n'> x, rate;         // x' of the ramps [1/s]
   Scratch<'n'> factor;      // of such a matrix

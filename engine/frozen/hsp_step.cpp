@@ -63,7 +63,7 @@ struct hsp_controller {
   hsp::Vector expected_q, expected_v;  // the last state that was accepted, and what follows from it
   bool blind = false;                  // whether hsp_stop goes by what is expected
   std::atomic<hsp_status> error = HSP_OK;  // of the last request
-  char failure[512] = "";                  // what an exception said
+  char failure[512] = "";                  // an exception's message
   std::atomic_flag busy = ATOMIC_FLAG_INIT;
 };
 
@@ -173,7 +173,7 @@ hsp_status change(hsp_controller& of, const char* name, const double* values, st
     if (!port->payloads->permits(wanted)) return HSP_WRONG_VALUE;
     return port->payloads->then(port->frame, now, ramp, wanted) ? HSP_OK : HSP_TOO_MANY;
   }
-  // A target has bounds of its own motion: no ramp.
+  // A target's motion is bounded already: no ramp.
   if (!port->input && duration > 0.0) return HSP_WRONG_VALUE;
   if (port->target) return port->target->send_target(wanted) ? HSP_OK : HSP_WRONG_VALUE;
   if (port->velocity) return port->velocity->send_velocity(wanted) ? HSP_OK : HSP_WRONG_VALUE;

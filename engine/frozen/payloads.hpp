@@ -1,4 +1,4 @@
-// What a robot carries, as a program without Python says it: see `ChangePayload`.
+// What a robot carries, as a program without Python sets it: see `ChangePayload`.
 #pragma once
 #include <Eigen/Eigenvalues>
 #include <hsp/indices.hpp>

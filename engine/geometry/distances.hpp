@@ -100,7 +100,7 @@ struct DistanceGradients {
   }
 
   // Add J(x)ᵀ f and its rate, J the linear Jacobian of a link's point. A joint that mimics another
-  // has a column of its own, and the other's index in v.
+  // has its own column, and the other's index in v.
   void push(Index i, const Vector3& x, const Vector3& x_dot, const Vector3& force,
             const Vector3& force_dot) {
     const auto columns = bodies.own_columns(i), dofs = bodies.own_dofs(i);

@@ -57,7 +57,7 @@ typedef enum hsp_status {
   HSP_WRONG_SIZE = -6,   /* an input or output has another number of values */
   HSP_WRONG_VALUE = -7,  /* a value is not finite, or outside of its bounds */
   HSP_TOO_MANY = -8,     /* more than 8 ramps of one input at a time */
-  HSP_FAILED = -9,       /* something else, which `hsp_last_error` says */
+  HSP_FAILED = -9,       /* something else, which `hsp_last_error` names */
   HSP_STOPPED = -10      /* of hsp_step: the stop has begun, tau is its effort; see hsp_restart */
 } hsp_status;
 
@@ -73,7 +73,7 @@ typedef struct hsp_port {
 } hsp_port;
 
 /* Open a controller that was frozen; NULL where it is none, was cut or changed, or is of another
- * version or processor: `hsp_last_error(NULL)` says which. */
+ * version or processor: `hsp_last_error(NULL)` names it. */
 HSP_API hsp_controller* hsp_open(const char* file) HSP_NOEXCEPT;
 HSP_API void hsp_close(hsp_controller* controller) HSP_NOEXCEPT;
 

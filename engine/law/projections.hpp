@@ -4,7 +4,7 @@
 
 namespace hsp {
 
-// A bounded pseudo-inverse with memory of its own.
+// A bounded pseudo-inverse with its memory.
 struct OwnInverse {
   Scratch<'m', 'n'> B, Q;
   Scratch<'m', 'm'> X, square;

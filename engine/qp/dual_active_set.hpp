@@ -34,7 +34,7 @@ namespace hsp {
 
 // A QP with k rows lower ≤ A x ≤ upper; bounds on x count as k, k + 1, ...
 //
-// The cost couples the first unknowns; of the others, each has a cost of its own: J is
+// The cost couples the first unknowns; the others' costs are separate: J is
 // block-diagonal.
 struct QP {
   In<'z', 'f'> JT;  // Jᵀ of the first unknowns; what its rows do not span does not move

@@ -14,7 +14,7 @@ namespace hsp {
 // nb::type_error where an argument is missing, unknown, given twice or not by its name.
 nanobind::tuple values_of(const Kind& kind, nanobind::args by_order, nanobind::kwargs by_name);
 
-// Throws nb::type_error where a value is not what its field says.
+// Throws nb::type_error where a value does not fit its field.
 std::vector<Argument> arguments_of(const Kind& kind, nanobind::tuple values);
 
 // "Circle(rate, center: reads float64 (d,), ...)"

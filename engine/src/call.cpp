@@ -17,7 +17,7 @@ template <class Sizes> std::string tuple_text(const Sizes& sizes, int rank) {
   return text + (rank == 1 ? ",)" : ")");
 }
 
-// What the letters stand for; where each was read first is said in a complaint.
+// What the letters stand for; an error names where each was read first.
 Sizes sizes_of(const Kind& kind, const std::vector<Argument>& arguments) {
   Sizes sizes;
   const Field* first['z' + 1] = {};

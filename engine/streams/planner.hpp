@@ -9,7 +9,7 @@ namespace hsp {
 constexpr double shortest_motion = 1e-3;  // between different states [s]
 constexpr double same_state = 1e-7;  // states that differ by less are the same, in x, x' and x''
 // Share of an angular speed up to which motions are planned. A vector with components up to b/√3 is
-// no longer than b; each piece has axes of its own, and where one begins a component of ω may be
+// no longer than b; each piece has its own axes, and where one begins a component of ω may be
 // beyond its bound while all of ω is not.
 constexpr double planned_share = 0.95;
 

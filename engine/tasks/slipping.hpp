@@ -56,7 +56,7 @@ void factor_stiffness(const K& stiffness, C& factor, V& turned) {
   factor = turned.transpose();
 }
 
-// S of an error, in memory of its own.
+// S of an error, with its memory.
 struct BoundedStiffness {
   Scratch<'m', 'm'> C, V, L;
   Scratch<'m'> s, change, part;

@@ -9,7 +9,7 @@
 //
 //   w' = R w̃' - w × w_d + w_d'.
 //
-// The feedback says e'' = -Kv e' - Kp e, exactly, up to an angle of π. Of these accelerations the
+// The feedback sets e'' = -Kv e' - Kp e, exactly, up to an angle of π. Of these accelerations the
 // joints make what the frame does not by its own motion in its joint; see FrameMotion.
 #pragma once
 #include <hsp/rotations.hpp>

@@ -2,7 +2,7 @@
 //
 //   x' = p' s'      x'' = p' s'' + p'' s'²      p' and p'' by s
 //
-// The path is a motion of its own, with a parameter u that is not its length. The length from the
+// The path is itself a motion, with a parameter u that is not its length. The length from the
 // path's start, s(u), is a polynomial in each cell of a table, and u(s) is found by Newton's
 // method.
 #pragma once

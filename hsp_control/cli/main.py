@@ -62,7 +62,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         where = "" if error.filename is None else f"{error.filename!s:.200}: "
         print(f"hsp: {where}{error.strerror or error}", file=sys.stderr)
     except MemoryError:
-        print("hsp: not enough memory for what was asked", file=sys.stderr)
+        print("hsp: not enough memory", file=sys.stderr)
     except KeyboardInterrupt:
         print("hsp: stopped by the user", file=sys.stderr)
         return INTERRUPTED

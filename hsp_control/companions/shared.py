@@ -45,7 +45,7 @@ def name_and_options(address: str) -> tuple[str, dict[str, str]]:
 
 
 class Rate:
-    """Says when something is due that is sent at a rate, once a period of a loop.
+    """Reports when something is due that is sent at a rate, once a period of a loop.
 
     The mean rate is right, also where a loop's period does not divide its own.
     """

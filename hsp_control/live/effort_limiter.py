@@ -94,7 +94,7 @@ class EffortLimiter:
         if beyond[i] <= 0.0:
             return None
         return (
-            f"the robot says it has an effort of {effort[i]:.6g} at "
+            f"the robot reports an effort of {effort[i]:.6g} at "
             f"{self._robot.dof_names[i]}; it can have {least[i]:.6g} to {most[i]:.6g}"
         )
 

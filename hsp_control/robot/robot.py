@@ -123,8 +123,7 @@ class Robot(RobotModel):
             name = RobotDescription(name, **given)
         elif given:
             raise ModelError(
-                "a RobotDescription says all about the robot: give "
-                f"{' and '.join(given)} in it"
+                f"a RobotDescription is complete: give {' and '.join(given)} in it"
             )
         return cls._described(name, access)
 

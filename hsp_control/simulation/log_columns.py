@@ -182,7 +182,7 @@ class TaskColumns:
         what = " and ".join(part.name for part in parts)
         column(f"{prefix}.error", (m,), unit, f"error e: {what}")
         column(f"{prefix}.error_rate", (m,), rate_unit, "error rate e'")
-        column(f"{prefix}.bounded", (), unit, "length of an error that counts for less")
+        column(f"{prefix}.bounded", (), unit, "length of an error that is bounded")
         # To search for streams in every row would cost more than the row.
         self._streams[name] = list(_streams_of(task, name))
         for stream, _ in self._streams[name]:

@@ -136,7 +136,7 @@ def beyond_limits(rollout: Log) -> str:
         return ""
     unit = rate_unit(rollout)
     return (
-        f"the field demands more than the limits give: |g| {asked:.3g} {unit}, "
+        f"the field demands more than the limits allow: |g| {asked:.3g} {unit}, "
         f"|e_N| {missing:.3g} {unit} at the end"
     )
 
@@ -174,7 +174,7 @@ def unexplained_rows(rollout: Log) -> Iterator[str]:
         dof = int(share.argmax())
         if share[dof] > LARGE_SHARE:
             yield (
-                "the robot does not do what the model says: that is "
+                "the model does not describe the robot: that is "
                 f"{100.0 * share[dof]:.0f} % of the effort limit of "
                 f"{rollout.meta['robot']['dofs'][dof]}; is there a load, or a contact?"
             )

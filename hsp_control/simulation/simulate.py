@@ -166,7 +166,7 @@ def simulate(
     ):
         message = (
             f"{type(plant).__name__} does not follow changes of payload and gravity; "
-            "it has to be told by its own means"
+            "change them in the plant itself"
         )
         warnings.warn(message, StartWarning, stacklevel=2)
     # The loop
@@ -312,9 +312,9 @@ def _whole(total: float, part: float, total_name: str, part_name: str) -> int:
         if (total, total_name) == (LOG_PERIOD, "log_period"):  # nobody has written it
             with within(part_name):
                 raise SimulationError(
-                    f"a row is logged every {total:g} s unless log_period says "
-                    f"otherwise, which is not a whole multiple of {part:g} s; give "
-                    f"log_period, too, for example {max(round(ratio), 1) * part:g}"
+                    f"a row is logged every {total:g} s by default, which is not a "
+                    f"whole multiple of {part:g} s; give log_period, too, for "
+                    f"example {max(round(ratio), 1) * part:g}"
                 )
         raise SimulationError(
             f"{total_name} = {total:g} s is not a whole multiple of "

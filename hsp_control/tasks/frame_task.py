@@ -62,7 +62,7 @@ def place_pose(
     if not isinstance(placed, ComposedPose):
         with within("blend"):
             raise TaskError(
-                f"{type(placed).__name__} begins where it says; remove blend"
+                f"{type(placed).__name__} has its own beginning; remove blend"
             )
     return ComposedPose(
         place_point(placed.position, np.array(here.translation), blend),

@@ -14,8 +14,8 @@
 // A group may have a `check`, too. What a step uses as an index is checked there, when the call is
 // made (`indices.hpp`), and not again: a step reads it as it is.
 //
-// What operator() returns is a number with one meaning, which `doc` says: a value (f of a cost), or
-// a bool. What there is more to say of a call it writes, into a record with names (`LawOutcome`).
+// What operator() returns is a number with one meaning, given in `doc`: a value (f of a cost), or
+// a bool. Further results of a call it writes, into a record with names (`LawOutcome`).
 //
 // The members are read into a table in C's layout, and whatever is the same for all kinds is
 // written once, over that table: the checks of shapes and entries, what Python sees, what a

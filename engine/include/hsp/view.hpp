@@ -1,4 +1,4 @@
-// Views: the arguments of calls. An argument's type says its entries, its shape and its use.
+// Views: the arguments of calls. An argument's type determines its entries, its shape and its use.
 //
 //   In<'m', 'n'> J;     reads a matrix             Ints<'m'> rows;       reads integers
 //   Out<'n'> a;         writes a vector            Flags<'m'> springs;   reads booleans

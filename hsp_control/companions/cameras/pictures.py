@@ -1,6 +1,6 @@
 """Pictures of a simulated robot's MuJoCo scene by HTTP: ``/CAMERA.jpg``.
 
-A process of its own draws, each picture when it is asked for, of the scene as it is
+A separate process draws each picture on request, of the scene as it is
 then; what simulates the robot only copies its state. Without a graphics card Mesa
 draws.
 """
@@ -86,7 +86,7 @@ def show(address: str, plant: Plant) -> Callable[..., object]:
     state, lock = np.ctypeslib.as_array(memory), anew.Lock()
 
     ours, theirs = anew.Pipe(duplex=False)
-    alive = anew.RawValue(ctypes.c_ulonglong)  # who draws counts it up
+    alive = anew.RawValue(ctypes.c_ulonglong)  # incremented by the process that draws
     arguments = (host, port, compiled.tobytes(), memory, lock, theirs, alive)
     drawing = anew.Process(target=_serve, args=arguments, name="cameras", daemon=True)
     silence, counted = Silence(monotonic()), 0
@@ -213,7 +213,7 @@ class _Handler(BaseHTTPRequestHandler):
     """Answers one request."""
 
     server: _Drawer
-    timeout = 1.0  # of a client that asks for nothing [s]
+    timeout = 1.0  # of a client that sends no request [s]
 
     def do_GET(self) -> None:
         """Send a picture, or say what there is."""
@@ -237,7 +237,7 @@ class _Handler(BaseHTTPRequestHandler):
 
 
 def _asked(path: str, cameras: list[str]) -> tuple[int, str, dict[str, int]]:
-    """Return the camera, the format and the size that a path asks for."""
+    """Return the camera, the format and the size in the path of a request."""
     parts = urlsplit(path)
     name, _, ending = unquote(parts.path).removeprefix("/").rpartition(".")
     if name not in cameras or ending not in _FORMATS:

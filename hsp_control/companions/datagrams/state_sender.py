@@ -1,4 +1,4 @@
-"""A live loop tells what a policy needs, one JSON text in each datagram."""
+"""A live loop sends what a policy needs, one JSON text in each datagram."""
 
 import json
 import logging
@@ -27,7 +27,7 @@ _log = logging.getLogger(__name__)
 
 
 def publish(address: str, source: EffortSource) -> "Teller":
-    """Return what tells a loop's state to another process; see `Teller`.
+    """Return what sends a loop's state to another process; see `Teller`.
 
     Args:
         address: ``HOST:PORT?rate=HZ``.
@@ -67,7 +67,7 @@ def publish(address: str, source: EffortSource) -> "Teller":
 class Teller:
     """Sends the state of a loop to one address; `run_loop` calls it as ``on_period``.
 
-    Nobody need listen, and nothing waits: what cannot be sent is dropped, and said
+    Nobody need listen, and nothing waits: what cannot be sent is dropped, and logged
     once. ``docs/companions/policies.md`` has the keys.
     """
 
@@ -91,7 +91,7 @@ class Teller:
         source.log_channels()
 
     def __call__(self, t: float) -> None:
-        """Tell the state, if it is time again.
+        """Send the state, if it is time again.
 
         Args:
             t: The controller's time [s].
@@ -101,7 +101,7 @@ class Teller:
         self._send({"phase": "running", **self._state()})
 
     def ended(self, ended: str, reason: str) -> None:
-        """Tell how the run ended, and close the socket.
+        """Send how the run ended, and close the socket.
 
         Args:
             ended: ``completed``, ``operator`` or ``fault``.
@@ -163,7 +163,7 @@ class Teller:
         except OSError as error:
             if not self._said:
                 _log.warning(
-                    "udp://%s:%s: the state is not told there: %s", *self._to, error
+                    "udp://%s:%s: the state cannot be sent there: %s", *self._to, error
                 )
             self._said = True
 

@@ -23,7 +23,7 @@ _POLL = 0.2  # how soon a listener notices that nobody needs it any more [s]
 
 
 class Address(NamedTuple):
-    """What an address ``udp://HOST:PORT/PART`` says.
+    """The parts of an address ``udp://HOST:PORT/PART``.
 
     Attributes:
         host: Where to listen.
@@ -37,7 +37,7 @@ class Address(NamedTuple):
 
 
 def address_of(source: str) -> Address | None:
-    """Return what an address says; None: it is none."""
+    """Parse an address; None: it is none."""
     try:
         parts = urlsplit(source)
         host, port = parts.hostname, parts.port
@@ -51,7 +51,7 @@ def address_of(source: str) -> Address | None:
 
 
 def check_address(source: str) -> Address:
-    """Return what an address ``udp://HOST:PORT`` or ``udp://HOST:PORT/PART`` says."""
+    """Parse an address ``udp://HOST:PORT`` or ``udp://HOST:PORT/PART``."""
     if (found := address_of(source)) is None:
         raise StreamError(
             f"source is {source!r}; needs udp://HOST:PORT, for example "

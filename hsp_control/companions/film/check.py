@@ -1,4 +1,4 @@
-"""What ``hsp doctor`` says of the browser that draws films."""
+"""What ``hsp doctor`` reports on the browser that draws films."""
 
 from hsp_control.cli.doctor import Check
 from hsp_control.companions.film.chromium import find_browser

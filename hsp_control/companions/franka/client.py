@@ -117,7 +117,7 @@ def packed(state: Any) -> bytes:
 
 
 def described(state: Any) -> dict[str, Any]:
-    """Return what a state tells once: mode, errors, and what hangs on the flange."""
+    """Return what is logged once of a state: mode, errors, the load on the flange."""
     errors = state.current_errors
     names = [name for name in dir(errors) if not name.startswith("_")]
     return {
@@ -168,7 +168,7 @@ class GripperClient:
                     return
                 try:
                     text, sender = self.inbox.recvfrom(LONGEST)
-                except OSError:  # who was told something is not there any more
+                except OSError:  # the listener is not there any more
                     continue
                 if is_answer(text) or sender == self.inbox.getsockname():
                     continue  # our own, which came back: no answer to it would be last
@@ -191,7 +191,7 @@ class GripperClient:
                 try:
                     self.inbox.sendto(json.dumps(answer).encode(), listener)
                 except OSError as error:
-                    self.say(f"{listener[0]}:{listener[1]} is not told: {error}")
+                    self.say(f"{listener[0]}:{listener[1]} cannot be reached: {error}")
 
     def beat(self, link: socket.socket) -> None:
         """Say that this process lives; nothing if the loop has not read the last."""
@@ -239,7 +239,7 @@ def is_answer(text: bytes) -> bool:
     """Return whether a datagram is one of those that a gripper answers with."""
     try:
         message = json.loads(text)
-    except Exception:  # `read` says what is wrong
+    except Exception:  # `read` reports it
         return False
     return isinstance(message, dict) and "grasped" in message
 

@@ -24,7 +24,7 @@ silent, takes less than two."""
 
 
 class ClientProcess:
-    """Runs `client` in a process of its own, which always ends.
+    """Runs `client` in a separate process, which always ends.
 
     One request is on its way at most. The process has its own session, so that Ctrl-C
     in a terminal reaches the loop only; if the loop's process dies, it ends, too.
@@ -107,7 +107,7 @@ class ClientProcess:
     def trouble(self) -> str:
         """Return why the process fails, "" if it runs.
 
-        While nothing is asked it says now and then that it lives.
+        Without requests it reports now and then that it is alive.
         """
         heard = False
         while select([self._link], [], [], 0.0)[0]:
@@ -119,7 +119,7 @@ class ClientProcess:
                 return "has ended"
             heard = True
         hangs = self._silence.look(monotonic(), heard=heard) > _HANGS
-        return f"has said nothing for {_HANGS:g} s" if hangs else ""
+        return f"has sent nothing for {_HANGS:g} s" if hangs else ""
 
     def _ended(self) -> str:
         """Return how the process ended, and the last line that it wrote."""

@@ -20,7 +20,7 @@ JOINTS = 7
 
 
 class FrankaCommand(IntEnum):
-    """What a request asks for."""
+    """The kinds of requests."""
 
     CONNECT = 0
     MOVE = 1

@@ -54,7 +54,7 @@ REFLEXES: dict[str, tuple[str, str]] = {
     ),
     "communication_constraints_violation": (
         "too many efforts arrived late, or none arrived for 20 ms",
-        "use a real-time kernel, --priority 80 and a cable of its own; docs/latency.md "
+        "use a real-time kernel, --priority 80 and a separate cable; docs/latency.md "
         "measures the computer",
     ),
     "power_limit_violation": (
@@ -164,7 +164,7 @@ def about(names: list[str]) -> str:
 
 def table() -> str:
     """Return the errors as a Markdown table, for the manual."""
-    lines = ["| the robot says | what happened | what to do |", "|---|---|---|"]
+    lines = ["| the robot reports | what happened | what to do |", "|---|---|---|"]
     rows: dict[tuple[str, str], list[str]] = {}
     for name, about_it in REFLEXES.items():
         rows.setdefault(about_it, []).append(f"`{name}`")

@@ -102,7 +102,7 @@ class FrankaSettings(Part, error=LiveError):
 
     @classmethod
     def parse(cls, text: str) -> Self:
-        """Return what ``ADDRESS?name=value&...`` says, or ``FILE.yaml?...``.
+        """Parse ``ADDRESS?name=value&...``, or ``FILE.yaml?...``.
 
         Values are written as in YAML; ``load.mass`` is a key inside ``load``. The text
         overrides the file.

@@ -339,7 +339,7 @@ class ControlBox:
         return np.clip(effort, -limit - gravity, limit - gravity)
 
     def _measure(self, effort: Array) -> None:
-        """Measure the arm after an effort, without gravity's, and tell it."""
+        """Measure the arm after an effort, without gravity's, and send it."""
         self._measured = self.plant.measure(self.t, self.q, self.v)
         self.model.measure(self.t, *self._measured, self.tau)
         self._wrench = self.readings.set_measured(

@@ -79,7 +79,7 @@ def _experiment(options: argparse.Namespace) -> Experiment:
     """Return the experiment of a configuration, or of a robot at home."""
     source, name = options.config, str(options.config)
     if is_robot(name):
-        # This says what is wrong with it, not with a task.
+        # The message is about it, not about a task.
         Arm(Robot.load(name, access=robot_access(name, options)))
         source = {
             "robot": {"name": name},

@@ -60,7 +60,7 @@ class Connection:
 
     Attributes:
         name: Its address, for the user.
-        connected: Whether it has said that it speaks our version.
+        connected: Whether it has confirmed our version.
         outdated: Number of commands for another state than the last one.
         late: Number of commands after the deadline.
         malformed: Number of datagrams that are no commands.
@@ -82,7 +82,7 @@ class Connection:
 
     @property
     def silent(self) -> bool:
-        """Whether it has not said for some time which version it speaks."""
+        """Whether it has not sent its version for some time."""
         return not self.connected and time.monotonic() - self._begun > _PATIENCE
 
     def requests(self) -> Iterator[Request]:

@@ -122,7 +122,7 @@ class Gripper(Thread):
         return self.grasped
 
     def _tell(self) -> None:
-        """Send a state to who has said where; it may be lost."""
+        """Send a state to the registered address; it may be lost."""
         self._count += 1
         state = _STATE.pack(self._count, self.width, WIDEST, self.grasped, 30)
         if self._peer[1]:

@@ -59,7 +59,7 @@ _HAND_ERRORS = (
 
 
 class Violation(NamedTuple):
-    """An error, and what a user wants to know about it.
+    """An error, its cause and its remedy.
 
     Attributes:
         error: The error.

@@ -139,7 +139,7 @@ class Server:
         begun = motion.commands > 0
         if begun:
             longest = 0.0 if self._cut else self._patience
-        else:  # the first state tells a client that it has begun; it answers the next
+        else:  # the first state confirms that it has begun; it answers the next
             longest = PATIENCE if motion is self._announced else PERIOD
             self._announced = motion
         command = self._await(number, monotonic() + longest, motion)
@@ -187,8 +187,8 @@ class Server:
     def _accept(self) -> None:
         tcp, peer = self._listener.accept()
         silent = self.client is not None and self.client.silent
-        if silent:  # it has not even said which version it speaks
-            self._part("it says nothing, and another one waits", broken=True)
+        if silent:  # it has not even sent its version
+            self._part("it sends nothing, and another one waits", broken=True)
         if self.client is not None:
             self._say(
                 f"refused: {peer[0]}:{peer[1]}, since {self.client.name} is connected"

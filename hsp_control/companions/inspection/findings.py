@@ -297,7 +297,7 @@ class Inspection:
 
     source: RobotSource  # where the robot comes from
     findings: tuple[Finding, ...]  # what is odd, errors first
-    facts: Mapping[str, str]  # what can be said about it in general: names and texts
+    facts: Mapping[str, str]  # general facts about it: names and texts
 
     @property
     def loads(self) -> bool:
@@ -392,7 +392,7 @@ def _of_robot(robot: Robot) -> tuple[list[Finding], dict[str, str]]:
         "robot": f"{robot.name}: nq = {robot.nq}, nv = {robot.nv}, {root}",
         "end effector": f"{robot.end_effector} (by default): {robot.hand.why}",
         "reach": f"{robot.size:.3g} m from the first joint at most: the longest chain",
-        "bounds": f"an error counts up to {far:.3g} m and {turned:.3g} rad by default",
+        "bounds": f"an error is bounded at {far:.3g} m and {turned:.3g} rad by default",
         "effort rate": _rates(robot),
         "springs": _springs(robot),
         "mass": f"{pin.computeTotalMass(robot.model):.4g} kg move",

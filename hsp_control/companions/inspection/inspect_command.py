@@ -85,7 +85,7 @@ def report(inspection: Inspection) -> Iterator[str]:
 
 def _is_mjcf(path: Path) -> bool:
     """Return whether a file is an MJCF: both kinds of file may end in .xml."""
-    with suppress(OSError, ValueError, XmlError):  # of a robot by name; said later
+    with suppress(OSError, ValueError, XmlError):  # of a robot by name; reported later
         return path.suffix == ".xml" and read_xml(path).tag == "mujoco"
     return False
 

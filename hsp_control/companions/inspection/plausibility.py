@@ -62,7 +62,7 @@ def check_gyration(
 
     Args:
         xml: The URDF.
-        robot: The robot; of links that do not move no inertia counts.
+        robot: The robot; inertias of links that do not move are ignored.
         shapes: Points of the links' shapes in their frames, (k, 3) each [m].
     """
     moving = {f.name for f in robot.model.frames if f.parentJoint > 0}

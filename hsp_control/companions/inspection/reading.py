@@ -60,7 +60,7 @@ def check_followers(xml: Element) -> Iterator[Finding]:
             lower, upper = each.leaders_range(joints)
             low, high = each.bounds(joints[each.name])
         except ModelError:
-            continue  # said by `check_limits`
+            continue  # `check_limits` reports it
         name = f"joint {each.name!r}"
         if max(lower, low) >= min(upper, high):
             message = (
@@ -98,7 +98,7 @@ _ENDS = "lower", "upper"
 
 
 def check_planar_axes(xml: Element) -> Iterator[Finding]:
-    """Yield the planar joints whose plane is not said."""
+    """Yield the planar joints without a declared plane."""
     for joint in xml.findall("joint"):
         if joint.get("type") == "planar" and joint.find("axis") is None:
             yield Finding(

@@ -191,7 +191,7 @@ def _scalar_joint(axis: Array, *, turns: bool) -> Any:
 
 _SHOWN_GROUPS = 3
 _DEFAULT_COLOR = np.array([0.5, 0.5, 0.5, 1.0], dtype=np.float32)
-"""Where a geom has this colour, that of its material counts."""
+"""Where a geom has this colour, its material's is used."""
 
 
 def body_shapes(selection: Selection) -> tuple[BodyShape, ...]:

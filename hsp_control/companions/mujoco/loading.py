@@ -278,7 +278,7 @@ def _of_joints(selection: Selection) -> Iterator[Lack]:
     yield (
         "joints",
         moving(lopsided),
-        "their effort has different limits in both directions; the smaller one counts, "
+        "their effort has different limits in both directions; the smaller is used, "
         "and none if that is zero",
     )
 

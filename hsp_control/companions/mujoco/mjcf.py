@@ -170,7 +170,7 @@ class Solid(Part, error=SimulationError):
     is pushed off by the acceleration μ b ‖u‖, since the cone's dual couples the two.
     The surface supplies (1 - d)/d of the acceleration with which the shape is pressed;
     if that is less, the contact opens and closes for ever. With ``slip_damping`` b and
-    ``impedance`` d things slide as Coulomb says, see ``docs/forces.md``.
+    ``impedance`` d things slide by Coulomb's law, see ``docs/forces.md``.
     """
 
     yaml_key: ClassVar[str | None] = "name"
@@ -282,7 +282,7 @@ def write_mjcf(
                 geom = replace(geom, placement=pin.SE3.Identity())
             element = _add_geom(parent, name, geom, solid.friction, kind)
             element.set("mass", _numbers([solid.mass or 0.0]))
-            element.set("priority", "1")  # its friction counts, not the other's
+            element.set("priority", "1")  # its friction is used, not the other's
             _set_impedance(element, solid)
     lower, upper = robot.position_limits()
     bodies = {0: world}

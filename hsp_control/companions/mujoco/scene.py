@@ -64,7 +64,9 @@ class Names:
     def __init__(self, model: Any) -> None:
         self.bodies = _distinct("body", model.body, model.nbody)
         self.joints = _distinct("joint", model.joint, model.njnt)
-        count = len(model.actuator_trntype)  # nu counts controls since MuJoCo 4
+        count = len(
+            model.actuator_trntype
+        )  # nu is the number of controls since MuJoCo 4
         self.actuators = _distinct("actuator", model.actuator, count)
         bodies, sites = set(self.bodies), _distinct("site", model.site, model.nsite)
         self.sites = tuple(f"site:{name}" if name in bodies else name for name in sites)
@@ -228,7 +230,7 @@ def select(
 
     ``root`` None: the whole scene; ``joints`` None: all of the subtree. The scene's
     configuration is ``qpos`` (model.nq,), or that of a ``keyframe``. ``locked`` joints
-    stay at these values [rad or m], whatever the configuration says.
+    stay at these values [rad or m], whatever the configuration declares.
     """
     names, locked, top = Names(model), locked or {}, 0
     if root is not None:

@@ -1,4 +1,4 @@
-"""A robot in a MuJoCo scene, which moves as MuJoCo says.
+"""A robot in a MuJoCo scene, simulated by MuJoCo.
 
 MuJoCo has no contacts between a body and its parent, except where the parent stands
 still: a base that its first link overlaps holds this link like a brake.

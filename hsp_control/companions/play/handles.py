@@ -39,7 +39,7 @@ from hsp_control.trajectories.streams.followed import FollowedStream
 from hsp_control.trajectories.streams.streamed import Streamed
 
 BACK = 1.5
-"""Time over which a path of its own comes back [s]: half a metre at 0.6 m/s at most."""
+"""Time over which a grip returns to its path [s]: half a metre at 0.6 m/s at most."""
 _FARTHEST = 1e3  # nothing is dragged farther [m]
 
 
@@ -91,7 +91,7 @@ class Grip(ABC):
 
     @abstractmethod
     def _wanted(self, value: Array) -> Array:
-        """Return what a page asks for as the stream takes it."""
+        """Return a page's command as the stream accepts it."""
 
     @abstractmethod
     def _follow(self, stream: Any, at: Changes) -> None:
@@ -238,7 +238,7 @@ class PostureGrip(Grip):
             t for t in terms_of(self._controller.field) if isinstance(t, TargetPosture)
         ]
         weights = np.array([sample_weight(term.weight, state)[0] for term in terms])
-        if terms and not weights.any():  # the field is switched off: the newest counts
+        if terms and not weights.any():  # the field is switched off: the newest is used
             weights[-1] = 1.0
         moved = np.zeros(self._robot.nv)
         for term, weight in zip(terms, weights / weights.sum(), strict=True):
@@ -309,11 +309,11 @@ def posture_of(controller: Controller) -> dict[str, PostureGrip]:
     return {POSTURE: PostureGrip(postures[0], controller)}
 
 
-KNOB_PERIOD = 0.1  # time between two changes by one knob [s]: a slider says much more
+KNOB_PERIOD = 0.1  # time between two changes by one knob [s]: a slider sends many more
 
 
 class Handles:
-    """Turns what a page says into streams and changes of a controller."""
+    """Turns a page's commands into streams and changes of a controller."""
 
     def __init__(self, controller: Controller, period: float) -> None:
         """Find what can be touched; nothing is touched yet."""
@@ -336,7 +336,7 @@ class Handles:
         self.knobs[knob.id], self.values[knob.id] = knob, knob.value
 
     def receive(self, message: Mapping[str, Any]) -> None:
-        """Do what a page says; what is wrong is answered in `message`.
+        """Do what a page commands; errors are reported in `message`.
 
         ``move`` a target or an ``obstacle``, let it ``resume`` its own path, ``set`` a
         knob. What is ``release``d stays where it is.

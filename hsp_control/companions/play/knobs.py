@@ -71,7 +71,7 @@ def _null_space(controller: Controller, period: float) -> Iterator[Knob]:
         return
     switch = FieldSwitch(field)
     if switch.whole:
-        note = "Off: nothing tells the free joints where to go."
+        note = "Off: the free joints have no desired velocity."
         yield Knob("field", group, "Field", "", True, 0.0, 1.0, switch.turn, note)
     K = controller.null_space_gain
     gain = float(np.diag(K).mean())
@@ -85,7 +85,7 @@ def _null_space(controller: Controller, period: float) -> Iterator[Knob]:
         if weight:
             turn, most = partial(switch.weigh, name), 5.0 * weight
             label = f"Weight of {name.replace('_', ' ')}"
-            note = "How much this term counts beside the others."
+            note = "The weight of this term in the sum."
             yield Knob(
                 f"weight.{name}", group, label, "", weight, 0.0, most, turn, note
             )

@@ -70,7 +70,7 @@ def channel_pair() -> tuple[Channel, socket.socket]:
     return Channel(here), there
 
 
-TIMEOUT = 0.5  # silence after which the key counts as released [s]
+TIMEOUT = 0.5  # silence after which the key is taken as released [s]
 
 
 class DeadMansKey:
@@ -82,7 +82,7 @@ class DeadMansKey:
         self._until = -float("inf")
 
     def update(self, *, held: bool) -> None:
-        """Note what the page says of it."""
+        """Note the page's message about it."""
         self._until = self._clock() + TIMEOUT if held else -float("inf")
 
     @property
@@ -159,7 +159,7 @@ class SteeredLoop:
 
 
 class RemoteHandles(Handles):
-    """What can be touched in another process: where it is, that process tells."""
+    """What can be touched in another process: that process reports where it is."""
 
     def __init__(self, controller: Controller, period: float) -> None:
         """Begin where the controller is."""
@@ -172,7 +172,7 @@ class RemoteHandles(Handles):
         return self._places
 
     def update(self, word: Mapping[str, Any]) -> None:
-        """Note what the loop says; its changes are made here, too."""
+        """Note what the loop reports; its changes are made here, too."""
         self._places = word["targets"], word["obstacles"]
         self.message, self.warning = word["message"], word["warning"]
         self.held = word["held"]
@@ -181,7 +181,7 @@ class RemoteHandles(Handles):
                 continue
             self.values[name] = value
             at = self._controller.at(self._controller.state.t).ramp(RAMP)
-            with suppress(HspControlError):  # the loop's word counts
+            with suppress(HspControlError):  # the loop decides
                 self.knobs[name].turn(at, value)
 
 
@@ -246,7 +246,7 @@ class Mirror:
         return None
 
     def say(self, message: dict[str, Any]) -> None:
-        """Pass on what a page says; a preview is this process's own."""
+        """Pass on a page's commands; a preview is this process's own."""
         if message["do"] == "preview":
             self.previews = message.get("on") is True
             return
@@ -261,7 +261,7 @@ class Mirror:
         if self._journal.read():
             self.recorder = self._journal
             row = self._journal.rows(self._journal.count - 1)
-            with suppress(HspControlError):  # the loop says what is wrong
+            with suppress(HspControlError):  # the loop reports it
                 self.controller.compute(float(row["t"][0]), row["q"][0], row["v"][0])
         if self._journal.ended:
             self.over = str(self._journal.meta["message"])

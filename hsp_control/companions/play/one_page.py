@@ -1,4 +1,4 @@
-"""Writes a play as one page, in a process of its own: the play goes on meanwhile."""
+"""Writes a play as one page, in a separate process: the play goes on meanwhile."""
 
 import subprocess
 import sys

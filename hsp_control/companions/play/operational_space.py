@@ -6,7 +6,7 @@ With W = M it is Khatib's (1987); here W is the metric of the controller, so tha
 laws project alike, with the same tasks, field and gains. The tasks obey the same
 equation. What is missing is the motion of the null space: with P = I - J# J, nothing
 cancels P' and g', so that the null-space velocity follows a field that moves only with
-an error, and no theorem says how large it is.
+an error, and no theorem bounds it.
 """
 
 import numpy as np

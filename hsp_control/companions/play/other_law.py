@@ -89,7 +89,7 @@ class OtherLaw:
         return instant is not None
 
     def receive(self, message: Mapping[str, Any]) -> None:
-        """Do what a page says, as the session does; what it refuses is said there."""
+        """Do what a page commands; what is refused the session reports."""
         self.handles.receive(message)
 
     @property

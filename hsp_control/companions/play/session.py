@@ -182,7 +182,7 @@ class Session:
     # -- messages ---------------------------------------------------------------------
 
     def receive(self, message: Mapping[str, Any]) -> None:
-        """Do what a page says: ``pull`` at a link and ``let_go``, or see `Handles`."""
+        """Execute a command: ``pull`` at a link and ``let_go``, or see `Handles`."""
         try:
             match message:
                 case {"do": "pull", "path": str(path), "point": list(point),

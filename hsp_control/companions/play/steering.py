@@ -119,7 +119,7 @@ class PageProcess:
 
     def _say(self, message: dict[str, Any]) -> None:
         assert self._process.stdin is not None
-        with suppress(OSError):  # it has ended, and said why
+        with suppress(OSError):  # it has ended, and reported why
             self._process.stdin.write(json.dumps(message).encode() + b"\n")
             self._process.stdin.flush()
 
@@ -201,7 +201,7 @@ def main() -> int:
     """Show the loop until it has ended; return 0, or 2 after one error message.
 
     This is the page's process. It draws what the loop writes into its journal, and
-    passes on what the page says. It reads lines of JSON from its standard input. The
+    passes on the page's commands. It reads lines of JSON from its standard input. The
     first has its settings; then it writes the page's address. ``prepare`` lets it draw
     the robot and the scene, ``status`` sets the status line, ``begin`` lets it draw the
     loop: until then the loop's process prepares what both need. When its input is

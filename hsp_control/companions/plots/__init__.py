@@ -22,6 +22,7 @@ if TYPE_CHECKING:  # for type checkers; a help text must not import what is slow
     from .figures import paper_figure as paper_figure
     from .figures import save_figure as save_figure
     from .figures import save_figures as save_figures
+    from .figures import save_for_a_column as save_for_a_column
     from .figures import styled as styled
     from .figures import use_style as use_style
     from .frames import draw_frame as draw_frame
@@ -40,7 +41,7 @@ __getattr__, __dir__ = at_first_use(
         ),
         "figures": (
             "diagnostics_figure differing new_figure paper_figure save_figure "
-            "save_figures styled use_style"
+            "save_figures save_for_a_column styled use_style"
         ),
         "frames": "draw_frame draw_frames draw_superimposed",
         "log_series": "chosen_rows",

@@ -21,7 +21,7 @@ def _add_options(plot: argparse.ArgumentParser) -> None:
         dest="file",
         type=Path,
         metavar="FILE",
-        help="draw one figure into this file; its ending says the format",
+        help="draw one figure into this file; the format follows from its ending",
     )
     plot.add_argument(
         "--names",

@@ -33,7 +33,8 @@ from hsp_control.simulation.measures import (
     task_errors,
 )
 
-_WIDE = 5.0  # width of a figure [inches]
+_WIDE = 4.5  # width of a figure [inches]
+_LEGEND = 8.4  # font size of legends [pt]
 _HANDLE, _GAP, _LETTER = 2.2, 1.3, 0.55
 """Widths in a legend over its font size: handle, gap of columns, mean letter."""
 
@@ -85,7 +86,7 @@ def _fitting(axes: Axes, labels: Sequence[str]) -> int:
     assert figure is not None
     # The layout comes later: a narrow figure leaves less beside the labels.
     share = 1.1 if figure.get_figwidth() > _WIDE else 0.9
-    width = axes.get_window_extent().width / figure.dpi * 72.0 / 8.0 * share
+    width = axes.get_window_extent().width / figure.dpi * 72.0 / _LEGEND * share
     for columns in range(len(labels), 1, -1):
         rows = -(-len(labels) // columns)
         wide = sum(
@@ -111,7 +112,7 @@ def draw_lines(
 ) -> str:
     """Draw one line per column, named in the legend; return the units of what is drawn.
 
-    If the named lines differ in their units, names tell them; lines without a name are
+    If the named lines differ in their units, names show them; lines without a name are
     drawn only if they share a unit with named ones. A lower or upper limit of a named
     line is drawn if it comes near. Shapes: t (N,), values (N, k), limits (k,) each.
     """
@@ -196,12 +197,25 @@ def mark_steps(axes: Axes, rollout: Rollout) -> None:
 def mark_frames(axes: Axes, times: Array) -> None:
     """Mark the times of frames with their numbers, from 1, at the upper edge."""
     upper = axes.secondary_xaxis("top")
-    few = len(times) <= MAX_NAMED
-    upper.set_xticks(
-        times, labels=[str(k + 1) if few else "" for k in range(len(times))]
-    )
-    upper.tick_params(length=2.0, pad=1.0, labelsize=7.0, labelcolor=palette.MUTED)
+    upper.set_xticks(times, labels=_spaced_numbers(axes, times))
+    upper.tick_params(length=2.0, pad=1.0, labelsize=8.4, labelcolor=palette.MUTED)
     upper.spines["top"].set_visible(False)
+
+
+def _spaced_numbers(axes: Axes, times: Array) -> list[str]:
+    """Return the numbers of frames, those left out that would overlap."""
+    if len(times) > MAX_NAMED:
+        return [""] * len(times)
+    figure = axes.get_figure(root=True)
+    assert figure is not None
+    wide = axes.get_window_extent().width / figure.dpi * 72.0
+    places = (times - times[0]) * wide / np.ptp(axes.get_xlim())
+    texts, shown = [""] * len(times), list[float]()
+    for k in (0, len(times) - 1, *range(1, len(times) - 1)):  # the ends first
+        if all(abs(places[k] - other) >= _LEGEND for other in shown):
+            texts[k] = str(k + 1)
+            shown.append(places[k])
+    return texts
 
 
 _UNIT_DASHES = {"rad": "--", "–": ":"}

@@ -31,7 +31,7 @@ from hsp_control.companions.plots.frames import (
     draw_frames,
     draw_superimposed,
 )
-from hsp_control.companions.plots.paths import draw_end_effector
+from hsp_control.companions.plots.paths import draw_end_effector, path_view
 from hsp_control.simulation import Rollout, measures
 
 STYLE: dict[str, Any] = {
@@ -60,7 +60,7 @@ STYLE: dict[str, Any] = {
     "grid.linewidth": 0.6,
     "legend.borderaxespad": 0.0,
     "legend.columnspacing": 1.3,
-    "legend.fontsize": 8.0,
+    "legend.fontsize": 8.4,
     "legend.frameon": False,
     "legend.handlelength": 1.7,
     "legend.handletextpad": 0.5,
@@ -69,17 +69,17 @@ STYLE: dict[str, Any] = {
     "lines.solid_capstyle": "round",
     "mathtext.default": "regular",
     "mathtext.fontset": "dejavusans",
-    "pdf.fonttype": 42,  # TrueType, which journals ask for
+    "pdf.fonttype": 42,  # TrueType, which journals require
     "savefig.dpi": 160,
     "text.color": palette.INK,
     "xtick.color": palette.MUTED,
     "xtick.labelcolor": palette.INK,
-    "xtick.labelsize": 8.0,
+    "xtick.labelsize": 8.4,
     "xtick.major.size": 3.0,
     "xtick.minor.size": 1.5,
     "ytick.color": palette.MUTED,
     "ytick.labelcolor": palette.INK,
-    "ytick.labelsize": 8.0,
+    "ytick.labelsize": 8.4,
     "ytick.major.size": 3.0,
     "ytick.minor.size": 1.5,
 }
@@ -141,9 +141,11 @@ def paper_figure(
         absolute: Whether angles of joints are absolute where the robot has such.
         frames: How many frames are drawn, evenly over the run.
         times: Their times instead [s].
-        title: The heading; None: as the log says.
+        title: The heading; None: the log's title.
         width: The width for a paper, such as ``84mm``, or in metres: without heading
-            and foot, and below 150 mm with the panels one below the other.
+            and foot. Below 150 mm the panels of a plane are in two columns, which at
+            117 mm may be printed at 84 mm with text of 6 pt; those of space, and all
+            below 110 mm, are one below the other.
 
     Raises:
         PlotError: If the log has no rows, or no frame is requested.
@@ -152,12 +154,24 @@ def paper_figure(
     rows = log_series.chosen_rows(rollout, frames, times)
     if not rows:
         raise PlotError("no frame is requested; needs at least 1")
-    wide = 11.0 if width is None else _inches(width)
+    wide = 11.0 if width is None else inches(width)
     narrow = wide < _NARROW
+    paired = narrow and wide > _ONE_COLUMN and bool(path_view(rollout).names)
     with styled():
-        strip_of = (wide, 0.75 * wide) if narrow else (0.62 * wide, 0.245 * wide)
+        high_of = 0.5 if paired else 0.75
+        strip_of = (wide, high_of * wide) if narrow else (0.62 * wide, 0.245 * wide)
         columns = columns_for(rollout, len(rows), *strip_of)
-        if narrow:
+        if paired:
+            # Two columns: a and b, c and e, and below them d.
+            high = [0.66 * wide, 0.62 * wide, high_of * wide]
+            figure = new_figure(wide, sum(high))
+            first, second, strip = figure.subfigures(
+                3, 1, squeeze=False, height_ratios=high
+            ).ravel()
+            left, right = first.subfigures(1, 2, width_ratios=(0.9, 1.0))
+            below, together = second.subfigures(1, 2, width_ratios=(0.9, 1.0))
+            a, b, c = (part.add_subplot() for part in (left, right, below))
+        elif narrow:
             # One below the other: a, b, c, then d and e.
             named = len(log_series.lively(rollout.tau))  # in the legend of b
             lines = 0.14 * named if named > 3 else 0.0
@@ -178,6 +192,8 @@ def paper_figure(
             _add_title(figure, rollout, title)
         draw_end_effector(a, rollout)
         a.set_anchor("NW")
+        if paired:
+            a.locator_params(nbins=4)
         curves.draw_joint_positions(b, rollout, absolute=absolute)
         third, title = PANELS[
             "determinant" if measures.rows_compare(rollout) else "singular_values"
@@ -187,9 +203,11 @@ def paper_figure(
         draw_frames(cells.ravel().tolist(), rollout, rows, short=narrow)
         for cell in cells.ravel():
             cell.label_outer()
+            if paired:  # the axes of e, which has their labels
+                cell.set(xlabel="", ylabel="")
         strip.suptitle("(d)  Selected frames", **_HEADING)
         e = together.add_subplot()
-        draw_superimposed(e, rollout, rows)
+        draw_superimposed(e, rollout, rows, letter=0.055 if paired else 0.035)
         e.set_anchor("N")
         together.suptitle("(e)  Frames together", **_HEADING)
         titles = ["End effector", "Joints", title]
@@ -213,7 +231,8 @@ PANELS: dict[str, tuple[Callable[[Axes, Rollout], None], str]] = {
     "speeds": (curves.draw_speeds, "Joint speeds"),
 }
 """The panels of `diagnostics_figure`, by name: what draws each, and its title."""
-_NARROW = 5.9  # width of a figure below which its panels are one below the other [in]
+_NARROW = 5.9  # width of a figure below which its panels are not in one row [in]
+_ONE_COLUMN = 4.33  # width up to which they are one below the other [in]
 _SHAPE = 0.72, 0.55  # height of a panel over its width, and its legend's [inches]
 _LOG_DASHES: tuple[Any, ...] = ("-", (0, (6, 1.5)), "-.", ":")
 """Of the first log, the second and so on."""
@@ -251,7 +270,7 @@ def diagnostics_figure(
         columns = len(chosen) if len(chosen) <= 3 else many
         wide, more = 3.6 * columns, 0.6
     else:
-        wide, more = _inches(width), 0.0
+        wide, more = inches(width), 0.0
         columns = min(max(round(wide / 3.0), 1), len(chosen))
     rows = -(-len(chosen) // columns)
     high = rows * (_SHAPE[0] * wide / columns + _SHAPE[1]) + more
@@ -391,7 +410,7 @@ def differing(names: Sequence[str]) -> list[str]:
 _INCHES = {"mm": 1.0 / 25.4, "cm": 1.0 / 2.54, "in": 1.0}
 
 
-def _inches(width: str | float) -> float:
+def inches(width: str | float) -> float:
     """Return a width in inches: of a text such as ``84mm``, or in metres."""
     text = width if isinstance(width, str) else f"{1e3 * width}mm"
     try:
@@ -420,6 +439,18 @@ def save_figures(
         *save_figure(paper, Path(folder) / f"{stem}-paper", formats),
         *save_figure(diagnostics, Path(folder) / f"{stem}-diagnostics", formats),
     ]
+
+
+def save_for_a_column(
+    figure: Figure, path: Path, metadata: dict[str, str] | None = None
+) -> None:
+    """Write a picture that has 300 dots per inch where it is printed 84 mm wide.
+
+    A journal's column is as wide. Text of 6 pt there is one of 6 pt w / 84 mm in a
+    figure that is w wide.
+    """
+    dots = 300.0 * 84.0 * _INCHES["mm"]
+    figure.savefig(path, dpi=dots / figure.get_figwidth(), metadata=metadata)
 
 
 def save_figure(figure: Figure, stem: Path, formats: Sequence[str]) -> list[Path]:

@@ -27,7 +27,7 @@ from hsp_control.companions.plots.world import (
 )
 from hsp_control.simulation import Rollout
 
-_NEAR = 0.035  # width and height of a letter of a number, over the size of the scene
+_BEYOND = 1.5  # distance of a number from the last point, over the size of its letters
 MAX_TICKS = 10  # with more frames, their times are not the ticks of the time scale
 
 
@@ -66,16 +66,24 @@ def draw_frames(
             title = one.get_title(loc="left")
             title = title.removeprefix("t = ") if short else f" {title}"
             number = rf"$\mathbf{{{place + 1}}}$  {title}"
-            size = 7.5 if short else 8.5
-            one.set_title(number, fontsize=size, fontweight="normal", pad=3.0)
+            one.set_title(number, fontsize=8.5, fontweight="normal", pad=3.0)
         else:
             one.set_axis_off()
 
 
 def draw_superimposed(
-    axes: Axes, rollout: Rollout, rows: Sequence[int], *, numbered: bool = True
+    axes: Axes,
+    rollout: Rollout,
+    rows: Sequence[int],
+    *,
+    numbered: bool = True,
+    letter: float = 0.035,
 ) -> None:
-    """Draw the robot at all rows in one plot; later rows are darker."""
+    """Draw the robot at all rows in one plot; later rows are darker.
+
+    ``letter``: the width and height of a letter of a frame's number, over the size of
+    the scene; numbers that would overlap are one text.
+    """
     scene, tree = _Surroundings.of(rollout), parents(rollout)
     _draw_paths(axes, scene.view, rollout, 2.2)
     times = rollout.t[list(rows)]
@@ -94,8 +102,8 @@ def draw_superimposed(
             axes, scene.view, points, tree, link=link, joint=joint, zorder=zorder
         )
     if numbered:
-        near = _NEAR * float(np.ptp(scene.view.project(scene.points), axis=1).max())
-        for row, text in _numbers(scene.view, rollout, rows, near):
+        near = letter * float(np.ptp(scene.view.project(scene.points), axis=1).max())
+        for row, text in _numbers(scene.view, rollout, tree, rows, near):
             _number(axes, scene.view, rollout["skeleton"][row], tree, text)
     scene.finish(axes, shadows=False, key=True)
     if end > start:
@@ -157,10 +165,13 @@ class _Surroundings(NamedTuple):
 
 
 def _numbers(
-    view: View, rollout: Rollout, rows: Sequence[int], near: float
+    view: View, rollout: Rollout, tree: Sequence[int], rows: Sequence[int], near: float
 ) -> Iterator[tuple[int, str]]:
     """Yield a row and its frames' numbers; numbers that would overlap are one text."""
-    ends = np.column_stack(view.project(rollout["skeleton"][list(rows), -1]))
+    points = [rollout["skeleton"][list(rows), k] for k in (-1, tree[-1])]
+    ends, before = (np.column_stack(view.project(each)) for each in points)
+    lengths = np.linalg.norm(ends - before, axis=1, keepdims=True)
+    ends += _BEYOND * near * (ends - before) / np.maximum(lengths, 1e-12)
     groups: list[list[int]] = []
     for place in range(len(rows)):
         group = [place]
@@ -203,7 +214,7 @@ def _number(
         textcoords="offset points",
         ha="center",
         va="center",
-        fontsize=7.5,
+        fontsize=8.4,
         fontweight="bold",
         color=palette.INK,
         zorder=9.0,
@@ -221,7 +232,7 @@ def _time_bar(axes: Axes, start: float, end: float, ticks: list[float]) -> None:
     scale = LinearSegmentedColormap.from_list("time", [palette.EARLY, palette.LATE])
     figure = axes.get_figure(root=False)
     assert figure is not None
-    beside = axes.inset_axes((1.04, 0.0, 0.035, 1.0))
+    beside = axes.inset_axes((1.08, 0.0, 0.035, 1.0))
     bar = figure.colorbar(ScalarMappable(Normalize(start, end), scale), cax=beside)
     bar.set_label("time [s]")
     if len(ticks) <= MAX_TICKS:

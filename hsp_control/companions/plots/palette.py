@@ -60,7 +60,7 @@ SERIES = (
 """Lines of one kind, such as joints; without yellow, which is invisible on white."""
 
 RUNS = ("#332288", "#AA4499", "#117733", "#999933", "#882255", "#44AA99")
-"""Lines of one run each, by Tol: none is a colour of `SERIES`, which tells joints."""
+"""Lines of one run each, by Tol: none is a colour of `SERIES`, which is for joints."""
 
 TASKS = (ACTUAL, TASK, "#CC79A7", "#56B4E9", INK)
 """Measured values of the first task, the second and so on."""

@@ -17,7 +17,7 @@ from hsp_control.companions.plots.log_series import TaskPath, task_path
 from hsp_control.simulation import Rollout
 from hsp_control.simulation.measures import task_names
 
-FLAT = 1e-6  # depth over width below which motion counts as planar
+FLAT = 1e-6  # depth over width below which motion is taken as planar
 AZIMUTH, ELEVATION = -60.0, 22.0  # direction of the eye in an oblique view [deg]
 
 

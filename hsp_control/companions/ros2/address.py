@@ -15,7 +15,7 @@ _LARGEST_DOMAIN = 232  # beyond, RTPS has no ports for it
 
 
 class TopicAddress(NamedTuple):
-    """What an address says.
+    """The parts of an address.
 
     Attributes:
         name: A name of ROS 2, beginning with a slash.
@@ -29,7 +29,7 @@ class TopicAddress(NamedTuple):
 
 
 def parse(address: str, options: Collection[str] = ()) -> TopicAddress:
-    """Return what an address says; the domain is ``ROS_DOMAIN_ID``'s, or else 0."""
+    """Parse an address; the domain is ``ROS_DOMAIN_ID``'s, or else 0."""
     address = address.removeprefix(SCHEME)
     where = SCHEME + address
     try:

@@ -39,7 +39,7 @@ class Ros2Hardware:
     field ``effort`` is not read: whether it is commanded or measured, and with or
     without gravity, differs from robot to robot.
 
-    A state has no number. Its stamp counts: one that is not later than the last one is
+    A state has no number, but a stamp: one that is not later than the last one is
     old, and a step of n periods means that n - 1 states were lost. The clock of the
     stamps is compared with nothing (`AgeEstimator`).
 
@@ -68,7 +68,7 @@ class Ros2Hardware:
 
         Raises:
             HardwareError: If the address is invalid, Cyclone DDS cannot start, or the
-                robot is not there; says what is there instead.
+                robot is not there; lists what is there instead.
         """
         name, domain, options = parse(address, ("states", "joints"))
         self.period, self._joints = period, Joints(robot)
@@ -139,7 +139,7 @@ class Ros2Hardware:
             del self._subscription, self._publisher
 
     def _measurement(self, received: ReceivedMessage[JointState]) -> Measurement | None:
-        """Return what a message says; None if it is old, or about other joints."""
+        """Return the state of a message; None if it is old, or about other joints."""
         try:
             state = self._joints.state(received.message, self.states)
         except HardwareError as error:

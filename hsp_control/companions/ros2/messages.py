@@ -153,7 +153,7 @@ TYPE_HASHES: dict[type[IdlStruct], str] = {
     PoseStamped: "10f3786d7d40fd2b54367835614bff85d4ad3b5dab62bf8bca0cc232d73b4cd8",
     TwistStamped: "5f0fcd4f81d5d06ad9b4c4c63e3ea51b82d6ae4d0558f1d475229b1121db6f64",
 }
-"""The hashes (RIHS01) by which ROS 2 since Iron tells types apart. It compares none
+"""The hashes (RIHS01) by which ROS 2 since Iron distinguishes types. It compares none
 over DDS, but warns where one is missing."""
 
 

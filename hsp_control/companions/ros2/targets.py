@@ -28,7 +28,7 @@ _WORLD = "world"
 
 
 def check_address(source: str) -> TopicAddress:
-    """Return what an address ``ros2://TOPIC?type=twist&frame=NAME&domain=N`` says."""
+    """Parse an address ``ros2://TOPIC?type=twist&frame=NAME&domain=N``."""
     try:
         address = parse(source, ("type", "frame", "tool"))
     except HardwareError as error:
@@ -93,7 +93,7 @@ def _listen(
 def _said(
     message: "AnyTarget", options: Mapping[str, str], space: Space
 ) -> dict[str, Any]:
-    """Return what a message says to a stream; see `message_of`."""
+    """Return a stream's command of a message; see `message_of`."""
     named, frame = message.header.frame_id, options.get("frame", _WORLD)
     if hasattr(message, "pose"):
         _check_frame("a pose", named, [frame])

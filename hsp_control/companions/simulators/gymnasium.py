@@ -43,7 +43,7 @@ class HandTargets(
     between the world and the hand. What they were driven with does not count any more.
     The other entries of the environment's own action, such as those of fingers, follow
     after the target. The environment sees zeros as the action of the arm, and so does a
-    reward that counts it.
+    reward that includes it.
 
     An action is a change of the hand's pose, or, if ``absolute``, the pose itself: a
     position [m], and unless only ``axes`` are tracked, a rotation vector [rad], in

@@ -102,7 +102,7 @@ class HandControl:
         """Set the next target.
 
         Args:
-            goal: The hand's pose, body to world; of a position only the origin counts.
+            goal: The hand's pose, body to world; of a position only the origin is used.
             t: The present time [s].
 
         Raises:

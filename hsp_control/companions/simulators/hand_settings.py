@@ -1,4 +1,4 @@
-"""What a configuration says about a hand whose targets come from a simulator."""
+"""The configuration of a hand whose targets come from a simulator."""
 
 from collections.abc import Mapping
 from dataclasses import KW_ONLY, replace
@@ -20,7 +20,7 @@ from hsp_control.trajectories import StreamPose
 
 _POSTURE_RATE = 10.0**0.5
 """With it as weight and as gain, the posture obeys e'' + 2√10 e' + 10 e = 0 in the null
-space: what robosuite's OSC_POSE asks for there [1/s]."""
+space: as of robosuite's OSC_POSE there [1/s]."""
 
 _UNHURRIED = StreamPose(
     delay=0.11,  # two actions at 20 Hz, and a little
@@ -52,7 +52,7 @@ class HandSettings(Part, error=ConfigError):
     """The control of self-motion; by default the posture of the start attracts."""
     limits: LimitsOrNone = Limits(effort="none")
     """Limits that the law keeps: by default those of the joints' motion. Efforts are
-    also clipped, as a simulator clips those of its own controllers."""
+    also clipped, as a simulator clips those of its controllers."""
     compensation: Compensation = Compensation(friction_feed_forward="urdf")
     """Compensators; by default the friction of the simulated joints is fed forward. An
     observer that is ``auto`` is off: the model is the simulator's own."""
@@ -60,10 +60,10 @@ class HandSettings(Part, error=ConfigError):
     """Obstacles that fields and limits name."""
 
     def __post_init__(self) -> None:
-        """Check that the stream is free to hear the simulator.
+        """Check that the simulator can command the stream.
 
         Raises:
-            ConfigError: If it has a source of its own.
+            ConfigError: If it has another source.
         """
         if self.stream is not None and (
             self.stream.source is not None or self.stream.messages is not None

@@ -8,7 +8,7 @@ Import this module, and a controller configuration may say::
     config["body_parts"]["right"]["hsp"] = "hand.yaml"  # or its data; or leave it out
 
 Actions mean what they mean to OSC_POSE, whose code interprets them: deltas or absolute
-poses, input and output ranges, reference frames. robosuite asks for an effort at every
+poses, input and output ranges, reference frames. robosuite calls for an effort at every
 step of the simulation, at 500 Hz, whatever the rate of the actions.
 """
 
@@ -31,12 +31,12 @@ try:
     from robosuite.controllers.parts.arm.osc import OperationalSpaceController
 except ImportError as error:
     raise ControllerError(
-        f"robosuite cannot be imported ({error}); docs/companions/simulators.md says "
+        f"robosuite cannot be imported ({error}); docs/companions/simulators.md shows "
         "how to install it"
     ) from error
 
 TYPE = "HSP_POSE"
-"""What an arm's configuration says as ``type``."""
+"""The ``type`` in an arm's configuration."""
 _FIXED: dict[str, Any] = {
     "impedance_mode": "fixed",
     "interpolation": None,

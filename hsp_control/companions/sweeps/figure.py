@@ -12,9 +12,15 @@ from matplotlib.ticker import FuncFormatter, LogLocator, MaxNLocator, NullLocato
 
 from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import PlotError
+from hsp_control.common.suggestions import did_you_mean, listing
 from hsp_control.companions.plots import palette
 from hsp_control.companions.plots.curves import literal_text
-from hsp_control.companions.plots.figures import new_figure, save_figure, styled
+from hsp_control.companions.plots.figures import (
+    inches,
+    new_figure,
+    save_figure,
+    styled,
+)
 from hsp_control.companions.sweeps import Sensitivity, Sweep
 from hsp_control.companions.sweeps.sensitivities import (
     MIN_RUNS,
@@ -37,26 +43,40 @@ def save_sweep_figure(
     return save_figure(sweep_figure(sweep), beginning, formats)
 
 
-def sweep_figure(sweep: Sweep, outcomes: Sequence[str] | None = None) -> Figure:
+def sweep_figure(
+    sweep: Sweep,
+    outcomes: Sequence[str] | None = None,
+    *,
+    parameters: Sequence[str] | None = None,
+    width: str | float | None = None,
+) -> Figure:
     """Return a figure with a panel for every result over every parameter.
 
     A panel's tint shows the influence: blue if the result increases with the parameter,
     orange if it decreases, purple for other dependence; its strength is the share of
-    the variance of ranks. Of few runs it has none. ``outcomes`` None: tracking, null
-    space, distances and effort.
+    the variance of ranks. Of few runs it has none.
+
+    Args:
+        sweep: The runs.
+        outcomes: The results; None: tracking, null space, distances and effort.
+        parameters: Which of those that vary; None: all, or the most influential ones.
+        width: The width for a paper, such as ``117mm``, or in metres: without heading.
+
+    Raises:
+        PlotError: If nothing varies, or a parameter is not one that does.
     """
     found = influences(sweep, outcomes)
     rows = range(min(len(found.outcomes), MAX_OUTCOMES))
-    # If not all parameters fit, the most influential ones are shown.
-    order = np.argsort(
-        -np.nan_to_num(found.share).max(axis=1, initial=0.0), kind="stable"
-    )
-    columns = sorted(order[:MAX_PARAMETERS].tolist())
+    columns = _columns(found, parameters)
     if not columns or not rows:
         raise PlotError("no parameter of this sweep varies: there is nothing to draw")
+    wide = 1.5 + 1.75 * len(columns) if width is None else inches(width)
+    each = (wide - 1.5) / len(columns)
     with styled():
-        figure = new_figure(1.5 + 1.75 * len(columns), 1.1 + 1.5 * len(rows))
-        _add_title(figure, sweep, found)
+        figure = new_figure(wide, 1.1 + 1.5 * len(rows))
+        if width is None:
+            _add_title(figure, sweep)
+        _add_foot(figure, sweep, found, letters=round(16.0 * wide))
         grid = figure.subplots(
             len(rows), len(columns), squeeze=False, sharex="col", sharey="row"
         )
@@ -65,11 +85,29 @@ def sweep_figure(sweep: Sweep, outcomes: Sequence[str] | None = None) -> Figure:
                 _draw_panel(grid[j, k], sweep, found, i, j)
             metric = sweep.meta["metrics"][found.outcomes[j]]
             label = textwrap.fill(f"{metric['meaning']} [{metric['unit']}]", 22)
-            grid[j, 0].set_ylabel(literal_text(label))
-            grid[j, 0].yaxis.set_label_coords(-0.36, 0.5)
+            grid[j, 0].set_ylabel(literal_text(label), fontsize=8.4)
+            grid[j, 0].yaxis.set_label_coords(-0.63 / each, 0.5)
         for k, i in enumerate(columns):
-            grid[-1, k].set_xlabel(literal_text(_wrapped(found.parameters[i])))
+            grid[-1, k].set_xlabel(
+                literal_text(_wrapped(found.parameters[i], round(15.0 * each))),
+                fontsize=8.4,
+            )
     return figure
+
+
+def _columns(found: Sensitivity, parameters: Sequence[str] | None) -> list[int]:
+    """Return the places of the parameters to show, in the sweep's order or as given."""
+    if parameters is None:
+        # If not all parameters fit, the most influential ones are shown.
+        influence = np.nan_to_num(found.share).max(axis=1, initial=0.0)
+        order = np.argsort(-influence, kind="stable")
+        return sorted(order[:MAX_PARAMETERS].tolist())
+    names = list(found.parameters)
+    for name in parameters:
+        if name not in names:
+            near = f"{did_you_mean(name, names)} (there are {listing(names)})"
+            raise PlotError(f"no parameter {name!r} varies{near}")
+    return [names.index(name) for name in parameters]
 
 
 def _draw_panel(axes: Axes, sweep: Sweep, found: Sensitivity, i: int, j: int) -> None:
@@ -190,12 +228,16 @@ def _medians(x: Array, y: Array) -> tuple[Array, Array]:
     return np.array([m[0] for m in middle]), np.array([m[1] for m in middle])
 
 
-def _add_title(figure: Figure, sweep: Sweep, found: Sensitivity) -> None:
+def _add_title(figure: Figure, sweep: Sweep) -> None:
     identity = sweep.meta["identity"]
     named = identity["configuration"].get("title") or Path(sweep.meta["name"]).stem
-    figure.suptitle(
-        literal_text(textwrap.fill(str(named), 24 + 22 * len(found.parameters)))
-    )
+    letters = round(12.5 * figure.get_figwidth()) + 5
+    figure.suptitle(literal_text(textwrap.fill(str(named), letters)))
+
+
+def _add_foot(figure: Figure, sweep: Sweep, found: Sensitivity, letters: int) -> None:
+    """Write how the runs were made below the panels, in lines of so many letters."""
+    identity = sweep.meta["identity"]
     failed = len(sweep) - found.runs
     parts = [
         f"{len(sweep)} runs, {identity['design'].replace('_', ' ')}",
@@ -205,17 +247,15 @@ def _add_title(figure: Figure, sweep: Sweep, found: Sensitivity) -> None:
         f"hsp_control {identity['versions']['hsp_control']}",
     ]
     figure.supxlabel(
-        literal_text(
-            textwrap.fill("  ·  ".join(parts), 30 + 42 * len(found.parameters))
-        ),
-        fontsize=8.0,
+        literal_text(textwrap.fill("  ·  ".join(parts), letters)),
+        fontsize=8.4,
         color=palette.MUTED,
         x=0.01,
         ha="left",
     )
 
 
-def _wrapped(key: str, width: int = 22) -> str:
+def _wrapped(key: str, width: int) -> str:
     """Return a key path, wrapped after dots."""
     lines = [""]
     for part in key.replace(".", ".\0").split("\0"):

@@ -192,7 +192,7 @@ def _record(robot: Robot) -> dict[str, Any] | None:
         _log.warning("%s has to be on all computers: %s", robot.name, lost)
         return None
     if any(part.get("left_out") for part in record.get("parts", ())):
-        return None  # a warning says so; each computer needs the files
+        return None  # with a warning; each computer needs the files
     return record
 
 

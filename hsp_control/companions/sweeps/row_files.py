@@ -265,7 +265,7 @@ def _meta(table: pa.Table) -> dict[str, Any]:
 
 
 def _joined(tables: Sequence[pa.Table]) -> pa.Table:
-    """Return tables as one, in the order of runs; the last row of each run counts."""
+    """Return tables as one, in the order of runs; the last row of each run is kept."""
     metas = [_meta(table) for table in tables]
     described = {k: v for meta in metas for k, v in meta["metrics"].items()}
     table = pa.concat_tables(tables, promote_options="default")
@@ -283,7 +283,7 @@ def _joined(tables: Sequence[pa.Table]) -> pa.Table:
 
 
 def _parameters(plan: SweepPlan) -> tuple[dict[str, pa.Array], dict[str, Any]]:
-    """Return each parameter's values in all runs, and what says how to read them.
+    """Return each parameter's values in all runs, and how to read them.
 
     They are of all values of the plan, so that each file has the same types.
     """

@@ -104,7 +104,7 @@ def sweep(
     if workers is not None and workers < 1:
         raise SweepError(f"{workers} workers; needs at least 1")
     if workers is not None and scheduler is not None:
-        raise SweepError("a scheduler has workers of its own: give one of the two")
+        raise SweepError("a scheduler starts its own workers: give one of the two")
     own = [str(each) for each in imports]
     for each in own:
         import_code(each)

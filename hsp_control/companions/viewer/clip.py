@@ -100,7 +100,7 @@ def _activities(
 
 
 def _out_of_reach(task: Unreached) -> Band:
-    """Return the band of a target out of reach; it tells the largest distance."""
+    """Return the band of a target out of reach; its label is the largest distance."""
     name, away = f"{task.task}: {OUT}", task.out[task.out > 0.0]
     varies = away.min(initial=np.inf) < _SAME * away.max(initial=0.0)
     length = ("up to " if varies else "") + task.length(int(task.out.argmax()))

@@ -42,13 +42,13 @@ def _add_view_options(view: argparse.ArgumentParser) -> None:
         "--speed",
         type=float,
         metavar="X",
-        help="playback speed, 1 is real time; default: as the log says",
+        help="playback speed, 1 is real time; default: the log's",
     )
     view.add_argument(
         "--loop",
         action=argparse.BooleanOptionalAction,
         default=None,
-        help="repeat the run; default: as the log says",
+        help="repeat the run; default: as in the log",
     )
     add_page(view)
     add_import(view)

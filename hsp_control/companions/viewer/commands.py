@@ -104,7 +104,7 @@ class LegendEntry(NamedTuple):
     # Whether the row is only a switch, as what it names explains itself: films leave it
     # out.
     plain: bool = False
-    # A short name: the switch is beside the views instead of in a row of its own.
+    # A short name: the switch is beside the views instead of in a separate row.
     short: str = ""
     key: str = ""  # the key of the keyboard that does the same, if any
 

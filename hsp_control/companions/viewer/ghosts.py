@@ -20,7 +20,7 @@ class Ghosts:
     """Copies of a robot in a page, as many as there are configurations."""
 
     def __init__(self, name: str, robot: Robot, color: str, opacity: float) -> None:
-        """Draw no ghost yet; ``name`` tells these ghosts from others."""
+        """Draw no ghost yet; ``name`` distinguishes these ghosts."""
         self._robot, self._data = robot, robot.model.createData()
         self._joints = [path_element(each) for each in robot.model.names[1:]]
         self._name = name

@@ -79,7 +79,7 @@ class LivePlot(NamedTuple):
 
 
 def live_plots(rows: Mapping[str, Array], meta: Mapping[str, Any]) -> list[LivePlot]:
-    """Return the plots of a log that is being written, what tells most first."""
+    """Return the plots of a log that is being written, the most informative first."""
     log = Rollout(dict(rows), dict(meta))
     return [
         *_null_space(log),

@@ -300,7 +300,7 @@ _ZERO = (0.0, 0.0, 0.0)
 
 
 def _solids(meta: Mapping[str, Any]) -> Sequence[Mapping[str, Any]]:
-    """Return the solids that a log's plant has, as the log tells them."""
+    """Return the solids of the plant that a log was made with."""
     return tuple((meta.get("plant") or {}).get("solids", ()))
 
 

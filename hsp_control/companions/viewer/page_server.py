@@ -1,4 +1,4 @@
-"""The server of a page: it sends the scene to all open pages, from a thread of its own.
+"""The server of a page: it sends the scene to all open pages, from a separate thread.
 
 Pages and their connections must name the server's own host, against DNS rebinding, and
 connections must come from one of its own pages. Pages and connections need a key in
@@ -125,7 +125,7 @@ class Hub:
         self.show_who_steers()
 
     def show_who_steers(self) -> None:
-        """Tell all pages whether they steer, and whether any page does."""
+        """Report to all pages whether they steer, and whether any page does."""
         taken = self.steering is not None
         for page in self.pages:
             mine = self.steering is page
@@ -166,7 +166,7 @@ class Page(WebSocketHandler):
         self.hub, self._door = hub, door
         self.has_pending, self._ready = asyncio.Event(), asyncio.Event()
         self._delivery: asyncio.Task[None] | None = None
-        # A page says so; a program that reads the scene need not.
+        # A page declares it; a program that reads the scene need not.
         self._unpacks = "gzip" in self.request.query_arguments
         self.answered = 0
 
@@ -201,7 +201,7 @@ class Page(WebSocketHandler):
             hub.show_who_steers()
 
     def on_message(self, message: str | bytes) -> None:
-        """Process an answer, or what a page that steers says; hang up on others."""
+        """Process an answer, or a command of a page that steers; hang up on others."""
         try:
             if message == TAKEN:
                 self._ready.set()
@@ -232,7 +232,7 @@ class Page(WebSocketHandler):
             self.hub.receive(message)
 
     def on_close(self) -> None:
-        """Remove the page; if that fails, the server ends, and its program hears so."""
+        """Remove the page; if that fails, the server ends, and `failure` has it."""
         try:
             self._remove()
         except BaseException as error:
@@ -257,7 +257,7 @@ class Page(WebSocketHandler):
         self.command("", "ask", type="ask", number=self.hub.asked)
 
     def command(self, path: str, name: str, **command: Any) -> None:
-        """Tell this page something."""
+        """Send a message to this page."""
         packed = umsgpack.packb({"path": path, **command})
         with self.hub.lock:
             self.pending.keep([PageCommand(path, key_of(path, name), packed)])
@@ -382,7 +382,7 @@ class ServerThread:
         self._thread.join()
 
     def _run(self) -> None:
-        """Serve; whatever is raised, what is open is closed, and `failure` says it."""
+        """Serve; whatever is raised, what is open is closed, and `failure` has it."""
         try:
             with asyncio.Runner(loop_factory=lambda: self._loop) as runner:
                 runner.run(self._serve())

@@ -39,7 +39,7 @@ from hsp_control.simulation.log_writer import LogWriter
 
 
 class OpeningPage:
-    """Opens a page once, when all is ready: mistakes are said before."""
+    """Opens a page once, when all is ready: errors are raised before."""
 
     def __init__(
         self,
@@ -77,7 +77,7 @@ def draw_before(viewer: Viewer, loaded: LoadedScenario) -> None:
     viewer.draw_scene(loaded.scene, title=loaded.scenario.title or None)
     try:
         start = loaded.start()
-    except HspControlError:  # `Experiment.of` says where the mistake is
+    except HspControlError:  # `Experiment.of` names the place
         start = loaded.robot.home()
     viewer.show(start)
 
@@ -92,7 +92,7 @@ class Screen:
     def __init__(
         self, viewer: Viewer | None = None, page: OpeningPage | None = None
     ) -> None:
-        self._viewer, self._page = viewer, page  # None if it failed, which was said
+        self._viewer, self._page = viewer, page  # None if it failed, which was reported
         self._live: LiveView | None = None
 
     @classmethod

@@ -132,7 +132,7 @@ def mesh(
 
 
 def mesh_group(geometry: Json, surface: Json, *about: Any, shadow: bool = True) -> Json:
-    """Return an object of its own of a geometry and a material; see `mesh`."""
+    """Return a separate object of a geometry and a material; see `mesh`."""
     return group([mesh(geometry, surface, *about, shadow=shadow)])
 
 

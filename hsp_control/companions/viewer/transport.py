@@ -177,7 +177,7 @@ class PageServer(SceneRecorder):
         return True
 
     def wait_until_closed(self) -> None:
-        """Wait until no page is open; a page that is reloaded counts as open."""
+        """Wait until no page is open; a page that is reloaded is taken as open."""
         last_seen = time.monotonic()
         while time.monotonic() < last_seen + RELOAD_TIMEOUT:
             if self._hub.pages:

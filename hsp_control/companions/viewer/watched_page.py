@@ -26,7 +26,7 @@ _input = FileIO(0, closefd=False)  # standard input; nothing waits in a buffer
 _NICENESS = 10  # the loop comes first
 _POLL = 0.01
 _KEPT = 1000  # rows that are kept for the picture
-_STILL = 0.5  # time without a row after which the loop is said to stand still [s]
+_STILL = 0.5  # time without a row after which the loop is reported to stand still [s]
 _RATE_WINDOW = 1.0  # time over which the rate is measured [s]
 
 
@@ -93,7 +93,7 @@ class Watched:
         """Move the controller, whose field and distances are drawn, to the last row."""
         if self.controller is not None:
             row = self._last()
-            with suppress(HspControlError):  # the loop says what is wrong
+            with suppress(HspControlError):  # the loop reports it
                 self.controller.compute(float(row["t"][0]), row["q"][0], row["v"][0])
 
 
@@ -159,7 +159,7 @@ def _follow(server: PageServer, journal: Path, view: dict[str, Any]) -> Path | N
 
 
 class _Word:
-    """What the loop's process says: another journal, or nothing any more."""
+    """What the loop's process reports: another journal, or nothing any more."""
 
     def __init__(self, path: Path | None) -> None:
         self.path = path

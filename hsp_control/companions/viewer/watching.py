@@ -79,7 +79,7 @@ def watch(
     is. 30 times a second a thread copies the state of the last `Controller.compute`,
     for some microseconds, and computes with a copy of the controller what is drawn. A
     `Recorder` has it already: what it writes is shown, and there is no thread. The page
-    has a process of its own.
+    is in a separate process.
 
     Args:
         loop: The controller, or a `Recorder` of it.
@@ -125,7 +125,7 @@ def watch(
 
 
 def _address(process: subprocess.Popen[bytes], settings: dict[str, Any]) -> str:
-    """Give the page's process its settings, and return the address that it says."""
+    """Give the page's process its settings, and return the address that it reports."""
     assert process.stdout is not None
     _say(process, settings)
     ready, _, _ = select.select([process.stdout], [], [], START)
@@ -137,7 +137,7 @@ def _address(process: subprocess.Popen[bytes], settings: dict[str, Any]) -> str:
 
 def _say(process: subprocess.Popen[bytes], message: dict[str, Any]) -> None:
     assert process.stdin is not None
-    with suppress(OSError, ValueError):  # it has ended, and said why
+    with suppress(OSError, ValueError):  # it has ended, and reported why
         process.stdin.write(json.dumps(message).encode() + b"\n")
         process.stdin.flush()
 

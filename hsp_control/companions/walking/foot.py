@@ -82,7 +82,7 @@ class Foot(Switched):
         self._rotation = here.rotation.copy()
         yaw = float(np.arctan2(here.rotation[1, 0], here.rotation[0, 0]))
         self._yaw = self._last_yaw = near(yaw, heading)
-        # The sole in axes of its own: x forward, in the ground.
+        # The sole's own axes: x forward, in the ground.
         local = self._points @ turned(-self._yaw, here.rotation).T
         self._middle: Array = local[:, :2].mean(axis=0)
         self._corners: Array = local[:, :2] - self._middle
@@ -128,7 +128,7 @@ class Foot(Switched):
 
         The tilt is a rotation from the level, shape (3, 3); the height is that of the
         frame's origin [m]; the slope is the ground's gradient, shape (2,) [-]. Level
-        ground counts as level, and the height is what it was as the foot landed.
+        ground is taken as level, and the height is what it was as the foot landed.
         """
         here = state.frame(self.frame)
         normal = here.rotation @ self.flat(self.place.yaw)[2]

@@ -272,7 +272,7 @@ class RunningQuadruped(RunningPlan):
             self._sensed[foot.name] |= force is not None and force > self._touch
 
     def _groundless(self) -> str:
-        """Return what a message says of feet that never stood on anything."""
+        """Return the message on feet that never had contact."""
         never = [name for name, touched in self._sensed.items() if not touched]
         if not never:
             return ""

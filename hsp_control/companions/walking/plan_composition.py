@@ -15,7 +15,7 @@ from hsp_control.tasks.frame_task import TrackingTask
 from hsp_control.trajectories import ComposedPose
 
 FRICTION = 0.35
-"""What a foot counts on whose contact declares no friction: nobody knows the ground to
+"""The friction coefficient of a contact that declares none: nobody knows the ground to
 which a robot comes [-]."""
 
 
@@ -65,7 +65,7 @@ def _followed(task: Task, needed: TrackingTask, swings: bool) -> Task:
             f"{needed.axes!r}"
         )
     if task.schedule is not None:
-        raise PlanError("it has a schedule, but the plan says when it counts")
+        raise PlanError("it has a schedule, but the plan determines when it is active")
     changes: dict[str, Any] = {"blend": None, "trajectory": Fed(3)}
     if isinstance(needed, CenterOfMass):
         changes["trajectory"] = Fed(len(needed.axes))

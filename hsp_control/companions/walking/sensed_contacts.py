@@ -138,7 +138,7 @@ class Sensed(MotionPlan, type="sensed"):
                     if known[rule.task].schedule is not None or rule.task in moves:
                         raise PlanError(
                             f"{rule.task!r} has a schedule, or moves two contacts; it "
-                            "counts while the contact is not active"
+                            "is in force while the contact is not active"
                         )
                 moves[rule.task] = rule
         return PlanParts(

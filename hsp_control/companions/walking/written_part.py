@@ -30,7 +30,7 @@ class Written(Remembering):
         vars(self)["_memory"] = state["_memory"].copy()  # the other is read-only
 
     def __deepcopy__(self, memo: dict[int, Any]) -> Self:
-        """Return a part with a memory of its own."""
+        """Return a part with a separate memory."""
         copied: Self | None = memo.get(id(self))
         if copied is None:
             copied = type(self)(**self.all_fields())

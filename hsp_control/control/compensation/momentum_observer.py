@@ -201,8 +201,8 @@ class RunningObserver(Stage):
         found["observer.share"] = LogChannel(
             np.array(share.max()),
             "-",
-            f"largest |r| of an effort limit; above {LARGE_SHARE:g} the robot does not "
-            "do what the model says",
+            f"largest |r| of an effort limit; above {LARGE_SHARE:g} the model does not "
+            "describe the robot",
         )
         threshold = run.controller.singularity_threshold
         for task in run.controller.tasks:

@@ -70,7 +70,7 @@ class Inbox:
         if sender != self._sender and now < self._until:
             raise StreamError(
                 f"{sender} sends while {self._sender} does, which was first and is "
-                f"heard alone until it is silent for {_SILENCE:g} s"
+                f"accepted alone until it is silent for {_SILENCE:g} s"
             )
 
     def receive(self, sender: str, now: float, data: Mapping[str, Any]) -> None:

@@ -190,4 +190,6 @@ def test_what_cannot_be_sent_is_said_once_and_hinders_nothing(
     told(1.0)
     told.ended("completed", "")
     (line,) = caplog.messages
-    assert line.startswith("udp://255.255.255.255:5006: the state is not told there: ")
+    assert line.startswith(
+        "udp://255.255.255.255:5006: the state cannot be sent there: "
+    )

@@ -269,7 +269,7 @@ def test_the_gripper_goes_where_openings_say_and_tells_where_it_is() -> None:
 
 @pytest.mark.parametrize(
     ("sent", "said"),
-    [(signal.SIGKILL, "has ended"), (signal.SIGSTOP, "has said nothing for 2 s")],
+    [(signal.SIGKILL, "has ended"), (signal.SIGSTOP, "has sent nothing for 2 s")],
 )
 def test_without_a_gripper_that_obeys_the_arm_stops(
     sent: signal.Signals, said: str, monkeypatch: pytest.MonkeyPatch

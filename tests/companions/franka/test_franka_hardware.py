@@ -176,7 +176,7 @@ def test_a_gripper_s_process_that_hangs_is_noticed(
             now += 0.0999
             assert not process.trouble()
         now += 0.0999
-        assert process.trouble() == "has said nothing for 5 s"
+        assert process.trouble() == "has sent nothing for 5 s"
         theirs.send(client.ALIVE)
         assert not process.trouble()
 

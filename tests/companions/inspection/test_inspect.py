@@ -186,7 +186,7 @@ def test_an_mjcf_is_inspected_as_a_urdf_is(
     assert main(["inspect", str(path)]) == 0
     printed = capsys.readouterr().out
     assert "reach         0.7 m from" in printed
-    assert "bounds        an error counts up to 0.245 m and 1.25 rad" in printed
+    assert "bounds        an error is bounded at 0.245 m and 1.25 rad" in printed
     assert "changes by more than 55 N·m/s" in printed
     assert "note: left out\n  rod: springs at joints k: no force" in printed
     path.write_text(ARM)

@@ -560,7 +560,14 @@ def test_the_slider_looks_back(page: Any) -> None:
         track = {"path": "/seen", "property": "position", "values": [0.1 * k, 0, 0]}
         track |= {"times": [0.0]}
         tell(page, "pose", tracks=[track])
+        place = [0.1 * k, 0.2, 0.5, 0.0, 0.0, 0.0, 1.0]
+        tell(page, "play_targets", poses={"hand": place})
         tell(page, "play_state", t=2.0 + k, running=True, rate=1.0, message="")
+    handle = "play.gizmos.get('target hand').position.x"
+    held = "play.hand.find(...Object.values(play.sight.update().project("
+    held += "play.gizmos.get('target hand').position)).slice(0, 2), 'mouse')"
+    assert page.evaluate(handle) == pytest.approx(0.4)
+    assert page.evaluate(f"{held} !== null")
     x = float(page.evaluate(f"{node}.position.x"))
     page.evaluate(
         "(() => { const back = document.querySelector('.back'); back.value = -2.5; "
@@ -570,6 +577,15 @@ def test_the_slider_looks_back(page: Any) -> None:
     assert page.evaluate("play.bar.clock.textContent") == "3.00 s"
     assert page.evaluate(f"{node}.position.x") == pytest.approx(0.1)
     assert x == pytest.approx(0.4)
+    assert page.evaluate(handle) == pytest.approx(0.1)
+    tell(page, "play_targets", poses={"hand": [0.7, 0.2, 0.5, 0.0, 0.0, 0.0, 1.0]})
+    assert page.evaluate(handle) == pytest.approx(0.1)  # of the row that is seen
+    assert page.evaluate(f"{held} === null")
+    page.evaluate(
+        "(() => { const back = document.querySelector('.back'); back.value = 0; "
+        "back.dispatchEvent(new Event('input')); back.value = -2.5; })()"
+    )
+    assert page.evaluate(handle) == pytest.approx(0.7)
     for running in (False, True):  # it pauses, and later goes on
         tell(page, "play_state", t=6.0, running=running, rate=1.0, message="")
     assert not page.evaluate("play.bar.past.looking")

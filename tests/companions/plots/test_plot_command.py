@@ -1,11 +1,14 @@
 """`hsp plot`: names, order, one file, the floor and the decay, and what is narrow."""
 
+import itertools
 from pathlib import Path
 
 import numpy as np
 import pytest
 from drawn_logs import legend_texts, planar
 from matplotlib.figure import Figure
+from matplotlib.image import imread
+from matplotlib.text import Text
 
 import hsp_control as hsp
 import hsp_control.companions.plots as plots
@@ -102,3 +105,30 @@ def test_a_narrow_figure_has_its_panels_one_below_the_other(
     assert figure.get_figwidth() == pytest.approx(84.0 / 25.4)
     assert figure.get_figheight() > 2.0 * figure.get_figwidth()
     assert not figure.texts  # heading and foot are the paper's
+
+
+def test_text_of_two_columns_has_6_pt_where_it_is_printed_84_mm_wide(
+    logs: dict[str, hsp.Rollout], tmp_path: Path
+) -> None:
+    figure = plots.paper_figure(logs["rest"], width="117mm")
+    plots.save_for_a_column(figure, tmp_path / "figure.png")
+    height, width = imread(tmp_path / "figure.png").shape[:2]
+    assert width == 992
+    assert height < 2.0 * width
+    shown = [text for text in figure.findobj(Text) if text.get_text()]
+    assert len(shown) > 50
+    assert min(text.get_fontsize() for text in shown) * 84.0 / 117.0 > 6.0
+
+
+def test_numbers_of_frames_do_not_overlap(logs: dict[str, hsp.Rollout]) -> None:
+    end = float(logs["rest"].t[-1])
+    close = [0.05 * end * (1.0 + k) for k in range(8)]
+    figure = plots.paper_figure(logs["rest"], width="117mm", times=close)
+    figure.canvas.draw()
+    (upper,) = figure.axes[1].child_axes
+    texts = [label.get_text() for label in upper.get_xticklabels()]
+    boxes = [label.get_window_extent() for label in upper.get_xticklabels()]
+    shown = [box for box, text in zip(boxes, texts, strict=True) if text]
+    assert (texts[0], texts[-1]) == ("1", "8")
+    assert 2 < len(shown) < 8
+    assert all(a.x1 < b.x0 for a, b in itertools.pairwise(shown))

@@ -10,7 +10,7 @@ import pytest
 from scipy import stats
 from scipy.special import ndtr, ndtri
 
-from hsp_control.common.exceptions import SweepError
+from hsp_control.common.exceptions import PlotError, SweepError
 from hsp_control.companions import sweeps
 from hsp_control.companions.sweeps import Sweep, row_files
 from hsp_control.companions.sweeps.design import chosen_design, points
@@ -328,6 +328,18 @@ def test_every_pair_has_its_panel_and_failures_are_shown() -> None:
     assert tints[0][2] > tints[0][0]  # grows: blue
     assert tints[4][0] > tints[4][2]  # falls: orange
     assert axes[2].get_title(loc="left") == "no influence"
+
+
+def test_a_figure_shows_the_parameters_that_are_named_as_wide_as_a_paper_needs() -> (
+    None
+):
+    figure = sweeps.sweep_figure(invented(), parameters=["bowl", "up"], width="117mm")
+    assert figure.get_figwidth() == pytest.approx(117.0 / 25.4)
+    assert len(figure.axes) == 8
+    last = [each.get_xlabel() for each in figure.axes[-2:]]
+    assert last == ["bowl", "up"]
+    with pytest.raises(PlotError, match="no parameter 'upp' varies; did you mean 'up'"):
+        sweeps.sweep_figure(invented(), parameters=["upp"])
 
 
 @pytest.mark.parametrize("runs", [2, 3])

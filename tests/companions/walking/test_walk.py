@@ -84,7 +84,7 @@ def test_it_adds_what_it_needs_and_keeps_what_is_given(talos):
             Walk(),
             [CenterOfMass(schedule=Schedule([(0, 9)]))],
             FEET,
-            "^tasks.center_of_mass: it has a schedule, but the plan says when",
+            "^tasks.center_of_mass: it has a schedule, but the plan determines when",
         ),
         (Walk(trunk="base_lnk"), [], FEET, "^plan.trunk: no frame 'base_lnk'; did you"),
     ],

@@ -61,7 +61,7 @@ def test_a_run_says_how_much_nobody_explained() -> None:
     beside = {**LOAD, "payload": {**LOAD["payload"], "center": [0.15, 0.0, 0.0]}}
     log = load_experiment(CONFIG | {"plant": beside}).run()
     _, told, remedy = unexplained_rows(log)
-    assert told.startswith("the robot does not do what the model says: that is ")
+    assert told.startswith("the model does not describe the robot: that is ")
     assert "of the effort limit of panda_joint" in told
     assert remedy == "the model has no rotors: robot: motor_inertia adds them"
     size = np.abs(log["observer.disturbance"]) / log.meta["limits"]["effort"]

@@ -79,7 +79,7 @@ MISTAKES: list[tuple[Callable[[Any], Any], str, str, str]] = [
     (lambda r: compose(r).compute(r.home(), np.zeros(7)), "RobotState; v is missing",
      "null_space=rest", "'rest' is text; expected a mapping of "),
     (lambda r: run(r, duration=2.0, control_period=1.0), "control_period: a row is "
-     "logged every 0.01 s unless log_period says otherwise, which is not a whole "
+     "logged every 0.01 s by default, which is not a whole "
      "multiple of 1 s; give log_period, too, for example 1",
      "simulation.control_period=1", "give log_period, too, for example 1"),
     (lambda _: hsp.load_experiment("panda"), "'panda' is a robot, and this needs a conf"

@@ -238,7 +238,7 @@ def test_a_fault_while_the_arm_accelerates_does_not_throw_its_wrist(begin: int) 
 def test_no_wrong_effort_makes_the_next_one_jump(kind: str) -> None:
     robot, report = run(IN_MOTION, LIES[f"effort: {kind}"], ALL)
     assert report.ended == "fault"
-    assert "the robot says it has an effort of" in report.reason
+    assert "the robot reports an effort of" in report.reason
     steps = np.abs(np.diff(robot.sent, axis=0))
     assert steps.max() <= 1000.0 * PERIOD * (1.0 + 1e-9)
 

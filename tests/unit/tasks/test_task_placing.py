@@ -284,7 +284,7 @@ MISTAKES: dict[str, tuple[Callable[[], Task], type[HspControlError], str]] = {
      r"^tasks.hand.trajectory: point has 2 coordinates \[0.0, 0.0\]; needs 3$"),
     "blend": (
      lambda: FramePose(trajectory=HoldPose(POINT, TURNED), blend=1.0, name="hand"),
-     TaskError, r"^tasks.hand.blend: HoldPose begins where it says; remove blend$"),
+     TaskError, r"^tasks.hand.blend: HoldPose has its own beginning; remove blend$"),
     "gains": (lambda: FramePosition(gains=Gains([1, 2], 3), name="hand"), GainError,
      r"^tasks.hand.gains: kp has shape \(2,\); needs a number, 3 numbers or a 3"),
     "joints": (lambda: JointPosture(joints=["joint1"], name="hand"),

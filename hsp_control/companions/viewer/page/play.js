@@ -81,9 +81,13 @@ class Play {
 
   showTargets({poses = {}, obstacles = {}, away = {}}) {
     this.away = away;
-    for (const [name, pose] of Object.entries(poses)) this.showAt(`target ${name}`, pose);
-    for (const [name, place] of Object.entries(obstacles)) this.showAt(`obstacle ${name}`, place);
+    const keyed = (noun, things) =>
+      Object.entries(things).map(([name, pose]) => [`${noun} ${name}`, pose]);
+    const places = new Map([...keyed("target", poses), ...keyed("obstacle", obstacles)]);
+    if (this.bar.past.takePlaces(places)) this.showPlaces(places);
   }
+
+  showPlaces(places) { for (const [key, pose] of places) this.showAt(key, pose); }
 
   // Show a thing where the program has it, unless the hand has it.
   showAt(key, pose) {

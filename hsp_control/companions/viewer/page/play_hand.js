@@ -88,7 +88,9 @@ class PlayHand {
     };
   }
 
+  // What can be held under a pixel; nothing while one looks back.
   find(x, y, pointer) {
+    if (this.play.bar.past.looking) return null;
     const {gizmos} = this.play, sight = this.play.sight.update();
     const found = [...gizmos].map(([key, gizmo]) => ({key, ...gizmo.find(sight, x, y, pointer)}));
     const [best] = found.filter(({gap}) => gap >= 0).sort((one, other) => one.gap - other.gap);
@@ -187,7 +189,7 @@ class PlayKeys {
 
   move(key, way, fine) {
     const {play} = this, gizmo = play.gizmos.get(play.selected);
-    if (!play.mine || !gizmo || play.hand.grip) return;
+    if (!play.mine || !gizmo || play.hand.grip || play.bar.past.looking) return;
     play.sight.update();
     if (!gizmo.movable) {
       this.turn(gizmo, way, (fine ? 0.1 : 1) * Math.PI / 180);

@@ -210,12 +210,13 @@ class PlayPanel {
 }
 
 // The poses of the last ten seconds, and the slider that looks back at them. What is shown is then
-// the past: a simulation pauses, a live loop goes on.
+// the past, targets and obstacles too, and none can be dragged: a simulation pauses, a live loop
+// goes on.
 class PlayPast {
   static SPAN = 10;  // s
 
   constructor(play, input) {
-    Object.assign(this, {play, input, poses: [], last: null});
+    Object.assign(this, {play, input, poses: [], last: null, places: new Map()});
     on(input, "input", () => this.look());
   }
 
@@ -227,10 +228,18 @@ class PlayPast {
     return !this.looking;
   }
 
+  // Keep where targets and obstacles are; return whether they are to be shown there.
+  takePlaces(places) {
+    this.places = new Map([...this.places, ...places]);
+    return !this.looking;
+  }
+
   // The time of the last pose.
   mark(t, running) {
     if (t < (this.poses.at(-1)?.t ?? t)) this.poses = [];  // it has begun anew
-    if (this.last && t > (this.poses.at(-1)?.t ?? -1)) this.poses.push({t, tracks: this.last});
+    if (this.last && t > (this.poses.at(-1)?.t ?? -1)) {
+      this.poses.push({t, tracks: this.last, places: this.places});
+    }
     const old = this.poses.findIndex((pose) => pose.t > t - PlayPast.SPAN);
     if (old > 50) this.poses.splice(0, old);
     if (this.looking && running && this.play.simulated && this.paused) this.leave();
@@ -244,6 +253,9 @@ class PlayPast {
     const wanted = end + Number(this.input.value);
     const pose = this.poses.findLast(({t}) => t <= wanted) ?? this.poses[0];
     player.pose(pose.tracks);
+    for (const [key, place] of this.looking ? pose.places : this.places) {
+      play.gizmos.get(key)?.setPose(place);
+    }
     play.bar.clock.textContent = `${pose.t.toFixed(2)} s`;
     play.viewer.set_dirty();
   }

@@ -225,7 +225,7 @@ class RunningBaseEstimator(RunningEstimator):
         velocity = R @ (v[:3] + np.cross(v[3:6], p_unit) + twist[:3])
         position = q[:3] + R @ p_unit
         P = np.zeros((FIXED, FIXED))
-        upright = np.array([1.0, 1.0, 0.0])  # the heading is what it is said to be
+        upright = np.array([1.0, 1.0, 0.0])  # the heading is as given
         P[ROTATION, ROTATION] = own.start_tilt**2 * np.diag(upright)
         P[VELOCITY, VELOCITY] = own.start_velocity**2 * np.eye(3)
         P[GYROSCOPE, GYROSCOPE] = own.start_gyroscope_bias**2 * np.eye(3)
