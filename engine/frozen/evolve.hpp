@@ -13,8 +13,8 @@ namespace hsp {
 
 struct Evolve {
   static constexpr const char* doc =
-      "x(t): each transition k crossfades from what was before, (1 - s_k) x_(k-1)(t) + s_k "
-      "target_k.";
+      "x(t): each transition k crossfades from what was before, x_(k-1)(t) + s_k (target_k - "
+      "x_(k-1)(t)).";
   InOut<'n'> initial;       // x before all transitions that are kept
   InOut<'k', 'n'> targets;  // in order of time
   InOut<'k', 2> times;      // when each begins, and how long it takes [s]
@@ -43,7 +43,7 @@ struct Evolve {
         rate.setZero();
       } else if (s > 0.0) {
         rate = (1.0 - s) * rate + s_dot * (target - x);
-        x = (1.0 - s) * x + s * target;
+        x += s * (target - x);
       }
     }
   }

@@ -126,7 +126,7 @@ struct Payloads {
       } else if (step.s > 0.0) {
         x_ddot = (1.0 - step.s) * x_ddot - 2.0 * step.s_dot * x_dot + step.s_ddot * (target - x);
         x_dot = (1.0 - step.s) * x_dot + step.s_dot * (target - x);
-        x = (1.0 - step.s) * x + step.s * target;
+        x += step.s * (target - x);
       }
     }
     return {x, x_dot, x_ddot};

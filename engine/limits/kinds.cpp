@@ -13,8 +13,8 @@
 namespace hsp {
 const Kind* const* limit_kinds() {
   return kinds<NearestEffort, Copy, AccelerationBounds, Within, EffortWindow, ExpectedVelocity,
-               Observe, IsPlain, CheckLimits, ForceMap, MinimumNormForces, WithinCones, Displace,
-               DistancesAt, NearPairs, ApproachedPairs, DistanceRows, HoldingRows, Clear, CheckRows,
-               PlaceRows>();
+               Observe, IsPlain, CheckLimits, ForceMap, MinimumNormForces, CommandedForce,
+               WithinCones, Displace, DistancesAt, NearPairs, ApproachedPairs, DistanceRows,
+               HoldingRows, Clear, CheckRows, PlaceRows>();
 }
 }  // namespace hsp

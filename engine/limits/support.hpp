@@ -1,5 +1,6 @@
 // Contact forces: their map to generalised forces, those of minimum norm, friction cones.
 #pragma once
+#include <algorithm>
 #include <cmath>
 #include <hsp/indices.hpp>
 #include <hsp/linalg.hpp>
@@ -98,6 +99,24 @@ struct MinimumNormForces {
       if (eigenvalue > negligible * largest)
         multipliers += U.row(r).dot(w) / eigenvalue * U.row(r).transpose();
     }
+  }
+};
+
+struct CommandedForce {
+  static constexpr const char* doc =
+      "f_ref = w S F of a commanded force F at a contact's points, whose normal force pushes.";
+  In<'c'> command;       // F [N, N·m]
+  In<1> offset, weight;  // added to the normal force [N]; w in [0, 1]
+  In<'f', 'c'> shares;   // S, from coordinates of F to the forces at the points
+  std::int64_t normal;   // which coordinate is the normal force
+  Out<'f'> reference;
+  Scratch<'c'> pushing;
+
+  void check() const { check_index("normal", normal, command.size()); }
+  void operator()() {
+    pushing = command;
+    pushing[normal] = std::max(pushing[normal] + offset[0], 0.0);
+    reference = weight[0] * shares.lazyProduct(pushing);
   }
 };
 

@@ -53,11 +53,12 @@ struct Crossfade {
     const double elapsed = t - start_time;
     if (elapsed < 0.0) {
       assign(before, out);
-    } else if (elapsed >= duration) {
-      assign(after, out);
-    } else {
-      mix(smooth_step(elapsed, 0.0, duration), before, after, out);
+      return;
     }
+    const SmoothStep step =
+        elapsed < duration ? smooth_step(elapsed, 0.0, duration) : SmoothStep{1.0, 0.0, 0.0};
+    if (step.s == 1.0) assign(after, out);  // exactly
+    else mix(step, before, after, out);
   }
 };
 

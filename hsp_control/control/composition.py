@@ -111,7 +111,7 @@ class Composition:
         """Place all parts, and apply the changes."""
         setup = self._declared.placed(start)
         if self._without_python:
-            setup = setup.with_set_weights()
+            setup = setup.with_set_numbers()
         self._in_force.begin(TimeLine.of(setup, changes))
 
     def _here(self) -> Start:

@@ -350,7 +350,7 @@ class Controller(Commanded):
         return active
 
     def without_python(self, period: float) -> "Controller":
-        """Return a preview whose streams and weights a program sets, not Python.
+        """Return a preview whose streams, weights and forces a program sets.
 
         Args:
             period: Time between two steps, and so between two messages [s].

@@ -40,7 +40,7 @@ class Evolution(Generic[Value]):
 
     Transition k crossfades from whatever x would have been without it:
 
-        x_k(t) = (1 - s_k(t)) x_{k-1}(t) + s_k(t) target_k.
+        x_k(t) = x_{k-1}(t) + s_k(t) (target_k - x_{k-1}(t)).
 
     So a transition that begins while another is under way continues its motion, and x
     is C² however they overlap. x depends on time alone, not on when it is evaluated.
@@ -96,7 +96,7 @@ class Evolution(Generic[Value]):
                 away = each.target - x
                 x_ddot = (1.0 - s) * x_ddot - 2.0 * s_dot * x_dot + s_ddot * away
                 x_dot = (1.0 - s) * x_dot + s_dot * away
-                x = (1.0 - s) * x + s * each.target
+                x = x + s * away
         return x, x_dot, x_ddot
 
     def settled(self, t: float) -> "Evolution[Value]":

@@ -11,6 +11,8 @@ import numpy as np
 from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import ControllerError
 from hsp_control.common.suggestions import did_you_mean, listing
+from hsp_control.constraints.contacts import CommandedForce
+from hsp_control.constraints.contacts.contact import NORMAL
 from hsp_control.control.evolution import ABSENT, Evolution
 from hsp_control.control.model_in_force import PlannedPayload
 from hsp_control.control.planned import (
@@ -26,6 +28,7 @@ from hsp_control.null_space.fields import FieldSum, NullSpaceField
 from hsp_control.null_space.fields.weight import SetWeight
 from hsp_control.null_space.metrics import Metric
 from hsp_control.trajectories.crossfade import settled
+from hsp_control.trajectories.hold import SetPoint
 from hsp_control.trajectories.schedule import Schedule
 
 _MOST = 500
@@ -58,9 +61,14 @@ class Setup:
             return terms[0]
         return FieldSum(terms)
 
-    def with_set_weights(self) -> "Setup":
-        """Return the setup in which weights that are numbers are written elsewhere."""
-        return replace(self, terms=tuple(_set_weight(each) for each in self.terms))
+    def with_set_numbers(self) -> "Setup":
+        """Return the setup in which weights and normal forces are written elsewhere.
+
+        Those that are numbers.
+        """
+        terms = tuple(_set_weight(each) for each in self.terms)
+        contacts = tuple(_set_force(each) for each in self.contacts)
+        return replace(self, terms=terms, contacts=contacts)
 
     @property
     def end(self) -> float:
@@ -173,6 +181,15 @@ def _set_weight(term: PlannedTerm) -> PlannedTerm:
         return term
     numbers = np.array([term.weight.target, 0.0])
     return replace(term, field=replace(term.field, weight=SetWeight(numbers)))
+
+
+def _set_force(planned: PlannedContact) -> PlannedContact:
+    force = planned.contact.force
+    if force is None or force.trajectory is not None or force.dimension != NORMAL:
+        return planned
+    numbers = np.array(force.followed.sample(0.0).position)
+    set_force = CommandedForce(trajectory=SetPoint(numbers))
+    return replace(planned, contact=replace(planned.contact, force=set_force))
 
 
 def _events(presence: Evolution[float], schedule: Schedule | None) -> set[float]:

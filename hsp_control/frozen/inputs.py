@@ -23,6 +23,7 @@ from hsp_control.frozen.image import PAYLOAD, TARGET, VELOCITY, Port
 from hsp_control.law import VARYING
 from hsp_control.null_space.fields.weight import SetWeight
 from hsp_control.tasks.compliant_task import impedance_of
+from hsp_control.trajectories.hold import SetPoint
 from hsp_control.trajectories.streams.alone import StreamAlone
 from hsp_control.trajectories.streams.followed import FollowedStream
 
@@ -53,6 +54,7 @@ def inputs_of(own: Controller, bound: BoundStep, period: float) -> Iterator[Inpu
         meaning, most = "damping of the error equation", 2.0 / period
         yield _matrix(f"{task.name}.Kv", "1/s", meaning, Kv, most)
     yield from _weights(own)
+    yield from _forces(own)
     K_N = bound.active.law.problem.gain
     meaning = "K_N, rate of the null-space error"
     name, most = "null_space_gain", min(2.0 / period, LARGEST)
@@ -75,6 +77,17 @@ def _weights(own: Controller) -> Iterator[Input]:
         evolve = _evolving(w, 0.0, LARGEST, 0, rate)
         meaning = "weight of the field"
         yield Input(Port(f"{name}.weight", "-", meaning, w, evolve), (evolve,))
+
+
+def _forces(own: Controller) -> Iterator[Input]:
+    """Yield the commanded normal forces that are numbers."""
+    for each in own.setup.contacts:
+        force = each.contact.force
+        if force is not None and isinstance(force.followed, SetPoint):
+            evolve = _evolving(force.followed.numbers, 0.0, LARGEST, 0)
+            name, meaning = f"{each.contact.name}.force", "normal force, which presses"
+            port = Port(name, "N", meaning, force.followed.numbers, evolve)
+            yield Input(port, (evolve,))
 
 
 def model_inputs(

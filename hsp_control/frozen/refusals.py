@@ -5,6 +5,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from hsp_control.common.exceptions import FreezeError
+from hsp_control.constraints.contacts.contact import WRENCH
 from hsp_control.control.bound_step import BoundStep
 from hsp_control.control.controller import Controller
 from hsp_control.declaration import within
@@ -46,7 +47,9 @@ def check_steady(own: Controller) -> None:
         contact = one.contact
         reasons = {
             "schedule": one.always or "a frozen controller stands on the same feet",
-            "force": contact.force is None or "a commanded force is Python's",
+            "force": contact.force is None
+            or not (contact.slides or contact.force.dimension == WRENCH)
+            or "the forces of a contact that slides, and moments, are Python's",
         }
         for name, reason in reasons.items():
             if reason is not True:
@@ -129,6 +132,11 @@ def _plans_of(own: Controller, state: RobotState) -> Iterator[tuple[Path, StepPl
             yield ("tasks", task.name, "trajectory"), supplied(task.followed)[1]
         rows = TaskSample.allocate(task.rows, nv)
         yield ("tasks", task.name), planned(task.calls(state, task.feedback(), rows))
+    for each in own.setup.contacts:
+        force = each.contact.force
+        if force is not None:
+            key = "contacts", each.contact.name, "force"
+            yield key, supplied(force.followed)[1]
     metric, sample = MetricSample.allocate(nv), FieldSample.allocate(nv)
     yield ("null_space", "metric"), planned(own.metric.calls(state, metric))
     for k, term in enumerate(terms_of(own.field)):

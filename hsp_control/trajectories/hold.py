@@ -5,10 +5,13 @@ from typing import ClassVar, Self
 
 import numpy as np
 import pinocchio as pin
+from pydantic import InstanceOf
 
+from hsp_control import engine
 from hsp_control.common.arrays import Array
 from hsp_control.declaration.quantities import Vector, numbers
 from hsp_control.declaration.rotation import Rotation, matrix_of
+from hsp_control.engine.plans import TIME, PartCall, PartCalls
 from hsp_control.trajectories.orientation import (
     OrientationSample,
     OrientationTrajectory,
@@ -43,6 +46,30 @@ class Hold(Trajectory, type="hold"):
         out.velocity.fill(0.0)
         out.acceleration.fill(0.0)
         return out
+
+
+class SetPoint(Trajectory):
+    """x(t) that is written elsewhere, while it is followed; without rates."""
+
+    numbers: InstanceOf[np.ndarray]
+    """x, shape (n,), read in each step [m, or the task's unit]."""
+
+    @property
+    def dimension(self) -> int:
+        """The number n of coordinates."""
+        return self.numbers.size
+
+    def sample(self, t: float, out: TrajectorySample | None = None) -> TrajectorySample:
+        """Return x and zero rates; see `Trajectory.sample`."""
+        out = self._output(out)
+        out.position[:] = self.numbers
+        out.velocity.fill(0.0)
+        out.acceleration.fill(0.0)
+        return out
+
+    def calls(self, out: TrajectorySample) -> PartCalls:
+        """Return the call that writes x; see `Trajectory.calls`."""
+        return [PartCall(engine.Copy, x=self.numbers, out=out.position, t=TIME)]
 
 
 class HoldOrientation(OrientationTrajectory, type="hold"):

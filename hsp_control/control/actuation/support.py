@@ -67,16 +67,17 @@ class Support:
         # f_ref, shape (size,): the commanded forces, zero where none is
         self.reference = np.zeros(self.size)
         self._scheduled: list[tuple[PlannedContact, slice, Array]] = []
-        self._commanded: list[tuple[PlannedContact, CommandedForces, Array]] = []
+        self._commanded: list[tuple[PlannedContact, CommandedForces]] = []
         for planned, where in zip(contacts, self.points, strict=True):
             columns = slice(3 * where.start, 3 * where.stop)
             friction = planned.contact.friction
             full = np.tile([friction**2, friction**2, 1.0], where.stop - where.start)
             if planned.contact.force is not None:
                 offset = force_offset(planned.contact.name)
-                command = CommandedForces(planned.contact, state, offset)
+                own = self.reference[columns]
+                command = CommandedForces(planned.contact, state, offset, own)
                 full[command.mask] *= COMMANDED_INVERSE_COST
-                self._commanded.append((planned, command, self.reference[columns]))
+                self._commanded.append((planned, command))
             self.inverse_cost[columns] = full
             if not planned.always:
                 self._scheduled.append((planned, columns, full))
@@ -93,8 +94,8 @@ class Support:
             on = max(planned.weight(state.t), 1e-6)
             self.upper[columns][2::3] = on * _MAX_FORCE * self.weight
             self.inverse_cost[columns] = on * full
-        for planned, command, own in self._commanded:
-            command.write(state, planned.weight(state.t), law, own)
+        for planned, command in self._commanded:
+            command.write(state, planned.weight(state.t), law)
 
     @cached_property
     def _write_maps(self) -> Callable[[], object]:
@@ -120,7 +121,7 @@ class Support:
         return calls
 
     def calls(self, wanted: Array) -> PartCalls:
-        """Return the calls of contacts that always count, and command no force.
+        """Return the calls of contacts that are active at all times.
 
         They do what `update` and `minimum_norm_forces` do.
 
@@ -128,9 +129,9 @@ class Support:
             wanted: The effort without contact forces, shape (nv,) [N·m or N].
         """
         assert not self._scheduled
-        assert not self._commanded
         copy = PartCall(engine.Copy, x=wanted, out=self._wanted)
-        return [*self.maps(), copy, self._solution()]
+        commands = [call for _, each in self._commanded for call in each.calls()]
+        return [*self.maps(), *commands, copy, self._solution()]
 
     def minimum_norm_forces(self, wanted: Array) -> Array:
         """Return the forces of minimum Σ (f - f_ref)²/e, and write `tau`."""
@@ -197,14 +198,22 @@ cheaper than a miss of the tasks."""
 class CommandedForces:
     """Writes f_ref for the points of one contact, and how dear other forces are."""
 
-    def __init__(self, contact: Contact, state: RobotState, offset: Array) -> None:
-        """Follow the command of a contact; ``offset`` is added to its normal force."""
+    def __init__(
+        self, contact: Contact, state: RobotState, offset: Array, out: Array
+    ) -> None:
+        """Follow the command of a contact.
+
+        Args:
+            contact: The contact, with k points.
+            state: Where the robot is.
+            offset: What is added to its normal force, shape (1,) [N].
+            out: f_ref of its points, shape (3 k,) [N], which is written.
+        """
         assert contact.force is not None
-        self._contact, self._offset = contact, offset
+        self._contact = contact
         n = contact.force.dimension
         self._command = TrajectorySample.allocate(n)
-        calls = contact.force.followed.calls(self._command)
-        self._follow = engine.Plan(state.plan(calls).steps())
+        self._followed = contact.force.followed.calls(self._command)
         k = len(contact.points)
         self._varies = n == WRENCH  # with the arms
         self._shares = np.zeros((3 * k, n))
@@ -213,20 +222,33 @@ class CommandedForces:
         only_normal = n == NORMAL and not contact.slides
         # commanded entries of the contact's forces, shape (3 k,)
         self.mask = np.tile([not only_normal, not only_normal, True], k)
-        self._normal = 0 if n == NORMAL else 2
+        self._weight, self._out = np.ones(1), out
+        self._command_call = PartCall(
+            engine.CommandedForce,
+            command=self._command.position,
+            offset=offset,
+            weight=self._weight,
+            shares=self._shares,
+            normal=0 if n == NORMAL else 2,
+            reference=out,
+        )
+        self._write = engine.Plan(state.plan(self.calls()).steps())
 
-    def write(
-        self, state: RobotState, weight: float, law: BoundLaw, out: Array
-    ) -> None:
+    def calls(self) -> PartCalls:
+        """Return the calls that write f_ref of a contact that is active.
+
+        Not of one that slides, nor of moments: see `write`.
+        """
+        return [*self._followed, self._command_call]
+
+    def write(self, state: RobotState, weight: float, law: BoundLaw) -> None:
         """Write f_ref."""
-        self._follow(state.t)
-        command = self._command.position.copy()
-        command[self._normal] = max(command[self._normal] + self._offset[0], 0.0)
-        contact = self._contact
+        contact, out = self._contact, self._out
         if self._varies:
             arms = contact.arms_in_axes(state.frame(contact.frame))
             self._shares[:] = shares(WRENCH, arms)
-        out[:] = weight * (self._shares @ command)
+        self._weight[:] = weight
+        self._write(state.t)
         if isinstance(contact, SlidingContact) and contact.slides:
             slip = _slip(contact, state, intended_velocity(state, law))
             speed = float(np.hypot(slip[0], slip[1]))

@@ -1,15 +1,27 @@
 """A frozen controller stands: contacts that are the same at all times."""
 
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
-from frozen_library import BRAKING, FAILED, HOLDING, OK, WRONG_STATE, Opened
+from frozen_library import (
+    BRAKING,
+    FAILED,
+    HOLDING,
+    OK,
+    WRONG_NAME,
+    WRONG_SIZE,
+    WRONG_STATE,
+    WRONG_VALUE,
+    Opened,
+)
 from frozen_runs import EXAMPLE, compiled, computed, random_states, replayed
 
 import hsp_control as hsp
 from hsp_control.common.exceptions import FreezeError
+from hsp_control.constraints.contacts import CommandedForce
 from hsp_control.live import LiveSettings, SafeStop, StopSettings
 from hsp_control.live.safe_stop import StandingFeet
 
@@ -87,6 +99,54 @@ def test_a_robot_on_feet_that_sees_nothing_any_more_is_stopped(tmp_path: Path) -
     held = rests.effort(robot.state(0.0, q, np.zeros(robot.nv)))
     assert np.abs(last - held).max() > 0.02
     np.testing.assert_allclose(opened.tau, held, rtol=0.0, atol=1e-3)
+
+
+def pressing(value: float | list[float]) -> hsp.Controller:
+    """Return a standing robot of which one foot presses as it is commanded."""
+    own = hsp.load_experiment("whole_body/solo12_trunk").controller.contacts
+    foot = replace(own[0], force=CommandedForce(value=value))
+    return solo(contacts=(foot, *own[1:]))
+
+
+@pytest.mark.parametrize("ramp", [0.0, 0.02])
+def test_a_commanded_force(ramp: float, tmp_path: Path) -> None:
+    """Also while one ramp is not over when the next begins, and to nothing."""
+    declared = pressing(6.0)
+    foot = declared.contacts[0].name
+    opened = Opened(hsp.freeze(declared, tmp_path / "frozen.hsp"))
+    controller = declared.preview()
+    q, v = declared.setup.start.state.q, np.zeros(18)
+    changes = {4: 2.5, 11: 9.0, 20: 0.0, 50: 5.0}
+    for k in range(90):
+        v[6:] = 0.01 * np.sin(0.3 * k)
+        output = controller.compute(k * H, q, v)
+        controller.applied(output.tau, H)
+        assert opened.step(k * H, q, v) == output.status
+        np.testing.assert_array_equal(opened.tau, output.tau)
+        if k in changes:
+            force = CommandedForce(value=changes[k])
+            controller.at(k * H).ramp(ramp).force(foot, force)
+            assert opened.ramp(f"{foot}.force", changes[k], ramp) == OK
+    assert output.forces.reshape(-1, 3)[0, 2] == pytest.approx(5.0, abs=0.01)
+    np.testing.assert_array_equal(opened.get(f"{foot}.force", 1), 5.0)
+    for wrong in (-1e-3, np.nan, 1e31):
+        assert opened.set(f"{foot}.force", wrong) == WRONG_VALUE
+    assert opened.set(f"{foot}.force", [1.0, 2.0]) == WRONG_SIZE
+    assert opened.ramp(f"{foot}.force", 1.0, -0.1) == WRONG_VALUE
+    other = declared.contacts[1].name
+    assert opened.set(f"{other}.force", 1.0) == WRONG_NAME
+
+
+def test_a_commanded_force_along_a_plane_is_frozen_as_it_is(
+    replay: Path, tmp_path: Path
+) -> None:
+    controller = pressing([0.5, -0.3, 6.0])
+    frozen = hsp.freeze(controller, tmp_path / "frozen.hsp")
+    q = controller.setup.start.state.q
+    states = random_states(controller.robot, q, 50, SEED, away=0.02, speed=0.05)
+    expected = computed(controller, states)
+    np.testing.assert_array_equal(replayed(replay, frozen, states), expected)
+    assert not any(name.endswith(".force") for name in Opened(frozen).ports)
 
 
 def test_what_nothing_carries_is_not_stopped(tmp_path: Path) -> None:

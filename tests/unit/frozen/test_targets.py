@@ -174,16 +174,19 @@ def test_a_new_run_begins_anew(tmp_path: Path) -> None:
         ("hand.target", [0.5, 0.0, np.nan, 0.0, 0.0, 0.0, 1.0], 0.0, WRONG_VALUE),
         ("hand.target", [0.5, 0.0, 2e6, 0.0, 0.0, 0.0, 1.0], 0.0, WRONG_VALUE),
         ("hand.target", [0.5, 0.0, 0.5, 0.0, 0.0, 0.0, 1.0], 0.1, WRONG_VALUE),
+        ("hand.target", [0.5, 0.0, 0.5, 0.0, 0.0, 0.0, 1.0], -0.1, WRONG_VALUE),
         ("hand.target", [0.5, 0.0, 0.5], 0.0, WRONG_SIZE),
         ("hand.velocity", [np.inf, 0.0, 0.0, 0.0, 0.0, 0.0], 0.0, WRONG_VALUE),
         ("hand.velocity", np.zeros(7), 0.0, WRONG_SIZE),
         ("elbow.target", np.zeros(7), 0.0, WRONG_NAME),
     ],
 )
+@pytest.mark.parametrize("kind", ["pose", "interpolate"])
 def test_a_wrong_target_changes_nothing(
-    name: str, values: Any, duration: float, status: int, tmp_path: Path
+    kind: str, name: str, values: Any, duration: float, status: int, tmp_path: Path
 ) -> None:
-    pair = Pair("pose", tmp_path)
+    pair = Pair(kind, tmp_path)
+    pair.target(random_target(kind, np.random.default_rng(SEED), 0.02))
     pair.steps(3)
     assert pair.opened.ramp(name, values, duration) == status
     assert pair.opened.error
