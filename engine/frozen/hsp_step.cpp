@@ -122,7 +122,8 @@ void expect(hsp_controller& of) {
 
 // Brake, or hold: the effort, or the last one, is then `of.tau`. No clock is wrong here.
 hsp_status stopped(hsp_controller& of, double t, const double* q, const double* v) {
-  if (!of.stops) throw std::runtime_error("nothing carries this robot's base: it is not stopped here");
+  if (!of.stops)
+    throw std::runtime_error("nothing carries this robot's base: it is not stopped here");
   hsp::Move& stop = of.plan.stop();
   const Eigen::Map<const hsp::Vector> q_in(q, stop.q.size()), v_in(v, stop.v.size());
   of.stopping = true;

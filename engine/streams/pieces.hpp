@@ -7,7 +7,9 @@
 namespace hsp {
 
 // Bounds of the magnitudes of x', x'' and x''', for each coordinate.
-template <template <int...> class As> struct MotionBounds { As<'n'> speed, acceleration, jerk; };
+template <template <int...> class As> struct MotionBounds {
+  As<'n'> speed, acceleration, jerk;
+};
 
 struct StateMemory : OwnState {
   void prepare(const Sizes& size) { resize(size('n')); }
