@@ -96,6 +96,9 @@ class SafeStop:
     that one gain k is enough. s, in [0, 1], scales the whole vector into the effort
     limits: damping that is clipped joint by joint can accelerate the robot.
 
+    With other masses or an unknown load g(q) is wrong by d, and a joint that is only
+    damped sinks at d/(k M); so an estimate of d is subtracted where there is one.
+
     Hold: tau = g(q) - ω² M₀ (q ⊖ q₀) - 2 ω M₀ v with M₀ at the configuration q₀ where
     the robot came to rest: the PD control with gravity compensation of Takegaki and
     Arimoto (1981), stable for any inertia.
@@ -153,8 +156,14 @@ class SafeStop:
         held = self.held_for >= self._settings.hold - 0.5 * self._period
         return self.phase == Phase.HOLDING and held
 
-    def effort(self, state: RobotState) -> Array:
-        """Return the effort of this period at the state, shape (nv,); once a period."""
+    def effort(self, state: RobotState, disturbance: Array | None = None) -> Array:
+        """Return the effort of this period at the state, shape (nv,); once a period.
+
+        Args:
+            state: The state, measured or predicted.
+            disturbance: What acts besides the model's gravity and is compensated, shape
+                (nv,) [N·m or N]; None: nothing.
+        """
         settings, v = self._settings, state.v
         if self.phase == Phase.DAMPING and (
             float(np.abs(v).max()) <= settings.rest_speed
@@ -176,6 +185,8 @@ class SafeStop:
             braking = -(self._held_mass @ (w * w * displacement + 2.0 * w * v))
         rest = self._rest  # with what the state's robot carries
         gravity = self._robot.inverse_dynamics(state.q, rest, rest, state.dynamics)
+        if disturbance is not None:
+            gravity = gravity - disturbance
         gravity, braking = (
             self.feet.joint_effort(state, force) for force in (gravity, braking)
         )

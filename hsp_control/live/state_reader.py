@@ -469,6 +469,16 @@ class StateReader:
         return max(self._reckoning.predicted_for, self._motion.unknown_for)
 
     @property
+    def disturbance(self) -> Array:
+        """What acts on the joints besides their efforts, shape (nv,) [N·m or N]."""
+        return self._motion.disturbance
+
+    @property
+    def ambiguous(self) -> bool:
+        """Whether nobody knows if a joint moves as it is measured."""
+        return self._motion.ambiguous
+
+    @property
     def speed(self) -> float:
         """Speed of the fastest joint, a mean of some milliseconds, or as predicted."""
         mean = self._motion.mean_velocity
@@ -524,7 +534,8 @@ class StateReader:
     def effort_sent(self, applied: Array) -> float:
         """Record the effort that acts now, (nv,); return the response time [s]."""
         response = self._clock() - self.arrival
-        self._motion.applied(self.state.q, self.state.v, applied)
+        state = self.state
+        self._motion.applied(state.q, state.v, applied, state.mass_matrix)
         if self.measurement is not None:
             self.deadlines.add(self.arrival - self._last_arrival, response)
             self._last_arrival = self.arrival
@@ -577,7 +588,8 @@ class StateReader:
         self._reckoning.correct(t, measurement.q, measurement.v)
 
     def _predict(self, applied: Array) -> None:
-        self._reckoning.predict(applied)
+        stopping = self._motion.stopping
+        self._reckoning.predict(applied + self.disturbance if stopping else applied)
         self._missing += 1
         self.deadlines.without_state += 1
         self._due = max(self._due + self._period, self._clock())
