@@ -12,6 +12,8 @@ _RATE = 10.0
 """With which the estimate follows [1/s]."""
 _GRAVITY = 0.2
 """Part of a joint's gravity that the model may have wrong."""
+_LOAD = 1.0
+"""What a load exerts on a joint at most, relative to its friction."""
 
 
 class Driving(NamedTuple):
@@ -33,7 +35,7 @@ class Disturbance:
 
     With other masses or a load that the model lacks a joint that is only damped sinks
     at d/(k M) until it is held: some tenths of a rad/s. So the safe stop compensates
-    this estimate. It is at most what friction and an error of the gravity may be, and
+    this estimate. It is at most what friction, a load and an error of the gravity may be, and
     does not get there sooner than in 1/K: what is wrong for milliseconds leaves little.
 
     Attributes:
@@ -46,14 +48,15 @@ class Disturbance:
         """``effort`` limits the efforts, shape (nv,), inf where unlimited."""
         self._rate = min(_RATE, 0.1 / period)
         limited = np.isfinite(effort)  # where it is not, friction is unknown
-        self._friction = settings.friction * np.where(limited, effort, 0.0)
+        self._bound = np.where(limited, effort, 0.0)
+        self._bound *= (1.0 + _LOAD) * settings.friction
         self._judged = not robot.unactuated
         self.restart()
 
     def restart(self) -> None:
         """Begin at rest, without a disturbance."""
-        self.effort: Array = np.zeros(self._friction.size)
-        self._v: Array = np.zeros(self._friction.size)
+        self.effort: Array = np.zeros(self._bound.size)
+        self._v: Array = np.zeros(self._bound.size)
 
     def update(self, v: Array, driving: Driving, passed: float) -> None:
         """Follow a new state.
@@ -65,7 +68,7 @@ class Disturbance:
         """
         if not self._judged:
             return
-        allowed = self._friction + _GRAVITY * np.abs(driving.gravity)
+        allowed = self._bound + _GRAVITY * np.abs(driving.gravity)
         part = min(self._rate * passed, 1.0)
         known = passed * (driving.effort + self.effort)
         change = driving.inertia @ (v - self._v) - known

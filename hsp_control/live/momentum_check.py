@@ -36,7 +36,7 @@ class _Window:
     def restart(self) -> None:
         """Forget all that was."""
         self._count = 0
-        self._impulse = np.zeros(self._impulses.shape[1])
+        self.impulse = np.zeros(self._impulses.shape[1])
         self._impulses[:] = 0.0
         self._efforts[:] = 0.0
 
@@ -52,9 +52,9 @@ class _Window:
             signs, shape (nv,); None until it has passed.
         """
         k = self._count
-        self._impulse = self._impulse + impulse - self._efforts[k % self.states]
+        self.impulse = self.impulse + impulse - self._efforts[k % self.states]
         self._efforts[k % self.states] = impulse
-        self._impulses[k % len(self._impulses)] = self._impulse
+        self._impulses[k % len(self._impulses)] = self.impulse
         self._velocities[k % (self.states + 1)] = v
         self._count += 1
         if k < self.states:
@@ -134,10 +134,12 @@ class MomentumCheck:
     def _judge(self, window: _Window, change: Array, driving: Driving) -> None:
         width = window.states * self._period
         momentum = driving.inertia @ change
-        least, most = window.bounds()
-        size = _MASSES * np.maximum(np.abs(least), np.abs(most))
-        allowed = (self._allowed + _GRAVITY * np.abs(driving.gravity)) * width + size
+        allowed = (self._allowed + _GRAVITY * np.abs(driving.gravity)) * width
         allowed += self._noise * np.diag(driving.inertia)
+        if (np.abs(momentum - window.impulse) <= allowed).all():
+            return  # as most of the time
+        least, most = window.bounds()
+        allowed += _MASSES * np.maximum(np.abs(least), np.abs(most))
         # One that moves may be heavier than its model, and its momentum smaller.
         moves = np.abs(change) > self._noise
         least = np.where(moves, np.minimum(least, 0.0), least)
