@@ -35,8 +35,9 @@ class Disturbance:
 
     With other masses or a load that the model lacks a joint that is only damped sinks
     at d/(k M) until it is held: some tenths of a rad/s. So the safe stop compensates
-    this estimate. It is at most what friction, a load and an error of the gravity may be, and
-    does not get there sooner than in 1/K: what is wrong for milliseconds leaves little.
+    this estimate. It is at most what friction, a load and an error of the gravity may
+    be, and does not get there sooner than in 1/K: what is wrong for milliseconds leaves
+    little.
 
     Attributes:
         effort: The estimate, shape (nv,) [N·m or N]; 0 for a floating base.
