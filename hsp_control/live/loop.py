@@ -358,6 +358,7 @@ class LiveRun:
         self.phase = self.safe_stop.phase
         too_long = self.reader.predicted_for > self.settings.prediction_time
         unknown = self.reader.connection_lost or too_long
+        unknown |= self.reader.ambiguous and self.safe_stop.done
         self.silent = unknown or not np.isfinite(tau).all()
         self.done = self.silent or self.safe_stop.done
         return tau

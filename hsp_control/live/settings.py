@@ -98,6 +98,10 @@ class LiveSettings(Part, error=LiveError):
     """Largest friction that may hold a joint at rest, relative to its effort limit. A
     joint whose readings do not change by a bit under more than that has a dead sensor
     [-]."""
+    contact: NonNegative = 0.3
+    """Largest effort that contacts, loads and persons may exert on a joint, relative to
+    its effort limit. A joint that is pushed by more has met something hard, or its
+    sensors are wrong [-]."""
     start_timeout: Positive = 10.0
     """Maximum time to wait for the first state [s]."""
     watchdog: PositiveCount = 20

@@ -469,6 +469,11 @@ class StateReader:
         return max(self._reckoning.predicted_for, self._motion.unknown_for)
 
     @property
+    def ambiguous(self) -> bool:
+        """Whether nobody knows if a joint moves as it is measured."""
+        return self._motion.ambiguous
+
+    @property
     def speed(self) -> float:
         """Speed of the fastest joint, a mean of some milliseconds, or as predicted."""
         mean = self._motion.mean_velocity
@@ -524,7 +529,8 @@ class StateReader:
     def effort_sent(self, applied: Array) -> float:
         """Record the effort that acts now, (nv,); return the response time [s]."""
         response = self._clock() - self.arrival
-        self._motion.applied(self.state.q, self.state.v, applied)
+        state = self.state
+        self._motion.applied(state.q, state.v, applied, state.mass_matrix)
         if self.measurement is not None:
             self.deadlines.add(self.arrival - self._last_arrival, response)
             self._last_arrival = self.arrival

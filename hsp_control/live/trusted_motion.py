@@ -7,6 +7,7 @@ import numpy as np
 from hsp_control.common.arrays import Array, Flags, Indices
 from hsp_control.common.exceptions import HspControlError
 from hsp_control.control.measurement import Measurement
+from hsp_control.live.momentum_check import Driving, MomentumCheck, smaller
 from hsp_control.live.response_check import ResponseCheck
 from hsp_control.live.settings import LiveSettings
 from hsp_control.live.still_sensors import StillSensors
@@ -28,6 +29,7 @@ _LAST = 20
 """Periods of the safe stop that follow the death of a sensor of a joint at rest."""
 _SMALL = 2.0
 """A contradiction up to this, relative to the error of velocities, may be the lag."""
+_EFFORT = {"rad": "N·m", "m": "N"}
 
 
 class ExpectedMotion:
@@ -105,14 +107,20 @@ class TrustedMotion:
 
     Where both agree and are wrong, the efforts reveal it: a joint whose readings do not
     change though it is pushed (`StillSensors`), one that goes the other way
-    (`ResponseCheck`), and in the safe stop one that is braked and speeds up. Then no
+    (`ResponseCheck`), one whose momentum changes as neither efforts nor contacts change
+    it (`MomentumCheck`), and in the safe stop one that is braked and speeds up. Then no
     effort of ours is of use, and the loop leaves it to the robot.
+
+    A joint that is pushed hard has met something, or is measured wrong. Until the loop
+    falls silent it is braked by the smaller of its measured and its expected velocity,
+    or not at all if they have different signs: whichever is right, it gets no faster.
 
     Attributes:
         fault: The contradiction, or None.
         doubtful: Whether the last measurement should not be used, though it is no fault
             yet.
         complete: Whether all measurements are trusted.
+        stopping: Whether the joints are braked.
         unknown_for: Time since which some joint was only expected, not measured [s].
         last: The last measurement, as it came; None before the first.
     """
@@ -123,6 +131,7 @@ class TrustedMotion:
         self._expected = ExpectedMotion(robot, settings.velocity_error, period)
         limits = settings.effort_limits(robot)
         self._sensors = StillSensors(robot, settings, limits, period)
+        self._momentum = MomentumCheck(robot, settings, limits, period)
         # Nobody knows what the feet of a robot with a floating base push.
         self._judged = np.full(robot.nv, not robot.unactuated)
         self._response = ResponseCheck(settings.velocity_error, self._judged)
@@ -134,12 +143,15 @@ class TrustedMotion:
         self._check.restart()
         self._sensors.restart()
         self._response.restart()
+        self._momentum.restart()
         self._contrary = np.zeros(self._robot.nv, dtype=bool)
+        self._pushed = np.zeros(self._robot.nv, dtype=bool)
         self.last: Measurement | None = None
         self._q: Array = np.zeros(0)  # the last trusted configuration
         self.complete = True
         self._useless = False  # whether joints do not follow their efforts
-        self._stopping = False  # whether the joints are braked
+        self.stopping = False  # whether the joints are braked
+        self._driving: Driving | None = None
         self._moving = False  # whether the robot's clock has begun
         self._positions = np.ones(self._robot.nv, dtype=bool)
         self._velocities = np.ones(self._robot.nv, dtype=bool)
@@ -153,19 +165,36 @@ class TrustedMotion:
         return self._check.mean if self._moving and self.complete else None
 
     @property
+    def ambiguous(self) -> bool:
+        """Whether a joint was pushed hard, or is measured wrong: nobody knows which."""
+        return bool(self._pushed.any())
+
+    @property
     def trusted_positions(self) -> Flags:
         """Joints whose positions are trusted, shape (nv,)."""
         return self._positions
 
     def stop(self) -> None:
         """From now on the joints are braked: what speeds up is wrong, or its motor."""
-        self._stopping = True
+        self.stopping = True
 
-    def applied(self, q: Array, v: Array, tau: Array) -> None:
-        """Record the effort that acts from now on, shape (nv,), at a state."""
+    def applied(
+        self, q: Array, v: Array, tau: Array, inertia: Array | None = None
+    ) -> None:
+        """Record the effort that acts from now on, shape (nv,), at a state.
+
+        ``inertia`` is its mass matrix, shape (nv, nv); None: it is computed.
+        """
         self._expected.apply(q, v, tau)
         if self.complete and self._moving:
             self._sensors.judge(q, v, tau)
+        if self._robot.unactuated:
+            return
+        if inertia is None:
+            inertia = self._robot.state(0.0, q, v).mass_matrix
+        effort = inertia @ self._expected.acceleration
+        gravity = self._robot.inverse_dynamics(q, 0.0 * v, 0.0 * v)
+        self._driving = Driving(inertia, effort, gravity)
 
     def update(self, new: Measurement, passed: float, jumps: Flags) -> Measurement:
         """Return a measurement of what can be trusted; set the fault.
@@ -186,14 +215,18 @@ class TrustedMotion:
         way = self._robot.difference(last.q, new.q)
         if not self._moving:  # a robot starts at rest
             self._moving = True
-            expected.begin(_smaller(way / passed, new.v))
+            expected.begin(smaller(way / passed, new.v))
         expected.advance(passed)
         check.update(way, new.v, passed)
         self._sensors.update(way, new.v, check.mean, passed)
         if self.complete:
             self._response.update(expected.acceleration, check.mean, passed)
+            if (driving := self._driving) is not None:
+                now = np.stack([new.v, way / passed])
+                means = np.stack([check.mean, check.slope])
+                self._momentum.update(now, means, driving, passed)
         known = self._velocities.astype(np.int64) + self._positions
-        if self._stopping:  # what is braked must obey
+        if self.stopping:  # what is braked must obey
             known = np.minimum(known, 1)
         expected.follow(check.mean, check.slope, known, passed)
         self._judge(new.v, jumps)
@@ -203,7 +236,7 @@ class TrustedMotion:
             return new
         all_known = (self._velocities | self._positions).all()
         self.unknown_for = 0.0 if all_known else self.unknown_for + passed
-        if self._sensors.dead.any():  # nobody knows how fast it is
+        if (self._sensors.dead | self._pushed).any():  # nobody knows how fast it is
             self.unknown_for = max(self.unknown_for, self._soon)
         if self._useless:
             self.unknown_for = inf
@@ -211,6 +244,7 @@ class TrustedMotion:
         self.doubtful = self.fault is None and bool((check.doubtful & both).any())
         v = np.where(self._positions, check.slope, expected.v[2])
         v = np.where(self._velocities, new.v, v)
+        v = np.where(self._pushed, smaller(new.v, v), v)
         way = self._robot.difference(self._q, new.q)
         way = np.where(self._positions, way, passed * v)
         self._q = self._robot.integrate(self._q, way)
@@ -221,9 +255,11 @@ class TrustedMotion:
         check = self._check
         dead = check.dead | self._sensors.dead
         contrary = self._response.contrary
+        # What a dead sensor hides seems to push the other joints, too.
+        pushed = self._momentum.beyond & ~check.halted.any()
         wrong = check.contradicted | jumps
-        runs = self._left(v) if self._stopping else np.zeros(v.size, dtype=bool)
-        if self.complete and not (wrong | dead | contrary | runs).any():
+        runs = self._left(v) if self.stopping else np.zeros(v.size, dtype=bool)
+        if self.complete and not (wrong | dead | contrary | pushed | runs).any():
             return
         both = self._positions & self._velocities
         wrong &= both
@@ -239,7 +275,8 @@ class TrustedMotion:
         lost = dead & (self._positions | self._velocities)
         if self.complete:
             self._contrary |= contrary & both
-            lost |= contrary & both
+            self._pushed |= pushed & both & ~(wrong | dead)
+            lost |= (contrary | pushed) & both
         lost |= runs | self._left(v) & (self._positions ^ self._velocities)
         # Efforts do harm where a joint goes against them: only the robot can brake.
         self._useless |= bool(runs.any() or self._contrary.any())
@@ -281,6 +318,12 @@ class TrustedMotion:
                 f"{name} goes the other way than its effort drives it: its sensor or "
                 "its motor has the wrong sign"
             )
+        if self._pushed[i]:
+            return (
+                f"{name} is pushed by {self._momentum.rest[i]:.3g} {_EFFORT[unit]} "
+                "beside its effort: it has met something hard, or its sensors are "
+                "wrong"
+            )
         if runs:
             return (
                 f"{name} is braked, and moves at {v[i]:.3g} {unit}/s where "
@@ -292,9 +335,3 @@ class TrustedMotion:
             f"are measured, and its positions change by {self._check.slope[i]:.3g} "
             f"{unit}/s"
         )
-
-
-def _smaller(a: Array, b: Array) -> Array:
-    """Return the smaller of two velocities; 0 if they contradict each other."""
-    smaller: Array = np.where(np.abs(a) < np.abs(b), a, b)
-    return np.where(a * b > 0.0, smaller, 0.0)

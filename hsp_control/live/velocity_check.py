@@ -65,6 +65,7 @@ class VelocityCheck:
         doubtful: Joints whose last velocity is not used yet, shape (nv,).
         contradicted: Joints whose velocity contradicts their positions, shape (nv,).
         dead: Joints whose sensor is dead, shape (nv,).
+        halted: Joints that moved, and whose readings stay to the last bit, (nv,).
         slope: Slope of the last positions, shape (nv,) [rad/s or m/s].
         difference: Between velocity and slope at the last one, shape (nv,).
         mean: Mean velocity in the same time, shape (nv,).
@@ -104,6 +105,7 @@ class VelocityCheck:
         self._by_v: Flags = np.ones(nv, dtype=bool)  # whose velocities are
         self._none, self._nothing = np.zeros(nv, dtype=bool), np.zeros(nv)
         self.dead: Flags = self._none
+        self.halted: Flags = self._none
 
     def trust(self, positions: Flags, velocities: Flags) -> None:
         """From now on a sensor is dead if what is trusted of it stands, (nv,) each."""
@@ -161,6 +163,7 @@ class VelocityCheck:
         speed, self._speed = np.maximum(now, self._speed), now
         if not still.any():
             self._still[:], self._before, self.dead = 0, speed, self._none
+            self.halted = self._none
             return
         self._before = np.where(still, self._before, speed)
         self._still = np.where(still, self._still + 1, 0)
@@ -168,6 +171,7 @@ class VelocityCheck:
         far = moved > np.maximum(_STEP, np.minimum(_STEPS * self._step, _COARSEST))
         # Friction may stop one joint soon, but not several in the same period.
         went = still & (self._before > _WENT)
+        self.halted = went
         together = (went[:, None] & (self._still[:, None] == self._still)).sum(axis=0)
         fast = self._before > 2.0 * _STOPS * self._period / np.maximum(together, 1)
         self.dead = (self._still >= _STILL) & fast & far & self._judged

@@ -135,3 +135,13 @@ def test_a_robot_that_may_fall_cannot_have_some(name: str) -> None:
         velocity_filter=VelocityFilter(50.0),
         friction_feed_forward=FrictionFeedForward(0.1),
     ).check(robot, [])
+
+
+def test_a_second_order_filter_is_the_bilinear_transform_of_butterworths() -> None:
+    """Its coefficients are those of SciPy, its answers to an impulse too."""
+    from scipy import signal
+
+    b, a = VelocityFilter(40.0, 2).coefficients(0.001)
+    expected_b, expected_a = signal.butter(2, 40.0, fs=1000.0)
+    assert b == pytest.approx(expected_b, rel=1e-12)
+    assert (1.0, *a) == pytest.approx(expected_a, rel=1e-12)
