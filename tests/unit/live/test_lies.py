@@ -585,7 +585,7 @@ def test_noise_in_motion_says_nothing_of_rest() -> None:
 
 
 OVER = "the duration is over"
-"""The run ended by itself. The stop after it sinks with a wrong model, which is said."""
+"""The run ended by itself; the stop after it sinks under a wrong model."""
 
 
 @pytest.mark.parametrize("share", [0.8, 1.2])
