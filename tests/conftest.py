@@ -2,7 +2,9 @@
 
 import gc
 import os
+import re
 import signal
+from functools import cache
 from importlib.util import find_spec
 from pathlib import Path
 
@@ -29,6 +31,9 @@ collect_ignore_glob = [
 ]
 
 
+gc.disable()  # while tests are collected: of what they are made of nothing is garbage
+
+
 def pytest_collection_finish() -> None:
     """Take what the tests are made of out of the garbage collector's sight.
 
@@ -37,6 +42,7 @@ def pytest_collection_finish() -> None:
     """
     gc.collect()
     gc.freeze()
+    gc.enable()
 
 
 def pytest_sessionfinish() -> None:
@@ -45,6 +51,19 @@ def pytest_sessionfinish() -> None:
 
 
 SYSTEM = Path(__file__).parent / "system"
+STARTS_OTHERS = re.compile(r"mark\.(process|browser|system)\b")
+
+
+@cache
+def may_be_of_the_system(file: Path) -> bool:
+    """Return whether a file of tests can have those of `make test-system`."""
+    return SYSTEM in file.parents or bool(STARTS_OTHERS.search(file.read_text("utf-8")))
+
+
+def pytest_ignore_collect(collection_path: Path, config: pytest.Config) -> bool | None:
+    """Import no file for `make test-system` that has nothing for it: most have not."""
+    only = config.option.markexpr == "system" and collection_path.is_file()
+    return True if only and not may_be_of_the_system(collection_path) else None
 
 
 @pytest.hookimpl(tryfirst=True)  # others choose by it
@@ -60,3 +79,8 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
         )
         if outside and not item.get_closest_marker("smoke"):
             item.add_marker("system")
+        if item.get_closest_marker("system") and not may_be_of_the_system(item.path):
+            raise pytest.UsageError(
+                f"{item.path} has tests for `make test-system`, which would not find "
+                f"them: the file itself must say {STARTS_OTHERS.pattern}"
+            )

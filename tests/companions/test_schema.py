@@ -2,14 +2,15 @@
 
 import json
 
+from exported_schema import exported_schema
+
 from hsp_control.common.resources import bundled, bundled_configs
-from hsp_control.config import json_schema
 
 
 def test_the_bundled_schema_is_the_exported_one() -> None:
     """Editors find it by the first line of each bundled configuration."""
     file = bundled("configs") / "hsp_control.schema.json"
-    assert json.loads(file.read_text(encoding="utf-8")) == json_schema(), (
+    assert json.loads(file.read_text(encoding="utf-8")) == exported_schema(), (
         "refresh it with: hsp schema > configs/hsp_control.schema.json"
     )
     for path in bundled_configs().values():

@@ -46,6 +46,14 @@ def opened(browser: Any, url: str, **options: Any) -> tuple[Any, list[str]]:
     return page, wrong
 
 
+def draw_lightly(page: Any) -> None:
+    """Let a page leave out shadows and mirrors, where no picture of the scene is seen.
+
+    Without a graphics card a picture then takes a fifth of the time.
+    """
+    page.evaluate("drawLightly()")
+
+
 def exported(
     browser: Any, file: Path, t: float, size: tuple[int, int]
 ) -> tuple[Any, list[str]]:
@@ -54,6 +62,7 @@ def exported(
     width, height = size
     page, wrong = opened(browser, address, viewport={"width": width, "height": height})
     page.wait_for_selector("body[data-ready]", state="attached")
+    draw_lightly(page)
     return page, wrong
 
 

@@ -117,9 +117,13 @@ def watch(browser: Any) -> Iterator[Callable[..., Watched]]:
         assert watched.wrong == []
 
 
-def exported(watch: Callable[..., Watched], page: Path, **about: Any) -> Watched:
+def exported(
+    watch: Callable[..., Watched], page: Path, *, fully: bool = False, **about: Any
+) -> Watched:
     watched = watch(page, **about)
     watched.page.wait_for_selector("body[data-ready]", state="attached")
+    if not fully:
+        browsers.draw_lightly(watched.page)
     return watched
 
 
@@ -142,7 +146,7 @@ def cursors(watched: Watched) -> list[float]:
 def test_the_arm_is_drawn_and_moves(
     planar: Rollout, planar_page: Path, watch: Callable[..., Watched]
 ) -> None:
-    watched = exported(watch, planar_page, at="#t=0")
+    watched = exported(watch, planar_page, fully=True, at="#t=0")
     first = watched.picture()
     seek(watched, 1.0)
     second = watched.picture()
@@ -418,6 +422,7 @@ def test_the_live_view_has_the_run_s_plots(
     with Viewer(experiment.robot) as viewer:
         watched = watch(viewer.url)
         page = watched.page
+        browsers.draw_lightly(page)
         live = LiveView(viewer, experiment)
         assert not page.locator("#side").is_visible()  # there is no run yet
         log = experiment.run(on_row=on_row)

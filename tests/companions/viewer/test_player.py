@@ -44,6 +44,7 @@ def opened(chromium: Any, viewer: Viewer) -> Iterator[tuple[Any, list[str]]]:
     size = {"width": 900, "height": 600}
     page, wrong = browsers.opened(chromium, str(viewer.url), viewport=size)
     assert viewer.wait_for_browser(200.0)
+    browsers.draw_lightly(page)
     yield page, wrong
     page.close()
 

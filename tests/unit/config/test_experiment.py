@@ -7,6 +7,7 @@ import jsonschema
 import numpy as np
 import pytest
 import yaml
+from exported_schema import exported_schema, validator
 from scenario_document import check_place
 
 from hsp_control import (
@@ -19,7 +20,6 @@ from hsp_control import (
 )
 from hsp_control.common import exceptions
 from hsp_control.common.resources import bundled_configs
-from hsp_control.config import json_schema
 
 MOVING = "paper/4_moving_obstacle"
 
@@ -55,12 +55,10 @@ def changed(path: str, value: object) -> dict:
 
 @pytest.mark.slow
 def test_every_bundled_configuration_follows_the_exported_schema() -> None:
-    schema = json_schema()
-    jsonschema.Draft202012Validator.check_schema(schema)
-    valid = jsonschema.Draft202012Validator(schema)  # `validate` would check it again
+    jsonschema.Draft202012Validator.check_schema(exported_schema())
     for name, file in bundled_configs().items():
         data = yaml.safe_load(file.read_text(encoding="utf-8"))
-        valid.validate(data)
+        validator().validate(data)
         assert data["title"], name
 
 

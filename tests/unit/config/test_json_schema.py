@@ -7,22 +7,34 @@ from typing import Any
 
 import jsonschema
 import pytest
+from exported_schema import exported_schema, validator
 
 from hsp_control.cli import main
-from hsp_control.config import json_schema
 from hsp_control.config.document import Document
 from hsp_control.config.loaded_scenario import validate
 from hsp_control.config.scenario import Scenario
 from hsp_control.declaration.families import Family
 from hsp_control.declaration.part import Part
 
-SCHEMA = json_schema()
-DEFINITIONS: dict[str, Any] = {"Scenario": SCHEMA, **SCHEMA["$defs"]}
-PROPERTIES = [
-    (f"{name}.{key}", about)
-    for name, definition in DEFINITIONS.items()
-    for key, about in definition.get("properties", {}).items()
-]
+
+@pytest.fixture(scope="module")
+def schema() -> dict[str, Any]:
+    return exported_schema()
+
+
+@pytest.fixture(scope="module")
+def definitions(schema: dict[str, Any]) -> dict[str, Any]:
+    return {"Scenario": schema, **schema["$defs"]}
+
+
+@pytest.fixture(scope="module")
+def properties(definitions: dict[str, Any]) -> list[tuple[str, Any]]:
+    return [
+        (f"{name}.{key}", about)
+        for name, definition in definitions.items()
+        for key, about in definition.get("properties", {}).items()
+    ]
+
 
 _SYMBOL = r"(?:rad|m|s|kg|N|Hz)[²³]?"
 _PRODUCT = rf"(?:1|{_SYMBOL}(?:·{_SYMBOL})*)(?:/{_SYMBOL})?(?:/√Hz)?"
@@ -43,22 +55,24 @@ def numeric(about: Any) -> bool:
     return about.get("type") in ("number", "integer") or any(map(numeric, inner))
 
 
-def test_everything_has_a_description() -> None:
-    assert [name for name, each in DEFINITIONS.items() if "title" not in each] == []
-    texts = {name: each.get("description") for name, each in DEFINITIONS.items()}
-    texts |= {name: about.get("description") for name, about in PROPERTIES}
+def test_everything_has_a_description(
+    definitions: dict[str, Any], properties: list[tuple[str, Any]]
+) -> None:
+    assert [name for name, each in definitions.items() if "title" not in each] == []
+    texts = {name: each.get("description") for name, each in definitions.items()}
+    texts |= {name: about.get("description") for name, about in properties}
     assert [name for name, text in texts.items() if not text] == []
     assert [name for name, text in texts.items() if "TODO" in text] == []
 
 
-def test_every_number_has_a_unit() -> None:
+def test_every_number_has_a_unit(properties: list[tuple[str, Any]]) -> None:
     without = [
         f"{name}: {about['description']}"
-        for name, about in PROPERTIES
+        for name, about in properties
         if numeric(about) and not UNIT.search(about["description"])
     ]
     assert without == []
-    assert sum(numeric(about) for _, about in PROPERTIES) > 200
+    assert sum(numeric(about) for _, about in properties) > 200
 
 
 @pytest.mark.parametrize(
@@ -77,11 +91,13 @@ def test_what_a_unit_is(text: str, has_one: bool) -> None:
     assert bool(UNIT.search(text)) is has_one
 
 
-def test_defaults_fit_their_own_schema() -> None:
-    for name, about in PROPERTIES:
+def test_defaults_fit_their_own_schema(
+    schema: dict[str, Any], properties: list[tuple[str, Any]]
+) -> None:
+    for name, about in properties:
         if "default" in about:
-            schema = {**about, "$defs": SCHEMA["$defs"]}
-            found = list(jsonschema.Draft202012Validator(schema).iter_errors(
+            own = {**about, "$defs": schema["$defs"]}
+            found = list(jsonschema.Draft202012Validator(own).iter_errors(
                 about["default"]
             ))  # fmt: skip
             assert not found, (name, about["default"])
@@ -121,7 +137,7 @@ def test_editor_and_program_agree_about_names(
         "tasks": {"hand": tasks},
         "changes": [{"type": "add_task", "at": 1, "task": added}],
     }
-    assert jsonschema.Draft202012Validator(SCHEMA).is_valid(data) is good
+    assert validator().is_valid(data) is good
     try:
         scenario = validate(Document(data, {}, "data"), Scenario)
     except ValueError:
@@ -131,6 +147,8 @@ def test_editor_and_program_agree_about_names(
         assert scenario.changes[0].task.name == added.get("name", "hand")
 
 
-def test_the_command_prints_it(capsys: pytest.CaptureFixture[str]) -> None:
+def test_the_command_prints_it(
+    capsys: pytest.CaptureFixture[str], schema: dict[str, Any]
+) -> None:
     assert main(["schema"]) == 0
-    assert json.loads(capsys.readouterr().out) == SCHEMA
+    assert json.loads(capsys.readouterr().out) == schema

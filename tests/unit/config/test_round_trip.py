@@ -5,10 +5,10 @@ from dataclasses import fields
 from pathlib import Path
 from typing import Any
 
-import jsonschema
 import numpy as np
 import pytest
 import yaml
+from exported_schema import validator
 
 from hsp_control import (
     Controller,
@@ -25,7 +25,6 @@ from hsp_control import (
 )
 from hsp_control.common.exceptions import ConfigError, HspControlError, SceneError
 from hsp_control.common.resources import bundled_configs
-from hsp_control.config import json_schema
 from hsp_control.config.document import Document
 from hsp_control.config.loaded_scenario import validate
 from hsp_control.config.scenario import NullSpaceSettings, Scenario
@@ -37,8 +36,6 @@ from hsp_control.geometry.scene import Scene
 from hsp_control.null_space.metrics import MassMatrixMetric
 from hsp_control.tasks import FramePosition
 from hsp_control.trajectories import Hold
-
-SCHEMA = jsonschema.Draft202012Validator(json_schema())
 
 EVERYTHING: dict[str, Any] = {
     "robot": {"name": "panda", "tool_frames": {"pen": {"parent": "panda_hand"}}},
@@ -102,7 +99,7 @@ def test_a_configuration_equals_what_it_becomes_as_data(
     assert json.loads(json.dumps(data, allow_nan=False)) == data
     again = Document.parse(yaml.safe_dump(data), name)
     assert validate(again, Scenario) == scenario
-    assert not list(SCHEMA.iter_errors(data))
+    assert not list(validator().iter_errors(data))
 
 
 def test_with_defaults_no_key_is_missing() -> None:
@@ -155,7 +152,7 @@ def test_an_experiment_of_parts_goes_to_yaml_and_back(tmp_path: Path) -> None:
     assert again.scenario == made.scenario
     first, second = made.run(), again.run()
     np.testing.assert_array_equal(first.tau, second.tau)
-    assert not list(SCHEMA.iter_errors(yaml.safe_load(made.to_yaml())))
+    assert not list(validator().iter_errors(yaml.safe_load(made.to_yaml())))
     # A log says the same, and its run can be repeated.
     log = load_experiment(first.save(tmp_path / "run.npz"))
     np.testing.assert_array_equal(log.run().tau, first.tau)
