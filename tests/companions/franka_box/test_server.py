@@ -224,4 +224,4 @@ def test_a_client_that_says_nothing_makes_room_for_the_next_one(
     monkeypatch.setattr(connection, "_PATIENCE", 0.0)
     with served() as rig, client(rig):  # it is silent
         assert serves(rig)
-        assert rig.tells("says nothing")
+        assert rig.tells("sends nothing")
