@@ -96,8 +96,8 @@ def test_a_second_sender_is_refused_until_the_first_is_silent(
     assert all(taken("b:2", 2.6 + 0.05 * k) for k in range(40))
     refused, silent = (each.partition("5005: ")[2] for each in caplog.messages)
     assert refused == (
-        "a message is dropped: b:2 sends while a:1 does, which was first and is accepted "
-        "alone until it is silent for 2 s"
+        "a message is dropped: b:2 sends while a:1 does, which was first and is "
+        "accepted alone until it is silent for 2 s"
     )
     assert silent.startswith("a:1 is silent for 2 s; the reference rests where")
 
