@@ -146,9 +146,10 @@ wheel-test: wheel ## build the wheel, install it elsewhere, use it from there
 	echo "The wheel works."
 
 ##@ Documents
+REPLAYS ?=# arguments of tools/replays.py, such as --brief
 docs: $(STAMP) $(ENGINE) ## build the site into docs/_build/html, with its replays; warnings are errors
 	@echo "Running what the site's frames play (a minute, once) ..."
-	@$(BIN)/python tools/replays.py
+	@$(BIN)/python tools/replays.py $(REPLAYS)
 	@$(BIN)/sphinx-build -q -W --keep-going -b html docs docs/_build/html
 	@echo "The site is docs/_build/html/index.html"
 

@@ -114,7 +114,8 @@ def test_the_loop_drives_a_client_that_is_a_robot(tmp_path: Path) -> None:
         with pytest.warns(RuntimeWarning, match="are ignored: gripper"):
             connected = Ros2Hardware(address, panda(), PERIOD, timeout=LONG)
         hardware = Recording(connected, robot)
-        settings = LiveSettings(age=1e9, missing=200, prediction_time=0.003)
+        own = {"missing": 200, "prediction_time": 0.003}
+        settings = LiveSettings(age=1e9, contact=1e3, **own)  # it moves as it likes
         report = run_loop(law(), hardware, settings=settings)  # type: ignore[arg-type]
     log: list[Any] = json.loads(said.read_text())
     assert len(log) == COUNT
