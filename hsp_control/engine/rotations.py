@@ -11,9 +11,15 @@ quaternion is x, y, z, w. The equations stand in the engine's ``rotations.hpp``.
 - ``quaternion_from_rotation(R)``: of length 1, with a scalar part that is not negative.
 - ``rotation_from_quaternion(q)``: of a quaternion of any length but zero.
 - ``stumpff(s)``: the functions C0 to C5 of which all of them are made, at s = |y|².
+- ``cross3(a, b)``: a × b of two arrays of shape (3,).
 
-They take what NumPy takes for an array, and raise TypeError for another shape.
+All but ``cross3`` take what NumPy takes for an array, and raise TypeError for another
+shape.
 """
+
+import numpy as np
+
+from hsp_control.common.arrays import Array
 
 from ._engine import exp3 as exp3
 from ._engine import jexp3 as jexp3
@@ -23,3 +29,9 @@ from ._engine import log3 as log3
 from ._engine import quaternion_from_rotation as quaternion_from_rotation
 from ._engine import rotation_from_quaternion as rotation_from_quaternion
 from ._engine import stumpff as stumpff
+
+
+def cross3(a: Array, b: Array) -> Array:
+    """Return a × b: `np.cross` takes ten times as long for two vectors."""
+    (a1, a2, a3), (b1, b2, b3) = a.tolist(), b.tolist()
+    return np.array([a2 * b3 - a3 * b2, a3 * b1 - a1 * b3, a1 * b2 - a2 * b1])

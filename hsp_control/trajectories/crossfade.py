@@ -275,8 +275,7 @@ class _ChangeOfStreams:
         given = {"before": self._before, "after": self._after, "out": out}
         kind: Any = engine.Crossfade
         self._coefficients = np.zeros((6, 3))
-        self._turns = isinstance(part, CrossfadeOrientation)
-        if self._turns:
+        if isinstance(part, CrossfadeOrientation):
             kind = engine.CrossfadeOrientation
             given["coefficients"] = self._coefficients
         self._known = False  # whether these are: in the change, and not before
