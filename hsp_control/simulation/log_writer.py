@@ -2,6 +2,7 @@
 
 import platform
 from collections.abc import Mapping
+from functools import cache
 from importlib.metadata import version
 from pathlib import Path
 from typing import Any
@@ -412,12 +413,13 @@ def continuous_dofs(robot: Robot) -> list[int]:
 
 def versions() -> dict[str, str]:
     """Return the versions of the packages that a run depends on."""
-    packages = ("pin", "numpy", "scipy")
-    return {
-        "hsp_control": __version__,
-        "python": platform.python_version(),
-        **{package: version(package) for package in packages},
-    }
+    python = {"hsp_control": __version__, "python": platform.python_version()}
+    return python | _installed()
+
+
+@cache  # reading a package's metadata takes milliseconds
+def _installed() -> dict[str, str]:
+    return {package: version(package) for package in ("pin", "numpy", "scipy")}
 
 
 def _skeleton(

@@ -9,6 +9,7 @@ Pinocchio and the short form of the law. Nothing is shared but the paper.
 import numpy as np
 import planar_arm as arm
 import pytest
+from places import further
 from planar_arm import A, PlanarSimulation, simulate_paper
 
 from hsp_control import (
@@ -62,7 +63,7 @@ def agree(found: Array, expected: Array, tolerance: float) -> None:
     )
 
 
-@pytest.mark.parametrize("number", NUMBERS)
+@pytest.mark.parametrize("number", [1, 2, 3, *further(4)])
 def test_whole_trajectories(number: int, runs: dict[int, Rollout]) -> None:
     """θ and det(JJᵀ) to 1e-9, rates, accelerations and torques to 1e-8 of the largest.
 

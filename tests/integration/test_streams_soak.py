@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 import pinocchio as pin
 import pytest
+from places import further
 
 import hsp_control as hsp
 from hsp_control.trajectories.streams import inbox
@@ -23,7 +24,9 @@ PERIOD = 5e-3
 EACH = 200  # targets in a part of the run, of 1 s
 
 
-@pytest.mark.parametrize("policy", ["latest", "interpolate", "extrapolate", "twists"])
+@pytest.mark.parametrize(
+    "policy", ["interpolate", "twists", *further("latest", "extrapolate")]
+)
 def test_targets_are_forgotten(policy: Any, monkeypatch: pytest.MonkeyPatch) -> None:
     """What may wait and be recorded is bounded, and full after the first part."""
     monkeypatch.setattr(inbox, "CAPACITY", 64)

@@ -3,6 +3,7 @@
 import os
 from importlib.util import find_spec
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -10,6 +11,15 @@ ROOT = Path(__file__).resolve().parents[2]
 
 THOROUGH = os.environ.get("HSP_THOROUGH") == "1"
 """Whether more seeds are tried, and all pages drawn: `make thorough`."""
+
+
+def further(*cases: Any) -> tuple[Any, ...]:
+    """Return cases that show what others do as well, for `make thorough`; else none."""
+    return cases if THOROUGH else ()
+
+
+IF_THOROUGH = pytest.mark.skipif(not THOROUGH, reason="only in make thorough")
+"""Of a test that shows what others do as well, and takes long."""
 
 ON_MUJOCO = pytest.mark.skipif(
     find_spec("hsp_control.companions.mujoco") is None, reason="of another companion"

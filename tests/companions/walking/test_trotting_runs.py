@@ -5,6 +5,7 @@ from functools import cache
 
 import numpy as np
 import pytest
+from places import IF_THOROUGH
 from ramps import ramp
 
 from hsp_control import Experiment, Rollout, Stream, TargetPosture, load_experiment
@@ -47,6 +48,7 @@ def test_it_returns_to_its_line_after_a_push():
     assert np.ptp(run.q[fast, 0]) == pytest.approx(0.3, abs=0.05)
 
 
+@IF_THOROUGH
 def test_down_a_ramp_a_foot_bears_while_the_other_one_still_looks_for_ground():
     """A hind foot on the platform, the diagonal one above ground that is not there."""
     until = "plan.until=2", "simulation.duration=4"

@@ -7,7 +7,7 @@ from math import radians, tan
 import numpy as np
 import pytest
 import yaml
-from places import ROOT
+from places import IF_THOROUGH, ROOT
 from ramps import ramp
 
 from hsp_control import Rollout, load_experiment
@@ -55,6 +55,7 @@ def test_it_walks_and_stands_again():
     assert np.sqrt((error**2).sum(axis=1).mean()) < 0.01
 
 
+@IF_THOROUGH
 def test_it_walks_down_a_ramp_of_which_it_does_not_know():
     """Of -5 degrees, from a platform: the soles lie on it, the mass stays above it."""
     run = load_experiment("walking/talos_walk", *ramp(5.0, 0.3)).run()

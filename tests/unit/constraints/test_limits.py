@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 import pytest
 from controller_cases import panda
+from places import further
 
 from hsp_control import Hold, Limits, Obstacle, Robot, Sphere
 from hsp_control.common.arrays import Array
@@ -274,7 +275,7 @@ def test_distance_rows_are_its_second_derivative(kind: str) -> None:
         np.testing.assert_allclose(b, least[chosen], rtol=0, atol=2e-2)
 
 
-@pytest.mark.parametrize("name", ["panda", "kinova", "solo12"])
+@pytest.mark.parametrize("name", ["panda", "kinova", *further("solo12")])
 def test_the_rows_are_those_of_single_pairs(name: str) -> None:
     """Also where q is no vector, and where Coal computes a distance (the cloud)."""
     robot, rng = Robot.load(name), np.random.default_rng(4)

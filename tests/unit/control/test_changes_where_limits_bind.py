@@ -10,7 +10,7 @@ import pytest
 from compensators import only
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
-from places import THOROUGH
+from places import THOROUGH, further
 
 import hsp_control as hsp
 from hsp_control.common.arrays import Array
@@ -18,8 +18,8 @@ from hsp_control.control.actuation import Status, actuation
 from hsp_control.control.compensation import CompensatedController, FrictionFeedForward
 from hsp_control.trajectories import HoldOrientation, Schedule
 
-# One of each kind: with 1, 4 and 3 joints more than the hand has directions.
-ROBOTS = ["planar3r", "panda", "ur5", *(("iiwa14", "xarm7") if THOROUGH else ())]
+# With 4 joints more than the hand has directions; with 1, 3, 4 and 4.
+ROBOTS = ["panda", *further("planar3r", "ur5", "iiwa14", "xarm7")]
 START, RAMP = 0.2, 0.3
 EVENTS = (START, START + 0.1, START + RAMP - 0.1, START + RAMP)
 """When something begins or ends, of the changes below [s]."""

@@ -9,6 +9,7 @@ import pytest
 from controller_cases import panda
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
+from places import THOROUGH
 from runs import held
 from static_rows import static_rows
 
@@ -64,7 +65,7 @@ def inverse_cost(law: BoundLaw, held: Array) -> Array:
 @pytest.mark.parametrize("threshold", [1e-3, 0.2, 0.5, 0.999, 1.0, 5.0])
 @pytest.mark.parametrize("metric", METRICS)
 @given(seeds)
-@settings(max_examples=10)
+@settings(max_examples=30 if THOROUGH else 3)
 def test_levels_share_directions_as_the_law_does(
     metric: str, threshold: float, levels: int, seed: int
 ) -> None:

@@ -30,9 +30,15 @@ extern "C" auto hsp_kinds_1() { return hsp::kinds<Doubled>(); }
 """
 
 
+@pytest.fixture(scope="module")
+def cache(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Return where libraries are kept: each takes seconds to compile."""
+    return tmp_path_factory.mktemp("cache")
+
+
 @pytest.fixture
-def source(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
+def source(tmp_path: Path, cache: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    monkeypatch.setenv("XDG_CACHE_HOME", str(cache))
     file = tmp_path / "doubled.cpp"
     file.write_text(SOURCE)
     return file
@@ -51,7 +57,7 @@ def test_a_file_is_compiled_once_and_used(
         kinds.Doubled(x=x, y=np.zeros(2))
     monkeypatch.setenv("CXX", "false")  # what is compiled is kept
     assert own_kinds.load(source) is kinds
-    source.write_text(SOURCE.replace("2.0 * x", "3.0 * x"))
+    source.write_text(SOURCE.replace("2.0 * x", "4.0 * x"))
     with pytest.raises(EngineError, match=r"doubled\.cpp does not compile"):
         own_kinds.load(source)
 
@@ -177,6 +183,7 @@ def test_zig_compiles_for_any_processor_as_the_engine_does(
 def test_no_file_and_no_compiler(source: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     with pytest.raises(EngineError, match="there is no file"):
         own_kinds.load(source.with_name("nowhere.cpp"))
+    source.write_text(SOURCE.replace("2.0 * x", "5.0 * x"))
     monkeypatch.setenv("CXX", "/nowhere/c++")
     with pytest.raises(EngineError, match=r"compiler does not start: .*/nowhere/c\+\+"):
         own_kinds.load(source)

@@ -11,6 +11,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 from odd_robots import collision, odd_robot
+from places import THOROUGH
 
 from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import ModelError
@@ -27,7 +28,7 @@ def volume(first: Array, second: Array, radius: float) -> float:
 
 
 @pytest.mark.slow
-@settings(max_examples=40)
+@settings(max_examples=40 if THOROUGH else 12)
 @given(
     cloud=st.integers(1, 12).flatmap(
         lambda k: arrays(float, (k, 3), elements=st.integers(-8, 8).map(float))

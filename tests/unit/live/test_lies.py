@@ -10,7 +10,7 @@ import pinocchio as pin
 import pytest
 from lies import LIES, THE_SIGN, Lie, Sensors
 from live_rigs import PERIOD, Rig, panda, start, watched
-from places import THOROUGH
+from places import THOROUGH, further
 
 import hsp_control as hsp
 from hsp_control.common.arrays import Array
@@ -282,7 +282,7 @@ class Noisy(Rig):
 
 @pytest.mark.parametrize("noise", [0.0, 0.05])
 @pytest.mark.parametrize(("delay", "frequency"), [(0.0, np.inf), (0.005, 20.0)])
-@pytest.mark.parametrize("encoder", [0.0, 1.5e-3])
+@pytest.mark.parametrize("encoder", [1.5e-3, *further(0.0)])
 def test_what_real_sensors_do_is_no_lie(
     noise: float, delay: float, frequency: float, encoder: float
 ) -> None:
@@ -294,7 +294,7 @@ def test_what_real_sensors_do_is_no_lie(
     assert report.ended == "completed", report.reason
 
 
-PERIODS = [0.001, 0.002, 0.005, 0.01] if THOROUGH else [0.001, 0.01]
+PERIODS = [0.001, *further(0.002, 0.005, 0.01)]
 
 
 @pytest.mark.parametrize("period", PERIODS)

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 from compensators import ALONE
+from places import further
 from wrong_arms import ARMS, H, WrongArm, holding, posture
 
 import hsp_control as hsp
@@ -41,7 +42,7 @@ def growth(
     return float(error[-part:].max() / error[part : 2 * part].max())
 
 
-@pytest.mark.parametrize("name", ["panda", "iiwa14", "xarm7"])
+@pytest.mark.parametrize("name", ["panda", *further("iiwa14", "xarm7")])
 def test_rotors_that_are_told_are_borne_and_larger_ones_are_not(name: str) -> None:
     found, made, q = borne(name, Compensation())
     for times, grows in ((0.6, False), (1.6, True)):
@@ -52,7 +53,7 @@ def test_rotors_that_are_told_are_borne_and_larger_ones_are_not(name: str) -> No
     assert more.rotor > 5.0 * min(found.rotor, 0.1)
 
 
-@pytest.mark.parametrize("name", ["panda", "ur5"])
+@pytest.mark.parametrize("name", ["panda", *further("ur5")])
 def test_a_delay_that_is_told_is_borne_and_a_longer_one_is_not(name: str) -> None:
     found, made, q = borne(name, Compensation())
     periods = round(found.delay / H)
@@ -90,7 +91,7 @@ class Pushed(RigidBodyPlant):
         return super().acceleration(t, q, v, tau + self.push)
 
 
-@pytest.mark.parametrize("joint", [0, 3, 5])
+@pytest.mark.parametrize("joint", [3, *further(0, 5)])
 def test_an_unknown_effort_moves_the_hand_as_far_as_is_told(joint: int) -> None:
     """A hundredth of what is told for 1 N·m, where the arm is linear."""
     small = 0.01
