@@ -10,6 +10,7 @@ import browsers
 import numpy as np
 import pytest
 from browsers import until
+from places import IF_THOROUGH
 from played import Played
 
 import hsp_control as hsp
@@ -70,6 +71,7 @@ def dragged(page: Any, start: list[float], by: list[float], steps: int = 5) -> N
         page.mouse.move(start[0] + by[0] * k / steps, start[1] + by[1] * k / steps)
 
 
+@IF_THOROUGH
 def test_hand_ball_and_elbow(browser: Any, played: Played, tmp_path: Path) -> None:
     """The hand comes within a millimetre of its target; the elbow ducks the ball."""
     page, wrong = browsers.opened(browser, played.url, **SMALL)
