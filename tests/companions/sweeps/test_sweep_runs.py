@@ -18,6 +18,7 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
 from distributed import Client
+from places import IF_THOROUGH
 from sweep_runs import MOVING, OVER, QUICK
 
 import hsp_control as hsp
@@ -233,6 +234,7 @@ def finish(out: Path, kept: Sweep, whole: Sweep, scheduler: str) -> None:
 
 @pytest.mark.process
 @pytest.mark.slow
+@IF_THOROUGH
 def test_a_killed_sweep_goes_on_where_it_was(
     tmp_path: Path, whole: Sweep, scheduler: str
 ) -> None:
@@ -308,6 +310,7 @@ def running(word: str, parent: psutil.Process) -> list[psutil.Process]:
 
 @pytest.mark.process
 @pytest.mark.slow
+@IF_THOROUGH
 def test_a_killed_worker_is_replaced(whole: Sweep) -> None:
     killed: list[int] = []
 
