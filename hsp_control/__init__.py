@@ -12,8 +12,10 @@ The names that most programs need are here. All others are in namespaces:
 has one: ``hsp.viewer``, ``hsp.plots``, ``hsp.walking``, ``hsp.sweeps`` ...
 """
 
+import gc
 from importlib import import_module
 from pathlib import Path
+from types import ModuleType
 from typing import TYPE_CHECKING, Any
 
 from hsp_control.common.version import __version__ as __version__
@@ -146,17 +148,28 @@ __all__ = ["__version__", *_HOMES, *_NAMESPACES]
 def __getattr__(name: str) -> Any:
     """Return a public name or namespace, imported at its first use (PEP 562)."""
     if name in _NAMESPACES:
-        value: Any = import_module(f"{__name__}.{_NAMESPACES[name]}")
+        value: Any = _room(_NAMESPACES[name])
     elif name in _HOMES:
-        value = getattr(import_module(f"{__name__}.{_HOMES[name]}"), name)
+        value = getattr(_room(_HOMES[name]), name)
     elif name in _companions():
-        value = import_module(f"{__name__}.companions.{name}")
+        value = _room(f"companions.{name}")
     else:
         raise AttributeError(
             f"module {__name__!r} has no attribute {name!r}{_hint(name)}"
         )
     globals()[name] = value
     return value
+
+
+def _room(name: str) -> ModuleType:
+    """Import a room without collecting garbage: what imports make is none."""
+    collecting = gc.isenabled()
+    gc.disable()
+    try:
+        return import_module(f"{__name__}.{name}")
+    finally:
+        if collecting:
+            gc.enable()
 
 
 def _hint(name: str) -> str:

@@ -163,8 +163,7 @@ class RobotModel(Structure):
     @cached_property
     def typical_inertia(self) -> float:
         """Geometric mean of the joints' largest inertias [kg·m²], nearly."""
-        joints = np.setdiff1d(np.arange(self.nv), self.unactuated)
-        inertias = self.largest_inertias[joints]
+        inertias = np.delete(self.largest_inertias, list(self.unactuated))
         inertias = inertias[inertias > 0.0]
         return float(np.exp(np.log(inertias).mean())) if inertias.size else 1.0
 

@@ -420,7 +420,7 @@ class Actuation:
         some = np.zeros(nv, dtype=bool)
         if limits is not None:
             some = np.isfinite(limits.effort) | np.isfinite(limits.effort_rate)
-        motors = np.setdiff1d(np.arange(nv), self._support.base)
+        motors = np.delete(np.arange(nv), self._support.base)
         capacity = 1 << (count - 1).bit_length() if count else 0
         permitted = None
         if limits is not None and not self._support.base.size:
