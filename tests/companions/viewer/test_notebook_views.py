@@ -57,6 +57,7 @@ class Notebook:
         self.views = self.page.frames[1:]
         for view in self.views:
             until(view, "document.body.dataset.ready === 'yes'")
+            browsers.draw_lightly(view)
 
     def _on_console(self, message: Any) -> None:
         if message.type in {"error", "warning"} and HARMLESS not in message.text:
