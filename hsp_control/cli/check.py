@@ -191,7 +191,7 @@ _LIMITS = {
     "redistributed": "shift contact forces at the start",
     "limited": "bind at the start: the law is not exact there",
     "relaxed": "contradict each other at the start",
-    "beyond": "are not kept at the start: a joint is beyond its range or its speed",
+    "beyond": "are violated at the start: a joint is beyond its range or its speed",
 }
 """The step's status in words, of its limits."""
 
@@ -276,7 +276,7 @@ def start_advice(experiment: Experiment, damped: str = "") -> Iterator[str]:
     try:
         found = search.rounded(search.find(null_space.singularity_threshold))
     except ConfigurationError as error:
-        yield f"No better start is known: {error}."
+        yield f"No better start was found: {error}."
         return
     yield (
         "A better start (smallest singular value of the tasks "

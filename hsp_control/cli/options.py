@@ -101,7 +101,7 @@ def command_line() -> argparse.ArgumentParser:
     which.add_argument("--json", action="store_true", help="print JSON")
 
     _add(commands, added, 1)
-    doctor = _command(commands, "doctor", "say what this machine lacks")
+    doctor = _command(commands, "doctor", "report what this machine lacks")
     doctor.add_argument("--json", action="store_true", help="print JSON")
     _command(commands, "schema", "print the JSON Schema of a configuration")
     return parser
@@ -141,7 +141,7 @@ def add_live(live: argparse.ArgumentParser) -> None:
     live.add_argument(
         "--publish",
         metavar="NAME://ADDRESS",
-        help="tell the state: udp://HOST:PORT to a policy, ros2://NAME to watchers",
+        help="publish the state: udp://HOST:PORT to a policy, ros2://NAME to ROS 2",
     )
     live.add_argument(
         "--cameras",
@@ -184,7 +184,7 @@ def add_freeze(freeze: argparse.ArgumentParser) -> None:
         "--payload",
         action="append",
         metavar="FRAME",
-        help="a frame that may carry something (by default those of the tasks)",
+        help="a frame that may carry a payload; default: those of the tasks",
     )
     where = freeze.add_mutually_exclusive_group()
     for name, what in (
@@ -232,7 +232,7 @@ def add_strict(parser: argparse.ArgumentParser) -> None:
         "--strict",
         action="store_true",
         help="for untrusted files: read only files beside them and bundled ones, and "
-        "admit only our own types",
+        "accept only types of this package",
     )
     parser.add_argument(
         "--allow",
@@ -240,8 +240,8 @@ def add_strict(parser: argparse.ArgumentParser) -> None:
         default=[],
         type=Path,
         metavar="DIR|PACKAGE",
-        help="another folder to read from, or a package to admit types of; means "
-        "--strict; may be repeated",
+        help="another folder to read from, or a package whose types are accepted; "
+        "implies --strict; may be repeated",
     )
 
 
@@ -253,8 +253,9 @@ def add_import(parser: argparse.ArgumentParser) -> None:
         default=[],
         dest="imports",
         metavar="FILE.py|MODULE",
-        help="import this Python code first, whose functions and types a configuration "
-        "may name: it may do anything, so none with --strict; may be repeated",
+        help="import this Python code first, whose functions and types a "
+        "configuration may name: it may do anything, so not with --strict; may "
+        "be repeated",
     )
 
 

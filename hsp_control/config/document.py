@@ -151,7 +151,9 @@ class Document:
         The value is YAML. Keys with a dot need quotes: ``frames.'a.b'.parent=x``.
         """
         if not isinstance(assignment, str):
-            raise ConfigError(f"{shown(assignment)} is no text like 'key.path=value'")
+            raise ConfigError(
+                f"{shown(assignment)} is not text such as 'key.path=value'"
+            )
         words = " ".join(assignment.split())
         origin = shortened(spoken(f"--set {words}", repr(words)), _LONGEST_ORIGIN)
         try:
@@ -277,13 +279,13 @@ def _read(source: str | PathLike[str] | dict[str, Any], strict: bool) -> Documen
             )
         if lost := run.meta.get("changes_lost"):
             raise ConfigError(
-                f"{path}: the run cannot be repeated, because changes were made while "
-                f"it ran that are not data: {lost}"
+                f"{path}: the run cannot be repeated, because some changes during it "
+                f"cannot be written as data: {lost}"
             )
         if lost := run.meta.get("streams_lost"):
             raise ConfigError(
                 f"{path}: the run cannot be repeated, because {lost} messages of its "
-                "streams were too many to be recorded"
+                "streams were not recorded: there were too many"
             )
         _check_heard(path, run)
         made = run.meta.get("changes") or []
@@ -322,6 +324,6 @@ def _check_heard(path: Path, run: Rollout) -> None:
             if taken > len(messages):
                 raise ConfigError(
                     f"{path}: the run cannot be repeated: a stream of task {name!r} "
-                    f"took {taken:.0f} messages, and the log holds {len(messages)} of "
-                    "them, because it has no end"
+                    f"used {taken:.0f} messages, and the log contains {len(messages)} "
+                    "of them, because its writer was killed"
                 )

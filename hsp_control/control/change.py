@@ -198,7 +198,7 @@ class ExchangeField(Change, type="exchange_field"):
         """Return the setup with the other field; see `Change.apply`."""
         k = _find_field(setup, self.field)
         if not self.by.controls:
-            raise ControllerError("an uncontrolled null space replaces no other field")
+            raise ControllerError("an uncontrolled null space cannot replace a field")
         new = replace(self.by, weight=setup.terms[k].field.weight)
         return _with_field(setup, k, new, self)
 

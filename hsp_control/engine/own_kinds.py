@@ -116,7 +116,7 @@ def load(file: str | os.PathLike[str]) -> SimpleNamespace:
         try:
             kinds = load_library(str(path))
         except RuntimeError as error:
-            raise EngineError(f"{path.name} brings no kinds: {error}") from None
+            raise EngineError(f"{path.name} declares no kinds: {error}") from None
         _LOADED[path] = SimpleNamespace(**{kind.name: kind for kind in kinds})
     return _LOADED[path]
 

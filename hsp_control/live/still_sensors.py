@@ -111,9 +111,9 @@ class StillSensors:
     def why(self, i: int) -> str:
         """Return why the sensor of a dead joint is dead."""
         if self._alive[i] > _ALIVE:
-            return "its sensor had noise, and has none any more; it is dead"
+            return "its sensor's noise has vanished; it is dead"
         if self._reaction.felt:
-            return "the other joints feel it move; its sensor is dead"
+            return "the other joints show that it moves; its sensor is dead"
         return (
             f"its effort is {self.beyond[i]:.3g} {_EFFORT[self._robot.units[i]]} "
             "beyond what holds it; its sensor is dead, or it is blocked"

@@ -308,27 +308,30 @@ class TrustedMotion:
         name, unit = self._robot.dof_names[i], self._robot.units[i]
         if self._check.dead[i]:
             return (
-                f"{name} stands from one state to the next, where the model expects "
-                f"{self._expected.v[2, i]:.3g} {unit}/s: its sensor is dead"
+                f"{name} does not move from one state to the next, where the model "
+                f"expects {self._expected.v[2, i]:.3g} {unit}/s: its sensor is dead"
             )
         if self._sensors.dead[i]:
-            return f"the state of {name} stands to the last bit: {self._sensors.why(i)}"
+            return (
+                f"the state of {name} stays the same to the last bit: "
+                f"{self._sensors.why(i)}"
+            )
         if self._contrary[i]:
             return (
-                f"{name} goes the other way than its effort drives it: its sensor or "
-                "its motor has the wrong sign"
+                f"{name} moves against its effort: its sensor or its motor has the "
+                "wrong sign"
             )
         if self._pushed[i]:
             return (
                 f"{name} is pushed by {self._momentum.rest[i]:.3g} {_EFFORT[unit]} "
-                "beside its effort: it has met something hard, or its sensors are "
+                "beside its effort: it has hit something hard, or its sensors are "
                 "wrong"
             )
         if runs:
             return (
                 f"{name} is braked, and moves at {v[i]:.3g} {unit}/s where "
-                f"{self._expected.v[2, i]:.3g} {unit}/s are expected: its efforts do "
-                "not what they should"
+                f"{self._expected.v[2, i]:.3g} {unit}/s are expected: its motor does "
+                "not follow the efforts"
             )
         return (
             f"the velocity of {name} contradicts its positions: {v[i]:.3g} {unit}/s "

@@ -270,7 +270,7 @@ def serve(
             done = robot.done
             if robot.t > t:
                 rows, on_rows = on_rows, ()
-                with _halting(robot, "its period cannot be told"):
+                with _halting(robot, "its period cannot be reported"):
                     for on_row in rows:
                         on_row(t, q, v, done)
                     on_rows = rows

@@ -154,15 +154,16 @@ def _check_joint(
 
 def _rest(s: float, u: float) -> TrajectoryError:
     return TrajectoryError(
-        f"at s = {s:.3f} along the path its own motion rests (at {u:.4g} s): no speed "
-        "but 0 passes it; give a path that does not stop there"
+        f"at s = {s:.3f} along the path its own motion stops (at {u:.4g} s): it can "
+        "only be passed at rest; give a path that does not stop there"
     )
 
 
 def _corner(s: float, u: float) -> TrajectoryError:
     return TrajectoryError(
-        f"at s = {s:.3f} along the path (its own time is {u:.4g} s) it has a corner or "
-        "turns back: no speed but 0 passes it; round it, or end the path there"
+        f"at s = {s:.3f} along the path (its own time is {u:.4g} s) it has a corner "
+        "or turns back: it can only be passed at rest; round it, or end the path "
+        "there"
     )
 
 

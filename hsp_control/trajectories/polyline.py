@@ -104,13 +104,13 @@ def _check(angles: Array, cut: Array, lengths: Array) -> None:
     for i, angle in enumerate(angles):
         if angle > BACK:
             raise TrajectoryError(
-                f"the path turns back at waypoint {i}: no speed but 0 passes it; use "
-                "stops, or a waypoint beside it"
+                f"the path turns back at waypoint {i}: it can only be passed at rest; "
+                "use stops, or a waypoint beside it"
             )
         if angle > STRAIGHT and not cut[i] > 0.0:
             raise TrajectoryError(
-                f"waypoint {i} is a corner of {np.degrees(angle):.3g} degrees: no "
-                "speed but 0 passes it; give blend_radius, or use stops"
+                f"waypoint {i} is a corner of {np.degrees(angle):.3g} degrees: it can "
+                "only be passed at rest; give blend_radius, or use stops"
             )
     for i, length in enumerate(lengths):
         if cut[i] + cut[i + 1] > length * (1.0 + 1e-12):

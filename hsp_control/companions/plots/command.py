@@ -1,4 +1,4 @@
-"""``hsp plot`` and its options; what is slow is imported when it runs."""
+"""``hsp plot`` and its options; slow modules are imported when it runs."""
 
 import argparse
 import re

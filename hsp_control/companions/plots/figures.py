@@ -309,7 +309,9 @@ def _chosen_panels(runs: Sequence[Rollout], panels: Sequence[str]) -> list[str]:
             near = f"{did_you_mean(name, PANELS)} (there are {listing(PANELS)})"
             raise PlotError(f"no panel {name!r}{near}")
         if not can.get(name, True):
-            raise PlotError(f"there are no {name} to draw, or none that compare")
+            raise PlotError(
+                f"the logs have no {name} to draw, or none that can be compared"
+            )
     usual = [name for name in PANELS if name not in ("joints", "speeds")]
     return [*dict.fromkeys(panels)] or [name for name in usual if can.get(name, True)]
 

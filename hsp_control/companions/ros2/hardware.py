@@ -124,7 +124,7 @@ class Ros2Hardware:
             HardwareError: If nobody listens to the commands any more.
         """
         if self._publisher.matched == 0:
-            raise HardwareError(f"nobody listens to {self.commands} any more")
+            raise HardwareError(f"no subscriber of {self.commands} is left")
         data = effort[self._order].tolist()
         self._publisher.send(Float64MultiArray(MultiArrayLayout(), data))
 

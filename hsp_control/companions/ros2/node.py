@@ -104,7 +104,7 @@ class _End(Generic[M]):
     def _user_data(self) -> Policy.Userdata:
         return Policy.Userdata(f"typehash=RIHS01_{TYPE_HASHES[self.kind]};".encode())
 
-    def _others(self, builtin: BuiltinTopic, verb: str) -> str:
+    def _others(self, builtin: BuiltinTopic, end: str) -> str:
         """Return which endpoints there are instead of one that fits."""
         reader = BuiltinDataReader(self._participant, builtin)
         there = {
@@ -123,7 +123,7 @@ class _End(Generic[M]):
             )
         same = sorted(name[2:] for name, kind in there if kind == needed)
         return (
-            f"nobody {verb} {self.topic} in domain {self._participant.get_domain_id()} "
+            f"no {end} of {self.topic} in domain {self._participant.get_domain_id()} "
             f"(topics with {ros_name(needed)}: {listing(same) if same else 'none'})"
         )
 
@@ -158,7 +158,7 @@ class TopicPublisher(_End[M]):
 
     def why_none(self) -> str:
         """Return why nobody receives it, as far as can be seen."""
-        return self._others(BuiltinTopicDcpsSubscription, "listens to")
+        return self._others(BuiltinTopicDcpsSubscription, "subscriber")
 
 
 class Subscription(_End[M]):
@@ -195,7 +195,7 @@ class Subscription(_End[M]):
 
     def why_none(self) -> str:
         """Return why it receives nobody, as far as can be seen."""
-        return self._others(BuiltinTopicDcpsPublication, "publishes")
+        return self._others(BuiltinTopicDcpsPublication, "publisher")
 
     def wait(self, timeout: float) -> bool:
         """Wait until something is there to be taken; return whether it is."""

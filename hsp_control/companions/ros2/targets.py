@@ -39,7 +39,10 @@ def check_address(source: str) -> TopicAddress:
             f"source is {source!r}: type is {kind!r}; needs pose or twist"
         )
     if kind == "pose" and "tool" in address.options:
-        raise StreamError(f"source is {source!r}: poses are in no tool's axes")
+        raise StreamError(
+            f"source is {source!r}: a tool is only for type=twist; poses are in the "
+            "stream's frame"
+        )
     return address
 
 
@@ -110,7 +113,7 @@ def _said(
 def _check_frame(what: str, named: str, known: list[str]) -> None:
     if named and named not in known:
         needed = " or ".join(map(repr, known))
-        raise StreamError(f"{what} is in the frame {named!r:.40}; needs {needed}")
+        raise StreamError(f"{what} is in frame {named!r:.40}; needs {needed}")
 
 
 def _numbers(linear: list[float], angular: list[float], space: Space) -> list[float]:

@@ -143,7 +143,7 @@ class Luggage(WorkerPlugin):  # type: ignore[misc]
         experiment = build(changed(self._base, changes))
         if self.model and fingerprint(experiment.robot) != self.model:
             raise SweepError(
-                f"{experiment.robot.name} has another model on the computer of a worker"
+                f"{experiment.robot.name} has a different model on a worker's computer"
             )
         return experiment
 
@@ -214,8 +214,8 @@ def _declaring(named: set[str], imported: Sequence[str]) -> Iterator[Path]:
         file = getattr(sys.modules.get(module), "__file__", None)
         if file is None:
             raise SweepError(
-                f"{part.__name__} is declared where no file is, so that no worker can "
-                "know it; put it into a file, and import that"
+                f"{part.__name__} is not declared in a file, so that workers cannot "
+                "import it; move it into a file, and import that"
             )
         yield Path(file).resolve()
 

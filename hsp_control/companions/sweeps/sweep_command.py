@@ -76,8 +76,7 @@ def sweep(options: argparse.Namespace) -> int:
     if not swept.complete:
         left = swept.meta["runs"] - len(swept)
         print(
-            f"hsp: stopped by the user, {left} runs are left; the same command "
-            "continues",
+            f"hsp: stopped by the user, {left} runs are left; the same command resumes",
             file=sys.stderr,
         )
         return INTERRUPTED

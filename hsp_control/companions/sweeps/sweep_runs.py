@@ -258,7 +258,9 @@ def _row(future: Any, result: Any) -> "Row":
         row: Row = result
         return row
     if future.status in ("cancelled", "lost"):
-        raise SweepError("the scheduler is gone; the same command continues")
+        raise SweepError(
+            "the scheduler does not answer any more; the same command resumes the sweep"
+        )
     _, error, _ = result
     if isinstance(error, KilledWorker):
         died = error.allowed_failures + 1

@@ -53,8 +53,8 @@ class Foot(Switched):
             and isinstance(pose.orientation, FedOrientation)
         ):
             raise PlanError(
-                f"the foot {name!r} does not follow the plan: make the controller of "
-                "the plan's parts"
+                f"the foot {name!r} does not follow the plan: build the controller "
+                "from the plan's parts"
             )
         self.frame, self.normal = contact.frame, contact.axes[:, 2]
         self.contact, self.task = contact.schedule, task.schedule

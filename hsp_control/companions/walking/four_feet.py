@@ -66,8 +66,8 @@ class PointFoot(Switched):
             and isinstance(task.followed, Fed)
         ):
             raise PlanError(
-                f"the foot {name!r} does not follow the plan: make the controller of "
-                "the plan's parts"
+                f"the foot {name!r} does not follow the plan: build the controller "
+                "from the plan's parts"
             )
         self.frame, self.normal = contact.frame, contact.axes[:, 2]
         self.reach = np.inf
@@ -125,7 +125,7 @@ class RunningQuadruped(RunningPlan):
         ):
             raise PlanError(
                 "the tasks 'trunk', 'height' and 'center_of_mass' do not follow the "
-                "plan: make the controller of the plan's parts"
+                "plan: build the controller from the plan's parts"
             )
         self._trunk, self._height, self._body = trunk, height, body
         self._trunk_frame: str = tasks["trunk"].frame  # type: ignore[attr-defined]

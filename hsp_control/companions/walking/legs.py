@@ -12,7 +12,7 @@ def root_frame(robot: Robot) -> str:
     for frame in robot.model.frames:
         if frame.parentJoint == 1 and frame.type == pin.FrameType.BODY:
             return str(frame.name)
-    raise PlanError(f"{robot.name} has no body at its root")
+    raise PlanError(f"{robot.name} has no link at its root")
 
 
 def leg_joints(robot: Robot, foot: str) -> list[int]:

@@ -45,11 +45,12 @@ class Fed(Written, Trajectory):
     def anchored(self, start: ArrayLike | None) -> Self:
         """Return the reference itself, at rest where the robot starts."""
         if start is None:
-            raise TrajectoryError("a fed reference is missing: nothing starts here")
+            raise TrajectoryError("the reference of a plan needs a start")
         where = np.asarray(start, dtype=float)
         if where.shape != (self.size,):
             raise TrajectoryError(
-                f"the fed reference has {self.size} coordinates; needs {where.size}"
+                f"the reference of the plan has {self.size} coordinates; needs "
+                f"{where.size}"
             )
         if self.relative:
             self.write(0.0, where)

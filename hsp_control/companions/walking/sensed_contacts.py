@@ -124,7 +124,7 @@ class Sensed(MotionPlan, type="sensed"):
                 if there[name].schedule is not None:
                     raise PlanError(
                         "the contact has a schedule, but the plan switches it; give "
-                        "only one, or the intervals as wanted"
+                        "only one of them"
                     )
                 if rule.task is None:
                     continue
@@ -138,7 +138,7 @@ class Sensed(MotionPlan, type="sensed"):
                     if known[rule.task].schedule is not None or rule.task in moves:
                         raise PlanError(
                             f"{rule.task!r} has a schedule, or moves two contacts; it "
-                            "is in force while the contact is not active"
+                            "must be active while the contact is not"
                         )
                 moves[rule.task] = rule
         return PlanParts(
@@ -189,8 +189,8 @@ class FeltContact(Switched):
             or not (task is None or isinstance(task.schedule, Switch))
         ):
             raise PlanError(
-                f"the contact {name!r} does not follow the plan: make the controller "
-                "of the plan's parts"
+                f"the contact {name!r} does not follow the plan: build the controller "
+                "from the plan's parts"
             )
         self.frame: str = contact.frame
         self._normal: Array = contact.axes[:, 2]

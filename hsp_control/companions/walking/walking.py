@@ -116,14 +116,14 @@ class RunningWalk(RunningPlan):
         missing = [name for name in (body, trunk, *feet) if name not in tasks]
         if missing:
             raise PlanError(
-                f"the controller has no task {missing[0]!r}: make it of the plan's "
+                f"the controller has no task {missing[0]!r}: build it from the plan's "
                 "parts"
             )
         moved, turned_by = tasks[body].followed, tasks[trunk].followed
         if not (isinstance(moved, Fed) and isinstance(turned_by, FedOrientation)):
             raise PlanError(
-                f"the tasks {body!r} and {trunk!r} do not follow the plan: make the "
-                "controller of the plan's parts"
+                f"the tasks {body!r} and {trunk!r} do not follow the plan: build the "
+                "controller from the plan's parts"
             )
         self._body, self._trunk = moved, turned_by
         self._trunk_frame: str = tasks[trunk].frame  # type: ignore[attr-defined]
@@ -157,11 +157,11 @@ class RunningWalk(RunningPlan):
             "plan.phase": LogChannel(
                 phase, "-", "0 stands; 1 on two feet; 2 left, 3 right foot swings"
             ),
-            "plan.steps": LogChannel(float(self._taken), "-", "steps that were taken"),
+            "plan.steps": LogChannel(float(self._taken), "-", "steps completed"),
             "plan.dcm": LogChannel(self._dcm, "m", "divergent component of motion"),
-            "plan.dcm_reference": LogChannel(self._dcm_wanted, "m", "what is wanted"),
+            "plan.dcm_reference": LogChannel(self._dcm_wanted, "m", "desired"),
             "plan.repellent_point": LogChannel(
-                self._point, "m", "where the feet are to push, within the soles"
+                self._point, "m", "desired centre of pressure, within the soles"
             ),
             "plan.footstep": LogChannel(
                 np.array(self._target), "m and rad", "where the swing foot lands"

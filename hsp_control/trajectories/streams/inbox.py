@@ -69,8 +69,8 @@ class Inbox:
         """Raise if another one sends, who was first; ``now`` is our own time [s]."""
         if sender != self._sender and now < self._until:
             raise StreamError(
-                f"{sender} sends while {self._sender} does, which was first and is "
-                f"accepted alone until it is silent for {_SILENCE:g} s"
+                f"{sender} is ignored: {self._sender} sent first, and is the only "
+                f"sender accepted until it has been silent for {_SILENCE:g} s"
             )
 
     def receive(self, sender: str, now: float, data: Mapping[str, Any]) -> None:
@@ -98,8 +98,8 @@ class Inbox:
         if -inf < self._until <= now:
             self._until = -inf
             self._say(
-                f"{self._sender} is silent for {_SILENCE:g} s; the reference rests "
-                "where its last message ends"
+                f"{self._sender} has been silent for {_SILENCE:g} s; the reference "
+                "rests where its last message ends"
             )
 
     def put(self, **data: Any) -> None:

@@ -110,7 +110,7 @@ def message_of(data: Any, space: Space) -> Message:
         axes = _axes(given, space)
         return Message(t, np.zeros(1), None, velocities, axes=axes)
     if "axes" in given:
-        raise StreamError("axes are those of a velocity that is sent without a value")
+        raise StreamError("axes are only for a velocity without a value; remove axes")
     if velocities is not None and len(velocities) != len(values):
         raise StreamError(
             f"there are {len(velocities)} velocities for {len(values)} values"

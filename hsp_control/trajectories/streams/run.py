@@ -103,8 +103,8 @@ class StreamRun:
     def _put(self, **message: Any) -> None:
         if self.stream.listens_to:
             raise StreamError(
-                f"this stream listens to {self.stream.listens_to}; only a stream "
-                "without source and messages can be sent to"
+                f"this stream receives from {self.stream.listens_to}; send needs a "
+                "stream without source and messages"
             )
         self._inbox.put(**message)
 

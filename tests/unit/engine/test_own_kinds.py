@@ -160,7 +160,7 @@ def test_a_kind_says_what_it_does(source: Path) -> None:
 
 def test_a_library_without_kinds_is_named(source: Path) -> None:
     source.write_text(SOURCE.replace("hsp_kinds_1", "hsp_kinds_0"))
-    with pytest.raises(EngineError, match="brings no kinds: it has no function hsp_k"):
+    with pytest.raises(EngineError, match="declares no kinds: it has no function"):
         own_kinds.load(source)
 
 

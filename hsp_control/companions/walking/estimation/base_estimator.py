@@ -124,8 +124,8 @@ class RunningBaseEstimator(RunningEstimator):
             )
         if not controller.contacts:
             raise EstimationError(
-                "there are no contacts, by which legs could say where the base is; "
-                "declare contacts, or remove the estimator"
+                "there are no contacts, from which the legs' kinematics could locate "
+                "the base; declare contacts, or remove the estimator"
             )
         there = {each.name: each for each in controller.contacts}
         still = [name for name, each in there.items() if not each.slides]
@@ -198,10 +198,12 @@ class RunningBaseEstimator(RunningEstimator):
                 R @ self._v[:3] - R_true @ v[:3], "m/s", "estimated minus true, world"
             ),
             "estimate.tilt_deviation": LogChannel(
-                np.sqrt(np.diag(P)[ROTATION][:2]), "rad", "what the filter expects"
+                np.sqrt(np.diag(P)[ROTATION][:2]),
+                "rad",
+                "standard deviation by the filter",
             ),
             "estimate.velocity_deviation": LogChannel(
-                np.sqrt(np.diag(P)[VELOCITY]), "m/s", "what the filter expects"
+                np.sqrt(np.diag(P)[VELOCITY]), "m/s", "standard deviation by the filter"
             ),
             "estimate.gyroscope_bias": LogChannel(
                 self.filter.gyroscope_bias, "rad/s", "estimated"
