@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     AnyTarget = PoseStamped | TwistStamped
 
 _POLL = 0.2
-"""How soon a listener notices that nobody needs it any more [s]."""
+"""Time until a listener notices that its stream is gone [s]."""
 _WORLD = "world"
 
 
@@ -52,7 +52,7 @@ def is_local(source: str) -> bool:
 
 
 def opened(source: str, space: Space) -> Callable[["ref[Inbox]"], None]:
-    """Join the domain of an address; return what listens to its topic."""
+    """Join the domain of an address; return the listener of its topic."""
     address = check_address(source)
     twists = address.options.get("type") == "twist"
     if space.linear not in {0, 3} or not space.width:
@@ -76,7 +76,7 @@ def _listen(
     space: Space,
     inbox: "ref[Inbox]",
 ) -> None:
-    """Put every target into the inbox for as long as it is there."""
+    """Put every target into the inbox while it exists."""
     while inbox() is not None:
         taken = subscription.take() if subscription.wait(_POLL) else []
         if there := inbox():
@@ -117,5 +117,5 @@ def _check_frame(what: str, named: str, known: list[str]) -> None:
 
 
 def _numbers(linear: list[float], angular: list[float], space: Space) -> list[float]:
-    """Return what of a target belongs to a stream."""
+    """Return the part of a target that a stream uses."""
     return (linear if space.linear else []) + (angular if space.rotational else [])

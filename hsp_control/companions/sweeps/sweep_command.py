@@ -29,7 +29,7 @@ from hsp_control.companions.sweeps import sweep as run_sweep
 if TYPE_CHECKING:
     from distributed import Client
 
-_REASONS = 3  # printed for runs that did not complete
+_REASONS = 3  # maximum number of reasons printed for runs that did not complete
 _NUMBER = re.compile(r"-?[0-9][0-9.]*(e[-+]?[0-9]+)?")
 
 

@@ -154,7 +154,7 @@ def test_a_library_that_returns_nothing_is_named(source: Path) -> None:
 
 def test_a_kind_says_what_it_does(source: Path) -> None:
     source.write_text(SOURCE.replace("doc =", "words ="))
-    with pytest.raises(EngineError, match="a kind says what it does: static constexpr"):
+    with pytest.raises(EngineError, match="a kind needs a description: static"):
         own_kinds.load(source)
 
 
