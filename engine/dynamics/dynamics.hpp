@@ -1,4 +1,5 @@
 // A robot's rigid-body dynamics: Pinocchio's algorithms on a model built from parameters.
+//
 // Only this directory includes Pinocchio. Its algorithms are compiled in, so that any release of
 // its Python package can be installed, and so that a step needs no Python. The results of these
 // functions do not depend on earlier calls.

@@ -1,15 +1,18 @@
 // The cost of deviations while active limits keep the tasks from being met, level by level.
+//
 // Where a limit is active, the step deviates from the unconstrained a by δ, and lower priorities
 // deviate before a level does (`qp/deviation_cost.hpp`). Let c δ ≥ x be the limit, in whitened
 // coordinates with |c| = 1, n the length of the part of c in the null space of the level, and ρ the
 // cost of deviations there. In that null space δ has the length
 //
 //   x n/(n² + ρ (1 - n²)),
+//
 // whose slope in n is at most x/(n² + ρ): n depends on the posture, and so does δ. For a task that
 // cannot be met x persists. So ρ has to follow x as ε follows f (`threshold.hpp`), unless lower
 // priorities can supply x easily:
 //
 //   ρ = max_c (A/K - n²),      A = x max_j ‖L⁻¹e_j‖
+//
 // with A the largest joint acceleration due to x. Of a direction of the singular value s below its
 // threshold ε a level has the share 1 - (1 - s²/ε²)², as of the law.
 #pragma once

@@ -1,7 +1,9 @@
 // The acceleration that a step approximates while a limit is active.
+//
 // While a limit is active the law's equations cannot hold. Then it is decomposed,
 //
 //   a = a_t + φ_N,
+//
 // into the motion of the tasks and the self-motion. Two things change, each in proportion to the
 // excess of a beyond a limit, so that the step is a continuous function of the state. With E the
 // excess, relative to what the limit permits, 1/(1 + E) is the part of the command that is within
@@ -15,8 +17,10 @@
 // *The field's command is bounded.* That is φ_N + P K_N P v, the self-motion without its damping. A
 // field's command is unbounded, r times what the limits permit far from them; it is scaled by
 // 1/(1 + E), but not below 1/r. The damping is not scaled, or the null space would oscillate.
+//
 // Both begin slowly: a step that is reduced by more than its excess reverses its command where it
 // begins to violate a limit, and oscillates about the limit (docs/edge.md).
+//
 // The permitted value is, for an effort, its maximum; for an acceleration, that of the barriers of
 // `Limits` far from them. The limit on the effort's rate is ignored: it depends on the last effort,
 // and a step that waited for it would wait for ever.

@@ -32,8 +32,10 @@ struct ThresholdBelow {
 };
 
 struct HowHeld {
-  static constexpr const char* doc = "How far a level is unmet at the workspace boundary, from 0 to
-  nearly 1."; double lacking, wanted, least; Following following;
+  static constexpr const char* doc =
+      "How far a level is unmet at the workspace boundary, from 0 to nearly 1.";
+  double lacking, wanted, least;
+  Following following;
 
   double operator()() { return how_held(lacking, wanted, least, following); }
 };

@@ -10,6 +10,7 @@
 // φ therefore has the gradient
 //
 //   w_i · Σ_{j from i on} (l_j × b_j + w_j × c_j) + l_i · Σ_{j before i} (b_j × w_j)
+//
 // which running sums compute in O(n), without the kinematic Hessian. Its rate is exact too, because
 // J' is known exactly.
 #pragma once

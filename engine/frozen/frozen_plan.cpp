@@ -39,8 +39,8 @@ Bytes body_of(std::string_view content) {
 const Kind& kind_named(const Kind* const* kinds, const std::string& name) {
   for (; *kinds; ++kinds)
     if ((*kinds)->name == name) return **kinds;
-  throw std::runtime_error("it has calls of the kind " + name + ", which this library does not
-  have");
+  throw std::runtime_error("it has calls of the kind " + name +
+                           ", which this library does not have");
 }
 
 const Kind& kind_named(const std::string& library, const std::string& name) {
@@ -191,11 +191,15 @@ void FrozenPlan::read_port(Bytes& bytes) {
   port.entry = bytes.number<char>();
   const char role = bytes.number<char>();
   const Field field{.rank = 1};
-  if (port.entry != 'd' && port.entry != 'i') throw std::runtime_error("a port has an unknown
-  type"); const Argument array = read_array(bytes, field); port.size = array.shape[0];
-  port.data = array.data; if (role == 'i') port.input = &input<Evolve>(bytes); else if (role == 't')
-  port.target = &input<StreamAlone>(bytes); else if (role == 'v')
-  port.velocity = &input<StreamAlone>(bytes); else if (role == 'p') {
+  if (port.entry != 'd' && port.entry != 'i')
+    throw std::runtime_error("a port has an unknown type");
+  const Argument array = read_array(bytes, field);
+  port.size = array.shape[0];
+  port.data = array.data;
+  if (role == 'i') port.input = &input<Evolve>(bytes);
+  else if (role == 't') port.target = &input<StreamAlone>(bytes);
+  else if (role == 'v') port.velocity = &input<StreamAlone>(bytes);
+  else if (role == 'p') {
     port.payloads = &input<Payloads>(bytes);
     const double* first = port.payloads->asked.data();
     port.frame = (static_cast<double*>(port.data) - first) / 10;
@@ -220,8 +224,9 @@ template <class Kind> Kind& FrozenPlan::input(Bytes& bytes) const {
 }
 
 const FrozenPlan::Object& FrozenPlan::object(std::uint32_t index) const {
-  if (index >= objects_.size()) throw std::runtime_error("it refers to an object that does not
-  exist"); return objects_[index];
+  if (index >= objects_.size())
+    throw std::runtime_error("it refers to an object that does not exist");
+  return objects_[index];
 }
 
 void* FrozenPlan::shared(std::uint32_t index, std::string_view type) const {

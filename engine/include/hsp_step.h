@@ -34,12 +34,13 @@ extern "C" {
 #endif
 
 /* The outcome of a step, or of a request. If it is 0 or more, the request succeeded, and tau is a
-new effort; below 0 it was refused. After a refused step or stop, tau is the last delivered effort,
-or 0 if there was none yet, for at most 5 periods in a row: an effort that is repeated for long
-drives the robot. From the sixth on the robot is stopped permanently, as by hsp_stop. The stop uses
-t, q and v if they are finite. Otherwise it uses the last finite ones, and predicts their change
-under its own braking: the effort fades to that which carries the robot. This motion is not
-measured: let the robot's own brakes take over. */ typedef enum hsp_status {
+ * new effort; below 0 it was refused. After a refused step or stop, tau is the last delivered
+ * effort, or 0 if there was none yet, for at most 5 periods in a row: an effort that is repeated
+ * for long drives the robot. From the sixth on the robot is stopped permanently, as by hsp_stop.
+ * The stop uses t, q and v if they are finite. Otherwise it uses the last finite ones, and predicts
+ * their change under its own braking: the effort fades to that which carries the robot. This motion
+ * is not measured: let the robot's own brakes take over. */
+typedef enum hsp_status {
   HSP_OK = 0,            /* the law's own effort */
   HSP_REDISTRIBUTED = 1, /* with contact forces chosen by a QP */
   HSP_LIMITED = 2,       /* the nearest within the limits */
@@ -71,9 +72,9 @@ typedef struct hsp_port {
 } hsp_port;
 
 /* Open a frozen controller; NULL if the file is not one, was truncated or changed, or is for
-another version or processor: `hsp_last_error(NULL)` has the reason. */ HSP_API hsp_controller*
-hsp_open(const char* file) HSP_NOEXCEPT; HSP_API void hsp_close(hsp_controller* controller)
-HSP_NOEXCEPT;
+ * another version or processor: `hsp_last_error(NULL)` has the reason. */
+HSP_API hsp_controller* hsp_open(const char* file) HSP_NOEXCEPT;
+HSP_API void hsp_close(hsp_controller* controller) HSP_NOEXCEPT;
 
 /* Sizes of q, and of v and tau; the period for which an effort is held [s]. */
 HSP_API size_t hsp_size_q(const hsp_controller* controller) HSP_NOEXCEPT;
@@ -104,9 +105,9 @@ HSP_API const hsp_port* hsp_port_of(const hsp_controller* controller,
                                     const char* name) HSP_NOEXCEPT;
 
 /* Change an input from the next step on: at once, or by a smooth ramp of a duration [s], like
-`controller.at(t).ramp(duration)` in Python. A ramp starts from the present value, and may begin
-during another one. Before the first step both apply at once. */ HSP_API hsp_status
-hsp_set(hsp_controller* controller, const char* name, const double* values,
+ * `controller.at(t).ramp(duration)` in Python. A ramp starts from the present value, and may begin
+ * during another one. Before the first step both apply at once. */
+HSP_API hsp_status hsp_set(hsp_controller* controller, const char* name, const double* values,
                            size_t size) HSP_NOEXCEPT;
 HSP_API hsp_status hsp_ramp(hsp_controller* controller, const char* name, const double* values,
                             size_t size, double duration) HSP_NOEXCEPT;
@@ -116,8 +117,8 @@ HSP_API hsp_status hsp_get(hsp_controller* controller, const char* name, double*
                            size_t size) HSP_NOEXCEPT;
 
 /* Why the last request of a handle was refused; of `hsp_open` in this thread for NULL. It is never
-NULL, and stays valid until the next request. */ HSP_API const char* hsp_last_error(const
-hsp_controller* controller) HSP_NOEXCEPT;
+ * NULL, and stays valid until the next request. */
+HSP_API const char* hsp_last_error(const hsp_controller* controller) HSP_NOEXCEPT;
 
 /* A status in words. */
 HSP_API const char* hsp_status_text(hsp_status status) HSP_NOEXCEPT;

@@ -57,6 +57,7 @@ Range of_position(Index i, double q, double v, const MotionLimits<In>& limits, c
 }
 
 // The largest acceleration towards a speed limit at a distance.
+//
 // It is 2α gap, or √(jerk gap) if that is less: then the acceleration vanishes at the limit with
 // half the jerk, and the rest of the effort's rate is reserved for the coupling of other joints.
 inline double towards_speed(double gap, double alpha, double jerk) {
@@ -89,6 +90,7 @@ Range of_speed(Index i, double v, const MotionLimits<In>& limits, const Held& he
 
 // Write the bounds on the acceleration that the barriers of `Limits` require. `where` is the index
 // in q of each dof's coordinate, -1 for none.
+//
 // A constant external force uses effort without motion, so the barriers are widened by
 // `held.steady`, the still present part of a longer mean of the error.
 template <class Held>

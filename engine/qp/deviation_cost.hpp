@@ -3,15 +3,18 @@
 // The cost of a deviation δ is ½ δᵀH δ with H = Σ ρ_k (Lᵀδ·n_k)², over directions n_k that are
 // orthonormal in whitened coordinates Lᵀδ. So H⁻¹ = J Jᵀ, with the columns L⁻ᵀ n_k / √ρ_k in J: no
 // matrix is factorised.
+//
 // The cost below a level is a small part of the level's own, which grows with the level's error:
 // priorities are strict where the errors are small. With a fixed tiny part, a hand that cannot
 // reach its target would move the null space as far as limits permit for a negligible gain, from
 // one bound of the efforts to the other between two periods. The cost is larger while a limit keeps
 // the level from being met, see `edge/held_levels.hpp`.
+//
 // Levels of springs have no precedence: deviations below them have the same cost. With the mass
 // matrix, their metric, the deviation then follows from Gauss's principle of least constraint:
 // joints at active limits receive the reaction of mechanical stops, which does no work, so that a
 // spring feeds no oscillation.
+//
 // With P_k the projector for the levels below k, P_0 = 1, a level has the share P_{k-1} - P_k of
 // all motions, and the null space the rest, P_K. Their costs are ρ_k = ρ_N^t_k, t_1 = 0 to t_N = 1,
 // and that of all is
@@ -170,6 +173,7 @@ struct Directions {
   }
 
   // Write the directions of the only level, if the law has found its spectrum; return their number.
+  //
   // First those that belong to it alone. The null space has the share (1 - s²/threshold²)² of a
   // direction with the singular value s below the threshold.
   Index write_damped_level() {
@@ -226,6 +230,7 @@ struct Directions {
   }
 
   // Complete the first directions to an orthonormal basis, with the null space.
+  //
   // Each new row is the residual of the unit vector with the largest residual. The components of a
   // unit vector are entries of N. Where less than half of it remains, the rounding errors are
   // subtracted ("twice is enough", Giraud et al. 2005).

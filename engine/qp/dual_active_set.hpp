@@ -112,6 +112,7 @@ class DualActiveSet {
 
   // Overwrite x0 with the optimum x. A warm start begins with the active constraints of the last
   // solution.
+  //
   // Finally the optimum of the active constraints is computed in their order, so that x does not
   // depend on the iterations, not even in its last bit: a step is the same whether it began with
   // the active constraints of the last one or not.
@@ -223,6 +224,7 @@ class DualActiveSet {
   }
 
   // Make y and x the optimum of the active constraints, without rounding of steps.
+  //
   // w = L⁻¹ (b - A x) is their residual; the multipliers grow by L⁻ᵀ w. Twice, at x0 and at y = Bᵀ
   // multipliers, since the second time corrects the first; then y grows by Qᵀ w. Constraints with a
   // multiplier of the wrong sign are released, the worst first: the method may begin from the

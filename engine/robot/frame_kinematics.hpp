@@ -22,6 +22,7 @@ struct ParentJoint {
 //
 //   (l + w × p, w)              at the frame's origin p, and its rate is
 //   (l' + w' × p + w × p', w').
+//
 // A frame that moves in its joint has a velocity in excess of J v. With ω of the joint, R r' and R
 // w, and their rates, in which p' is that of the frame, so that J'v has the other half of Coriolis'
 // term:

@@ -15,8 +15,7 @@ struct Timing {
 
 struct Periods {
   static constexpr const char* doc =
-      "Advance a plant from one period to another, or to one with an active limit; return its
-      index.";
+      "Advance a plant from one period to another, or to one with an active limit; return it.";
   Shared<Plan> moving;   // integrates the plant over the interval
   Shared<Move> step;     // writes the effort, and the outcome of law and limits
   Shared<Plan> sending;  // records that this effort is held from now on

@@ -84,7 +84,7 @@ class CallOutput(NamedTuple):
     out: Any
 
 
-def says(part: object, *ways: str) -> str:
+def implemented_by(part: object, *ways: str) -> str:
     """Return which of several methods the most derived class of a part overrides.
 
     A subclass of a part of the package may override any of them; the result is the

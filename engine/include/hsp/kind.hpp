@@ -13,8 +13,10 @@
 //
 // A group may have a `check`, too. Indices are checked there, when the call is made
 // (`indices.hpp`), and not again in a step.
+//
 // operator() returns a number with one meaning, given in `doc`: a value (f of a cost), or a bool.
 // Further results of a call are written into a record with names (`LawOutcome`).
+//
 // The members are read into a table in C's layout, and everything common to all kinds is written
 // once, over that table: the checks of shapes and entries, the Python interface, the inputs and
 // outputs of a call. So a user's own library can declare kinds: it needs this header, Eigen and
@@ -194,9 +196,10 @@ template <class T> std::vector<Field> fields() {
 
 // The table of a struct's members, made once.
 template <class T> const Kind& kind_of() {
-  static_assert(requires { T::doc; }, "a kind needs a description: static constexpr const char*
-  doc"); static const std::vector<Field> fields = detail::fields<T>(); static const Kind
-  kind = {.name = detail::kept(detail::type_name<T>()),
+  static_assert(requires { T::doc; },
+                "a kind needs a description: static constexpr const char* doc");
+  static const std::vector<Field> fields = detail::fields<T>();
+  static const Kind kind = {.name = detail::kept(detail::type_name<T>()),
                             .doc = T::doc,
                             .timed = is_timed<T>,
                             .size = sizeof(T),

@@ -16,7 +16,7 @@ from hsp_control.common.arrays import Array, Indices
 from hsp_control.common.exceptions import LimitError
 from hsp_control.declaration import Part
 from hsp_control.declaration.quantities import Names, NonNegative, Number
-from hsp_control.engine.plans import OnlyIf, PartCall, PartCalls, says
+from hsp_control.engine.plans import OnlyIf, PartCall, PartCalls, implemented_by
 from hsp_control.geometry.scene import Start
 from hsp_control.null_space.fields import Clearance, ObstacleClearance, SelfClearance
 from hsp_control.null_space.fields.clearance import ObstacleOrName
@@ -201,7 +201,7 @@ class MinimumDistance(Barrier):
     def room(self, state: RobotState) -> int:
         """Return the number of pairs; see `Barrier.room`."""
         ways = "row_calls", "rows", "values", "gradients", "_numbers"
-        own = says(self, *ways) == "row_calls"
+        own = implemented_by(self, *ways) == "row_calls"
         return len(self.clearance.proximity(state).pairs) if own else 0
 
     def rows(
