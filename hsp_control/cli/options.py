@@ -1,6 +1,6 @@
-"""All commands and their options; nothing slow is imported: help comes at once.
+"""All commands and their options; nothing slow is imported, for instant help.
 
-What a companion adds is named by entry points; no import does.
+Additions of companions are found by entry points, not by imports.
 """
 
 import argparse
@@ -21,7 +21,7 @@ class Parser(argparse.ArgumentParser):
     """An `argparse.ArgumentParser` for commands and for their options."""
 
     def __init__(self, *args: Any, **options: Any) -> None:
-        # By their full names: ``--st`` is no ``--strict``.
+        # By their full names: ``--st`` is not ``--strict``.
         super().__init__(*args, **{"allow_abbrev": False, **options})
 
     def parse_known_args(  # type: ignore[override]
@@ -194,7 +194,7 @@ def add_freeze(freeze: argparse.ArgumentParser) -> None:
         where.add_argument(name, action="store_true", help=f"print {what}, and end")
 
 
-# --- what several commands have -------------------------------------------------------
+# --- common options -------------------------------------------------------
 
 
 def add_configuration(
@@ -246,7 +246,7 @@ def add_strict(parser: argparse.ArgumentParser) -> None:
 
 
 def add_import(parser: argparse.ArgumentParser) -> None:
-    """Add which Python code is imported first."""
+    """Add the option for Python code to import first."""
     parser.add_argument(
         "--import",
         action="append",
@@ -271,20 +271,21 @@ def complete(action: argparse.Action, names: Callable[[], Iterable[str]]) -> Non
     vars(action)["completer"] = completer
 
 
-# --- what companions add --------------------------------------------------------------
+# --- additions of companions
+# --------------------------------------------------------------
 
 
 class AddedCommand(NamedTuple):
     """A command: an entry point of ``hsp_control.commands`` with the command's name.
 
-    Its module is imported for every help text: what is slow is imported by `run`.
+    Its module is imported for every help text: slow modules are imported by `run`.
 
     Attributes:
-        help: What it does, in a line.
+        help: Its description, in a line.
         add_options: Adds its options to its parser.
         run: Runs it; returns the exit status.
         own_interrupts: Whether it ends in order at Ctrl-C, instead of at once.
-        place: Where the help lists it, smaller first: below zero before `hsp live`,
+        place: Its position in the help, smaller first: below zero before `hsp live`,
             above zero after `hsp robots`.
     """
 
@@ -296,15 +297,15 @@ class AddedCommand(NamedTuple):
 
 
 class CommandPage(NamedTuple):
-    """A page that shows what `hsp run` or `hsp live` does.
+    """A page that shows a run of `hsp run` or `hsp live`.
 
     It is an entry point of ``hsp_control.pages`` with the command's name, and imported
     as an `AddedCommand` is.
 
     Attributes:
         add_options: Adds its options to the command's parser.
-        open: Opens it, given the options and what the command is about: a context with
-            the command's outputs, or None if the options open no page.
+        open: Opens it, given the options and the command's subject: a context with the
+        command's outputs, or None if the options open no page.
     """
 
     add_options: Callable[[argparse.ArgumentParser], object]

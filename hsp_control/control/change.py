@@ -52,9 +52,9 @@ class Change(Part, ABC, family="changes", error=ControllerError):
 
     _: KW_ONLY
     at: Number
-    """When it begins [s]; a time that has passed means now."""
+    """Its start time [s]; a time that has passed means now."""
     ramp: NonNegative = 0.3
-    """How long it takes [s]; 0 is a jump."""
+    """Its duration [s]; 0 is a jump."""
 
     @property
     def end(self) -> float:
@@ -187,7 +187,7 @@ class ExchangeField(Change, type="exchange_field"):
     field: str
     """Name of the field that goes."""
     by: NullSpaceField
-    """The field that comes; its own weight does not count."""
+    """The new field; its own weight is ignored."""
 
     def placed(self, start: Start, setup: Setup) -> Self:
         """Return the change with its field placed."""

@@ -9,7 +9,7 @@ from hsp_control.common.exceptions import ControllerError
 
 
 class StepLock:
-    """A lock: other threads wait for it; the thread that holds it gets an error."""
+    """A lock: other threads wait for it; re-entry by its holder raises."""
 
     __slots__ = ("__weakref__", "_lock", "_taken")
 
