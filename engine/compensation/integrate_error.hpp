@@ -13,7 +13,7 @@ struct IntegrateError {
   double limit;
   In<1> period;
   Ints<1> damped, status, starting;
-  std::int64_t limited;  // the least status of what is not the law's own
+  std::int64_t limited;  // lowest status of a step that is not the law's
   InOut<'m'> integral;
   Out<'m'> offset;
 

@@ -1,4 +1,4 @@
-// The momentum observer of De Luca: an estimate r of what the model does not explain.
+// The momentum observer of De Luca: an estimate r of the effort that the model does not explain.
 //
 // With p = M v, p' = tau + Cᵀv - G + d, and Cᵀv - G = M'v - N since M' = C + Cᵀ, N = C v + G.
 #pragma once
@@ -48,7 +48,7 @@ struct ObserveMomentum {
 
 struct Unexplained {
   static constexpr const char* doc =
-      "M⁻¹ (r - what is cancelled of it): the acceleration that something else causes.";
+      "M⁻¹ (r - its cancelled part): the acceleration by external causes.";
   In<'n', 'n'> M;
   In<'n'> disturbance, cancelled;
   Out<'n'> acceleration;

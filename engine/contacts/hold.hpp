@@ -1,4 +1,4 @@
-// Rows that keep a contact still: points, the normal of what slides, surfaces.
+// Rows that keep a contact at rest: points, the normal of a sliding contact, surfaces.
 //
 //   J a + J'v = -Kd J v,    damping without stiffness.
 #pragma once

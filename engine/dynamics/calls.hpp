@@ -14,7 +14,7 @@
 
 namespace hsp {
 
-// Throws where q, v or another vector of v's size is of another robot.
+// Throws if q, v or another vector of v's size has a different size.
 inline void check_sizes(const Dynamics& robot, Index q, Index v) {
   if (q == robot.configuration_size() && v == robot.size()) return;
   throw std::invalid_argument("q and v have " + std::to_string(q) + " and " + std::to_string(v) +
@@ -28,7 +28,7 @@ using MayAllocate = Allocation;
 
 struct Carry {
   static constexpr const char* doc =
-      "Let a robot carry bodies at its joints, each in part, from now on; in the joints' axes.";
+      "Set the bodies carried at a robot's joints, each with a share, in the joints' axes.";
   Shared<Dynamics> dynamics;
   Ints<'k'> joints;
   In<'k'> masses;       // [kg]
@@ -51,7 +51,7 @@ struct Carry {
 
 struct ChangeGravity {
   static constexpr const char* doc =
-      "Let gravity be the robot's own and a change of it, from now on [m/s²].";
+      "Set gravity to the robot's own plus a change of it [m/s²].";
   Shared<Dynamics> dynamics;
   In<3> change;
 
@@ -60,7 +60,7 @@ struct ChangeGravity {
 
 struct Weights {
   static constexpr const char* doc =
-      "The mass of what each joint moves [kg], with what it carries, its centre [m], and gravity.";
+      "The mass at each joint [kg], payloads included, its centre [m], and gravity.";
   Shared<Dynamics> dynamics;
   Out<'j'> mass;
   Out<'j', 3> center;

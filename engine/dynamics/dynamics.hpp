@@ -1,8 +1,8 @@
-// A robot's rigid-body dynamics: Pinocchio's algorithms on a model that came as numbers.
+// A robot's rigid-body dynamics: Pinocchio's algorithms on a model built from parameters.
 //
-// Nothing outside of this room sees Pinocchio. Its algorithms are compiled in, so that no
-// release of its Python package has to be the one that this was built with, and so that a step
-// needs no Python. Whatever these functions return does not depend on what was computed before.
+// Only this directory includes Pinocchio. Its algorithms are compiled in, so that any release of
+// its Python package can be installed, and so that a step needs no Python. The results of these
+// functions do not depend on earlier calls.
 #pragma once
 #include <array>
 #include <hsp/view.hpp>
@@ -20,41 +20,41 @@ using Placements = Eigen::Map<Eigen::Matrix<double, Eigen::Dynamic, 12, Eigen::R
 
 // A joint and the body that it moves; in the joint's axes where nothing else is stated.
 struct Joint {
-  std::string name, type;            // the type as Pinocchio calls it: "JointModelRZ"
+  std::string name, type;            // Pinocchio's name of the type: "JointModelRZ"
   std::int64_t parent = 0;           // 0: the world
   std::array<double, 12> placement;  // in the parent: R, row by row, and the origin [m]
-  Vector3 axis = Vector3::UnitX();   // of those that move along or about any axis
+  Vector3 axis = Vector3::UnitX();   // for joints that move along or about any axis
   double pitch = 0.0;                // of a screw [m/rad]
-  std::int64_t leader = 0;           // what it follows: q = ratio q_leader + offset; 0: none
+  std::int64_t leader = 0;           // the joint it follows: q = ratio q_leader + offset; 0: none
   double ratio = 1.0, offset = 0.0;
-  std::vector<Joint> parts;  // of a composite joint: one after the other, placed as they say
+  std::vector<Joint> parts;  // of a composite joint: in series, by their placements
   double mass = 0.0;         // of the body [kg]
   Vector3 center = Vector3::Zero();
   Matrix3 inertia = Matrix3::Zero();  // about the centre [kg·m²]
 };
 
-// A body that is fixed to a joint, in the joint's axes, and how much of it is carried.
+// A body that is fixed to a joint, in the joint's axes, and its carried share.
 struct Carried {
   std::int64_t joint;
   double mass;                       // [kg]
   Vector3 center;                    // [m]
   Matrix3 inertia;                   // about the centre [kg·m²]
-  double share, rate, acceleration;  // how much of it, and the share's derivatives [1/s, 1/s²]
+  double share, rate, acceleration;  // the share, and its derivatives [1/s, 1/s²]
 };
 
-// What bodies that come or go add to the motion of the centre of mass c: to c' and c'' [m/s, m/s²],
-// and to the rate of the angular momentum about c per mass [m²/s²].
+// Contribution of bodies whose share changes to the motion of the centre of mass c: to c' and c''
+// [m/s, m/s²], and to the rate of the angular momentum about c per mass [m²/s²].
 struct MassFlow {
   Vector3 velocity = Vector3::Zero(), acceleration = Vector3::Zero(), momentum = Vector3::Zero();
 };
 
-const char* pinocchio_version();  // of what is compiled in
+const char* pinocchio_version();  // of the compiled code
 
 class Dynamics {
  public:
   static constexpr const char* type_name = "Dynamics";
 
-  // `armature` [kg·m² or kg] is what the rotors add to the diagonal of M, shape (n,).
+  // `armature` [kg·m² or kg] is the rotors' part of the diagonal of M, shape (n,).
   // Throws std::invalid_argument for a joint that is not known, or whose parent or leader does
   // not come before it.
   Dynamics(const std::vector<Joint>& joints, const Vector3& gravity, const Vector& armature);
@@ -66,11 +66,11 @@ class Dynamics {
   Index columns() const;             // of the Jacobian of all joints, followers included
   Index joints() const;              // with the world
 
-  // What is carried from now on, besides what the model has; at most as many as `make_room` allows.
+  // Set the payloads, in addition to the model's bodies; at most as many as `make_room` reserves.
   void make_room(Index bodies);
   void put_down();
   void carry(const Carried& body);
-  void change_gravity(const Vector3& change);  // from the model's own, in the world [m/s²]
+  void change_gravity(const Vector3& change);  // relative to the model's, in the world [m/s²]
   Vector3 gravity() const;
   double mass() const;  // of all bodies [kg]
   void body_masses(Eigen::Map<Vector> mass, Centers center) const;
@@ -85,13 +85,13 @@ class Dynamics {
   void inverse_dynamics(const ConstVector& q, const ConstVector& v, const ConstVector& a,
                         Eigen::Map<Vector> effort);  // RNEA
   void mass_matrix(const ConstVector& q, Square M);  // CRBA
-  // Along v, and with what is carried.
+  // Along v, payloads included.
   void mass_matrix_rate(const ConstVector& q, const ConstVector& v, Square M_dot);
-  // M⁻¹ (tau - N); false if M is singular, which only models with followers can say.
+  // M⁻¹ (tau - N); false if M is singular, which is detected for models with followers only.
   bool forward_dynamics(const ConstVector& q, const ConstVector& v, const ConstVector& tau,
                         Eigen::Map<Vector> a);
   // The centroidal map: A v = (momentum, angular momentum about the centre of mass c), and A'
-  // about a point at rest, both of constant masses. Returns what others add.
+  // about a point at rest, both for constant masses. Returns the contribution of changing masses.
   MassFlow centroidal_map(const ConstVector& q, const ConstVector& v, Vector3& c, Jacobian A,
                           Jacobian A_dot);
 

@@ -1,4 +1,4 @@
-// The model out of numbers.
+// The model from its parameters.
 #include <cmath>
 #include <stdexcept>
 
@@ -58,7 +58,7 @@ void check_numbers(const Joint& joint) {
   };
   const Eigen::Map<const Eigen::Vector<double, 12>> placement(joint.placement.data());
   if (!placement.allFinite()) throw wrong("its placement is not finite");
-  if (!(std::abs(joint.axis.norm() - 1.0) < 1e-6)) throw wrong("its axis has not the norm 1");
+  if (!(std::abs(joint.axis.norm() - 1.0) < 1e-6)) throw wrong("its axis does not have norm 1");
   if (!std::isfinite(joint.pitch + joint.ratio + joint.offset))
     throw wrong("its pitch, ratio or offset is not finite");
   if (!(joint.mass >= 0.0 && std::isfinite(joint.mass))) throw wrong("its mass is not 0 or more");
@@ -67,7 +67,7 @@ void check_numbers(const Joint& joint) {
   for (const Joint& part : joint.parts) check_numbers(part);
 }
 
-// Throws unless a joint can follow another: Pinocchio's own words are those of a compiler.
+// Throws unless a joint can follow another: Pinocchio's own message is a compiler's.
 template <class AnyJoint>
 void check_follower(const Joint& own, const AnyJoint& joint, const AnyJoint& leader) {
   const bool fits = joint.nv() == 1 && leader.nv() == 1 && joint.nq() == leader.nq();

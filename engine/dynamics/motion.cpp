@@ -36,10 +36,10 @@ const Dynamics::Pinocchio::Data::MatrixXs& Dynamics::Pinocchio::mass_matrix(cons
   return data.M;
 }
 
-// Pinocchio's own (4.1) adds to what it does not clear, and leaves out what joints of several
-// freedoms between a leader and its follower share with them. Here Jᵀ I J of each joint and all
-// that carry it, with the inertia I of all that the joint carries, at the world's origin; those of
-// a follower count for its leader.
+// Pinocchio's own (4.1) accumulates into memory that it does not clear, and omits the coupling of
+// joints of several degrees of freedom between a leader and its follower. Here M is the sum of Jᵀ I
+// J over pairs of each joint and its ancestors, with the composite inertia I beyond the joint, at
+// the world's origin; columns of a follower are added to its leader's.
 void Dynamics::Pinocchio::write_mass_matrix_of_followers(const ConstVector& q) {
   pin::computeJointJacobians(model, data, q);
   auto& carried_by = data.oYcrb;
@@ -69,9 +69,10 @@ void Dynamics::Pinocchio::write_mass_matrix_of_followers(const ConstVector& q) {
 
 void Dynamics::mass_matrix(const ConstVector& q, Square M) { M = pinocchio_->mass_matrix(q); }
 
-// Pinocchio's own takes each joint for columns of v. Here a joint's columns are I J, with the
-// inertia I of all that the joint carries, at the world's origin (Orin, Goswami and Lee 2013,
-// by composite bodies), and those of a follower count for its leader. Then about the centre.
+// Pinocchio's own assumes that each joint has its own columns of v. Here a joint's columns are I J,
+// with the composite inertia I beyond the joint, at the world's origin (Orin, Goswami and Lee
+// 2013), and those of a follower are added to its leader's. The result is then moved to the centre
+// of mass.
 Vector3 Dynamics::Pinocchio::map_of_followers(const ConstVector& q, const ConstVector& v,
                                               Jacobian A, Jacobian A_dot) {
   pin::computeJointJacobiansTimeVariation(model, data, q, v);

@@ -1,4 +1,4 @@
-// What only the sources of this room include: Pinocchio, with the joints that we have.
+// Included by the sources of this directory only: Pinocchio, with the supported joints.
 #pragma once
 #include <pinocchio/multibody.hpp>
 
@@ -8,8 +8,8 @@ namespace hsp {
 
 namespace pin = pinocchio;
 
-// Of the 25 types of Pinocchio's own collection those that a controlled robot can have. Each
-// costs time to compile; what differs only by its axis is `Unaligned`, but what most joints are.
+// Of the 25 types of Pinocchio's own collection those that a controlled robot can have. Each costs
+// compile time; joints that differ only by their axis are `Unaligned`, except the most common ones.
 template <class S, int O> struct JointTypes {
   using Scalar = S;
   static constexpr int Options = O;
@@ -41,7 +41,7 @@ struct Dynamics::Pinocchio {
 
   Model model;
   Data data;
-  Model::InertiaVector own;  // without what is carried
+  Model::InertiaVector own;  // without payloads
   Vector3 own_gravity;
   std::vector<Carried> carried;
   Vector zero, step, there;            // two of v's size, one of q's

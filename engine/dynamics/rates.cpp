@@ -20,7 +20,7 @@ ConstVector Dynamics::Pinocchio::moved(const ConstVector& q, const ConstVector& 
 }
 
 // C + Cᵀ, with Coriolis' matrix C. Pinocchio has none of models with followers: there it is by
-// differences of the fourth order. And what a ramp of what is carried adds.
+// differences of the fourth order. The ramps of payloads are added.
 void Dynamics::mass_matrix_rate(const ConstVector& q, const ConstVector& v, Square M_dot) {
   auto& own = *pinocchio_;
   if (own.has_followers()) own.write_rate_by_differences(q, v, M_dot);
@@ -28,7 +28,7 @@ void Dynamics::mass_matrix_rate(const ConstVector& q, const ConstVector& v, Squa
     const auto& C = pin::computeCoriolisMatrix(own.model, own.data, q, v);
     M_dot = C + C.transpose();
   }
-  // M is linear in the inertias: what a body adds is the difference with and without all of it.
+  // M is linear in the inertias: the contribution of a body is the difference with and without it.
   for (const Carried& body : own.carried) {
     if (body.rate == 0.0) continue;
     M_dot -= body.rate * own.mass_matrix(q);
@@ -103,7 +103,7 @@ MassFlow Dynamics::centroidal_map(const ConstVector& q, const ConstVector& v, Ve
   if (pinocchio_->has_followers()) {
     c = pinocchio_->map_of_followers(q, v, A, A_dot);
   } else {
-    data.vcom[0].setZero();  // it reads this, and writes it later
+    data.vcom[0].setZero();  // read before it is written
     pin::computeCentroidalMapTimeVariation(pinocchio_->model, data, q, v);
     c = data.com[0];
     A = data.Ag;

@@ -1,4 +1,4 @@
-// What the first levels make of the law, where a limit binds.
+// The contribution of the first levels to the law, while a limit is active.
 #pragma once
 #include "resolve.hpp"
 
@@ -6,8 +6,8 @@ namespace hsp {
 
 struct ByLevels {
   static constexpr const char* doc =
-      "Write what the first k levels make of a_damped for each level k but the last, and all that "
-      "the tasks make of a, after `SelfMotions`.";
+      "Write the part of a_damped due to the first k levels, for each level k but the last, and "
+      "the tasks' part of a, after `SelfMotions`.";
   In<'m', 'n'> J, J_dot;
   In<'m'> a_x;
   In<'n', 'n'> L;
@@ -38,7 +38,7 @@ struct ByLevels {
   }
 
  private:
-  // X is lower triangular: the first k levels of the exact law are those of the law that has no
+  // X is lower triangular: the first k levels of the exact law are those of a law without the
   // others.
   void write_exact(Index last) {
     part.noalias() = factors.X * missing;

@@ -1,4 +1,4 @@
-// The damped law of several levels: each inverse is bounded as far as it has to be.
+// The damped law of several levels: each inverse is bounded by its threshold.
 #pragma once
 #include "../law/hierarchy.hpp"
 #include "threshold.hpp"
@@ -6,7 +6,7 @@
 namespace hsp {
 
 struct DampedMemory {
-  Scratch<'n'> drawn;  // a_f, what the levels above draw at rest
+  Scratch<'n'> drawn;  // a_f, the command of the levels above at rest
   Scratch<'m'> rest, opposed, x, row;
   Scratch<'m', 'm'> G, V;
   void prepare(const Sizes& size) {
@@ -17,8 +17,8 @@ struct DampedMemory {
 };
 
 // Write e_N and a; return the first level with a damped singular value, 1 for the highest one, and
-// 0 if none was damped. The thresholds are raised below levels that turn or are held. `by_tasks` is
-// what the levels make of a; the rest is φ_N.
+// 0 if none was damped. The thresholds are raised below levels whose directions turn or that are
+// unmet. `by_tasks` is the levels' part of a; the rest is φ_N.
 template <class B, class E, class A>
 int write_damped_levels(const LawInput& in, const Demand& rows, double least,
                         const Following& following, Thresholds& thresholds,
@@ -43,7 +43,7 @@ int write_damped_levels(const LawInput& in, const Demand& rows, double least,
     auto x = all_x.head(size), row = all_row.head(size);
     auto G = all_G.topLeftCorner(size, size), V = all_V.topLeftCorner(size, size);
 
-    // What is left for the level to do, and of that f - J a_f, at rest
+    // The residual of the level, and its part at rest, f - J a_f
     rest = a_x.segment(start, size);
     rest.noalias() -= J_dot_k * in.v;
     rest.noalias() -= J_k * a;
@@ -52,13 +52,13 @@ int write_damped_levels(const LawInput& in, const Demand& rows, double least,
     const double threshold = std::max(
         thresholds.own[level], threshold_below(opposed, held, above, level, following, thresholds));
 
-    // What it does with what those above leave
+    // Its contribution in the null space of the levels above
     const double smallest = open_level(J_k, projectors.Q, QJ, G, V, x);
     write_bounded_inverse(V, x, threshold, G_inverse);
     add_level(QJ, G_inverse, rest, row, a);
     add_level(QJ, G_inverse, opposed, row, drawn);
 
-    // What it leaves to those below, and how much it turns or is held; contacts stay where they are
+    // The projector for the levels below, and how much it turns or is unmet; contacts do neither
     thresholds.own[level] = threshold;
     if (springs.any() || (rows.yields.segment(start, size).array() > 0.0).any())
       above = std::min(above, std::max(std::sqrt(smallest), threshold) / thresholds.scales[level]);

@@ -1,20 +1,20 @@
-// What yielding costs where limits hold the tasks, level by level.
+// The cost of deviations while active limits keep the tasks from being met, level by level.
 //
-// Where a limit is active, the step deviates from the unconstrained a by δ, and what is below a
-// level yields before it does (`qp/deviation_cost.hpp`). Let c δ ≥ x be the limit, in whitened
-// coordinates with |c| = 1, n the length of the part of c that is left to what is below, and ρ what
-// that costs. Below the level δ has the length
+// Where a limit is active, the step deviates from the unconstrained a by δ, and lower priorities
+// deviate before a level does (`qp/deviation_cost.hpp`). Let c δ ≥ x be the limit, in whitened
+// coordinates with |c| = 1, n the length of the part of c in the null space of the level, and ρ the
+// cost of deviations there. In that null space δ has the length
 //
 //   x n/(n² + ρ (1 - n²)),
 //
-// whose slope in n is at most x/(n² + ρ): n turns with the posture, and δ with it. A task that
-// cannot be met demands x forever. So ρ has to follow x as ε follows f (`threshold.hpp`), unless
-// what is below can give x easily:
+// whose slope in n is at most x/(n² + ρ): n depends on the posture, and so does δ. For a task that
+// cannot be met x persists. So ρ has to follow x as ε follows f (`threshold.hpp`), unless lower
+// priorities can supply x easily:
 //
 //   ρ = max_c (A/K - n²),      A = x max_j ‖L⁻¹e_j‖
 //
-// with A the most that x may make of a joint's acceleration. Of a direction of the singular value
-// s below its threshold ε a level has the share 1 - (1 - s²/ε²)², as of the law.
+// with A the largest joint acceleration due to x. Of a direction of the singular value s below its
+// threshold ε a level has the share 1 - (1 - s²/ε²)², as of the law.
 #pragma once
 #include <hsp/linalg.hpp>
 #include <hsp/records.hpp>
@@ -25,14 +25,14 @@ namespace hsp {
 
 struct HeldLevels {
   static constexpr const char* doc =
-      "Write what is below each level costs at least, relative to it, for what the first levels "
-      "ask for beyond limits; no more counts than all of a is beyond them.";
+      "Write the minimum cost below each level, relative to it, for the demand of the first "
+      "levels beyond limits, which is bounded by that of a.";
   In<'n', 'n'> M, L;
   int form;
-  In<'n'> a;               // what is wanted
-  In<'n'> effort;          // M a + N, and what compensators add
-  In<'n'> law;             // of it the law's
-  In<'l', 'n'> by_levels;  // what the first k levels make of the law
+  In<'n'> a;               // the unconstrained acceleration
+  In<'n'> effort;          // M a + N, plus the compensators' part
+  In<'n'> law;             // its part by the law
+  In<'l', 'n'> by_levels;  // the part of the law due to the first k levels
   Factors<In> factors;     // Q = X J L⁻ᵀ, orthonormal rows, X lower triangular
   Ints<'l'> ends;          // where each level's rows end
   In<'l'> thresholds;      // ε of each level
@@ -41,10 +41,10 @@ struct HeldLevels {
   } bounds;           // on a
   In<'n'> permitted;  // efforts; inf where there is no limit
   struct {
-    In<'k', 'w'> A;  // the first n columns count
+    In<'k', 'w'> A;  // the first n columns are used
     In<'k'> lower;   // for a deviation δ from a: A δ ≥ lower
   } barred;
-  double stiffest;  // K: the most that δ may change with its direction [1/s²]
+  double stiffest;  // K: maximum change of δ with its direction [1/s²]
   Out<'l'> held;
   Scratch<'n'> change, effort_change, row;
   Scratch<'m'> share;
@@ -65,11 +65,11 @@ struct HeldLevels {
   }
 
  private:
-  // What each row's level has of its direction.
+  // The share of each row's direction in its level.
   void write_shares() {
     for (Index k = 0, r = 0; k < ends.size(); ++k)
       for (; r < ends[k]; ++r) {
-        const double inverse = factors.X(r, r);  // of what the rows before leave of a row
+        const double inverse = factors.X(r, r);  // of the row, orthogonal to those before
         const double s = inverse > 0.0 ? 1.0 / (inverse * thresholds[k]) : 0.0;
         const double left = std::max(1.0 - s * s, 0.0);
         share[r] = 1.0 - left * left;

@@ -1,29 +1,29 @@
-// The acceleration that a step approximates where a limit is active.
+// The acceleration that a step approximates while a limit is active.
 //
-// Where a limit is active the law's equations cannot hold. Then it is decomposed,
+// While a limit is active the law's equations cannot hold. Then it is decomposed,
 //
 //   a = a_t + φ_N,
 //
-// into what moves the tasks and the self-motion. Two things change, each as far as a is beyond a
-// limit, so that the step is a continuous function of the state. With E the excess, relative to
-// what the limit permits, 1/(1 + E) is the part of the command that is within it.
+// into the motion of the tasks and the self-motion. Two things change, each in proportion to the
+// excess of a beyond a limit, so that the step is a continuous function of the state. With E the
+// excess, relative to what the limit permits, 1/(1 + E) is the part of the command that is within
+// it.
 //
-// *The tasks are damped.* An arm that is held at its edge, or rushes to it, commands more than its
-// motors give, from one side and then from the other: the nearest step within the limits would
-// oscillate. So as far as a_t alone is beyond the limits, by an excess E_t, the step approaches the
-// damped law, and reaches it at E_t = `large`.
+// *The tasks are damped.* An arm at its workspace boundary, or moving fast towards it, commands
+// more than its motors supply, with alternating signs: the nearest step within the limits would
+// oscillate. So in proportion to the excess E_t of a_t alone, the step approaches the damped law,
+// and reaches it at E_t = `large`.
 //
-// *The field's command is bounded.* That is φ_N + P K_N P v, the self-motion without its brake. A
-// field may command anything, r times what the limits permit far from them; 1/(1 + E) of it is
-// left, and never less than 1/r. The brake is not scaled: else the null space would oscillate.
+// *The field's command is bounded.* That is φ_N + P K_N P v, the self-motion without its damping. A
+// field's command is unbounded, r times what the limits permit far from them; it is scaled by
+// 1/(1 + E), but not below 1/r. The damping is not scaled, or the null space would oscillate.
 //
-// Both begin slowly: a step that loses more than its excess beyond a limit commands the opposite
-// where it begins to violate one, and oscillates from one side of the limit to the other
-// (docs/edge.md).
+// Both begin slowly: a step that is reduced by more than its excess reverses its command where it
+// begins to violate a limit, and oscillates about the limit (docs/edge.md).
 //
-// What a limit permits is, of an effort, the maximum; of an acceleration, what the barriers of
-// `Limits` permit far from them. The limit on the effort's rate is ignored: it depends on the
-// last effort, and a step that waits for it would wait for ever.
+// The permitted value is, for an effort, its maximum; for an acceleration, that of the barriers of
+// `Limits` far from them. The limit on the effort's rate is ignored: it depends on the last effort,
+// and a step that waited for it would wait for ever.
 #pragma once
 #include <hsp/indices.hpp>
 #include <hsp/records.hpp>
@@ -32,10 +32,10 @@ namespace hsp {
 
 struct LimitedTarget {
   static constexpr const char* doc =
-      "Overwrite what is wanted by what the step is to come near to.";
+      "Overwrite the unconstrained acceleration by the target of the step.";
   In<'n', 'n'> M;
-  InOut<'n'> a;       // the law's acceleration, and what compensators add
-  InOut<'n'> effort;  // M a + N, and what compensators add
+  InOut<'n'> a;       // the law's acceleration, plus the compensators' part
+  InOut<'n'> effort;  // M a + N, plus the compensators' part
   struct {
     In<'n'> law, damped;
     In<'n'> law_self_motion, damped_self_motion;  // φ_N
@@ -48,10 +48,10 @@ struct LimitedTarget {
     In<'n'> effort, acceleration;  // inf where there is no limit
   } permitted;                     // far from the limits
   struct {
-    In<'k', 'w'> A;    // the first n columns count
+    In<'k', 'w'> A;    // the first n columns are used
     InOut<'k'> lower;  // for a deviation δ from a: A δ ≥ lower
   } barred;
-  double large;  // E_t from which on the damped law applies wholly
+  double large;  // E_t from which on the damped law applies fully
   Scratch<'n'> change, demand;
   Scratch<'n'> effort_change, effort_demand;  // M times them
 
@@ -82,7 +82,7 @@ struct LimitedTarget {
     barred.lower.noalias() -= barred.A.leftCols(a.size()) * change;
   }
 
-  // By how much a + change is beyond limits, relative to what they permit.
+  // Excess of a + change beyond limits, relative to the permitted values.
   double excess() const {
     const auto efforts = (effort + effort_change).array().abs() / permitted.effort.array();
     const auto above = (a + change - bounds.upper).array();
@@ -98,7 +98,7 @@ struct LimitedTarget {
     return most;
   }
 
-  // How many times what the limits permit far from them is demanded; at least 1.
+  // Demand relative to what the limits permit far from them; at least 1.
   double times_permitted() const {
     const double efforts = (effort_demand.array().abs() / permitted.effort.array()).maxCoeff();
     const double motions = (demand.array().abs() / permitted.acceleration.array()).maxCoeff();

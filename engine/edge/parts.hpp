@@ -1,4 +1,4 @@
-// The parts of the thresholds as calls of their own, so that each can be tried alone.
+// The parts of the thresholds as separate calls, for tests.
 #pragma once
 #include "threshold.hpp"
 
@@ -20,7 +20,7 @@ struct WriteThresholds {
 };
 
 struct ThresholdBelow {
-  static constexpr const char* doc = "The ε that a level below others has at least.";
+  static constexpr const char* doc = "The least ε of a level below others.";
   In<'m'> demand;
   double held, above;
   int level;
@@ -32,7 +32,8 @@ struct ThresholdBelow {
 };
 
 struct HowHeld {
-  static constexpr const char* doc = "How much a level is held at the edge, from 0 to nearly 1.";
+  static constexpr const char* doc =
+      "How far a level is unmet at the workspace boundary, from 0 to nearly 1.";
   double lacking, wanted, least;
   Following following;
 

@@ -1,4 +1,4 @@
-// The two laws of the edge, one with bounded inverses and the exact one, and their blend.
+// The two laws at the workspace boundary, with bounded and with exact inverses, and their blend.
 #pragma once
 #include "../law/outcome.hpp"
 #include "damped_levels.hpp"
@@ -6,33 +6,33 @@
 
 namespace hsp {
 
-// What the two laws leave.
+// Results of the two laws.
 template <template <int...> class As> struct EdgeMemory {
   As<'m', 'n'> Q;  // factors of the exact inverse
   As<'m', 'm'> X;
   As<'n'> exact;     // a_exact, where μ < 1 and the laws differ
-  As<'n'> damped;    // a_damped, where they differ and it is not left out
-  As<'n'> by_tasks;  // a_damped without φ_N, where it went level by level
+  As<'n'> damped;    // a_damped, where they differ and it is computed
+  As<'n'> by_tasks;  // a_damped without φ_N, where it was computed level by level
   As<'n'> exact_e_N;
   As<1> share;  // μ, without the share of the limits
 };
 
 struct Resolve {
-  static constexpr const char* doc = "Write e_N and a, and what became of the law.";
+  static constexpr const char* doc = "Write e_N and a, and the outcome of the law.";
   LawInput law;
   Demand rows;
   double least;  // ε_0
   Following following;
   bool exact_beside;  // whether there is an exact law beside the damped one
   bool alone;         // whether the tasks are one level, which is resolved at once
-  bool beside;        // whether the damped law is written even where it does not count
+  bool beside;        // whether the damped law is written even where μ = 0
   Thresholds thresholds;
   Factors<InOut> factors;
   Projectors<InOut> projectors;
   EdgeMemory<InOut> edge;
   Out<'n'> e_N, a;
   OutInts<1> edge_level;  // the first level whose inverse the damped law bounds; 0: none
-  OutInts<1> left_out;    // whether the damped law does not count, and was not written
+  OutInts<1> left_out;    // whether μ = 0, and the damped law was not written
   LawOutcome<OutInts> outcome;
 
   struct Memory {
@@ -80,9 +80,9 @@ struct Resolve {
     return alone || is_finite();
   }
 
-  // a = a_exact + μ (a_damped - a_exact); the first two shares count here, see `shares.hpp`. Where
-  // μ = 0 the law is the exact one; the outcome reports it. Only limits may come near to the damped
-  // one then, which is left out until they need it.
+  // a = a_exact + μ (a_damped - a_exact); with the first two shares, see `shares.hpp`. Where
+  // μ = 0 the law is the exact one; the outcome reports it. Only limits may need the damped one
+  // then, which is skipped until they do.
   void blend(double threshold) {
     auto& [Q, X, exact, damped, by_tasks, exact_e_N, share] = edge;
     const double mu = exact_beside ? share_of_damped() : 1.0;

@@ -1,9 +1,9 @@
-// What the law does to the null space alone, where a limit binds.
+// The law's part in the null space, while a limit is active.
 //
 //   a = a_t + φ_N,      φ_N = P u
 //
-// of each of the two laws. Where an inverse is bounded P is no projector: P a is less than φ_N, and
-// what is left of it would pass for something that the tasks want.
+// of each of the two laws. Where an inverse is bounded P is not a projector: P a is less than φ_N,
+// and the difference would appear as a command of the tasks.
 #pragma once
 #include "resolve.hpp"
 
@@ -11,7 +11,7 @@ namespace hsp {
 
 struct SelfMotions {
   static constexpr const char* doc =
-      "Write φ_N of a and of a_damped, and P K_N P v, what brakes them, of both.";
+      "Write φ_N of a and of a_damped, and their damping P K_N P v.";
   In<'m', 'n'> J, J_dot;
   In<'m'> a_x;
   In<'n', 'n'> W, L;

@@ -1,20 +1,20 @@
-// The edge: the law is exact where tasks can be met, and damped where they cannot.
+// The workspace boundary: the law is exact where tasks can be met, and damped where they cannot.
 //
 //   a = a_exact + μ (a_damped - a_exact),      0 ≤ μ ≤ 1
 //
 // Out of reach an error persists, and with it the feedback's command. Near a singular posture
 // the exact inverse of that changes faster than a sampled loop can follow, so the inverse of
 // a_damped is bounded by thresholds that follow what is commanded (`threshold.hpp`). But a
-// threshold cannot distinguish an error that persists from a step within reach. Where the arm is
-// held does: at a singularity, far away, or at a limit. So μ is the largest of three shares, each
-// of them 0 in the middle:
+// threshold cannot distinguish an error that persists from a step within reach. Three conditions
+// can: a singularity, a large error, or an active limit. So μ is the largest of three shares, each
+// of them 0 in the interior of the workspace:
 //
 //   near    σ ≥ σ_x: 0;  σ ≤ σ_x/2: 1.    σ_x is a tenth of the robot's size
 //   far     |e| ≤ 0.85 ℓ: 0;  |e| ≥ ℓ: 1.      ℓ is the largest error that is fed back
 //   limits  a_t is within all limits: 0;  it is three times what they permit: 1
 //
 // with σ the smallest singular value of the stack J, whatever the metric. The first two are here,
-// the last is where limits are known, in `limited_target.hpp`. All are continuous, so a is.
+// the last is in `limited_target.hpp`, where limits are known. All are continuous, so a is.
 #pragma once
 #include <hsp/linalg.hpp>
 
@@ -27,7 +27,8 @@ inline double smooth_share(double x) {
 }
 
 // How near a singular posture is, from 0 to 1. `edge` is σ_x [m]; the law is not exact below
-// twice ε_0. What is written besides is used. The share is 1 long before rounding shows in σ.
+// twice ε_0. The other arguments are scratch memory. The share is 1 long before rounding shows in
+// σ.
 template <class J, class B, class X, class S>
 double near_share(const J& jacobian, double edge, double least, B& rows, X& factor, S& square,
                   SymmetricSpectrum& spectrum) {
@@ -36,7 +37,7 @@ double near_share(const J& jacobian, double edge, double least, B& rows, X& fact
   return smooth_share(2.0 - 2.0 * smallest_singular_value(factor, square, spectrum) / middle);
 }
 
-// How far an error is, from 0 to 1; `stretched` is |e|/ℓ of each row.
+// The share of large errors, from 0 to 1; `stretched` is |e|/ℓ of each row.
 template <class S> double far_share(const S& stretched, double far) {
   const double most = stretched.size() ? std::max(stretched.maxCoeff(), 0.0) : 0.0;
   return smooth_share((most - far) / (1.0 - far));

@@ -1,13 +1,13 @@
 // Where an inverse begins to be bounded: a threshold that follows the errors.
 //
-// A level commands J a = d. Along a direction of the singular value s it gets d/s where s is above
-// the threshold ε, and s (2 - s²/ε²) d/ε² below. The steepest of both is 2 d/ε², at s = 0. Let
-// f = Kp s(e) be what the feedback commands at rest, the part of d that persists while a task
-// cannot be met. With
+// A level commands J a = d. Along a direction of the singular value s the acceleration is d/s where
+// s is above the threshold ε, and s (2 - s²/ε²) d/ε² below. The largest slope of both in s is 2
+// d/ε², at s = 0. Let f = Kp s(e) be the feedback's command at rest, the part of d that persists
+// while a task cannot be met. With
 //
 //   ε² = max(ε_0², ‖f‖/L)
 //
-// the acceleration that it causes changes by at most 2 L for each unit of s, whatever the target.
+// the acceleration due to f changes by at most 2 L per unit of s, for any target.
 // docs/edge.md has the propositions, and the origin of each constant.
 #pragma once
 #include <hsp/indices.hpp>
@@ -15,39 +15,39 @@
 
 namespace hsp {
 
-// How the thresholds follow what is commanded, and when the exact law applies beside; the constants
-// and their reasons are those of `hsp_control/edge/constants.py`.
+// Parameters of the thresholds, and of the range of the exact law; the values and their reasons are
+// in `hsp_control/edge/constants.py`.
 struct Following {
   double size;      // the robot's [m]; 0: they do not follow
   double steepest;  // L [rad/s² for each unit of a singular value]; inf: it does not follow
   double modest;    // f_0 [m/s² or rad/s²]; 0 on a fixed base
-  double below;     // by how much L is less below a held level
-  double turning;   // ε for each rad/s of a field where a spring slips [s], times the size
+  double below;     // factor of L below an unmet level
+  double turning;   // ε per rad/s of a field while a spring is saturated [s], times the size
   double quickest;  // the largest part of a field that is used [rad/s]
-  double near;      // σ_x: the exact law applies wholly above [m]
-  double far;       // part of the largest error up to which it applies wholly
+  double near;      // σ_x: the exact law applies fully above [m]
+  double far;       // part of the largest error up to which it applies fully
 };
 
-// Where the inverses of the levels begin to be bounded.
+// The thresholds below which the inverses of the levels are bounded.
 struct Thresholds {
   InOut<'l'> own;      // ε of each level
   InOut<'l'> follows;  // the part of it that follows f
-  InOut<'l'> scales;   // by how much J L⁻ᵀ is longer than J, at least 1: the unit of ε
+  InOut<'l'> scales;   // ratio of J L⁻ᵀ to J, at least 1: the unit of ε
 };
 
-// What is commanded for the rows of the stack, level after level.
+// Commands of the rows of the stack, level after level.
 struct Demand {
   Ints<'l'> ends;      // where each level's rows end
-  In<'m'> demand;      // f, what the feedback commands at rest
-  In<'m'> yields;      // by how much L is less for a row; 0: it is not active
-  In<'m'> pulls;       // with how much of its largest force a spring pulls
+  In<'m'> demand;      // f, the feedback's command at rest
+  In<'m'> yields;      // factor of L for a row; 0: it is not active
+  In<'m'> pulls;       // force of a spring relative to its largest
   Flags<'m'> springs;  // whether a row is that of a spring
-  In<'m'> stretched;   // how long an error is, relative to its largest length
+  In<'m'> stretched;   // length of an error relative to its largest
 
   void check() const { check_ends("ends", ends, demand.size()); }
 };
 
-// The ε that a field needs where a spring slips.
+// The ε that a field needs while a spring is saturated.
 template <class G> double turning_threshold(const G& g, const Following& following) {
   return following.turning * std::min(g.norm(), following.quickest);
 }
@@ -57,7 +57,7 @@ template <class G> double turning_threshold(const G& g, const Following& followi
 template <class J, class B>
 double write_thresholds(const J& jacobian, const B& whitened, const Demand& rows, double least,
                         double turning, const Following& following, Thresholds& thresholds) {
-  double largest = least, above = 0.0;  // the largest scale of those above
+  double largest = least, above = 0.0;  // the largest scale of the levels above
   Index start = 0;
   for (Index level = 0; level < rows.ends.size(); ++level) {
     const Index size = rows.ends[level] - start;
@@ -89,8 +89,9 @@ double write_thresholds(const J& jacobian, const B& whitened, const Demand& rows
   return largest;
 }
 
-// The ε that a level below others has at least. It commands f - J a_f; `held` is how much
-// those above are held, and `above` their least singular value in their scale, inf if none turns.
+// The least ε of a level below others. It commands f - J a_f; `held` is how far the levels above
+// are unmet, and `above` their smallest singular value in their scale, inf if none is near a
+// singularity.
 template <class F>
 double threshold_below(const F& demand, double held, double above, Index level,
                        const Following& following, const Thresholds& thresholds) {
@@ -100,9 +101,9 @@ double threshold_below(const F& demand, double held, double above, Index level,
   return std::sqrt(square + follows * follows * following.size / above);
 }
 
-// How much a level is held at the edge, from 0 (exact) to nearly 1, by ‖f - J a_f‖², its unmet
-// command at rest, and ‖f‖². It grows slowly with the command that its threshold follows: as fast
-// as the level is lost to what is below it, both would oscillate.
+// How far a level is unmet at the workspace boundary, from 0 (exact) to nearly 1, by ‖f - J a_f‖²,
+// its unmet command at rest, and ‖f‖². It grows slowly with the command that its threshold follows:
+// if it grew as fast as lower levels are released, both would oscillate.
 inline double how_held(double lacking, double wanted, double least, const Following& following) {
   const double beyond = std::sqrt(wanted) - following.modest;
   if (beyond <= 0.0) return 0.0;

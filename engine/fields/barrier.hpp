@@ -10,7 +10,8 @@ struct BarrierValue {
   double value, slope, curvature;
 };
 
-// b(s) = -(1 - s)² ln s, b' and b'', s the distance over that at which the barrier begins.
+// b(s) = -(1 - s)² ln s, b' and b'', with s the distance relative to that at which the barrier
+// begins.
 //
 // C², zero for s ≥ 1. Below the core its second-order Taylor polynomial at the core replaces it,
 // so that it is finite for all s (Li et al. 2020, incremental potential contact).

@@ -11,7 +11,7 @@
 //
 //   w_i · Σ_{j from i on} (l_j × b_j + w_j × c_j) + l_i · Σ_{j before i} (b_j × w_j)
 //
-// which running sums give in O(n), without the kinematic Hessian. Its rate is exact too, because
+// which running sums compute in O(n), without the kinematic Hessian. Its rate is exact too, because
 // J' is known exactly.
 #pragma once
 #include <hsp/indices.hpp>
@@ -41,8 +41,8 @@ struct ChainGradient {
   In<'k', 'n'> slope, slope_rate;  // ∂φ/∂J and its rate, of the selected rows
   Ints<'k'> selected;
   In<'k'> scale;
-  Ints<'s'> dofs;   // those that move the frame, from the root on
-  Ints<'s'> first;  // where among them the joint of each begins
+  Ints<'s'> dofs;   // the dofs that move the frame, from the root on
+  Ints<'s'> first;  // index among them at which the joint of each begins
   Out<'n'> gradient, rate;
   Scratch<6, 'n'> B, B_dot;  // zero in the rows that are not selected
   Scratch<'s', 3> before, before_dot, from_here, from_here_dot;

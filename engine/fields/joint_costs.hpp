@@ -9,7 +9,7 @@
 
 namespace hsp {
 
-// Throws where the joints with limits are not those of a robot with these sizes of q and v.
+// Throws if the joints with limits do not fit these sizes of q and v.
 inline void check_limited(const Ints<'k', 2>& limited, Index q, Index v) {
   check_indices("the joints' indices in v", limited.col(0), v);
   check_indices("the joints' indices in q", limited.col(1), q);
@@ -19,7 +19,7 @@ struct JointCentering {
   static constexpr const char* doc = "f = ½ Σ k_i (q_i - m_i)² of the joints with limits.";
   In<'q'> q;
   In<'n'> v;
-  Ints<'k', 2> limited;       // where they are in v and in q
+  Ints<'k', 2> limited;       // indices in v and in q
   In<'k'> middle, stiffness;  // m, and k = w_i/r_i² [1/s]
   Out<'n'> gradient, rate;
   Scratch<'k'> away;
@@ -44,7 +44,7 @@ struct TargetPosture {
   In<'n'> v;
   In<'q'> target;
   TrajectorySample<In, 'n'> displacement;
-  Ints<'s', 3> single_dof_joints;  // where they are in v and in q, and their coordinates there
+  Ints<'s', 3> single_dof_joints;  // indices in v and in q, and number of coordinates
   In<'n'> weights;                 // w [1/s]
   Out<'n'> gradient, rate;
 
@@ -79,7 +79,7 @@ struct EqualJointAngles {
   In<'n'> v;
   In<'q'> neutral;
   Ints<'s', 3> single_dof_joints;
-  Ints<'k'> chain;  // where they are in v
+  Ints<'k'> chain;  // indices in v
   Out<'n'> gradient, rate;
   Scratch<'n'> angles;
 
@@ -110,7 +110,7 @@ struct LimitBarrier {
       "f = Σ w_i (b((q_i - lower_i)/u_i) + b((upper_i - q_i)/u_i)) of the joints with limits.";
   In<'q'> q;
   In<'n'> v;
-  Ints<'k', 2> limited;                 // where they are in v and in q
+  Ints<'k', 2> limited;                 // indices in v and in q
   In<'k'> lower, upper, unit, weights;  // u, and w [1/s]
   Out<'n'> gradient, rate;
 

@@ -8,7 +8,7 @@
 namespace hsp {
 
 // J are the selected rows of a frame's Jacobian, scaled (`SelectRows`), so that metres and radians
-// can be added; A : B = Σ A_ij B_ij. The gradient in q is made of ∂f/∂J by `ChainGradient`.
+// can be added; A : B = Σ A_ij B_ij. `ChainGradient` computes the gradient in q from ∂f/∂J.
 //
 // With G = J W⁻¹ Jᵀ + ε I and φ = ½ log det G,
 //

@@ -19,7 +19,7 @@ class Bytes {
     return value;
   }
   std::string text() { return std::string(take(number<std::uint32_t>())); }
-  // How many things follow, each of a byte at least.
+  // Number of items that follow, each of at least one byte.
   std::uint32_t count() {
     const auto n = number<std::uint32_t>();
     if (n > rest_.size()) fail();
@@ -38,12 +38,12 @@ class Bytes {
 
  private:
   [[noreturn]] static void fail() {
-    throw std::runtime_error("it ends too early: it was cut, or is no frozen controller");
+    throw std::runtime_error("it ends too early: it was truncated, or is not a frozen controller");
   }
   std::string_view rest_;
 };
 
-// CRC-32, as zlib's: whatever is changed within 32 bits shows.
+// CRC-32, as zlib's: detects any change within 32 bits.
 inline std::uint32_t checksum(std::string_view bytes) {
   std::uint32_t crc = 0xffffffffu;
   for (const char byte : bytes) {

@@ -1,4 +1,4 @@
-// The end of a step that nobody looks at: which effort is delivered, and whether there is one.
+// The end of a step without Python: which effort is delivered, and whether there is one.
 #pragma once
 #include <hsp/indices.hpp>
 #include <hsp/kind.hpp>
@@ -10,7 +10,7 @@
 
 namespace hsp {
 
-// What is decided here is what `BoundStep.make` and `Actuation.delivered` decide in Python.
+// The decisions are those of `BoundStep.make` and `Actuation.delivered` in Python.
 struct Deliver {
   static constexpr const char* doc =
       "The effort of a step: the law's own M a + N within the limits, else the nearest; the last "
@@ -18,7 +18,7 @@ struct Deliver {
   LawOutcome<Ints> law;
   LimitsOutcome<Ints> limits;
   QPOutcome<Ints> qp;
-  In<'n'> acceleration, effort;  // the law's own
+  In<'n'> acceleration, effort;  // of the law
   In<'n'> nearest_acceleration, nearest_effort;
   In<'n'> wanted, lower, upper;  // the QP's unconstrained solution, and bounds of the effort
   std::int64_t relaxed, beyond;
@@ -34,7 +34,7 @@ struct Deliver {
     a = nearest ? nearest_acceleration : acceleration;
     tau = nearest ? nearest_effort : effort;
     status[0] = nearest ? qp.status[0] : 0;
-    if (limits.violated[0] && !nearest) {  // the solver gave up
+    if (limits.violated[0] && !nearest) {  // the solver failed
       tau = wanted.cwiseMax(lower).cwiseMin(upper);
       status[0] = relaxed;
     }
@@ -43,7 +43,7 @@ struct Deliver {
   }
 };
 
-// Where contacts carry: what `Actuation._within_limits` decides in Python.
+// With contacts that carry the robot: the decision of `Actuation._within_limits` in Python.
 struct ForcesWithin {
   static constexpr const char* doc =
       "Whether the law's acceleration is delivered with the forces of minimum norm, needs others, "
@@ -77,9 +77,9 @@ struct DeliverWithForces {
   LimitsOutcome<Ints> limits;
   QPOutcome<Ints> qp;
   Ints<1> exact, redistribute;
-  In<'n'> acceleration, effort;  // the law's own
+  In<'n'> acceleration, effort;  // of the law
   In<'n'> nearest_acceleration, nearest_effort;
-  Ints<'b'> base;  // what has no motor
+  Ints<'b'> base;  // dofs without a motor
   In<'n'> lower, upper;
   std::int64_t redistributed, relaxed, beyond;
   Out<'n'> a, tau;
@@ -91,7 +91,7 @@ struct DeliverWithForces {
     const bool solved = !exact[0] && !qp.unsolved[0];
     if (exact[0]) found = effort;
     else if (solved) found = nearest_effort;
-    else {  // the solver gave up
+    else {  // the solver failed
       found = effort.cwiseMax(lower).cwiseMin(upper);
       for (Index i = 0; i < base.size(); ++i) found[base[i]] = 0.0;
     }

@@ -1,4 +1,4 @@
-// An input that changes as on the time line of a controller in Python: see `Evolution`.
+// An input that changes like the time line of a controller in Python: see `Evolution`.
 #pragma once
 #include <algorithm>
 #include <cmath>
@@ -18,9 +18,9 @@ struct Evolve {
   InOut<'n'> initial;       // x before all transitions that are kept
   InOut<'k', 'n'> targets;  // in order of time
   InOut<'k', 2> times;      // when each begins, and how long it takes [s]
-  InOutInts<1> count;       // how many there are
-  double least, most;       // bounds of what may be commanded
-  std::int64_t definite;    // size of x as a matrix that has to be positive definite; 0: it is none
+  InOutInts<1> count;       // number of transitions
+  double least, most;       // bounds of commands
+  std::int64_t definite;    // size of x as a matrix that must be positive definite; 0: not a matrix
   Out<'n'> x, rate;         // x' of the ramps [1/s]
   Scratch<'n'> factor;      // of such a matrix
 
@@ -59,7 +59,7 @@ struct Evolve {
     return cholesky(L, L);
   }
 
-  // Go to a value from a time on, which is none before the last one; whether there is room for it.
+  // Go to a value from a time on, not before the last one; returns whether there is room for it.
   template <class Values> bool then(double t, double ramp, const Values& wanted) {
     settle(t);
     if (used() == targets.rows()) return false;
@@ -72,7 +72,7 @@ struct Evolve {
  private:
   Index used() const { return std::clamp<Index>(count[0], 0, targets.rows()); }
 
-  // Forget what is over: x is the target of the last transition that is complete.
+  // Drop completed transitions: x is the target of the last of them.
   void settle(double t) {
     Index done = 0;
     for (Index k = 0; k < used(); ++k)

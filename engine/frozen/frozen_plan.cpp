@@ -21,14 +21,14 @@ std::string content_of(const std::string& file) try {
   throw std::runtime_error("it cannot be read");
 }
 
-// What follows the header: magic, checksum, build. All that a reader trusts is behind the checksum.
+// The header: magic, checksum, build. Only data behind the checksum is trusted.
 Bytes body_of(std::string_view content) {
   if (content.substr(0, magic.size()) != magic)
-    throw std::runtime_error("it is no frozen controller");
+    throw std::runtime_error("it is not a frozen controller");
   Bytes bytes(content.substr(magic.size()));
   const auto sum = bytes.number<std::uint32_t>();
   if (checksum(content.substr(magic.size() + sizeof(sum))) != sum)
-    throw std::runtime_error("it was changed or cut since it was written: freeze it anew");
+    throw std::runtime_error("it was changed or truncated since it was written: freeze it anew");
   const std::string build = bytes.text();
   if (build != build_text())
     throw std::runtime_error("it was frozen by " + build + "; this library is " + build_text() +
@@ -39,7 +39,8 @@ Bytes body_of(std::string_view content) {
 const Kind& kind_named(const Kind* const* kinds, const std::string& name) {
   for (; *kinds; ++kinds)
     if ((*kinds)->name == name) return **kinds;
-  throw std::runtime_error("it has calls of the kind " + name + ", which this library has not");
+  throw std::runtime_error("it has calls of the kind " + name +
+                           ", which this library does not have");
 }
 
 const Kind& kind_named(const std::string& library, const std::string& name) {
@@ -88,7 +89,7 @@ std::int64_t entries(const Argument& array, int rank) {
   constexpr std::int64_t most = std::int64_t{1} << 40;
   for (int i = 0; i < rank; ++i) {
     if (array.shape[i] < 0 || array.shape[i] > most / std::max<std::int64_t>(count, 1))
-      throw std::runtime_error("an array has a shape that cannot be");
+      throw std::runtime_error("an array has an impossible shape");
     count *= array.shape[i];
   }
   return count;
@@ -104,7 +105,7 @@ FrozenPlan::FrozenPlan(const std::string& file) {
   move_ = shared(bytes.number<std::uint32_t>(), Move::type_name);
   stop_ = shared(bytes.number<std::uint32_t>(), Move::type_name);
   if (stop().q.size() != move().q.size() || stop().v.size() != move().v.size())
-    throw std::runtime_error("its stop is of another robot");
+    throw std::runtime_error("its stop is for another robot");
   for (auto n = bytes.count(); n > 0; --n) read_port(bytes);
 }
 
@@ -117,12 +118,12 @@ const Port* FrozenPlan::port(std::string_view name) const {
 Plan::Row FrozenPlan::Object::row() const {
   if (plan)
     return {[](void* self, double t) { return static_cast<Plan*>(self)->run(t); }, plan.get()};
-  if (!call) throw std::runtime_error("a plan makes what is no call");
+  if (!call) throw std::runtime_error("a plan contains an object that is not a call");
   return {call->kind.run, call->self()};
 }
 
-// Arrays that overlap in Python overlap here; and each lies as it lay to a packet of a processor,
-// since the order of a sum follows from that.
+// Arrays that overlap in Python overlap here; and each has the same alignment to the processor's
+// packets, which determines the order of sums.
 void FrozenPlan::read_memory(Bytes& bytes) {
   initial_ = bytes.take(bytes.number<std::uint64_t>());
   arena_.reset(static_cast<char*>(::operator new(initial_.size(), alignment)));
@@ -190,7 +191,8 @@ void FrozenPlan::read_port(Bytes& bytes) {
   port.entry = bytes.number<char>();
   const char role = bytes.number<char>();
   const Field field{.rank = 1};
-  if (port.entry != 'd' && port.entry != 'i') throw std::runtime_error("a port is of no type");
+  if (port.entry != 'd' && port.entry != 'i')
+    throw std::runtime_error("a port has an unknown type");
   const Argument array = read_array(bytes, field);
   port.size = array.shape[0];
   port.data = array.data;
@@ -202,7 +204,7 @@ void FrozenPlan::read_port(Bytes& bytes) {
     const double* first = port.payloads->asked.data();
     port.frame = (static_cast<double*>(port.data) - first) / 10;
     if (port.data < first || port.frame >= port.payloads->asked.rows())
-      throw std::runtime_error("a payload is of no frame");
+      throw std::runtime_error("a payload has no frame");
   } else if (role != 'o') throw std::runtime_error("a port has no role");
   const Index size = port.input      ? port.input->x.size()
                      : port.target   ? port.target->sent_target.size()
@@ -217,12 +219,13 @@ void FrozenPlan::read_port(Bytes& bytes) {
 template <class Kind> Kind& FrozenPlan::input(Bytes& bytes) const {
   const Object& found = object(bytes.number<std::uint32_t>());
   if (!found.call || &found.call->kind != &kind_of<Kind>())
-    throw std::runtime_error("an input is none");
+    throw std::runtime_error("an input is invalid");
   return *static_cast<Kind*>(found.call->self());
 }
 
 const FrozenPlan::Object& FrozenPlan::object(std::uint32_t index) const {
-  if (index >= objects_.size()) throw std::runtime_error("it names an object that is not there");
+  if (index >= objects_.size())
+    throw std::runtime_error("it refers to an object that does not exist");
   return objects_[index];
 }
 
@@ -232,7 +235,7 @@ void* FrozenPlan::shared(std::uint32_t index, std::string_view type) const {
   if (type == Dynamics::type_name && found.dynamics) return found.dynamics.get();
   if (type == Move::type_name && found.call && &found.call->kind == &kind_of<Move>())
     return found.call->self();
-  throw std::runtime_error("an object is no " + std::string(type));
+  throw std::runtime_error("an object is not a " + std::string(type));
 }
 
 }  // namespace hsp::frozen

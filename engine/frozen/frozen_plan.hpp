@@ -1,4 +1,4 @@
-// A plan out of a file, with its memory and its robots; see `hsp_control/frozen/image.py`, which
+// A plan from a file, with its memory and its robots; see `hsp_control/frozen/image.py`, which
 // writes it.
 #pragma once
 #include <memory>
@@ -22,7 +22,7 @@ struct Port {
   char entry;  // 'd' or 'i'
   std::int64_t size;
   void* data;
-  // What takes what is set; all are null of an output.
+  // The receivers of a set value; all are null for an output.
   Evolve* input = nullptr;
   StreamAlone *target = nullptr, *velocity = nullptr;
   Payloads* payloads = nullptr;
@@ -32,13 +32,13 @@ struct Port {
 
 class FrozenPlan {
  public:
-  // Throws std::exception where the file is not one of this library, or does not fit itself.
+  // Throws std::exception if the file is not one of this library, or is inconsistent.
   explicit FrozenPlan(const std::string& file);
   FrozenPlan(const FrozenPlan&) = delete;
 
   void restart() { std::memcpy(arena_.get(), initial_.data(), initial_.size()); }
   Move& move() const { return *static_cast<Move*>(move_); }
-  // What brakes instead of it; itself where nothing does.
+  // The plan of the safe stop; itself if there is none.
   Move& stop() const { return *static_cast<Move*>(stop_); }
   const std::vector<Port>& ports() const { return ports_; }
   // Null if there is none.
@@ -58,7 +58,7 @@ class FrozenPlan {
   };
   static constexpr std::align_val_t alignment{64};
 
-  // What calls share, or a plan makes: an address for each type that it can be.
+  // A shared object or a call: an address for each type that it can have.
   struct Object {
     std::unique_ptr<Dynamics> dynamics;
     std::unique_ptr<Call> call;
@@ -76,7 +76,7 @@ class FrozenPlan {
   void* shared(std::uint32_t index, std::string_view type) const;
 
   std::unique_ptr<char, Aligned> arena_;
-  std::string initial_;  // the arena as it was in the file
+  std::string initial_;  // the arena as in the file
   std::vector<Object> objects_;
   std::vector<Port> ports_;
   void *move_ = nullptr, *stop_ = nullptr;

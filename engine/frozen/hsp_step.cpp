@@ -52,7 +52,7 @@ struct hsp_controller {
   double* tau;
   const std::int64_t *status, *delivered;
   const double* period;
-  double* origin;              // what the clock reads at time 0 [s]
+  double* origin;              // the clock's reading at time 0 [s]
   std::optional<double> last;  // time of the last step [s]
   const bool stops;            // whether hsp_stop brakes
   const double* stop_tau = nullptr;
@@ -60,8 +60,8 @@ struct hsp_controller {
   const double* damping = nullptr;  // [1/s]
   bool stopping = false;
   int refused = 0;                     // periods in a row without a new effort
-  hsp::Vector expected_q, expected_v;  // the last state that was accepted, and what follows from it
-  bool blind = false;                  // whether hsp_stop goes by what is expected
+  hsp::Vector expected_q, expected_v;  // the last accepted state, and the state predicted from it
+  bool blind = false;                  // whether hsp_stop uses the predicted state
   std::atomic<hsp_status> error = HSP_OK;  // of the last request
   char failure[512] = "";                  // an exception's message
   std::atomic_flag busy = ATOMIC_FLAG_INIT;
@@ -97,14 +97,14 @@ hsp_status moved(hsp_controller& of, double t, const double* q, const double* v)
   hsp::Move& move = of.plan.move();
   const Eigen::Map<const hsp::Vector> q_in(q, move.q.size()), v_in(v, move.v.size());
   if (!std::isfinite(t)) return HSP_WRONG_STATE;
-  if (!of.last) *of.origin = t;  // times count from the first step, whatever the clock reads
+  if (!of.last) *of.origin = t;  // times are relative to the first step
   else if (t < *of.last || t > *of.last + most_periods * *of.period) return HSP_WRONG_CLOCK;
   if (!move.to(t, q_in, v_in)) return HSP_WRONG_STATE;
   accept(of, t, move);
   return *of.delivered ? static_cast<hsp_status>(*of.status) : HSP_NOT_FINITE;
 }
 
-// Brake, or hold, at the state that the stop has moved to.
+// Brake, or hold, at the state to which the stop was moved.
 hsp_status braked(hsp_controller& of) {
   const Eigen::Map<const hsp::Vector> found(of.stop_tau, of.plan.stop().v.size());
   if (!found.allFinite()) return HSP_NOT_FINITE;
@@ -112,24 +112,24 @@ hsp_status braked(hsp_controller& of) {
   return *of.holding ? HSP_HOLDING : HSP_BRAKING;
 }
 
-// A period whose state is not known: it moves on as fast as before while the last effort is
-// repeated, and then more and more slowly, as a robot does that is braked by -k M v.
+// A period with an unknown state: the prediction moves at constant speed while the last effort is
+// repeated, and then decelerates like a robot braked by -k M v.
 void expect(hsp_controller& of) {
   hsp::Vector &q = of.expected_q, &v = of.expected_v;
-  if (q.size() == v.size()) q += *of.period * v;  // joints that are counted from zero
+  if (q.size() == v.size()) q += *of.period * v;  // joints with linear coordinates
   if (of.refused >= most_repeated && of.stops) v *= std::max(1.0 - *of.damping * *of.period, 0.0);
 }
 
-// Brake, or hold: the effort, or the last one, is then `of.tau`. No clock is wrong here.
+// Brake, or hold: the effort, or the last one, is then `of.tau`. The time is not checked here.
 hsp_status stopped(hsp_controller& of, double t, const double* q, const double* v) {
   if (!of.stops)
-    throw std::runtime_error("nothing carries this robot's base: it is not stopped here");
+    throw std::runtime_error("no contact carries this robot's base: it cannot be stopped here");
   hsp::Move& stop = of.plan.stop();
   const Eigen::Map<const hsp::Vector> q_in(q, stop.q.size()), v_in(v, stop.v.size());
   of.stopping = true;
   if (stop.is_valid(t, q_in, v_in)) {
     if (!of.last) *of.origin = t;
-    if (of.blind) *of.holding = 0;  // where it was expected to come to rest it need not be
+    if (of.blind) *of.holding = 0;  // it may not be at rest where that was predicted
     of.blind = false;
     stop.to(t, q_in, v_in);
     accept(of, t, stop);
@@ -146,7 +146,7 @@ hsp_status step(hsp_controller& of, double t, const double* q, const double* v, 
                 bool stops) {
   hsp_status status = HSP_STOPPED;
   if (!stops && !of.stopping) status = moved(of, t, q, v);
-  // One wrong state is passed over. An effort that is repeated for long drives the robot.
+  // A single invalid state is tolerated. An effort that is repeated for long drives the robot.
   const bool lasts = status < 0 && of.refused >= most_repeated && of.last && of.stops;
   if (stops || of.stopping || lasts) {
     const hsp_status stop = stopped(of, t, q, v);
@@ -159,7 +159,7 @@ hsp_status step(hsp_controller& of, double t, const double* q, const double* v, 
   return status;
 }
 
-// Let an input go to values from now on.
+// Change an input to values from now on.
 hsp_status change(hsp_controller& of, const char* name, const double* values, std::size_t size,
                   double duration) {
   const Port* port = name ? of.plan.port(name) : nullptr;
@@ -167,7 +167,7 @@ hsp_status change(hsp_controller& of, const char* name, const double* values, st
   if (static_cast<std::size_t>(port->size) != size) return HSP_WRONG_SIZE;
   if (!values || !(duration >= 0.0 && duration < infinite)) return HSP_WRONG_VALUE;
   const Eigen::Map<const hsp::Vector> wanted(values, port->size);
-  // Before the first step it is so from the beginning.
+  // Before the first step they apply from the beginning.
   const double now = of.last ? of.plan.move().time[0] : -infinite;
   const double ramp = of.last ? duration : 0.0;
   if (port->payloads) {
@@ -202,7 +202,7 @@ const char* sentence(hsp_status status) {
     case HSP_STOPPED:
       return "the robot is being stopped, as by hsp_stop; hsp_restart begins a new run";
     case HSP_WRONG_STATE:
-      return "t, q or v is not finite, or a quaternion or (cos, sin) pair in q has not norm 1";
+      return "t, q or v is not finite, or a quaternion or (cos, sin) pair in q is not of norm 1";
     case HSP_WRONG_CLOCK:
       return "the time went back, or on by more than 100 periods, since the last step: times are "
              "seconds, and increase by the period; hsp_restart begins a new run";
@@ -222,9 +222,9 @@ const char* sentence(hsp_status status) {
     case HSP_TOO_MANY:
       return "the input still follows 8 ramps, which is the most";
     case HSP_FAILED:
-      return "a call failed, which hsp_last_error says";
+      return "a call failed; see hsp_last_error";
   }
-  return "no status of hsp_step.h";
+  return "not a status of hsp_step.h";
 }
 
 }  // namespace
@@ -232,7 +232,7 @@ const char* sentence(hsp_status status) {
 hsp_controller* hsp_open(const char* file) noexcept {
   opening[0] = 0;
   if (!file) {
-    write(opening, sizeof opening, "hsp_open was given no file");
+    write(opening, sizeof opening, "hsp_open received no file");
     return nullptr;
   }
   try {

@@ -1,4 +1,4 @@
-// What compensators add to a step that nobody looks at.
+// The contribution of compensators to a step without Python.
 #pragma once
 #include <hsp/kind.hpp>
 
@@ -31,7 +31,7 @@ struct Subtract {
 };
 
 struct HasMoved {
-  static constexpr const char* doc = "A state has other numbers than before.";
+  static constexpr const char* doc = "Whether a state differs from the last one.";
   InOutInts<1> stamp;
 
   void operator()() { ++stamp[0]; }

@@ -1,4 +1,4 @@
-// What a robot carries, as a program without Python sets it: see `ChangePayload`.
+// A robot's payloads, set by a program without Python: see `ChangePayload`.
 #pragma once
 #include <Eigen/Eigenvalues>
 #include <hsp/indices.hpp>
@@ -27,20 +27,20 @@ struct BodyInJoint {
 
 struct Payloads {
   static constexpr const char* doc =
-      "Let a robot carry bodies, each in part while it is taken up or put down.";
+      "Set the bodies that a robot carries, each with a share while it is taken up or put down.";
   Shared<Dynamics> dynamics;
   Ints<'f'> joints;         // of the frames that may carry,
   In<'f', 3, 3> rotations;  // in their axes
   In<'f', 3> positions;
-  InOut<'f', 10> asked;   // mass, centre, xx xy xz yy yz zz of the inertia about it
+  InOut<'f', 10> asked;   // mass, centre, and xx xy xz yy yz zz of the inertia about it
   InOutInts<1> count;     // bodies that are carried, taken up or put down
-  InOutInts<'k'> frames;  // what each is fixed to
+  InOutInts<'k'> frames;  // the frame of each
   InOut<'k'> masses;
   InOut<'k', 3> centers;
   InOut<'k', 9> inertias;
-  InOutInts<'k'> changes;  // how many: the first one takes it up, the others put it down
+  InOutInts<'k'> changes;  // their number: the first takes it up, the others put it down
   InOut<'k', 'm'> starts, ramps;
-  Scratch<1> carries;  // whether the dynamics have any
+  Scratch<1> carries;  // whether the dynamics have payloads
 
   void check() const {
     check_indices("joints", joints, dynamics->joints(), 1);
@@ -73,7 +73,7 @@ struct Payloads {
            !(body[0] == 0.0 && principal[2] > 0.0);
   }
 
-  // Carry it from a time on, instead of what the frame carries; whether there is room for it.
+  // Carry it from a time on, instead of the frame's present payload; returns whether there is room.
   template <class Values> bool then(Index frame, double t, double ramp, const Values& body) {
     settle(t);
     const Index used = number();
@@ -113,7 +113,7 @@ struct Payloads {
     return I;
   }
 
-  // How much of it is carried, and the derivatives of that: see `Evolution`.
+  // Its carried share, and the derivatives: see `Evolution`.
   SmoothStep share_of(Index k, double t) const {
     double x = 0.0, x_dot = 0.0, x_ddot = 0.0;
     for (Index i = 0; i < number_of(k); ++i) {
@@ -132,7 +132,7 @@ struct Payloads {
     return {x, x_dot, x_ddot};
   }
 
-  // Forget what has been put down.
+  // Remove bodies that have been put down.
   void settle(double t) {
     Index kept = 0;
     for (Index k = 0; k < number(); ++k) {

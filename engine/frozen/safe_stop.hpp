@@ -16,8 +16,8 @@ struct Brake {
   In<'q'> q;
   In<'n'> v, away;  // q - q0, of the last q0
   In<'n', 'n'> M;
-  Ints<'b'> base;       // what has no motor,
-  In<'f'> standing;     // and what carries it: 1 for each force of a foot that stands, 0 for others
+  Ints<'b'> base;       // dofs without a motor,
+  In<'f'> standing;     // and its supports: 1 for each force of a stance foot, 0 for others
   InOut<1> damped_for;  // [s]
   InOutInts<1> holding;
   InOut<'q'> held_q;  // q0

@@ -1,4 +1,4 @@
-// Links and obstacles, where they are and how they move.
+// Links and obstacles, their placements and motions.
 #pragma once
 #include <hsp/indices.hpp>
 #include <hsp/kind.hpp>
@@ -31,7 +31,7 @@ struct Bodies {
       if (is_link(i)) check_range("a link", kinds(i, 2), kinds(i, 3), columns.size());
     check_indices("kinds", kinds.col(0), HALF_SPACE + 1);
   }
-  // Throw where the joints, the Jacobian or v are those of another robot.
+  // Throws if the joints, the Jacobian or v are those of another robot.
   void check_joints(Index joints) const {
     check_indices("the joints of kinds", kinds.col(1), joints, -motion.rows());
   }
@@ -50,7 +50,7 @@ struct Bodies {
   auto own_dofs(Index i) const { return dofs.segment(kinds(i, 2), kinds(i, 3) - kinds(i, 2)); }
 };
 
-// Pairs are a link, a body, and where their distance is; a link's core is a segment.
+// Pairs are a link, a body, and the index of their distance; a link's core is a segment.
 template <class Pairs> void check_pairs(const Pairs& pairs, const Bodies& bodies, Index distances) {
   check_indices("pairs", pairs.template leftCols<2>(), bodies.kinds.rows());
   check_indices("the places of pairs", pairs.col(2), distances);

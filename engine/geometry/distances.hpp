@@ -21,7 +21,7 @@ struct MeasureDistances {
   In<'j', 12> placements;     // of the joints, see WorldKinematics
   Bodies bodies;
   Ints<'u'> used;             // the bodies with segments that are in a pair
-  Ints<'p', 3> pairs;         // two bodies, and where their distance is written
+  Ints<'p', 3> pairs;         // two bodies, and the index of their distance
   InOut<'b', 2, 3> segments;  // start and axis in the world
   Out<'p', 3, 3> cores;       // x, y and n of each pair
   InOut<'d'> distances;       // [m]
@@ -118,7 +118,7 @@ struct DistanceGradients {
 struct AddForce {
   static constexpr const char* doc = "Add J(x)ᵀ f, J the linear Jacobian of a link's point x.";
   Columns<6, 'e'> jacobian;  // of all joints, in world axes at the world's origin
-  Ints<'c'> columns, dofs;   // those that move the link, and their indices in v
+  Ints<'c'> columns, dofs;   // columns that move the link, and their indices in v
   In<3> point, force;
   InOut<'n'> out;
 

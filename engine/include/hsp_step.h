@@ -12,8 +12,7 @@
  *
  * The effort is that of the controller in Python, to the last bit. `hsp_step`, `hsp_stop`,
  * `hsp_set`, `hsp_ramp`, `hsp_get` and `hsp_restart` allocate nothing, take no lock and make no
- * system call. A handle belongs to one thread at a time; different handles do not know of each
- * other.
+ * system call. A handle belongs to one thread at a time; different handles are independent.
  *
  * Units are SI, axes those of the world, linear rows before angular rows. */
 #ifndef HSP_STEP_H
@@ -34,13 +33,13 @@ extern "C" {
 #define HSP_NOEXCEPT
 #endif
 
-/* What became of a step, or of a request. From 0 on it was done, and tau is a new effort; below, it
- * was refused. Of a step or a stop that was refused, tau is the effort that was delivered last, or
- * 0 if there was none yet, but for no more than 5 periods in a row: an effort that is repeated for
- * long drives the robot. From the sixth on the robot is stopped, as by hsp_stop and for good. Where
- * t, q and v are finite the stop goes by them. Where they are not, it goes by the last ones that
- * were, and by how fast they would change under its own braking: the effort fades to that which
- * carries the robot. This is not measured: let the robot's own brakes take over. */
+/* The outcome of a step, or of a request. If it is 0 or more, the request succeeded, and tau is a
+ * new effort; below 0 it was refused. After a refused step or stop, tau is the last delivered
+ * effort, or 0 if there was none yet, for at most 5 periods in a row: an effort that is repeated
+ * for long drives the robot. From the sixth on the robot is stopped permanently, as by hsp_stop.
+ * The stop uses t, q and v if they are finite. Otherwise it uses the last finite ones, and predicts
+ * their change under its own braking: the effort fades to that which carries the robot. This motion
+ * is not measured: let the robot's own brakes take over. */
 typedef enum hsp_status {
   HSP_OK = 0,            /* the law's own effort */
   HSP_REDISTRIBUTED = 1, /* with contact forces chosen by a QP */
@@ -72,8 +71,8 @@ typedef struct hsp_port {
   int is_input;        /* whether it can be set */
 } hsp_port;
 
-/* Open a controller that was frozen; NULL where it is none, was cut or changed, or is of another
- * version or processor: `hsp_last_error(NULL)` names it. */
+/* Open a frozen controller; NULL if the file is not one, was truncated or changed, or is for
+ * another version or processor: `hsp_last_error(NULL)` has the reason. */
 HSP_API hsp_controller* hsp_open(const char* file) HSP_NOEXCEPT;
 HSP_API void hsp_close(hsp_controller* controller) HSP_NOEXCEPT;
 
@@ -89,15 +88,15 @@ HSP_API hsp_status hsp_step(hsp_controller* controller, double t, const double* 
 
 /* Stop the robot: call it each period instead of hsp_step, once a step is refused or the run is to
  * end. It brakes all joints alike, tau = g(q) - s k M(q) v, until they are slow, and then holds
- * them, as `hsp live` does, by the same code; the law, its limits and its clock are not evaluated.
- * Efforts keep their limits, but not those on their rate. Payloads are included. A robot on feet
- * stands on its contacts meanwhile, except on those steeper than 60°: they carry it and the braking
- * of its base. Whether they do is not measured: after a fall, switch the motors off. hsp_step makes
- * no step from then on: it does the same, and returns HSP_STOPPED. */
+ * them, as `hsp live` does, with the same code; the law, its limits and its clock are not
+ * evaluated. Efforts keep their limits, but not those on their rate. Payloads are included. A robot
+ * on feet stands on its contacts meanwhile, except on those steeper than 60°: they carry it and the
+ * braking of its base. Whether they do is not measured: after a fall, switch the motors off.
+ * From then on hsp_step does the same instead of a step, and returns HSP_STOPPED. */
 HSP_API hsp_status hsp_stop(hsp_controller* controller, double t, const double* q, const double* v,
                             double* tau) HSP_NOEXCEPT;
 
-/* Begin anew: all memory is as in the file, inputs too. */
+/* Restart: all memory is as in the file, including inputs. */
 HSP_API hsp_status hsp_restart(hsp_controller* controller) HSP_NOEXCEPT;
 
 /* Inputs and outputs, by number or by name; NULL where there is none. */
@@ -105,26 +104,26 @@ HSP_API const hsp_port* hsp_port_at(const hsp_controller* controller, size_t num
 HSP_API const hsp_port* hsp_port_of(const hsp_controller* controller,
                                     const char* name) HSP_NOEXCEPT;
 
-/* Let an input have other values from the next step on: at once, or by a smooth ramp of a duration
- * [s], as `controller.at(t).ramp(duration)` does in Python. A ramp goes on from what is then in
- * force, and may begin while another is under way. Before the first step both are at once. */
+/* Change an input from the next step on: at once, or by a smooth ramp of a duration [s], like
+ * `controller.at(t).ramp(duration)` in Python. A ramp starts from the present value, and may begin
+ * during another one. Before the first step both apply at once. */
 HSP_API hsp_status hsp_set(hsp_controller* controller, const char* name, const double* values,
                            size_t size) HSP_NOEXCEPT;
 HSP_API hsp_status hsp_ramp(hsp_controller* controller, const char* name, const double* values,
                             size_t size, double duration) HSP_NOEXCEPT;
 
-/* Read an output, or an input as it is now. */
+/* Read an output, or the present value of an input. */
 HSP_API hsp_status hsp_get(hsp_controller* controller, const char* name, double* values,
                            size_t size) HSP_NOEXCEPT;
 
 /* Why the last request of a handle was refused; of `hsp_open` in this thread for NULL. It is never
- * NULL, and stays as it is until the next request. */
+ * NULL, and stays valid until the next request. */
 HSP_API const char* hsp_last_error(const hsp_controller* controller) HSP_NOEXCEPT;
 
 /* A status in words. */
 HSP_API const char* hsp_status_text(hsp_status status) HSP_NOEXCEPT;
 
-/* What this library is: the version, and the processor that it was built for. */
+/* The version of this library, and the processor for which it was built. */
 HSP_API const char* hsp_build(void) HSP_NOEXCEPT;
 
 #ifdef __cplusplus

@@ -1,4 +1,4 @@
-// `hsp_step.h` for C++20: sizes are checked, the handle closes itself, and what cannot be opened
+// `hsp_step.h` for C++20: sizes are checked, the handle closes itself, and a failure to open
 // throws. A step throws nothing.
 #pragma once
 #include <hsp_step.h>

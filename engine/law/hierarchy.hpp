@@ -5,7 +5,7 @@
 //   Q_k = Q_{k-1} - Q_{k-1} J_kᵀ q(G_k) J_k Q_{k-1}                      `close_level`
 //
 // Each level acts in the null space of the levels above. Those stay exact, whatever the lower
-// level requires. The field is the last level: with P = Q_K W, J_a the stack of all levels, and w
+// levels command. The field is the last level: with P = Q_K W, J_a the stack of all levels, and w
 // any solution of J_aᵀ w = W(I - P)x, found by going back through them,
 //
 //   φ_N = Q_K [ W(g' + K_N e_N) - J_a'ᵀ w + W'(x - e_N/2) ],   e_N = P x,  x = g - v
@@ -23,9 +23,9 @@
 
 namespace hsp {
 
-// What the levels leave of their projectors.
+// Projectors of the levels.
 template <template <int...> class As> struct Projectors {
-  As<'n', 'n'> Q;          // what the last level leaves, Q_K = P W⁻¹
+  As<'n', 'n'> Q;          // null space of the last level, Q_K = P W⁻¹
   As<'n', 'm'> QJ;         // Q_{k-1} J_kᵀ of all levels side by side
   As<'m', 'm'> G_inverse;  // q(G_k) of all levels along the diagonal
 };
@@ -65,7 +65,7 @@ void write_bounded_inverse(const V& turned, const X& x, double threshold, Out&& 
   }
 }
 
-// Add Q Jᵀ q(G) times what is left to do to a.
+// Add Q Jᵀ q(G) times the level's residual to a.
 template <class QJ, class G, class Rest, class Row, class A>
 void add_level(const QJ& product, const G& inverse, const Rest& rest, Row&& row, A& a) {
   row.noalias() = inverse * rest;
@@ -103,7 +103,7 @@ void add_null_space(const LawInput& in, const Ends& ends, const Projectors<InOut
   const auto& [Q, QJ, G_inverse] = projectors;
   auto& [x, Wx, Y, bent, rate, row, w] = memory;
 
-  // x = g - v, and what the levels take of it and of its motion
+  // x = g - v, and the levels' parts of it and of its motion
   x = g - in.v;
   Wx.noalias() = W * x;
   Y.setZero();

@@ -17,7 +17,7 @@
 
 namespace hsp {
 
-// What the law reads: the tasks stacked, a field, a metric, the velocity and the gain [1/s].
+// Inputs of the law: the stacked tasks, a field, a metric, the velocity and the gain [1/s].
 struct LawInput {
   TaskSample<In> task;
   FieldSample<In> field;
@@ -28,7 +28,7 @@ struct LawInput {
   bool controls;  // false: u = 0, tasks alone, the paper's first simulation
 };
 
-// Intermediate results; `part` is what PseudoInverse computes with.
+// Intermediate results; `part` is PseudoInverse's memory.
 
 struct LawMemory {
   Scratch<'n'> x, y, u, bent;
@@ -39,7 +39,7 @@ struct LawMemory {
   }
 };
 
-// Write e_N and a for an inverse J#. In `bent` is first J'ᵀw, then all of W⁻¹[...].
+// Write e_N and a for an inverse J#. `bent`, the drift covector, is first J'ᵀw, then W⁻¹[...].
 template <class Inverse, class E, class A>
 void write_law(const LawInput& in, const Inverse& inverse, LawMemory& memory, E& e_N, A& a) {
   const auto& [J, J_dot, error, error_rate, a_x] = in.task;

@@ -1,4 +1,4 @@
-// What became of the law in a step.
+// The outcome of the law in a step.
 #pragma once
 #include <hsp/view.hpp>
 

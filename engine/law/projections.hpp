@@ -1,4 +1,4 @@
-// What a pseudo-inverse makes of a motion of tasks, and of joint efforts, outside of a step.
+// Products of a pseudo-inverse with a motion of tasks, and with joint efforts, outside of a step.
 #pragma once
 #include "pseudo_inverse.hpp"
 

@@ -23,14 +23,14 @@ void whiten(const J& jacobian, const L& factor, int form, B& whitened) {
   if (form != IDENTITY) solve_rows(factor, whitened);
 }
 
-// What multiplies by J#, given its factors.
+// Products with J#, given its factors.
 template <class Q, class X, class L> struct PseudoInverse {
   const Q& q;
   const X& factor;
   const L& L_metric;
   int form;
 
-  // y = J# x = L⁻ᵀ Qᵀ X x, the smallest motion that gives x.
+  // y = J# x = L⁻ᵀ Qᵀ X x, the smallest motion that achieves x.
   template <class In, class Part, class Out> void apply(const In& x, Part& part, Out&& y) const {
     part.noalias() = factor * x;
     y.noalias() = q.transpose() * part;

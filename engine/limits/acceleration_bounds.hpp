@@ -2,8 +2,8 @@
 //
 // With the bandwidth α a position barrier h(q) ≥ 0 is kept by h'' + 2α h' + α² h ≥ 0, and a speed
 // limit by v' ≤ 2α (v_max - v). Where barriers contradict each other, position has priority over
-// velocity, and velocity over acceleration: each narrows the range that the earlier ones leave, as
-// far as it can.
+// velocity, and velocity over acceleration: each narrows the range of the earlier ones as far as
+// possible.
 #pragma once
 #include <algorithm>
 #include <cmath>
@@ -18,7 +18,7 @@ struct Range {
   double low = -std::numeric_limits<double>::infinity();
   double high = std::numeric_limits<double>::infinity();
 
-  // The part of it within another range, or its nearest point.
+  // Its intersection with another range, or its nearest point.
   Range within(const Range& other) const {
     return {std::max(low, std::min(other.low, high)), std::min(high, std::max(other.high, low))};
   }
@@ -26,22 +26,22 @@ struct Range {
 
 namespace barriers {
 
-// How much steeper the velocity barrier is beyond the guarded speed.
+// Factor of the velocity barrier's slope beyond the guarded speed.
 constexpr double steeper = 4.0;
 
-// How much of a joint's range a mean error may take away at one end: a joint that something
-// blocks errs by all that it should accelerate.
+// Maximum share of a joint's range that a mean error may remove at one end: the error of a blocked
+// joint is its whole commanded acceleration.
 constexpr double most_shift = 0.1;
 
-// What the effort's rate can do in this time [s] is held against a force that lasts, where that
-// is more: a light wrist with an undeclared tool.
+// Time [s] whose change of effort is reserved against a lasting force, if that is more: a light
+// wrist with an undeclared tool.
 constexpr double held_time = 0.002;
 
 // The accelerations that a position limit permits.
 //
-// A mean error would pass the limit by the error over α². So the barrier makes up for the worst
-// mean of late that leads beyond it, `least` at the lower end and `most` at the upper one, and for
-// all that is `lasting` now.
+// A mean error would pass the limit by the error over α². So the barrier compensates the worst
+// recent mean towards it, `least` at the lower end and `most` at the upper one, and all of the
+// present `lasting` error.
 template <class Held>
 Range of_position(Index i, double q, double v, const MotionLimits<In>& limits, const Held& held) {
   const double alpha = limits.bandwidth[0], lower = limits.lower[i], upper = limits.upper[i];
@@ -56,11 +56,10 @@ Range of_position(Index i, double q, double v, const MotionLimits<In>& limits, c
   return range;
 }
 
-// The largest acceleration towards a speed limit that is so far away.
+// The largest acceleration towards a speed limit at a distance.
 //
-// It is 2α gap, and √(jerk gap) where that is less: then the acceleration ends at the limit though
-// it can fall by half the jerk only, and the rest of the effort's rate is for what the other
-// joints do.
+// It is 2α gap, or √(jerk gap) if that is less: then the acceleration vanishes at the limit with
+// half the jerk, and the rest of the effort's rate is reserved for the coupling of other joints.
 inline double towards_speed(double gap, double alpha, double jerk) {
   const double barrier = 2.0 * alpha * gap;
   return gap > 0.0 && jerk < std::numeric_limits<double>::infinity()
@@ -68,8 +67,8 @@ inline double towards_speed(double gap, double alpha, double jerk) {
              : barrier;
 }
 
-// The accelerations that a speed limit permits. Its margin covers the largest error that the
-// acceleration had of late, up to half the speed.
+// The accelerations that a speed limit permits. Its margin covers the largest recent error of the
+// acceleration, up to half the speed.
 template <class Held>
 Range of_speed(Index i, double v, const MotionLimits<In>& limits, const Held& held) {
   const double alpha = limits.bandwidth[0], jerk = limits.jerk[i], most = limits.velocity[i];
@@ -92,8 +91,8 @@ Range of_speed(Index i, double v, const MotionLimits<In>& limits, const Held& he
 // Write the bounds on the acceleration that the barriers of `Limits` require. `where` is the index
 // in q of each dof's coordinate, -1 for none.
 //
-// What is commanded against a steady force moves nothing, and the barriers are wider by as much:
-// `held.steady` is what of a longer mean of the error is still there.
+// A constant external force uses effort without motion, so the barriers are widened by
+// `held.steady`, the still present part of a longer mean of the error.
 template <class Held>
 void write_acceleration_bounds(const In<'q'>& q, const In<'n'>& v, const Ints<'n'>& where,
                                const MotionLimits<In>& limits, const Held& held, Out<'n'>& a_lower,

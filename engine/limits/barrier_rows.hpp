@@ -1,4 +1,4 @@
-// Rows A a ≥ least that barriers add in each step, and whether the wanted acceleration keeps them.
+// Rows A a ≥ least of barriers in each step, and whether the unconstrained acceleration meets them.
 #pragma once
 #include <algorithm>
 #include <hsp/indices.hpp>
@@ -15,17 +15,17 @@ template <template <int...> class As, template <int...> class Counts> struct Bar
   As<'r', 'n'> A;
   As<'r'> least;
 
-  // The place of one row more. Throws std::length_error where there is none.
+  // The index of an additional row. Throws std::length_error if there is none.
   Index next() {
     if (number[0] < 0 || number[0] >= least.size())
-      throw std::length_error("a barrier has more rows than there is place for");
+      throw std::length_error("a barrier has more rows than are reserved");
     return number[0]++;
   }
   Index used() const { return std::clamp<Index>(number[0], 0, least.size()); }
 };
 
 struct Clear {
-  static constexpr const char* doc = "Begin to count anew.";
+  static constexpr const char* doc = "Remove all rows.";
   OutInts<1> number;
 
   void operator()() { number.setZero(); }

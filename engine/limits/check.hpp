@@ -11,13 +11,13 @@ namespace hsp {
 
 struct IsPlain {
   static constexpr const char* doc =
-      "Whether the law is exact and within all limits: else its outcome and theirs say more, "
-      "unless a QP has found the nearest step, and nothing else was found.";
+      "Whether the law is exact and within all limits: otherwise its outcome and theirs have "
+      "the reason, unless only a QP has found the nearest step.";
   LawOutcome<Ints> law;
   LimitsOutcome<Ints> limits;
   QPOutcome<Ints> qp;
   std::int64_t limited;  // the status of a nearest step
-  OutInts<1> nearest;    // whether it was found, and nothing else
+  OutInts<1> nearest;    // whether only that was found
 
   bool operator()() {
     const bool exact = law.finite[0] && law.damped_level[0] == 0 && !limits.beyond[0];
@@ -54,9 +54,9 @@ struct CheckLimits {
   }
 
  private:
-  // The robot accelerates by a and the disturbance, which something else is known to cause; so
-  // the bounds on a are moved by it. It makes a bound narrower by no more than the speed's barrier
-  // permits at rest, so that a push that ends does no harm.
+  // The robot accelerates by a plus the known external disturbance, so the bounds on a are shifted
+  // by it. A bound is narrowed by no more than the speed's barrier permits at rest, so that the end
+  // of a push does no harm.
   void move_bounds() {
     const auto brake = 2.0 * limits.bandwidth[0] * limits.velocity.array();
     const auto up = held.disturbance.array().max(0.0);

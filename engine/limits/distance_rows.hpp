@@ -29,10 +29,10 @@ struct DistancesAt {
       "Move another state of the robot, whose move measures distances, and keep these.";
   Shared<Move> move;
   In<1> time;
-  double later;  // how much later than `time` it is there [s]
+  double later;  // offset of its time from `time` [s]
   In<'q'> q;
   In<'n'> v;
-  In<'d'> measured;  // what the move writes
+  In<'d'> measured;  // written by the move
   Out<'d'> distances;
 
   void operator()() {
@@ -41,8 +41,8 @@ struct DistancesAt {
   }
 };
 
-// How far joints turn along an acceleration to see what it does to distances [rad]; no joint moves
-// a point by more than the robot's size for each radian.
+// Displacement of joints along an acceleration for its effect on distances [rad]; no joint moves a
+// point by more than the robot's size per radian.
 struct Turning {
   double turn, size;
 
@@ -52,13 +52,13 @@ struct Turning {
 
 struct NearPairs {
   static constexpr const char* doc =
-      "The least ∇d·a of each pair, which pairs are close or come close, and whether the wanted "
+      "The least ∇d·a of each pair, which pairs are or come close, and whether the unconstrained "
       "acceleration may be too much for others.";
   double minimum, bandwidth, span;
-  double look_ahead;  // for how long a pair's rate is followed [s]
+  double look_ahead;  // time over which a pair's rate is extrapolated [s]
   Turning turning;
   In<'d'> now, ahead, behind;
-  In<'n'> a;  // the wanted acceleration
+  In<'n'> a;  // the unconstrained acceleration
   Out<'d'> least;
   OutInts<'d'> near;
   Out<'n'> displacement;
@@ -81,7 +81,7 @@ struct NearPairs {
 
 struct ApproachedPairs {
   static constexpr const char* doc =
-      "Add the pairs of which the wanted acceleration takes half of what they may lose.";
+      "Add the pairs for which the acceleration uses half of the permitted approach.";
   Turning turning;
   In<'d'> now, turned, least;
   In<'n'> a;

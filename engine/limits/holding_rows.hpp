@@ -11,9 +11,9 @@ namespace hsp {
 
 struct HoldingRows {
   static constexpr const char* doc =
-      "Add the rows of motors near the part of their effort that gravity may take.";
+      "Add the rows of motors near the share of their effort that gravity may use.";
   double share, bandwidth;
-  double look_ahead;  // for how long the present growth is followed [s]
+  double look_ahead;  // time over which the present growth is extrapolated [s]
   double near;        // the part of the share from which on a motor has a row
   Ints<'k'> motors;
   In<'n'> limit;  // of the efforts

@@ -6,12 +6,12 @@ namespace hsp {
 
 struct NearestEffort {
   static constexpr const char* doc =
-      "Minimise (x - wanted)ᵀ M⁻¹ (x - wanted) within bounds: joint by joint, again and again.";
+      "Minimise (x - wanted)ᵀ M⁻¹ (x - wanted) within bounds: joint by joint, in sweeps.";
   In<'n', 'n'> inverse;  // M⁻¹
   In<'n'> wanted, least, most;
   Out<'n'> nearest;
-  int sweeps;    // at most
-  double small;  // change of a sweep that does not count, relative to the first one
+  int sweeps;    // maximum number
+  double small;  // negligible change of a sweep, relative to the first one
   Scratch<'n'> away;
 
   void operator()() {

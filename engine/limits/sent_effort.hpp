@@ -1,4 +1,4 @@
-// What is remembered of the efforts sent, and what that leaves for the next one.
+// Memory of the sent efforts, and the range of the next one.
 #pragma once
 #include <algorithm>
 #include <cmath>
@@ -10,8 +10,8 @@ namespace hsp {
 
 struct EffortWindow {
   static constexpr const char* doc =
-      "The range of the next effort that limits on it and on its rate leave: tau ± rate T.";
-  In<'w'> last;  // the last effort, and how long it is held: n + 1 numbers
+      "The range of the next effort by limits on it and on its rate: tau ± rate T.";
+  In<'w'> last;  // the last effort, and the time for which it is held: n + 1 numbers
   In<'n'> effort, rate;
   Out<'n'> lower, upper;
 
@@ -28,7 +28,7 @@ struct EffortWindow {
 
 struct ExpectedVelocity {
   static constexpr const char* doc =
-      "v + T (a + disturbance) at the end of a period T that begins now, and when that is.";
+      "v + T (a + disturbance) at the end of a period T that begins now, and the time of that end.";
   In<1> time;
   In<'n'> v, a, disturbance;
   InOut<2> timing;
@@ -45,13 +45,13 @@ namespace sent {
 // The acceleration is observed over this time, or over one period if that is longer [s]: over 1 ms
 // noise of 0.02 rad/s would be 28 rad/s², over 10 ms it is 3.
 constexpr double window = 0.01;
-// A mean error that a position limit has to hold against is taken over this time [s]: noise of a
-// velocity is then that over this time, 0.3 rad/s² for 0.01 rad/s.
+// The mean error for position limits is averaged over this time [s]: it has the velocity's noise
+// over this time, 0.3 rad/s² for 0.01 rad/s.
 constexpr double quick_time = 0.03;
 // An error is weighted less after this time; over it the error that persists is averaged [s].
 constexpr double memory = 0.1;
 
-// What two numbers have in common: the nearer to 0 of one sign, or 0.
+// The common part of two numbers: the nearer to 0 if they have the same sign, or 0.
 inline double shared(double a, double b) {
   return std::max(std::min(a, b), 0.0) + std::min(std::max(a, b), 0.0);
 }
@@ -81,7 +81,7 @@ inline void observe(const In<'n'>& v, Held<InOut>& held, double t) {
 }
 
 struct Observe {
-  static constexpr const char* doc = "Compare the velocity with what was expected of an effort.";
+  static constexpr const char* doc = "Compare the velocity with the prediction for an effort.";
   In<'n'> v;
   Held<InOut> held;
 

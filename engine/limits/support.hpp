@@ -41,9 +41,9 @@ struct ForceMap {
 struct MinimumNormForces {
   static constexpr const char* doc =
       "f = r + E Aᵀ(A E Aᵀ)⁺(w - A r), of minimum Σ (f - r)²/e, and the remaining effort.";
-  // A are the base's rows of F, E = diag(e), w the base's rows of the wanted effort, and r what is
-  // commanded. w lies in the range of A: directions without support are left out. The effort of
-  // the base, which has no motor, is zero.
+  // A are the base's rows of F, E = diag(e), w the base's rows of the wanted effort, and r the
+  // commanded forces. w lies in the range of A: directions without support are omitted. The effort
+  // of the base, which has no motor, is zero.
   In<'n', 'f'> F;
   Ints<'b'> base;
   In<'f'> inverse_cost, reference;  // e, r
@@ -77,8 +77,8 @@ struct MinimumNormForces {
   }
 
  private:
-  // Whether the Cholesky factor U of G can be trusted: no pivot is so much smaller than the
-  // largest that a direction might be without support.
+  // Whether the Cholesky factor U of G is reliable: no pivot is so small relative to the largest
+  // that a direction might lack support.
   bool well_conditioned() {
     constexpr double trusted = 1e-6;
     if (!cholesky(G, U)) return false;
@@ -108,7 +108,7 @@ struct CommandedForce {
   In<'c'> command;       // F [N, N·m]
   In<1> offset, weight;  // added to the normal force [N]; w in [0, 1]
   In<'f', 'c'> shares;   // S, from coordinates of F to the forces at the points
-  std::int64_t normal;   // which coordinate is the normal force
+  std::int64_t normal;   // index of the normal force
   Out<'f'> reference;
   Scratch<'c'> pushing;
 

@@ -1,4 +1,4 @@
-// Linear algebra as calls of their own, so that each can be tried alone.
+// Linear algebra as separate calls, for tests.
 #pragma once
 #include <hsp/kind.hpp>
 #include <hsp/linalg.hpp>

@@ -5,7 +5,7 @@
 
 namespace hsp {
 
-// W = L Lᵀ; nothing is to be solved if it is the identity.
+// W = L Lᵀ; no solve is needed if it is the identity.
 template <class L, class X> void raise(int form, const L& factor, X& covector) {
   if (form == IDENTITY) return;
   solve_lower(factor, covector);

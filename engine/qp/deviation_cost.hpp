@@ -4,26 +4,26 @@
 // orthonormal in whitened coordinates Lᵀδ. So H⁻¹ = J Jᵀ, with the columns L⁻ᵀ n_k / √ρ_k in J: no
 // matrix is factorised.
 //
-// What is below a level costs a small part of what the level itself does, and the more of it the
-// larger the level's own error is: priorities are strict where the errors are small. With a fixed
-// tiny part, a hand that cannot reach its target would move the null space as far as limits permit
-// for the last bit of it, from one bound of the efforts to the other between two periods. It costs
-// more where a limit holds the level forever, see `edge/held_levels.hpp`.
+// The cost below a level is a small part of the level's own, which grows with the level's error:
+// priorities are strict where the errors are small. With a fixed tiny part, a hand that cannot
+// reach its target would move the null space as far as limits permit for a negligible gain, from
+// one bound of the efforts to the other between two periods. The cost is larger while a limit keeps
+// the level from being met, see `edge/held_levels.hpp`.
 //
-// Springs do not come first: what is below a level of springs costs as much as it does. Over the
-// mass matrix, their metric, the deviation is then what Gauss's principle of least constraint
-// gives: joints that limits hold get the reaction of mechanical stops, which does no work, and a
+// Levels of springs have no precedence: deviations below them have the same cost. With the mass
+// matrix, their metric, the deviation then follows from Gauss's principle of least constraint:
+// joints at active limits receive the reaction of mechanical stops, which does no work, so that a
 // spring feeds no oscillation.
 //
-// With P_k what the law leaves to the levels below k, P_0 = 1, a level has the share P_{k-1} - P_k
-// of all motions, and the null space what remains, P_K. Their costs are ρ_k = ρ_N^t_k, t_1 = 0 to
-// t_N = 1, and that of all is
+// With P_k the projector for the levels below k, P_0 = 1, a level has the share P_{k-1} - P_k of
+// all motions, and the null space the rest, P_K. Their costs are ρ_k = ρ_N^t_k, t_1 = 0 to t_N = 1,
+// and that of all is
 //
 //     log H = log ρ_N Σ t_k (P_{k-1} - P_k),      in whitened coordinates
 //
 // Away from singularities each share is a projector, and each n_k belongs to one level. Near one
-// the law leaves a part of a direction to the levels below, and so it does here: H is a continuous
-// function of the law's own projectors.
+// the law releases a part of a direction to the levels below, and so does H: it is a continuous
+// function of the law's projectors.
 #pragma once
 #include <algorithm>
 #include <cmath>
@@ -35,7 +35,7 @@
 
 namespace hsp {
 
-// What level k and then the null space cost: ρ_k = ρ_N^t_k.
+// Costs of level k and then of the null space: ρ_k = ρ_N^t_k.
 struct LevelCosts {
   Vector t, root;  // 1/√ρ
 
@@ -47,7 +47,7 @@ struct LevelCosts {
 
 struct Directions {
   static constexpr const char* doc =
-      "Directions of the law's levels and of the null space, and what deviating in each costs.";
+      "Directions of the law's levels and of the null space, and the costs of deviating in each.";
   In<'m', 'n'> jacobian;  // of all tasks, level after level
   In<'n', 'n'> L;         // Cholesky factor of the metric
   std::int64_t form;      // metric's form
@@ -57,14 +57,14 @@ struct Directions {
   double size;            // robot's size [m]
   std::int64_t first;     // first level that may deviate: 1 below contacts, else 0
   double least;           // least cost of a level relative to the one above it
-  In<'l'> held;           // what is below each level costs at least, see `HeldLevels`
+  In<'l'> held;           // minimum costs below each level, see `HeldLevels`
   In<'l'> thresholds;     // singular value below which a direction belongs to a level in part
   Factors<In> factors;
   Projectors<In> projectors;
   Ints<1> edge_level;  // the first level whose inverse the damped law bounds; 0: none
   bool alone;          // whether the law resolves its one level at once, whatever happens
   Out<'n', 'n'> N;     // directions n_k as rows
-  OutInts<1> kept;     // how many of the first belong to the first level alone
+  OutInts<1> kept;     // number of leading directions that belong to the first level alone
   Out<'n'> root;       // 1/√ρ of each
   LevelCosts costs;
   Scratch<'m', 'n'> B;  // whitened rows
@@ -97,12 +97,12 @@ struct Directions {
   }
 
  private:
-  // What is below a level costs this, another level or the null space, for an error of the robot's
-  // size, relative to the level itself, and the most that it costs.
+  // Cost below a level, of another level or the null space, relative to the level, for an error of
+  // the robot's size; and its maximum.
   static constexpr double below_level = 1.0, below_last = 0.2, most = 0.1;
 
-  // Singular value, relative to the threshold, below which rounding decides where a direction
-  // points; the null space has all of it but 2e-6.
+  // Singular value, relative to the threshold, below which rounding determines a direction; the
+  // null space has all of it but 2e-6.
   static constexpr double lost = 1e-3;
 
   double free_root() const { return costs.root[costs.root.size() - 1]; }
@@ -119,7 +119,7 @@ struct Directions {
       const bool is_spring = springs.segment(start, rows).all();
       const double of_error = k < last - 1 ? below_level : below_last;
       const double length = error.segment(start, rows).norm();
-      // Whoever stands keeps the balance at any cost.
+      // A standing robot keeps its balance at any cost.
       const double far = std::min(of_error * length / size, most);
       const double below = standing ? 0.0 : std::max(far, held[k]);
       if (k >= first && (standing || !is_spring))
@@ -133,8 +133,8 @@ struct Directions {
     if (log_cost < 0.0) costs.t /= log_cost;
   }
 
-  // Write the directions that the first levels have for themselves; return how many. The last of
-  // them may have singular values below the threshold: these are left out.
+  // Write the directions that belong to one of the first levels alone; return their number. The
+  // last of them may have singular values below the threshold: these are left out.
   Index write_levels(Index levels) {
     whiten(jacobian, L, form, B);
     Index count = 0, start = 0;
@@ -172,10 +172,10 @@ struct Directions {
     kept[0] = ends.size() ? std::min<Index>(count, ends[0]) : 0;
   }
 
-  // Write the directions of the only level, where the law has found its spectrum; return how many.
+  // Write the directions of the only level, if the law has found its spectrum; return their number.
   //
-  // First those that it has for itself. Of a direction with the singular value s below the
-  // threshold the null space has the share (1 - s²/threshold²)².
+  // First those that belong to it alone. The null space has the share (1 - s²/threshold²)² of a
+  // direction with the singular value s below the threshold.
   Index write_damped_level() {
     const auto& Q = factors.Q;
     const double threshold = thresholds[0], own = costs.root[0];
@@ -195,7 +195,7 @@ struct Directions {
     return count;
   }
 
-  // Overwrite the directions after the first ones, which levels share.
+  // Overwrite the directions after the first ones, which are shared by levels.
   //
   // These are the eigenvectors of T = Σ t_k (P_{k-1} - P_k) + P_K in the rows of N from `count` on,
   // and their costs ρ_N^t for the eigenvalues t.
@@ -205,7 +205,7 @@ struct Directions {
     auto rest = N.bottomRows(d);
     auto F_d = F.topRows(d), FQ_d = FQ.topRows(d);
     auto T_d = T.topLeftCorner(d, d), U_d = U.topLeftCorner(d, d);
-    // Lᵀ Q L is what Q is in whitened coordinates.
+    // Lᵀ Q L is Q in whitened coordinates.
     if (form == IDENTITY) F_d = rest;
     else F_d.noalias() = rest * L.transpose();
     FQ_d.noalias() = F_d * projectors.Q.transpose();
@@ -231,9 +231,9 @@ struct Directions {
 
   // Complete the first directions to an orthonormal basis, with the null space.
   //
-  // Each new row is what the others leave of the unit vector of which they leave most. The
-  // components of a unit vector are entries of N. Where less than half of it remains, what
-  // rounding left is subtracted ("twice is enough", Giraud et al. 2005).
+  // Each new row is the residual of the unit vector with the largest residual. The components of a
+  // unit vector are entries of N. Where less than half of it remains, the rounding errors are
+  // subtracted ("twice is enough", Giraud et al. 2005).
   void complete(Index count) {
     remainders.setOnes();
     for (Index k = 0; k < count; ++k) remainders -= N.row(k).cwiseAbs2().transpose();
@@ -268,7 +268,7 @@ struct InverseRoot {
   std::int64_t form;
   bool standing;  // whether the first level may not move
   Out<'n', 'n'> JT;
-  OutInts<1> moving;  // how many of its rows these are
+  OutInts<1> moving;  // number of these rows
 
   void operator()() {
     const Index rows = N.rows() - (standing ? std::clamp<Index>(kept[0], 0, N.rows()) : 0);

@@ -6,18 +6,18 @@
 //   least ≤ x ≤ greatest,       entries may be infinite.
 //
 // The method is that of Goldfarb and Idnani (1983). It starts at the unconstrained optimum and
-// adds the most violated constraint, until none is violated. The constraints that it holds active
-// are kept as B = L Q: row i of B is b_i = Jᵀ a_i, Q has orthonormal rows and L is lower triangular
-// (Gill, Gould, Murray, Saunders and Wright 1984, "A weighted Gram-Schmidt method for convex
-// quadratic programming"). So J is never changed, and its zeros and those of A's rows save work in
-// every iteration.
+// adds the most violated constraint, until none is violated. The active constraints are stored as
+// B = L Q: row i of B is b_i = Jᵀ a_i, Q has orthonormal rows and L is lower triangular (Gill,
+// Gould, Murray, Saunders and Wright 1984, "A weighted Gram-Schmidt method for convex quadratic
+// programming"). So J is never changed, and its zeros and those of A's rows save work in every
+// iteration.
 //
 // Each constraint that enters raises the dual cost strictly, so no set of active constraints
 // returns and the method cannot cycle; against rounding there is a limit on iterations.
 //
 // A constraint can be *soft*: lower ≤ a·x + s ≤ upper with the cost s²/(2 σ²). Its slack s is one
-// more entry of y, and σ one more entry of Jᵀ a: it has a column while the constraint was active,
-// so that what could be violated costs nothing where it is not. A QP whose constraints contradict
+// more entry of y, and σ one more entry of Jᵀ a: it has a column only while the constraint is
+// active, so that constraints that are not violated cost no time. A QP whose constraints contradict
 // each other is solved again with soft ones: the smaller σ, the nearer to the least violation. σ of
 // 1e-2 times the dearest motion's entries of J is safe; at 1e-4 rounding shows where the cheapest
 // motion is 1e4 times cheaper.
@@ -37,40 +37,40 @@ namespace hsp {
 // The cost couples the first unknowns; the others' costs are separate: J is
 // block-diagonal.
 struct QP {
-  In<'z', 'f'> JT;  // Jᵀ of the first unknowns; what its rows do not span does not move
+  In<'z', 'f'> JT;  // Jᵀ of the first unknowns; directions outside the span of its rows do not move
   In<'o'> own;      // J of the others, 1/√cost of each
   In<'k', 'n'> A;
   Ints<'k'> begin, end;     // of the non-zero entries of each row of A
   In<'c'> lower, upper;     // of the rows and then of x: c = k + n
   In<'s'> softness;         // σ of each constraint, zero if it is hard; none if all are
-  std::int64_t equalities;  // how many of the first rows are equalities, lower = upper
+  std::int64_t equalities;  // number of leading rows that are equalities, lower = upper
 
   void check() const {
     for (Index r = 0; r < begin.size(); ++r) check_range("a row of A", begin[r], end[r], A.cols());
   }
 };
 
-// The active constraints: where the next QP begins, if it begins warm.
+// The active constraints, from which the next QP begins after a warm start.
 struct ActiveSet {
   InOutInts<'c'> held;     // 1 if a constraint's lower bound is active, -1 if the upper, else 0
   InOutInts<2> counts;     // of active constraints and of iterations
-  InOutInts<'m'> active;   // which they are
+  InOutInts<'m'> active;   // their indices
   InOut<'m'> multipliers;  // H (x - x0) = Σ multiplier a; positive at lower bounds
 };
 
-// What the solver computes with; m is the largest number of active constraints.
+// Memory of the solver; m is the maximum number of active constraints.
 struct ActiveSetMemory {
   Vector x0, y;
   double rounding = 0.0;  // square of a remainder of Jᵀ a that is rounding, for ‖a‖ = 1
   Matrix B;               // Jᵀ a of active constraints, and then that of an entering one
   Matrix L, Q;            // B = L Q
-  Vector remainder;       // what Q does not span of the entering constraint's b
+  Vector remainder;       // part of the entering constraint's b outside the span of Q
   Vector components;      // Q b
-  Vector again;           // what rounding left in them
+  Vector again;           // their rounding errors
   Vector lack;            // of the active constraints
   Vector rate;            // of the multipliers
-  Index width = 0;        // how many entries y has at present
-  Eigen::Matrix<Index, Eigen::Dynamic, 1> slack;  // which of them is a constraint's; -1: none
+  Index width = 0;        // present number of entries of y
+  Eigen::Matrix<Index, Eigen::Dynamic, 1> slack;  // index of the entry of a constraint; -1: none
 
   void prepare(const Sizes& size) {
     const Index n = size('n'), slacks = size('s'), constraints = size('k') + n;
@@ -113,16 +113,16 @@ class DualActiveSet {
   // Overwrite x0 with the optimum x. A warm start begins with the active constraints of the last
   // solution.
   //
-  // The last thing computed is the optimum of the active constraints in their order, so that x
-  // does not depend on the way there, not even in its last bit: a step is the same whether it
-  // began with the active constraints of the last one or not.
+  // Finally the optimum of the active constraints is computed in their order, so that x does not
+  // depend on the iterations, not even in its last bit: a step is the same whether it began with
+  // the active constraints of the last one or not.
   Code minimise(bool warm, Index iterations_per_constraint = most_iterations) {
     if (!prepare(warm)) return INFEASIBLE;
     return iterate(begin(), iterations_per_constraint);
   }
 
-  // The optimum of the same QP from another x0, which is in x, after one that was found: what is
-  // active needs no factorisation.
+  // The optimum of the same QP from another x0, which is in x, after one that was found: the active
+  // constraints need no factorisation.
   Code minimise_again() {
     const Index held = count();
     memory.x0 = x;
@@ -132,7 +132,7 @@ class DualActiveSet {
   }
 
  private:
-  // Add violated constraints until there is none; `in_order`: x is the optimum of what is held.
+  // Add violated constraints until there is none; `in_order`: x is the optimum of the active ones.
   Code iterate(bool in_order, Index iterations_per_constraint) {
     bool settled = in_order;
     double tolerance = first_tolerance;
@@ -146,7 +146,7 @@ class DualActiveSet {
         in_order = settled = false;
       } else if (in_order) {
         return SOLVED;
-      } else {  // x is a sum of steps: compute it anew, and look again
+      } else {  // x is a sum of steps: recompute it, and check again
         in_order = begin();
         settled = true;
       }
@@ -157,7 +157,7 @@ class DualActiveSet {
   // Distance from x to a violated constraint that is accepted, relative to 1 + max|x|. It does not
   // depend on the scale of the row. It grows tenfold each time that x, computed anew, violates a
   // constraint: where active rows nearly depend on each other, rounding can let two of them take
-  // turns. What is not solved below the loosest is given up.
+  // turns. A QP that is not solved with the loosest one is abandoned.
   static constexpr double first_tolerance = 1e-10, loosest_tolerance = 1e-6;
 
   // A row belongs to the span of the active ones if its remainder in y is smaller than this,
@@ -187,7 +187,7 @@ class DualActiveSet {
   auto multipliers() { return set.multipliers.head(count()); }
   auto a(Index i) const { return qp.A.row(i).segment(qp.begin[i], qp.end[i] - qp.begin[i]); }
 
-  // Begin at x0 and mark what to hold; return whether each constraint can be kept alone. NaN makes
+  // Begin at x0 and mark the constraints to hold; return whether each can be met alone. NaN makes
   // each comparison false, and so the result; in A it is found by `most_violated`.
   bool prepare(bool warm) {
     set.counts.setZero();
@@ -225,10 +225,10 @@ class DualActiveSet {
 
   // Make y and x the optimum of the active constraints, without rounding of steps.
   //
-  // w = L⁻¹ (b - A x) is what they lack; the multipliers grow by L⁻ᵀ w. Twice, at x0 and at
-  // y = Bᵀ multipliers, since the second time corrects the first; then y grows by Qᵀ w.
-  // Constraints with a multiplier of the wrong sign are released, the worst first: from what
-  // remains the method may begin.
+  // w = L⁻¹ (b - A x) is their residual; the multipliers grow by L⁻ᵀ w. Twice, at x0 and at y = Bᵀ
+  // multipliers, since the second time corrects the first; then y grows by Qᵀ w. Constraints with a
+  // multiplier of the wrong sign are released, the worst first: the method may begin from the
+  // remaining ones.
   void settle() {
     for (Index wrong = 0; wrong >= 0;) {
       auto w = memory.lack.head(count());
@@ -277,7 +277,7 @@ class DualActiveSet {
     x.tail(p) += qp.own.cwiseProduct(memory.y.segment(moving, p));
   }
 
-  // The constraint that x is farthest from, marked as held, and by how much it is violated. The
+  // The most violated constraint, marked as held, and its violation. The
   // distance is the violation divided by the length of the row. A row that contains NaN is
   // violated.
   Violation most_violated(double tolerance) {
@@ -330,15 +330,15 @@ class DualActiveSet {
         set.multipliers[count() - 1] = multiplier;
         return true;
       }
-      release(leaving);  // the remainder gains what is freed
+      release(leaving);  // the remainder gains the released direction
       const auto freed = memory.Q.row(count()).head(memory.width);
       remainder() += memory.components[count()] * freed.transpose();
       square = remainder().squaredNorm();
     }
   }
 
-  // Shorten a step to where the first multiplier of an active inequality vanishes; return which,
-  // or -1.
+  // Shorten a step to where the first multiplier of an active inequality vanishes; return its
+  // index, or -1.
   Index first_to_vanish(double side, double& step) {
     Index leaving = -1;
     for (Index c = 0; c < count(); ++c) {
@@ -354,7 +354,7 @@ class DualActiveSet {
     return leaving;
   }
 
-  // Write b = Jᵀ a of constraint i, Q b, and what remains of b; return its square.
+  // Write b = Jᵀ a of constraint i, Q b, and the remainder of b; return its square.
   //
   // b goes to the row of B after the active ones. If nine tenths of the length cancel, the
   // components are subtracted a second time ("twice is enough", Giraud et al. 2005).
@@ -424,8 +424,8 @@ class DualActiveSet {
     count() = c + 1;
   }
 
-  // Remove an active constraint: rotations make L lower triangular again. They leave the direction
-  // that is freed in the row of Q after the last, and rotate the components Q b too.
+  // Remove an active constraint: rotations make L lower triangular again. They leave the released
+  // direction in the row of Q after the last, and rotate the components Q b, too.
   void release(Index leaving) {
     auto& [x0, y, rounding, B, L, Q, remainder, components, again, lack, rate, width, slack] =
         memory;
@@ -471,7 +471,7 @@ struct Minimise {
   static constexpr const char* doc = "The optimum of a QP; 0: solved, 1: infeasible, 2: exhausted.";
   QP problem;
   std::int64_t iterations;  // limit, per constraint
-  bool warm;                // begin with what is held
+  bool warm;                // begin with the active constraints
   InOut<'n'> x;             // x0, then the optimum
   ActiveSet work;
   ActiveSetMemory memory;

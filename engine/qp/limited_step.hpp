@@ -1,4 +1,4 @@
-// The QP of a step within limits: its rows, where it begins, its solution.
+// The QP of a step within limits: its rows, its start, its solution.
 //
 // The unknowns are x = (δ, g): δ the deviation from the law's acceleration, and g the contact
 // forces in robot weights. The first rows are
@@ -6,7 +6,7 @@
 //   base        (M a + N - F f)_base = 0                          no motor acts there
 //   effort      bounds on M a + N - F f, within the rate limit of the last effort
 //
-// and then those of cones, barriers and contacts, which Python writes. The bounds of x are those
+// and then those of cones, barriers and contacts, written by Python. The bounds of x are those
 // on a from position, velocity and acceleration limits, and those of f.
 #pragma once
 #include <cmath>
@@ -16,13 +16,13 @@
 
 namespace hsp {
 
-// What the law wants; the effort is M a + N and friction, without contact forces.
+// The law's command; the effort is M a + N and friction, without contact forces.
 struct Wanted {
   In<'n', 'n'> mass_matrix;
   In<'n'> acceleration, effort;
 };
 
-// The contact forces that are possible; none where they have no size.
+// The possible contact forces; none if they are empty.
 struct Forces {
   In<'n', 'p'> map;  // F
   In<'p'> first;     // forces nearest to the commanded ones
@@ -44,10 +44,10 @@ struct Places {
 // Throws unless x is one deviation and the forces.
 inline void check_step(Index x, const Wanted& wanted, const Forces& forces) {
   if (x != wanted.effort.size() + forces.first.size())
-    throw std::invalid_argument("x are n deviations and the forces");
+    throw std::invalid_argument("x must be n deviations and the forces");
 }
 
-// What is delivered.
+// The delivered quantities.
 struct Result {
   InOut<'n'> effort, acceleration;
   InOut<'p'> forces;
@@ -63,7 +63,7 @@ struct BeginLimitedStep {
 
   void check() const { check_at_least("x", x.size(), own.size()); }
   void operator()() {
-    // While a contact fades its forces become dear, but not infinitely so.
+    // While a contact fades the cost of its forces grows, but stays finite.
     constexpr double least_inverse_cost = 1e-6;
     const Index p = own.size();
     own = (forces.inverse_cost.array().max(least_inverse_cost) / cost).sqrt();
@@ -86,7 +86,7 @@ struct LimitedRows {
     check_at_least("A", A.rows(), places.dofs.size());
     check_step(A.cols(), wanted, forces);
     if (lower.size() != A.rows() + A.cols())
-      throw std::invalid_argument("lower and upper are those of the rows and of x");
+      throw std::invalid_argument("lower and upper must be those of the rows and of x");
   }
   void operator()() {
     const auto& [M, a, effort] = wanted;
@@ -107,11 +107,11 @@ struct LimitedRows {
 };
 
 struct SolveLimitedStep {
-  static constexpr const char* doc = "The optimum of the QP, and what is reached with it.";
-  std::int64_t reached;  // the status that its solution has
+  static constexpr const char* doc = "The optimum of the QP, and its status.";
+  std::int64_t reached;  // the status of its solution
   bool warm;
   QP problem;
-  Ints<1> moving;  // how many rows of Jᵀ move
+  Ints<1> moving;  // number of rows of Jᵀ that move
   InOut<'n'> x;
   ActiveSet work;
   QPOutcome<OutInts> outcome;

@@ -1,9 +1,9 @@
-// A step whose limits contradict each other: some rows are widened as little as the others permit.
+// A step whose limits contradict each other: some rows are widened as little as possible.
 //
 // Soft are the accelerations of contacts, the bounds on the joints' motion and the rows of
-// barriers; efforts, cones and forces stay within their limits. First the least violation is
-// found, then the rows are widened by it, and then the step is the nearest to what the law wants
-// within them (`limited_step.hpp`).
+// barriers; efforts, cones and forces stay within their limits. First the least violation is found,
+// then the rows are widened by it, and the step is the nearest to the law's command within them
+// (`limited_step.hpp`).
 #pragma once
 #include <algorithm>
 #include <limits>
@@ -28,7 +28,7 @@ struct RelaxedRows {
     check_range("rows of contacts", first, first + J.rows(), A.rows());
     check_at_least("the columns of A", A.cols(), J.cols());
     if (lower.size() != A.rows() + A.cols())
-      throw std::invalid_argument("lower and upper are those of the rows and of x");
+      throw std::invalid_argument("lower and upper must be those of the rows and of x");
   }
   void operator()() {
     const Index h = J.rows(), n = J.cols();
@@ -45,7 +45,7 @@ struct RelaxedRows {
 struct LeastViolation {
   static constexpr const char* doc =
       "The x that violates soft rows least, without any cost of x itself.";
-  std::int64_t reached;  // the status that a step has with it
+  std::int64_t reached;  // the status of a step with it
   QP problem;
   InOut<'n'> x;
   ActiveSet work;
@@ -82,7 +82,7 @@ struct LeastViolation {
 };
 
 struct Widen {
-  static constexpr const char* doc = "Widen the soft rows to where x is; write by how much.";
+  static constexpr const char* doc = "Widen the soft rows to contain x; write the violation.";
   Ints<1> unsolved;  // whether there is no x
   In<'k', 'n'> A;
   In<'n'> x;
@@ -92,7 +92,7 @@ struct Widen {
 
   void check() const {
     if (softness.size() != A.rows() + A.cols())
-      throw std::invalid_argument("softness is that of the rows and of x");
+      throw std::invalid_argument("softness must be that of the rows and of x");
   }
   void operator()() {
     relaxation[0] = 0.0;

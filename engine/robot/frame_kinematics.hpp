@@ -13,7 +13,7 @@ struct ParentJoint {
   In<3, 3> R_local;                          // joint ← frame
   In<3> p_local, p_local_dot, p_local_ddot;  // r, r' and r'': the frame's origin in the joint
   In<3> w_local, w_local_dot;                // its angular velocity in the joint, and the rate
-  Ints<'c'> columns, dofs;  // what moves the joint: columns of J_world, and their indices in v
+  Ints<'c'> columns, dofs;  // columns of J_world that move the joint, and their indices in v
 
   void check() const { check_indices("columns", columns, J_world.cols()); }
 };
@@ -23,8 +23,9 @@ struct ParentJoint {
 //   (l + w × p, w)              at the frame's origin p, and its rate is
 //   (l' + w' × p + w × p', w').
 //
-// A frame that moves in its joint has velocities beyond J v. With ω of the joint, R r' and R w, and
-// their rates, in which p' is that of the frame, so that J'v has the other half of Coriolis' term:
+// A frame that moves in its joint has a velocity in excess of J v. With ω of the joint, R r' and R
+// w, and their rates, in which p' is that of the frame, so that J'v has the other half of Coriolis'
+// term:
 //
 //   ω × R r' + R r'',    ω × R w + R w'.
 //
@@ -32,9 +33,9 @@ struct ParentJoint {
 // leader's.
 struct FrameKinematics {
   static constexpr const char* doc =
-      "J, J', R, p and the velocity of a frame; nothing if it is known.";
+      "J, J', R, p and the velocity of a frame, unless computed already.";
   Ints<1> stamp;
-  InOutInts<1> computed;  // the stamp at which it was computed last
+  InOutInts<1> computed;  // the stamp of the last computation
   ParentJoint carrier;
   In<'n'> v;
   FrameMotion<Out> motion;

@@ -1,4 +1,4 @@
-// The efforts against gravity, and their derivatives by the posture and along the motion.
+// The efforts against gravity, and their derivatives with respect to q and along the motion.
 #pragma once
 #include <hsp/indices.hpp>
 #include <hsp/records.hpp>
@@ -12,18 +12,19 @@ namespace hsp {
 //   G_k = -g·x_k,   ∂G_k/∂q_i = w_i·(g × x_k) where i carries k or is of the same joint,
 //                             = w_k·(g × x_i) where i is beyond k,
 //
-// and 0 where neither carries the other. Along v, with what carries k turning by Ω and what is
-// beyond it moving by ξ = Σ x_i v_i,
+// and 0 where neither carries the other. Along v, with the angular velocity Ω of the bodies before
+// k and the motion ξ = Σ x_i v_i of those beyond it,
 //
 //   x_k' = Ω × x_k + w_k × ξ,
 //
-// and G'' at constant v is the rate of ∂G/∂q, times v. Columns of followers add to their leader's.
+// and G'' at constant v is the rate of ∂G/∂q, times v. Columns of followers are added to their
+// leader's.
 struct Gravity {
   static constexpr const char* doc =
-      "The efforts G that gravity takes, their slope ∂G/∂q, and G'' at constant velocity.";
+      "The efforts G against gravity, their slope ∂G/∂q, and G'' at constant velocity.";
   Columns<6, 'x'> jacobian, jacobian_dot;  // in world axes at the world's origin
   In<'j', 12> placements;                  // of the joints; see JointJacobians
-  In<'j'> mass;                            // of what is fixed to a joint [kg]
+  In<'j'> mass;                            // of the body at a joint [kg]
   In<'j', 3> center;                       // its centre of mass in the joint [m]
   Flags<'x', 'j'> moves;                   // whether a column moves a joint
   Ints<'x'> joints, dofs;                  // of each column

@@ -5,7 +5,7 @@
 
 namespace hsp {
 
-// Throws where rows of joints are not those of a robot with these sizes of q and v.
+// Throws if rows of joints do not fit these sizes of q and v.
 template <class Joints> void check_joint_rows(const Joints& joints, Index q, Index v) {
   check_indices("the joints' indices in v", joints.col(0), v);
   check_indices("the joints' indices in q", joints.col(1), q);
@@ -23,7 +23,7 @@ double joint_displacement(const Q& q, const Reference& reference, const Row& row
   return std::atan2(s * c_ref - c * s_ref, c * c_ref + s * s_ref);
 }
 
-// Of several joints, each at its index in v; the other entries stay as they are.
+// Of several joints, each at its index in v; the other entries are unchanged.
 template <class Q, class Reference, class Joints, class Out>
 void joint_displacements(const Q& q, const Reference& reference, const Joints& joints, Out& out) {
   for (Index k = 0; k < joints.rows(); ++k)

@@ -1,4 +1,4 @@
-// Where a tool is in the joint that carries it.
+// The placement of a tool in the joint that carries it.
 #pragma once
 #include <hsp/records.hpp>
 

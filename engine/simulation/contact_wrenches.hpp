@@ -1,4 +1,4 @@
-// The wrenches of contacts on those that they touch.
+// The wrenches of contacts on the touching bodies.
 #pragma once
 #include <hsp/indices.hpp>
 #include <limits>
@@ -7,12 +7,12 @@ namespace hsp {
 
 struct AddContactWrenches {
   static constexpr const char* doc =
-      "Add each contact's wrench to the second that it touches, and the opposite to the first.";
-  Ints<'k', 2> touched;  // rows of the sums; below zero: of none
+      "Add each contact's wrench to its second body, and the opposite to the first.";
+  Ints<'k', 2> touched;  // rows of the sums; negative: none
   In<'k', 3> positions;  // of the contacts in the world
   In<'k', 3, 3> frames;  // the rows are the axes of a contact in the world
   In<'k', 6> wrenches;   // force and moment, in those axes
-  In<'m', 3> origins;    // the points about which the moments of the sums are
+  In<'m', 3> origins;    // reference points of the moments of the sums
   InOut<'m', 6> sums;    // in world axes
 
   void check() const {

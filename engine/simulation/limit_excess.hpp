@@ -1,4 +1,4 @@
-// How far a robot is beyond its limits.
+// The excess of a robot beyond its limits.
 #pragma once
 #include <hsp/indices.hpp>
 
@@ -6,8 +6,8 @@ namespace hsp {
 
 struct LimitExcess {
   static constexpr const char* doc =
-      "The largest of what it was, q - upper and lower - q, and of |v| - speed, for each dof.";
-  Ints<'k'> coordinates, dofs;  // where the joints that have a range stand in q and v
+      "The maximum of its last value, q - upper and lower - q, and of |v| - speed, for each dof.";
+  Ints<'k'> coordinates, dofs;  // indices in q and v of the joints with a range
   In<'q'> q;
   In<'n'> v, lower, upper, speed;
   InOut<'n'> position, velocity;

@@ -1,4 +1,4 @@
-// Many control periods of a simulation as one call, as long as its controller's steps are free.
+// Many control periods of a simulation as one call, while no limit is active in a step.
 #pragma once
 #include "../law/outcome.hpp"
 #include "../limits/records.hpp"
@@ -10,19 +10,19 @@ namespace hsp {
 struct Timing {
   In<1> start, span;  // [s]
   Ints<1> periods;
-  Ints<1> first, last;  // the period that begins now, and the one that is not made any more
+  Ints<1> first, last;  // the period that begins now, and the one after the last
 };
 
 struct Periods {
   static constexpr const char* doc =
-      "Move a plant on from one period to another, or to one that is not free; return which.";
+      "Advance a plant from one period to another, or to one with an active limit; return it.";
   Shared<Plan> moving;   // integrates the plant over the interval
-  Shared<Move> step;     // writes the effort, and what became of law and limits
+  Shared<Move> step;     // writes the effort, and the outcome of law and limits
   Shared<Plan> sending;  // records that this effort is held from now on
   In<'q'> q;
   In<'n'> v;
-  Out<'n'> held;    // what the plant is under
-  In<'n'> effort;   // what the step writes
+  Out<'n'> held;    // effort that acts on the plant
+  In<'n'> effort;   // written by the step
   Out<2> interval;  // both ends of a period
   LawOutcome<Ints> law;
   LimitsOutcome<Ints> limits;
@@ -50,7 +50,7 @@ struct Periods {
     return timing.start[0] + passed / static_cast<double>(timing.periods[0]);
   }
 
-  // Whether the effort is that of the law, as it is; its inverse may be bounded.
+  // Whether the effort is the law's; its inverse may be bounded.
   bool is_free() const { return law.finite[0] && !limits.violated[0] && !limits.beyond[0]; }
 };
 

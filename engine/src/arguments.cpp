@@ -33,7 +33,7 @@ std::string use_text(const Field& field) {
                            .c_str());
 }
 
-// The memory of an array, not a copy: a call reads what is there when it is made.
+// The memory of an array, not a copy: a call reads its present values.
 Argument array(const Kind& kind, const Field& field, nb::handle given) {
   if (!PyArray_Check(given.ptr())) refuse(kind, field, text_of(nb::repr(given)));
   auto* x = reinterpret_cast<PyArrayObject*>(given.ptr());
@@ -121,7 +121,7 @@ class Given {
   }
 
  private:
-  // The place of a field; mostly it is the one after that of the last.
+  // The index of a field; usually the one after the last.
   nb::object* find(std::string_view name) {
     for (std::int64_t i = 0; i < kind_.count; ++i) {
       const std::int64_t k = (next_ + i) % kind_.count;
@@ -139,7 +139,7 @@ class Given {
     const Field* end = kind_.fields + kind_.count;
     return std::any_of(kind_.fields, end, [&](const Field& x) { return is_in(name, x.name); });
   }
-  // The largest group around a member of which nothing is given; else the member.
+  // The largest group around a member that is entirely missing; otherwise the member.
   std::string_view whole_group(std::string_view name) const {
     for (auto dot = name.find('.'); dot != name.npos; dot = name.find('.', dot + 1)) {
       const std::string_view group = name.substr(0, dot);

@@ -9,7 +9,7 @@
 
 namespace hsp {
 
-// What is given for each field of a kind, in their order. A group is given as a record of its
+// The values for the fields of a kind, in their order. A group is given as a record of its
 // members, which is a named tuple or a dict, or member by member: "task.error". Throws
 // nb::type_error where an argument is missing, unknown, given twice or not by its name.
 nanobind::tuple values_of(const Kind& kind, nanobind::args by_order, nanobind::kwargs by_name);

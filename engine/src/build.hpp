@@ -1,4 +1,4 @@
-// What the engine was built as: plans that are saved run with the same, and give the same bits.
+// The build of the engine: saved plans require the same build, and give the same bits.
 #pragma once
 
 namespace hsp {

@@ -17,7 +17,7 @@ template <class Sizes> std::string tuple_text(const Sizes& sizes, int rank) {
   return text + (rank == 1 ? ",)" : ")");
 }
 
-// What the letters stand for; an error names where each was read first.
+// The sizes of the letters; an error names the argument that defined each.
 Sizes sizes_of(const Kind& kind, const std::vector<Argument>& arguments) {
   Sizes sizes;
   const Field* first['z' + 1] = {};
@@ -49,7 +49,7 @@ std::int64_t bytes_of(const Field& field, const Argument& argument) {
   return count * (field.entry == 'b' ? 1 : 8);
 }
 
-// Eigen reads an argument while it writes another one: in the same memory numbers would be wrong.
+// Eigen reads an argument while it writes another one: in shared memory results would be wrong.
 void check_apart(const Kind& kind, const std::vector<Argument>& arguments) {
   const auto is_written = [](const Field& field) {
     return field.access == Access::Out || field.access == Access::InOut;

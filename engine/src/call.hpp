@@ -15,8 +15,8 @@ struct Argument {
 
 class Call {
  public:
-  // One argument for each of the kind's fields, in their order. Throws std::invalid_argument
-  // where a letter would stand for two numbers, or a size is not as the kind has it.
+  // One argument for each of the kind's fields, in their order. Throws std::invalid_argument if a
+  // letter would denote two numbers, or a size differs from the kind's.
   Call(const Kind& kind, const std::vector<Argument>& arguments);
 
   double operator()(double t) const { return kind.run(self(), t); }
@@ -32,7 +32,7 @@ class Call {
   std::unique_ptr<void, Delete> self_;  // the kind's struct
 };
 
-// A field's shape as one writes it: "(m, 3)".
+// A field's shape as text: "(m, 3)".
 std::string shape_text(const Field& field);
 
 }  // namespace hsp

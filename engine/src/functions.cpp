@@ -1,4 +1,4 @@
-// Functions that Python calls by themselves: of few numbers, with new arrays as results.
+// Functions called directly from Python: of few numbers, with new arrays as results.
 #include "functions.hpp"
 
 #include <hsp/rotations.hpp>

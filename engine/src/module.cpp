@@ -71,7 +71,7 @@ NB_MODULE(_engine, m) {
   if (!has_numpy()) throw nb::python_error();
   nb::set_leak_warnings(false);
 
-  nb::class_<Kind>(m, "Kind", "A kind of call: what its arguments are, and its mathematics.")
+  nb::class_<Kind>(m, "Kind", "A kind of call: its arguments and its mathematics.")
       .def("__repr__", &signature)
       .def(
           "__call__",
@@ -88,7 +88,7 @@ NB_MODULE(_engine, m) {
       .def("__deepcopy__", [](nb::object kind, nb::handle) { return kind; })
       .def("__reduce__", [](nb::object kind) { return engine("reduced")(kind); });
 
-  nb::class_<Runnable>(m, "Runnable", "What a plan can make: f(t) ↦ a number.")
+  nb::class_<Runnable>(m, "Runnable", "A callable of a plan: f(t) ↦ a number.")
       .def(
           "__call__", [](const Runnable& call, double t) { return call(t); }, "t"_a = 0.0)
       .def_prop_ro(
@@ -98,10 +98,10 @@ NB_MODULE(_engine, m) {
                              reinterpret_cast<std::intptr_t>(call.row.self));
           },
           "The addresses of its function f(self, t) and of self.")
-      .def_ro("python", &Runnable::python, "Whether a function of Python is among what it runs.");
+      .def_ro("python", &Runnable::python, "Whether it runs a function of Python.");
 
   nb::class_<CallObject, Runnable>(
-      m, "Call", "A kind with its arguments, whose memory it reads each time that it is made.",
+      m, "Call", "A kind with its arguments, whose memory it reads each time it runs.",
       nb::type_slots(slots<CallObject, &CallObject::values>))
       .def("__repr__", &described)
       .def_prop_ro(
@@ -116,7 +116,7 @@ NB_MODULE(_engine, m) {
                                              named_values(c.call.kind, c.values)));
       });
 
-  nb::class_<PlanObject, Runnable>(m, "Plan", "Calls that are made one after the other.",
+  nb::class_<PlanObject, Runnable>(m, "Plan", "Calls that run in sequence.",
                                    nb::type_slots(slots<PlanObject, &PlanObject::calls>))
       .def(
           "__init__",

@@ -9,13 +9,13 @@ namespace hsp {
 
 struct Move {
   static constexpr const char* type_name = "Move";
-  static constexpr const char* doc = "Make calls at a state, which `to` has moved.";
+  static constexpr const char* doc = "Run calls at the state set by `to`.";
   Shared<Plan> calls;
   In<1> origin;  // reading of the clock at time 0 [s]
   Out<1> time;   // since then [s]
   Out<'q'> q;
   Out<'n'> v;
-  Ints<'u', 2> unit_blocks;  // start and size of what in q has norm 1
+  Ints<'u', 2> unit_blocks;  // start and size of the blocks of q with norm 1
   InOutInts<1> stamp;        // the number of moves
 
   void check() const {

@@ -1,4 +1,4 @@
-// A plan: calls that are made one after the other, and what makes a plan under a condition.
+// A plan: calls that run in sequence, and calls that run a plan under a condition.
 #pragma once
 #include <algorithm>
 #include <cmath>
@@ -18,7 +18,7 @@ class Plan {
 
   explicit Plan(std::vector<Row> rows) : rows_(std::move(rows)) {}
 
-  // Make the calls at a time [s]; return what the last one returns.
+  // Run the calls at a time [s]; return the last one's result.
   double run(double t) const {
     double value = 0.0;
     for (const Row& row : rows_) value = row.run(row.self, t);
@@ -30,7 +30,7 @@ class Plan {
 };
 
 struct Once {
-  static constexpr const char* doc = "Make calls unless they were made at this stamp.";
+  static constexpr const char* doc = "Run calls unless they were run at this stamp.";
   Shared<Plan> calls;
   Ints<1> stamp;
   InOutInts<1> made;
@@ -43,7 +43,7 @@ struct Once {
 };
 
 struct OnlyIf {
-  static constexpr const char* doc = "Make calls if a condition is not 0.";
+  static constexpr const char* doc = "Run calls if a condition is not 0.";
   Shared<Plan> calls;
   Ints<1> condition;
 
@@ -63,7 +63,7 @@ struct EqualSteps {
   static constexpr double most = 1e9;
 
   void check() const {
-    if (!(longest > 0.0)) throw std::invalid_argument("longest is more than 0");
+    if (!(longest > 0.0)) throw std::invalid_argument("longest must be more than 0");
   }
   void operator()() {
     const double start = interval[0], duration = interval[1] - start;

@@ -46,7 +46,7 @@ std::vector<Plan::Row> PlanObject::rows(nb::tuple given) {
       found.push_back(nb::cast<Runnable&>(each).row);
     } else if (!nb::isinstance<Runnable>(each) && nb::hasattr(each, "row") &&
                nb::try_cast(each.attr("row"), row) && row.first) {
-      // What was compiled elsewhere lists the same addresses.
+      // Code that was compiled elsewhere lists the same addresses.
       found.push_back({reinterpret_cast<double (*)(void*, double)>(row.first),
                        reinterpret_cast<void*>(row.second)});
     } else {

@@ -1,5 +1,5 @@
-// What Python holds: calls, plans, and functions of Python as calls. Each has a row: the
-// addresses of a function f(self, t) and of self, which is all that a plan knows of it.
+// Objects of Python: calls, plans, and functions of Python as calls. Each has a row: the addresses
+// of a function f(self, t) and of self, which is all that a plan uses.
 #pragma once
 #include <nanobind/nanobind.h>
 
@@ -15,8 +15,8 @@ namespace hsp {
 
 struct Runnable {
   Plan::Row row;
-  bool python;    // whether a function of Python is among what it runs
-  int depth = 0;  // how many plans it runs one within another
+  bool python;    // whether it runs a function of Python
+  int depth = 0;  // depth of nested plans
 
   double operator()(double t) const { return row.run(row.self, t); }
 };
@@ -38,7 +38,7 @@ struct CallObject : Runnable {
 
 nanobind::dict named_values(const Kind& kind, nanobind::tuple values);
 
-// Calls that are made one after the other.
+// Calls that run in sequence.
 struct PlanObject : Runnable {
   explicit PlanObject(nanobind::tuple given) : calls(given), plan(rows(given)) {
     row = {[](void* self, double t) { return static_cast<Plan*>(self)->run(t); }, &plan};
@@ -50,7 +50,7 @@ struct PlanObject : Runnable {
   PlanObject(const PlanObject&) = delete;
   static std::vector<Plan::Row> rows(nanobind::tuple given);
   static bool is_python(nanobind::handle call);
-  static constexpr int most_depth = 1000;  // each takes of the stack when it is run
+  static constexpr int most_depth = 1000;  // each uses stack memory when it runs
 
   nanobind::tuple calls;
   Plan plan;
@@ -69,7 +69,7 @@ struct PythonCall : Runnable {
   bool timed;
 };
 
-// A robot's dynamics, with the numbers that they were made of.
+// A robot's dynamics, with the parameters from which they were built.
 struct DynamicsObject {
   // `joints` are objects with the attributes of `Joint`.
   DynamicsObject(nanobind::tuple joints, nanobind::tuple gravity, nanobind::tuple armature);
@@ -79,8 +79,7 @@ struct DynamicsObject {
   Dynamics dynamics;
 };
 
-// A state's move, as Python makes it: refused where t is no number, or q and v are no vectors of
-// doubles.
+// A state's move from Python: refused if t is not a number, or q and v are not vectors of doubles.
 struct MoveObject {
   explicit MoveObject(nanobind::tuple given);
   // None where it is refused.

@@ -1,4 +1,4 @@
-// The only file that sees Ruckig's headers.
+// The only file that includes Ruckig's headers.
 #include "fastest.hpp"
 
 #include <limits>
@@ -8,12 +8,12 @@ namespace hsp {
 
 namespace {
 
-// Rounding errors are no distance: Ruckig fails where they are all there is.
+// Rounding errors are not a distance: Ruckig fails if there is no other.
 void give(const Vector& x, std::vector<double>& to) {
   for (Index i = 0; i < x.size(); ++i) to[i] = std::abs(x[i]) < 1e-12 ? 0.0 : x[i];
 }
 
-// How the coordinates belong together: the next where Ruckig fails.
+// Synchronisation of the coordinates: the next one if Ruckig fails.
 constexpr ruckig::Synchronization ways[] = {
     ruckig::Synchronization::Phase,  // on a straight line, where that is possible
     ruckig::Synchronization::Time,

@@ -14,11 +14,11 @@ struct OwnBounds {
 
 // The request, in a frame that moves with the target.
 struct FastestTask {
-  Vector x, rate, acceleration;  // at the start; x is counted from the target
+  Vector x, rate, acceleration;  // at the start; x is relative to the target
   Vector target_rate;            // x' at the end
   Vector drift;                  // velocity of the frame
   bool positions;                // whether the target is a position; else only a velocity
-  Index together;                // how many coordinates, from the first on, arrive together
+  Index together;                // number of leading coordinates that arrive together
   double minimum;                // the motion is not shorter [s]
 
   void resize(Index n) {
@@ -34,7 +34,7 @@ class Fastest {
 
  private:
   struct Memory;
-  std::shared_ptr<Memory> memory_;  // which is all of Ruckig's
+  std::shared_ptr<Memory> memory_;  // of Ruckig
 };
 
 }  // namespace hsp

@@ -14,7 +14,7 @@ template <template <int...> class As> struct ChartState {
   As<3, 3> base;
 };
 
-// One that a call computes on its way.
+// A piece with its own memory.
 struct OwnState {
   Vector x, rate, acceleration;
   Matrix3 base;
@@ -47,7 +47,7 @@ class Piece {
 
   bool is(PieceForm form) const { return numbers_[0] == static_cast<double>(form); }
   double& start() { return numbers_[1]; }
-  double& end() { return numbers_[2]; }  // what follows may begin earlier
+  double& end() { return numbers_[2]; }  // the next piece may begin earlier
   double& duration() { return numbers_[3]; }
   Eigen::Map<Eigen::Matrix<double, 3, 3, Eigen::RowMajor>> base() {
     return Eigen::Map<Eigen::Matrix<double, 3, 3, Eigen::RowMajor>>(numbers_ + 4);

@@ -1,4 +1,4 @@
-// The pieces of a reference that Python plans: it decides where to, these say how.
+// The pieces of a reference that Python plans: it chooses the goals, these the motion.
 #pragma once
 #include <hsp/indices.hpp>
 
@@ -22,7 +22,7 @@ struct StateMemory : OwnState {
   }
 };
 
-// What a call plans with, and on: no arguments.
+// Memory of a call for planning.
 struct PlannerMemory {
   Planner planner;
   StateMemory state;
@@ -68,8 +68,8 @@ struct PieceState {
 
 struct RebasedState {
   static constexpr const char* doc =
-      "The same state about the orientation that it has, where its rotation vector is zero.";
-  double linear;  // how many coordinates are none of a rotation vector
+      "The same state about its own orientation, where its rotation vector is zero.";
+  double linear;  // number of coordinates outside of a rotation vector
   ChartState<In> state;
   ChartState<Out> out;
   StateMemory found;
@@ -84,7 +84,7 @@ struct RebasedState {
 
 struct WaypointPiece {
   static constexpr const char* doc =
-      "On through waypoints, each with the derivatives that it was given, or that it shows with "
+      "Through waypoints, each with its given derivatives, or those estimated from its "
       "its "
       "neighbours; whether there is a way.";
   double t, linear, delay, smoothing, extrapolation;
@@ -94,7 +94,7 @@ struct WaypointPiece {
   In<'m'> times;        // increasing [s]
   In<'m', 'w'> values;  // linear coordinates, then perhaps a quaternion (x, y, z, w)
   In<'m', 'n'> velocities;
-  Flags<'m'> given;  // which velocities count
+  Flags<'m'> given;  // which velocities are given
   Out<'p'> piece;
   PlannerMemory memory;
   PassingMemory<'m'> passing;
@@ -122,7 +122,7 @@ struct WaypointPiece {
 
 struct VelocityPiece {
   static constexpr const char* doc =
-      "To a velocity, and on at it: 0 where there is no way, 1; 2 where x stands for the integral "
+      "To a velocity, and on with it: 0 if no motion is found, 1; 2 if x is the integral "
       "of u, x' = R u.";
   double t, linear, tool, delay;  // tool: 1 where the velocity is in the body's axes
   MotionBounds<In> bounds;
@@ -135,7 +135,7 @@ struct VelocityPiece {
     check_piece(piece.size(), state.x.size());
     check_linear(linear, state.x.size());
     if (tool != 0.0 && linear != 0.0 && (linear != 3.0 || state.x.size() != 6))
-      throw std::invalid_argument("only what turns has axes of its own");
+      throw std::invalid_argument("only a piece with a rotation has axes of its own");
   }
   double operator()() {
     memory.set(linear, bounds);

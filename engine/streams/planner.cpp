@@ -14,13 +14,13 @@ namespace {
 // A quintic is cut into this many pieces: the bounds of a Bézier curve by its control points are
 // then at most a tenth too cautious for a motion from rest to rest.
 constexpr int cuts = 4;
-constexpr int tries = 8;         // how often a longer cubic is tried,
-constexpr double longer = 1.25;  // and how much longer: up to five times
-constexpr int repeated = 40;     // a change that turns by a radian needs some fifteen
-constexpr double far = 2.0;      // a change that turns by more is not made steady at its end [rad]
+constexpr int tries = 8;         // number of longer cubics that are tried,
+constexpr double longer = 1.25;  // and their ratio: up to five times longer
+constexpr int repeated = 40;     // a change by a radian needs some fifteen
+constexpr double far = 2.0;      // rotation beyond which a change does not end steadily [rad]
 constexpr double infinite = std::numeric_limits<double>::infinity();
 
-// What maps control points to those of the piece from `start` to `end`: entry (i, j) is the blossom
+// Map from control points to those of the piece from `start` to `end`: entry (i, j) is the blossom
 // of Bernstein polynomial j at i times `end` and degree - i times `start`.
 Matrix cut(int degree, double start, double end) {
   Matrix rows(degree + 1, degree + 1);
@@ -37,7 +37,7 @@ Matrix cut(int degree, double start, double end) {
   return rows;
 }
 
-// What maps the ends of a quintic to T^k times the control points of its k-th derivative.
+// Map from the ends of a quintic to T^k times the control points of its k-th derivative.
 std::array<Matrix, 3> derivatives() {
   Matrix points = Matrix::Zero(6, 6);
   points.topLeftCorner<3, 3>() << 1.0, 0.0, 0.0, 1.0, 1.0 / 5.0, 0.0, 1.0, 2.0 / 5.0, 1.0 / 20.0;
@@ -237,9 +237,9 @@ bool Planner::to_rest(double t, const OwnState& state, double delay, Piece& piec
 }
 
 // A velocity changes along a cubic, so that all its components keep their ratio from one steady
-// velocity to another: a hand leaves its straight line or its screw for no moment. Where no cubic
-// keeps the bounds, what still accelerates is brought to a steady velocity first; in world axes, at
-// last, Ruckig finds a way.
+// velocity to another: a hand never leaves its straight line or its screw. If no cubic keeps the
+// bounds, an accelerating motion is first brought to a steady velocity; finally, in world axes,
+// Ruckig plans the motion.
 Planned Planner::follow(double t, const OwnState& state, const Vector& velocity, bool tool,
                         double delay, Piece& piece) {
   bound_velocity(velocity, wanted_);
@@ -272,7 +272,7 @@ Planned Planner::follow(double t, const OwnState& state, const Vector& velocity,
     kept = keeps(ends_, T);
     if (!kept) T *= longer;
   }
-  if (!kept) {  // the acceleration must end first, as the stick was turned back
+  if (!kept) {  // the acceleration must end first, since the stick was reversed
     T = std::max(shortest_motion, 2.0 * share(seen_.acceleration, bounds_.jerk)) * (1.0 + 1e-9);
     there_ = seen_.rate + T / 3.0 * seen_.acceleration;
     change(seen_, there_, tool, T);
@@ -317,17 +317,17 @@ double Planner::share(const Vector& change, const Vector& bound) const {
   return most;
 }
 
-// How long a change of velocity takes from one steady one to another: a cubic's largest
+// Duration of a change from one steady velocity to another: a cubic's largest
 // acceleration is 1.5 Δ/T, its largest jerk 6 Δ/T².
 double Planner::shortest(const Vector& change, double delay) const {
   double T = std::max({delay, shortest_motion, 1.5 * share(change, bounds_.acceleration)});
   T = std::max(T, std::sqrt(6.0 * share(change, bounds_.jerk)));
-  return T * (1.0 + 1e-9);  // else rounding decides
+  return T * (1.0 + 1e-9);  // otherwise rounding decides
 }
 
 // The ends of a quintic whose velocity is a cubic. At its end the velocity is steady in its axes.
-// How a rotation vector must move for that depends on where it is then, which depends on how it
-// moves: `steady` repeats what it finds until that stays.
+// The required motion of a rotation vector depends on its final value, which depends on the motion:
+// `steady` iterates to a fixed point.
 void Planner::change(const OwnState& state, const Vector& rate, bool tool, double T) {
   moved_ = 0.5 * T * state.rate;
   moved_ += state.x + T * T / 12.0 * state.acceleration;
@@ -344,8 +344,8 @@ void Planner::change(const OwnState& state, const Vector& rate, bool tool, doubl
   ends_.row(5) = T * T * acceleration_.transpose();
 }
 
-// x, x' and x'' in which the angular velocity is as wanted, and steady. Where it is not found, as
-// it turns far until then, the next piece corrects what is left, which is less.
+// x, x' and x'' with the desired steady angular velocity. If it is not found, after a large
+// rotation, the next piece corrects the smaller remainder.
 bool Planner::steady(const Vector& wanted, bool tool, double T) {
   rate_ = wanted;
   acceleration_.setZero();
@@ -367,8 +367,8 @@ bool Planner::steady(const Vector& wanted, bool tool, double T) {
   return false;
 }
 
-// As `keeps_box`, but the angular bounds hold for lengths. What is too fast at the start, as a body
-// may be in other axes than those of before, may be so until it is slower.
+// As `keeps_box`, but the angular bounds hold for lengths. A velocity that is too high at the
+// start, as may happen after a change of axes, may stay so until it has decreased.
 bool Planner::keeps(const Matrix& ends, double duration) {
   double scale = 1.0;
   const Vector* bounds[] = {&bounds_.speed, &bounds_.acceleration, &bounds_.jerk};

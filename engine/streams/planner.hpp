@@ -1,4 +1,4 @@
-// Pieces that lead from a state to a target, or to a velocity, within bounds: quintics where they
+// Pieces from a state to a target, or to a velocity, within bounds: quintics where they
 // keep the bounds, and otherwise Ruckig's fastest motion.
 #pragma once
 #include "fastest.hpp"
@@ -13,18 +13,18 @@ constexpr double same_state = 1e-7;  // states that differ by less are the same,
 // beyond its bound while all of ω is not.
 constexpr double planned_share = 0.95;
 
-// Where the reference should be at a time, and how it moves there.
+// The desired value of the reference at a time, and its motion there.
 struct OwnGoal {
-  double time;  // when [s]
+  double time;  // time [s]
   Vector x, rate, acceleration;
 };
 
-// What is planned: a piece in the axes of its chart; or one whose linear coordinates are u in place
-// of x', x' = R u, in the axes of the body; or none, where none was found.
+// The result of planning: a piece in the axes of its chart; or one whose linear coordinates are u
+// in place of x', x' = R u, in the axes of the body; or none, if none was found.
 enum class Planned { NONE, PIECE, IN_TOOL_AXES };
 
-// The same state in the chart in which its rotation vector is zero; `linear` coordinates are none
-// of it.
+// The same state in the chart in which its rotation vector is zero; the first `linear` coordinates
+// are outside of it.
 void rebase(OwnState& state, Index linear);
 
 class Planner {
@@ -42,16 +42,16 @@ class Planner {
 
   // A value in coordinates about a base.
   void local(const double* value, const Matrix3& base, Vector& x) const;
-  // The rotation vector of the same orientation that is nearest to that of other coordinates.
+  // The rotation vector of an orientation nearest to that of other coordinates.
   void continue_from(const Vector& before, Vector& x) const;
   // x' at x for a velocity in world axes; a rotation vector's is y' = Jlog(y) exp(y)ᵀ R_bᵀ ω.
   void local_rate(const Vector& x, const Matrix3& base, Vector& rate) const;
 
   // The quintic that reaches a goal in time; whether the bounds permit it.
   bool smooth(double t, const OwnState& state, const OwnGoal& goal, Piece& piece);
-  // The fastest way to a goal, which goes on moving at its velocity.
+  // The fastest motion to a goal, which continues to move at its velocity.
   bool fastest(double t, const OwnState& state, const OwnGoal& goal, Piece& piece);
-  // To a velocity, linear, then angular, and on at it; in `delay` [s] if the bounds permit.
+  // To a velocity, linear, then angular, and on with it; in `delay` [s] if the bounds permit.
   Planned follow(double t, const OwnState& state, const Vector& velocity, bool tool, double delay,
                  Piece& piece);
   // To rest at a value, at a time or later.

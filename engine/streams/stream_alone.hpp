@@ -7,10 +7,10 @@
 
 namespace hsp {
 
-// What `StreamRun` does with messages that have no time of their own, to the last bit.
+// Equal to `StreamRun` for messages without a time, to the last bit.
 struct StreamAlone {
   static constexpr const char* doc =
-      "A reference that follows targets and velocities, whatever is sent and when.";
+      "A reference that follows targets and velocities, sent at any time.";
   double linear;
   double policy;                                                 // `Policy`
   double delay, smoothing, extrapolation, dead_man, hold_after;  // [s]
@@ -18,15 +18,15 @@ struct StreamAlone {
   InOut<'p'> piece;
   InOut<'k'> times;  // of waypoints, in order [s]
   InOut<'k', 'w'> values;
-  InOutInts<1> count;                    // how many there are
+  InOutInts<1> count;                    // number of waypoints
   InOut<'n'> velocity;                   // the command: linear, then angular, in world axes
   InOutInts<1> commanded;                // whether it is followed, instead of waypoints
   InOut<1> now, begun, heard, fades_at;  // [s]
   InOutInts<1> silent;
-  InOut<'w'> sent_target;  // what comes to count in the next step
+  InOut<'w'> sent_target;  // message that is used in the next step
   InOut<'n'> sent_velocity;
   InOutInts<1> sent;     // `Sent`, the last one
-  InOutInts<1> differs;  // whether what was sent differs in itself, or from a velocity
+  InOutInts<1> differs;  // whether the message differs from the last one, or from a velocity
   InOutInts<1> alone;    // whether a velocity was sent, which ends all waypoints
   ChartState<Out> out;
   PlannerMemory memory;
@@ -35,9 +35,9 @@ struct StreamAlone {
   enum Policy { LATEST, INTERPOLATE, EXTRAPOLATE };
   enum Sent { NOTHING, TARGET, VELOCITY };
   static constexpr double infinite = std::numeric_limits<double>::infinity();
-  static constexpr double largest = 1e6;    // of a number that is sent: see `message.py`
+  static constexpr double largest = 1e6;    // magnitude of a sent number: see `message.py`
   static constexpr double unit = 1e-3;      // deviation of a quaternion's norm from 1
-  static constexpr double kept = 1.0;       // how long waypoints that were passed are [s]
+  static constexpr double kept = 1.0;       // time for which passed waypoints are kept [s]
   static constexpr Index considered = 256;  // waypoints before and after a time: see `planner.py`
 
   void check() const {
@@ -51,13 +51,13 @@ struct StreamAlone {
     const Index n = out.x.size();
     memory.set(linear, bounds);
     Piece present(piece.data(), n);
-    if (now[0] == -infinite) now[0] = begun[0] = t;  // what is sent comes to count later
+    if (now[0] == -infinite) now[0] = begun[0] = t;  // messages are used later
     else if (t > now[0]) advance(t, present);
     present.state(t, memory.state);
     memory.state.copy_to(out);
   }
 
-  // Take a target: whether it is one.
+  // Store a target; return whether it is valid.
   template <class Values> bool send_target(const Values& given) {
     if (!(given.cwiseAbs().array() <= largest).all()) return false;
     sent_target = given;
@@ -75,7 +75,7 @@ struct StreamAlone {
     return true;
   }
 
-  // Take a velocity: whether it is one.
+  // Store a velocity; return whether it is valid.
   template <class Values> bool send_velocity(const Values& given) {
     if (!(given.cwiseAbs().array() <= largest).all()) return false;
     differs[0] = differs[0] || (sent[0] == VELOCITY && sent_velocity != given);
@@ -120,7 +120,7 @@ struct StreamAlone {
     forget(std::max(old, near(t)));
   }
 
-  // Whether what was sent changes what lies ahead.
+  // Whether the message changes the future reference.
   bool take(double t) {
     if (sent[0] == NOTHING) return false;
     heard[0] = t;
@@ -163,9 +163,9 @@ struct StreamAlone {
     present.state(t, state);
     rebase(state, static_cast<Index>(linear));
     if (next(t, planner, state, present)) return;
-    count[0] = commanded[0] = 0;  // so far away that no motion is found
+    count[0] = commanded[0] = 0;  // too far away for a motion
     fades_at[0] = infinite;
-    // Where it cannot even rest, what follows is not finite, and the step is refused.
+    // If it cannot even come to rest, the result is not finite, and the step is refused.
     if (planner.to_rest(t, state, delay, present)) return;
     present.begin(PieceForm::COAST, t, infinite, state.base);
     present.body().setConstant(std::numeric_limits<double>::quiet_NaN());

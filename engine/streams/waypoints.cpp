@@ -43,7 +43,7 @@ bool Passing::plan(Planner& planner, double t, const OwnState& state, const Wayp
   Index tried = 0;
   for (Index k = ahead; k <= last; k += 1 + tried * tried / 8) {
     pass(planner, way, state.base, k, how.smoothing);
-    if (k == ahead && k == last && way.rests) rest(goal_);  // no message shows how it goes on
+    if (k == ahead && k == last && way.rests) rest(goal_);  // no message continues it
     if (planner.smooth(t, state, goal_, piece)) return true;
     ++tried;
   }
@@ -67,7 +67,7 @@ void Passing::localize(const Planner& planner, const Waypoints& way, const Matri
   }
 }
 
-// Waypoint k as a goal, with the derivatives that it was given, or shows.
+// Waypoint k as a goal, with given or estimated derivatives.
 void Passing::pass(const Planner& planner, const Waypoints& way, const Matrix3& base, Index k,
                    double smoothing) {
   goal_.time = way.times[k];
@@ -120,7 +120,7 @@ void Passing::parabola(const Waypoints& way, Index k, Index begin, Index end) {
   const double b1 = size1 / count;
   const auto p2 = [&](Index i) { return (s(i) - a1) * p1(i) - b1; };
   for (Index i = begin; i < end; ++i) size2 += p2(i) * p2(i);
-  const bool curved = size2 > rounding * rounding * count;  // else there are two times
+  const bool curved = size2 > rounding * rounding * count;  // otherwise there are two times
   for (Index c = 0; c < x_.cols(); ++c) {
     double c0 = 0.0, c1 = 0.0, c2 = 0.0;
     for (Index i = begin; i < end; ++i) {
@@ -134,7 +134,7 @@ void Passing::parabola(const Waypoints& way, Index k, Index begin, Index end) {
   }
 }
 
-// A piece that meets a goal that moves, in `delay` or later.
+// A piece that meets a moving goal, in `delay` or later.
 bool Passing::meet(Planner& planner, double t, const OwnState& state, double delay, double end,
                    Piece& piece) {
   if (on_line(state, t)) {
@@ -152,7 +152,7 @@ bool Passing::meet(Planner& planner, double t, const OwnState& state, double del
     if (planner.smooth(t, state, met_, piece)) return true;
   }
   if (!planner.fastest(t, state, goal_, piece)) return false;
-  piece.end() = std::min(piece.end(), end);  // unless a message shows how it goes on
+  piece.end() = std::min(piece.end(), end);  // unless a message determines how it continues
   return true;
 }
 

@@ -1,30 +1,30 @@
-// A reference that passes through waypoints, with the derivatives that they were given or show.
+// A reference that passes through waypoints, with given or estimated derivatives.
 #pragma once
 #include "planner.hpp"
 
 namespace hsp {
 
-// Waypoints in order of time: some that were passed, and the next ones.
+// Waypoints in order of time: some passed ones, and the next ones.
 struct Waypoints {
   Eigen::Map<const Vector> times;       // increasing [s]
   Eigen::Map<const Matrix> values;      // linear coordinates, then perhaps a quaternion
-  Eigen::Map<const Matrix> velocities;  // in world axes, where they are given
+  Eigen::Map<const Matrix> velocities;  // in world axes, if given
   const bool* given;                    // null: nowhere
   bool more;                            // whether others follow these
   bool rests;  // whether the reference comes to rest at the last one, and does not go on beyond it
 };
 
 struct PassingTimes {
-  double delay;          // from a waypoint's own time to when the reference is there [s]
+  double delay;          // delay of the reference after a waypoint's time [s]
   double smoothing;      // waypoints not farther in time are smoothed by a parabola [s]
-  double extrapolation;  // how long the reference goes on at the last velocity [s]
+  double extrapolation;  // time for which the reference continues at the last velocity [s]
 };
 
 class Passing {
  public:
   // Make room for so many waypoints of n coordinates.
   void resize(Index most, Index n);
-  // The piece that goes on through the waypoints; whether there is a way.
+  // Write the piece through the waypoints; return whether there is one.
   bool plan(Planner& planner, double t, const OwnState& state, const Waypoints& way,
             const PassingTimes& how, Piece& piece);
 

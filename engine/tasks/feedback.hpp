@@ -5,8 +5,8 @@
 
 namespace hsp {
 
-// s(e) is e with each bounded part of it, such as its position, shortened to its largest length
-// ℓ: s(e) = e wherever no part is longer.
+// s(e) is e with each bounded part, such as its position, shortened to its largest length ℓ:
+// s(e) = e if no part is longer.
 template <int m = 'm'> struct Feedback {
   In<m, m> Kp, Kv;     // [1/s²], [1/s]
   In<m> offset;        // [m/s² or rad/s²]

@@ -1,6 +1,6 @@
 // From an impedance to the gains that give it at a state.
 //
-// With J_e the Jacobian of the error's coordinates, e' = -J_e v plus what the reference does,
+// With J_e the Jacobian of the error's coordinates, e' = -J_e v plus the reference's motion,
 // G = Λ⁻¹ = J_e M⁻¹ J_eᵀ and an external force f, τ = J_eᵀ f:
 //
 //   e'' = e''_commanded - G f
@@ -29,7 +29,7 @@
 
 namespace hsp {
 
-// Which rows of an error are a rotation vector, and what rotates.
+// The rows of an error that are a rotation vector, and the rotating frame.
 struct Rotating {
   int first;               // of the three rows; the number of rows if there are none
   In<3, 3> rotation;       // world ← frame
@@ -44,7 +44,7 @@ struct ImpedanceGains {
   Rotating rotating;
   Impedance impedance;
   Ints<'g'> ends;         // where each part of the error ends
-  TaskSample<In> sample;  // of the task, whatever its gains are
+  TaskSample<In> sample;  // of the task, independent of its gains
   double threshold;       // of the law's singularities
   Out<'m', 'm'> G, Kp, Kv;
 
@@ -88,7 +88,7 @@ struct ImpedanceGains {
 
  private:
   // J_e and J_e': J and J', but T J and its rate for a rotation vector. e = -y with y' = T ω,
-  // T = Jlog(y) Rᵀ, plus what the reference does; hence T' = -Jlog Jexp' T - T [ω]×.
+  // T = Jlog(y) Rᵀ, plus the reference's motion; hence T' = -Jlog Jexp' T - T [ω]×.
   void write_error_jacobian() {
     J_e = sample.jacobian;
     J_e_dot = sample.jacobian_dot;

@@ -1,7 +1,7 @@
-// A spring whose force is bounded, as if it slipped where it pulls with the most.
+// A spring with a bounded force, which slips at its largest force.
 //
-// Let each group of rows g, such as the position, carry no more than F_g. The spring slips by x,
-// as it does at a friction that is F_g in every direction, and K (e - x) pulls:
+// Let each group of rows g, such as the position, exert no more than F_g. The spring slips by x, as
+// against a friction force of F_g in every direction, and its force is K (e - x):
 //
 //   U(e) = min_x ½ (e - x)ᵀ K (e - x) + Σ F_g |x_g|
 //   s(e) = ∂U/∂e = S e,    S = (K⁻¹ + diag(c))⁻¹ = C (I + Cᵀ diag(c) C)⁻¹ Cᵀ,    c ≥ 0
@@ -56,7 +56,7 @@ void factor_stiffness(const K& stiffness, C& factor, V& turned) {
   factor = turned.transpose();
 }
 
-// S of an error, with its memory.
+// The secant stiffness S of an error, with its memory.
 struct BoundedStiffness {
   Scratch<'m', 'm'> C, V, L;
   Scratch<'m'> s, change, part;
@@ -91,7 +91,7 @@ struct BoundedStiffness {
   static constexpr double tolerance = 1e-11;  // of |s_g|, relative to F_g
   static constexpr int steps = 40;
 
-  // Newton's iteration on 1/|s_g|, which is nearly linear in c_g; whether nothing had to change.
+  // Newton's iteration on 1/|s_g|, which is nearly linear in c_g; returns whether it has converged.
   template <class E> bool bound(const Group& group, Index g, const Ints<'g'>& ends, const E& e) {
     if (std::isinf(group.most)) return true;
     for (int step = 0; step < steps; ++step) {

@@ -9,8 +9,8 @@
 //
 //   w' = R w̃' - w × w_d + w_d'.
 //
-// The feedback sets e'' = -Kv e' - Kp e, exactly, up to an angle of π. Of these accelerations the
-// joints make what the frame does not by its own motion in its joint; see FrameMotion.
+// The feedback sets e'' = -Kv e' - Kp e, exactly, up to an angle of π. The joints produce these
+// accelerations minus the frame's own motion in its joint; see FrameMotion.
 #pragma once
 #include <hsp/rotations.hpp>
 

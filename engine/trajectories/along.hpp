@@ -98,20 +98,20 @@ struct ArcLength {
   }
 };
 
-// What leads from the path's own rates y and y_u, by u, to those by t. With g the rate of the
+// Conversion of the path's own rates y and y_u, by u, to those by t. With g the rate of the
 // length by u, c = y/g is the rate by s:
 //
 //   y' = c s'      y'' = c s'' + (y_u - c g_u)/g² s'²
 class ByLength {
  public:
-  // `rate` and `change`: of what the length is measured on, g = |rate|.
+  // `rate` and `change`: y and y_u of the measured motion, g = |rate|.
   template <class Rate, class Change>
   ByLength(const TimeScaling::Value& scaling, const Rate& rate, const Change& change)
       : scaling_(scaling), g_(rate.norm()), g_u_(g_ > 0.0 ? rate.dot(change) / g_ : 0.0) {}
 
   template <class Y, class YU, class YDot, class YDDot>
   void operator()(const Y& y, const YU& y_u, YDot& y_dot, YDDot& y_ddot) const {
-    if (!(g_ > 0.0)) {  // the path's own motion rests; so does this one, at an end
+    if (!(g_ > 0.0)) {  // the path's own motion is at rest; so is this one, at an end
       y_dot.setZero();
       y_ddot.setZero();
       return;
@@ -169,7 +169,7 @@ struct AlongPose {
   PoseSample<In> own;
   ArcLength arc;
   TimeScaling scaling;
-  bool by_angle;  // where the origin does not move
+  bool by_angle;  // if the origin does not move
   PoseSample<Out> out;
 
   void operator()(double t) {

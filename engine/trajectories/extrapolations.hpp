@@ -1,4 +1,4 @@
-// Motions from the last state that was written on: uniformly accelerated.
+// Uniformly accelerated motions from the last written state.
 #pragma once
 #include "orientations.hpp"
 

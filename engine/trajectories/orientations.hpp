@@ -6,7 +6,7 @@
 
 namespace hsp {
 
-// Numbers in place of arguments, for what a call computes on its way.
+// Fixed-size values, for intermediate results of a call.
 template <int... sizes> using Own = typename detail::Plain<double, Order::Rows, sizes...>::type;
 
 // R = B exp(y) for an orientation B that moves:

@@ -1,4 +1,4 @@
-// The smooth step from 0 to 1, and what it mixes.
+// The smooth step from 0 to 1, and mixtures by it.
 #pragma once
 #include <hsp/records.hpp>
 

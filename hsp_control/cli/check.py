@@ -28,7 +28,7 @@ from hsp_control.simulation.model_errors import describe, lines
 from hsp_control.tasks import SecondOrderTask
 
 ROUNDING = 1e-9
-"""A singular value below this share of the largest one is zero but for rounding."""
+"""Share of the largest singular value below which one is zero up to rounding."""
 
 
 def check(options: argparse.Namespace) -> int:
@@ -77,7 +77,7 @@ def _checked(
     values, efforts = diagnostics.singular_values, np.abs(output.tau)
     borne = experiment.model_errors
     rank = int(np.sum(values > ROUNDING * values.max(initial=0.0)))
-    held = controller.active_stack.first_task_row  # by contacts, or without motors
+    held = controller.active_stack.first_task_row  # rows of contacts, or without motors
     tasks = {}
     for task in controller.tasks:
         rows = controller.task_rows.get(task.name)  # not before its schedule begins
@@ -131,7 +131,7 @@ def _exact(controller: Controller) -> dict[str, Any] | None:
 
 
 def _rates(controller: Controller) -> list[float | None]:
-    """Return the bound on each effort's rate [N·m/s or N/s]; None: there is none."""
+    """Return the bound on each effort's rate [N·m/s or N/s]; None without one."""
     if controller.limits is None:
         return [None] * controller.robot.nv
     rates = controller.limits.effort_rate.tolist()
@@ -172,7 +172,7 @@ def _check_table(found: dict[str, Any]) -> Table:
 
 
 def _where_exact(exact: dict[str, Any]) -> str:
-    """Return in words where the law is exact."""
+    """Return in words the range in which the law is exact."""
     errors = ", ".join(
         f"{name} below {np.rad2deg(most):.0f}°" if unit == "rad" else
         f"{name} below {most:.2g} {unit}"
@@ -191,9 +191,9 @@ _LIMITS = {
     "redistributed": "shift contact forces at the start",
     "limited": "bind at the start: the law is not exact there",
     "relaxed": "contradict each other at the start",
-    "beyond": "are not kept at the start: a joint is beyond its range or its speed",
+    "beyond": "are violated at the start: a joint is beyond its range or its speed",
 }
-"""The step's status in words, of its limits."""
+"""The state of the limits in words, by the step's status."""
 
 
 def warn_of_reach(experiment: Experiment) -> None:
@@ -213,7 +213,7 @@ def warn_of_reach(experiment: Experiment) -> None:
 
 
 def warn_of_rates(experiment: Experiment) -> None:
-    """Print which gains are high for the control period."""
+    """Print the gains that are high for the control period."""
     for finding in experiment.rate_findings:
         place = ".".join(finding.path)
         print(f"hsp: {place}: {finding.message}", file=sys.stderr)
@@ -240,7 +240,7 @@ def robot_advice(robot: Robot) -> Iterator[str]:
 
 
 def advice_of_run(experiment: Experiment, rollout: Rollout) -> Iterator[str]:
-    """Yield the advice of `hsp check` if a run began singular."""
+    """Yield the advice of `hsp check` if a run began at a singularity."""
     controller = experiment.controller
     least = rollout["singular_values"][0].min(initial=np.inf)
     if not least < controller.singularity_threshold:
@@ -252,7 +252,7 @@ def advice_of_run(experiment: Experiment, rollout: Rollout) -> Iterator[str]:
 
 def start_advice(experiment: Experiment, damped: str = "") -> Iterator[str]:
     """Yield lines about a start that is singular, in collision or cannot be held."""
-    # Where it is singular or in collision, a better one follows.
+    # If it is singular or in collision, a better one follows.
     robot, null_space = experiment.robot, experiment.scenario.null_space
     if damped:
         yield (
@@ -276,7 +276,7 @@ def start_advice(experiment: Experiment, damped: str = "") -> Iterator[str]:
     try:
         found = search.rounded(search.find(null_space.singularity_threshold))
     except ConfigurationError as error:
-        yield f"No better start is known: {error}."
+        yield f"No better start was found: {error}."
         return
     yield (
         "A better start (smallest singular value of the tasks "

@@ -35,10 +35,10 @@ from hsp_control.simulation.run_summary import summary_rows
 
 
 class _Shown(Protocol):
-    """What a companion shows of a run."""
+    """The display of a run by a companion."""
 
     def begin(self, experiment: Experiment) -> None:
-        """Show what will run."""
+        """Show the run's start."""
 
     def on_row(self, recorder: LogWriter) -> None:
         """Show the rows computed so far."""
@@ -50,7 +50,7 @@ class _Shown(Protocol):
 def run(options: argparse.Namespace) -> int:
     """Simulate, save the log and print a summary; rows computed so far are kept."""
     loaded = load_scenario(read(options))
-    options.out.mkdir(parents=True, exist_ok=True)  # fails before the work, not after
+    options.out.mkdir(parents=True, exist_ok=True)  # raises before the work, not after
     log = _log_of(Path(loaded.document.name), options)
     tell = _tell_json if options.json else _tell
     with options.open_page(options, loaded) as page:
@@ -60,13 +60,13 @@ def run(options: argparse.Namespace) -> int:
         return _run_and_save(experiment, log, tell, page)
 
 
-_LONGEST = 120  # of a file's name, without its ending
+_LONGEST = 120  # maximum length of a file's name, without its ending
 _SHOWN = re.compile(r"\s*(title|description|view)\b")
 """Keys that change how a run is shown, not the run."""
 
 
 def file_name(words: str) -> str:
-    """Return words as the name of a file; what is too long ends in its hash."""
+    """Return words as the name of a file; a longer name is cut and ends in its hash."""
     name = re.sub(r"[\s/\\]+", "_", re.sub(r"[,;+]\s*", "-", words))
     if len(name) <= _LONGEST:
         return name
@@ -76,7 +76,7 @@ def file_name(words: str) -> str:
 def _log_of(source: Path, options: argparse.Namespace) -> Path:
     """Return the path of a run's log, whose name contains the settings.
 
-    So it replaces neither the log of another run nor the one that it repeats.
+    So it replaces neither the log of another run nor the repeated one.
     """
     changed = [each for each in options.overrides if not _SHOWN.match(each)]
     folder: Path = options.out

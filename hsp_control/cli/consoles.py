@@ -31,7 +31,7 @@ errors = Console(stderr=True, highlight=False)
 
 @contextmanager
 def working(what: str) -> Iterator[None]:
-    """Show on a terminal what is being done, and for how long, as long as it takes."""
+    """Show the present activity and its duration on a terminal."""
     columns = SpinnerColumn(), TextColumn("{task.description}"), TimeElapsedColumn()
     with Progress(
         *columns,

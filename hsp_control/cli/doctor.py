@@ -1,4 +1,4 @@
-"""``hsp doctor``: whether this machine suits a fast and punctual loop."""
+"""``hsp doctor``: checks this machine for a fast and punctual loop."""
 
 import argparse
 import json
@@ -26,10 +26,10 @@ class Check(NamedTuple):
     """A check and its result."""
 
     topic: str  # the topic
-    # ``ok``; ``note``: something is slower, later or absent; ``bad``: something does
+    # ``ok``; ``note``: something is slower, later or missing; ``bad``: something does
     # not work
     state: Literal["ok", "note", "bad"]
-    found: str  # what was found
+    found: str  # the finding
     advice: str = ""  # the remedy
 
 
@@ -71,7 +71,7 @@ def _versions() -> Iterator[Check]:
 
 
 def _dynamics() -> Check:
-    """Report which Pinocchio loads models, and which one is compiled in."""
+    """Report the Pinocchio that loads models, and the compiled one."""
     from pinocchio import __version__ as loads
 
     from hsp_control.engine import PINOCCHIO

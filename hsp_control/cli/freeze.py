@@ -15,7 +15,7 @@ _BUILDING = {"cmake_dir": cmake_folder, "flags": compiler_flags}
 
 
 def freeze(options: argparse.Namespace) -> int:
-    """Write a configuration's controller to a file, or print where the library is."""
+    """Write a configuration's controller to a file, or print the library's location."""
     for name, answer in _BUILDING.items():
         if getattr(options, name):
             print(answer())

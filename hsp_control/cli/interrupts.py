@@ -7,7 +7,7 @@ program that only imports the package is not affected.
 During a run the first Ctrl-C ends the run at its next row, the second at once. A
 `KeyboardInterrupt` may be raised anywhere, also between the last row and writing the
 log; all computed rows would then be lost. So the first Ctrl-C only sets a flag, which
-the run checks at its next row. If no row comes (an integrator may reduce its steps to a
+the run checks at its next row. Without a row (an integrator may reduce its steps to a
 nanosecond), the computation is interrupted after a short time.
 """
 
@@ -34,14 +34,14 @@ class DeferredInterrupt:
     """
 
     def __init__(self) -> None:
-        self.requested = False  # whether a Ctrl-C has come that `check` has not raised
+        self.requested = False  # whether there was a Ctrl-C that `check` has not raised
         self._before: Any = None
         self._first_ignored = False
         self._patience = threading.Timer(PATIENCE, _thread.interrupt_main)
         self._patience.daemon = True
 
     def check(self) -> None:
-        """Raise `KeyboardInterrupt` if Ctrl-C has come."""
+        """Raise `KeyboardInterrupt` after Ctrl-C."""
         if self.requested:
             self.requested = False
             self._patience.cancel()

@@ -39,8 +39,8 @@ from hsp_control.live.operator_requests import stop_signals
 from hsp_control.simulation import Rollout
 from hsp_control.simulation.run_summary import summary_rows
 
-_DRY_RUN = 0.5  # duration of the run before, in which all is done once [s]
-_DRY_RUN_OF_A_PLAN = 3.0  # the same with a plan, which has to come to its steps [s]
+_DRY_RUN = 0.5  # duration of the dry run, in which every call is made once [s]
+_DRY_RUN_OF_A_PLAN = 3.0  # the same with a plan, which must reach its steps [s]
 
 
 def live(options: argparse.Namespace) -> int:
@@ -56,7 +56,7 @@ def live(options: argparse.Namespace) -> int:
             "--faults and --cameras are for the simulated robot: leave them out with "
             "--robot"
         )
-    # What runs
+    # The experiment
     name = Path(loaded.document.name).stem
     loop_log = options.out / f"{name}-live.journal"
     robot_log = options.out / f"{name}-robot.journal"
@@ -110,7 +110,7 @@ def live(options: argparse.Namespace) -> int:
         )
         observed = _on_observer(experiment, real=real)
         out.print(f"Momentum observer: {observed}", highlight=False)
-        # A robot, and what else listens
+        # A robot, and further listeners
         hardware: Hardware | None = None
         if options.robot is not None:
             hardware = connect(options.robot, experiment.robot, live_period(experiment))
@@ -150,7 +150,7 @@ def live(options: argparse.Namespace) -> int:
         ) as robot:
             report = run(robot.hardware)
             robot_report = robot.wait()
-    # What became of it
+    # The result
     link = robot.hardware.link
     counts = {**link.counts, "lost": link.lost}
     out.print(_times(report, experiment))
@@ -166,7 +166,7 @@ def live(options: argparse.Namespace) -> int:
 
 
 def _compensated(experiment: Experiment, *, real: bool) -> CompensatedController:
-    """Return the chain to the effort; what ``auto`` is depends on what moves."""
+    """Return the chain to the effort; ``auto`` depends on the kind of robot."""
     own = experiment.scenario.compensation if real else experiment.compensation
     return CompensatedController(experiment.controller, own)
 
@@ -201,7 +201,7 @@ def _times(report: LoopReport, experiment: Experiment) -> Table:
 
 
 def _summary(rollout: Rollout) -> Table:
-    """Return what a log says of the run, as ``hsp run`` prints it."""
+    """Return the summary of a log, as ``hsp run`` prints it."""
     title = str(rollout.meta.get("name", ""))
     table = Table(title=title, box=None, pad_edge=False, show_header=False)
     for row in summary_rows(rollout):
@@ -254,7 +254,7 @@ def _print_ends(report: LoopReport, robot_report: dict[str, Any] | None) -> None
 
 
 def _convert(journal: Path, **meta: Any) -> bool:
-    """Convert a journal to an ``.npz`` log, else keep it; return whether it is one."""
+    """Convert a journal to an ``.npz`` log, or keep it; return its success."""
     try:
         rollout = Rollout.load(journal)
         rollout.meta.update(meta)

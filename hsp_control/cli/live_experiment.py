@@ -1,6 +1,6 @@
 """The parts of an experiment for a live run: period, start, plant as a robot.
 
-A live run begins where the robot is, not where the configuration places it.
+A live run begins at the robot's configuration, not at that of the file.
 """
 
 import argparse
@@ -60,20 +60,20 @@ def simulated_robot(experiment: Experiment) -> SimulatedRobot:
 
 
 _FARTHEST = 0.2
-"""Largest distance of a joint from the configuration's start [rad or m].
+"""Maximum distance of a joint from the configuration's start [rad or m].
 
-As near as one guides an arm by hand; from there, what was rehearsed is what happens."""
+The accuracy of hand guiding; from there, the run is as rehearsed."""
 
 
 def begun_where_it_is(
     experiment: Experiment, options: argparse.Namespace, q: Array
 ) -> Experiment:
     """Return the experiment with the robot's configuration as its start."""
-    # What is relative to the start (``origin: start``) then does not pull at the robot.
+    # Parts relative to the start (``origin: start``) then do not pull the robot.
     distances = np.abs(experiment.robot.difference(experiment.q0, q))
     worst = int(np.argmax(distances))
     start = f"start={{configuration: [{', '.join(f'{each:.6f}' for each in q)}]}}"
-    if not distances[worst] <= _FARTHEST:  # also of a state that is NaN
+    if not distances[worst] <= _FARTHEST:  # also if the state is NaN
         raise HardwareError(
             f"{experiment.robot.dof_names[worst]} is {distances[worst]:.3g} from the "
             f"configuration's start; {_FARTHEST:g} is allowed. Move the robot there, "

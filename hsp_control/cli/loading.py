@@ -1,4 +1,4 @@
-"""The experiment or the robot that a command is about."""
+"""Loads the experiment or the robot of a command."""
 
 import argparse
 from pathlib import Path
@@ -30,7 +30,7 @@ def read(options: argparse.Namespace, *overrides: str) -> Document:
 
 
 def own_code(options: argparse.Namespace) -> list[str]:
-    """Return the code that ``--import`` names, which strict reading does not admit."""
+    """Return the code named by ``--import``, which strict reading does not accept."""
     for name in options.imports:
         if options.strict or options.allow:
             raise AccessError(
@@ -46,7 +46,7 @@ def run_imports(options: argparse.Namespace) -> None:
 
 
 def robot_access(name: str, options: argparse.Namespace) -> Access:
-    """Return which files a command may read that is given a robot, not a configuration.
+    """Return which files a command with a robot, not a configuration, may read.
 
     Strict reading reads beside the robot's file; a name allows no folder.
     """

@@ -35,8 +35,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
         # Commands are imported only when needed, so that `hsp --help` answers at once.
         from hsp_control.cli import consoles
 
-        # Else Ctrl-C ends the process at once, as during start-up: there is nothing to
-        # save, and an exception may get lost in callbacks of libraries.
+        # Otherwise Ctrl-C ends the process at once, as during start-up: there is
+        # nothing to save, and an exception may be lost in callbacks of libraries.
         added: AddedCommand | None = getattr(options, "added", None)
         if added is not None and added.own_interrupts:
             end_in_order()

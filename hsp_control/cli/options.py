@@ -1,6 +1,6 @@
-"""All commands and their options; nothing slow is imported: help comes at once.
+"""All commands and their options; nothing slow is imported, for instant help.
 
-What a companion adds is named by entry points; no import does.
+Additions of companions are found by entry points, not by imports.
 """
 
 import argparse
@@ -21,7 +21,7 @@ class Parser(argparse.ArgumentParser):
     """An `argparse.ArgumentParser` for commands and for their options."""
 
     def __init__(self, *args: Any, **options: Any) -> None:
-        # By their full names: ``--st`` is no ``--strict``.
+        # By their full names: ``--st`` is not ``--strict``.
         super().__init__(*args, **{"allow_abbrev": False, **options})
 
     def parse_known_args(  # type: ignore[override]
@@ -101,7 +101,7 @@ def command_line() -> argparse.ArgumentParser:
     which.add_argument("--json", action="store_true", help="print JSON")
 
     _add(commands, added, 1)
-    doctor = _command(commands, "doctor", "say what this machine lacks")
+    doctor = _command(commands, "doctor", "report what this machine lacks")
     doctor.add_argument("--json", action="store_true", help="print JSON")
     _command(commands, "schema", "print the JSON Schema of a configuration")
     return parser
@@ -141,7 +141,7 @@ def add_live(live: argparse.ArgumentParser) -> None:
     live.add_argument(
         "--publish",
         metavar="NAME://ADDRESS",
-        help="tell the state: udp://HOST:PORT to a policy, ros2://NAME to watchers",
+        help="publish the state: udp://HOST:PORT to a policy, ros2://NAME to ROS 2",
     )
     live.add_argument(
         "--cameras",
@@ -184,7 +184,7 @@ def add_freeze(freeze: argparse.ArgumentParser) -> None:
         "--payload",
         action="append",
         metavar="FRAME",
-        help="a frame that may carry something (by default those of the tasks)",
+        help="a frame that may carry a payload; default: those of the tasks",
     )
     where = freeze.add_mutually_exclusive_group()
     for name, what in (
@@ -194,7 +194,7 @@ def add_freeze(freeze: argparse.ArgumentParser) -> None:
         where.add_argument(name, action="store_true", help=f"print {what}, and end")
 
 
-# --- what several commands have -------------------------------------------------------
+# --- common options -------------------------------------------------------
 
 
 def add_configuration(
@@ -232,7 +232,7 @@ def add_strict(parser: argparse.ArgumentParser) -> None:
         "--strict",
         action="store_true",
         help="for untrusted files: read only files beside them and bundled ones, and "
-        "admit only our own types",
+        "accept only types of this package",
     )
     parser.add_argument(
         "--allow",
@@ -240,21 +240,22 @@ def add_strict(parser: argparse.ArgumentParser) -> None:
         default=[],
         type=Path,
         metavar="DIR|PACKAGE",
-        help="another folder to read from, or a package to admit types of; means "
-        "--strict; may be repeated",
+        help="another folder to read from, or a package whose types are accepted; "
+        "implies --strict; may be repeated",
     )
 
 
 def add_import(parser: argparse.ArgumentParser) -> None:
-    """Add which Python code is imported first."""
+    """Add the option for Python code to import first."""
     parser.add_argument(
         "--import",
         action="append",
         default=[],
         dest="imports",
         metavar="FILE.py|MODULE",
-        help="import this Python code first, whose functions and types a configuration "
-        "may name: it may do anything, so none with --strict; may be repeated",
+        help="import this Python code first, whose functions and types a "
+        "configuration may name: it may do anything, so not with --strict; may "
+        "be repeated",
     )
 
 
@@ -270,20 +271,21 @@ def complete(action: argparse.Action, names: Callable[[], Iterable[str]]) -> Non
     vars(action)["completer"] = completer
 
 
-# --- what companions add --------------------------------------------------------------
+# --- additions of companions
+# --------------------------------------------------------------
 
 
 class AddedCommand(NamedTuple):
     """A command: an entry point of ``hsp_control.commands`` with the command's name.
 
-    Its module is imported for every help text: what is slow is imported by `run`.
+    Its module is imported for every help text: slow modules are imported by `run`.
 
     Attributes:
-        help: What it does, in a line.
+        help: Its description, in a line.
         add_options: Adds its options to its parser.
         run: Runs it; returns the exit status.
         own_interrupts: Whether it ends in order at Ctrl-C, instead of at once.
-        place: Where the help lists it, smaller first: below zero before `hsp live`,
+        place: Its position in the help, smaller first: below zero before `hsp live`,
             above zero after `hsp robots`.
     """
 
@@ -295,15 +297,15 @@ class AddedCommand(NamedTuple):
 
 
 class CommandPage(NamedTuple):
-    """A page that shows what `hsp run` or `hsp live` does.
+    """A page that shows a run of `hsp run` or `hsp live`.
 
     It is an entry point of ``hsp_control.pages`` with the command's name, and imported
     as an `AddedCommand` is.
 
     Attributes:
         add_options: Adds its options to the command's parser.
-        open: Opens it, given the options and what the command is about: a context with
-            the command's outputs, or None if the options open no page.
+        open: Opens it, given the options and the command's subject: a context with the
+        command's outputs, or None if the options open no page.
     """
 
     add_options: Callable[[argparse.ArgumentParser], object]

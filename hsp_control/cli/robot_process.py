@@ -1,4 +1,4 @@
-"""Run a simulated robot in a process of its own, which always ends."""
+"""Run a simulated robot in a separate process, which always ends."""
 
 import json
 import os
@@ -116,7 +116,7 @@ class RobotProcess:
             answer = self.process.stdout.readline() if ready else b""
         except OSError:
             pass
-        except BaseException:  # Ctrl-C, say: nobody else ends the process
+        except BaseException:  # such as Ctrl-C: nothing else ends the process
             self.close()
             raise
         if (reply := answer.decode(errors="replace").strip()) != READY:
@@ -168,7 +168,7 @@ def main() -> int:
     This is the robot's process. It reads its settings from its standard input, one line
     of JSON. The input then stays open; when the parent process dies it is closed, and
     the robot stops itself, completes its log and ends. It writes two lines to its
-    standard output: ``ready``, and at the end its report, as JSON, or what is wrong.
+    standard output: ``ready``, and at the end its report, as JSON, or an error.
     """
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C stops the loop only
     terminated = threading.Event()
@@ -212,7 +212,7 @@ def _run(settings: dict[str, Any], stop_reason: Any) -> dict[str, Any]:
         rows.append(known.load()(address, robot.plant))
     _print(READY)
     served = serve(robot, link, stop_reason=stop_reason, on_rows=rows)
-    link.send(PacketKind.BYE)  # its number tells the loop how many packets it lost
+    link.send(PacketKind.BYE)  # its number shows the loop how many packets were lost
     reason = robot.reason or "no effort arrived"
     report: dict[str, Any] = {
         "phase": robot.phase.name.lower(),
@@ -283,7 +283,7 @@ class _RobotLog:
 
 
 def _warm_up(robot: SimulatedRobot, experiment: Experiment) -> None:
-    """Execute each real-time operation once, so that none is the first later."""
+    """Execute each real-time operation once in advance."""
     experiment.controller.compute(0.0, experiment.q0, experiment.v0)
     trial = SimulatedRobot(
         robot.plant,

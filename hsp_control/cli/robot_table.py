@@ -27,7 +27,7 @@ LOAD_OPTIONS: dict[str, dict[str, Any]] = {
     "icub": {"locked": {"neck_yaw": 0.0}},
     "romeo": {"locked": {"LHand": 0.0, "RHand": 0.0}},
 }
-"""Options of `Robot.load` for robots that do not load, or cannot move, without them."""
+"""Options of `Robot.load` without which robots do not load, or cannot move."""
 
 REMARKS = {
     "icub": "no mass moves with neck_yaw at its home",
@@ -58,7 +58,7 @@ class RobotRow:
 
 
 def count() -> int:
-    """Return how many rows there are, without loading a robot."""
+    """Return the number of rows, without loading a robot."""
     return len(_sources()) + len(list(examples_without_urdf()))
 
 
@@ -159,5 +159,5 @@ def abilities(robot: Robot) -> dict[str, int]:
 
 
 def number(value: int | None) -> str:
-    """Return a number as the table has it; a dash for none."""
+    """Return a number as text; a dash for None."""
     return "-" if value is None else str(value)

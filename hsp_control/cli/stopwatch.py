@@ -1,4 +1,4 @@
-"""How fast a run was computed, and how large its log is."""
+"""The speed of a run's computation, and the size of its log."""
 
 from time import perf_counter
 

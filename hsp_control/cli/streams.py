@@ -1,4 +1,4 @@
-"""Standard streams that a command can write to: closed ones, in ASCII, or full."""
+"""Standard streams made safe to write to: closed ones, in ASCII, or full."""
 
 import errno
 import os
@@ -8,11 +8,11 @@ from contextlib import suppress
 from typing import Any
 
 _WRITTEN = "·µ°≤→"
-"""Characters of our output; where one has no place, a question mark stands for it."""
+"""Characters of our output; a question mark replaces those without an encoding."""
 
 
 class LastingStream:
-    """A standard stream as long as its text is read; then the text is discarded.
+    """A standard stream while its text is read; later text is discarded.
 
     A pipe may lose its reader (``hsp live ... | head``), a disk may be full: that must
     not end a run, and lose its log.
@@ -32,7 +32,7 @@ class LastingStream:
         return len(text)
 
     def flush(self) -> None:
-        """Write what is kept."""
+        """Write the buffered text."""
         self._try(self._stream.flush)
 
     def _try(self, function: Callable[[], object]) -> None:
@@ -56,10 +56,10 @@ def lost_text() -> str | None:
 
 
 def make_usable() -> None:
-    """Let closed streams lead nowhere, and others take any text while they can.
+    """Redirect closed streams to nothing, and let others accept any text.
 
-    A file that is opened would else get the number of a closed stream, and what
-    libraries print would stand in it.
+    Otherwise a newly opened file would have the number of a closed stream, and would
+    receive the output of libraries.
     """
     for number, mode in ((0, os.O_RDONLY), (1, os.O_WRONLY), (2, os.O_WRONLY)):
         try:

@@ -12,5 +12,5 @@ def check_host_name(host: str) -> None:
     try:
         host.encode("idna")
     except UnicodeError:
-        reason = "no name of a computer (a part of it is empty, or too long)"
+        reason = "not a host name (a part of it is empty, or too long)"
         raise socket.gaierror(socket.EAI_NONAME, reason) from None

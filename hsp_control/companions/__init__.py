@@ -1,6 +1,7 @@
-"""What one kind of user needs, beside the core.
+"""Additions to the core, each for one kind of user.
 
-The core imports nothing from here. It finds what a companion adds by the entry points
-in pyproject.toml: types of a configuration, commands of `hsp`, robots, formats. Whoever
-does not want one deletes its folder. In Python: ``hsp_control.walking.Walk``.
+The core imports nothing from here. It finds a companion's additions by the entry points
+in pyproject.toml: types of a configuration, commands of `hsp`, robots, formats. A
+companion that is not wanted can be deleted with its folder. In Python:
+``hsp_control.walking.Walk``.
 """

@@ -1,4 +1,4 @@
-"""What several companions use, and nothing in the core."""
+"""Code that several companions share, and the core does not need."""
 
 from collections.abc import Callable, Mapping
 from importlib import import_module
@@ -47,7 +47,7 @@ def name_and_options(address: str) -> tuple[str, dict[str, str]]:
 class Rate:
     """Reports when something is due that is sent at a rate, once a period of a loop.
 
-    The mean rate is right, also where a loop's period does not divide its own.
+    The mean rate is exact even if the loop's period does not divide its own.
     """
 
     def __init__(self, rate: float) -> None:
@@ -62,7 +62,7 @@ class Rate:
         if t < self._next - 1e-9:
             return False
         following = self._next + self._every
-        # What was missed is not made up for.
+        # Missed times are not made up for.
         self._next = following if following > t else t + self._every
         return True
 

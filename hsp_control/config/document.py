@@ -57,7 +57,7 @@ def assign(data: dict[str, Any], keys: list[str], value: Any) -> KeyPath:
 
 
 def _place(holder: Any, key: str, path: KeyPath) -> str | int:
-    """Return ``key`` for a mapping, or the number of the entry for a list."""
+    """Return ``key`` for a mapping, or the index of the entry for a list."""
     if isinstance(holder, dict):
         return key
     if not isinstance(holder, list):
@@ -75,8 +75,8 @@ _LONGEST_ORIGIN = 72
 class Document:
     """The plain data of a YAML text, with a location for every key path.
 
-    A key path is a tuple: ``("tasks", 0, "frame")`` for what the user writes as
-    ``tasks.0.frame``. All errors have the form ``file:line: key.path: what is wrong``.
+    A key path is a tuple: ``("tasks", 0, "frame")`` for ``tasks.0.frame``. All errors
+    have the form ``file:line: key.path: what is wrong``.
     """
 
     def __init__(
@@ -88,12 +88,12 @@ class Document:
         self.packages: frozenset[str] | None = None
         # a log's record of its robot, unless another one is chosen; see `recorded`
         self.recorded_robot: Any = None
-        # of a log: what the code that it imports was, by name, as SHA-256
+        # of a log: SHA-256 of its imported code, by name
         self.recorded_code: dict[str, str] | None = None
-        self.given_code: frozenset[str] = frozenset()  # what the user named, too
+        self.given_code: frozenset[str] = frozenset()  # code that the user named, too
         self._data = deepcopy(data)
         self._origins: dict[KeyPath, Mark | str] = dict(marks)
-        self._written = bool(marks)  # as a text, not in Python
+        self._written = bool(marks)  # read from a text, not built in Python
 
     @classmethod
     def read(cls, path: str | PathLike[str]) -> "Document":
@@ -151,7 +151,9 @@ class Document:
         The value is YAML. Keys with a dot need quotes: ``frames.'a.b'.parent=x``.
         """
         if not isinstance(assignment, str):
-            raise ConfigError(f"{shown(assignment)} is no text like 'key.path=value'")
+            raise ConfigError(
+                f"{shown(assignment)} is not text such as 'key.path=value'"
+            )
         words = " ".join(assignment.split())
         origin = shortened(spoken(f"--set {words}", repr(words)), _LONGEST_ORIGIN)
         try:
@@ -173,7 +175,7 @@ class Document:
             self.recorded_robot = None
         for inside in [key for key in self._origins if key[: len(path)] == path]:
             del self._origins[inside]
-        for end in range(1, len(path)):  # what was created on the way
+        for end in range(1, len(path)):  # containers created on the way
             if self._written:
                 self._origins.setdefault(path[:end], origin)
         self._origins[path] = origin
@@ -190,7 +192,7 @@ class Document:
         return True
 
     def says_nothing(self, key: str) -> bool:
-        """Return whether the text has the key with nothing behind it."""
+        """Return whether the text has the key without a value."""
         given = self._data.get(key, self) is None
         return given and isinstance(self._origins.get((key,)), Mark)
 
@@ -212,7 +214,7 @@ class Document:
     def at(self, *path: str | int) -> Iterator[None]:
         """Add the location of a key path to errors that are raised inside the block.
 
-        An error that has a location already keeps it: that of the innermost block. A
+        An error with a location keeps it: that of the innermost block. A
         key path that the error has itself continues the given one::
 
             with document.at("tasks", "hand"), within("frame"):
@@ -242,7 +244,7 @@ def _why_unreadable(name: str, error: OSError | ValueError) -> str:
     return f"cannot be read: {getattr(error, 'strerror', None) or error}"
 
 
-# --- where it comes from --------------------------------------------------------------
+# --- sources --------------------------------------------------------------
 
 
 def read_document(
@@ -277,13 +279,13 @@ def _read(source: str | PathLike[str] | dict[str, Any], strict: bool) -> Documen
             )
         if lost := run.meta.get("changes_lost"):
             raise ConfigError(
-                f"{path}: the run cannot be repeated, because changes were made while "
-                f"it ran that are not data: {lost}"
+                f"{path}: the run cannot be repeated, because some changes during it "
+                f"cannot be written as data: {lost}"
             )
         if lost := run.meta.get("streams_lost"):
             raise ConfigError(
                 f"{path}: the run cannot be repeated, because {lost} messages of its "
-                "streams were too many to be recorded"
+                "streams were not recorded: there were too many"
             )
         _check_heard(path, run)
         made = run.meta.get("changes") or []
@@ -322,6 +324,6 @@ def _check_heard(path: Path, run: Rollout) -> None:
             if taken > len(messages):
                 raise ConfigError(
                     f"{path}: the run cannot be repeated: a stream of task {name!r} "
-                    f"took {taken:.0f} messages, and the log holds {len(messages)} of "
-                    "them, because it has no end"
+                    f"used {taken:.0f} messages, and the log contains {len(messages)} "
+                    "of them, because its writer was killed"
                 )

@@ -59,8 +59,8 @@ from hsp_control.trajectories.streams.streamed import Streamed
 class Experiment:
     """A controller and its plant: the objects of one configuration.
 
-    It is made of the same parts in Python and in YAML: `load_experiment` reads what
-    `to_yaml` writes. It does not change.
+    It has the same parts in Python and in YAML: `load_experiment` reads the output of
+    `to_yaml`. It is immutable.
 
     Attributes:
         name: The configuration's name, for file names.
@@ -113,29 +113,30 @@ class Experiment:
         """Build an experiment.
 
         Args:
-            robot: The robot, as `Robot.load` made it, or its name, the path of its
-                URDF, or its description.
-            tasks: The tasks; this and all others up to ``changes`` as for `Controller`.
+            robot: The robot from `Robot.load`, or its name, the path of its URDF, or
+            its description.
+            tasks: The tasks; these and all arguments up to ``changes`` as for
+            `Controller`.
             field: The null-space field.
             null_space_gain: K_N [1/s].
             metric: The joint-space metric.
             singularity_threshold: Singular value below which the inverse is bounded.
             limits: Limits on efforts and motion; None: no limits.
             contacts: The contacts of a floating base.
-            base: What moves a floating base without contacts.
+            base: The actuation of a floating base without contacts.
             plan: The plan that writes references and switches contacts; it adds its own
                 tasks.
             scene: The obstacles; those of fields and limits are added.
-            changes: Changes while running.
-            start: Where the run begins; at home and at rest by default. ``auto``: at a
-                good configuration that is found.
+            changes: Changes at run time.
+            start: The initial state; at home and at rest by default. ``auto``: a good
+            configuration is searched.
             plant: The simulated system; the controller's own model by default.
             compensation: Compensators for model errors.
             estimators: Estimators that complete each measurement.
             simulation: Duration, periods and integrator.
             live: Settings of a live run.
             view: Settings of the 3-D view.
-            title: One line that says what the experiment shows.
+            title: The experiment in one line.
             description: A longer description.
             name: Its name, for file names.
 
@@ -176,19 +177,19 @@ class Experiment:
         return experiment
 
     def _compose(self, loaded: LoadedScenario) -> None:
-        """Make the objects, in the order in which one needs another."""
+        """Build the objects, in the order of their dependences."""
         document, scenario, robot, scene = loaded
         folder = Path(document.name).resolve().parent
         contacts = tuple(scenario.contacts.values())
         null_space, tasks = scenario.null_space, tuple(scenario.tasks.values())
-        # First: its engine may not be installed, and what follows may take long.
+        # First: its engine may not be installed, and the rest may take long.
         scenario = replace(scenario, plant=scenario.plant.located(folder))
         plant = _plant(document, scenario, robot)
         with document.at("start"):
             q0 = scenario.start.configuration_of(
                 robot, contacts, tasks, scene, null_space.singularity_threshold
             )
-            if scenario.start.is_found:  # a run of the log begins there, too
+            if scenario.start.is_found:  # a repeated run begins there, too
                 found = InitialState(configuration=q0, velocity=scenario.start.velocity)
                 scenario = replace(scenario, start=found)
         with document.at():
@@ -214,7 +215,7 @@ class Experiment:
             v0 = scenario.start.velocity_of(controller, q0)
             if controller.limits is not None:
                 controller.limits.check_start(q0, v0)
-        with document.at():  # the first step would have no place in the file
+        with document.at():  # errors of the first step would have no location
             controller.check_derivatives(robot.state(0.0, q0, v0))
         if scenario.plan is not None:
             with document.at("plan"):
@@ -246,7 +247,7 @@ class Experiment:
     def compensation(self) -> Compensation:
         """Compensators for differences between plant and model, which depend on both.
 
-        A real robot gets those of its `scenario` instead, which do not depend on the
+        A real robot uses those of its `scenario` instead, which do not depend on the
         plant.
         """
         own = self.scenario.compensation
@@ -262,8 +263,8 @@ class Experiment:
     def model_errors(self) -> ModelErrors | None:
         """The model errors that the loop tolerates at the start.
 
-        As it is on a robot that is not its model. None without a control period, and
-        where `model_errors` has no answer.
+        For a robot that differs from its model. None without a control period, and if
+        `model_errors` has no result.
         """
         period = self.scenario.simulation.control_period
         if period is None:
@@ -292,7 +293,7 @@ class Experiment:
 
     @property
     def config(self) -> dict[str, Any] | None:
-        """The whole configuration as data, for the log; None if a part is no data."""
+        """The whole configuration as data, for the log; None if a part is not data."""
         try:
             config: dict[str, Any] = plain_data(self.scenario, defaults=True)
         except ConfigError:
@@ -338,7 +339,7 @@ class Experiment:
     ) -> Rollout:
         """Simulate the experiment; see `simulate` for arguments and errors.
 
-        If another process feeds a stream, the run keeps pace with real time.
+        If another process feeds a stream, the run advances in real time.
         """
         settings = self.scenario.simulation
         if self.live_sources:
@@ -356,7 +357,7 @@ class Experiment:
             plan=self.scenario.plan,
             estimators=self.scenario.estimators,
             scene=self.scene,
-            check_rate=False,  # checked when it was built, or not to be
+            check_rate=False,  # checked when it was built, or disabled
             on_progress=on_progress,
             on_row=on_row,
             log=log,
@@ -404,7 +405,7 @@ def build(document: Document) -> Experiment:
 
 
 def _plant(document: Document, scenario: Scenario, robot: Robot) -> Plant:
-    """Return the plant, which has the control period and the steps that it needs."""
+    """Return the plant, with the required control period and steps."""
     settings = scenario.simulation
     if (step := scenario.plant.longest_step) is not None:
         with document.at("simulation"):
@@ -442,7 +443,7 @@ def controller_data(
 ) -> dict[str, Any]:
     """Return the configuration of a controller; see `Experiment`.
 
-    The parts' own obstacles are in its scene, and the parts have their names.
+    The parts' own obstacles are in its scene, and the parts refer to their names.
     """
     if isinstance(robot, Robot):
         if robot.description is None:
@@ -517,7 +518,7 @@ def _rate_findings(
 def _in_real_time(
     period: float, on_row: Callable[[LogWriter], None] | None
 ) -> Callable[[LogWriter], None]:
-    """Return what keeps a simulation pace with the clock, called after every row."""
+    """Return a function, called after every row, that keeps a run in real time."""
     rows, begin = count(), monotonic()
 
     def wait(recorder: LogWriter) -> None:
@@ -526,7 +527,7 @@ def _in_real_time(
             on_row(recorder)
         row = next(rows)
         if row == 0:
-            begin = monotonic()  # calls are bound now
+            begin = monotonic()  # after the calls are bound
         sleep(max(begin + row * period - monotonic(), 0.0))
 
     return wait

@@ -32,13 +32,13 @@ Value = TypeVar("Value", bound=Part)
 class LoadedScenario(NamedTuple):
     """A checked configuration, with its robot and its scene."""
 
-    document: Document  # the configuration as it was read; it locates errors
+    document: Document  # the configuration as read, which locates errors
     scenario: Scenario  # the configuration, checked
     robot: Robot  # the robot
     scene: Scene  # its obstacles
 
     def start(self) -> Array:
-        """Return the start configuration (nq,); home where it has to be found."""
+        """Return the start configuration (nq,); home if it has to be searched."""
         start, contacts = self.scenario.start, self.scenario.contacts.values()
         if start.is_found:
             return self.robot.home()
@@ -101,7 +101,7 @@ def _located(obstacle: Obstacle, folder: Path, access: Access) -> Obstacle:
             with within("file"):
                 access.check(Path(shape.file), "mesh")
                 check_references(Path(shape.file), "mesh", access)
-        shape.geometry()  # fails here, where the error has a location
+        shape.geometry()  # raises here, where the error has a location
         return replace(obstacle, shape=shape)
 
 

@@ -14,7 +14,7 @@ _log = logging.getLogger(__name__)
 
 
 def logged_document(rollout: Rollout, access: Access = ANYWHERE) -> Document:
-    """Return a log's configuration, with the robot that the log holds.
+    """Return a log's configuration, with the robot in the log.
 
     Raises:
         ConfigError: If the log has no configuration.
@@ -29,7 +29,7 @@ def logged_document(rollout: Rollout, access: Access = ANYWHERE) -> Document:
 
 
 def logged_controller(rollout: Rollout, access: Access = ANYWHERE) -> Controller | None:
-    """Return the controller of a log as it was before the run, if it can be rebuilt."""
+    """Return the controller of a log before the run, if it can be rebuilt."""
     try:
         return build(logged_document(rollout, access)).controller
     except HspControlError as error:

@@ -36,8 +36,8 @@ def run_imports(document: Document) -> None:
     the run, or named by ``--import`` as well.
 
     Raises:
-        AccessError: If a configuration that is read strictly lists a file, or a module
-            of a package that is not allowed.
+        AccessError: If a strictly read configuration lists a file, or a module of a
+        package that is not allowed.
         ConfigError: If something cannot be imported.
     """
     listed = document.to_dict().get(_KEY)
@@ -75,8 +75,8 @@ def located_imports(imports: Sequence[str], folder: Path) -> tuple[str, ...]:
 def own_modules(scenario: Any) -> Iterator[str]:
     """Yield modules that declare types of a scenario, and that can be imported.
 
-    Not those of this package and of installed ones that name their types, which are
-    found without a list; and not a script, which would run once more.
+    Modules of this package and of installed ones with entry points are found without a
+    list, and a script would run once more: these are left out.
     """
     for part in _parts(scenario):
         name = type(part).__module__
@@ -95,7 +95,7 @@ def own_modules(scenario: Any) -> Iterator[str]:
 
 
 def _parts(value: Any) -> Iterator[Part]:
-    """Yield a part and all that are inside it."""
+    """Yield a part and all parts inside it."""
     for part in parts_within(value, Part):
         yield part
         yield from _parts(part.all_fields())
@@ -112,7 +112,7 @@ def _is_known(name: str) -> bool:
 
 
 def _check_allowed(name: str, document: Document) -> None:
-    """Check that strict reading admits the package of a module; it admits no file."""
+    """Check that strict reading accepts the package of a module; it accepts no file."""
     package = "" if is_file_name(name) else name.partition(".")[0]
     if not document.access.strict or package in (document.packages or ()):
         return

@@ -1,4 +1,4 @@
-"""The meshes of a log's obstacles, where their files are not."""
+"""The meshes of a log's obstacles, on computers without their files."""
 
 import logging
 from collections.abc import Mapping
@@ -16,8 +16,8 @@ _log = logging.getLogger(__name__)
 def with_recorded_scene(run: Rollout) -> Rollout:
     """Return a log whose obstacles' meshes are files of this computer.
 
-    They are those that the run had: a file that has changed since is not used, and a
-    warning names it.
+    They are those of the run: a file that has changed since is not used, and a warning
+    names it.
 
     Raises:
         ModelError: If the recorded meshes are damaged.
@@ -43,7 +43,7 @@ def with_recorded_scene(run: Rollout) -> Rollout:
 
 
 def _renamed(value: Any, files: Mapping[str, Path]) -> Any:
-    """Return data in which each ``file`` is one of this computer."""
+    """Return data in which each ``file`` is on this computer."""
     if isinstance(value, Mapping):
         return {
             key: str(files.get(str(inside), inside))

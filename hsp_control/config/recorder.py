@@ -27,7 +27,7 @@ from hsp_control.simulation.log_writer import LogWriter
 class Recorder:
     """Records a user's own loop: `hsp plot`, `view`, `export` and `run` accept its log.
 
-    Rows are on the disk at once, so that a killed program loses none:
+    Rows are written to the disk at once, so that a killed program loses none:
 
         with hsp.Recorder(controller, "out/mine.npz") as recorder:
             while running:
@@ -36,10 +36,10 @@ class Recorder:
         hsp.plots.diagnostics_figure(recorder.rollout)
 
     `hsp run` repeats it in simulation, if the robot was loaded by `Robot.load`, the
-    parts are data and no Python functions, and t begins at 0.
+    parts are data and not Python functions, and t begins at 0.
 
     Attributes:
-        path: The log's file; None: it is only in memory once the recorder is closed.
+        path: The log's file; None: after closing, the log is only in memory.
     """
 
     @suggesting
@@ -78,14 +78,14 @@ class Recorder:
 
     @property
     def journal(self) -> Path:
-        """The file that has each row at once, until the recorder is closed."""
+        """The journal with all rows, until the recorder is closed."""
         return self._journal
 
     def record(self, output: ControlOutput, tau: ArrayLike | None = None) -> None:
         """Write a row for the controller's last output, if one is due.
 
         Args:
-            output: What the last `Controller.compute` returned.
+            output: The result of the last `Controller.compute`.
             tau: The effort that was sent, shape (nv,) [N·m or N]; None: the output's.
 
         Raises:
@@ -177,7 +177,7 @@ class Recorder:
             interrupted = isinstance(error, KeyboardInterrupt)
             status = "interrupted" if interrupted else "stopped"
             self.close(status, described(error))
-        else:  # there is nothing to keep
+        else:  # no row was written
             self._writer.close()
             self._journal.unlink(missing_ok=True)
             if self._folder is not None:

@@ -150,13 +150,13 @@ class Scenario(Part, error=ConfigError):
 
     _: KW_ONLY
     title: Annotated[str, Field(max_length=300)] = ""
-    """One line that says what the configuration shows; the title of its plots."""
+    """The configuration in one line; the title of its plots."""
     description: str = ""
     """A longer description, for readers."""
     imports: Annotated[Sequence[str], Field(max_length=100), AfterValidator(tuple)] = ()
-    """Python code of your own with the types and functions that the configuration
-    names: files, such as ``parts.py`` beside it, and modules that Python can import,
-    such as ``my_package.parts``."""
+    """Your own Python code with the types and functions named in the configuration:
+    files, such as ``parts.py`` beside it, and modules that Python can import, such as
+    ``my_package.parts``."""
     robot: RobotDescription
     """The robot that is controlled."""
     start: StartOrAuto = InitialState()
@@ -176,15 +176,15 @@ class Scenario(Part, error=ConfigError):
     ] = field(default_factory=ReadOnlyDict)
     """The contacts that support a robot with a free-flyer root, by name."""
     base: Literal["flying", "driven"] | None = None
-    """For a free-flyer root without contacts: ``flying`` if nothing holds it,
-    ``driven`` if something outside the controller moves it."""
+    """For a free-flyer root without contacts: ``flying`` if it is free, ``driven`` if
+    another device moves it."""
     limits: LimitsOrNone = Limits()
     """Limits on efforts and motion that the controller enforces: the robot's own by
     default; ``none``: no limits."""
     null_space: NullSpaceSettings = NullSpaceSettings()
     """The control of self-motion: fields, metric and gain."""
     changes: Annotated[Sequence[Change], AfterValidator(tuple)] = ()
-    """Changes of tasks, gains, fields and contacts while the controller runs."""
+    """Changes of tasks, gains, fields and contacts at run time."""
     plant: AnyPlant = RigidBody()
     """The simulated system on which the efforts act, and its differences from the
     controller's model."""
@@ -192,7 +192,7 @@ class Scenario(Part, error=ConfigError):
     """Compensators for the differences between the plant and the model."""
     estimators: Estimators = ()
     """Estimators that complete each measurement, by type: the base of a robot, or
-    forces of contacts; by default the measurement is used as it is."""
+    forces of contacts; by default the measurement is used unchanged."""
     simulation: SimulationSettings = SimulationSettings()
     """Settings of the simulation."""
     live: LiveSettings = LiveSettings()
@@ -215,7 +215,7 @@ def json_schema() -> dict[str, Any]:
 
 
 class _SchemaOfScenario(GenerateJsonSchema):
-    """Pydantic's generator, with the defaults as YAML would give them."""
+    """Pydantic's generator, with the defaults in YAML's form."""
 
     def encode_default(self, dft: Any) -> Any:
         """Return a default as plain data."""
@@ -223,7 +223,7 @@ class _SchemaOfScenario(GenerateJsonSchema):
 
 
 def _name_added_tasks(definitions: dict[str, Any]) -> None:
-    """Let a task have a name where it is not the key of a mapping: in a change."""
+    """Permit a task's name where it is not the key of a mapping: in a change."""
     name = {"type": "string", "description": Task.documentation["name"]}
     for option in definitions["AddTask"]["properties"]["task"]["oneOf"]:
         task = option["$ref"].removeprefix("#/$defs/")

@@ -1,4 +1,4 @@
-"""Streams of a configuration: recordings that it names, and those in a log."""
+"""Streams of a configuration: its named recordings, and those in a log."""
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from copy import deepcopy

@@ -35,8 +35,8 @@ class YamlError(Exception):
     def __init__(self, line: int, message: str, path: KeyPath = ()) -> None:
         super().__init__(line, message, path)
         self.line = line  # the line of the error, counted from 1
-        self.message = message  # what is wrong there
-        self.path = path  # the key path of the error; empty if it is not known
+        self.message = message  # the message
+        self.path = path  # the key path of the error; empty if unknown
 
 
 def _null(text: str) -> None:
@@ -77,16 +77,17 @@ _SCALARS: dict[str, tuple[str, Callable[[str], Any], str | None]] = {
     ),
     TAG + "str": ("text", _text, None),
 }
-"""By tag the scalars that are allowed: the name in messages, what converts the text (or
-raises ValueError), and the text without quotes; None if nothing else fits."""
+"""The permitted scalars by tag: the name in messages, the converter of the text (which
+may raise ValueError), and the pattern of the text without quotes; None: any other
+text."""
 
 
 MAX_SIZE = 1_000_000
-"""Most characters in a text; parsing that many takes seconds."""
+"""Maximum number of characters in a text; parsing that many takes seconds."""
 MAX_VALUES = 100_000
-"""Most values in a text, counted after its aliases are expanded."""
+"""Maximum number of values in a text, after expanding its aliases."""
 MAX_DEPTH = 50
-"""Most levels of nesting."""
+"""Maximum depth of nesting."""
 
 
 class Mark(NamedTuple):

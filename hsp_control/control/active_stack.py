@@ -33,7 +33,7 @@ from hsp_control.trajectories.streams.followed import FollowedStream
 
 
 class Layout(NamedTuple):
-    """What the rows of a stack are."""
+    """The rows of a stack."""
 
     rows: int
     places: Mapping[str, slice]  # the rows of each task, by name
@@ -141,7 +141,7 @@ class ActiveStack:
                 parts = each.task.error_parts
                 yields = [part.yields for part in parts for _ in range(part.size)]
                 self.law.problem.yields[here] = yields
-            # Who is about to fall needs the balance whatever it costs.
+            # A falling robot needs its balance at any cost.
             balances = robot.unactuated and each.task.keeps_balance(robot)
             follows = each.key in below or len(in_force.feedback.largest)
             draws = spring and below  # from those below it
@@ -186,7 +186,7 @@ class ActiveStack:
         return self.level_names[level - 1] if level else ""
 
     def bind(self) -> None:
-        """Bind what `resolve` calls, now instead of then; and call it once.
+        """Bind the calls of `resolve` now, and run them once.
 
         A part, or a user's function, may make something at its first use. A stream's
         messages belong to a time, and what raises does so in the step that meets it.
@@ -266,7 +266,7 @@ class ActiveStack:
             self.raise_not_finite()
 
     def raise_not_finite(self) -> NoReturn:
-        """Raise for what made a step's effort NaN or infinite."""
+        """Raise for the part that made a step's effort NaN or infinite."""
         state, problem = self._state, self.law.problem
         for part, sample in self._parts:
             if not all(np.isfinite(array).all() for array in sample):
@@ -276,12 +276,12 @@ class ActiveStack:
                     "does its trajectory return NaN or infinity there?"
                 )
         if not all(np.isfinite(array).all() for array in problem.field):
-            self._field.value(state.read_only)  # may say what is wrong
+            self._field.value(state.read_only)  # may raise a more precise error
             raise NonFiniteError(
                 f"field {self._field.name!r} is not finite at t = {state.t:.6g} s"
             )
         given = as_given(self._metric, state)
-        self._metric.evaluate(given, problem.metric)  # may say what is wrong
+        self._metric.evaluate(given, problem.metric)  # may raise a more precise error
         raise NonFiniteError(
             f"the effort is not finite at t = {state.t:.6g} s, "
             f"q = {state.q.tolist()}, v = {state.v.tolist()}"

@@ -52,9 +52,9 @@ class Change(Part, ABC, family="changes", error=ControllerError):
 
     _: KW_ONLY
     at: Number
-    """When it begins [s]; a time that has passed means now."""
+    """Its start time [s]; a time that has passed means now."""
     ramp: NonNegative = 0.3
-    """How long it takes [s]; 0 is a jump."""
+    """Its duration [s]; 0 is a jump."""
 
     @property
     def end(self) -> float:
@@ -187,7 +187,7 @@ class ExchangeField(Change, type="exchange_field"):
     field: str
     """Name of the field that goes."""
     by: NullSpaceField
-    """The field that comes; its own weight does not count."""
+    """The new field; its own weight is ignored."""
 
     def placed(self, start: Start, setup: Setup) -> Self:
         """Return the change with its field placed."""
@@ -198,7 +198,7 @@ class ExchangeField(Change, type="exchange_field"):
         """Return the setup with the other field; see `Change.apply`."""
         k = _find_field(setup, self.field)
         if not self.by.controls:
-            raise ControllerError("an uncontrolled null space replaces no other field")
+            raise ControllerError("an uncontrolled null space cannot replace a field")
         new = replace(self.by, weight=setup.terms[k].field.weight)
         return _with_field(setup, k, new, self)
 

@@ -68,7 +68,8 @@ class ChangePayload(Change, type="payload"):
             frame = robot.model.frames[robot.frame_id(self.frame)]
             if frame.parentJoint == 0:
                 raise ControllerError(
-                    f"{self.frame!r} is fixed to the world, which carries everything"
+                    f"{self.frame!r} is fixed to the world, where a payload has no "
+                    "effect; give a frame of a moving link"
                 )
         center, inertia = np.zeros(3), np.zeros((3, 3))
         engine.BodyInJoint(
@@ -104,7 +105,7 @@ class ChangePayload(Change, type="payload"):
                     "nor greater than the sum of the others"
                 )
             if self.mass == 0.0 and principal[2] > 0.0:
-                raise ControllerError("is that of a body without mass; give its mass")
+                raise ControllerError("is not 0, but the mass is; give the mass")
         return moments
 
 

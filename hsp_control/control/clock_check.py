@@ -29,9 +29,9 @@ class ClockCheck:
         """Look at the time of the first step [s]."""
         if abs(t) > _LATE:
             self._tell(
-                f"the first step is at t = {t:.10g} s of its state: trajectories, "
-                "schedules and changes count from 0, so they are over; give "
-                "compute(t, q, v) what the clock reads, which may begin anywhere"
+                f"the first state has t = {t:.10g} s, but trajectories, schedules and "
+                "changes begin at t = 0, so they are over; call compute(t, q, v) "
+                "with the time of the clock, which may begin anywhere"
             )
 
     def change(self, at: float, now: float) -> None:

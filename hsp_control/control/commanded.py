@@ -1,4 +1,4 @@
-"""What commands a controller while it runs: changes, targets and velocities."""
+"""Commands of a running controller: changes, targets and velocities."""
 
 from dataclasses import replace
 from typing import Any
@@ -37,7 +37,7 @@ class Commanded(Composition):
         return Changes(self.change, t)
 
     def set_target(self, task: str, target: ArrayLike | pin.SE3) -> StreamHandle:
-        """Let a task go to a target from now on, smoothly, until the next one is set.
+        """Move a task to a target from now on, smoothly, until the next one is set.
 
         ``controller.set_target("hand", pose)``, at any time and as often as needed. A
         stream takes over from the task's trajectory, with a crossfade, and goes there
@@ -102,7 +102,7 @@ class Commanded(Composition):
     def set_velocity(
         self, task: str, velocity: ArrayLike, axes: Axes = "world"
     ) -> StreamHandle:
-        """Let a task move at a velocity from now on, as with a joystick.
+        """Move a task at a velocity from now on, as with a joystick.
 
         ``controller.set_velocity("hand", twist, axes="tool")``, again and again: if no
         other velocity or target comes for 0.2 s, it fades to zero. The reference is its

@@ -1,4 +1,4 @@
-"""What is looked at where a run begins, and not in its steps."""
+"""Checks at the start of a run, not in its steps."""
 
 import warnings
 from collections.abc import Iterable

@@ -1,4 +1,4 @@
-"""What of a time line is in force now, and the step that is bound for it."""
+"""The part of a time line in force now, and the step that is bound for it."""
 
 from typing import NamedTuple
 
@@ -22,7 +22,7 @@ earlier times than the last one."""
 
 
 class InForce:
-    """What of a time line is in force now, and the step that is bound for it.
+    """The part of a time line in force now, and the step that is bound for it.
 
     Gains, limits, model and tools are arrays that the calls of a step read; `advance`
     writes those of a time. What steps call is bound in `follow`, when a change is made,

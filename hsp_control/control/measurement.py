@@ -29,7 +29,7 @@ class Inertial(NamedTuple):
 
 
 class Measurement(NamedTuple):
-    """What is measured of a robot at one time, simulated or real.
+    """The measurement of a robot at one time, simulated or real.
 
     The pose and the twist of a floating base are the first entries of q and v: true
     ones in a simulation, or those of an estimator.

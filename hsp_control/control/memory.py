@@ -1,4 +1,4 @@
-"""What a controller remembers of its run: one record, to which all else is bound."""
+"""A controller's memory of its run: one record, to which everything else is bound."""
 
 from collections.abc import Iterable
 from dataclasses import dataclass, field
@@ -14,7 +14,7 @@ from hsp_control.trajectories.streams.run import StreamRun
 
 @dataclass
 class RunMemory:
-    """All that a controller remembers of its run.
+    """The whole memory of a controller's run.
 
     A controller is what is declared, its time line, the state of its robot, and this.
     What computes reads and writes these arrays, and remembers nothing by itself. A copy

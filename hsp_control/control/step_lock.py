@@ -9,7 +9,7 @@ from hsp_control.common.exceptions import ControllerError
 
 
 class StepLock:
-    """A lock: other threads wait for it; the thread that holds it gets an error."""
+    """A lock: other threads wait for it; re-entry by its holder raises."""
 
     __slots__ = ("__weakref__", "_lock", "_taken")
 
@@ -42,8 +42,8 @@ _BY_ITSELF = (
 )
 _FORKED = (
     "this process was forked while another thread computed with this controller, whose "
-    "memory is half a step here: make the controller in each process, or start "
-    'processes by "spawn"'
+    "memory stays in the middle of a step here: make the controller in each process, "
+    'or start processes by "spawn"'
 )
 _locks: WeakSet[StepLock] = WeakSet()
 

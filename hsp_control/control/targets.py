@@ -29,9 +29,9 @@ from hsp_control.trajectories.streams.run import StreamRun
 from hsp_control.trajectories.streams.streamed import Streamed
 
 RAMP = 0.2
-"""Time that a change takes which somebody makes by hand [s]."""
+"""Ramp of interactive changes [s]."""
 DEAD_MAN = 0.2
-"""Time after which a velocity fades that is not repeated [s]."""
+"""Time after which an unrepeated velocity fades [s]."""
 DELAY = 0.03
 """Time to a target, if the bounds permit [s]: about two of a page's pictures."""
 MOVING: dict[str, Any] = {"speed": 0.5, "acceleration": 3.0, "jerk": 60.0}

@@ -37,7 +37,7 @@ def plain_data(value: Any, *, defaults: bool = False) -> Any:
     if (name := name_of(value)) is not None:
         return name
     what = getattr(value, "__qualname__", None) or f"a {type(value).__name__}"
-    raise ConfigError(f"YAML cannot say {what}: it is Python, not data")
+    raise ConfigError(f"YAML cannot express {what}: it is Python, not data")
 
 
 def _of_part(part: Declared, defaults: bool) -> dict[str, Any]:

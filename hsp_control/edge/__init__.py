@@ -1,3 +1,3 @@
-"""The edge: bounds where tasks cannot be met, so that no arm oscillates."""
+"""The workspace boundary: bounds where tasks cannot be met, against oscillation."""
 
 from .bound_law import BoundLaw as BoundLaw

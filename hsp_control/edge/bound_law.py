@@ -27,11 +27,11 @@ class BoundLaw:
         ends: End of each level's rows in the stack.
         form: The metric's form.
         threshold: ε_0, the singular value below which the inverse is always bounded.
-        thresholds: ε of each level, as `call` wrote it last, shape (levels,).
-        acceleration: a, as `call` wrote it last, shape (nv,).
-        null_space_error: e_N, as `call` wrote it last, shape (nv,).
+        thresholds: ε of each level, of the last `call`, shape (levels,).
+        acceleration: a of the last `call`, shape (nv,).
+        null_space_error: e_N of the last `call`, shape (nv,).
         outcome: The outcome of the law then.
-        edge: The results of the two laws of the edge then.
+        edge: The results of the damped and the exact law then.
         edge_level: The first level whose inverse the damped law bounds, from 1 on,
             shape (1,); 0: none, or the damped law is not computed.
         factors: The stack's pseudo-inverse then.
@@ -51,7 +51,7 @@ class BoundLaw:
         *,
         controls: bool = True,
     ) -> None:
-        """Allocate; ``controls``: whether there is a field, else u = 0."""
+        """Allocate; ``controls``: whether there is a field; without one u = 0."""
         m = sum(levels)
         self.problem = Problem(m, nv, gain)
         self.ends: Indices = np.cumsum([*levels] or [0], dtype=np.int64)
@@ -67,8 +67,8 @@ class BoundLaw:
         self.edge_level: Indices
         self.edge_level, self._left_out = np.zeros((2, 1), dtype=np.int64)
         self._self_motions, self._brakings = np.zeros((2, 2, nv))
-        # Only a fixed base has a law beside the damped one. A robot on feet keeps its
-        # balance by tasks that nothing damps.
+        # Only a fixed base uses both laws. A robot on feet keeps its balance by tasks
+        # that must not be damped.
         legs = following.modest > 0.0
         self._exact_beside = following.size > 0.0 and m <= nv and not legs
         # A conflict needs two levels, or more rows than degrees of freedom.
@@ -115,7 +115,7 @@ class BoundLaw:
         )
 
     def damped_beside(self, v: Array) -> OnlyIf:
-        """Return what writes the damped law if `call` left it out; a stays the same."""
+        """Return a call that writes the damped law if `call` omitted it; a is kept."""
         return OnlyIf([self.call(v, beside=True)], self._left_out)
 
     def self_motions(self, v: Array) -> tuple[PartCall, tuple[Array, Array]]:
@@ -125,8 +125,8 @@ class BoundLaw:
             v: Velocity, shape (nv,).
 
         Returns:
-            The call, and what it writes: φ_N of a and of a_damped, shape (2, nv), and
-            their brake P K_N P v, shape (2, nv).
+            The call, and its results: φ_N of a and of a_damped, shape (2, nv), and
+            their damping P K_N P v, shape (2, nv).
         """
         task, metric = self.problem.task, self.problem.metric
         written = self._self_motions, self._brakings
@@ -158,7 +158,7 @@ class BoundLaw:
             v: Velocity, shape (nv,).
 
         Returns:
-            The call, and what it writes: the part of the first k levels in a_damped for
+            The call, and its results: the part of the first k levels in a_damped for
             each level k but the last, and that of all tasks in a, shape (levels, nv);
             orthonormal rows Q = X J L⁻ᵀ of the stack, X lower triangular.
         """
@@ -184,14 +184,14 @@ class BoundLaw:
         return call, (made, factors)
 
     def diagnosis(self, first: int) -> tuple[PartCall, Array, Array]:
-        """Return a call that finds how near the law is to singular and to rest.
+        """Return a call that computes the law's distance from singularity and rest.
 
         Args:
             first: The first row of the tasks: those before it belong to contacts.
 
         Returns:
             The call, which returns det(J W⁻¹ Jᵀ) without the rows before ``first``, the
-            paper's manipulability; and what it writes: what `singular_values` takes,
+            paper's manipulability; and its results: the argument of `singular_values`,
             and ‖e_N‖_W, the square root of 2 V, shape (1,).
         """
         J, metric = self.problem.task.jacobian[first:], self.problem.metric

@@ -1,11 +1,11 @@
-"""What yielding costs where limits hold the tasks, level by level.
+"""The cost of deviations while limits keep tasks from being met, level by level.
 
-Where a limit is active, what is below a level yields before the level does. The
-direction in which it yields turns with the posture, the more the less it can yield and
-the cheaper it is. A task that cannot be met demands it forever: so the cost ρ follows
-what is commanded beyond the limit, as ε follows f (`threshold.py`), and the tiny ρ of
-strict priorities is for feasible tasks, and for what yields easily. ``docs/edge.md``
-has the proof, the call the equations.
+While a limit is active, lower priorities deviate before a level does. The direction of
+their deviation depends on the posture: the more, the smaller their mobility along the
+limit and the smaller their cost. For a task that cannot be met the demand persists: so
+the cost ρ follows the command beyond the limit, as ε follows f (`threshold.py`), and
+the tiny ρ of strict priorities applies to feasible tasks, and to directions of large
+mobility. ``docs/edge.md`` has the proof, the call the equations.
 """
 
 import numpy as np
@@ -18,9 +18,9 @@ from hsp_control.edge.step import Factors
 from hsp_control.engine.plans import PartCall
 
 STIFFEST = 1000.0
-"""K [1/s²], the most that a deviation changes for each radian by which its direction
-turns. A sampled loop tolerates k h < 2 c, that is 2000 1/s² with a null-space gain of
-10 1/s and periods of up to 10 ms: K is half of it."""
+"""K [1/s²], the maximum change of a deviation per radian of rotation of its direction.
+A sampled loop tolerates k h < 2 c, that is 2000 1/s² with a null-space gain of 10 1/s
+and periods of up to 10 ms: K is half of it."""
 
 
 def held_levels(
@@ -34,7 +34,7 @@ def held_levels(
     permitted: Array,
     barred: Barred,
 ) -> tuple[PartCall, Array]:
-    """Return the call that writes the least costs of what is below each level.
+    """Return the call that writes the minimum costs below each level.
 
     Args:
         M: Mass matrix, shape (nv, nv).
@@ -48,8 +48,8 @@ def held_levels(
         barred: Rows of barriers, for deviations from a.
 
     Returns:
-        The call, and what it writes, shape (levels,): ρ for what the first levels
-        command beyond limits, 0 if that is nothing. It may be more than 1.
+        The call, and its result, shape (levels,): ρ for the first levels' command
+        beyond limits, 0 without one. It may be more than 1.
     """
     held, metric = np.zeros(len(by_levels)), law.problem.metric
     call = PartCall(

@@ -1,28 +1,28 @@
-"""The acceleration that a step approximates where a limit is active.
+"""The acceleration that a step approximates while a limit is active.
 
-Where a limit is active the law's equations cannot hold. Then it is decomposed,
+While a limit is active the law's equations cannot hold. Then it is decomposed,
 
     a = a_t + φ_N,
 
-into the tasks' part and the self-motion (`self_motion.py`). Two things
-change, as far as a is beyond a limit, so that the step is a continuous function of the
-state:
+into the tasks' part and the self-motion (`self_motion.py`). Two things change, in
+proportion to the excess of a beyond a limit, so that the step is a continuous function
+of the state:
 
-*The tasks are damped.* An arm that is held at its edge, or rushes to it, commands more
-than its motors give, from one side and then from the other: the nearest step within the
-limits would oscillate. So as far as a_t alone is beyond the limits, the step approaches
-the damped law instead (`shares.py`), and reaches it at E_t = 2.
+*The tasks are damped.* An arm at its workspace boundary, or moving fast towards it,
+commands more than its motors supply, with alternating signs: the nearest step within
+the limits would oscillate. So in proportion to the excess of a_t alone, the step
+approaches the damped law instead (`shares.py`), and reaches it at E_t = 2.
 
 *The field's command is bounded.* That is φ_N + P K_N P v, the self-motion without its
-brake. A field may command anything; at most what the limits permit far from them is
-passed to the QP; damping is not scaled: else the null space would oscillate at the
-limits.
+damping. A field's command is unbounded; at most the value that the limits permit far
+from them is passed to the QP; damping is not scaled, or the null space would oscillate
+at the limits.
 
-An excess E is relative to what the limit permits: of an effort, the maximum; of an
-acceleration, what the barriers of `Limits` permit far from them. A field keeps at least
-1/(1 + E): what is cut by more than its excess oscillates there. The limit on the
-effort's rate is ignored: it depends on the last effort, and a step that waits for it
-would wait for ever.
+An excess E is relative to the permitted value: for an effort, its maximum; for an
+acceleration, that of the barriers of `Limits` far from them. A field keeps at least
+1/(1 + E): a command that is reduced by more than its excess oscillates there. The limit
+on the effort's rate is ignored: it depends on the last effort, and a step that waited
+for it would wait for ever.
 """
 
 from typing import NamedTuple, Self
@@ -34,12 +34,12 @@ from hsp_control.common.arrays import Array
 from hsp_control.engine.plans import PartCall
 
 LARGE = 2.0
-"""Excess of the tasks from which on the damped law applies wholly: where they command
-three times what the limits permit."""
+"""Excess of the tasks from which on the damped law applies fully: they command three
+times the permitted value."""
 
 
 class Permitted(NamedTuple):
-    """The bounds far from all limits, shape (nv,) each; inf where there is none."""
+    """The bounds far from all limits, shape (nv,) each; inf without one."""
 
     effort: Array  # [N·m or N]
     acceleration: Array  # [rad/s² or m/s²]

@@ -1,4 +1,4 @@
-"""The results of the law and its edge in each step."""
+"""The results of the law and its bounds in each step."""
 
 from typing import NamedTuple, Self
 
@@ -17,10 +17,10 @@ class Factors(NamedTuple):
 class Projectors(NamedTuple):
     """The projectors of the damped law of several levels.
 
-    Level k takes Q_{k-1} J_kᵀ q(G_k) J_k Q_{k-1} of W⁻¹, and leaves Q_k.
+    Level k subtracts Q_{k-1} J_kᵀ q(G_k) J_k Q_{k-1} from Q_{k-1}, which gives Q_k.
     """
 
-    Q: Array  # what the last level leaves, Q_K = P W⁻¹, shape (nv, nv)
+    Q: Array  # null space of the last level, Q_K = P W⁻¹, shape (nv, nv)
     QJ: Array  # Q_{k-1} J_kᵀ of all levels side by side, shape (nv, m)
     G_inverse: Array  # q(G_k) of all levels along the diagonal, shape (m, m)
 
@@ -37,7 +37,7 @@ class EdgeMemory(NamedTuple):
     X: Array  # (m, m)
     exact: Array  # a_exact, shape (nv,), where μ < 1 and the laws differ
     damped: Array  # a_damped, shape (nv,), where they differ or a limit is violated
-    by_tasks: Array  # a_damped without φ_N, where it went level by level, shape (nv,)
+    by_tasks: Array  # a_damped without φ_N, if computed level by level, shape (nv,)
     exact_e_N: Array  # shape (nv,)
     share: Array  # μ, without the share of the limits, shape (1,)
 

@@ -3,7 +3,7 @@
 A kind is a struct of the folder ``engine`` in the sources: its members are its
 arguments, its ``operator()`` is its mathematics. ``repr(engine.Circle)`` shows them.
 
-The variable HSP_ENGINE names another library than the installed one, such as one with
+The variable HSP_ENGINE selects another library than the installed one, such as one with
 Eigen's assertions: ``python hatch_build.py Debug`` builds it.
 """
 
@@ -59,7 +59,7 @@ def kind(name: str) -> Kind:
 
 
 def reduced(own: Kind) -> tuple[Callable[..., Kind], tuple[str, ...]]:
-    """Return how a kind is made again from a pickle; one of a user's own is loaded."""
+    """Return how a kind is rebuilt from a pickle; a user's own library is loaded."""
     if _BY_NAME.get(own.name) is own:
         return kind, (own.name,)
     from .own_kinds import library_of, of_library

@@ -1,4 +1,4 @@
-"""What a plan does: its calls, what writes their arguments, which one went wrong."""
+"""Inspection of a plan: its calls, the writers of their arguments, the first NaN."""
 
 from collections.abc import Iterator
 from typing import Any
@@ -23,7 +23,7 @@ def calls(step: object) -> Iterator[Any]:
 
 
 def listing(step: object) -> str:
-    """Return what a plan does, a line for each call and for each of its arguments.
+    """Return the contents of a plan, a line for each call and each of its arguments.
 
     An array that an earlier call of the plan writes is shown with that call's number.
     """
@@ -50,22 +50,22 @@ def listing(step: object) -> str:
 
 
 def first_nan(step: object, t: float = 0.0) -> tuple[Any, list[str]] | None:
-    """Make a plan call by call, up to the first one that writes NaN.
+    """Run a plan call by call, up to the first one that writes NaN.
 
     Args:
         step: The plan.
-        t: The time that its calls are given [s].
+        t: The time passed to its calls [s].
 
     Returns:
-        That call, and the names of the arguments that it wrote so; None if there is
-        none. A call within `Once` is made whether it was made at this stamp or not.
-        Infinite is what has no limit.
+        That call, and the names of its arguments with NaN; None if there is none. A
+        call within `Once` runs even if it did at this stamp. Infinity is valid: no
+        limit.
     """
     for call in calls(step):
         if isinstance(call, Call) and any(
             isinstance(x, Plan | Move) for x in call.values.values()
         ):
-            continue  # what it makes was made
+            continue  # its calls have run
         if isinstance(call, Runnable):
             call(t)
         if isinstance(call, Call):

@@ -1,6 +1,6 @@
-"""Kinds of one's own: a file in C++, compiled once, and what it brings.
+"""A user's own kinds: a file in C++, compiled once, and its kinds.
 
-Its last line says which kinds it has:
+Its last line lists its kinds:
 
     extern "C" auto hsp_kinds_1() { return hsp::kinds<ElbowHeight>(); }
 """
@@ -22,10 +22,10 @@ _LOADED: dict[Path, SimpleNamespace] = {}
 
 
 def include_folders() -> list[Path]:
-    """Return where the headers are: the engine's, Eigen's and Boost's.
+    """Return the folders of the headers: the engine's, Eigen's and Boost's.
 
     Raises:
-        EngineError: If Eigen's or Boost's are not there.
+        EngineError: If Eigen's or Boost's are missing.
     """
     package = Path(__file__).parent / "include"
     own = package if package.is_dir() else Path(__file__).parents[2] / "engine/include"
@@ -60,7 +60,7 @@ def command(source: Path, library: Path) -> list[str]:
                 f"no C++ compiler is there to compile {source.name}: install one "
                 "(Debian: apt install g++), name it in CXX, or pip install ziglang"
             ) from None
-        # Left alone, zig takes every instruction of this processor.
+        # By default, zig uses every instruction of this processor.
         compiler = [sys.executable, "-m", "ziglang", "c++", "-mcpu=baseline"]
     # The engine's own flags: alignment is part of Eigen's layout, and follows from the
     # processor's instructions.
@@ -77,12 +77,12 @@ def build(source: str | os.PathLike[str], library: Path | None = None) -> Path:
 
     Args:
         source: The file in C++.
-        library: Where the library is written; beside the file by default, where `load`
-            finds it: a computer without a compiler needs no more.
+        library: The library to write; by default beside the file, where `load` finds
+        it, also on a computer without a compiler.
 
     Raises:
-        EngineError: If it does not compile, with what the compiler says, or there is
-            no compiler.
+        EngineError: If it does not compile, with the compiler's message, or there is no
+        compiler.
     """
     path = Path(source)
     library = library or path.with_suffix(".so")
@@ -101,11 +101,11 @@ def build(source: str | os.PathLike[str], library: Path | None = None) -> Path:
 def load(file: str | os.PathLike[str]) -> SimpleNamespace:
     """Return the kinds of a library, or of a file in C++, by name.
 
-    A file is compiled where no library beside it is newer; what is compiled then is
-    kept in the user's cache folder, and is new where the file or the engine is.
+    A file is compiled unless a library beside it is newer; the result is stored in the
+    user's cache folder, and is compiled again after a change of the file or the engine.
 
     Raises:
-        EngineError: If there is no such file, or it brings no kinds.
+        EngineError: If there is no such file, or it declares no kinds.
     """
     path = Path(file).resolve()
     if not path.is_file():
@@ -116,7 +116,7 @@ def load(file: str | os.PathLike[str]) -> SimpleNamespace:
         try:
             kinds = load_library(str(path))
         except RuntimeError as error:
-            raise EngineError(f"{path.name} brings no kinds: {error}") from None
+            raise EngineError(f"{path.name} declares no kinds: {error}") from None
         _LOADED[path] = SimpleNamespace(**{kind.name: kind for kind in kinds})
     return _LOADED[path]
 
@@ -141,7 +141,7 @@ def library_of_own(kind: Kind) -> str:
 
 
 def of_library(library: str, name: str) -> Kind:
-    """Return a kind of a library by name, as a pickle asks for it.
+    """Return a kind of a library by name, for pickles.
 
     Raises:
         EngineError: If there is no such library, or it has no such kind.

@@ -1,12 +1,12 @@
-"""Plans: the calls of parts, bound once, and what supplies their arguments.
+"""Plans: the calls of parts, bound once, and the calls that supply their arguments.
 
-A part says its mathematics as a kind of call with arguments by name, a `PartCall`. An
-argument may be something that has to be brought up to date first: the kinematics of a
-frame, a trajectory, what another call writes. Its method ``supplied`` returns what is
-read, and the calls that write it. `planned` makes a plan of it all:
+A part defines its mathematics as a kind of call with arguments by name, a `PartCall`.
+An argument may be a value that must be updated first: the kinematics of a frame, a
+trajectory, the result of another call. Its method ``supplied`` returns the array to
+read, and the calls that write it. `planned` combines them into a plan:
 
-    PartCall   what is to be called, with arguments that may have to be supplied
-    Step       a call that is bound: it has its arrays, and is called with the time
+    PartCall the call to make, with arguments that may have to be supplied
+    Step       a bound call: it has its arrays, and is called with the time
     StepPlan   the steps of part calls, in order: first what follows the time alone, so
                that a state may be evaluated after it, then what reads the state
     Plan       steps as one call of the engine
@@ -29,8 +29,8 @@ TIME = object()
 class PartCall:
     """A kind of the engine, or a function, with arguments: a part's mathematics.
 
-    Arguments have the names of the kind's members, or of the function's parameters.
-    Who makes the call adds the others; `planned` says what may be among them.
+    Arguments have the names of the kind's members, or of the function's parameters. The
+    caller adds the others; `planned` describes the possible values.
     """
 
     __slots__ = ("arguments", "function")
@@ -53,20 +53,20 @@ class PartCall:
 
 
 class Once(NamedTuple):
-    """Calls that are made unless they were made at this stamp."""
+    """Calls that run unless they have run at this stamp."""
 
     calls: "PartCalls"
     stamp: Indices  # shape (1,)
-    made: Indices  # the stamp at which they were made last, shape (1,)
+    made: Indices  # the stamp of their last run, shape (1,)
 
     @classmethod
     def at(cls, stamp: Indices, *calls: PartCall) -> Self:
-        """Return calls that were not made yet."""
+        """Return calls that have not run yet."""
         return cls(calls, stamp, np.full(1, -1))
 
 
 class OnlyIf(NamedTuple):
-    """Calls that are made if a condition is not 0."""
+    """Calls that run if a condition is not 0."""
 
     calls: "PartCalls"
     condition: Indices  # shape (1,)
@@ -74,21 +74,21 @@ class OnlyIf(NamedTuple):
 
 AnyCall = PartCall | Once | OnlyIf
 PartCalls = Sequence[AnyCall]
-"""What a part does in each step: its calls with all their arguments, in this order."""
+"""The calls of a part in each step, with all their arguments, in this order."""
 
 
 class CallOutput(NamedTuple):
-    """An argument of a call: what another call writes into its argument ``out``."""
+    """An argument of a call: the result of another call in its argument ``out``."""
 
     call: PartCall
     out: Any
 
 
-def says(part: object, *ways: str) -> str:
-    """Return by which of several methods a part's class says its mathematics.
+def implemented_by(part: object, *ways: str) -> str:
+    """Return which of several methods the most derived class of a part overrides.
 
-    It is the one of the most derived class, so that a subclass of a part of the package
-    may override any of them; the first, if one class has several.
+    A subclass of a part of the package may override any of them; the result is the
+    first, if one class has several.
     """
     for each in type(part).__mro__:
         for way in ways:
@@ -98,17 +98,17 @@ def says(part: object, *ways: str) -> str:
 
 
 Step = Callable[..., Any]
-"""What stands in a plan: a call of the engine, or one that it makes as its own."""
+"""An element of a plan: a call of the engine, or an object that behaves like one."""
 
 
 class StepPlan(NamedTuple):
-    """The calls that evaluate parts of a controller, at whatever the state is."""
+    """The calls that evaluate parts of a controller, at the present state."""
 
     follow: tuple[Step, ...] = ()  # bring references up to the time [s]
     write: tuple[Step, ...] = ()  # read the state, and write the results
 
     def run(self, t: float) -> float:
-        """Make the calls at a time [s]; return what the last one returns."""
+        """Run the calls at a time [s]; return the last one's result."""
         return Plan(self.steps())(t)
 
     def steps(self) -> list[Step]:
@@ -116,12 +116,12 @@ class StepPlan(NamedTuple):
         return [*self.follow, *self.write]
 
     def call(self) -> Plan:
-        """Return what writes, as one call."""
+        """Return the writing calls as one call."""
         return Plan(self.write)
 
 
 def planned(calls: PartCalls) -> StepPlan:
-    """Return the plan of calls; one that comes twice is bound once."""
+    """Return the plan of calls; one that occurs twice is bound once."""
     plans: dict[int, StepPlan] = {}
     follow: list[Step] = []
     write: list[Step] = []
@@ -159,7 +159,7 @@ _NOTHING = StepPlan()
 
 
 def supplied(argument: Any) -> tuple[Any, StepPlan]:
-    """Return an argument as a call reads it, and the plan of what writes it."""
+    """Return an argument as a call reads it, and the plan of its writers."""
     if type(argument) is CallOutput:
         return argument.out, planned([argument.call.given(out=argument.out)])
     if hasattr(argument, "supplied"):
@@ -177,14 +177,15 @@ def supplied(argument: Any) -> tuple[Any, StepPlan]:
 def bind(
     function: Callable[..., Any], arguments: Mapping[str, Any], *, timed: bool = False
 ) -> Step:
-    """Return a call with these arguments, as a plan makes it.
+    """Return a bound call with these arguments.
 
     Args:
         function: A kind of the engine, or a function.
         arguments: By name: arrays, numbers, and records of them, which are named tuples
             or dicts. The call reads and writes the memory of these arrays each time;
             numbers are constants.
-        timed: Whether it is also given the time; a function takes it first.
+        timed: Whether it also receives the time; a function has it as its first
+        parameter.
     """
     if isinstance(function, Kind):
         return function(**arguments)

@@ -1,7 +1,7 @@
 """Rotations for plain Python: exp, log and their Jacobians on SO(3), each a new array.
 
 A rotation vector y is a rotation by the angle √(y·y) about y, shape (3,) [rad]; a
-quaternion is x, y, z, w. The equations stand in the engine's ``rotations.hpp``.
+quaternion is x, y, z, w. The equations are in the engine's ``rotations.hpp``.
 
 - ``exp3(y)``: the rotation exp([y]×), shape (3, 3).
 - ``log3(R)``: the rotation vector of R, |y| ≤ π; at π either sign is right.
@@ -10,11 +10,11 @@ quaternion is x, y, z, w. The equations stand in the engine's ``rotations.hpp``.
 - ``jlog3(y)``: its inverse, y' = Jlog(y) ω, for |y| < 2π.
 - ``quaternion_from_rotation(R)``: of length 1, with a scalar part that is not negative.
 - ``rotation_from_quaternion(q)``: of a quaternion of any length but zero.
-- ``stumpff(s)``: the functions C0 to C5 of which all of them are made, at s = |y|².
+- ``stumpff(s)``: the functions C0 to C5 from which the others are computed, at
+s = |y|².
 - ``cross3(a, b)``: a × b of two arrays of shape (3,).
 
-All but ``cross3`` take what NumPy takes for an array, and raise TypeError for another
-shape.
+All but ``cross3`` accept array-like arguments, and raise TypeError for another shape.
 """
 
 import numpy as np

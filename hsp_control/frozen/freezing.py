@@ -134,7 +134,7 @@ def _image(
         *(each.port for each in inputs),
     ]
     ports += targets_of(own, streams)
-    read = Port("origin", "s", "what the clock read in the first step", origin)
+    read = Port("origin", "s", "time of the clock in the first step", origin)
     stopped, outputs = stopping(own, bound, stop, held, origin, first)
     return Image(move, [*ports, *outputs, read], stopped)
 
@@ -153,9 +153,14 @@ def _ports(
 ) -> Iterator[Port]:
     """Yield what can be set, or read after a step."""
     effort, rate = "N·m or N", "rad/s² or m/s²"
-    yield Port("tau", effort, "the effort that was delivered last", delivered.tau)
-    yield Port("acceleration", rate, "the acceleration that it gives", delivered.a)
-    yield Port("status", "-", "what became of the step", delivered.status)
+    yield Port("tau", effort, "the last delivered effort", delivered.tau)
+    yield Port(
+        "acceleration",
+        rate,
+        "the acceleration that it causes by the model",
+        delivered.a,
+    )
+    yield Port("status", "-", "outcome of the step", delivered.status)
     yield Port("delivered", "-", "whether there is an effort", delivered.delivered)
     yield Port("period", "s", "how long an effort is held", period)
     damped = bound.active.law.outcome.damped_level

@@ -85,7 +85,8 @@ def _forces(own: Controller) -> Iterator[Input]:
         force = each.contact.force
         if force is not None and isinstance(force.followed, SetPoint):
             evolve = _evolving(force.followed.numbers, 0.0, LARGEST, 0)
-            name, meaning = f"{each.contact.name}.force", "normal force, which presses"
+            name = f"{each.contact.name}.force"
+            meaning = "normal force, positive when it presses"
             port = Port(name, "N", meaning, force.followed.numbers, evolve)
             yield Input(port, (evolve,))
 

@@ -49,7 +49,7 @@ def check_steady(own: Controller) -> None:
             "schedule": one.always or "a frozen controller stands on the same feet",
             "force": contact.force is None
             or not (contact.slides or contact.force.dimension == WRENCH)
-            or "the forces of a contact that slides, and moments, are Python's",
+            or "the forces of a sliding contact, and moments, are computed in Python",
         }
         for name, reason in reasons.items():
             if reason is not True:
@@ -72,8 +72,8 @@ def check_stack(own: Controller, bound: BoundStep, compensators: bool) -> None:
     if active.first_task_row > sum(contact.rows for contact in active.contacts):
         with within("contacts" if active.contacts else "base"):
             raise FreezeError(
-                "motions of the base that nothing drives are found in Python: they "
-                "need contacts that hold all of the base"
+                "the motion of a base that contacts leave free is computed in "
+                "Python; needs contacts that hold all of the base"
             )
     if compensators and not bound.direct and active.contacts:
         with within("compensation"):
@@ -91,7 +91,7 @@ def check_streams(own: Controller) -> None:
             stream = each.run.stream
             reasons = {
                 "source": stream.source is None or "the program sets targets instead",
-                "messages": stream.messages is None or "a recording is Python's",
+                "messages": stream.messages is None or "a recording is read in Python",
                 "axes": stream.axes == "world" or "velocities are in world axes",
                 "stop_after": stream.stop_after is None
                 or "the program stops the robot; hold_after brings it to rest",

@@ -12,7 +12,7 @@ def singular_values(triangle: bytes) -> Array:
     """Return the singular values of J L⁻ᵀ, the largest first, shape (min(m, nv),).
 
     Args:
-        triangle: What the call of `BoundLaw.diagnosis` wrote, as bytes.
+        triangle: The result of `BoundLaw.diagnosis`, as bytes.
     """
     T = np.frombuffer(triangle).copy()
     values = np.zeros(isqrt(len(T)))

@@ -1,4 +1,4 @@
-"""Whether the law's equations hold, as the engine reports it."""
+"""Whether the law's equations hold, as reported by the engine."""
 
 from enum import IntEnum
 from typing import NamedTuple, Self

@@ -9,7 +9,7 @@ from hsp_control.law.samples import FieldSample, MetricSample, TaskSample
 
 
 class StepRecord(NamedTuple):
-    """The quantities of a step, in one block of memory, so that one copy keeps all.
+    """The quantities of a step, in one block of memory, so that one copy stores all.
 
     Attributes:
         task: All tasks, level after level: J, J', e, e', a_x.
@@ -57,15 +57,15 @@ class Problem:
         gain: K_N, shape (nv, nv) [1/s].
         demand: Kp s(e), the feedback's command at rest in the coordinates of e,
             shape (m,); zero in rows without one, such as those of contacts.
-        yields: How much the threshold of a row's level follows the row's demand, shape
-            (m,): 0 where no bound is on its error, so that it follows only below a held
-            level; see `write_thresholds`.
+        yields: Weight with which the threshold of a row's level follows the row's
+        demand, shape (m,): 0 without a bound on its error, so that it follows only
+        below an unmet level; see `write_thresholds`.
         pulls: Force of a spring along a row over its largest force, shape (m,); 0 for
             other rows.
         stretched: Length of the part of the error to which a row belongs, over its
             largest length, shape (m,); 0 for rows without one.
         springs: Whether a row belongs to a spring, shape (m,). The law itself treats
-            all rows alike; where limits bind, a spring yields as a body would.
+            all rows alike; while limits are active, a spring yields like a body.
     """
 
     def __init__(self, rows: int, nv: int, gain: Array) -> None:
@@ -83,6 +83,6 @@ class Problem:
 
     @property
     def rows(self) -> dict[str, Array | Flags]:
-        """The commands of each row, by name."""
+        """The quantities of each row, by name."""
         names = "demand", "yields", "pulls", "springs", "stretched"
         return {name: getattr(self, name) for name in names}

@@ -10,15 +10,15 @@ from hsp_control.live.settings import LiveSettings
 from hsp_control.robot import Robot
 
 _TOLERANCE = 0.5
-"""By how much the effort of a robot that has stopped may exceed the limits, relative to
-them: its own stop, or another load, may need more."""
+"""Tolerance of a stopped robot's effort beyond the limits, relative to them: its own
+stop, or another load, may need more."""
 
 _SURE = 5
-"""Periods in a row without a measurement that a bad connection may have."""
+"""Consecutive periods without a measurement that a bad connection may have."""
 
 
 class EffortLimiter:
-    """Converts an effort into the value that is sent, within effort and rate limits."""
+    """Converts an effort into the sent value, within effort and rate limits."""
 
     def __init__(
         self,
@@ -31,7 +31,8 @@ class EffortLimiter:
         self._rest = np.zeros(robot.nv)
         self._compensates = settings.compensates_gravity
         self._upper = settings.effort_limits(robot, limits)
-        # The controller's limits may fall while it runs: efforts follow by their rate.
+        # The controller's limits may decrease at run time: efforts follow at their
+        # rate.
         self._largest = np.maximum(self._upper, settings.effort_limits(robot))
         self._step = settings.rate_limits(robot) * period
         # the value sent last, shape (nv,): tau, or tau - g(q)
@@ -42,8 +43,8 @@ class EffortLimiter:
         self.gravity: Array = np.zeros(robot.nv)
         kept = max(settings.missing, settings.watchdog) + _SURE
         self._recent = SentEfforts(self._largest, kept)
-        # The least and greatest effort that the robot may have; and before the last
-        # effort.
+        # The least and greatest effort that the robot may have, now and before the last
+        # one.
         self._least: Array = np.zeros(robot.nv)
         self._most: Array = np.zeros(robot.nv)
         self._before = self._least, self._most
@@ -56,7 +57,7 @@ class EffortLimiter:
         return self._upper
 
     def follow(self, limits: RobotLimits | None) -> None:
-        """Use the controller's limits of now, which may change in a run."""
+        """Use the controller's present limits, which may change in a run."""
         if limits is not self._limits:
             self._limits = limits
             self._upper[:] = self._settings.effort_limits(self._robot, limits)
@@ -79,9 +80,9 @@ class EffortLimiter:
         return self.gravity if self._compensates else 0.0
 
     def contradiction(self, effort: Array, *, halted: bool) -> str | None:
-        """Return why the robot cannot have an effort, shape (nv,), or None.
+        """Return why the robot cannot have an effort, shape (nv,), or None if it can.
 
-        It has one that was sent (`SentEfforts`), or its own where it has halted.
+        It has one that was sent (`SentEfforts`), or its own after it has halted.
         """
         if halted:
             most = self._largest * (1.0 + _TOLERANCE)
@@ -99,17 +100,16 @@ class EffortLimiter:
         )
 
     def robot_has(self, effort: Array | None) -> bool:
-        """Use the effort that the robot reports; return whether it is another.
+        """Use the effort reported by the robot; return whether it differs.
 
-        The last one that was sent may be lost, or still under way: the robot may have
-        both, unless they are too far apart for one step from both. None: it reports
-        none.
+        The last sent one may be lost, or still in transit: either is possible, unless
+        they are too far apart for one step from both. None: it reports none.
         """
         self._unanswered, self._says = 0, effort is not None
         if effort is None or np.array_equal(effort, self.sent):
             self._least = self._most = self.sent.copy()
             return False
-        # Not even by rounding does an effort come from beyond the limits.
+        # Rounding must not move an effort beyond the limits.
         borne = self._added_by_robot
         has = np.clip(effort, -self._largest - borne, self._largest - borne)
         other = np.where(np.abs(has - self.sent) > 2.0 * self._step, has, self.sent)
@@ -118,7 +118,7 @@ class EffortLimiter:
         return True
 
     def no_measurement(self) -> None:
-        """Count a period without a measurement; a dead line got what was sent."""
+        """Add a period without a measurement; a dead line received the sent efforts."""
         self._unanswered += 1
         if self._says and self._unanswered <= _SURE:
             least, most = self._before
@@ -126,15 +126,15 @@ class EffortLimiter:
             self._most = np.maximum(most, self.sent)
 
     def apply(self, tau: Array, q: Array, inertia: Array | None = None) -> bool:
-        """Compute ``sent`` from an effort; return whether tau is finite, else it stays.
+        """Compute ``sent``; return False, and keep the last one, if tau is not finite.
 
         The effort is clipped to its limits first, then the sent value to its rate. If
-        some value satisfies both limits, the result does. The rate counts from all
+        some value satisfies both limits, the result does. The rate is relative to all
         efforts that the robot may have.
 
         With the mass matrix ``inertia``, shape (nv, nv), a joint whose effort can
-        follow at once holds its own acceleration where a heavier one's lags behind
-        (`nearest_effort`). Clipped joint by joint, an arm that must stop while it
+        follow at once keeps its acceleration while that of a heavier joint lags behind
+        (`nearest_effort`). With clipping joint by joint, an arm that must stop while it
         accelerates would accelerate its wrist.
         """
         if not np.isfinite(tau).all():
@@ -164,7 +164,7 @@ class EffortLimiter:
         self.applied = self.sent + self._added_by_robot
 
     def replace_sent(self, sent: Array) -> None:
-        """Set ``sent``, shape (nv,): to another effort that the robot has."""
+        """Set ``sent``, shape (nv,), to a different effort of the robot."""
         self.sent = sent
         self._least = self._most = sent.copy()
         self.applied = sent + self._added_by_robot

@@ -19,17 +19,16 @@ from hsp_control.simulation.control_chain import EffortSource
 class Hardware(Protocol):
     """A robot under effort control: implement it once for each kind of robot.
 
-    The loop calls `read` once, and then binds its calls for some time. From the
-    second `read` on, it calls `read` and `write` once a period, and `close` at the end.
-    If it has no valid state any more, it calls `close` without further writes.
+    The loop calls `read` once, and then prepares for some time. From the second `read`
+    on, it calls `read` and `write` once a period, and `close` at the end. Without a
+    valid state, it calls `close` without further writes.
 
-    Once the first effort is out, whatever the methods raise ends in the report, also
-    what is no `Exception`. What
-    `read` raises means that no state can arrive any more: the loop sends nothing more.
-    If `write` raises, it continues with the safe stop.
+    After the first effort any exception of the methods is reported, also one that is
+    not an `Exception`. An exception of `read` means that no state can arrive any more:
+    the loop stops sending. If `write` raises, it continues with the safe stop.
 
-    One that runs in real time may have an attribute ``real_time`` that is true: its
-    clock is then compared with this computer's.
+    Hardware in real time may have an attribute ``real_time`` that is true: its clock is
+    then compared with this computer's.
 
     Attributes:
         period: Time between two measurements [s].
@@ -41,7 +40,7 @@ class Hardware(Protocol):
         """Wait for a new measurement, and return the newest one.
 
         Args:
-            timeout: Longest time to wait [s]; 0: do not wait.
+            timeout: Maximum time to wait [s]; 0: do not wait.
 
         Returns:
             The measurement; its arrays must not be overwritten later. None if no new
@@ -59,7 +58,7 @@ class Hardware(Protocol):
         """
 
     def close(self) -> None:
-        """Tell the robot that no more efforts follow; a second call does nothing."""
+        """End the connection: no more efforts follow; a second call does nothing."""
 
 
 def described(error: BaseException) -> str:
@@ -78,7 +77,7 @@ def described(error: BaseException) -> str:
 
 @runtime_checkable
 class LocatedHardware(Hardware, Protocol):
-    """`Hardware` that knows where the robot is: a run can begin there."""
+    """`Hardware` with the robot's configuration: a run can begin there."""
 
     q: Array  # its configuration when it was connected, shape (nq,)
 
@@ -94,7 +93,7 @@ class AdaptingHardware(LocatedHardware, Protocol):
         """The fault, or None."""
 
     def adapted(self, settings: LiveSettings) -> LiveSettings:
-        """Return the settings with what is fixed on this robot."""
+        """Return the settings with the values prescribed by this robot."""
 
 
 def connect(url: str, robot: Robot, period: float) -> Hardware:
@@ -124,11 +123,11 @@ class Publisher(Protocol):
         """Publish the state at the controller's time t [s], if it is due."""
 
     def ended(self, ended: str, reason: str) -> object:
-        """Publish how the run ended, as in `LoopReport`."""
+        """Publish the end of the run, as in `LoopReport`."""
 
 
 def publish(url: str, source: EffortSource) -> Publisher:
-    """Return the publisher of a loop, once a period, to listeners at an address.
+    """Return the publisher of a loop to listeners at an address.
 
     Args:
         url: ``name://address``; an entry point of ``hsp_control.publishers`` has it.
@@ -144,7 +143,7 @@ def publish(url: str, source: EffortSource) -> Publisher:
 
 
 def installed(option: str, url: str, group: str) -> tuple[str, EntryPoint]:
-    """Return the address and what is installed in a group for ``name://address``."""
+    """Return the address and the installed entry of a group for ``name://address``."""
     name, separator, address = url.partition("://")
     known = entry_points(group)
     if not separator or name not in known:

@@ -13,7 +13,7 @@ Datagrams have a fixed binary layout with a checksum. All numbers are little-end
     acks      8 bytes   sequence of the newest packet that the sender has received
     stamp     8 bytes   when it was sent, on the sender's monotonic clock [ns]
     t         8 bytes   time of the payload [s], a double
-    payload   8 count   doubles: q and v of a state, what its other sensors measure
+    payload 8 count doubles: q and v of a state, readings of its other sensors
                         (`SensorLayout`), and the effort that the robot has, if it has
                         one; tau of an effort
     check     4 bytes   CRC-32 of all bytes before
@@ -108,7 +108,7 @@ class Faults:
     """Probabilities of packet faults; a packet has one fault at most.
 
     Attributes:
-        late: Probability that a packet is sent after some later ones.
+        late: Probability that a packet is delayed behind later ones.
         lost: Probability that it is not sent.
         duplicated: Probability that it is sent twice.
         corrupted: Probability that one of its bits is inverted.
@@ -199,7 +199,7 @@ class FaultInjector:
         return [bytes(corrupted), *released]
 
     def flush(self) -> list[bytes]:
-        """Return the late packets that still wait, before the last packet is sent."""
+        """Return the remaining late packets, before the last packet is sent."""
         waiting, self._waiting = self._waiting, []
         return [data for _, data in waiting]
 
@@ -217,9 +217,9 @@ class Link:
     """One end of a UDP connection.
 
     Every received packet is one of: accepted; corrupted (incomplete or changed);
-    foreign (of another session, or of a kind that the other end does not send: our own
-    that came back); duplicated (the newest again); stale (older than the newest).
-    `receive` returns the accepted ones only.
+    foreign (of another session, or of a kind that the other end does not send: our own,
+    reflected); duplicated (the newest again); stale (older than the newest). `receive`
+    returns the accepted ones only.
     """
 
     def __init__(
@@ -236,11 +236,11 @@ class Link:
 
         Args:
             session: Number of the session.
-            address: Where to listen.
+            address: The address to listen at.
             peer: The other end's address; None: that of its first packet.
             faults: Faults to inject into packets sent.
             stream: Number of the stream of random numbers.
-            hears: The kind that the other end sends besides BYE; None: any.
+            hears: The kind that is received besides BYE; None: any.
         """
         self.session, self.peer = session, peer
         self._hears = hears
@@ -296,7 +296,7 @@ class Link:
         )
         if kind is PacketKind.BYE:
             self._byes.add(stamp)
-        # A BYE must arrive: faults are injected only into packets that repeat.
+        # A BYE must arrive: faults are injected only into packets that are repeated.
         if kind is PacketKind.BYE:
             sent = [*self._faults.flush(), encode(packet)]
         else:
@@ -309,7 +309,7 @@ class Link:
         """Return the accepted packets, oldest first; none after `close`.
 
         Args:
-            timeout: Longest time to wait if there is none [s]; 0: do not wait.
+            timeout: Maximum time to wait if there is none [s]; 0: do not wait.
         """
         accepted = self._drain() if self._socket.fileno() >= 0 else []
         if accepted or timeout <= 0.0 or self._socket.fileno() < 0:
@@ -366,7 +366,7 @@ class AgeEstimator:
     """Estimates the age of packets without synchronised clocks.
 
     age = (arrival - stamp) - min over recent packets of (arrival - stamp): the packet
-    with the smallest difference is taken to have had no delay. Recent: in this time
+    with the smallest difference is assumed to have had no delay. Recent: in this time
     window or the one before, because clocks drift.
     """
 

@@ -39,7 +39,7 @@ def live_channels(**values: Array | float) -> dict[str, LogChannel]:
 
 
 class DueRows:
-    """When rows of a log are due: on a grid of times, and where the phase changes."""
+    """The times of a log's rows: on a grid, and at changes of the phase."""
 
     def __init__(self, period: float) -> None:
         self._period, self._next, self._last = period, -inf, -inf
@@ -51,7 +51,7 @@ class DueRows:
         return (on_grid or last) and t > self._last
 
     def written(self, t: float, phase: int) -> None:
-        """Note that a row was written."""
+        """Record that a row was written."""
         periods = floor(t / self._period + 1e-6) + 1
         self._next, self._last = (periods - 1e-6) * self._period, t
         self._phase = phase
@@ -119,7 +119,7 @@ class LoopLog:
             self._log.plan = self._chain.plan
 
     def end(self, report: LoopReport) -> None:
-        """Write how the loop ended, and close the journal, if there is one."""
+        """Write the end of the loop, and close the journal, if there is one."""
         if self._log is None:
             return
         deadlines = report.deadlines
@@ -138,7 +138,7 @@ class LoopLog:
         self._log.end(report.status, report.reason, live=summary)
 
     def abandon(self) -> None:
-        """Close the journal of a run that did not begin; another one may write it."""
+        """Close the journal of a run that did not begin; another run may write it."""
         if self._log is not None:
             self._log.close()
 
@@ -174,6 +174,6 @@ class LoopLog:
             return self._chain.compensated.controller.compute(state)
         except KeyboardInterrupt:
             raise
-        except BaseException:  # its effort is not used any more: log without it
+        except BaseException:  # its effort is no longer used: log without it
             self.controller_failed = True
             return None

@@ -65,27 +65,27 @@ def run_loop(
 
     Every run ends with a safe stop, damping and then hold (`SafeStop`); then the
     hardware is closed. Faults are: a state that is malformed, not finite, missing,
-    frozen, too old, outside the limits, or further from the last one than the robot can
-    be; a velocity that contradicts the positions, an effort that was not sent, a clock
-    that does not fit; a robot that stopped by itself or cannot be reached; a fall; all
-    that the hardware, the controller, the plan, a change or ``on_period`` raises, also
-    what is no `Exception`, such as `asyncio.CancelledError`. Once real-time operation
-    has begun, nothing is raised; the report contains the fault.
+    frozen, too old, outside the limits, or farther from the last one than the robot can
+    move; a velocity that contradicts the positions, an effort that was not sent, an
+    inconsistent clock; a robot that stopped by itself or cannot be reached; a fall; any
+    exception of the hardware, the controller, the plan, a change or ``on_period``, also
+    one that is not an `Exception`, such as `asyncio.CancelledError`. Once real-time
+    operation has begun, nothing is raised; the report contains the fault.
 
     Ctrl-C and SIGTERM are the operator's stop (`stop_signals`).
 
     Args:
-        controller: The controller, or an `EffortSource` around one. A controller gets a
-            momentum observer where nothing is to yield, unless the robot is simulated
-            and its own model (`Compensation.momentum_observer`).
+        controller: The controller, or an `EffortSource` around one. A controller
+        without compliant tasks receives a momentum observer, unless the robot is
+        simulated with the controller's model (`Compensation.momentum_observer`).
         hardware: The robot.
         duration: Time from the first state to the stop [s]; None: until the operator
             stops.
-        plan: What writes references and switches contacts; the controller is made of
-            its `MotionPlan.parts`.
-        estimators: What completes each measurement, for the plan and the controller.
-        settings: Which efforts the robot accepts, the faults that are tolerated, and
-            how the safe stop brakes and holds; None: the defaults.
+        plan: Writes references and switches contacts; the controller is built from its
+        `MotionPlan.parts`.
+        estimators: Complete each measurement, for the plan and the controller.
+        settings: The efforts accepted by the robot, the tolerated faults, and the safe
+        stop; None: the defaults.
         requests: The operator's requests: stop the loop, or change the controller
             between periods. `KeyboardInterrupt` is the operator's stop, too.
         log: The journal to write; `Rollout.load` reads it also after a crash.
@@ -98,15 +98,15 @@ def run_loop(
         clock: A monotonic clock [s].
 
     Returns:
-        How the run ended, and its response times.
+        The end of the run, and its response times.
 
     Raises:
-        LiveError: If the robot has a floating base that nothing holds, or a setting is
-            invalid.
+        LiveError: If the robot has a floating base without support, or a setting is
+        invalid.
         HardwareError: If no first state arrives, or the robot cannot be started.
         LogError: If the journal cannot be created.
         HspControlError: If the controller, the plan or an estimator raises at the first
-            state: what it needs may not be measured.
+            state, for example because a quantity is not measured.
     """
     source = (
         CompensatedController(controller, _compensation(controller, hardware))
@@ -178,7 +178,7 @@ def run_loop(
 
 
 def _compensation(controller: Controller, hardware: Hardware) -> Compensation:
-    """Return the compensators of a controller for which nobody gave any."""
+    """Return the default compensators of a controller."""
     if isinstance(hardware, InProcessRobot):
         exact = is_exact(hardware.robot.plant, controller.robot)
         return Compensation().suited(controller, hardware.period, exact)
@@ -205,7 +205,7 @@ _ROOT = 1
 
 
 def _fall_detector(controller: Controller, state: RobotState) -> FallDetector | None:
-    """Return what finds a fall; None if the robot's base is fixed."""
+    """Return a fall detector; None if the robot's base is fixed."""
     robot = controller.robot
     if not robot.unactuated:
         return None
@@ -230,15 +230,15 @@ class LiveRun:
     log: LoopLog
     requests: OperatorRequests
     settings: LiveSettings
-    end: float  # when the duration is over [s]
-    detector: FallDetector | None  # until the robot has fallen; None: it cannot fall
+    end: float  # end of the duration [s]
+    detector: FallDetector | None  # until a fall; None: the robot cannot fall
     phase: Phase = Phase.RUNNING  # running, damping or holding
     ended: Ended = "completed"
     reason: str = ""
     error: BaseException | None = None
-    # how it will end, and why, once the plan has brought the robot to rest
+    # how and why it ends, once the plan has brought the robot to rest
     ending: tuple[Ended, str] | None = None
-    asked_at: float = 0.0  # when that was requested [s]
+    asked_at: float = 0.0  # time of that request [s]
     silent: bool = False  # whether it stopped sending efforts
     done: bool = False
     abandoned: bool = False
@@ -257,21 +257,23 @@ class LiveRun:
                     self.abandon(request)
                     continue
                 reason = f"stopped by the operator ({_called(request)})"
-                # Who raises it in the law would raise it again in the stop.
+                # An exception of the law would be raised again in the stop.
                 self.log.controller_failed |= self.chain.plan is None
                 if self.ending is None:
                     self.end_regularly("operator", reason)
                 else:
                     self.log.controller_failed = True
                     self.stop("operator", reason)
-            except BaseException as error:  # the effort to send is unknown now
+            except BaseException as error:  # the effort to send is unknown
                 self.silent = self.done = True
                 self.fail(error)
 
     def abandon(self, request: BaseException) -> None:
-        """Leave the safe stop to the robot, because the operator asks again."""
+        """Leave the safe stop to the robot, after the operator's second request."""
         self.abandoned = True
-        if self.ended == "completed":  # it is not: whether it rests is unknown
+        if (
+            self.ended == "completed"
+        ):  # not completed: whether the robot is at rest is unknown
             self.ended = "operator"
             self.reason += (
                 f"; the safe stop was cut short by the operator ({_called(request)})"
@@ -296,7 +298,7 @@ class LiveRun:
             tau = self.stop_effort()
         limiter.follow(self.chain.compensated.controller.limits)
         before = limiter.sent.copy()
-        # The stop must brake all joints at once, and the law's effort is sent as it is.
+        # The stop must brake all joints at once; the law's effort is sent unchanged.
         stops = self.phase != Phase.RUNNING
         inertia = reader.state.mass_matrix if stops else None
         if tau is not None and not limiter.apply(tau, reader.state.q, inertia):
@@ -309,7 +311,7 @@ class LiveRun:
             self.rest_of_period(on_period)
 
     def feel_ground(self) -> None:
-        """Find which feet stand, and stop if the robot falls."""
+        """Detect the stance feet, and stop if the robot falls."""
         measurement, state = self.reader.measurement, self.reader.state
         if self.detector is None or measurement is None:
             return
@@ -320,7 +322,7 @@ class LiveRun:
             self.fall(str(error))
 
     def fall(self, reason: str, error: BaseException | None = None) -> None:
-        """Stop a robot that falls: its feet hold it no more."""
+        """Stop a falling robot: its feet no longer support it."""
         self.detector = None
         self.safe_stop.feet.lift()
         self.stop("fault", reason, error)
@@ -391,14 +393,14 @@ class LiveRun:
         self.reader.stop()
 
     def fail(self, error: BaseException) -> None:
-        """Stop because a user's code or the law raised an error."""
+        """Stop after an error of a user's code or of the law."""
         name = type(error).__name__
         text = described(error)
         message = text if text.startswith(name) else f"{name}: {text}"
         self.stop("fault", message, error)
 
     def check_applied_effort(self) -> None:
-        """Report to the controller which effort the robot has: one may be lost."""
+        """Report to the controller the robot's effort: a sent one may be lost."""
         if (measurement := self.reader.measurement) is None:
             self.limiter.no_measurement()
             return
@@ -412,7 +414,7 @@ class LiveRun:
             self.report_applied_effort()
 
     def report_applied_effort(self) -> None:
-        """Report to the controller which effort the motors apply."""
+        """Report to the controller the effort of the motors."""
         if self.log.controller_failed:
             return
         try:
@@ -436,7 +438,7 @@ class LiveRun:
             self.stop("fault", reason, error)
 
     def log_row(self, response: float) -> None:
-        """Write a row if one is due; if Ctrl-C cuts it short, once more."""
+        """Write a row if one is due; after an interrupt by Ctrl-C, once more."""
 
         def write() -> None:
             self.log.row(
@@ -472,7 +474,7 @@ class LiveRun:
         return self.report()
 
     def report(self) -> LoopReport:
-        """Return how the run ended."""
+        """Return the report of the run."""
         state = self.reader.state
         speed = self.reader.speed
         standing = speed <= self.settings.stop.standstill
@@ -495,7 +497,7 @@ class LiveRun:
         )
 
     def _close(self, what: str, close: Callable[[], object]) -> None:
-        """Close something; if Ctrl-C cuts it short, once more."""
+        """Close something; after an interrupt by Ctrl-C, once more."""
         for last in (False, True):
             try:
                 close()

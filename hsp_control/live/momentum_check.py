@@ -1,4 +1,4 @@
-"""Detects joints whose momentum changes as neither efforts nor contacts change it."""
+"""Detects changes of momentum that neither efforts nor contacts explain."""
 
 from math import ceil
 from typing import NamedTuple
@@ -10,21 +10,21 @@ from hsp_control.live.settings import LiveSettings
 from hsp_control.robot import Robot
 
 _JUMP, _PUSH = 0.003, 0.05
-"""Times over which changes are compared [s]: a jump, and what a push lasts."""
+"""Times over which changes are compared [s]: of a jump, and of a push."""
 _LAG = 0.05
-"""How late a velocity may be [s]: delayed by 5 ms, after a filter of 20 Hz."""
+"""Maximum lag of a velocity [s]: a delay of 5 ms and a filter of 20 Hz."""
 _MASSES = 0.25
-"""Part by which an effort may move other masses than those of the model."""
+"""Tolerance of the masses, relative to the model's."""
 _GRAVITY = 0.2
-"""Part of a joint's gravity that the model may have wrong."""
+"""Tolerance of a joint's gravity, relative to the model's."""
 _FEW = 2
-"""Velocities that are averaged against their noise where a jump is sought."""
+"""Number of velocities averaged against noise in the detection of jumps."""
 _GAP = 3.5
-"""Periods without a state from which on nothing is compared across them."""
+"""Number of periods without a state across which nothing is compared."""
 
 
 class Driving(NamedTuple):
-    """What drives the joints by the model, from one state to the next."""
+    """The terms that drive the joints by the model, from one state to the next."""
 
     inertia: Array  # the mass matrix M, shape (nv, nv)
     effort: Array  # tau - h, shape (nv,) [N·m or N]
@@ -48,14 +48,14 @@ class _Window:
         self.restart()
 
     def restart(self) -> None:
-        """Forget all that was."""
+        """Forget all states."""
         self._count = 0
         self.impulse = np.zeros(self._impulses.shape[1])
         self._impulses[:] = 0.0
         self._efforts[:] = 0.0
 
     def add(self, v: Array, impulse: Array) -> Array | None:
-        """Take a state.
+        """Add a state.
 
         Args:
             v: The velocity from two sources, shape (2, nv).
@@ -83,15 +83,15 @@ class _Window:
 class MomentumCheck:
     """Compares changes of momentum, M Δv, with the impulse of the efforts.
 
-    In a time w a joint's momentum changes by the integral of tau - h, and by what else
-    acts on it: friction, an error of the masses, contacts. Each of them is bounded
-    (`LiveSettings.friction`, `LiveSettings.contact`), so a larger rest is a hard
+    In a time w a joint's momentum changes by the integral of tau - h, and by other
+    effects: friction, an error of the masses, contacts. Each of them is bounded
+    (`LiveSettings.friction`, `LiveSettings.contact`), so a larger residual is a hard
     collision, or position and velocity are wrong in the same way. A joint may follow
     its effort by less, because of a rotor that the model lacks.
 
     Attributes:
         beyond: Joints whose momentum changes by more, shape (nv,).
-        rest: What acts on each beside its effort, shape (nv,) [N·m or N].
+        rest: The residual: other efforts on each joint, shape (nv,) [N·m or N].
     """
 
     def __init__(
@@ -102,7 +102,7 @@ class MomentumCheck:
         self._noise = settings.velocity_error
         share = settings.friction + settings.contact
         self._allowed = np.where(np.isfinite(effort), share * effort, np.inf)
-        if robot.unactuated:  # nobody knows what pushes its feet
+        if robot.unactuated:  # the forces at its feet are unknown
             self._allowed[:] = np.inf
         lag = max(ceil(_LAG / period), 1)
         self._windows = [
@@ -128,7 +128,7 @@ class MomentumCheck:
             now: Measured velocity, and slope of the positions since the last state,
                 shape (2, nv).
             means: Their means of some milliseconds, shape (2, nv).
-            driving: What has driven the joints since the last state.
+            driving: The terms that have driven the joints since the last state.
             passed: Time since then [s].
         """
         if passed > _GAP * self._period:
@@ -151,10 +151,10 @@ class MomentumCheck:
         allowed = (self._allowed + _GRAVITY * np.abs(driving.gravity)) * width
         allowed += self._noise * np.diag(driving.inertia)
         if (np.abs(momentum - window.impulse) <= allowed).all():
-            return  # as most of the time
+            return  # the usual case
         least, most = window.bounds()
         allowed += _MASSES * np.maximum(np.abs(least), np.abs(most))
-        # One that moves may be heavier than its model, and its momentum smaller.
+        # A moving joint may be heavier than its model, and its momentum smaller.
         moves = np.abs(change) > self._noise
         least = np.where(moves, np.minimum(least, 0.0), least)
         most = np.where(moves, np.maximum(most, 0.0), most)

@@ -1,4 +1,4 @@
-"""The effort that a robot's rates permit, and that accelerates nearly as another."""
+"""The effort within a robot's rates whose acceleration is nearest to another's."""
 
 import numpy as np
 
@@ -6,7 +6,7 @@ from hsp_control import engine
 from hsp_control.common.arrays import Array
 
 _SWEEPS = 30
-"""Most sweeps in which each joint's effort is adapted to those of the others."""
+"""Maximum number of sweeps that adapt each joint's effort to the others."""
 _NEAR = 1e-10
 """Change of a sweep that is negligible, relative to the first one."""
 
@@ -16,14 +16,15 @@ def nearest_effort(
 ) -> Array | None:
     """Return the effort within bounds whose acceleration is nearest to that of another.
 
-    It minimizes aᵀ M a, where a = M⁻¹ (tau - wanted) is the acceleration that is wrong.
-    Where a heavy joint's effort lags behind, a light one's, which can follow, keeps its
-    desired acceleration; clipped joint by joint it would be accelerated.
+    It minimizes aᵀ M a, where a = M⁻¹ (tau - wanted) is the deviation of the
+    acceleration. If a heavy joint's effort lags behind, a light joint, whose effort can
+    follow, keeps its desired acceleration; with clipping joint by joint it would be
+    accelerated.
 
     Args:
         wanted: The unlimited effort, shape (nv,) [N·m or N].
         least: The least effort of each joint, shape (nv,).
-        most: The greatest, shape (nv,).
+        most: The greatest effort, shape (nv,).
         inertia: The mass matrix M, shape (nv, nv).
 
     Returns:

@@ -12,7 +12,8 @@ class OperatorRequests:
 
     Attributes:
         reason: Why the operator requested a stop; None without a request.
-        fault: Whether it was no operator: nobody could have requested one any more.
+        fault: Whether the request is due to a fault: no operator could stop the loop
+        any more.
     """
 
     def __init__(self) -> None:
@@ -42,8 +43,8 @@ class OperatorRequests:
 
 
 OPERATOR = (KeyboardInterrupt, SystemExit)
-"""What an operator raises, or a program that ends. All else that is no `Exception`,
-such as `asyncio.CancelledError` or a panic of an extension, is a fault."""
+"""Exceptions of an operator, or of a program that ends. Anything else that is not an
+`Exception`, such as `asyncio.CancelledError` or a panic of an extension, is a fault."""
 
 _KINDS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 _DEFAULTS = (signal.SIG_DFL, signal.default_int_handler)

@@ -11,30 +11,30 @@ _WASHOUT = 0.1
 _MEMORY = 0.1
 """Time constant of the mean squares that are compared [s]."""
 _FELT, _MOST = 0.5, 1.6
-"""Least and largest part of the reaction that is measured: masses may be wrong, and
+"""Minimum and maximum share of the reaction that is measured: masses may be wrong, and
 friction may brake the joint."""
 _EXPLAINED = 0.8
-"""Part of the others' unexpected motion that the reaction explains."""
+"""Share of the others' unexpected motion that the reaction must explain."""
 _LEAST = 0.1
 """Smallest reaction that is judged, relative to the error of velocities."""
 _HELD = 0.03
-"""Duration of that [s]."""
+"""Time for which the condition must hold [s]."""
 
 
 class ReactionCheck:
     """Compares the other joints' motion with a silent joint at rest, and in motion.
 
-    Some joints s report the same to the last bit, under efforts that friction could
-    hold. If they stand, the others o accelerate by M_oo⁻¹ (tau - h)_o; if they move, by
-    the rows of M⁻¹ (tau - h). Where the others move as if the silent ones moved, and
-    not as if those stood, the sensors of the silent ones are dead.
+    Some joints s report constant values to the last bit, under efforts that friction
+    could hold. If they are at rest, the others o accelerate by M_oo⁻¹ (tau - h)_o; if
+    they move, by the rows of M⁻¹ (tau - h). If the others move as if the silent ones
+    moved, and not as if those were at rest, the sensors of the silent ones are dead.
 
     Attributes:
-        felt: Whether the others feel that the silent joints move.
+        felt: Whether the reaction on the others shows that the silent joints move.
     """
 
     def __init__(self, error: float) -> None:
-        """``error`` is that of velocities [rad/s or m/s]."""
+        """``error`` is the tolerance of velocities [rad/s or m/s]."""
         self._error = error
         self._silent: Flags = np.zeros(0, dtype=bool)
         self.restart()
@@ -56,7 +56,7 @@ class ReactionCheck:
         self.felt = False
 
     def expect(self, silent: Flags, inertia: Array, free: Array) -> None:
-        """Record what is expected from now on.
+        """Record the expectation from now on.
 
         Args:
             silent: Joints whose readings do not change, shape (nv,).

@@ -14,7 +14,7 @@ def no_garbage_collection() -> Iterator[None]:
 
     A collection takes milliseconds at an unknown time, and a control step creates no
     reference cycles. Existing objects are frozen: an explicit collection skips them.
-    Where some were frozen before, all stay so: none can be taken out alone.
+    If some were frozen before, all stay frozen: they cannot be released separately.
     """
     was_enabled, were_frozen = gc.isenabled(), gc.get_freeze_count() > 0
     gc.collect()

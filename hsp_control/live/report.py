@@ -85,7 +85,7 @@ class LoopReport:
     Attributes:
         ended: ``completed``: the duration is over, and the robot is at rest;
             ``operator``: the operator stopped it; ``fault``: a fault stopped it, or
-            came in the safe stop, or the robot still moved afterwards.
+            occurred in the safe stop, or the robot still moved afterwards.
         reason: Why it ended, in a sentence.
         phase: The last phase of the safe stop: `Phase.HOLDING` if the safe stop ended,
             `Phase.DAMPING` if the loop fell silent before.
@@ -96,8 +96,8 @@ class LoopReport:
             stop has ended.
         t: The run's time at the end [s].
         deadlines: Response times and deadline misses.
-        error: What the controller, a change or the hardware raised, if it ended the
-            run.
+        error: The exception of the controller, a change or the hardware that ended the
+        run, if any.
         log: The journal, if one was written.
     """
 

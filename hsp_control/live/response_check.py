@@ -11,10 +11,10 @@ _WASHOUT = 0.1
 _MEMORY = 0.1
 """Time constant of the mean squares that are compared [s]."""
 _CONTRARY = 0.1
-"""How much of a joint's motion may differ from the contrary of what is expected: for a
-wrong sign a few hundredths; for a push that a controller yields to at least 0.13."""
+"""Maximum residual of a joint's motion relative to the opposite of the expectation: for
+a wrong sign a few hundredths; for a push to which a controller yields at least 0.13."""
 _HELD = 0.03
-"""Duration of that [s]."""
+"""Time for which the condition must hold [s]."""
 _LEAST = 0.1
 """Smallest change of velocity that is judged, relative to the error of velocities."""
 
@@ -24,16 +24,16 @@ class ResponseCheck:
 
     A joint may follow its effort by less than the model expects, or not at all: its
     friction, its rotor and its contacts are unknown. A person may push it for a while.
-    But where velocity and positions agree and a joint repeatedly moves opposite to its
-    effort, it is measured with the wrong sign, or its motor has it. Feedback then
-    drives it ever faster.
+    But if velocity and positions agree and a joint repeatedly moves against its effort,
+    its sensor or its motor has the wrong sign. Feedback then accelerates it without
+    bound.
 
     Attributes:
         contrary: These joints, shape (nv,).
     """
 
     def __init__(self, error: float, judged: Flags) -> None:
-        """``error`` is that of velocities; only joints true in ``judged`` are found."""
+        """``error`` is the tolerance of velocities; ``judged`` selects the joints."""
         self._least, self._judged = (_LEAST * error) ** 2, judged
         self._none = np.zeros(judged.size, dtype=bool)
         self.restart()

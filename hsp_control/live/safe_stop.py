@@ -1,4 +1,4 @@
-"""The safe stop: first damping, then hold, on the feet that stand."""
+"""The safe stop: first damping, then hold, on the stance feet."""
 
 from collections.abc import Callable, Sequence
 from enum import IntEnum
@@ -25,7 +25,7 @@ class Phase(IntEnum):
 class StandingFeet:
     """The active contacts of a robot, on which it stands while it is stopped.
 
-    Without motors in six rows, and without a foot that stands, nothing holds the robot.
+    A floating base without a stance foot cannot be held.
     """
 
     def __init__(self, robot: Robot, contacts: Sequence[Contact]) -> None:
@@ -39,12 +39,12 @@ class StandingFeet:
         return not self._floats or bool(self.contacts)
 
     def update(self, measured: Measurement) -> None:
-        """Find which contacts are active: those that are pressed."""
+        """Update which contacts are active: the loaded ones."""
         if self._floats:
             self.contacts = tuple(c for c in self.all if _stands(c, measured))
 
     def lift(self) -> None:
-        """Let no contact be active any more."""
+        """Deactivate all contacts."""
         self.contacts = ()
 
 
@@ -57,11 +57,11 @@ class SafeStop:
     """Brakes a robot until it is at rest, then holds its position; see `BoundStop`.
 
     A robot with a floating base stands on its feet meanwhile: the share of damping and
-    hold on its base is exerted through the feet that stand (`StandingFeet`). If none
-    stands, or after a fall, nothing can hold it, and its joints are damped only.
+    hold on its base is exerted through the stance feet (`StandingFeet`). Without one,
+    or after a fall, it cannot be held, and its joints are damped only.
 
     Attributes:
-        feet: What the robot stands on.
+        feet: The feet of the robot.
         held_for: Time spent holding [s].
     """
 
@@ -80,7 +80,7 @@ class SafeStop:
             settings: Gains and durations.
             effort_limits: Upper limits of the efforts, shape (nv,); they may change.
             period: Time between two calls of `effort` [s].
-            feet: What a robot with a floating base stands on; None: nothing.
+            feet: The feet of a robot with a floating base; None: none.
 
         Raises:
             LiveError: If the period is too long for the settings.
@@ -111,7 +111,7 @@ class SafeStop:
 
     @property
     def held_q(self) -> Array:
-        """Where the robot is held, shape (nq,); neutral before."""
+        """The configuration in which the robot is held, shape (nq,); neutral before."""
         return self._robot.neutral() if self._bound is None else self._bound.held_q
 
     @property
@@ -131,7 +131,7 @@ class SafeStop:
         return bound.tau.copy()
 
     def _bound_to(self, state: RobotState) -> BoundStop:
-        """Return the stop at a state, which goes on with that at another one."""
+        """Return the stop at a state, which continues the one at another state."""
         before = self._bound
         if before is not None and before.state is state:
             return before

@@ -1,26 +1,26 @@
-"""Which efforts a robot can have: those that were sent, or its own at the start."""
+"""The possible efforts of a robot: those that were sent, or its own at the start."""
 
 import numpy as np
 
 from hsp_control.common.arrays import Array
 
 _ROUNDING, _LARGEST_ROUNDING = 0.01, 1.0
-"""By how much an effort may be beyond what was sent: a part of the limit, and the most
-[N·m or N]. Motors have steps."""
+"""Tolerance of an effort beyond the sent ones: a share of the limit, and the maximum
+[N·m or N]. Motors have discrete steps."""
 _START, _LARGEST_START = 0.1, 10.0
-"""The same at the start, when the robot has held itself: its model may have another
+"""The same at the start, after the robot has held itself: its model may have another
 load."""
 _START_PERIODS = 5
-"""How long its own effort may last after that [periods]."""
+"""Number of periods for which its own effort may last after that."""
 _FADES = 0.99
 """Factor by which an excess beyond all sent efforts must decrease each period: a
 filter of 1.6 Hz at 1 kHz."""
 
 
 class SentEfforts:
-    """What was sent in the last periods, and whether the robot can have an effort.
+    """The efforts of the last periods, and whether the robot can have a given one.
 
-    It has one of these, or a mean of some where it filters.
+    It has one of these, or a mean of some if it filters.
     """
 
     def __init__(self, limits: Array, periods: int) -> None:
@@ -31,7 +31,7 @@ class SentEfforts:
         self.restart(np.zeros(limits.size))
 
     def restart(self, effort: Array) -> None:
-        """Begin where the robot holds itself, with an effort near this one, (nv,)."""
+        """Begin while the robot holds itself, with an effort near this one, (nv,)."""
         self._sent[:] = effort
         self._count = self._answers = 0
         self._above, self._below = np.zeros((2, effort.size))
@@ -42,7 +42,7 @@ class SentEfforts:
         self._count += 1
 
     def bounds_of(self, effort: Array) -> tuple[Array, Array, Array]:
-        """Return the least and the most that it can have, and what rounding adds.
+        """Return its least and greatest possible effort, and the tolerance of rounding.
 
         Args:
             effort: The effort that the robot reports, shape (nv,).
@@ -60,7 +60,7 @@ class SentEfforts:
             least = sent_least - _FADES * self._below
             most = sent_most + _FADES * self._above
             spare = self._rounding
-        # What is beyond by rounding alone does not add up.
+        # An excess by rounding alone does not accumulate.
         beyond = np.maximum(effort, sent_most) - sent_most
         self._above = np.minimum(beyond, most - sent_most)
         beyond = sent_least - np.minimum(effort, sent_least)

@@ -1,4 +1,4 @@
-"""Settings of a live run: the robot's interface, what is tolerated, the safe stop."""
+"""Settings of a live run: the robot's interface, the tolerances, the safe stop."""
 
 from collections.abc import Sequence
 from dataclasses import KW_ONLY
@@ -42,12 +42,12 @@ class StopSettings(Part, error=LiveError):
     """Maximum duration of a plan's last steps, after which it stands [s]; they precede
     the safe stop of a run that ends without a fault."""
     standstill: Positive = 0.1
-    """Largest joint speed at the end with which a run is completed [rad/s or m/s];
-    above ``rest_speed``, because of noise."""
+    """Maximum joint speed at the end of a completed run [rad/s or m/s]; above
+    ``rest_speed``, because of noise."""
 
     @property
     def gains(self) -> StopGains:
-        """How a robot is braked, and then held."""
+        """The gains of braking and of holding."""
         return StopGains(*(getattr(self, name) for name in StopGains._fields))
 
     def check_period(self, period: float) -> None:
@@ -73,7 +73,7 @@ class LiveSettings(Part, error=LiveError):
     """Whether the robot adds g(q) itself, as a Panda (libfranka) and an iiwa (FRI) do;
     tau - g(q) is then sent [-]."""
     effort_rate: Positives | None = None
-    """Maximum rate of the effort that is *sent* [N·m/s or N/s], one number or nv; a
+    """Maximum rate of the *sent* effort [N·m/s or N/s], one number or nv; a
     Panda rejects more than 1000. Unlimited by default."""
     effort: Positives | None = None
     """Maximum effort of the motors, gravity included [N·m or N], one number or nv; by
@@ -84,23 +84,23 @@ class LiveSettings(Part, error=LiveError):
     age: Positive = 0.02
     """Maximum age of a state [s]."""
     prediction_time: NonNegative = 0.2
-    """How long the safe stop uses the model's prediction without a measurement [s].
-    Then the loop falls silent (stops sending efforts), and the robot's own watchdog
-    must stop it."""
+    """Time for which the safe stop uses the model's prediction without a measurement
+    [s]. Then the loop falls silent (stops sending efforts), and the robot's own
+    watchdog must stop it."""
     position_margin: NonNegative = 0.02
-    """How far a measured joint position may exceed its limits [rad or m]."""
+    """Tolerance of a measured joint position beyond its limits [rad or m]."""
     velocity_margin: NonNegative = 0.1
-    """How far a measured joint speed may exceed its limit, as a fraction of it [-]."""
+    """Tolerance of a measured joint speed beyond its limit, as a fraction of it [-]."""
     velocity_error: Positive = 0.3
-    """How far a measured joint velocity may be from the slopes of its positions in the
-    last 50 ms [rad/s or m/s]: six times its noise."""
+    """Tolerance of a measured joint velocity relative to the slopes of its positions in
+    the last 50 ms [rad/s or m/s]: six times its noise."""
     friction: NonNegative = 0.1
     """Largest friction that may hold a joint at rest, relative to its effort limit. A
     joint whose readings do not change by a bit under more than that has a dead sensor
     [-]."""
     contact: NonNegative = 0.3
     """Largest effort that contacts, loads and persons may exert on a joint, relative to
-    its effort limit. A joint that is pushed by more has met something hard, or its
+    its effort limit. A joint that is pushed by more has hit something hard, or its
     sensors are wrong [-]."""
     start_timeout: Positive = 10.0
     """Maximum time to wait for the first state [s]."""
@@ -118,7 +118,7 @@ class LiveSettings(Part, error=LiveError):
     def effort_limits(self, robot: Robot, limits: RobotLimits | None = None) -> Array:
         """Return the limits of the efforts, shape (nv,), inf where unlimited.
 
-        They are 0 where there is no motor: at a floating base.
+        They are 0 for dofs without a motor: those of a floating base.
         """
         if self.effort is None and limits is not None:
             own = np.array(limits.effort)
@@ -127,7 +127,7 @@ class LiveSettings(Part, error=LiveError):
                 own = by_dof(self.effort, robot.nv, error=LiveError)
         else:
             own = own_maximum(robot.model.effortLimit, robot)
-        own[list(robot.unactuated)] = 0.0  # no motor is there
+        own[list(robot.unactuated)] = 0.0  # dofs without a motor
         return own
 
 

@@ -24,7 +24,7 @@ from hsp_control.simulation.plants import (
 _ROUNDING = 1e-6
 """Tolerance of efforts and their rates, relative to the limit."""
 _LARGEST_EFFORT = 1e6
-"""No motor is stronger [N·m or N]: it holds where there is no limit."""
+"""Largest effort of any motor [N·m or N], used without a limit."""
 
 
 class EffortCheck:
@@ -34,7 +34,7 @@ class EffortCheck:
         self, robot: Robot, settings: LiveSettings, period: float, effort: Array
     ) -> None:
         self._names = robot.dof_names
-        # The controller's limits may be lower, and may grow while it runs.
+        # The controller's limits may be lower, and may grow at run time.
         upper = np.maximum(effort, settings.effort_limits(robot))
         self._upper = np.minimum(upper * (1.0 + _ROUNDING), _LARGEST_EFFORT)
         self._step = settings.rate_limits(robot) * period
@@ -44,12 +44,12 @@ class EffortCheck:
         self._speed = speed * (1.0 + settings.velocity_margin)
 
     def fault(self, effort: Array, before: Array | None, gravity: Array) -> str | None:
-        """Return why an effort is not accepted; ``before`` is None under the brakes."""
+        """Return why an effort is refused; ``before`` is None while the brakes hold."""
         if np.shape(effort) != gravity.shape:
             return f"an effort has shape {np.shape(effort)}; needs {gravity.shape}"
         if not np.isfinite(effort).all():
             return f"an effort is not finite: {effort.tolist()}"
-        # The sender may have compensated another gravity: one of another load.
+        # The sender may have compensated the gravity of another load.
         upper = self._upper + (np.abs(gravity) if self._compensates else 0.0)
         i = int((np.abs(effort) - upper).argmax())
         if abs(effort[i]) > upper[i]:
@@ -81,14 +81,14 @@ class EffortCheck:
 
 
 _LARGEST_SPEED = 1e4
-"""Of a joint [rad/s or m/s]; what is faster is no motion of a robot."""
+"""Maximum joint speed of any robot [rad/s or m/s]."""
 
 
 class SimulatedRobot:
     """A plant that is advanced period by period, and checks the efforts it receives.
 
-    Until the first effort its brakes hold it and its time stands still. Afterwards, in
-    a period without an effort it holds the last one. It stops by itself with a
+    Until the first effort its brakes hold it and its time does not advance. Afterwards,
+    in a period without an effort it holds the last one. It stops by itself with a
     `SafeStop` from its true state, within the same limits, and ignores all further
     efforts, as a real robot's safety controller and brakes do: after too many periods
     without an effort; after an effort that is not finite, beyond its limits, or faster
@@ -130,10 +130,9 @@ class SimulatedRobot:
             settings: Its watchdog, its own safe stop, its limits, and whether it
                 compensates gravity, with its true mass; None: the defaults.
             limits: Limits on its efforts, if the settings have none; None: the URDF's.
-                It accepts what either of them allows.
-            contacts: On which it stands, if its base is floating; its own stop needs
-                them.
-            follow: Lets the plant's model be that of a time [s], where it changes.
+                It accepts efforts within either of them.
+            contacts: Its contacts, if its base is floating, for its own stop.
+            follow: Sets the plant's model to that of a time [s], if it changes.
 
         Raises:
             LiveError: If the settings do not fit the robot or the period.
@@ -167,7 +166,7 @@ class SimulatedRobot:
 
     @property
     def in_force(self) -> Array | None:
-        """The effort that it holds, in the terms in which it receives efforts.
+        """The effort that it holds, in the form in which it receives efforts.
 
         Shape (nv,); None while its brakes hold it before the start.
         """
@@ -178,9 +177,9 @@ class SimulatedRobot:
         return self.plant.measure(self.t, self.q, self.v)
 
     def measured(self) -> Measurement:
-        """Return all that it measures, once a period; its number is that of periods.
+        """Return its measurement, once a period, with the number of the period.
 
-        Before the first effort nothing presses: its brakes hold it.
+        Before the first effort no contact is loaded: its brakes hold it.
         """
         q, v = self.measure()
         wrenches = self.plant.contact_wrenches(self.t, self.q, self.v, self.tau)
@@ -234,13 +233,13 @@ class SimulatedRobot:
         self.t = end
 
     def _pressed(self) -> Measurement:
-        """Return what presses on its feet, truly."""
+        """Return the true contact wrenches."""
         q, v = self.q, self.v
         wrenches = self.plant.contact_wrenches(self.t, q, v, self.tau)
         return Measurement(self.periods, self.t, q, v, wrenches=wrenches)
 
     def _move(self, end: float) -> None:
-        """Advance the plant; if that gives no state, the brakes hold the last one."""
+        """Advance the plant; without a valid result, the brakes hold the last state."""
         try:
             q, v = self.plant.advance(self.t, end, self.tau)
         except (HspControlError, ArithmeticError, ValueError) as error:

@@ -24,7 +24,7 @@ from hsp_control.robot import Robot, RobotState
 class DeadReckoning:
     """The last measured state, integrated with the model under the applied efforts.
 
-    Of a robot with a floating base the velocity is kept: the forces at its feet are
+    For a robot with a floating base the velocity is kept: the forces at its feet are
     unknown meanwhile, and without them the model would fall.
     """
 
@@ -56,19 +56,19 @@ class DeadReckoning:
 
 
 _LARGEST_SPEED = 1e4
-"""No joint moves faster [rad/s or m/s]: it holds where the model has no limit."""
+"""Maximum joint speed without a limit in the model [rad/s or m/s]."""
 _LARGEST_POSITION = 1e6
-"""No joint is further away, or was turned further [rad or m]."""
+"""Maximum magnitude of a joint position [rad or m]."""
 _LARGEST_EFFORT = 1e9
-"""No motor has a larger effort, and nothing is pressed harder [N·m or N]."""
+"""Maximum magnitude of an effort or a force [N·m or N]."""
 _LARGEST_FORCE = 1e6
-"""No specific force is larger, in an impact either [m/s²]."""
+"""Maximum magnitude of a specific force, also in an impact [m/s²]."""
 _RESOLUTION = 1e-3
-"""Coarsest step of the robot's clock [periods]; a huge time has coarser ones."""
+"""Maximum resolution of the robot's clock [periods]; a huge time has a coarser one."""
 
 
 def valid_measurement(raw: object, robot: Robot, period: float) -> Measurement:
-    """Return a measurement of finite plain types in arrays of its own."""
+    """Return a measurement of finite plain types in separate arrays."""
     if not isinstance(raw, Measurement):
         raise HardwareError(
             f"read returned an object of type {type(raw).__name__}; needs a "
@@ -166,19 +166,19 @@ def _vector(name: str, value: Any, size: int, largest: float) -> Array:
 
 
 _MOVED = 1e-3
-"""Motion by the model from which a state that stays the same is frozen [rad or m]."""
+"""Predicted motion above which an unchanged state is frozen [rad or m]."""
 
 
 class FrozenState:
-    """Compares a state that does not change with the motion that the model predicts.
+    """Compares an unchanged state with the motion predicted by the model.
 
-    New measurements with the same q and v to the last bit are right for a robot that
-    stands. If they have a velocity that is not 0, or come from a sensor with noise, the
-    model predicts how far the robot moved meanwhile under the efforts applied.
+    New measurements with the same q and v to the last bit are possible for a robot at
+    rest. If their velocity is not 0, or their sensor has noise, the model predicts the
+    motion of the robot meanwhile under the applied efforts.
 
-    Such a state must not be used: damping a velocity that is long gone drives the robot
-    backwards. A state with v = 0 in all joints is not judged: a robot that its brakes
-    or its friction hold looks the same.
+    Such a state must not be used: damping an outdated velocity drives the robot
+    backwards. A state with v = 0 in all joints is not judged: a robot held by its
+    brakes or its friction looks the same.
     """
 
     def __init__(self, robot: Robot, period: float, tolerated: int) -> None:
@@ -230,7 +230,7 @@ class MeasurementMonitor:
         self._read(limits)
 
     def follow(self, limits: RobotLimits | None) -> None:
-        """Check against the controller's limits of now, which may change in a run."""
+        """Check against the controller's present limits, which may change in a run."""
         if limits is not self._limits:
             self._read(limits)
 
@@ -251,9 +251,9 @@ class MeasurementMonitor:
     def jumps(
         self, measurement: Measurement, judged: Flags
     ) -> tuple[Flags, str | None]:
-        """Return the joints that cannot have come here from the last state, and why.
+        """Return the joints that cannot have moved here from the last state, and why.
 
-        Only those are judged that are true in ``judged``, shape (nv,).
+        ``judged`` selects the joints, shape (nv,).
         """
         last = self.last
         if last is None:
@@ -306,14 +306,14 @@ class RobotClock:
     """Converts the robot's time to the controller's, and judges its steps.
 
     Between two measurements the robot's clock may advance by the periods given by their
-    sequence numbers, or by the tolerated number of missing states. It may stand before
-    the robot starts, and for the tolerated number of states later. In some hundred
-    states it may not gain or lose more than that either. Of a robot in real time it may
-    not run faster than ours; a slower one shows in the numbers of states, or is a robot
-    that was held up.
+    sequence numbers, or by the tolerated number of missing states. It may stand still
+    before the robot starts, and for the tolerated number of states later. In some
+    hundred states it must not gain or lose more than that either. The clock of a robot
+    in real time must not run faster than ours; a slower one shows in the numbers of
+    states, or belongs to a robot that was delayed.
 
-    After a jump the controller's time goes on by one period: the safe stop that follows
-    needs no other.
+    After a jump the controller's time advances by one period, which is sufficient for
+    the safe stop.
     """
 
     def __init__(
@@ -334,8 +334,8 @@ class RobotClock:
         """Begin again with the next measurement."""
         self._last: Measurement | None = None
         self._offset, self._standing, self._moved = 0.0, 0, False
-        self._gained = 0.0  # by the clock, against the number of states [s]
-        self._lead = self._lead_before = -inf  # the greatest against ours [s]
+        self._gained = 0.0  # by the clock, relative to the number of states [s]
+        self._lead = self._lead_before = -inf  # the greatest lead relative to ours [s]
         self._window_end = -inf
         self.right = True  # whether it was never wrong
 
@@ -346,7 +346,7 @@ class RobotClock:
     def fault(self, measurement: Measurement, arrival: float) -> str | None:
         """Return why the clock cannot be right at a new measurement, or None.
 
-        ``arrival`` is when it arrived, by our clock [s].
+        ``arrival`` is its time of arrival, by our clock [s].
         """
         last, self._last = self._last, measurement
         if last is None:
@@ -364,7 +364,7 @@ class RobotClock:
         return measurement.t - last.t if self.right else states * self._period
 
     def _runs_fast(self, t: float, arrival: float) -> str | None:
-        """Compare the clock with ours: delays make it late, nothing makes it early."""
+        """Compare the clock with ours: delays make it late, never early."""
         if not (self._real_time and self._moved):
             return None
         lead = t - arrival
@@ -409,17 +409,17 @@ class RobotClock:
 
 
 _CLOCK_STATES = 100
-"""States after which the gain of the robot's clock is weighted less."""
+"""Number of states after which the gain of the robot's clock is weighted less."""
 _CLOCK_WINDOW = 2.0
-"""How long a robot's clock is compared with ours [s]."""
+"""Duration of a comparison of a robot's clock with ours [s]."""
 _LARGEST_LEAD = 0.1
-"""How much it may gain from one such window to the next [s]."""
+"""Maximum gain from one such window to the next [s]."""
 
 
 _FEW = 5
-"""Missing states in a row after which a speed is that of the model, not of the last."""
+"""Number of consecutive missing states after which a speed is the model's."""
 _READ_MARGIN = 0.5
-"""How late a state may be before its period is one without a state [periods]."""
+"""Maximum delay of a state before its period has none [periods]."""
 
 
 class StateReader:
@@ -454,7 +454,7 @@ class StateReader:
         self.fault: str | None = None  # why the robot must be stopped, or None
         self.error: BaseException | None = None  # what the hardware raised, or None
         self.connection_lost = False  # whether no state can arrive any more
-        # when this period's state arrived, by the loop's clock [s]
+        # arrival of this period's state, by the loop's clock [s]
         self.arrival = self._last_arrival = self._due = clock()
         self.deadlines = Deadlines(hardware.period)
 
@@ -470,7 +470,7 @@ class StateReader:
 
     @property
     def ambiguous(self) -> bool:
-        """Whether nobody knows if a joint moves as it is measured."""
+        """Whether it is unknown if a joint moves as measured."""
         return self._motion.ambiguous
 
     @property
@@ -511,7 +511,7 @@ class StateReader:
         self._due = self._last_arrival + (1.0 + _READ_MARGIN) * self._period
 
     def stop(self) -> None:
-        """From now on the joints are braked."""
+        """Begin braking: the joints are braked from now on."""
         self._motion.stop()
 
     def read(self, applied: Array, limits: RobotLimits | None) -> None:
@@ -567,7 +567,7 @@ class StateReader:
         return trusted
 
     def _trusted(self, new: Measurement) -> Measurement | None:
-        """Return the trusted part of a measurement; None: not used, no fault yet."""
+        """Return the trusted part of a measurement; None if unused without a fault."""
         motion = self._motion
         last = motion.last
         passed = 0.0 if last is None else self._robot_clock.passed(new, last)

@@ -10,14 +10,14 @@ from hsp_control.live.settings import LiveSettings
 from hsp_control.robot import Robot
 
 _QUIET, _FEWEST = 0.05, 5
-"""Time for which a sensor's reading is the same to the last bit before it is judged
-[s], and the fewest states."""
+"""Time for which a reading is constant to the last bit before it is judged [s], and the
+minimum number of states."""
 _REST = 0.05
-"""Speed below which what changes is noise [rad/s or m/s]."""
+"""Speed below which changes are noise [rad/s or m/s]."""
 _NOISE = 1e-9
-"""Smallest change that is noise: those of a simulated robot at rest are rounding."""
+"""Minimum change that is noise: those of a simulated robot at rest are rounding."""
 _MEMORY, _ALIVE = 1.0, 0.3
-"""Time over which noise is counted [s], and the part of the states that have it."""
+"""Time over which noise is detected [s], and the share of states that have it."""
 _GRAVITY = 0.2
 """Part of a joint's gravity that the model may have wrong."""
 
@@ -28,10 +28,11 @@ class StillSensors:
     """Judges joints whose position and velocity stay the same to the last bit.
 
     The reading of a joint at rest may be constant for ever. Its sensor is dead if it
-    had noise before: changes to and fro, of different sizes, so that a coarse encoder
-    on the edge of a step is none. Or if the effort exceeds the holding effort by more
-    than friction (`LiveSettings.friction`) and the model's errors: a live joint would
-    move. Or if the other joints move as they do where this one moves (`ReactionCheck`).
+    had noise before: changes in both directions, of different sizes, which excludes a
+    coarse encoder at the edge of a step. Or if the effort exceeds the holding effort by
+    more than friction (`LiveSettings.friction`) and the model's errors: the joint would
+    move. Or if the reaction on the other joints shows that this one moves
+    (`ReactionCheck`).
 
     Attributes:
         dead: Joints whose sensor is dead, shape (nv,).
@@ -64,7 +65,7 @@ class StillSensors:
         self._reaction.restart()
 
     def update(self, way: Array, v: Array, mean: Array, passed: float) -> None:
-        """Take a new measurement.
+        """Add a new measurement.
 
         Args:
             way: Displacement since the last one, shape (nv,) [rad or m].
@@ -111,9 +112,9 @@ class StillSensors:
     def why(self, i: int) -> str:
         """Return why the sensor of a dead joint is dead."""
         if self._alive[i] > _ALIVE:
-            return "its sensor had noise, and has none any more; it is dead"
+            return "its sensor's noise has vanished; it is dead"
         if self._reaction.felt:
-            return "the other joints feel it move; its sensor is dead"
+            return "the other joints show that it moves; its sensor is dead"
         return (
             f"its effort is {self.beyond[i]:.3g} {_EFFORT[self._robot.units[i]]} "
             "beyond what holds it; its sensor is dead, or it is blocked"
@@ -121,7 +122,7 @@ class StillSensors:
 
 
 def _holding(silent: Indices, inertia: Array, free: Array) -> Array:
-    """Return the force that must hold some joints, so that they stand under an effort.
+    """Return the force that keeps some joints at rest under an effort.
 
     By Gauss's principle M⁻¹ of these joints times the force is the missing
     acceleration.

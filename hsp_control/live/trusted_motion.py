@@ -15,36 +15,37 @@ from hsp_control.live.velocity_check import VelocityCheck
 from hsp_control.robot import Robot
 
 _BANDWIDTH = 30.0
-"""With which an expected velocity follows a source [1/s]."""
+"""Rate at which an expected velocity follows a source [1/s]."""
 _ALONE = 3.0
-"""The same if the other source was wrong: a braked joint must follow its effort
+"""The rate if the other source was wrong: a braked joint must follow its effort
 [1/s]."""
 _MEMORY = 0.2
 """Time constant with which a surprise is forgotten [s]."""
 _CLEARLY = 0.5
-"""One source is right, and the other wrong, if its surprise is so much smaller."""
+"""Ratio of surprises below which one source is right, and the other wrong."""
 _SPREAD = 0.25
-"""A joint's velocity may be further from what is expected by this part of that."""
+"""Tolerance of a joint's velocity, relative to the expected one."""
 _LAST = 20
-"""Periods of the safe stop that follow the death of a sensor of a joint at rest."""
+"""Number of periods of the safe stop after the sensor of a joint at rest has died."""
 _SMALL = 2.0
-"""A contradiction up to this, relative to the error of velocities, may be the lag."""
+"""Maximum contradiction due to the lag, relative to the error of velocities."""
 _EFFORT = {"rad": "N·m", "m": "N"}
 
 
 class ExpectedMotion:
-    """The velocity of a joint that the model expects, from each of its sources.
+    """The velocity of a joint expected by the model, from each of its sources.
 
     The sources are the rows of all arrays: the measured velocity, the slope of the
     positions, and their mean. Each expectation is integrated with the model under the
-    efforts applied, and follows its source by a limited step, so that a sensor that
-    jumps is not followed at once; a second state learns the acceleration that the model
-    misses.
+    efforts applied, and follows its source by a limited step, so that a jump of a
+    sensor is not followed at once; a second state estimates the acceleration that the
+    model lacks.
 
     Attributes:
-        v: The velocities that are expected, shape (3, nv) [rad/s or m/s].
+        v: The expected velocities, shape (3, nv) [rad/s or m/s].
         surprise: The largest recent differences, shape (3, nv).
-        acceleration: What the efforts applied cause by the model, shape (nv,).
+        acceleration: The acceleration by the applied efforts and the model, shape
+        (nv,).
     """
 
     def __init__(self, robot: Robot, error: float, period: float) -> None:
@@ -73,7 +74,7 @@ class ExpectedMotion:
             self.acceleration = acceleration
 
     def advance(self, passed: float) -> None:
-        """Go on for some time [s]."""
+        """Advance by a time [s]."""
         self.v = self.v + passed * (self.acceleration + self._missed)
 
     def follow(
@@ -81,8 +82,8 @@ class ExpectedMotion:
     ) -> None:
         """Compare with the sources, shapes (nv,), and follow them.
 
-        ``known`` is how many of them are trusted, shape (nv,). A joint of which none is
-        goes on as it is expected.
+        ``known`` is the number of trusted ones, shape (nv,). A joint without one
+        continues as expected.
         """
         sources = self._sources
         sources[0], sources[1] = velocity, slope
@@ -100,28 +101,28 @@ class ExpectedMotion:
 class TrustedMotion:
     """Judges measured positions and velocities, and selects those to use.
 
-    Where they contradict each other, that one is wrong which did what the model did not
-    expect. If that is not clear, both are wrong where they differ much, else it is the
-    velocity. Where both are wrong, or the sensor is dead, the expectation is used. What
-    was wrong once is not used again.
+    If they contradict each other, the one that deviates from the model's expectation is
+    wrong. If that is not clear, both are wrong if they differ much, otherwise the
+    velocity. If both are wrong, or the sensor is dead, the expectation is used. A
+    source that was wrong is not used again.
 
-    Where both agree and are wrong, the efforts reveal it: a joint whose readings do not
-    change though it is pushed (`StillSensors`), one that goes the other way
-    (`ResponseCheck`), one whose momentum changes as neither efforts nor contacts change
-    it (`MomentumCheck`), and in the safe stop one that is braked and speeds up. Then no
-    effort of ours is of use, and the loop leaves it to the robot.
+    If both agree and are wrong, the efforts reveal it: a joint whose readings do not
+    change though it is pushed (`StillSensors`), one that moves against its effort
+    (`ResponseCheck`), one with an unexplained change of momentum (`MomentumCheck`), and
+    in the safe stop one that is braked and accelerates. Then no effort of the loop
+    helps, and the robot must stop itself.
 
-    A joint that is pushed hard has met something, or is measured wrong. Until the loop
+    A joint that is pushed hard has hit something, or is measured wrong. Until the loop
     falls silent it is braked by the smaller of its measured and its expected velocity,
-    or not at all if they have different signs: whichever is right, it gets no faster.
+    or not at all if they have different signs: in either case it does not accelerate.
 
     Attributes:
         fault: The contradiction, or None.
-        doubtful: Whether the last measurement should not be used, though it is no fault
-            yet.
+        doubtful: Whether the last measurement should not be used, though it is not a
+        fault yet.
         complete: Whether all measurements are trusted.
         stopping: Whether the joints are braked.
-        unknown_for: Time since which some joint was only expected, not measured [s].
+        unknown_for: Time for which some joint was only expected, not measured [s].
         last: The last measurement, as it came; None before the first.
     """
 
@@ -132,7 +133,7 @@ class TrustedMotion:
         limits = settings.effort_limits(robot)
         self._sensors = StillSensors(robot, settings, limits, period)
         self._momentum = MomentumCheck(robot, settings, limits, period)
-        # Nobody knows what the feet of a robot with a floating base push.
+        # The forces at the feet of a robot with a floating base are unknown.
         self._judged = np.full(robot.nv, not robot.unactuated)
         self._response = ResponseCheck(settings.velocity_error, self._judged)
         self._soon = max(settings.prediction_time - _LAST * period, 0.0)
@@ -166,7 +167,7 @@ class TrustedMotion:
 
     @property
     def ambiguous(self) -> bool:
-        """Whether a joint was pushed hard, or is measured wrong: nobody knows which."""
+        """Whether a joint was pushed hard or is measured wrong, which is undecided."""
         return bool(self._pushed.any())
 
     @property
@@ -175,7 +176,7 @@ class TrustedMotion:
         return self._positions
 
     def stop(self) -> None:
-        """From now on the joints are braked: what speeds up is wrong, or its motor."""
+        """Begin braking: a joint that accelerates now has a wrong sensor or motor."""
         self.stopping = True
 
     def applied(
@@ -197,12 +198,12 @@ class TrustedMotion:
         self._driving = Driving(inertia, effort, gravity)
 
     def update(self, new: Measurement, passed: float, jumps: Flags) -> Measurement:
-        """Return a measurement of what can be trusted; set the fault.
+        """Return a measurement with its trusted part; set the fault.
 
         Args:
             new: A valid measurement.
             passed: Time since the last one [s]; 0: the robot has not started.
-            jumps: Joints whose position the robot cannot have come to, shape (nv,).
+            jumps: Joints whose position the robot cannot have reached, shape (nv,).
         """
         last, self.last = self.last, new
         self.fault, self.doubtful = None, False
@@ -226,7 +227,7 @@ class TrustedMotion:
                 means = np.stack([check.mean, check.slope])
                 self._momentum.update(now, means, driving, passed)
         known = self._velocities.astype(np.int64) + self._positions
-        if self.stopping:  # what is braked must obey
+        if self.stopping:  # braked joints must decelerate
             known = np.minimum(known, 1)
         expected.follow(check.mean, check.slope, known, passed)
         self._judge(new.v, jumps)
@@ -236,7 +237,7 @@ class TrustedMotion:
             return new
         all_known = (self._velocities | self._positions).all()
         self.unknown_for = 0.0 if all_known else self.unknown_for + passed
-        if (self._sensors.dead | self._pushed).any():  # nobody knows how fast it is
+        if (self._sensors.dead | self._pushed).any():  # its speed is unknown
             self.unknown_for = max(self.unknown_for, self._soon)
         if self._useless:
             self.unknown_for = inf
@@ -251,11 +252,11 @@ class TrustedMotion:
         return new._replace(q=self._q, v=v)
 
     def _judge(self, v: Array, jumps: Flags) -> None:
-        """Find what is wrong now, and what is not trusted from now on."""
+        """Find the wrong sources, and those not trusted from now on."""
         check = self._check
         dead = check.dead | self._sensors.dead
         contrary = self._response.contrary
-        # What a dead sensor hides seems to push the other joints, too.
+        # Motion hidden by a dead sensor seems to push the other joints, too.
         pushed = self._momentum.beyond & ~check.halted.any()
         wrong = check.contradicted | jumps
         runs = self._left(v) if self.stopping else np.zeros(v.size, dtype=bool)
@@ -278,7 +279,7 @@ class TrustedMotion:
             self._pushed |= pushed & both & ~(wrong | dead)
             lost |= (contrary | pushed) & both
         lost |= runs | self._left(v) & (self._positions ^ self._velocities)
-        # Efforts do harm where a joint goes against them: only the robot can brake.
+        # Efforts are harmful if a joint moves against them: only the robot can brake.
         self._useless |= bool(runs.any() or self._contrary.any())
         self._positions &= ~lost
         self._velocities &= ~lost
@@ -289,10 +290,10 @@ class TrustedMotion:
             self.fault = self._described(i, v, runs=bool(runs[i]))
 
     def _left(self, v: Array) -> Flags:
-        """Return the joints that a trusted source says have left what is expected.
+        """Return the joints that deviate from the expectation by a trusted source.
 
-        A joint that is slower than expected is braked by its friction, too; what is
-        wrong drives it, and then it is faster, or goes the other way.
+        A joint that is slower than expected may be braked by its friction; a wrong
+        sensor drives it, so that it is faster, or moves in the other direction.
         """
         slope, by_v, by_q = self._check.slope, self._expected.v[0], self._expected.v[1]
         used = np.where(self._velocities, v, slope)
@@ -308,27 +309,30 @@ class TrustedMotion:
         name, unit = self._robot.dof_names[i], self._robot.units[i]
         if self._check.dead[i]:
             return (
-                f"{name} stands from one state to the next, where the model expects "
-                f"{self._expected.v[2, i]:.3g} {unit}/s: its sensor is dead"
+                f"{name} does not move from one state to the next, where the model "
+                f"expects {self._expected.v[2, i]:.3g} {unit}/s: its sensor is dead"
             )
         if self._sensors.dead[i]:
-            return f"the state of {name} stands to the last bit: {self._sensors.why(i)}"
+            return (
+                f"the state of {name} stays the same to the last bit: "
+                f"{self._sensors.why(i)}"
+            )
         if self._contrary[i]:
             return (
-                f"{name} goes the other way than its effort drives it: its sensor or "
-                "its motor has the wrong sign"
+                f"{name} moves against its effort: its sensor or its motor has the "
+                "wrong sign"
             )
         if self._pushed[i]:
             return (
                 f"{name} is pushed by {self._momentum.rest[i]:.3g} {_EFFORT[unit]} "
-                "beside its effort: it has met something hard, or its sensors are "
+                "beside its effort: it has hit something hard, or its sensors are "
                 "wrong"
             )
         if runs:
             return (
                 f"{name} is braked, and moves at {v[i]:.3g} {unit}/s where "
-                f"{self._expected.v[2, i]:.3g} {unit}/s are expected: its efforts do "
-                "not what they should"
+                f"{self._expected.v[2, i]:.3g} {unit}/s are expected: its motor does "
+                "not follow the efforts"
             )
         return (
             f"the velocity of {name} contradicts its positions: {v[i]:.3g} {unit}/s "

@@ -26,7 +26,7 @@ from hsp_control.live.simulated_robot import SimulatedRobot
 from hsp_control.robot import Robot
 
 _EACH = 6
-"""Numbers of a wrench, and of a reading of an inertial measurement unit."""
+"""Sizes of a wrench, and of a reading of an inertial measurement unit."""
 
 
 class SensorLayout(NamedTuple):
@@ -34,7 +34,7 @@ class SensorLayout(NamedTuple):
 
     The numbers of a state are q, v, then six of each wrench in this order, then those
     of the inertial measurement unit (angular velocity, specific force), and at the end
-    the effort that the robot has, if it has one.
+    the effort of the robot, if it reports one.
     """
 
     # the frames whose wrench is measured; see `Measurement.wrenches`
@@ -44,7 +44,7 @@ class SensorLayout(NamedTuple):
 
     @classmethod
     def of(cls, measured: Measurement) -> "SensorLayout":
-        """Return the layout of what a robot measures."""
+        """Return the layout of a robot's measurements."""
         unit = measured.inertial
         return cls(tuple(measured.wrenches), None if unit is None else unit.frame)
 
@@ -89,7 +89,7 @@ class UdpHardware:
     """`Hardware` that exchanges `packets` with a robot, for example a simulated one.
 
     The robot sends its states to `address` with the number `session`; its own address
-    is taken from its first packet.
+    is that of its first packet.
 
     Attributes:
         period: Time between two states [s].
@@ -114,10 +114,10 @@ class UdpHardware:
         Args:
             robot: The model; gives the sizes nq and nv.
             period: Time between two states [s].
-            address: Where to listen; port 0: any free port.
+            address: The address to listen at; port 0: any free port.
             session: A number that the robot uses, too; None: a random one.
             faults: Faults to inject into the efforts sent.
-            sensors: What the robot measures besides q and v; None: nothing.
+            sensors: The robot's sensors besides those of q and v; None: none.
 
         Raises:
             HardwareError: If the address does not exist or is in use.
@@ -175,15 +175,15 @@ class UdpHardware:
 
 
 CLOSED_BY_LOOP = "the loop closed the connection"
-"""Why a robot stops at the regular end of a run."""
+"""The reason of a robot's stop at the regular end of a run."""
 
 
 @dataclass
 class ServerReport:
-    """What `serve` counted."""
+    """The statistics of `serve`."""
 
-    outdated: int = 0  # efforts that answered a state beyond the watchdog's limit
-    overrun: float = 0.0  # by how much its time fell behind real time [s]
+    outdated: int = 0  # efforts for a state older than the watchdog's limit
+    overrun: float = 0.0  # delay of its time behind real time [s]
 
 
 Row = Callable[[float, Array, Array, bool], object]
@@ -212,19 +212,19 @@ def serve(
 
     Each period: receive efforts, advance the plant, send the state. An effort that
     arrives within the period of its state acts from that state on, as if it had been
-    computed in no time; a later one acts from the next period on.
+    computed instantly; a later one acts from the next period on.
 
     If this process overruns by more than a period, the robot's time stands still
     meanwhile, so that the loop's efforts are not late.
 
-    Whatever the connection or ``on_rows`` raises stops the robot, too; none of
-    ``on_rows`` is called after that.
+    An exception of the connection or of ``on_rows`` stops the robot, too; then
+    ``on_rows`` is not called any more.
 
     Args:
         robot: The robot, waiting for its first effort.
         link: The connection; its peer is known.
         stop_reason: Called every period; returns a reason to stop, or None.
-        start_timeout: Longest time to wait for the first effort [s].
+        start_timeout: Maximum time to wait for the first effort [s].
         on_rows: Called after the state was sent, in the rest of the period.
 
     Returns:
@@ -264,13 +264,13 @@ def serve(
             robot.advance(efforts)
             state = sensors.pack(robot.measured())
             with _halting(robot, "no state can be sent"), suppress(OSError):
-                # A line that fails loses packets.
+                # A failing connection loses packets.
                 link.send(PacketKind.STATE, state, t=robot.t, phase=int(robot.phase))
             state_sequence = link.counts["sent"]
             done = robot.done
             if robot.t > t:
                 rows, on_rows = on_rows, ()
-                with _halting(robot, "its period cannot be told"):
+                with _halting(robot, "its period cannot be reported"):
                     for on_row in rows:
                         on_row(t, q, v, done)
                     on_rows = rows

@@ -9,54 +9,55 @@ from hsp_control.live.settings import LiveSettings
 from hsp_control.robot import Robot
 
 _WINDOW = 0.05
-"""How old the motion may be that a velocity reports [s]: a delay of 5 ms and a filter
-of 20 Hz, whose step response ends after 40 ms."""
+"""Maximum age of the motion in a velocity [s]: a delay of 5 ms and a filter of 20 Hz,
+whose step response ends after 40 ms."""
 _MEAN_TIME, _MEAN_ERROR = 0.012, 0.3
-"""Time constant of the mean of what is beyond [s], and how large that may be besides
-its noise, relative to the error of velocities."""
+"""Time constant of the mean excess [s], and its tolerance besides noise, relative to
+the error of velocities."""
 _FEWEST = 3
-"""Fewest slopes that are compared, where a period is long."""
+"""Minimum number of slopes that are compared, for long periods."""
 _LAG = 0.015
-"""Mean lag of a velocity: that of this delay and this filter [s]."""
+"""Mean lag of a velocity by this delay and this filter [s]."""
 _MEMORY = 0.5
 """Time constant with which small differences are summed [s]."""
 _CONSTANT = 0.01
-"""Position that may differ for other reasons, such as a coarse encoder [rad or m]."""
+"""Tolerance of positions for other reasons, such as a coarse encoder [rad or m]."""
 _DOUBT_LEAK, _DOUBT = 0.9, 1.9
-"""Each doubtful velocity counts 1, and 0.9 times that at the next one: two in a row
+"""Each doubtful velocity adds 1 to a sum that decays by 0.9 per velocity: two in a row
 are a fault, or three of five. A single one is not."""
 _SLOPE_TIME = 0.008
-"""Over which a joint's slope is taken, if it replaces its velocity [s]."""
+"""Time over which a joint's slope is computed, if it replaces its velocity [s]."""
 _GAP = 3.5
-"""Periods without a state from which on the slope across them is that of a time when
-the velocity was another one: the velocity after them is not compared with it."""
+"""Number of periods without a state after which the slope across them is not compared
+with the later velocity, which may be different."""
 _STILL = 3
-"""States with the same position and velocity from which a sensor is dead."""
+"""Number of states with the same position and velocity after which a sensor is dead."""
 _NO_CHANGE = 1e-12
-"""A smaller change of a position is rounding [rad or m]."""
+"""Change of a position below which it is rounding [rad or m]."""
 _STOPS = 50.0
-"""Largest deceleration of a joint that friction stops [rad/s² or m/s²]."""
+"""Maximum deceleration of a joint by friction [rad/s² or m/s²]."""
 _WENT = 0.05
-"""Speed from which a joint that stands has moved before [rad/s or m/s]."""
+"""Speed above which a joint has moved before it stopped [rad/s or m/s]."""
 _STEP = 2e-3
-"""Largest step of an encoder [rad or m], until smaller changes are seen: between two
-steps a velocity that is taken from them stays the same, too."""
+"""Maximum step of an encoder [rad or m], until smaller changes are observed: between
+two steps a velocity computed from them is constant, too."""
 _COARSEST = 0.01
-"""No encoder has coarser steps than a few of these together [rad or m]."""
+"""Resolution of the coarsest encoders, a few of whose steps may be summed [rad or
+m]."""
 _STEPS = 2.5
-"""Steps of the encoder that a slowing joint may lack, by its last velocity."""
+"""Encoder steps by which a decelerating joint may lag its last velocity."""
 
 
 class VelocityCheck:
     """Detects joints whose measured velocity contradicts their positions.
 
-    What is delayed and filtered is a mean of earlier velocities: it is between the
-    least and the greatest slope of positions in a window. The velocity may be beyond
-    them by `LiveSettings.velocity_error`, and its mean of some milliseconds by less. A
-    smaller difference that stays is found by a leaky sum of dq - v h, which noise and
-    lags leave small.
+    A delayed and filtered velocity is a mean of earlier ones: it is between the least
+    and the greatest slope of positions in a window. The velocity may exceed them by
+    `LiveSettings.velocity_error`, and its mean of some milliseconds by less. A smaller
+    persistent difference is detected by a leaky sum of dq - v h, which stays small
+    under noise and lags.
 
-    A joint's position and velocity that stay to the last bit are those of a dead sensor
+    Position and velocity that are constant to the last bit are those of a dead sensor
     if the joint was fast before: no brake stops it in a period.
 
     A base without motors is not judged: its motion is an estimate, and jumps.
@@ -65,7 +66,7 @@ class VelocityCheck:
         doubtful: Joints whose last velocity is not used yet, shape (nv,).
         contradicted: Joints whose velocity contradicts their positions, shape (nv,).
         dead: Joints whose sensor is dead, shape (nv,).
-        halted: Joints that moved, and whose readings stay to the last bit, (nv,).
+        halted: Joints that moved, and whose readings are now constant, shape (nv,).
         slope: Slope of the last positions, shape (nv,) [rad/s or m/s].
         difference: Between velocity and slope at the last one, shape (nv,).
         mean: Mean velocity in the same time, shape (nv,).
@@ -78,7 +79,7 @@ class VelocityCheck:
         self._few = max(2, ceil(_SLOPE_TIME / period))
         self._slopes = np.zeros((max(ceil(_WINDOW / period), _FEWEST), robot.nv))
         self._velocities = np.zeros_like(self._slopes)
-        # Which of them are the last few, by the place of the next one.
+        # Masks of the last few of them, by the index of the next one.
         size = len(self._slopes)
         self._latest = (np.arange(size)[:, None] - 1 - np.arange(self._few)) % size
         # Noise of this size, six standard deviations, leaves a sum of this size.
@@ -101,14 +102,14 @@ class VelocityCheck:
         self.difference: Array = np.zeros(nv)
         self.doubtful: Flags = np.zeros(nv, dtype=bool)
         self.contradicted: Flags = np.zeros(nv, dtype=bool)
-        self._by_q: Flags = np.ones(nv, dtype=bool)  # whose positions are trusted
-        self._by_v: Flags = np.ones(nv, dtype=bool)  # whose velocities are
+        self._by_q: Flags = np.ones(nv, dtype=bool)  # trusted positions
+        self._by_v: Flags = np.ones(nv, dtype=bool)  # trusted velocities
         self._none, self._nothing = np.zeros(nv, dtype=bool), np.zeros(nv)
         self.dead: Flags = self._none
         self.halted: Flags = self._none
 
     def trust(self, positions: Flags, velocities: Flags) -> None:
-        """From now on a sensor is dead if what is trusted of it stands, (nv,) each."""
+        """Set the trusted sources, (nv,) each; a sensor with constant ones is dead."""
         self._by_q, self._by_v = positions.copy(), velocities.copy()
 
     def update(self, way: Array, v: Array, passed: float) -> None:
@@ -154,8 +155,8 @@ class VelocityCheck:
         still &= (v == self._last_v) | ~self._by_v
         still &= self._by_q | self._by_v
         self._last_v = v
-        # The speed before it stood, of two states: the last may show a part of the lie.
-        # It is measured: friction that the model misses must not count.
+        # The speed before it stopped, of two states: the last may be partly wrong.
+        # A measured speed, so that friction unknown to the model has no effect.
         now = np.minimum(
             np.where(self._by_v, np.abs(v), inf),
             np.where(self._by_q, np.abs(slope), inf),

@@ -315,6 +315,6 @@ def _reader(kind: str) -> Callable[..., tuple[pin.Model, RobotSource]]:
     """Return the reader of a kind of model that a companion supports."""
     entry = entry_points("robots").get(kind)
     if entry is None:
-        raise ModelError(f"the companion that reads {kind} models is not here")
+        raise ModelError(f"the companion that reads {kind} models is not installed")
     reader: Callable[..., tuple[pin.Model, RobotSource]] = entry.load()
     return reader

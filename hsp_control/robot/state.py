@@ -26,8 +26,8 @@ from hsp_control.engine.plans import (
     PartCalls,
     Step,
     StepPlan,
+    implemented_by,
     planned,
-    says,
 )
 from hsp_control.robot.inertia import CentroidalMotion, inertia_terms
 from hsp_control.robot.kinematics import (
@@ -447,7 +447,7 @@ def as_given(part: object, state: RobotState) -> RobotState:
 
     Calls of the engine are bound to the state itself, whose arrays they write.
     """
-    is_plain = says(part, "call", "own_calls", "evaluate") == "evaluate"
+    is_plain = implemented_by(part, "call", "own_calls", "evaluate") == "evaluate"
     return state.read_only if is_plain else state
 
 

@@ -226,7 +226,7 @@ def missed_forces(
         for contact in support.contacts:
             force, kept = pressed.get(contact.name, 0.0), share
             problem = (
-                f"at most {kept * force:.3g} of {force:.3g} N can be had at rest, "
+                f"at most {kept * force:.3g} of {force:.3g} N are possible at rest, "
                 "within efforts, friction and balance"
             )
             if isinstance(contact, SlidingContact) and contact.slides and push_off:

@@ -189,7 +189,7 @@ class JournalReader:
             except (ValueError, KeyError, TypeError, AttributeError, RecursionError):
                 what = {_HEADING: "heading", _NOTE: "note"}.get(kind, "end")
                 raise LogError(
-                    f"{self.path}: a {what} of the journal is none"
+                    f"{self.path}: a {what} of the journal is invalid"
                 ) from None
         return self.count - before
 
@@ -237,10 +237,10 @@ class JournalReader:
         """Yield kind and payload of every new frame before the first incomplete one."""
         try:
             if self.path.exists() and not self.path.is_file():
-                raise LogError(f"{self.path} is no journal")
+                raise LogError(f"{self.path} is not a journal")
             with self.path.open("rb") as file:
                 if not MAGIC.startswith(file.read(len(MAGIC))):
-                    raise LogError(f"{self.path} is no journal")
+                    raise LogError(f"{self.path} is not a journal")
                 file.seek(self._at)
                 data = file.read()
         except FileNotFoundError:  # its writer has not begun

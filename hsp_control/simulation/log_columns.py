@@ -121,7 +121,7 @@ class LogColumns:
 STREAM_CHANNELS = {
     "age": "time since the last message",
     "taken": "messages taken",
-    "late": "of these, messages that came too late to count",
+    "late": "of these, messages that arrived too late to be used",
     "rejected": "invalid messages",
 }
 """The columns of a stream; see `StreamRun.counts`."""

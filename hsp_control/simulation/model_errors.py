@@ -183,8 +183,8 @@ def lines(found: ModelErrors) -> dict[str, str]:
         if found.rotor < USUAL_ROTOR:
             texts["rotors"] = (
                 f"a light wrist's has some {USUAL_ROTOR:g} kg m²: then a mode grows; "
-                "give them, if only a guess: robot: {motor_inertia: "
-                f"{USUAL_ROTOR:g}}}"
+                "give them, even as a guess: robot: "
+                f"{{motor_inertia: {USUAL_ROTOR:g}}}"
             )
     if found.hidden is not None:
         most = f"at most {1e3 * found.hidden:.3g} ms" if found.hidden else "hardly any"

@@ -70,9 +70,9 @@ class AngularMomentum(Task, type="angular_momentum"):
     """e' + K e = 0 with e = ℓ_d - ℓ, ℓ = A v / m the angular momentum per mass [m²/s].
 
     In world axes, about the centre of mass; J = A / m, a_x = ℓ_d' + K e. The error
-    equation is exact and of first order, because angular momentum is not the rate of
-    any function of the configuration. Divided by the mass, the rows of J have the same
-    size as those of a position, with which the singularity threshold compares them.
+    equation is exact and of first order, because angular momentum is not the rate of a
+    function of the configuration. Divided by the mass, the rows of J are of the size of
+    a position's, as the singularity threshold assumes.
     """
 
     order: ClassVar[Literal[1, 2]] = 1

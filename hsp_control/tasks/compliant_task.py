@@ -22,7 +22,7 @@ _THRESHOLD = 0.03  # default threshold of the law's singularities: see `Controll
 
 
 class Rotating(NamedTuple):
-    """Which rows of an error are a rotation vector, and what rotates."""
+    """The rows of an error that are a rotation vector, and the rotating frame."""
 
     first: int  # the first of the three rows; the number of rows if there are none
     rotation: Array  # world ← frame, (3, 3)
@@ -30,16 +30,16 @@ class Rotating(NamedTuple):
 
 
 class CompliantTask(SecondOrderTask):
-    """A task with gains, or with an impedance: then it yields to a force as a spring.
+    """A task with gains, or with an impedance: then it yields to a force like a spring.
 
-    An impedance is gains that depend on the state. A step evaluates the task, computes
-    them from its J, J', e and e', and evaluates it again with them: the error equation
-    of the task stays the only one. A subclass whose error contains a rotation vector
+    An impedance is a set of gains that depend on the state. A step evaluates the task,
+    computes them from its J, J', e and e', and evaluates it again with them: so there
+    is a single error equation. A subclass whose error contains a rotation vector
     overrides `_rotating`.
 
     Attributes:
         wrench_unit: The unit of a force along the rows of J, if these are axes of the
-            world: the log has such a force, if it is estimated.
+        world: an estimated force is then logged.
     """
 
     wrench_unit: ClassVar[str | None] = None
@@ -47,8 +47,8 @@ class CompliantTask(SecondOrderTask):
     _: KW_ONLY
     impedance: Impedance | None = None
     """Stiffness and damping of the rows [N/m and N·s/m, or N·m/rad and N·m·s/rad],
-    instead of `gains`; none by default. Its spring has its own largest force, and fades
-    where the hand cannot move: `largest_error` is ignored."""
+    instead of `gains`; none by default. Its spring has a largest force, and fades in
+    directions without mobility: `largest_error` is ignored."""
 
     def __post_init__(self) -> None:
         """Check that there are not both gains and an impedance."""
@@ -58,7 +58,7 @@ class CompliantTask(SecondOrderTask):
             )
 
     def _rotating(self, state: RobotState) -> Rotating:
-        """Return which rows are a rotation vector; by default none are."""
+        """Return the rows that are a rotation vector; by default none."""
         return Rotating(self.rows, np.eye(3), np.zeros(3))
 
     def checked(self, robot: Robot) -> Self:

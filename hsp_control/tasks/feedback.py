@@ -21,8 +21,8 @@ UNBOUNDED = np.zeros((0, 3))
 class Feedback(NamedTuple):
     """Kv e' + Kp s(e) + offset: a task's feedback, as one argument of a call.
 
-    s(e) is e with each part of it, such as its position, shortened to its largest
-    length: s(e) = e wherever no part is longer.
+    s(e) is e with each part, such as its position, shortened to its largest length:
+    s(e) = e if no part is longer.
 
     The controller owns these arrays and changes them in place: gains by events, the
     offset by compensators such as integral action.
@@ -57,7 +57,7 @@ class FeedbackInForce(NamedTuple):
     # Parameters that change at run time: Kp and Kv, (2, m, m), or those of another kind
     # of feedback.
     numbers: Array
-    feedback: Feedback  # what the task reads
+    feedback: Feedback  # read by the task
     # Λ⁻¹ in the coordinates of the error, (m, m), of the last step; only of a task with
     # an impedance.
     mobility: Array
@@ -67,10 +67,10 @@ class ErrorPart(NamedTuple):
     """Some consecutive components of a task's error that share a unit.
 
     Attributes:
-        name: What they are, such as ``position``.
+        name: Their name, such as ``position``.
         unit: Their unit, such as ``m``.
         rate_unit: The unit of their rates, such as ``m/s``.
-        size: How many they are.
+        size: Their number.
     """
 
     name: str
@@ -80,7 +80,7 @@ class ErrorPart(NamedTuple):
 
     @property
     def yields(self) -> float:
-        """The factor by which L is less for it; see `hsp_control.edge.threshold`."""
+        """The factor of L for it; see `hsp_control.edge.threshold`."""
         return 1.0 if self.unit == "rad" else max(WHOLE + 1.0 - self.size, 1.0)
 
 
@@ -109,7 +109,7 @@ def each_part(
 ) -> Sequence[float | None] | str:
     """Return a bound for each part of an error, None for no bound; or "none" for all.
 
-    ``own`` is what the robot has by the unit of the error, inf for no bound.
+    ``own`` has the robot's bounds by the unit of the error, inf for no bound.
     """
     if declared == "none" or declared is None:
         return "none"

@@ -39,8 +39,8 @@ class FrameOrientation(
 
     e is a rotation vector in the axes of the desired frame. The error equation is
     exact up to an angle of pi (docs/law.md). At pi the shortest rotation back changes
-    its side: e jumps to -e, and all values stay finite. J are the angular rows of the
-    frame's Jacobian in world axes.
+    its direction: e jumps to -e, and all values stay finite. J are the angular rows of
+    the frame's Jacobian in world axes.
     """
 
     drawn: ClassVar[tuple[Drawn, ...]] = ("orientation",)
@@ -71,7 +71,7 @@ class FrameOrientation(
         return Rotating(0, motion.rotation, motion.velocity[3:])
 
     def reference_rate(self, state: RobotState) -> Array:
-        """Return w_d, less what turns the frame in its joint, shape (3,) [rad/s]."""
+        """Return w_d minus the frame's rotation in its joint, shape (3,) [rad/s]."""
         own = state.frame(self.frame_name).own_velocity[3:]
         rate: Array = self._reference_at(state).angular_velocity - own
         return rate
@@ -83,7 +83,7 @@ class FrameOrientation(
 
 
 def _quaternions(desired: Array, actual: Array) -> tuple[Array, Array]:
-    """Return two rotations as quaternions; q and -q are one: of the nearer sign."""
+    """Return two rotations as quaternions, with the nearer of the signs q and -q."""
     q_d, q = quaternion_from_rotation(desired), quaternion_from_rotation(actual)
     return q_d, q if q_d @ q >= 0.0 else -q
 
@@ -118,7 +118,7 @@ class PoseTask(TrackingTask):
     def reference_rate(self, state: RobotState) -> Array:
         """Return x_d' and w_d in the reference's axes, shape (6,) [m/s, rad/s].
 
-        Less what moves the frame in its joint.
+        Minus the frame's motion in its joint.
         """
         sample = self._reference_at(state)
         velocity, turning = sample.position.velocity, sample.orientation
@@ -155,8 +155,8 @@ class FramePose(FrameTask, PoseTask, CompliantTask, type="frame_pose"):
     orientation of the start [m, rad]; held at the start by default."""
     _: KW_ONLY
     along: Literal["world", "tool"] = "world"
-    """Along which axes the position rows are, and so gains, stiffness and forces: the
-    world's, or those of the desired frame, the tool where it should be [-]."""
+    """Axes of the position rows, and so of gains, stiffness and forces: the world's, or
+    those of the desired frame of the tool [-]."""
 
     def _placed_at(self, here: FrameKinematics) -> dict[str, Any]:
         place = pin.SE3(here.rotation, here.position)

@@ -54,7 +54,7 @@ class FramePosition(FrameTask, TrackingTask, CompliantTask, type="frame_position
         )
 
     def reference_rate(self, state: RobotState) -> Array:
-        """Return x_d', less what moves the frame in its joint, shape (m,) [m/s]."""
+        """Return x_d' minus the frame's motion in its joint, shape (m,) [m/s]."""
         own = state.frame(self.frame_name).own_velocity[axis_indices(self.axes)]
         rate: Array = self._reference_at(state).velocity - own
         return rate

@@ -75,11 +75,11 @@ class TrackingTask(SecondOrderTask):
 
     _: KW_ONLY
     blend: Positive | None = None
-    """Duration of the transition from where the robot starts to the trajectory [s];
-    none by default."""
+    """Duration of the transition from the robot's start to the trajectory [s]; none by
+    default."""
 
     def _reference_at(self, state: RobotState) -> Any:
-        """Return the reference at the state's time, which keeps the sample's memory."""
+        """Return the reference at the state's time; the state stores the sample."""
 
         def make() -> tuple[Any, Any]:
             followed: Any = self.followed
@@ -92,7 +92,7 @@ class TrackingTask(SecondOrderTask):
 
 
 class FrameTask(SecondOrderTask):
-    """J a + J'v = a_x for one frame, with a reference that a trajectory gives.
+    """J a + J'v = a_x for one frame, with a trajectory as reference.
 
     Its kinematics are in world axes at its origin, linear rows before angular rows
     (Pinocchio's LOCAL_WORLD_ALIGNED).
@@ -120,7 +120,7 @@ class FrameTask(SecondOrderTask):
 
     @abstractmethod
     def _placed_at(self, here: FrameKinematics) -> dict[str, Any]:
-        """Return the fields that change where the frame starts."""
+        """Return the fields to replace for the frame's start."""
 
     def keeps_balance(self, robot: Robot) -> bool:
         """Whether the frame belongs to the trunk; see `Robot.is_on_trunk`."""

@@ -28,9 +28,9 @@ class FunctionTask(TrackingTask, type="function_task"):
     the error equation e'' + Kv e' + Kp e = 0 is J a + J'v = a_x with
     a_x = x_d'' - (∂y/∂t)' + Kv e' + Kp e + offset.
 
-    What is not given is computed by fourth-order differences; that of J' has an error
-    of about 1e-9 and needs 16 nv evaluations of the function. YAML gives the names of
-    functions; see `FunctionCost`.
+    Omitted derivatives are computed by fourth-order differences; that of J' has an
+    error of about 1e-9 and needs 16 nv evaluations of the function. YAML gives the
+    names of functions; see `FunctionCost`.
     """
 
     function: StateFunction
@@ -127,7 +127,7 @@ class FunctionTask(TrackingTask, type="function_task"):
         """Return x_d and y, shape (m,) each."""
         return self._reference_at(state).position.copy(), self.value(state)
 
-    # --- what functions return --------------------------------------------------------
+    # --- results of functions --------------------------------------------------------
 
     def _numbers(self, value: object, what: str, *shape: int) -> Array:
         """Return what a function has returned as an array of finite numbers."""

@@ -29,7 +29,7 @@ class Gains(Part, error=GainError):
     """ζ [-]; 1, critical damping, by default."""
 
     def __post_init__(self) -> None:
-        """Check that the gains are given one way, and positive."""
+        """Check that the gains are given in one way, and positive."""
         stiff = self.kp is not None or self.kv is not None
         if stiff and not (
             self.natural_frequency is None and self.damping_ratio is None

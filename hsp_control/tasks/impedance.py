@@ -24,10 +24,9 @@ class Impedance(Part, error=GainError):
 
     s(e) = K e, up to the spring's largest force.
 
-    Λ(q) = (J M⁻¹ Jᵀ)⁻¹ is the inertia that the robot has at the task, and f the
-    external force there. The robot's own inertia is not shaped, so no force has to be
-    measured, and ½ e'ᵀΛe' plus the energy of the spring never grows by itself
-    (docs/compliance.md).
+    Λ(q) = (J M⁻¹ Jᵀ)⁻¹ is the robot's inertia at the task, and f the external force
+    there. The inertia is not shaped, so no force has to be measured, and ½ e'ᵀΛe' plus
+    the energy of the spring never grows without external work (docs/compliance.md).
     """
 
     stiffness: Semidefinite
@@ -41,10 +40,10 @@ class Impedance(Part, error=GainError):
     direction must be damped."""
     damping_ratio: Positive | None = None
     """ζ of every mode of the task's inertia and K [-]; 1, critical damping, by default.
-    D then follows the inertia. It damps nothing where there is no stiffness."""
+    D then depends on the inertia. It damps no direction without stiffness."""
     largest_force: LargestError = "robot"
     """Largest force and moment of the spring [N or N·m]: beyond it the spring slips, so
-    that a target far away, or out of reach, does not pull harder. One number, or one
+    that the force of a target far away, or out of reach, is bounded. One number, or one
     for each part of the error; "none": no bound. By default the robot's
     (`Robot.spring_force`), and none for joints."""
 
@@ -77,8 +76,8 @@ class Impedance(Part, error=GainError):
     def numbers(self, parts: Sequence[ErrorPart]) -> Array:
         """Return K, D, ζ and 1/largest force in one array.
 
-        Numbers between those of two impedances are those of an impedance as well, so
-        that one may change into the other. `parts_of` is the inverse.
+        Interpolated numbers of two impedances are those of an impedance, too, so that
+        one may change into the other. `parts_of` is the inverse.
         """
         rows = sum(part.size for part in parts)
         out = np.zeros((2 * rows + 2, rows))
@@ -136,10 +135,10 @@ def _not_negative(value: ArrayLike, name: str) -> Array:
 
 
 def _check_damped(K: Array, D: Array) -> None:
-    """Check that every direction of a spring is damped: it would oscillate for ever."""
+    """Check that every direction of a spring is damped, so that none oscillates."""
     size = max(K.shape[0] if K.ndim else 1, D.shape[0] if D.ndim else 1)
     if {len(each) for each in (K, D) if each.ndim} - {size}:
-        return  # of different sizes, which the task says
+        return  # of different sizes, which the task reports
     stiff, damped = as_matrix(K, size, "stiffness"), as_matrix(D, size, "damping")
     values, directions = np.linalg.eigh(damped)
     free = directions[:, values <= _ROUNDING * max(values[-1], 0.0)]

@@ -75,7 +75,7 @@ class JointPosture(CompliantTask, type="joint_posture"):
         if displacement is not None:
             with within("displacement"):
                 begin = np.zeros(len(joints))
-                if isinstance(displacement, Stream):  # where the joints are
+                if isinstance(displacement, Stream):  # the present joint positions
                     away = robot.difference(reference, start.state.q)
                     begin = away[placed._indices(robot)]
                 displacement = displacement.anchored(begin)

@@ -30,9 +30,9 @@ class Pointing(FrameTask, type="pointing"):
     Two rows; the rotation about the axis itself is free. e are stereographic
     coordinates about the desired direction, |e| = tan(angle/2), in which the error
     equation is exact up to the antipode (docs/law.md). Within 12 degrees of the
-    antipode |e| is held at 9.9: the error equation no longer holds there, but the axis
-    still moves back. The acceleration is then proportional to the sine of the angle:
-    an axis that rests exactly at the antipode stays there.
+    antipode |e| is saturated at 9.9: the error equation no longer holds there, but the
+    axis still moves back. The acceleration is then proportional to the sine of the
+    angle: an axis that rests exactly at the antipode stays there.
 
     J are the angular rows of the frame's Jacobian along two directions perpendicular
     to the axis.
@@ -47,8 +47,8 @@ class Pointing(FrameTask, type="pointing"):
     """The pointing axis in the frame, of any length but zero [-]."""
     trajectory: OrientationTrajectory | None = None
     """Instead of `direction`, one that moves: an orientation, world ← desired frame,
-    whose third axis is the desired direction [rad]. What is omitted is such that the
-    axis points along it at the start."""
+    whose third axis is the desired direction [rad]. An omitted orientation is such that
+    the axis points along it at the start."""
 
     def __post_init__(self) -> None:
         """Check axis and direction."""
@@ -82,7 +82,7 @@ class Pointing(FrameTask, type="pointing"):
 
         Args:
             direction: The direction in the world, of any length but zero, shape (3,).
-            here: Where the frame is.
+            here: The frame's placement.
         """
         now = here.frame(self.frame_name).rotation @ self._turn
         shortest = pin.Quaternion.FromTwoVectors(now[:, 2], direction)
@@ -133,7 +133,7 @@ class Pointing(FrameTask, type="pointing"):
     def reference_rate(self, state: RobotState) -> Array:
         """Return the part of w_d perpendicular to the axis, shape (2,) [rad/s].
 
-        Less what turns the frame in its joint.
+        Minus the frame's rotation in its joint.
         """
         frame, w_d = state.frame(self.frame_name), self._desired.sample(state.t)
         rate = w_d.angular_velocity - frame.own_velocity[3:]

@@ -22,7 +22,7 @@ class RelativePose(PoseTask, type="relative_pose"):
     """e = (x_d - x, -log(R_dᵀ Q)), x = R_rᵀ(p - p_r), Q = R_rᵀ R [m, rad].
 
     The pose of a frame relative to a reference frame r, in the axes of r. Both errors
-    are exactly linear; all else is as in `FramePose`.
+    are exactly linear; everything else is as in `FramePose`.
     """
 
     frame: str | None = None
@@ -32,7 +32,7 @@ class RelativePose(PoseTask, type="relative_pose"):
     relative orientation of the start [m, rad]; held at the start by default."""
     _: KW_ONLY
     reference: str
-    """Name of the frame that the pose is relative to [-]."""
+    """Name of the frame of reference [-]."""
 
     def _default_name(self) -> str:
         return default_name(f"{self.frame or 'end_effector'}_from_{self.reference}")

@@ -1,4 +1,4 @@
-"""A spring whose force is bounded, as if it slipped at its largest force.
+"""A spring with a bounded force, which slips at its largest force.
 
 The mathematics is that of ``engine/tasks/slipping.hpp``.
 """
@@ -15,7 +15,7 @@ def spring_force(numbers: Array, ends: Indices, e: Array) -> Array:
 
     Args:
         numbers: As of `Impedance.numbers`, shape (2 m + 2, m).
-        ends: Where each part of the error ends, shape (parts,).
+        ends: End of each part of the error, shape (parts,).
         e: The error, shape (m,).
     """
     e = np.ascontiguousarray(e, dtype=float)
@@ -25,7 +25,7 @@ def spring_force(numbers: Array, ends: Indices, e: Array) -> Array:
 
 
 def slipped(numbers: Array, ends: Indices, e: Array) -> float:
-    """Return the length of the longest part of the error where the spring slips.
+    """Return the length of the longest part of the error for which the spring slips.
 
     Returns:
         Its length [m or rad]; 0 if the force is K e.

@@ -12,7 +12,7 @@ from hsp_control.common.exceptions import TaskError
 from hsp_control.declaration import Part, within
 from hsp_control.declaration.nested import parts_within
 from hsp_control.declaration.quantities import PositiveCount
-from hsp_control.engine.plans import PartCall, PartCalls, says
+from hsp_control.engine.plans import PartCall, PartCalls, implemented_by
 from hsp_control.geometry.scene import Start
 from hsp_control.law import TaskSample
 from hsp_control.robot import Robot, RobotState
@@ -39,8 +39,8 @@ class Task(Part, ABC, family="tasks", error=TaskError):
     A subclass declares its parameters as fields (see `Part`) and implements:
 
     * `error_parts` names the components of e, and so gives the number of rows.
-    * `call` returns what writes J, J', e, e' and a_x; or `evaluate`, in plain Python,
-      writes them itself. The error equation must follow *exactly* from
+    * `call` returns a kind of call that writes J, J', e, e' and a_x; or `evaluate`
+    * writes them in plain Python. The error equation must follow *exactly* from
       J a + J'v = a_x, in the coordinates of e.
     * `reference_rate` returns J v on the reference.
     * `measure` returns the reference and the actual value, for logs and plots.
@@ -51,16 +51,16 @@ class Task(Part, ABC, family="tasks", error=TaskError):
     coordinates of e, e' and offset may be others, in which the error equation is linear
     (a rotation vector, for example).
 
-    A task has no memory: the controller owns the feedback, and the state keeps the
+    A task has no memory: the controller owns the feedback, and the state stores the
     buffers of a computation (see `RobotState.cached`).
 
     Most tasks derive from `SecondOrderTask`, which has gains.
 
     Attributes:
         order: Order of the error equation.
-        drawn: What `measure` returns, in this order, if it can be drawn in the world:
-            ``position`` [m], along `axes` if the task has those, ``orientation`` as a
-            quaternion (x, y, z, w), ``direction`` as a unit vector.
+        drawn: The results of `measure`, in this order, if they can be drawn in the
+            world: ``position`` [m], along `axes` if the task has those, ``orientation``
+            as a quaternion (x, y, z, w), ``direction`` as a unit vector.
     """
 
     order: ClassVar[Literal[1, 2]] = 2
@@ -71,9 +71,9 @@ class Task(Part, ABC, family="tasks", error=TaskError):
     priority: PositiveCount | None = None
     """Priority [-]; 1 is the highest, and tasks of the same priority form one level. By
     default 1; on a floating base 1 for tasks that keep the balance (centre of mass,
-    angular momentum, the trunk) and 2 for all else."""
+    angular momentum, the trunk) and 2 for all others."""
     schedule: Schedule | None = None
-    """When the task is active [-]; always by default."""
+    """Schedule in which the task is active [-]; always by default."""
     name: str = ""
     """The task's name in the log [-]; by default that of its frame, or its type."""
 
@@ -107,7 +107,7 @@ class Task(Part, ABC, family="tasks", error=TaskError):
         return sum(part.size for part in self.error_parts)
 
     def part_ends(self) -> Indices:
-        """Return where each part of the error ends, shape (parts,)."""
+        """Return the end of each part of the error, shape (parts,)."""
         return np.cumsum([part.size for part in self.error_parts])
 
     @abstractmethod
@@ -197,7 +197,7 @@ class Task(Part, ABC, family="tasks", error=TaskError):
         return replace(self, **changes)
 
     def keeps_balance(self, robot: Robot) -> bool:
-        """Whether a floating base needs the task to stand; see `priority`."""
+        """Whether a floating base needs the task for its balance; see `priority`."""
         return False
 
     def call(self, state: RobotState) -> PartCall:
@@ -217,7 +217,7 @@ class Task(Part, ABC, family="tasks", error=TaskError):
         self, state: RobotState, feedback: Feedback, out: TaskSample
     ) -> PartCalls:
         """Return the calls that write the sample of each step."""
-        if says(self, "call", "evaluate") == "call":
+        if implemented_by(self, "call", "evaluate") == "call":
             return [self.call(state).given(feedback=feedback, out=out)]
         seen = state.read_only
         return [PartCall(self.evaluate, state=seen, out=out, feedback=feedback)]
@@ -306,9 +306,9 @@ class SecondOrderTask(Task):
     gains: Gains = Gains(natural_frequency=10.0)
     """Kp and Kv of the rows [1/s², 1/s]; critically damped at 10 rad/s by default."""
     largest_error: LargestError = "robot"
-    """Error beyond which the feedback does not grow, so that a target far away, or out
-    of reach, commands no more [m or rad]. One number, or one for each part of the
-    error; "none": no bound, and near a singularity the paper's law down to the
+    """Error beyond which the feedback does not grow, so that the command for a target
+    far away, or out of reach, is bounded [m or rad]. One number, or one for each part
+    of the error; "none": no bound, and near a singularity the paper's law down to the
     controller's threshold. By default 0.35 of the robot's size for a position
     (`Robot.size`), 1.25 rad for an orientation, and none for joints."""
 

@@ -27,32 +27,32 @@ from hsp_control.trajectories.orientation import OrientationTrajectory
 from hsp_control.trajectories.pose import PoseSample, PoseTrajectory
 from hsp_control.trajectories.trajectory import Trajectory
 
-POINTS = 64  # at which a pose's origin is looked at for whether it stays
-STAYS = 1e-9  # length of a path [m] below which the origin of a pose stays
+POINTS = 64  # number of points at which a pose's origin is tested for being constant
+STAYS = 1e-9  # length of a path [m] below which the origin of a pose is constant
 
 
 class Pace(NamedTuple):
-    """How a path is followed: two arguments of its call."""
+    """The timing of a path: two arguments of its call."""
 
     arc: ArcLength
     scaling: TimeScaling
 
 
 def own_motion(path: Any) -> tuple[Any, Plan]:
-    """Return a path's sample, and the plan that writes it at a time of its own."""
+    """Return a path's sample, and the plan that writes it at the path's own time."""
     sample, calls = path.supplied()
     return sample, Plan(planned(calls).steps())
 
 
 def pace(rates: Rates, course: Course, part: Any) -> Pace:
-    """Return how a part follows a path: it has speed, acceleration and start_time."""
+    """Return the timing of a part with speed, acceleration and start_time."""
     path = measured(rates, course)
     scaling = time_scaling(path, part.speed, part.acceleration, part.start_time)
     return Pace(path.arc, scaling)
 
 
 def point_rates(path: Trajectory) -> Rates:
-    """Return what a length is measured on: dp/du and its rate."""
+    """Return the rates from which a length is computed: dp/du and its rate."""
     own, plan = own_motion(path)
 
     def rates(u: float) -> tuple[Array, Array]:
@@ -63,7 +63,7 @@ def point_rates(path: Trajectory) -> Rates:
 
 
 def angle_rates(path: OrientationTrajectory) -> Rates:
-    """Return what an angle is measured on: ω and its rate, by u."""
+    """Return the rates from which an angle is computed: ω and its rate, by u."""
     own, plan = own_motion(path)
 
     def rates(u: float) -> tuple[Array, Array]:
@@ -74,7 +74,7 @@ def angle_rates(path: OrientationTrajectory) -> Rates:
 
 
 def pose_pace(path: PoseTrajectory, course: Course, part: Any) -> tuple[Pace, bool]:
-    """Return how a part follows poses, and whether their length is the angle."""
+    """Return the timing of poses, and whether their length is the angle."""
     own, plan = own_motion(path)
     position, orientation = own
 
@@ -136,7 +136,7 @@ class Along(Trajectory, type="along"):
     """x(t) = p(s(t)): the path of any motion, at a speed along it, s its length.
 
     x' = p' s' and x'' = p' s'' + p'' s'², with p' and p'' by s. The path's own times
-    say where it goes, and no longer how fast.
+    define only its shape, not its speed.
 
     With an acceleration the motion goes from rest to rest, and is C² where the path is:
     the speed is a trapezoid with cubic ramps. x'' is fed forward: at the corners of a
@@ -147,9 +147,9 @@ class Along(Trajectory, type="along"):
     then jumps, unless it goes on for ever, as a circle does: blend into it.
 
     Raises:
-        TrajectoryError: Where no speed passes (a corner), or where the path bends so
-            much that v²/r is more than the acceleration. The message gives the place,
-            and which speed would do.
+        TrajectoryError: At a corner, which can only be passed at rest, or where the
+        path bends so much that v²/r is more than the acceleration. The message gives
+        the place, and a feasible speed.
 
     References:
         B. Siciliano, L. Sciavicco, L. Villani, G. Oriolo, "Robotics: Modelling,
@@ -157,8 +157,8 @@ class Along(Trajectory, type="along"):
     """
 
     path: Trajectory
-    """p. Of its times only the order matters, and for a spline its shape; of a circle's
-    rate the sense."""
+    """p. Only the order of its times is used, and for a spline its shape; of a circle's
+    rate only the sense."""
     speed: Positive
     """Largest speed v along the path [m/s, or the task's unit per s]."""
     acceleration: Positive | None = None
@@ -177,13 +177,13 @@ class Along(Trajectory, type="along"):
 
     @property
     def relative(self) -> bool:
-        """Whether the path depends on where the robot starts."""
+        """Whether the path depends on the robot's start."""
         return self.path.relative or super().relative
 
     def anchored(self, start: ArrayLike | None) -> Trajectory:
         """Return the path in the world; see `Trajectory.anchored`."""
         if self.origin == "start":
-            return super().anchored(start)  # which refuses it: the path has an origin
+            return super().anchored(start)  # raises: the path has an origin
         return replace(self, path=self.path.anchored(start)) if self.relative else self
 
     @property
@@ -218,11 +218,11 @@ def course_of(pace: Pace) -> Course | None:
 class AlongOrientation(OrientationTrajectory, type="along"):
     """R(t) = P(s(t)): the orientations of any motion, at an angular speed.
 
-    s is the angle through which the body has turned; all else is as in `Along`.
+    s is the angle through which the body has rotated; everything else is as in `Along`.
     """
 
     path: OrientationTrajectory
-    """P. Of its times only the order matters, of a spin's rate the sense."""
+    """P. Only the order of its times is used, and of a spin's rate the sense."""
     speed: Positive
     """Largest angular speed |ω| [rad/s]."""
     acceleration: Positive | None = None
@@ -241,7 +241,7 @@ class AlongOrientation(OrientationTrajectory, type="along"):
 
     @property
     def relative(self) -> bool:
-        """Whether the path depends on how the robot starts."""
+        """Whether the path depends on the robot's start."""
         return self.path.relative
 
     def anchored(self, start: ArrayLike) -> Self:
@@ -269,14 +269,14 @@ class AlongOrientation(OrientationTrajectory, type="along"):
 class AlongPose(PoseTrajectory, type="along_pose"):
     """M(t) = P(s(t)): the poses of any motion, at a speed of its origin.
 
-    s is the length of the origin's path, and the rotation keeps pace with it. Where the
-    origin stays, s is the angle through which the body turns, speed is in rad/s, and
-    acceleration in rad/s². All else is as in `Along`.
+    s is the length of the origin's path, and the rotation is synchronous with it. If
+    the origin is constant, s is the angle through which the body rotates, speed is in
+    rad/s, and acceleration in rad/s². Everything else is as in `Along`.
     """
 
     path: PoseTrajectory
-    """P. Of its times only the order matters; a position and an orientation that it is
-    composed of stay together."""
+    """P. Only the order of its times is used; its position and its orientation stay
+    synchronous."""
     speed: Positive
     """Largest speed v of the origin [m/s, or rad/s]."""
     acceleration: Positive | None = None
@@ -295,7 +295,7 @@ class AlongPose(PoseTrajectory, type="along_pose"):
 
     @property
     def relative(self) -> bool:
-        """Whether the path depends on where the robot starts."""
+        """Whether the path depends on the robot's start."""
         return self.path.relative
 
     def anchored(self, start: pin.SE3) -> "AlongPose":
@@ -309,7 +309,7 @@ class AlongPose(PoseTrajectory, type="along_pose"):
 
     @cached_property
     def _pace(self) -> tuple[Pace, bool]:
-        """How the path is followed, and whether its length is the angle."""
+        """The timing of the path, and whether its length is the angle."""
         return pose_pace(self.path, followed(self.path, self.interval), self)
 
     def sample(self, t: float, out: PoseSample | None = None) -> PoseSample:

@@ -11,26 +11,28 @@ from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import TrajectoryError
 
 Rates = Callable[[float], tuple[Array, Array]]
-"""What the length of a path is measured on: y = dp/du and dy/du at a parameter u."""
+"""Rates from which a path's length is computed: y = dp/du and dy/du at a parameter
+u."""
 
 
 class Course(NamedTuple):
-    """The times between which a motion goes along its path."""
+    """The interval of times in which a motion traverses its path."""
 
-    knots: Array  # where it begins, one smooth piece joins the next, and it ends, (m,)
-    repeats: bool  # whether the same rates follow again and again: a circle
+    knots: Array  # its start, the joints of smooth pieces, and its end, (m,)
+    repeats: bool  # whether it is periodic: a circle
 
     @classmethod
     def turn(cls, rate: float) -> Self:
-        """Return one period of what repeats at a rate [rad/s], for ever."""
+        """Return one period of a periodic motion with a rate [rad/s]."""
         return cls(np.array([0.0, 2.0 * pi / abs(rate) if rate else 1.0]), True)
 
 
 class ArcLength(NamedTuple):
     """s(u): a polynomial in each cell from one knot to the next; see the engine's.
 
-    Its rate is |dp/du| but for 1e-13 of the largest |dp/du|. The rates of a motion that
-    follows the path are those of p itself: they are the motion's to that much.
+    Its rate is |dp/du| up to 1e-13 of the largest |dp/du|. The rates of a motion that
+    follows the path are computed from p itself, and agree with the motion to that
+    accuracy.
     """
 
     knots: Array  # u, increasing, (m,)
@@ -40,7 +42,7 @@ class ArcLength(NamedTuple):
 
 
 class Path(NamedTuple):
-    """The length along a path, and how much it bends at points that are close."""
+    """The length along a path, and its curvature at closely spaced points."""
 
     arc: ArcLength
     places: Array  # s of these points, (k,)
@@ -56,7 +58,7 @@ class TimeScaling(NamedTuple):
     """s(t): see the engine's."""
 
     start_time: float
-    speed: float  # the largest that is reached
+    speed: float  # the largest reached speed
     ramp: float  # duration of the rise and of the fall [s]
     length: float
 
@@ -81,11 +83,13 @@ _TO_POWERS = np.array(
 _TO_LEGENDRE = (np.arange(NODES) + 0.5)[:, np.newaxis] * _LEGENDRE.T * _WEIGHTS
 _ROUNDING = 2e-15  # share of the largest coefficient that is rounding error
 
-_EXACT = 1e-13  # error of |dp/du| beside its largest value, at which no cell is divided
-_NOISE = 1e-8  # from here on a cell is not divided if that does not help
+_EXACT = 1e-13  # relative error of |dp/du| below which no cell is divided
+_NOISE = 1e-8  # above it a cell is not divided if that does not help
 _DEPTH = 12  # a piece is divided into 2^12 cells at most
 _TURN = 0.99  # cosine of the angle between neighbours: the path turns by 8° at most
-_REST = 1e-9  # share of the largest |dp/du| at which the path's own motion rests
+_REST = (
+    1e-9  # share of the largest |dp/du| below which the path's own motion is at rest
+)
 
 
 class _Cell(NamedTuple):
@@ -101,8 +105,8 @@ def measured(rates: Rates, course: Course) -> Path:
     """Return the length along a path.
 
     Raises:
-        TrajectoryError: If nothing moves, or if the path has a place that no speed but
-            0 passes: a corner, or a point at which its own motion rests.
+        TrajectoryError: If nothing moves, or if the path has a place that can only be
+        passed at rest: a corner, or a point at which its own motion stops.
     """
     knots = course.knots
     largest = max(
@@ -142,7 +146,7 @@ def _inside(a: float, b: float, points: Array) -> Array:
 def _check_joint(
     rates: Rates, u: float, width: float, largest: float, s: float
 ) -> None:
-    """Refuse a knot at which the path's own motion rests, or has a corner."""
+    """Refuse a knot at which the path's own motion stops, or has a corner."""
     before, after = (rates(u + k * 1e-9 * width)[0] for k in (-1, 1))
     lengths = [float(np.linalg.norm(each)) for each in (before, after)]
     if min(lengths) <= _REST * largest:
@@ -154,25 +158,26 @@ def _check_joint(
 
 def _rest(s: float, u: float) -> TrajectoryError:
     return TrajectoryError(
-        f"at s = {s:.3f} along the path its own motion rests (at {u:.4g} s): no speed "
-        "but 0 passes it; give a path that does not stop there"
+        f"at s = {s:.3f} along the path its own motion stops (at {u:.4g} s): it can "
+        "only be passed at rest; give a path that does not stop there"
     )
 
 
 def _corner(s: float, u: float) -> TrajectoryError:
     return TrajectoryError(
-        f"at s = {s:.3f} along the path (its own time is {u:.4g} s) it has a corner or "
-        "turns back: no speed but 0 passes it; round it, or end the path there"
+        f"at s = {s:.3f} along the path (its own time is {u:.4g} s) it has a corner "
+        "or turns back: it can only be passed at rest; round it, or end the path "
+        "there"
     )
 
 
 def _cells(
     rates: Rates, start: float, end: float, largest: float, length: float
 ) -> Iterator[_Cell]:
-    """Give the cells of one piece, in order; ``length``: of what lies before it.
+    """Yield the cells of one piece, in order; ``length``: of the path before it.
 
-    A cell is halved until a polynomial fits |dp/du|, and until the path turns by little
-    from each point to the next.
+    A cell is halved until a polynomial fits |dp/du|, and until the direction changes
+    little between neighbouring points.
     """
     waiting = [(start, end, 0, inf)]
     while waiting:
@@ -219,7 +224,7 @@ def _fitted(g: Array, largest: float) -> tuple[Array, float]:
     The error is that between the nodes, as a share of the largest |dp/du|.
     """
     c = _TO_LEGENDRE @ g[:NODES]
-    c[np.abs(c) < _ROUNDING * largest] = 0.0  # as powers they would cost digits
+    c[np.abs(c) < _ROUNDING * largest] = 0.0  # as powers they would lose digits
     c = c @ _TO_POWERS
     return c, float(np.abs(_AT_BETWEEN @ c - g[NODES:]).max()) / largest
 
@@ -240,7 +245,9 @@ def time_scaling(
     if acceleration is None:
         return scaling
     needed = path.curvatures * _speeds(scaling, path.places) ** 2
-    worst = int(np.argmax(needed >= needed.max() * (1.0 - 1e-9)))  # the first of many
+    worst = int(
+        np.argmax(needed >= needed.max() * (1.0 - 1e-9))
+    )  # the first of equal ones
     if needed[worst] <= acceleration * (1.0 + 1e-9):
         return scaling
     raise TrajectoryError(
@@ -264,7 +271,7 @@ def _scaling(
 
 def _speeds(scaling: TimeScaling, places: Array) -> Array:
     """Return s' at lengths s, shape (k,)."""
-    if scaling.ramp == 0.0 or isinf(scaling.length):  # each place is passed at last
+    if scaling.ramp == 0.0 or isinf(scaling.length):  # each place is passed eventually
         return np.full(len(places), scaling.speed)
     # s = v T u³ (1 - u/2) on a ramp, by bisection
     ahead = np.minimum(places, scaling.length - places)
@@ -278,7 +285,7 @@ def _speeds(scaling: TimeScaling, places: Array) -> Array:
 
 
 def _feasible(path: Path, speed: float, acceleration: float) -> float:
-    """Return a speed that the path's bends permit, in three digits."""
+    """Return a speed permitted by the path's bends, with three digits."""
     for _ in range(100):
         scaling = _scaling(path.length, speed, acceleration, 0.0)
         needed = path.curvatures * _speeds(scaling, path.places) ** 2

@@ -54,7 +54,7 @@ class Blend(Trajectory, type="blend"):
 
     @property
     def relative(self) -> bool:
-        """Whether it, or the trajectory, depends on where the robot starts."""
+        """Whether it, or the trajectory, depends on the robot's start."""
         return self.trajectory.relative or super().relative
 
     def anchored(self, start: ArrayLike | None) -> Trajectory:
@@ -109,7 +109,7 @@ class BlendOrientation(OrientationTrajectory, type="blend"):
 
     @property
     def relative(self) -> bool:
-        """Whether it, or the trajectory, depends on how the robot starts."""
+        """Whether it, or the trajectory, depends on the robot's start."""
         return self.rotation is None or self.trajectory.relative
 
     def anchored(self, start: ArrayLike) -> Self:
@@ -147,7 +147,7 @@ class BlendOrientation(OrientationTrajectory, type="blend"):
 def offset_coefficients(
     start: OrientationSample, desired: OrientationSample, duration: float
 ) -> Array:
-    """Return the coefficients of y, with R_d exp(y), ω and ω' those of a start.
+    """Return the coefficients of y for which R_d exp(y), ω and ω' are those of a start.
 
     w = Jexp(y) y' is the angular velocity relative to R_d, in the body frame.
 

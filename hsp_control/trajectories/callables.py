@@ -47,7 +47,7 @@ def both_derivatives(
 
 
 class CallableTrajectory(Trajectory):
-    """x(t) = f(t); derivatives that are not given are numerical.
+    """x(t) = f(t); omitted derivatives are numerical.
 
     They are central differences of sixth order over seven points,
     with an error of about 1e-10 for motions of a few rad/s. The function must be

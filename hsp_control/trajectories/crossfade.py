@@ -31,8 +31,8 @@ from hsp_control.trajectories.trajectory import (
 AnyReference = Trajectory | OrientationTrajectory | PoseTrajectory
 
 MOST_OVERLAPPING = 64
-"""Changes of one reference that may overlap: the next one takes 40 ms then, and parts
-that contain a few hundred of one another are beyond Python's own limit."""
+"""Maximum number of changes of one reference that overlap: the next one then needs 40
+ms, and a nesting of a few hundred parts exceeds Python's limit."""
 
 
 class Crossfade(Trajectory, type="crossfade"):
@@ -61,7 +61,7 @@ class Crossfade(Trajectory, type="crossfade"):
 
     @property
     def relative(self) -> bool:
-        """Whether one of them depends on where the robot starts."""
+        """Whether one of them depends on the robot's start."""
         return self.before.relative or self.after.relative
 
     def anchored(self, start: ArrayLike | None) -> "Crossfade":
@@ -90,7 +90,7 @@ class Crossfade(Trajectory, type="crossfade"):
 
     def sample(self, t: float, out: TrajectorySample | None = None) -> TrajectorySample:
         """Return the point at time t; see `Trajectory.sample`."""
-        if t >= self.start_time + self.duration:  # a stream may know x_0 no more
+        if t >= self.start_time + self.duration:  # a stream may have dropped x_0
             return self.after.sample(t, self._output(out))
         return super().sample(t, out)
 
@@ -121,7 +121,7 @@ class CrossfadeOrientation(OrientationTrajectory, type="crossfade"):
 
     @property
     def relative(self) -> bool:
-        """Whether one of them depends on how the robot starts."""
+        """Whether one of them depends on the robot's start."""
         return self.before.relative or self.after.relative
 
     def anchored(self, start: ArrayLike) -> "CrossfadeOrientation":
@@ -150,9 +150,9 @@ class CrossfadeOrientation(OrientationTrajectory, type="crossfade"):
         """Return the orientation at time t; see `OrientationTrajectory.sample`."""
         out = self._output(out)
         end = self.start_time + self.duration
-        if t >= end:  # a stream may know R_0 no more
+        if t >= end:  # a stream may have dropped R_0
             return self.after.sample(t, out)
-        if self._streams:  # for copies, whose blend is another one
+        if self._streams:  # for copies, which have their own blend
             self.keep_start(end)
         if t < self.start_time:
             return self.before.sample(t, out)
@@ -163,7 +163,7 @@ class CrossfadeOrientation(OrientationTrajectory, type="crossfade"):
         return _calls(self, out) or super().calls(out)
 
     def keep_start(self, until: float) -> None:
-        """Let streams know until a time how R_0 was where the change began."""
+        """Make streams keep R_0 at the start of the change until a time."""
         for stream in self._streams:
             stream.run.keep(self.start_time, until)
         for earlier in self._earlier:
@@ -179,7 +179,7 @@ class CrossfadeOrientation(OrientationTrajectory, type="crossfade"):
 
     @cached_property
     def _coefficients(self) -> Array:
-        """Those of y, which begins with R_0's derivatives; shape (6, 3)."""
+        """The coefficients of y, which begins with R_0's derivatives; shape (6, 3)."""
         if self.duration == 0.0:
             return np.zeros((6, 3))
         start = self.before.sample(self.start_time)
@@ -260,14 +260,14 @@ def _check_overlapping(part: Crossfade | CrossfadeOrientation) -> None:
 
 
 def _calls(part: Crossfade | CrossfadeOrientation, out: Any) -> PartCalls:
-    """Return the calls of a change that streams follow: their past is forgotten."""
+    """Return the calls of a change of streams, whose past is dropped."""
     if any(True for _ in parts_within(part, FollowedStream)):
         return [PartCall(_ChangeOfStreams(part, out), t=TIME)]
     return []
 
 
 class _ChangeOfStreams:
-    """Writes the sample of a change that streams follow; its mixing is bound ahead."""
+    """Writes the sample of a change of streams; its mixing is bound in advance."""
 
     def __init__(self, part: Crossfade | CrossfadeOrientation, out: Any) -> None:
         self._part, self._out = part, out
@@ -278,7 +278,7 @@ class _ChangeOfStreams:
         if isinstance(part, CrossfadeOrientation):
             kind = engine.CrossfadeOrientation
             given["coefficients"] = self._coefficients
-        self._known = False  # whether these are: in the change, and not before
+        self._known = False  # whether these are computed: during the change, not before
         times = {"start_time": part.start_time, "duration": part.duration}
         call = PartCall(kind, **times, **given, t=TIME)
         self._mix = Plan(planned([call]).steps())
@@ -289,7 +289,7 @@ class _ChangeOfStreams:
         before: Any = part.before
         after: Any = part.after
         end = part.start_time + part.duration
-        if t >= end:  # a stream may know the past no more
+        if t >= end:  # a stream may have dropped the past
             write_sample(t, after.sample, out)
             return
         if isinstance(part, CrossfadeOrientation):
@@ -332,9 +332,9 @@ Kind = TypeVar("Kind")
 
 
 def settled(part: Kind, t: float) -> Kind:
-    """Return a part, or several, for times from t [s] on: what is over is left out.
+    """Return a part, or several, for times from t [s] on, without completed changes.
 
-    A reference that has changed is then the new one: it grows with no change.
+    A reference after its change is then the new one, so that nothing accumulates.
     """
     kinds: Any = (Crossfade, CrossfadeOrientation, ComposedPose)
     found: Kind = with_parts_replaced(part, kinds, lambda each: _settled(each, t))
@@ -356,7 +356,7 @@ def _settled(part: Crossfade | CrossfadeOrientation | ComposedPose, t: float) ->
 
 
 def _last(reference: Any, t: float) -> Any:
-    """Return what a reference has changed into, if all of that is over at a time."""
+    """Return the final reference of a change, if it is complete at a time."""
     while isinstance(reference, Crossfade | CrossfadeOrientation):
         if reference.start_time + reference.duration > t:
             break

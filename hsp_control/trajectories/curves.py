@@ -1,4 +1,4 @@
-"""Curves in closed form: a circle, a Lissajous figure, a line without end."""
+"""Curves in closed form: a circle, a Lissajous figure, an infinite line."""
 
 from dataclasses import KW_ONLY
 from fractions import Fraction
@@ -66,7 +66,7 @@ class Circle(Trajectory, type="circle"):
 
     @property
     def course(self) -> Course:
-        """One turn, again and again."""
+        """One turn, repeated."""
         return Course.turn(self.angular_rate)
 
     @cached_property
@@ -143,7 +143,7 @@ class Lissajous(Trajectory, type="lissajous"):
 
     @property
     def course(self) -> Course | None:
-        """One period, again and again, where the rates have a common one."""
+        """One period, repeated, if the rates have a common one."""
         rates = np.asarray(self.rates)[np.asarray(self.rates) != 0.0]
         if not len(rates):
             return None
@@ -187,7 +187,7 @@ class UniformLine(Trajectory, type="uniform_line"):
 
     @property
     def course(self) -> Course:
-        """The line of one second, again and again."""
+        """The line of one second, repeated."""
         return Course(np.array([0.0, 1.0]), True)
 
     def call(self) -> PartCall:

@@ -49,7 +49,7 @@ class Hold(Trajectory, type="hold"):
 
 
 class SetPoint(Trajectory):
-    """x(t) that is written elsewhere, while it is followed; without rates."""
+    """x(t) that is written elsewhere at run time; without rates."""
 
     numbers: InstanceOf[np.ndarray]
     """x, shape (n,), read in each step [m, or the task's unit]."""
@@ -83,7 +83,7 @@ class HoldOrientation(OrientationTrajectory, type="hold"):
 
     @classmethod
     def of_value(cls, value: object) -> Self | None:
-        """Return what a quaternion, a matrix, or roll, pitch and yaw mean."""
+        """Return the orientation of a quaternion, a matrix, or roll, pitch and yaw."""
         if isinstance(value, pin.Quaternion):
             return cls(value)
         given = numbers(value)

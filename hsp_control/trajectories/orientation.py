@@ -56,7 +56,7 @@ class OrientationTrajectory(Part, ABC, family="orientations", error=TrajectoryEr
 
     @property
     def relative(self) -> bool:
-        """Whether it depends on where the robot starts."""
+        """Whether it depends on the robot's start."""
         return getattr(self, "rotation", self) is None
 
     def anchored(self, start: ArrayLike) -> "OrientationTrajectory":
@@ -73,7 +73,7 @@ class OrientationTrajectory(Part, ABC, family="orientations", error=TrajectoryEr
 
     @property
     def course(self) -> Course | None:
-        """The times between which it turns; see `Trajectory.course`."""
+        """The interval in which it rotates; see `Trajectory.course`."""
         return None
 
     def call(self) -> PartCall:
@@ -175,7 +175,7 @@ class Spin(OrientationTrajectory, type="spin"):
 
     @property
     def course(self) -> Course:
-        """One turn, again and again."""
+        """One turn, repeated."""
         return Course.turn(self.rate)
 
     def call(self) -> PartCall:

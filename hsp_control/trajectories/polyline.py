@@ -37,7 +37,7 @@ from hsp_control.trajectories.pose import ComposedPose, PoseSample, PoseTrajecto
 from hsp_control.trajectories.trajectory import Trajectory
 
 STRAIGHT = 1e-9  # angle [rad] between two lines below which they are one
-BACK = pi - 1e-6  # from this angle on they lead back
+BACK = pi - 1e-6  # angle from which on they reverse
 
 
 class RoundedLines(NamedTuple):
@@ -74,7 +74,7 @@ def rounded_lines(waypoints: Array, radius: float) -> RoundedLines:
     rest = np.zeros(waypoints.shape[1])
     for i, (start, along) in enumerate(zip(waypoints, directions, strict=False)):
         straight = lengths[i] - cut[i] - cut[i + 1]
-        if straight > 1e-12 * lengths[i]:  # else one blend follows the other
+        if straight > 1e-12 * lengths[i]:  # otherwise one blend follows the other
             line = [start + cut[i] * along, straight * along, *[rest] * 4]
             coefficients.append(np.stack(line))
             times.append(times[-1] + straight)
@@ -104,13 +104,13 @@ def _check(angles: Array, cut: Array, lengths: Array) -> None:
     for i, angle in enumerate(angles):
         if angle > BACK:
             raise TrajectoryError(
-                f"the path turns back at waypoint {i}: no speed but 0 passes it; use "
-                "stops, or a waypoint beside it"
+                f"the path turns back at waypoint {i}: it can only be passed at rest; "
+                "use stops, or a waypoint beside it"
             )
         if angle > STRAIGHT and not cut[i] > 0.0:
             raise TrajectoryError(
-                f"waypoint {i} is a corner of {np.degrees(angle):.3g} degrees: no "
-                "speed but 0 passes it; give blend_radius, or use stops"
+                f"waypoint {i} is a corner of {np.degrees(angle):.3g} degrees: it can "
+                "only be passed at rest; give blend_radius, or use stops"
             )
     for i, length in enumerate(lengths):
         if cut[i] + cut[i + 1] > length * (1.0 + 1e-12):
@@ -125,16 +125,16 @@ def _check(angles: Array, cut: Array, lengths: Array) -> None:
 class Polyline(Trajectory, type="polyline"):
     """Straight lines through waypoints with rounded corners, at a speed along them.
 
-    It begins at the first waypoint and ends at the last. What is nearer to another one
-    than the blend radius is rounded, by a polynomial whose curvature begins and ends at
-    zero; at a right angle the path passes a waypoint at 0.36 radii, and its sharpest
+    It begins at the first waypoint and ends at the last. Within the blend radius of an
+    inner waypoint the path is rounded by a polynomial whose curvature begins and ends
+    at zero; at a right angle the path passes a waypoint at 0.36 radii, and its sharpest
     bend has a radius of 0.84. The motion is C² and goes from rest to rest; see `Along`
     for its speed. `Stops` rests at each waypoint.
 
     Raises:
-        TrajectoryError: At a corner that is not rounded, where a blend does not fit,
-            and where a bend needs more than the acceleration across it. The message
-            gives the place, and what would do.
+        TrajectoryError: At a corner that is not rounded, if a blend does not fit, or if
+        a bend needs more than the acceleration across it. The message gives the place,
+        and a feasible value.
     """
 
     points: ClassVar[tuple[str, ...]] = ("waypoints",)
@@ -183,8 +183,8 @@ class Polyline(Trajectory, type="polyline"):
 class PolylinePose(PoseTrajectory, type="polyline_pose"):
     """Poses along a `Polyline` of the origin, at a speed of the origin.
 
-    Between two waypoints the body turns by the shortest rotation, by the `smooth_step`
-    of the way from one to the next: it does not turn where a waypoint is passed, and
+    Between two waypoints the body rotates by the shortest rotation, by the
+    `smooth_step` of the distance: its angular velocity is zero at each waypoint, and
     the motion is C².
     """
 
@@ -200,12 +200,11 @@ class PolylinePose(PoseTrajectory, type="polyline_pose"):
     _: KW_ONLY
     rotations: Rotations | None = None
     """An orientation for each waypoint, body to world: roll, pitch and yaw [rad], a
-    quaternion or a matrix [-]; held as the robot starts by default."""
+    quaternion or a matrix [-]; held at the robot's start by default."""
     start_time: Number = 0.0
     """Time at which the motion begins [s]."""
     origin: Literal["world", "start"] = "world"
-    """What the waypoints are counted from: the world's origin, or where the robot
-    starts."""
+    """Origin of the waypoints: the world's, or the robot's start."""
 
     def __post_init__(self) -> None:
         """Measure the path, which checks it; it is the same wherever it begins."""
@@ -213,7 +212,7 @@ class PolylinePose(PoseTrajectory, type="polyline_pose"):
 
     @property
     def relative(self) -> bool:
-        """Whether it depends on where the robot starts."""
+        """Whether it depends on the robot's start."""
         return self.origin == "start" or self.rotations is None
 
     def anchored(self, start: pin.SE3) -> "PolylinePose":
@@ -234,7 +233,7 @@ class PolylinePose(PoseTrajectory, type="polyline_pose"):
     def _path(self) -> ComposedPose:
         waypoints = checks.array(self.waypoints, "waypoints", (None, 3))
         path, passing = rounded_lines(waypoints, self.blend_radius)
-        if self.rotations is None:  # the length of the path is known all the same
+        if self.rotations is None:  # the length of the path is known nevertheless
             return ComposedPose(path, HoldOrientation(np.eye(3)))
         rotations = np.asarray(self.rotations)
         if len(rotations) != len(waypoints):

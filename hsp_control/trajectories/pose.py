@@ -14,7 +14,7 @@ from hsp_control.common.exceptions import TrajectoryError
 from hsp_control.declaration import Part
 from hsp_control.declaration.quantities import Number, Positive, Vector3, numbers
 from hsp_control.declaration.rotation import Rotation, matrix_of
-from hsp_control.engine.plans import TIME, PartCall, PartCalls, says
+from hsp_control.engine.plans import TIME, PartCall, PartCalls, implemented_by
 from hsp_control.engine.rotations import jlog3, log3
 from hsp_control.trajectories.arc_length import Course
 from hsp_control.trajectories.hold import Hold, HoldOrientation
@@ -58,13 +58,13 @@ class PoseTrajectory(Part, ABC, family="poses", error=TrajectoryError):
 
     Body to world; x is the body's origin [m], all rates are in world axes. A subclass
     declares its parameters as fields and implements `sample`; it may override `calls`,
-    see `Trajectory.calls`. If it can be relative to where the robot starts, it
-    overrides `relative` and `anchored`.
+    see `Trajectory.calls`. If it can be relative to the robot's start, it overrides
+    `relative` and `anchored`.
     """
 
     @property
     def relative(self) -> bool:
-        """Whether it depends on where the robot starts."""
+        """Whether it depends on the robot's start."""
         return False
 
     def anchored(self, start: pin.SE3) -> "PoseTrajectory":
@@ -73,7 +73,7 @@ class PoseTrajectory(Part, ABC, family="poses", error=TrajectoryError):
 
     @property
     def course(self) -> Course | None:
-        """The times between which it moves; see `Trajectory.course`."""
+        """The interval in which it moves; see `Trajectory.course`."""
         return None
 
     @abstractmethod
@@ -117,12 +117,12 @@ class ComposedPose(PoseTrajectory, type="composed"):
 
     @property
     def relative(self) -> bool:
-        """Whether one of them depends on where the robot starts."""
+        """Whether one of them depends on the robot's start."""
         return self.position.relative or self.orientation.relative
 
     @property
     def course(self) -> Course | None:
-        """That of the position, on which a length is measured, or of what turns."""
+        """The course of the position, which has the length, or of the orientation."""
         moves, turns = self.position.course, self.orientation.course
         if self.position.constant:
             return turns
@@ -146,7 +146,7 @@ class ComposedPose(PoseTrajectory, type="composed"):
         return out
 
     def calls(self, out: PoseSample) -> PartCalls:
-        """Return those of both; see `Trajectory.calls`."""
+        """Return the calls of both; see `Trajectory.calls`."""
         orientation = self.orientation.calls(out.orientation)
         return [*self.position.calls(out.position), *orientation]
 
@@ -174,11 +174,11 @@ class HoldPose(PoseTrajectory, type="hold_pose"):
 
     @property
     def relative(self) -> bool:
-        """Whether it depends on where the robot starts."""
+        """Whether it depends on the robot's start."""
         return self.position is None or self.rotation is None
 
     def anchored(self, start: pin.SE3) -> "HoldPose":
-        """Return the pose, where the robot starts if it is not given."""
+        """Return the pose, by default that of the robot's start."""
         return HoldPose(
             start.translation if self.position is None else self.position,
             start.rotation if self.rotation is None else self.rotation,
@@ -223,7 +223,7 @@ class ScrewInterpolation(PoseTrajectory, type="screw"):
 
     @property
     def relative(self) -> bool:
-        """Whether it depends on where the robot starts."""
+        """Whether it depends on the robot's start."""
         return self.start_position is None or self.start_rotation is None
 
     def anchored(self, start: pin.SE3) -> "ScrewInterpolation":
@@ -277,7 +277,7 @@ class ScrewInterpolation(PoseTrajectory, type="screw"):
 
     def calls(self, out: PoseSample) -> PartCalls:
         """Return the calls that write ``out``; see `Trajectory.calls`."""
-        if says(self, "calls", "sample") == "sample":  # of a class that derives from it
+        if implemented_by(self, "calls", "sample") == "sample":  # in a derived class
             return super().calls(out)
         return [self._call.given(out=out, t=TIME)]
 

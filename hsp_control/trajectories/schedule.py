@@ -1,4 +1,4 @@
-"""Intervals in which something is active, with smooth ramps."""
+"""Intervals of activity, with smooth ramps."""
 
 from collections.abc import Sequence
 from functools import cached_property
@@ -58,7 +58,7 @@ class Schedule(Part, error=ScheduleError):
     """Duration of each rise and each fall, inside the intervals [s]."""
 
     def __post_init__(self) -> None:
-        """Check that intervals follow one another and have room for their ramps."""
+        """Check that intervals are in order and longer than their ramps."""
         previous = -np.inf
         for start, end in self.windows:
             if not start < end:
@@ -101,9 +101,9 @@ class Schedule(Part, error=ScheduleError):
         return any(start <= t < end for start, end in self.windows)
 
     def edge(self, t: float) -> float:
-        """Return when it is not active, just before or after the interval about t [s].
+        """Return a time just before or after the interval around t, inactive there [s].
 
-        It is the nearer one of the two.
+        The nearer one of the two is returned.
         """
         for start, end in self.windows:
             if start <= t < end:

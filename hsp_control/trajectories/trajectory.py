@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike
 from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import ShapeError, TrajectoryError
 from hsp_control.declaration import Part
-from hsp_control.engine.plans import TIME, PartCall, PartCalls, bind, says
+from hsp_control.engine.plans import TIME, PartCall, PartCalls, bind, implemented_by
 from hsp_control.trajectories.arc_length import Course
 
 
@@ -31,7 +31,7 @@ def calls_of_sample(trajectory: Any, out: Any) -> PartCalls:
     if trajectory.constant:
         trajectory.sample(0.0, out)
         return []
-    if says(trajectory, "call", "sample") == "call":
+    if implemented_by(trajectory, "call", "sample") == "call":
         return [trajectory.call().given(out=out, t=TIME)]
     return [PartCall(write_sample, sampler=trajectory.sample, out=out, t=TIME)]
 
@@ -73,10 +73,9 @@ class Trajectory(Part, ABC, family="trajectories", error=TrajectoryError):
     unit; a task defines its frame and units. A motion of finite duration rests at its
     first point before the start and at its last point after the end.
 
-    Points may be relative to where the robot starts: those that ``origin: start``
-    moves, and those that are omitted. Such a trajectory cannot be sampled; `anchored`
-    returns it with all points in the world. Name the fields that hold points in
-    `points`.
+    Points may be relative to the robot's start: those moved by ``origin: start``, and
+    omitted ones. Such a trajectory cannot be sampled; `anchored` returns it with all
+    points in the world. Name the fields that hold points in `points`.
 
     Attributes:
         constant: Whether it rests at one point for ever.
@@ -87,12 +86,11 @@ class Trajectory(Part, ABC, family="trajectories", error=TrajectoryError):
 
     _: KW_ONLY
     origin: Literal["world", "start"] = "world"
-    """What the points are counted from: the world's origin, or where the robot
-    starts."""
+    """Origin of the points: the world's, or the robot's start."""
 
     @property
     def relative(self) -> bool:
-        """Whether it depends on where the robot starts."""
+        """Whether it depends on the robot's start."""
         return self.origin == "start" or any(
             getattr(self, name) is None for name in self.points
         )
@@ -100,11 +98,11 @@ class Trajectory(Part, ABC, family="trajectories", error=TrajectoryError):
     def anchored(self, start: ArrayLike | None) -> "Trajectory":
         """Return this trajectory in the world, for a robot that starts at a point.
 
-        A stream returns what it is in a new run; all others one of their own type.
+        A stream returns its reference in a new run; all others return their own type.
 
         Args:
-            start: Where the robot starts, in the trajectory's coordinates, shape (n,);
-                None: nothing starts here, as in the case of an obstacle.
+            start: The robot's start, in the trajectory's coordinates, shape (n,); None:
+            there is none, as for an obstacle.
 
         Raises:
             TrajectoryError: If it has another dimension, or is relative to a start that
@@ -146,7 +144,7 @@ class Trajectory(Part, ABC, family="trajectories", error=TrajectoryError):
 
     @property
     def course(self) -> Course | None:
-        """The times between which it goes along its path; None: not known."""
+        """The interval in which it traverses its path; None: unknown."""
         return None
 
     def call(self) -> PartCall:

@@ -236,7 +236,7 @@ def test_a_log_that_does_not_hold_all_that_was_heard_is_not_repeated(
     run.meta["streams"]["hand"][0] = run.meta["streams"]["hand"][0][:3]
     log = run.save(tmp_path / "run.npz")
     with pytest.raises(
-        hsp.errors.ConfigError, match="'hand' took 8 messages, and the log holds 3 of"
+        hsp.errors.ConfigError, match="used 8 messages, and the log contains 3 of"
     ):
         hsp.load_experiment(log)
 

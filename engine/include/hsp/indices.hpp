@@ -1,5 +1,5 @@
-// Checks of what a step uses as indices, for the `check` of a kind: without them an index that is
-// out of range is memory of something else.
+// Checks of indices, for the `check` of a kind: without them an index out of range would access
+// other memory.
 #pragma once
 #include <hsp/view.hpp>
 #include <stdexcept>
@@ -30,8 +30,8 @@ inline void check_range(const char* name, std::int64_t begin, std::int64_t end, 
                               " to " + std::to_string(end) + " of " + std::to_string(size));
 }
 
-// Throws std::invalid_argument unless the rows from 0 on are divided into groups by where each
-// ends: no end is before the last one, or beyond all rows.
+// Throws std::invalid_argument unless the ends of groups of rows are in order: no end is before the
+// last one, or beyond all rows.
 template <class Ends> void check_ends(const char* name, const Ends& ends, Index rows) {
   Index start = 0;
   for (Index k = 0; k < ends.size(); start = ends[k++]) check_range(name, start, ends[k], rows);

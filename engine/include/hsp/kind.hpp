@@ -8,19 +8,19 @@
 //     Out<'n'> gradient;
 //     Scratch<'n'> away;               // no argument
 //     void operator()() { ... }        // or operator()(double t)
-//     void check() const { ... }       // optional: throws where arguments do not fit each other
+//     void check() const { ... }       // optional: throws if arguments are inconsistent
 //   };
 //
-// A group may have a `check`, too. What a step uses as an index is checked there, when the call is
-// made (`indices.hpp`), and not again: a step reads it as it is.
+// A group may have a `check`, too. Indices are checked there, when the call is made
+// (`indices.hpp`), and not again in a step.
 //
-// What operator() returns is a number with one meaning, given in `doc`: a value (f of a cost), or
-// a bool. Further results of a call it writes, into a record with names (`LawOutcome`).
+// operator() returns a number with one meaning, given in `doc`: a value (f of a cost), or a bool.
+// Further results of a call are written into a record with names (`LawOutcome`).
 //
-// The members are read into a table in C's layout, and whatever is the same for all kinds is
-// written once, over that table: the checks of shapes and entries, what Python sees, what a
-// call reads and writes. So a library of a user's own can bring kinds: it needs this header,
-// Eigen and Boost's headers, and neither Python nor this package's other sources.
+// The members are read into a table in C's layout, and everything common to all kinds is written
+// once, over that table: the checks of shapes and entries, the Python interface, the inputs and
+// outputs of a call. So a user's own library can declare kinds: it needs this header, Eigen and
+// Boost's headers, and neither Python nor this package's other sources.
 #pragma once
 #include <boost/pfr/core.hpp>
 #include <boost/pfr/core_name.hpp>
@@ -54,7 +54,7 @@ struct Kind {
   const Field* fields;
   void (*construct)(void* self);
   void (*destroy)(void* self);
-  // Returns null, or why the arguments do not fit. No exception goes from one library into
+  // Returns null, or why the arguments do not fit. No exception crosses from one library into
   // another: a wheel's engine has zig's C++ runtime, a kind compiled here has this computer's.
   const char* (*prepare)(void* self, const Sizes& size);
   double (*run)(void* self, double t);
@@ -196,7 +196,8 @@ template <class T> std::vector<Field> fields() {
 
 // The table of a struct's members, made once.
 template <class T> const Kind& kind_of() {
-  static_assert(requires { T::doc; }, "a kind says what it does: static constexpr const char* doc");
+  static_assert(requires { T::doc; },
+                "a kind needs a description: static constexpr const char* doc");
   static const std::vector<Field> fields = detail::fields<T>();
   static const Kind kind = {.name = detail::kept(detail::type_name<T>()),
                             .doc = T::doc,

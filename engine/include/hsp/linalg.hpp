@@ -1,6 +1,6 @@
 // Dense linear algebra for small matrices, without allocations.
 //
-// Decompositions of a wide B (m, n) work on its rows, as NumPy's matrices lie. The bounded
+// Decompositions of a wide B (m, n) work on its rows, as NumPy stores matrices. The bounded
 // inverse is B# = Qᵀ X: away from rank loss Q = X B has orthonormal rows and X is lower
 // triangular; near it Q = U B has orthogonal rows, and X = q(s²) U inverts the spectrum.
 #pragma once
@@ -110,7 +110,7 @@ template <class J, class Q, class X> double orthonormalise_rows(const J& rows, Q
 
 // Overwrite the lower triangle of Y (m, n), m ≤ n, with Y H's, and return det(Y Yᵀ). H is a
 // product of Householder's reflections: Y H is zero elsewhere, and has Y's singular values. The
-// rest of Y is used.
+// rest of Y is scratch memory.
 template <class Y> double triangularise_rows(Y& rows) {
   const Index m = rows.rows(), n = rows.cols();
   double product = 1.0;
@@ -145,8 +145,8 @@ template <class X> double smallest_singular_value_bound(const X& factor) {
 // Eigenvalues of a symmetric matrix; its memory is that of a size.
 using SymmetricSpectrum = Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd>;
 
-// The smallest singular value s of B, by X of Q = X B: 1/s² is the largest eigenvalue of X Xᵀ, and
-// more accurate than all others. `square` is used. Rounding in X is that of s, ε‖B‖.
+// The smallest singular value s of B, from X of Q = X B: 1/s² is the largest eigenvalue of X Xᵀ,
+// and the most accurate one. `square` is scratch memory. Rounding in X is that of s, ε‖B‖.
 template <class X, class S>
 double smallest_singular_value(const X& factor, S& square, SymmetricSpectrum& spectrum) {
   if ((factor.diagonal().array() == 0.0).any()) return 0.0;  // a row became zero
@@ -217,7 +217,7 @@ bool damped_inverse(const B& wide, double threshold, Q& q, X& factor) {
   return damped;
 }
 
-// The same, but without the spectrum where it is exact; `square` (m, m) is used.
+// The same, but without the spectrum where it is exact; `square` (m, m) is scratch memory.
 template <class B, class Q, class X, class S>
 bool bounded_inverse(const B& wide, double threshold, Q& q, X& factor, S& square) {
   return !exact_inverse(wide, threshold, q, factor, square) &&

@@ -5,7 +5,7 @@
 
 namespace hsp {
 
-// J a + J'v = a_x: the rows of a task; e is the reference minus what is.
+// J a + J'v = a_x: the rows of a task; e is the reference minus the actual value.
 template <template <int...> class As, int m = 'm'> struct TaskSample {
   As<m, 'n'> jacobian, jacobian_dot;
   As<m> error, error_rate, acceleration;
@@ -46,12 +46,12 @@ template <template <int...> class As> struct FrameMotion {
   As<3, 3> rotation;
   As<3> position;
   As<6> velocity;  // of the origin, and angular
-  // By how much the velocity is not J v, and its rate: the acceleration beyond J a + J'v. Zero but
-  // for a frame that moves in its joint, as while a tool is exchanged.
+  // The velocity in excess of J v, and its rate: the acceleration beyond J a + J'v. Zero except for
+  // a frame that moves in its joint, as during a tool change.
   As<6> own_velocity, own_acceleration;
 };
 
-// A point: the part of a frame's motion that does not turn.
+// A point: the translational part of a frame's motion.
 template <template <int...> class As> struct PointMotion {
   As<3, 'n'> jacobian, jacobian_dot;
   As<3> position, velocity;

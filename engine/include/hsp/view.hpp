@@ -24,7 +24,7 @@ using Matrix = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowM
 enum class Access : std::int32_t { In, Out, InOut, Number, Object };
 enum class Order : std::int32_t { Rows, Columns };
 
-// Letters begin at 'A'; what is below is the size itself.
+// Letters begin at 'A'; smaller values are the size itself.
 constexpr bool is_letter(int size) { return size >= 'A'; }
 constexpr int eigen_size(int size) { return is_letter(size) ? Eigen::Dynamic : size; }
 
@@ -119,7 +119,7 @@ template <class T> struct Shared {
   T* operator->() const { return object; }
 };
 
-// What the letters of a call stand for.
+// The sizes denoted by the letters of a call.
 class Sizes {
  public:
   std::int64_t& operator[](int letter) { return of_[letter - 'A']; }
@@ -129,7 +129,7 @@ class Sizes {
   std::int64_t of_['z' - 'A' + 1] = {};
 };
 
-// Memory of a call between its lines. It is no argument: the call allocates it once.
+// Scratch memory of a call, not an argument: the call allocates it once.
 template <int... sizes> struct Scratch : detail::Plain<double, Order::Rows, sizes...>::type {
   using Base = typename detail::Plain<double, Order::Rows, sizes...>::type;
   using Base::operator=;

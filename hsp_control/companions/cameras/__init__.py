@@ -1,3 +1,3 @@
-"""Cameras of a MuJoCo scene that another process looks through."""
+"""Pictures of a MuJoCo scene's cameras, for another process."""
 
 from hsp_control.companions.cameras.pictures import show as show

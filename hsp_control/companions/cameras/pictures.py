@@ -1,8 +1,7 @@
 """Pictures of a simulated robot's MuJoCo scene by HTTP: ``/CAMERA.jpg``.
 
-A separate process draws each picture on request, of the scene as it is
-then; what simulates the robot only copies its state. Without a graphics card Mesa
-draws.
+A separate process draws each picture on request, in the scene's state at that time; the
+simulation only copies its state. Without a graphics card Mesa draws.
 """
 
 import ctypes
@@ -35,19 +34,19 @@ _FORMATS: dict[str, dict[str, Any]] = {
 }
 _SIZE = {"width": 640, "height": 480}
 _LARGEST = 2048
-"""Most pixels of a side."""
+"""Maximum width and height [pixels]."""
 _SIZES = 4
-"""Of how many sizes pictures are drawn without a new start."""
+"""Number of picture sizes whose renderers are kept."""
 _PATIENCE = 60.0
-"""Longest time until the first picture could be drawn [s]."""
+"""Maximum time until the first picture can be drawn [s]."""
 _HANGS = 20.0
-"""After how much silence the process that draws hangs [s]: a large picture without a
-graphics card, the first of its size, takes some seconds."""
+"""Silence after which the drawing process is treated as hanging [s]: without a graphics
+card the first large picture of a size takes some seconds."""
 _INSTALL = "(pip install 'hsp_control[cameras]'; on Debian and Ubuntu also libegl1)"
 
 
 def show(address: str, plant: Plant) -> Callable[..., object]:
-    """Serve pictures of a plant; return what must be called after each of its steps.
+    """Serve pictures of a plant; return a function to call after each of its steps.
 
     Args:
         address: ``HOST:PORT``.
@@ -55,8 +54,8 @@ def show(address: str, plant: Plant) -> Callable[..., object]:
 
     Raises:
         HardwareError: If the address is invalid, the scene has no camera, or nothing
-            can be drawn here; by what is returned, if the process that draws has ended
-            or hangs.
+        can be drawn here; by the returned function, if the drawing process has ended or
+        hangs.
     """
     where = f"http://{address}"
     try:
@@ -94,14 +93,16 @@ def show(address: str, plant: Plant) -> Callable[..., object]:
     def tell(*_: object) -> None:
         nonlocal counted
         if drawing.exitcode is not None:
-            raise HardwareError(f"{where}: the process that draws there has ended")
+            raise HardwareError(
+                f"{where}: the process that draws its pictures has ended"
+            )
         before, counted = counted, alive.value
         if silence.look(monotonic(), heard=counted != before) > _HANGS:
             raise HardwareError(
-                f"{where}: the process that draws there has done nothing for "
+                f"{where}: the process that draws its pictures has not responded for "
                 f"{_HANGS:g} s"
             )
-        if lock.acquire(block=False):  # who draws has it for microseconds
+        if lock.acquire(block=False):  # the drawing process holds it for microseconds
             try:
                 mujoco.mj_getState(model, data, state, kind)
             finally:
@@ -109,7 +110,7 @@ def show(address: str, plant: Plant) -> Callable[..., object]:
 
     tell()
     drawing.start()
-    # Python ends such processes with a signal that one that hangs does not take.
+    # Python ends such processes with a signal that a hanging one does not receive.
     Finalize(drawing, drawing.kill, exitpriority=10)
     theirs.close()
     try:
@@ -117,12 +118,12 @@ def show(address: str, plant: Plant) -> Callable[..., object]:
         fault = ours.recv() if ready else f"it did not start in {_PATIENCE:g} s"
     except EOFError:
         fault = "its process has ended"
-    except BaseException:  # Ctrl-C, say
+    except BaseException:  # such as Ctrl-C
         drawing.kill()
         raise
     if fault:
         drawing.kill()
-        raise HardwareError(f"{where}: no pictures there: {fault}")
+        raise HardwareError(f"{where}: no pictures can be drawn: {fault}")
     return tell
 
 
@@ -135,7 +136,7 @@ def _serve(
     ready: Connection,
     alive: Any,
 ) -> None:
-    """Draw until the process that simulates has ended."""
+    """Draw until the simulating process has ended."""
     nothing = os.open(os.devnull, os.O_RDWR)
     for pipe in (0, 1):  # its parent's, which waits for their end
         os.dup2(nothing, pipe)
@@ -202,10 +203,10 @@ class _Drawer(HTTPServer):
     """Answers one request after another, in the thread that draws."""
 
     pictures: _Pictures
-    alive: Any  # what is counted up while it does something, also wait
+    alive: Any  # incremented while it is alive, also while it waits
 
     def service_actions(self) -> None:
-        """Say that it lives: twice a second, and after each request."""
+        """Report that it is alive: twice a second, and after each request."""
         self.alive.value += 1
 
 
@@ -216,7 +217,7 @@ class _Handler(BaseHTTPRequestHandler):
     timeout = 1.0  # of a client that sends no request [s]
 
     def do_GET(self) -> None:
-        """Send a picture, or say what there is."""
+        """Send a picture, or list the cameras."""
         try:
             camera, ending, size = _asked(self.path, self.server.pictures.cameras)
         except ValueError as error:
@@ -233,7 +234,7 @@ class _Handler(BaseHTTPRequestHandler):
         self.wfile.write(text.getvalue())
 
     def log_message(self, *_: Any) -> None:
-        """Say nothing."""
+        """Log nothing."""
 
 
 def _asked(path: str, cameras: list[str]) -> tuple[int, str, dict[str, int]]:

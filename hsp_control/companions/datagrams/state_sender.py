@@ -1,4 +1,4 @@
-"""A live loop sends what a policy needs, one JSON text in each datagram."""
+"""A live loop sends its state to a policy, one JSON text in each datagram."""
 
 import json
 import logging
@@ -22,16 +22,16 @@ from hsp_control.tasks import JointPosture
 from hsp_control.trajectories.streams.followed import FollowedStream
 
 _BYES = 3
-"""How often the end is sent: a datagram may be lost."""
+"""Number of datagrams that report the end: one may be lost."""
 _log = logging.getLogger(__name__)
 
 
 def publish(address: str, source: EffortSource) -> "Teller":
-    """Return what sends a loop's state to another process; see `Teller`.
+    """Return the sender of a loop's state to another process; see `Teller`.
 
     Args:
         address: ``HOST:PORT?rate=HZ``.
-        source: What computes the efforts.
+        source: The source of the efforts.
 
     Raises:
         HardwareError: If the address is invalid or unknown.
@@ -44,7 +44,7 @@ def publish(address: str, source: EffortSource) -> "Teller":
     for key in options:
         if key != "rate":
             raise HardwareError(
-                f"{where}: there is no option {key!r}{did_you_mean(key, ['rate'])} "
+                f"{where}: unknown option {key!r}{did_you_mean(key, ['rate'])} "
                 "(known: rate)"
             )
     to = address_of(f"udp://{name}")
@@ -67,8 +67,8 @@ def publish(address: str, source: EffortSource) -> "Teller":
 class Teller:
     """Sends the state of a loop to one address; `run_loop` calls it as ``on_period``.
 
-    Nobody need listen, and nothing waits: what cannot be sent is dropped, and logged
-    once. ``docs/companions/policies.md`` has the keys.
+    It needs no listener, and never waits: a datagram that cannot be sent is dropped,
+    and logged once. ``docs/companions/policies.md`` has the keys.
     """
 
     def __init__(self, to: Any, rate: float, source: EffortSource) -> None:
@@ -77,7 +77,7 @@ class Teller:
         Args:
             to: The address of the other side, host and port.
             rate: Datagrams in a second of the controller's time [1/s].
-            source: What computes the efforts.
+            source: The source of the efforts.
         """
         self._to, self._rate, self._source = to, Rate(rate), source
         self._socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
@@ -86,12 +86,12 @@ class Teller:
         robot, tasks = source.controller.robot, source.controller.tasks
         frames = [getattr(each, "frame", None) or robot.end_effector for each in tasks]
         self._frames = dict.fromkeys(frames or [robot.end_effector])
-        self._measured(source.controller.state)  # what it needs is bound now
+        self._measured(source.controller.state)  # bind its calls now
         self._poses(source.controller.state)
         source.log_channels()
 
     def __call__(self, t: float) -> None:
-        """Send the state, if it is time again.
+        """Send the state if it is due.
 
         Args:
             t: The controller's time [s].
@@ -112,7 +112,7 @@ class Teller:
         self._socket.close()
 
     def _state(self) -> dict[str, Any]:
-        """Return what a policy needs, as JSON data."""
+        """Return the state for a policy, as JSON data."""
         source = self._source
         state, output, controller = source.state, source.output, source.controller
         streams: dict[str, Any] = {}
@@ -146,7 +146,7 @@ class Teller:
         return found
 
     def _measured(self, state: RobotState) -> dict[str, dict[str, Any]]:
-        """Return where each task is, and where it should be."""
+        """Return the measured and the desired value of each task."""
         found: dict[str, dict[str, Any]] = {}
         for task in self._source.controller.tasks:
             reference, actual = map(_numbers, task.measure(state))
@@ -169,5 +169,5 @@ class Teller:
 
 
 def _numbers(values: Iterable[Any]) -> list[float | None]:
-    """Return numbers as JSON has them: it knows neither NaN nor Infinity."""
+    """Return numbers for JSON, which has neither NaN nor Infinity."""
     return [float(each) if isfinite(each) else None for each in values]

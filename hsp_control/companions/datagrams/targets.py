@@ -19,7 +19,7 @@ from hsp_control.trajectories.streams.message import Space, message_of, parsed
 
 SCHEME = "udp://"
 _LARGEST = 65_536
-_POLL = 0.2  # how soon a listener notices that nobody needs it any more [s]
+_POLL = 0.2  # time until a listener notices that its streams are gone [s]
 
 
 class Address(NamedTuple):
@@ -37,7 +37,7 @@ class Address(NamedTuple):
 
 
 def address_of(source: str) -> Address | None:
-    """Parse an address; None: it is none."""
+    """Parse an address; None if it is invalid."""
     try:
         parts = urlsplit(source)
         host, port = parts.hostname, parts.port
@@ -70,7 +70,7 @@ def is_local(source: str) -> bool:
 
 
 def opened(source: str, space: Space) -> Callable[["ref[Inbox]"], None]:
-    """Open the port of an address, if no stream did; return what listens there."""
+    """Open the port of an address, if no stream did; return its listener."""
     address = check_address(source)
     with _lock:
         port = _ports.get(address[:2])
@@ -79,18 +79,18 @@ def opened(source: str, space: Space) -> Callable[["ref[Inbox]"], None]:
         parts = [name for name, each in port.parts.items() if not each or each()]
         if parts and "" in (*parts, address.part):
             raise StreamError(
-                f"{source}: another stream of this process receives all that comes "
-                "there, or a part of it; give each its own udp://HOST:PORT/PART"
+                f"{source}: another stream of this process listens there already; "
+                "give each its own udp://HOST:PORT/PART"
             )
         port.parts[address.part] = None
     return partial(_listen, port, address.part)
 
 
 class _Port:
-    """A port, and the streams of this process that receive what comes there."""
+    """A port, and the streams of this process that receive its datagrams."""
 
     def __init__(self, address: Address) -> None:
-        self.parts: dict[str, ref[Inbox] | None] = {}  # None: it listens soon
+        self.parts: dict[str, ref[Inbox] | None] = {}  # None: it is about to listen
         self.reading = Lock()
         self._socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
         try:
@@ -105,9 +105,9 @@ class _Port:
         self._socket.settimeout(_POLL)
 
     def poll(self) -> None:
-        """Wait for a datagram; give each stream its part, or none if one is refused."""
+        """Wait for a datagram; pass each stream its part, or none if one is refused."""
         text: bytes | None = None
-        with suppress(OSError):  # nothing came
+        with suppress(OSError):  # no datagram
             text, (host, port) = self._socket.recvfrom(_LARGEST)
         parts, now = dict(self.parts), monotonic()
         there = {
@@ -136,7 +136,7 @@ class _Port:
 
 
 def _parts_of(text: bytes, inboxes: Mapping[str, Inbox]) -> dict[str, dict[str, Any]]:
-    """Return what each stream receives of a datagram; all of it is valid."""
+    """Return each stream's part of a valid datagram."""
     try:
         data = parsed(text)
     except (ValueError, RecursionError) as error:
@@ -152,7 +152,8 @@ def _parts_of(text: bytes, inboxes: Mapping[str, Inbox]) -> dict[str, dict[str, 
             continue
         if name not in inboxes:
             raise StreamError(
-                f"no stream of this port is {name!r:.40}{did_you_mean(name, inboxes)}"
+                f"no stream of this port is called {name!r:.40}"
+                f"{did_you_mean(name, inboxes)}"
             )
         if isinstance(message, Mapping):
             message = {"t": data.get("t"), **message}
@@ -164,7 +165,7 @@ def _parts_of(text: bytes, inboxes: Mapping[str, Inbox]) -> dict[str, dict[str, 
 
 @contextmanager
 def _naming(part: str) -> Iterator[None]:
-    """Put a part's name before what is wrong with it."""
+    """Prefix errors with a part's name."""
     try:
         yield
     except StreamError as error:
@@ -176,7 +177,7 @@ _lock = Lock()
 
 
 def _listen(port: _Port, part: str, inbox: "ref[Inbox]") -> None:
-    """Receive what comes for as long as an inbox is there, in turn with the others."""
+    """Receive datagrams while an inbox exists, in turn with the other listeners."""
     port.parts[part] = inbox
     try:
         while inbox() is not None:

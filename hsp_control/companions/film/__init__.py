@@ -4,7 +4,7 @@ from typing import TYPE_CHECKING
 
 from hsp_control.companions.shared import at_first_use
 
-if TYPE_CHECKING:  # for type checkers; a help text must not import what is slow
+if TYPE_CHECKING:  # for type checkers only: a help text must not import slow modules
     from .film import FilmStyle as FilmStyle
     from .film import export_film as export_film
 

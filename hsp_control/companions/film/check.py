@@ -1,4 +1,4 @@
-"""What ``hsp doctor`` reports on the browser that draws films."""
+"""The report of ``hsp doctor`` on the browser that draws films."""
 
 from hsp_control.cli.doctor import Check
 from hsp_control.companions.film.chromium import find_browser

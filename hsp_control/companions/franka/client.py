@@ -1,11 +1,11 @@
 """The process that holds the connection to a Franka arm; started by `ClientProcess`.
 
-libfranka waits without end for an answer when the control box closes the connection
-inside a command, and pylibfranka keeps the interpreter's lock while it waits, so that
-no thread of the same process could help. Its destructors may end the process. So it
-runs here, where the loop can kill it.
+libfranka waits for ever for an answer when the control box closes the connection inside
+a command, and pylibfranka keeps the interpreter's lock while it waits, so that no
+thread of the same process could help. Its destructors may end the process. So it runs
+here, where the loop can kill it.
 
-It does one request at a time, and needs nothing of hsp_control: it starts at once.
+It executes one request at a time, and imports nothing of hsp_control: it starts fast.
 Given an address to listen at, it drives the gripper instead.
 """
 
@@ -30,9 +30,9 @@ ANSWER, ERROR = b"A", b"X"
 LONGEST = 1 << 16
 """Longest message [bytes]."""
 SPEED, FORCE = 0.1, 30.0
-"""With which the gripper moves [m/s] and grasps [N]."""
+"""Speed [m/s] and grasping force [N] of the gripper."""
 _SAME = 0.001
-"""Openings of a finger that are one [m]."""
+"""Difference below which two openings of a finger are equal [m]."""
 _SILENCE = 2.0
 """Silence after which another sender is accepted [s]."""
 ALIVE = b"L"
@@ -72,7 +72,7 @@ class Client:
             return ERROR + json.dumps(answer).encode()
 
     def connect(self, wanted: dict[str, Any]) -> dict[str, Any]:
-        """Connect, set what is wanted, and return the robot's state and model."""
+        """Connect, apply the settings, and return the robot's state and model."""
         if (listens := wanted.get("gripper")) is not None:
             self.fingers = GripperClient(wanted["address"], *listens)
             return {"value": self.fingers.opening}
@@ -105,7 +105,7 @@ class Client:
         return {**described(state), "masses": masses, "gravities": gravities}
 
     def write(self, message: bytes, finished: bool = False) -> None:
-        """Send a request's effort, perhaps as the last one."""
+        """Send a request's effort, which may be the last one."""
         torques = self.library.Torques(list(REQUEST.unpack(message)[1:]))
         torques.motion_finished = finished
         self.control.writeOnce(torques)
@@ -117,7 +117,7 @@ def packed(state: Any) -> bytes:
 
 
 def described(state: Any) -> dict[str, Any]:
-    """Return what is logged once of a state: mode, errors, the load on the flange."""
+    """Return what a state logs once: mode, errors, the load on the flange."""
     errors = state.current_errors
     names = [name for name in dir(errors) if not name.startswith("_")]
     return {
@@ -140,10 +140,10 @@ def described(state: Any) -> dict[str, Any]:
 
 
 class GripperClient:
-    """Moves the gripper as JSON datagrams say, ``{"value": [0.02]}``: a finger [m].
+    """Moves the gripper by JSON datagrams, ``{"value": [0.02]}``: a finger [m].
 
-    Of messages during a motion the newest is used. A smaller opening grasps what is
-    there. The sender, also of a query ``{}``, receives its state.
+    Of messages during a motion the newest is used. A smaller opening grasps an object.
+    The sender, also of a query ``{}``, receives its state.
     """
 
     def __init__(self, address: str, host: str, port: int) -> None:
@@ -158,7 +158,7 @@ class GripperClient:
         self.last_beat = -_BEAT
 
     def serve(self, link: socket.socket) -> None:
-        """Do what comes until the loop ends; the fingers stay as they are then."""
+        """Execute messages until the loop ends; the fingers then keep their opening."""
         while True:
             wanted, waiting, listeners = self.opening, _BEAT, set()
             self.beat(link)
@@ -168,15 +168,15 @@ class GripperClient:
                     return
                 try:
                     text, sender = self.inbox.recvfrom(LONGEST)
-                except OSError:  # the listener is not there any more
+                except OSError:  # the listener is gone
                     continue
                 if is_answer(text) or sender == self.inbox.getsockname():
-                    continue  # our own, which came back: no answer to it would be last
+                    continue  # our own message: answering it would not end
                 listeners.add(sender)
                 waiting = 0.0
                 try:
                     wanted = self.read(json.loads(text), sender, wanted)
-                except Exception as error:  # a datagram may say anything
+                except Exception as error:  # a datagram may contain anything
                     self.say(f"a message is dropped: {error}")
             if not listeners:
                 continue
@@ -194,7 +194,7 @@ class GripperClient:
                     self.say(f"{listener[0]}:{listener[1]} cannot be reached: {error}")
 
     def beat(self, link: socket.socket) -> None:
-        """Say that this process lives; nothing if the loop has not read the last."""
+        """Report that this process is alive, unless the last report is unread."""
         if monotonic() - self.last_beat >= _BEAT:
             self.last_beat = monotonic()
             with suppress(OSError):
@@ -209,17 +209,17 @@ class GripperClient:
             return wanted
         if sender != self.sender and monotonic() - self.last_time < _SILENCE:
             known, other = (":".join(map(str, who)) for who in (self.sender, sender))
-            raise ValueError(f"{other} sends while {known} does")
+            raise ValueError(f"{other} is ignored while {known} sends")
         self.sender, self.last_time = sender, monotonic()
         numbers = value if isinstance(value, list) else []
         if len(numbers) != 1 or type(numbers[0]) not in (int, float):
             raise ValueError(f"the value is {str(value)[:40]}; needs [OPENING]")
         if not 0.0 <= (opening := float(numbers[0])) <= 1.0:
-            raise ValueError(f"the opening is {opening} m")
+            raise ValueError(f"the opening is {opening} m; needs 0 to 1")
         return opening
 
     def move(self, opening: float) -> None:
-        """Open, or close and grasp what is there."""
+        """Open, or close and grasp."""
         last = self.opening
         if abs(opening - last) > _SAME:
             if opening < last:
@@ -236,7 +236,7 @@ class GripperClient:
 
 
 def is_answer(text: bytes) -> bool:
-    """Return whether a datagram is one of those that a gripper answers with."""
+    """Return whether a datagram is an answer of a gripper."""
     try:
         message = json.loads(text)
     except Exception:  # `read` reports it
@@ -246,14 +246,14 @@ def is_answer(text: bytes) -> bool:
 
 def main(descriptor: int) -> None:
     """Answer requests from a socket until its other end is closed."""
-    gc.disable()  # nothing here makes cycles
+    gc.disable()  # no reference cycles occur here
     link = socket.socket(fileno=descriptor)
     client = Client()
     while message := link.recv(LONGEST):
         link.send(client.answer(message))
         if client.fingers is not None:
             client.fingers.serve(link)
-    os._exit(0)  # without libfranka's destructors, which may wait without end
+    os._exit(0)  # without libfranka's destructors, which may wait for ever
 
 
 if __name__ == "__main__":

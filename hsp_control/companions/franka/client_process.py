@@ -19,18 +19,18 @@ from hsp_control.companions.franka.reflexes import explained
 
 INSTALL = "pip install 'hsp_control[franka]'"
 _HANGS = 5.0
-"""After how much silence a process hangs [s]: a motion of the fingers, in which it is
-silent, takes less than two."""
+"""Silence after which a process is treated as hanging [s]: a motion of the fingers,
+during which it is silent, takes less than two."""
 
 
 class ClientProcess:
     """Runs `client` in a separate process, which always ends.
 
-    One request is on its way at most. The process has its own session, so that Ctrl-C
+    At most one request is pending. The process has its own session, so that Ctrl-C
     in a terminal reaches the loop only; if the loop's process dies, it ends, too.
 
     Attributes:
-        waiting: Whether a request has no answer yet.
+        waiting: Whether a request is pending.
         fault: The last message of the process that ends the connection, or None.
     """
 
@@ -64,7 +64,7 @@ class ClientProcess:
         self.waiting = True
 
     def receive(self, timeout: float) -> bytes | None:
-        """Return the answer to the request; None if it does not come in time [s]."""
+        """Return the answer to the request; None if it does not arrive in time [s]."""
         if self.fault is None:
             if not select([self._link], [], [], timeout)[0]:
                 return None
@@ -99,7 +99,7 @@ class ClientProcess:
             self._process.wait(2.0)
         except subprocess.TimeoutExpired:
             pass
-        finally:  # also where Ctrl-C cuts the waiting short
+        finally:  # also if Ctrl-C interrupts the wait
             self._process.kill()
             self._process.wait()
             self._errors.close()
@@ -107,7 +107,7 @@ class ClientProcess:
     def trouble(self) -> str:
         """Return why the process fails, "" if it runs.
 
-        Without requests it reports now and then that it is alive.
+        Without requests it reports periodically that it is alive.
         """
         heard = False
         while select([self._link], [], [], 0.0)[0]:

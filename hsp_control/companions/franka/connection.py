@@ -19,9 +19,9 @@ from hsp_control.declaration import within
 from hsp_control.robot import Robot
 
 _KERNEL = Path("/sys/kernel/realtime")
-"""Contains 1 with a PREEMPT_RT kernel; libfranka looks there, too."""
+"""Contains 1 with a PREEMPT_RT kernel; libfranka reads it, too."""
 _TIMEOUT = 20.0
-"""Longest time that connecting may take, a recovery included [s]."""
+"""Maximum time of connecting, including a recovery [s]."""
 
 
 def connect(
@@ -77,7 +77,7 @@ def reached(
     """Return a connection to an arm that is ready, and its reports (`client`).
 
     Args:
-        settings: What is set there.
+        settings: The settings to apply.
         chosen: Postures at which the robot's model is queried, shape (n, 7).
         moves: Whether the arm is to move; otherwise its collision behaviour stays.
 
@@ -131,7 +131,7 @@ def _check(robot: Robot, period: float) -> None:
 
 
 def _wanted(settings: FrankaSettings, chosen: Array, moves: bool) -> bytes:
-    """Return what the client shall set, as JSON."""
+    """Return the settings for the client, as JSON."""
     load = settings.load
     torque, force = settings.collision_torque, settings.collision_force
     thresholds = [np.asarray(each).tolist() for each in (torque, force)]
@@ -154,10 +154,10 @@ def _wanted(settings: FrankaSettings, chosen: Array, moves: bool) -> bytes:
 
 
 def _check_load(settings: FrankaSettings, found: dict[str, Any]) -> None:
-    """Check that the robot has the load that was sent.
+    """Check that the robot reports the load that was sent.
 
     Raises:
-        HardwareError: If it has another one.
+        HardwareError: If it reports another one.
     """
     load = settings.load
     if load is None:
@@ -166,6 +166,6 @@ def _check_load(settings: FrankaSettings, found: dict[str, Any]) -> None:
         sent = np.ravel(getattr(load, name))
         if not np.allclose(np.ravel(np.array(found[name])), sent, rtol=1e-5, atol=1e-6):
             raise HardwareError(
-                f"the robot's load has {name} {found[name]} after set_load with "
-                f"{sent.tolist()}"
+                f"the robot reports {name} {found[name]} of its load, and set_load "
+                f"has sent {sent.tolist()}"
             )

@@ -1,4 +1,4 @@
-"""A Franka arm under torque control, as the live loop sees it."""
+"""A Franka arm under torque control, as hardware of the live loop."""
 
 from collections.abc import Sequence
 from dataclasses import replace
@@ -16,9 +16,9 @@ from hsp_control.live.settings import LiveSettings
 from hsp_control.robot import Robot
 
 EFFORT_RATE = 999.0
-"""Greatest rate of the sent effort [N·m/s].
+"""Maximum rate of the sent effort [N·m/s].
 
-The arm accepts 1000, counted from an effort that it reports in single precision: 100
+The arm accepts 1000, relative to an effort that it reports in single precision: 100
 N·m are reported to 4e-6, which is 0.004 N·m/s."""
 _START = 5.0
 """Longest time to start or end the torque control [s]."""
@@ -29,14 +29,14 @@ _LAST_WORDS = 1.5
 class FrankaHardware:
     """`Hardware`: seven joints that take tau - g(q) each millisecond.
 
-    The second `read` starts the torque control and waits for it: the first states come
-    without, while the loop prepares. A reflex, the stop button and a lost line are
-    raised by `read`; the arm then holds itself.
+    The second `read` starts the torque control and waits for it: the first states
+    arrive without it, while the loop prepares. A reflex, the stop button and a lost
+    line are raised by `read`; the arm then holds itself.
 
     Attributes:
         period: Time between two states [s].
         q: Configuration when it was connected, shape (7,) [rad].
-        lines: What was found and set when connecting, one sentence each.
+        lines: Findings and settings of the connection, one sentence each.
     """
 
     period = 0.001
@@ -56,9 +56,9 @@ class FrankaHardware:
         Args:
             robot: The controller's model.
             process: The process.
-            settings: Those of the filter count here.
+            settings: The filter's settings are used here.
             q: Its configuration, shape (7,) [rad].
-            lines: What was found and set.
+            lines: Findings and settings of the connection.
             gripper: The process that drives its gripper; the loop never waits for it.
         """
         self._robot, self._process, self._gripper = robot, process, gripper
@@ -73,7 +73,7 @@ class FrankaHardware:
         self._new_part = self.period / (self.period + 1.0 / (2.0 * pi * cutoff))
 
     def adapted(self, settings: LiveSettings) -> LiveSettings:
-        """Return settings with what is fixed on this arm.
+        """Return settings with the values that this arm prescribes.
 
         It adds g(q) itself, and accepts no higher rate than `EFFORT_RATE`.
 
@@ -95,7 +95,7 @@ class FrankaHardware:
             HardwareError: If the arm stopped by itself, does not start or is lost.
         """
         if not self._process.waiting:
-            if self._running:  # the loop sent nothing: the last effort stays
+            if self._running:  # the loop sent nothing: the last effort is held
                 self._send(client.EFFORT)
             else:
                 self._process.ask(client.READ if self._reads == 0 else client.START)
@@ -139,7 +139,7 @@ class FrankaHardware:
     def close(self) -> None:
         """End the torque control with the last effort; see `Hardware.close`.
 
-        Its client may say only now why the arm did not answer: `fault`.
+        Its client may report only now why the arm did not answer: `fault`.
         """
         if self._closed:
             return
@@ -152,7 +152,7 @@ class FrankaHardware:
                 self._send(client.FINISH)
                 process.receive(_START)
         except HardwareError:
-            pass  # it is kept: `fault`
+            pass  # stored in `fault`
         finally:
             try:
                 process.close()

@@ -11,7 +11,7 @@ from functools import partial
 import numpy as np
 
 VERSION = 10
-"""The version that libfranka 0.18 to 0.21 speak."""
+"""The version of libfranka 0.18 to 0.21."""
 PORT = 1337
 """The TCP port that libfranka connects to; it has no option for another one."""
 PERIOD = 1e-3
@@ -54,7 +54,7 @@ class MoveStatus(IntEnum):
 
 
 class FrankaStatus(IntEnum):
-    """Answers to all other requests, as far as the box gives them."""
+    """Answers to all other requests, as far as the box sends them."""
 
     SUCCESS = 0
     COMMAND_NOT_POSSIBLE_REJECTED = 1
@@ -67,7 +67,7 @@ INCOMPATIBLE_VERSION = 1
 
 
 class MotionGenerator(IntEnum):
-    """What computes the desired motion; a request's number is one less."""
+    """The source of the desired motion; a request's number is one less."""
 
     IDLE = 0
     JOINT_POSITION = 1
@@ -78,7 +78,7 @@ class MotionGenerator(IntEnum):
 
 
 class ControllerMode(IntEnum):
-    """What computes the efforts."""
+    """The source of the efforts."""
 
     JOINT_IMPEDANCE = 0
     CARTESIAN_IMPEDANCE = 1

@@ -9,11 +9,11 @@ from hsp_control.common.exceptions import HardwareError
 from hsp_control.robot import Robot
 
 GRAVITY = 2.0
-"""Largest difference of g(q) with which the loop starts [N·m].
+"""Maximum difference of g(q) with which the loop starts [N·m].
 
 The gravity that the arm adds minus the one that the loop subtracts moves the arm. The
 bundled Panda and libfranka's Research 3 with the same hand differ by 1.1 N·m at these
-postures; if the robot does not know of its hand, by 3.5."""
+postures; if the hand is not set in the robot, by 3.5."""
 FREQUENCIES = (0.5, 2.0)
 """Range of the factors by which natural frequencies may change [-].
 
@@ -21,7 +21,7 @@ With Kp = ω² and Kv = 2 ω the errors of a robot with M_r under a controller w
 e'' = -λ (2 ω e' + ω² e) along the eigenvectors of M_r⁻¹ M, with its eigenvalues λ > 0:
 the natural frequency is √λ ω and the damping ratio √λ. The range keeps the ratio above
 a half, and the frequency below twice that for which the gains were chosen. Models of
-the wrist differ by so much: the bundled Panda's and Research 3's have √λ = 1.9."""
+the wrist differ by as much: the bundled Panda's and Research 3's have √λ = 1.9."""
 _POSTURES = 8
 
 

@@ -1,4 +1,4 @@
-"""``hsp franka-model``: save the model that a Franka arm has of itself."""
+"""``hsp franka-model``: save a Franka arm's own model."""
 
 import argparse
 

@@ -1,4 +1,4 @@
-"""Ask a control box for the robot's URDF, which pylibfranka does not hand out."""
+"""Request the robot's URDF from a control box, which pylibfranka cannot."""
 
 import socket
 from time import monotonic, sleep
@@ -26,8 +26,8 @@ _LARGEST = 20_000_000
 def robot_urdf(address: str) -> str:
     """Return the URDF of the robot at an address: the arm, without its end effector.
 
-    A box serves one client, and may take a moment to notice that the last one has gone:
-    for two seconds this tries again.
+    A box serves one client, and may notice late that the last one has disconnected: the
+    request is repeated for two seconds.
     """
     end = monotonic() + _OTHER_CLIENT
     while True:

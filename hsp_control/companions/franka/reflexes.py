@@ -1,4 +1,4 @@
-"""What the names of a Franka's errors mean, and what to do: messages and the manual."""
+"""Meanings and remedies of a Franka's errors by name: for messages and the manual."""
 
 import re
 
@@ -15,36 +15,36 @@ _DESK = (
 
 REFLEXES: dict[str, tuple[str, str]] = {
     "joint_position_limits_violation": (
-        "a joint is at the end of its range",
-        "guide it back by hand; keep limits on, and start farther from the end",
+        "a joint is at its position limit",
+        "guide it back by hand; keep limits on, and start farther from it",
     ),
     "cartesian_position_limits_violation": (
-        "the hand left the space that Desk allows",
+        "the hand left the workspace that Desk allows",
         "move the task, or the virtual walls in Desk",
     ),
     "self_collision_avoidance_violation": (
-        "the arm would have touched itself",
+        "the arm came too close to itself",
         "choose another path or posture",
     ),
     "joint_velocity_violation": (
-        "a joint was too fast",
+        "a joint exceeded its speed limit",
         "keep limits on; slow the task down, or lower natural_frequency and gain",
     ),
     "cartesian_velocity_violation": (
-        "the hand was too fast",
+        "the hand exceeded its speed limit",
         "slow the task down, or give it a longer blend",
     ),
     "force_control_safety_violation": (
-        "a force was above the limit of force control",
+        "a force exceeded the limit of force control",
         "look for a contact, and for a load that is not declared",
     ),
     "joint_reflex": (
-        "a joint felt an external torque above collision_torque",
+        "the external torque of a joint exceeded collision_torque",
         "look for a contact; then for a load that the robot does not know; only then "
         "raise collision_torque",
     ),
     "cartesian_reflex": (
-        "the hand felt an external force above collision_force",
+        "the external force at the hand exceeded collision_force",
         "look for a contact; then for a load that the robot does not know; only then "
         "raise collision_force",
     ),
@@ -58,7 +58,7 @@ REFLEXES: dict[str, tuple[str, str]] = {
         "measures the computer",
     ),
     "power_limit_violation": (
-        "the motors would have needed too much power",
+        "the motors exceeded their power limit",
         "slow the task down, or lower natural_frequency",
     ),
     "tau_j_range_violation": (
@@ -66,11 +66,11 @@ REFLEXES: dict[str, tuple[str, str]] = {
         "look for a contact or an overload; lower the gains",
     ),
     "instability_detected": (
-        "the robot found its motion unstable",
+        "the robot detected unstable motion",
         "lower natural_frequency and gain; compare the model (hsp franka-model)",
     ),
     "joint_move_in_wrong_direction": (
-        "a joint at the end of its range was guided further out",
+        "a joint at its position limit was guided further out",
         "guide it back by hand",
     ),
     "base_acceleration_initialization_timeout": (
@@ -107,7 +107,7 @@ REFLEXES: dict[str, tuple[str, str]] = {
     "joint_p2p_insufficient_torque_for_planning": _DESK,
     "joint_via_motion_generator_planning_joint_limit_violation": _DESK,
 }
-"""Error by its name in libfranka: what happened, and what to do."""
+"""Errors by their names in libfranka: the event, and the remedy."""
 
 _CAUSES: dict[str, str] = {
     "user stop pressed": "the stop button was pressed: release it",
@@ -119,13 +119,14 @@ _CAUSES: dict[str, str] = {
     "(docs/companions/franka.md), or ?realtime=ignore for a trial",
     "thread priority": "allow it: rtprio 99 in /etc/security/limits.conf "
     "(docs/companions/franka.md), or ?realtime=ignore for a trial",
-    "incompatible library version": "libfranka and the robot's system do not fit: "
+    "incompatible library version": "libfranka and the robot's system software are "
+    "incompatible: "
     "docs/companions/franka.md names the versions",
     "safety function": "a safety function of Desk is active: end it there",
     "not possible in the current mode": "unlock the joints in Desk, and leave guiding",
     "closed connection": "the control box ended the connection",
 }
-"""A part of a message of libfranka that is no reflex, and what to do."""
+"""Parts of libfranka's other messages, and the remedy."""
 
 MODES: dict[str, str] = {
     "Other": "its joints are locked, or it starts: unlock the joints in Desk",
@@ -135,14 +136,14 @@ MODES: dict[str, str] = {
     "UserStopped": "its stop button is pressed: release it",
     "AutomaticErrorRecovery": "it resets an error: wait, then connect again",
 }
-"""A mode of the robot in which no motion can start, and what to do."""
+"""Modes of the robot in which no motion can start, and the remedy."""
 
 
 def explained(kind: str, text: str) -> str:
-    """Return the message of an exception of libfranka, with what it means."""
+    """Return the message of an exception of libfranka, with its meaning."""
     first, *rest = (line.strip() for line in text.strip().splitlines() or [""])
     plain = first.removeprefix("libfranka: ").removeprefix("libfranka robot: ")
-    # A message spells two of them otherwise: tau_J_..., and ..._invalid_frame_flag.
+    # Messages spell two of them differently: tau_J_..., and ..._invalid_frame_flag.
     words = [w.lower().removesuffix("_flag") for w in re.findall(r"\w+", first)]
     names = [word for word in words if word in REFLEXES]
     if names:
@@ -157,7 +158,9 @@ def about(names: list[str]) -> str:
     """Return errors by name, each with its meaning and advice."""
     found = []
     for name in names:
-        what, advice = REFLEXES.get(name, ("an error without explanation here", ""))
+        what, advice = REFLEXES.get(
+            name, ("an error that this version does not know", "")
+        )
         found.append(f"{name}: {what}" + (f" ({advice})" if advice else ""))
     return listing(found, 3) if found else "no error is named"
 

@@ -23,7 +23,7 @@ def own_model(urdf: str, carried: dict[str, Any], tool: list[float]) -> str:
     """Return the robot's URDF with its load.
 
     Two links are added to the flange: ``carried`` has the mass of end effector and
-    load, ``end_effector`` is the frame that is set in Desk.
+    load, ``end_effector`` is the frame set in Desk.
     """
     top = _parsed(urdf)
     _carry(top, _flange(top), carried)
@@ -78,7 +78,7 @@ def _text(top: Element) -> str:
 
 
 def _named(top: Element, tag: str, name: str) -> Element:
-    """Return the link or joint whose name ends so: ``link3``, ``fr3_link3``."""
+    """Return the link or joint whose name has this ending: ``link3``, ``fr3_link3``."""
     for each in top.findall(tag):
         own = each.get("name", "")
         if own == name or own.endswith(f"_{name}"):
@@ -107,7 +107,7 @@ def _child(joint: Element) -> str:
 
 
 def _beyond(top: Element, flange: str) -> list[str]:
-    """Return the flange and all links that hang on it."""
+    """Return the flange and all links attached to it."""
     found = [flange]
     joints = top.findall("joint")
     for name in found:  # it grows while it is read

@@ -1,4 +1,4 @@
-"""Settings of a Franka arm: what is written behind ``franka://``, or in a file."""
+"""Settings of a Franka arm, given behind ``franka://`` or in a file."""
 
 from dataclasses import KW_ONLY
 from pathlib import Path
@@ -38,7 +38,7 @@ _Positive7 = Annotated[
 
 
 _FURTHEST = 2.0
-"""How far from the flange a load's centre of mass may be along an axis [m]."""
+"""Maximum distance of a load's centre of mass from the flange along an axis [m]."""
 
 
 class Load(Part, error=LiveError):
@@ -53,11 +53,11 @@ class Load(Part, error=LiveError):
     """Its inertia about its centre of mass, along the flange's axes [kg m²]."""
 
     def __post_init__(self) -> None:
-        """Check that some body has this inertia.
+        """Check that the inertia is physically consistent.
 
         Raises:
-            LiveError: If none has: not symmetric, moments a, b, c with a + b < c, or a
-                centre too far away.
+            LiveError: If it is not: not symmetric, moments a, b, c with a + b < c, or a
+            centre too far away.
         """
         furthest = float(np.abs(np.asarray(self.center)).max())
         if furthest > _FURTHEST:
@@ -87,18 +87,18 @@ class FrankaSettings(Part, error=LiveError):
     """``enforce``: no motion without a real-time kernel and priority; ``ignore``: any
     computer, for which `communication_constraints_violation` is then likely."""
     recover: Flag = False
-    """Whether a reflex that is still there from before is reset when connecting. A
+    """Whether a reflex that is still active from before is reset when connecting. A
     reflex during the run is never reset."""
     load: Load | None = None
     """The load of the hand; None: the robot's own setting is kept."""
     collision_torque: _Positive7 = (20.0, 20.0, 18.0, 18.0, 16.0, 14.0, 12.0)
-    """External torque at which a joint stops the robot [N·m], seven numbers."""
+    """External torques of the joints that stop the robot [N·m], seven numbers."""
     collision_force: _Positive6 = (20.0, 20.0, 20.0, 25.0, 25.0, 25.0)
     """External force and moment at the hand that stop the robot [N, N·m]."""
     cutoff_frequency: Positive | None = None
-    """Of a first-order filter between loop and robot [Hz]; None: no filter."""
+    """Cutoff of a first-order filter between loop and robot [Hz]; None: no filter."""
     gripper: Annotated[str, Field(pattern=r"^udp://[^/:]+:\d+$")] | None = None
-    """Where it receives openings of a finger, ``udp://HOST:PORT``; None: nowhere."""
+    """Address that receives openings of a finger, ``udp://HOST:PORT``; None: none."""
 
     @classmethod
     def parse(cls, text: str) -> Self:
@@ -126,7 +126,7 @@ class FrankaSettings(Part, error=LiveError):
         except LiveError as error:
             wrong = error.bare_message.removeprefix(f"{cls.__name__}: ")
             raise LiveError(f"franka://{text}: {wrong}") from None
-        except TypeError as error:  # a key that is no name
+        except TypeError as error:  # a key that is not a name
             raise LiveError(f"franka://{text}: {error}") from None
 
 
@@ -136,7 +136,7 @@ def _read(path: Path) -> dict[str, Any]:
     except OSError as error:
         raise LiveError(f"{path}: {error.strerror}") from None
     except UnicodeDecodeError:
-        raise LiveError(f"{path}: is no UTF-8 text") from None
+        raise LiveError(f"{path}: not UTF-8 text") from None
     if not isinstance(data, dict):
         raise LiveError(f"{path}: needs keys and values, such as address: 172.16.0.2")
     return data

@@ -13,13 +13,13 @@ from hsp_control.robot import Robot
 from hsp_control.robot.description.urdf import read_urdf
 
 FLANGE = "link8"
-"""What the name of the flange's frame ends with in Franka's descriptions."""
+"""Ending of the name of the flange's frame in Franka's descriptions."""
 EFFORT_RATE = 1000.0
-"""Largest rate of the commanded effort [N·m/s]."""
+"""Maximum rate of the commanded effort [N·m/s]."""
 ACCELERATION = 10.0
-"""Largest acceleration of a commanded motion [rad/s²]."""
+"""Maximum acceleration of a commanded motion [rad/s²]."""
 JERK = 5000.0
-"""Largest jerk of a commanded motion [rad/s³].
+"""Maximum jerk of a commanded motion [rad/s³].
 
 These three are Research 3's for every joint: libfranka 0.21, ``rate_limiting.h``, and
 "Limits for Franka Research 3" at https://frankarobotics.github.io/docs.
@@ -27,7 +27,7 @@ These three are Research 3's for every joint: libfranka 0.21, ``rate_limiting.h`
 ELBOW_FLIP = -0.467002423653011
 """Position of joint 4 at which the arm is stretched [rad]; the same page."""
 _ANY_DECELERATION = 1e9
-"""What clients receive if velocity limits do not depend on the position [rad/s²]."""
+"""Value sent to clients if velocity limits do not depend on the position [rad/s²]."""
 
 
 @dataclass(frozen=True)
@@ -60,7 +60,7 @@ class ArmLimits:
         return -self._speed(q - self.lower), self._speed(self.upper - q)
 
     def _speed(self, room: Array) -> Array:
-        """Return the largest speed towards a limit that is so far away [rad]."""
+        """Return the maximum speed towards a limit at a distance [rad]."""
         depends = np.isfinite(self.deceleration)
         braking = np.where(depends, self.deceleration, 0.0)
         speed = np.sqrt(2.0 * braking * np.maximum(room, 0.0)) - self.velocity_offset
@@ -68,7 +68,7 @@ class ArmLimits:
 
 
 class Arm:
-    """A robot's arm of seven revolute joints, without what its flange carries.
+    """A robot's arm of seven revolute joints, without the load at its flange.
 
     Attributes:
         robot: The arm with its end effector.
@@ -76,11 +76,11 @@ class Arm:
         flange: Placement of the flange in the frame of the last joint.
         nominal_end_effector: Placement of the nominal end effector in the flange.
         end_effector: Its inertia in the flange's frame.
-        urdf: What clients receive: the arm without its end effector.
+        urdf: The description sent to clients: the arm without its end effector.
     """
 
     def __init__(self, robot: Robot) -> None:
-        """Check the robot, and take it apart at the flange.
+        """Check the robot, and split it at the flange.
 
         Raises:
             LiveError: If it is not a chain of seven revolute joints on a fixed base, or
@@ -167,7 +167,7 @@ def _limits_of(robot: Robot) -> ArmLimits:
 
 
 def _urdf(model: pin.Model, flange: pin.SE3, limits: ArmLimits, name: str) -> str:
-    """Return a description with the names and elements that libfranka looks for.
+    """Return a description with the names and elements that libfranka expects.
 
     Its joints are joint1 to joint7, each with ``<position_based_velocity_limits>``, and
     its last link is link8. A name with ``tmr`` in front would be a mobile robot's.

@@ -34,22 +34,21 @@ from hsp_control.simulation.plants import SampledPlant
 _REST_SPEED = 1e-3
 """Speed below which the arm is at rest [rad/s]."""
 _LONGEST_BRAKING = 3.0
-"""Time after which an arm that does not come to rest is taken to be [s]."""
+"""Time after which an arm is treated as at rest even if it still moves [s]."""
 _CLEAR_ANGLE = 0.01
-"""How far within its limits a posture is to which recovery returns [rad]."""
+"""Margin to the limits of a posture to which recovery returns [rad]."""
 _CLEAR_DISTANCE = 0.01
-"""How far apart its links are there [m]."""
+"""Distance of its links in that posture [m]."""
 
 Say = Callable[[str], object]
-"""Called with a line for the user."""
+"""A function called with a line for the user."""
 
 
 class ControlBox:
-    """A simulated arm, moved period by period as the control box of a Franka moves it.
+    """A simulated arm, moved period by period as by a Franka's control box.
 
-    A client's effort acts together with gravity's, which the box computes with its own
-    model. Whenever no client moves the arm, an impedance controller brakes and holds
-    it.
+    The box adds gravity compensation, by its own model, to a client's effort. Whenever
+    no client moves the arm, an impedance controller brakes and holds it.
 
     Attributes:
         arm: The arm.
@@ -66,7 +65,7 @@ class ControlBox:
         v: True velocities, shape (7,) [rad/s].
         tau: Effort of the motors in the last period, shape (7,) [N·m].
         periods: Number of periods that were simulated.
-        at_rest: Whether the arm stands still, held by the box.
+        at_rest: Whether the arm is at rest, held by the box.
         on_period: Called at the end of each period, for logs.
     """
 
@@ -123,7 +122,7 @@ class ControlBox:
         hand = motion.generator.hand if motion and motion.generator else None
         self.readings.set_desired(self.model, wanted, hand)
         if motion is not None and motion.external:
-            fields["tau_J_d"][:] = motion.effort  # from which its rate is taken
+            fields["tau_J_d"][:] = motion.effort  # from which its rate is computed
         fields["message_id"][0] = self._id
         fields["robot_mode"][0] = self.mode
         idle = MotionGenerator.IDLE, ControllerMode.OTHER
@@ -138,8 +137,8 @@ class ControlBox:
 
         Args:
             number: Number of the request.
-            by: Who computes efforts.
-            kind: Which motion generator.
+            by: The source of the efforts.
+            kind: The motion generator.
         """
         start = reference.at_rest(self._reference.q)
         made = generator(kind, start, self.arm.limits, self.model)
@@ -195,7 +194,7 @@ class ControlBox:
         """Simulate a period of a millisecond.
 
         Args:
-            command: What arrived for the last state (`wire.COMMAND`), or None.
+            command: The command received for the last state (`wire.COMMAND`), or None.
         """
         if self.motion is not None:
             self._receive(self.motion, command)
@@ -226,7 +225,7 @@ class ControlBox:
         """Simulate until the arm is at rest, and a recovery has ended."""
         while not self.at_rest:
             self.step(None)
-            self._id += 1  # a client sees that time has passed
+            self._id += 1  # shows a client that time has passed
 
     def carry(self, load: pin.Inertia) -> None:
         """Set the load that the box compensates, in the flange's frame."""
@@ -239,7 +238,7 @@ class ControlBox:
         return robot.inverse_dynamics(self.model.state.q, rest, rest)
 
     def _receive(self, motion: Motion, command: np.void | None) -> None:
-        """Follow a client's command, or do without."""
+        """Follow a client's command, or continue without one."""
         if command is None:
             motion.miss()
             lost = list(reflexes.communication(motion.lost))
@@ -268,7 +267,7 @@ class ControlBox:
         self.mode = RobotMode.REFLEX
 
     def _violations(self) -> list[Violation]:
-        """Return what the measured state violates; note postures that are clear."""
+        """Return the violations of the measured state; store clear postures."""
         state, limits = self.model.state, self.arm.limits
         found = [*reflexes.measured(state.q, state.v, self.tau, limits)]
         distance, links = self._self_distance.nearest(state)
@@ -281,7 +280,7 @@ class ControlBox:
         return found
 
     def _is_allowed(self) -> bool:
-        """Return whether the arm is within its limits, and clear of itself."""
+        """Return whether the arm is within its limits, and not in self-collision."""
         state, limits = self.model.state, self.arm.limits
         inside = (limits.lower <= state.q) & (state.q <= limits.upper)
         return bool(inside.all()) and self._self_distance.nearest(state)[0] >= 0.0
@@ -290,7 +289,7 @@ class ControlBox:
         self.at_rest, self._braked_for = False, 0
 
     def _come_to_rest(self) -> None:
-        """Notice that the arm stands still; then a recovery is done."""
+        """Detect that the arm is at rest, which completes a recovery."""
         self._braked_for += 1
         wanted, goal = self._reference, self._goal
         on_its_way = goal is not None and not np.allclose(wanted.q, goal, 0.0, 1e-9)

@@ -37,7 +37,7 @@ def franka_box(options: argparse.Namespace) -> int:
     experiment = _experiment(options)
     terminal = _Terminal()
     box = _box(experiment, lambda _: None)
-    for _ in range(_WARM_UP):  # what is done first is done now, not in a motion
+    for _ in range(_WARM_UP):  # first calls happen now, not in a motion
         box.step(None)
     box = _box(experiment, terminal.say)
     terminal.box = box
@@ -79,7 +79,7 @@ def _experiment(options: argparse.Namespace) -> Experiment:
     """Return the experiment of a configuration, or of a robot at home."""
     source, name = options.config, str(options.config)
     if is_robot(name):
-        # The message is about it, not about a task.
+        # The message concerns the robot, not a task.
         Arm(Robot.load(name, access=robot_access(name, options)))
         source = {
             "robot": {"name": name},
@@ -87,7 +87,7 @@ def _experiment(options: argparse.Namespace) -> Experiment:
             "plant": {"type": "rigid_body", "motor_inertia": MOTOR_INERTIA},
         }
     strict = options.strict or bool(options.allow)
-    period = f"simulation.control_period={PERIOD}"  # whatever another loop's is
+    period = f"simulation.control_period={PERIOD}"  # whatever the configuration has
     document = read_document(source, strict=strict, allow=options.allow)
     for assignment in (*options.overrides, period):
         document.override(assignment)
@@ -103,11 +103,11 @@ def _box(experiment: Experiment, say: Callable[[str], object]) -> ControlBox:
 
 
 class _Terminal:
-    """Prints a line for each thing that happens, and below them how it stands.
+    """Prints a line for each event, and below them the present status.
 
     Attributes:
-        box: The box, once it is there.
-        server: The server, once it is there.
+        box: The box, once it exists.
+        server: The server, once it exists.
     """
 
     def __init__(self) -> None:
@@ -123,7 +123,7 @@ class _Terminal:
         print(f"{time:9.3f}  {line}", flush=True)
 
     def on_period(self) -> None:
-        """Update the last line of a terminal, from time to time."""
+        """Update the last line of a terminal periodically."""
         self._periods += 1
         if self._live and self._periods % _EVERY == 0 and self.server is not None:
             print(f"\r\x1b[K{_standing(self.server)}", end="", file=sys.stderr)
@@ -136,7 +136,7 @@ class _Terminal:
 
 
 def _standing(server: Server) -> str:
-    """Return who is connected, the mode, and how commands arrive."""
+    """Return the client, the mode, and the statistics of commands."""
     box, client = server.box, server.client
     parts = [
         f"{box.t:9.3f}  {client.name if client else 'no client'}",

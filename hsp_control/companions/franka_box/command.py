@@ -1,4 +1,4 @@
-"""``hsp franka-box`` and its options; what is slow is imported when it runs."""
+"""``hsp franka-box`` and its options; slow modules are imported when it runs."""
 
 import argparse
 from pathlib import Path

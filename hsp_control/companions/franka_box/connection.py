@@ -23,22 +23,22 @@ from hsp_control.companions.franka.layouts import (
 )
 
 _TIMESTAMPS = 35
-"""SO_TIMESTAMPNS: the kernel notes when a datagram arrived (Linux)."""
+"""SO_TIMESTAMPNS: the kernel records when a datagram arrived (Linux)."""
 _MOST = 65536
 
 
 class ConnectionEnd(HardwareError):
-    """The client has gone, or what it sent is not of the protocol.
+    """The client has disconnected, or has violated the protocol.
 
     Attributes:
-        answered: Whether the client was informed, and will close by itself.
+        answered: Whether the client was informed, and will disconnect.
     """
 
     answered = False
 
 
 _PATIENCE = 2.0
-"""How long a client may say nothing at first, while another one waits [s]."""
+"""Maximum silence of a new client while another one waits [s]."""
 
 
 class Request(NamedTuple):
@@ -63,7 +63,7 @@ class Connection:
         connected: Whether it has confirmed our version.
         outdated: Number of commands for another state than the last one.
         late: Number of commands after the deadline.
-        malformed: Number of datagrams that are no commands.
+        malformed: Number of datagrams that are not commands.
     """
 
     def __init__(self, tcp: socket.socket, peer: tuple[str, int], host: str) -> None:
@@ -86,7 +86,7 @@ class Connection:
         return not self.connected and time.monotonic() - self._begun > _PATIENCE
 
     def requests(self) -> Iterator[Request]:
-        """Yield the complete requests that have arrived; answer the first by itself."""
+        """Yield the complete requests that have arrived; answer the first here."""
         try:
             received = self.tcp.recv(_MOST)
         except BlockingIOError:
@@ -121,7 +121,7 @@ class Connection:
         self._sent = time.time_ns()
         try:
             self.udp.sendto(state, self._peer)
-        except OSError:  # a full buffer, or nobody listens any more
+        except OSError:  # the buffer is full, or the listener has gone
             return
 
     def command(self, number: int, deadline: float) -> np.void | None:
@@ -129,7 +129,7 @@ class Connection:
         while True:
             try:
                 data, notes, _, address = self.udp.recvmsg(_MOST, 64)
-            except OSError:  # nothing there, or an earlier state was not delivered
+            except OSError:  # no datagram, or an earlier state was not delivered
                 return None
             if len(data) != COMMAND.itemsize or address != self._peer:
                 self.malformed += 1
@@ -172,7 +172,7 @@ class Connection:
 
 
 def break_off(tcp: socket.socket) -> None:
-    """Have a socket's next close reset the connection."""
+    """Make a socket's next close reset the connection."""
     tcp.setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, struct.pack("ii", 1, 0))
 
 

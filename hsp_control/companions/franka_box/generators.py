@@ -25,21 +25,22 @@ class Generator(ABC):
 
     Attributes:
         reference: The desired motion.
-        hand: The desired motion of the hand, if that is what is commanded.
+        hand: The desired motion of the hand, if the hand is commanded.
     """
 
     def __init__(self, start: Reference, limits: ArmLimits) -> None:
         """Begin at a posture."""
         self.reference, self.limits = start, limits
         self.hand: HandMotion | None = None
-        # after the first command, if it goes on from the start
+        # after the first command, if it continues from the start
         self._under_way: tuple[Reference, HandMotion | None] | None = None
 
     def follow(self, command: np.void, *, first: bool) -> list[Violation]:
-        """Follow a command, and return what it violates.
+        """Follow a command, and return its violations.
 
         The first that arrives is often not the first of its client, which needs longer
-        for that: then the motion is under way since the start. The second shows.
+        for that: then the motion has been under way since the start. The second one
+        decides.
         """
         start = self.reference, self.hand
         found = list(self._follow(command, first=first))
@@ -68,11 +69,11 @@ class Generator(ABC):
 
     @abstractmethod
     def _follow(self, command: np.void, *, first: bool) -> Iterator[Violation]:
-        """Follow a command, and yield what it violates."""
+        """Follow a command, and yield its violations."""
 
     @abstractmethod
     def _extrapolate(self) -> None:
-        """Go on without a command."""
+        """Continue without a command."""
 
 
 class JointPositions(Generator):
@@ -145,7 +146,7 @@ class HandPoses(Generator):
         self.reference = reference.to_position(q, self.reference)
 
     def _move_joints(self, command: np.void, *, first: bool) -> Iterator[Violation]:
-        """Follow the hand with the joints, and yield what these violate."""
+        """Follow the hand with the joints, and yield their violations."""
         elbow, before = None, reference.as_commanded(self.reference)
         if command["valid_elbow"]:
             elbow, side = (float(x) for x in command["elbow_c"])

@@ -1,4 +1,4 @@
-"""A Franka Hand with libfranka's interface: its fingers open, close and hold something.
+"""A Franka Hand with libfranka's interface: its fingers open, close and grasp.
 
 Transcribed from libfranka-common (Apache-2.0, Franka Robotics),
 ``research_interface/gripper/types.h``.
@@ -18,29 +18,29 @@ from hsp_control.companions.franka_box.server import listen
 PORT = 1338
 """The TCP port that libfranka connects to; it has no option for another one."""
 WIDEST = 0.08
-"""How far the fingers open [m]."""
+"""Maximum opening of the fingers [m]."""
 _PERIOD = 0.02
 """Time between two states [s]."""
 _HEADER, _STATE = struct.Struct("<HII"), struct.Struct("<IddBH")
 _CONNECT, _HOMING, _GRASP, _MOVE, _STOP = range(5)
 _NUMBERS = {_CONNECT: "<HH", _HOMING: "<", _GRASP: "<5d", _MOVE: "<2d", _STOP: "<"}
 _LARGEST = 256
-"""Most bytes of a request."""
+"""Maximum size of a request [bytes]."""
 _PATIENCE = 2.0
-"""How long a client may be silent amid a request, and before its first [s]."""
+"""Maximum silence of a client within a request, and before its first [s]."""
 _SLOWEST = 1e-3
-"""Slowest motion [m/s]; a slower one would keep the hand for hours."""
+"""Minimum speed of a motion [m/s]; a slower one could take hours."""
 _FAILED = 2
-"""The status of what did not come about; that of success is 0."""
+"""The status of a failed motion; that of success is 0."""
 
 
 class Gripper(Thread):
     """Serves one client after another, in real time and beside the arm.
 
     Attributes:
-        width: How far it is open [m].
-        thing: How wide what lies between the fingers is [m]; 0: there is nothing.
-        grasped: Whether it holds that.
+        width: Its opening [m].
+        thing: Width of the object between the fingers [m]; 0: none.
+        grasped: Whether the object is grasped.
     """
 
     def __init__(self, say: Say, host: str = "127.0.0.1") -> None:
@@ -57,7 +57,7 @@ class Gripper(Thread):
         while True:
             try:
                 tcp, self._peer = self._listener.accept()[0], ("", 0)
-            except OSError:  # who came has left, or there are too many files
+            except OSError:  # the client has left, or there are too many files
                 time.sleep(_PERIOD)
                 continue
             tcp.settimeout(_PATIENCE)
@@ -65,12 +65,12 @@ class Gripper(Thread):
                 self._serve(tcp)
 
     def _serve(self, tcp: socket.socket) -> None:
-        """Answer requests, until one cannot be read."""
+        """Answer requests until one cannot be read."""
         begun = time.monotonic()
         while True:
             if not select([tcp], [], [], _PERIOD)[0]:
                 if not self._peer[1] and time.monotonic() - begun > _PATIENCE:
-                    return  # others wait
+                    return  # other clients wait
                 self._tell()
                 continue
             header = tcp.recv(_HEADER.size, socket.MSG_WAITALL)
@@ -90,7 +90,7 @@ class Gripper(Thread):
             tcp.sendall(_HEADER.pack(command, number, size) + answer)
 
     def _obey(self, tcp: socket.socket, command: int, given: tuple[float, ...]) -> bool:
-        """Move, and return whether what was to be came about.
+        """Move, and return whether the motion succeeded.
 
         Raises:
             ConnectionError: If the client leaves meanwhile: the fingers stop.
@@ -115,7 +115,7 @@ class Gripper(Thread):
             self._tell()
             time.sleep(_PERIOD)
             if select([tcp], [], [], 0.0)[0] and not tcp.recv(1, socket.MSG_PEEK):
-                raise ConnectionError("the client has left")
+                raise ConnectionError("the client has closed the connection")
         if command != _GRASP:
             return end == goal
         self.grasped = end == self.thing and goal - inner < end < goal + outer

@@ -9,7 +9,7 @@ from hsp_control.common.arrays import Array
 from hsp_control.companions.franka.layouts import PERIOD
 
 _TOLERANCE = 1e-5
-"""How far a matrix may be from a rotation, as in libfranka's ``checkMatrix``."""
+"""Tolerance of a rotation matrix, as in libfranka's ``checkMatrix``."""
 
 
 class HandMotion(NamedTuple):
@@ -27,7 +27,7 @@ class HandMotion(NamedTuple):
 
 
 def at_rest(pose: pin.SE3) -> HandMotion:
-    """Return the motion that stands still."""
+    """Return the motion at rest."""
     return HandMotion(pose, np.zeros(6), np.zeros(6))
 
 
@@ -48,13 +48,13 @@ def displacement(pose: pin.SE3, before: pin.SE3) -> Array:
 
 
 def to_pose(pose: pin.SE3, before: HandMotion) -> HandMotion:
-    """Return the motion that a commanded pose continues (backward Euler)."""
+    """Return the motion continued by a commanded pose (backward Euler)."""
     twist = displacement(pose, before.pose) / PERIOD
     return HandMotion(pose, twist, (twist - before.twist) / PERIOD)
 
 
 def to_twist(twist: Array, before: HandMotion) -> HandMotion:
-    """Return the motion that a commanded twist continues, shape (6,)."""
+    """Return the motion continued by a commanded twist, shape (6,)."""
     rotation = pin.exp3(PERIOD * twist[3:]) @ before.pose.rotation
     position = before.pose.translation + PERIOD * twist[:3]
     pose = pin.SE3(rotation, position)
@@ -67,7 +67,7 @@ def extrapolated(before: HandMotion) -> HandMotion:
 
 
 def placement(columns: Array) -> pin.SE3 | None:
-    """Return the placement of a matrix stored by columns; None if it is none."""
+    """Return the placement of a matrix stored by columns; None if it is not one."""
     matrix = np.array(columns, dtype=float).reshape(4, 4).T
     if not np.isfinite(matrix).all():
         return None

@@ -10,14 +10,14 @@ from hsp_control.companions.franka_box.model import Model
 from hsp_control.companions.franka_box.reflexes import Reference
 
 JOINT_STIFFNESS = np.array([3000.0, 3000.0, 3000.0, 2500.0, 2500.0, 2000.0, 2000.0])
-"""Unless a client sets another one [N·m/rad]; as the next one from libfranka's
+"""Default stiffness of the joints [N·m/rad]; this and the next from libfranka's
 examples, ``setDefaultBehavior``."""
 CARTESIAN_STIFFNESS = np.array([3000.0, 3000.0, 3000.0, 300.0, 300.0, 300.0])
-"""Along and about the axes of the stiffness frame [N/m, N·m/rad]."""
+"""Default stiffness along and about the axes of the stiffness frame [N/m, N·m/rad]."""
 _NULL_SPACE_STIFFNESS = 100.0
-"""Of the posture under an impedance of the hand [N·m/rad]; Franka publishes none."""
+"""Stiffness of the posture under an impedance of the hand [N·m/rad], not published."""
 _NULL_SPACE_DAMPING = 20.0
-"""Of the same [N·m·s/rad]."""
+"""Damping of the posture [N·m·s/rad]."""
 _SINGULAR = 0.03
 """Share of the largest singular value below which a direction is in the null space."""
 

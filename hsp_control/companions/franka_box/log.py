@@ -21,15 +21,15 @@ _PERIOD = 0.01
 class BoxLog:
     """Writes rows while the arm moves; a context, whose end completes the log.
 
-    The columns of the configuration's own controller are empty: somebody else's
-    controls the arm.
+    The columns of the configuration's controller are empty: the client controls the
+    arm.
 
     Attributes:
         path: The log.
     """
 
     def __init__(self, path: Path, experiment: Experiment, box: ControlBox) -> None:
-        """Begin a journal beside the log, and watch the box."""
+        """Begin a journal beside the log, and observe the box."""
         if path.suffix != ".npz":
             raise LogError(f"--log {path}: the name of a log ends in .npz")
         self.path, self._box = path, box

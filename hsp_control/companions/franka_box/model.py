@@ -1,4 +1,4 @@
-"""What the box computes with its own model: gravity, poses, external forces."""
+"""Quantities of the box's own model: gravity, poses, external forces."""
 
 import numpy as np
 import pinocchio as pin
@@ -10,7 +10,7 @@ from hsp_control.control.compensation.momentum_observer import MomentumObserver
 from hsp_control.robot import RobotState
 
 OBSERVER = MomentumObserver(50.0, cancel=False)
-"""Estimates external efforts; Franka does not publish its bandwidth."""
+"""Bandwidth of the estimated external efforts; Franka's own is not published."""
 _SINGULAR = 1e-3
 """Eigenvalue of J Jᵀ below which no wrench is estimated (σ = 0.03)."""
 
@@ -18,7 +18,7 @@ _SINGULAR = 1e-3
 class Model:
     """The arm with its end effector and the load that a client has set.
 
-    It lacks what the simulated arm has besides: friction, a payload.
+    It lacks the friction and the payload of the simulated arm.
 
     Attributes:
         arm: The arm.
@@ -48,7 +48,7 @@ class Model:
         self._observer = OBSERVER.begin(robot)
 
     def measure(self, t: float, q: Array, v: Array, tau: Array) -> None:
-        """Move on to a measured state."""
+        """Update to a measured state."""
         self.state.update(t, q, v)
         disturbance = self._observer.update(self.state, tau, PERIOD)
         np.negative(disturbance, out=self.external_effort)

@@ -1,4 +1,4 @@
-"""A motion under way: who computes it, and how well its commands arrive."""
+"""A motion under way: its controller, and the statistics of its commands."""
 
 from collections import deque
 from collections.abc import Iterator
@@ -15,10 +15,10 @@ from hsp_control.companions.franka_box.generators import Generator
 from hsp_control.companions.franka_box.reflexes import Reference, Violation, effort_rate
 
 _WINDOW = 100
-"""Commands over which the success rate is taken (libfranka, ``RobotState``)."""
+"""Commands over which the success rate is computed (libfranka, ``RobotState``)."""
 
 OF_THE_HAND = {MotionGenerator.CARTESIAN_POSITION, MotionGenerator.CARTESIAN_VELOCITY}
-"""Motion generators whose commands are the hand's."""
+"""Motion generators that command the hand."""
 _OF_THE_JOINTS = {MotionGenerator.JOINT_POSITION, MotionGenerator.JOINT_VELOCITY}
 SERVED = {(ControllerMode.EXTERNAL, MotionGenerator.NONE)} | {
     (controller, generator)
@@ -29,20 +29,20 @@ SERVED = {(ControllerMode.EXTERNAL, MotionGenerator.NONE)} | {
     )
     for generator in _OF_THE_JOINTS | OF_THE_HAND
 }
-"""What a motion can be made of."""
+"""The supported combinations of controller and motion generator."""
 
 
 class Motion:
     """The commands of a client, from the start of a motion to its end.
 
-    Until the first command none is lost: a client needs a while from the
-    answer that its motion has started to its first state.
+    Until the first command none is lost: a client needs some time between the answer
+    that its motion has started and its first state.
 
     Attributes:
         number: Number of the request that has started it.
-        controller: Who computes efforts.
-        kind: Which motion generator.
-        generator: What makes the desired motion; None without a motion generator.
+        controller: The source of the efforts.
+        kind: The motion generator.
+        generator: The source of the desired motion; None without a motion generator.
         effort: The effort commanded last, shape (7,) [N·m]; zero at first.
         commands: Number of commands.
         lost: Number of commands that were lost in a row.
@@ -85,7 +85,7 @@ class Motion:
         return sum(self._window) / len(self._window) if self._window else 1.0
 
     def miss(self) -> None:
-        """Go on without a command: the effort is held, the acceleration too."""
+        """Continue without a command: effort and acceleration are held."""
         if not self.commands:
             return
         self.lost += 1

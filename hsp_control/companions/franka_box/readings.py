@@ -16,7 +16,7 @@ from hsp_control.companions.franka_box.reflexes import Reference, ReflexThreshol
 class Readings:
     """The fields of a state.
 
-    Not filled, and zero: the accelerometers, which a simulated arm has not. The motors'
+    The accelerometers, which a simulated arm lacks, are zero. The motors'
     ``theta`` and ``dtheta`` are the joints' ``q`` and ``dq``.
 
     Attributes:
@@ -37,7 +37,7 @@ class Readings:
         return self._record.tobytes()
 
     def set_end_effector(self, model: Model) -> None:
-        """Fill what requests change: frames, masses, inertias; and gravity."""
+        """Fill frames, masses and inertias, which requests change; and gravity."""
         fields, arm = self.fields, model.arm
         fields["F_T_NE"][:] = _columns(arm.nominal_end_effector)
         fields["NE_T_EE"][:] = _columns(model.NE_T_EE)
@@ -52,7 +52,7 @@ class Readings:
     def set_desired(
         self, model: Model, reference: Reference, hand: HandMotion | None
     ) -> None:
-        """Fill the desired motion, and where the end effector is."""
+        """Fill the desired motion, and the pose of the end effector."""
         fields = self.fields
         fields["O_T_EE"][:] = _columns(model.O_T_EE)
         fields["q_d"][:], fields["dq_d"][:], fields["ddq_d"][:] = reference
@@ -73,7 +73,7 @@ class Readings:
     def set_measured(
         self, model: Model, tau_J: Array, tau_J_d: Array, thresholds: ReflexThresholds
     ) -> Array:
-        """Fill what is measured, once a period."""
+        """Fill the measured fields, once a period."""
         fields, state = self.fields, model.state
         fields["q"][:] = fields["theta"][:] = state.q
         fields["dq"][:] = fields["dtheta"][:] = state.v

@@ -8,11 +8,11 @@ from hsp_control.companions.franka_box.arm import ACCELERATION
 from hsp_control.companions.franka_box.reflexes import Reference
 
 RETREAT_SPEED = 0.2
-"""Speed of the way back into the range that is allowed [rad/s]."""
+"""Speed of the return into the permitted range [rad/s]."""
 
 
 def at_rest(q: Array) -> Reference:
-    """Return the motion that stands still at q, shape (7,) [rad]."""
+    """Return the motion at rest at q, shape (7,) [rad]."""
     return Reference(q, _REST, _REST)
 
 
@@ -26,13 +26,13 @@ def as_commanded(reference: Reference) -> Reference:
 
 
 def to_position(q: Array, before: Reference) -> Reference:
-    """Return the motion that a commanded position continues (backward Euler)."""
+    """Return the motion continued by a commanded position (backward Euler)."""
     dq = (q - before.q) / PERIOD
     return Reference(q, dq, (dq - before.dq) / PERIOD)
 
 
 def to_velocity(dq: Array, before: Reference) -> Reference:
-    """Return the motion that a commanded velocity continues; see `to_position`."""
+    """Return the motion continued by a commanded velocity; see `to_position`."""
     return Reference(before.q + PERIOD * dq, dq, (dq - before.dq) / PERIOD)
 
 

@@ -2,7 +2,7 @@
 
 The limits on a command are the "necessary conditions" of "Control Interface
 Specification and Robot Limits", https://frankarobotics.github.io/docs. The measured
-state is watched with the limits of the arm's description.
+state is monitored with the limits of the arm's description.
 """
 
 from collections.abc import Iterator, Sequence
@@ -24,18 +24,18 @@ from hsp_control.geometry import Proximity, link_shapes, self_pairs
 from hsp_control.robot import RobotState
 
 LOST_IN_A_ROW = 20
-"""So many lost commands in a row end a motion ("Errors due to communication problems",
-https://frankarobotics.github.io/docs/libfranka.html)."""
+"""Number of consecutive lost commands that end a motion ("Errors due to communication
+problems", https://frankarobotics.github.io/docs/libfranka.html)."""
 
 
 HAND_VELOCITY = np.array([3.0, 2.5])
-"""Largest speeds of a commanded hand, along and about an axis [m/s, rad/s]."""
+"""Maximum speeds of a commanded hand, along and about an axis [m/s, rad/s]."""
 HAND_ACCELERATION = np.array([9.0, 17.0])
-"""Largest accelerations of the same [m/s², rad/s²]."""
+"""Maximum accelerations of a commanded hand [m/s², rad/s²]."""
 HAND_JERK = np.array([4500.0, 8500.0])
-"""Largest jerks of the same [m/s³, rad/s³]."""
+"""Maximum jerks of a commanded hand [m/s³, rad/s³]."""
 ELBOW_VELOCITY = 1.5
-"""Largest speed of a commanded elbow [rad/s].
+"""Maximum speed of a commanded elbow [rad/s].
 
 These four are Research 3's: libfranka 0.21, ``rate_limiting.h``.
 """
@@ -44,13 +44,13 @@ OF_JOINTS = (
     Error.JOINT_MOTION_GENERATOR_VELOCITY_DISCONTINUITY,
     Error.JOINT_MOTION_GENERATOR_ACCELERATION_DISCONTINUITY,
 )
-"""Too large velocities, accelerations and jerks of commanded joints."""
+"""Errors of excessive velocities, accelerations and jerks of commanded joints."""
 AFTER_INVERSE_KINEMATICS = (
     Error.CARTESIAN_MOTION_GENERATOR_JOINT_VELOCITY_LIMITS_VIOLATION,
     Error.CARTESIAN_MOTION_GENERATOR_JOINT_VELOCITY_DISCONTINUITY,
     Error.CARTESIAN_MOTION_GENERATOR_JOINT_ACCELERATION_DISCONTINUITY,
 )
-"""The same of joints that follow a commanded hand."""
+"""The same errors of joints that follow a commanded hand."""
 _HAND_ERRORS = (
     Error.CARTESIAN_MOTION_GENERATOR_VELOCITY_LIMITS_VIOLATION,
     Error.CARTESIAN_MOTION_GENERATOR_VELOCITY_DISCONTINUITY,
@@ -63,7 +63,7 @@ class Violation(NamedTuple):
 
     Attributes:
         error: The error.
-        reason: Which joint, its value and its limit.
+        reason: The joint, its value and its limit.
     """
 
     error: Error
@@ -104,7 +104,7 @@ class ReflexThresholds(NamedTuple):
 
     @classmethod
     def none(cls) -> "ReflexThresholds":
-        """Return thresholds that nothing reaches."""
+        """Return infinite thresholds."""
         joints, axes = np.full(JOINTS, np.inf), np.full(6, np.inf)
         return cls(joints, joints, axes, axes)
 
@@ -112,7 +112,7 @@ class ReflexThresholds(NamedTuple):
 def measured(
     q: Array, dq: Array, tau_J: Array, limits: ArmLimits
 ) -> Iterator[Violation]:
-    """Yield what a measured state violates: positions, velocities, efforts."""
+    """Yield the violations of a measured state: positions, velocities, efforts."""
     lowest, highest = limits.velocities(q)
     yield from _outside(
         Error.JOINT_POSITION_LIMITS_VIOLATION, q, limits.lower, limits.upper, "rad"
@@ -124,7 +124,7 @@ def measured(
 
 
 def effort_rate(effort: Array, before: Array) -> Iterator[Violation]:
-    """Yield whether a commanded effort changes too fast (backward Euler)."""
+    """Yield a violation if a commanded effort changes too fast (backward Euler)."""
     limit = np.full(JOINTS, EFFORT_RATE)
     yield from _outside(
         Error.CONTROLLER_TORQUE_DISCONTINUITY,
@@ -136,7 +136,7 @@ def effort_rate(effort: Array, before: Array) -> Iterator[Violation]:
 
 
 def start_position(q: Array, at: Array, limits: ArmLimits) -> Iterator[Violation]:
-    """Yield whether a motion starts out of range, or where the arm is not."""
+    """Yield a violation if a motion starts out of range, or away from the arm."""
     yield from _position(q, limits)
     error = Error.JOINT_POSITION_MOTION_GENERATOR_START_POSE_INVALID
     lowest, highest = limits.velocities(at)
@@ -149,7 +149,7 @@ def commanded_motion(
     limits: ArmLimits,
     errors: tuple[Error, Error, Error] = OF_JOINTS,
 ) -> Iterator[Violation]:
-    """Yield what a commanded motion violates; see `reference.to_position`."""
+    """Yield the violations of a commanded motion; see `reference.to_position`."""
     yield from _position(new.q, limits)
     lowest, highest = limits.velocities(before.q)
     velocity, acceleration, jerk = errors
@@ -161,13 +161,13 @@ def commanded_motion(
 
 
 def start_pose(way: HandMotion) -> Iterator[Violation]:
-    """Yield whether a motion starts elsewhere than where the hand is."""
+    """Yield a violation if a motion starts away from the hand."""
     error = Error.CARTESIAN_POSITION_MOTION_GENERATOR_START_POSE_INVALID
     yield from _of_hand(error, PERIOD * way.twist, PERIOD * HAND_VELOCITY, "away")
 
 
 def commanded_hand(new: HandMotion, before: HandMotion) -> Iterator[Violation]:
-    """Yield what a commanded motion of the hand violates; see `hand.to_pose`."""
+    """Yield the violations of a commanded motion of the hand; see `hand.to_pose`."""
     change = (new.acceleration - before.acceleration) / PERIOD
     for error, values, limits, what in (
         (_HAND_ERRORS[0], new.twist, HAND_VELOCITY, "per s commanded"),
@@ -180,7 +180,7 @@ def commanded_hand(new: HandMotion, before: HandMotion) -> Iterator[Violation]:
 def commanded_elbow(
     speed: float, side: float, actual_side: float, *, first: bool
 ) -> Iterator[Violation]:
-    """Yield whether a commanded elbow is on the other side, or too far away."""
+    """Yield a violation if a commanded elbow is on the other side, or too far away."""
     if side != actual_side:
         yield Violation(
             Error.CARTESIAN_MOTION_GENERATOR_ELBOW_SIGN_INCONSISTENT,
@@ -198,7 +198,7 @@ def commanded_elbow(
 def collisions(
     effort: Array, wrench: Array, thresholds: ReflexThresholds
 ) -> Iterator[Violation]:
-    """Yield whether estimated external efforts are those of a collision."""
+    """Yield a violation if estimated external efforts are those of a collision."""
     upper = thresholds.upper_effort
     yield from _outside(
         Error.JOINT_REFLEX, effort, -upper, upper, "N·m of external effort"
@@ -211,7 +211,7 @@ def collisions(
 
 
 def communication(lost: int) -> Iterator[Violation]:
-    """Yield whether too many commands in a row were lost."""
+    """Yield a violation if too many consecutive commands were lost."""
     if lost >= LOST_IN_A_ROW:
         yield Violation(
             Error.COMMUNICATION_CONSTRAINTS_VIOLATION,
@@ -223,18 +223,18 @@ class LinkDistances:
     """The distances between the links of an arm that can collide.
 
     Attributes:
-        unwatched: What is not watched, and why, a line each.
+        unwatched: What is not monitored, and why, a line each.
     """
 
     def __init__(self, state: RobotState) -> None:
-        """Watch all pairs of links that are apart at a state."""
+        """Monitor all pairs of links that are apart at a state."""
         robot = state.robot
         self.unwatched: list[str] = []
         self._proximity: Proximity | None = None
         try:
             shapes = link_shapes(robot)
         except ModelError as error:  # a mesh is missing; the other reflexes need none
-            self.unwatched.append(f"no self-collision is watched: {error}")
+            self.unwatched.append(f"self-collisions are not monitored: {error}")
             return
         pairs = self_pairs(robot, shapes)
         if not pairs:
@@ -247,18 +247,18 @@ class LinkDistances:
                 continue
             links = " and ".join(shapes[k].link for k in pair)
             self.unwatched.append(
-                f"self-collision of {links} is not watched: they overlap at the start"
+                f"self-collision of {links} is not monitored: they overlap at the start"
             )
         if apart:
             self._proximity = Proximity(robot, shapes, (), apart)
 
     def nearest(self, state: RobotState) -> tuple[float, str]:
-        """Return the smallest distance [m], and between which links."""
+        """Return the smallest distance [m] and its pair of links."""
         return self._proximity.nearest(state) if self._proximity else (np.inf, "")
 
 
 def self_collision(distance: float, links: str) -> Iterator[Violation]:
-    """Yield whether links touch; see `LinkDistances.nearest`."""
+    """Yield a violation if links touch; see `LinkDistances.nearest`."""
     if distance < 0.0:
         yield Violation(
             Error.SELF_COLLISION_AVOIDANCE_VIOLATION,
@@ -267,7 +267,7 @@ def self_collision(distance: float, links: str) -> Iterator[Violation]:
 
 
 def _position(q: Array, limits: ArmLimits) -> Iterator[Violation]:
-    """Yield whether a commanded position is out of range.
+    """Yield a violation if a commanded position is out of range.
 
     The motion generators' own flag for it is always false since libfranka 0.15.
     """
@@ -278,7 +278,7 @@ def _position(q: Array, limits: ArmLimits) -> Iterator[Violation]:
 def _of_hand(
     error: Error, values: Array, limits: Array, what: str
 ) -> Iterator[Violation]:
-    """Yield whether the norm along or about the axes, of shape (6,), is too large."""
+    """Yield a violation if a norm along or about the axes, shape (6,), is too large."""
     norms = np.array([np.linalg.norm(values[:3]), np.linalg.norm(values[3:])])
     ways = ("translation", "rotation")
     yield from _outside(error, norms, -limits, limits, f"m or rad {what}", of=ways)

@@ -1,4 +1,4 @@
-"""What each request does: a table from the command to its handler."""
+"""The handlers of requests: a table from the command to its function."""
 
 from collections.abc import Callable
 
@@ -24,14 +24,14 @@ from hsp_control.robot.description.inertias import is_possible
 
 Say = Callable[[str], object]
 _TOLERANCE = 1e-5
-"""How far below zero a moment of inertia may be, by rounding [kg·m²]."""
+"""Tolerance of negative moments of inertia, for rounding [kg·m²]."""
 _NEAR = 1.0
-"""How far from the flange a load or a frame may be along an axis, and reach [m]."""
+"""Maximum distance of a load or a frame from the flange along an axis [m]."""
 _NO_FRAME = f"not a homogeneous transform, or further than {_NEAR:g} m"
 _HEAVIEST = 1e4
-"""Mass from which on it does not matter how much nobody can carry [kg]."""
+"""Mass at which larger masses are clipped: no arm can carry it [kg]."""
 _STIFFEST = {"K_theta": np.full(7, 14250.0), "K_x": np.repeat([3000.0, 300.0], 3)}
-"""Largest stiffness of joints and hand (libfranka, ``robot.h``) [N·m/rad, N/m]."""
+"""Maximum stiffness of joints and hand (libfranka, ``robot.h``) [N·m/rad, N/m]."""
 
 
 class Requests:
@@ -112,9 +112,9 @@ class Requests:
         return FrankaStatus.SUCCESS
 
     def _set_collision_behavior(self, number: int, body: np.void) -> int:
-        """Set thresholds; of those for acceleration and for constant speed the larger.
+        """Set thresholds: the larger of those for acceleration and for constant speed.
 
-        Which of both holds is not decided by an effort alone.
+        An effort alone does not decide which of the two applies.
         """
         limits = {}
         for bound in ("lower", "upper"):
@@ -154,7 +154,7 @@ class Requests:
 
     def _set_guiding_mode(self, number: int, body: np.void) -> int:
         return self._impossible(
-            FrankaCommand.SET_GUIDING_MODE, "nobody can take this arm by the hand"
+            FrankaCommand.SET_GUIDING_MODE, "hand guiding is not simulated"
         )
 
     def _set_ee_to_k(self, number: int, body: np.void) -> int:
@@ -189,8 +189,10 @@ class Requests:
         symmetric = np.isfinite(inertia).all() and np.allclose(inertia, inertia.T)
         small = np.abs(inertia).max(initial=0.0) <= mass * _NEAR**2 + _TOLERANCE
         if not (symmetric and small and is_possible(inertia, _TOLERANCE)):
-            return self._invalid(command, "no inertia of a body of this mass")
-        load.inertia = inertia  # the constructor refuses what rounding leaves below 0
+            return self._invalid(
+                command, "the inertia is not that of a body of this mass"
+            )
+        load.inertia = inertia  # the constructor refuses values below 0 due to rounding
         self._box.carry(load)
         self._box.readings.set_end_effector(self._box.model)
         return FrankaStatus.SUCCESS
@@ -203,7 +205,7 @@ _PHASES = ("acceleration", "nominal")
 
 
 def _near(frame: pin.SE3 | None) -> pin.SE3 | None:
-    """Return a frame that an end effector can have, else None."""
+    """Return a frame if it is possible for an end effector, else None."""
     if frame is None or np.abs(frame.translation).max() > _NEAR:
         return None
     return frame

@@ -23,10 +23,10 @@ from hsp_control.companions.franka_box.requests import Requests
 from hsp_control.live.real_time import no_garbage_collection
 
 DEADLINE = 300e-6
-"""How long a client may take for a command [s]: "approx. < 300 µs for your own control
+"""Maximum time of a client for a command [s]: "approx. < 300 µs for your own control
 loop" (https://frankarobotics.github.io/docs/libfranka.html)."""
 PATIENCE = 0.5
-"""How long a box in lockstep waits for a command [s]; libfranka waits a second."""
+"""Maximum wait of a box in lockstep for a command [s]; libfranka waits a second."""
 
 
 class Server:
@@ -34,13 +34,13 @@ class Server:
 
     In real time a period takes a millisecond, and a command that comes later than the
     deadline is lost. In lockstep the box waits for the command of each state, and while
-    no client moves the arm its time stands still: the same commands give the same bits.
+    no client moves the arm time does not advance: the same commands give the same bits.
     The box's own motions, braking and recovery, then take place between two states.
 
     Attributes:
         box: The box.
         client: The client's connection, or None.
-        overrun: By how much the box's time fell behind real time [s].
+        overrun: Delay of the box's time behind real time [s].
     """
 
     def __init__(
@@ -58,13 +58,13 @@ class Server:
 
         Args:
             box: The box.
-            say: Called with a line for each thing that happens.
+            say: Called with a line for each event.
             host: A loopback address; the port is always `PORT`.
             lockstep: Whether to wait for commands, instead of real time.
             deadline: Of a command in real time, after its state [s].
             patience: Longest wait for a command in lockstep [s].
-            cut: Simulated time at which states and commands stop to arrive [s]; TCP
-                stays. None: never.
+            cut: Simulated time from which states and commands no longer arrive [s]; TCP
+            stays. None: never.
 
         Raises:
             LiveError: If a time is out of range.
@@ -96,17 +96,17 @@ class Server:
             on_period: Called before each period; false ends the service.
         """
         advance = self._in_lockstep if self._lockstep else self._in_real_time
-        # What overflows is refused, or a reflex, and no matter of NumPy's.
+        # An overflow is refused, or a reflex; NumPy need not warn.
         with no_garbage_collection(), np.errstate(all="ignore"):
             self._due = monotonic()
             while on_period():
                 self._notice_cut()
                 number = self._send_state()
-                self._respond()  # who reads a state after it, reads one that is newer
+                self._respond()  # a state that is read after it is newer
                 advance(number)
 
     def _send_state(self) -> int:
-        """Send the next state, and return its number; 0 if nobody can answer it."""
+        """Send the next state, and return its number; 0 if no client can answer it."""
         number, state = self.box.state()
         client = self.client
         if client is None or not client.connected or self._cut:
@@ -121,7 +121,7 @@ class Server:
         """
         now = monotonic()
         late = now - self._due
-        if late > PERIOD:  # it will not be made up for: the clock is moved
+        if late > PERIOD:  # it is not made up for: the clock is shifted
             self.overrun += late
             self._due = now
         self._due += PERIOD
@@ -139,7 +139,7 @@ class Server:
         begun = motion.commands > 0
         if begun:
             longest = 0.0 if self._cut else self._patience
-        else:  # the first state confirms that it has begun; it answers the next
+        else:  # the first state confirms the start; the client answers the next
             longest = PATIENCE if motion is self._announced else PERIOD
             self._announced = motion
         command = self._await(number, monotonic() + longest, motion)
@@ -149,7 +149,7 @@ class Server:
     def _await(
         self, number: int, until: float, motion: Motion | None = None
     ) -> np.void | None:
-        """Serve requests until the command for a state has come, or the time.
+        """Serve requests until the command for a state has arrived, or until a time.
 
         Args:
             number: Number of the state; 0: there is no command to wait for.
@@ -165,7 +165,7 @@ class Server:
                     sockets.append(client.udp)
             ready, _, _ = select(sockets, [], [], max(until - monotonic(), 0.0))
             if client is not None and client.tcp in ready:
-                self._serve_requests(client)  # it may go, and another one come
+                self._serve_requests(client)  # it may leave, and another one connect
             if self._listener in ready:
                 self._accept()
             if client is not None and client.udp in ready:
@@ -181,14 +181,14 @@ class Server:
         malformed = client.malformed
         command = client.command(number, limit)
         if client.malformed and not malformed:
-            self._say(f"ignored: a datagram of {client.name} that is no command")
+            self._say(f"ignored: a datagram of {client.name} that is not a command")
         return command
 
     def _accept(self) -> None:
         tcp, peer = self._listener.accept()
         silent = self.client is not None and self.client.silent
-        if silent:  # it has not even sent its version
-            self._part("it sends nothing, and another one waits", broken=True)
+        if silent:  # it has not sent its version yet
+            self._part("it is silent, and another client is waiting", broken=True)
         if self.client is not None:
             self._say(
                 f"refused: {peer[0]}:{peer[1]}, since {self.client.name} is connected"

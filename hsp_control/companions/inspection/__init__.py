@@ -1,10 +1,10 @@
-"""What is odd about a robot's description: findings with the element and the cure."""
+"""Implausible values of a robot's description: findings with element and remedy."""
 
 from typing import TYPE_CHECKING
 
 from hsp_control.companions.shared import at_first_use
 
-if TYPE_CHECKING:  # for type checkers; a help text must not import what is slow
+if TYPE_CHECKING:  # for type checkers only: a help text must not import slow modules
     from .findings import Finding as Finding
     from .findings import Inspection as Inspection
     from .findings import inspect as inspect

@@ -1,4 +1,4 @@
-"""``hsp inspect`` and its options; what is slow is imported when it runs."""
+"""``hsp inspect`` and its options; slow modules are imported when it runs."""
 
 import argparse
 from pathlib import Path
@@ -33,7 +33,7 @@ def _run(options: argparse.Namespace) -> int:
 
 
 INSPECT = AddedCommand(
-    help="say what is odd about a robot's URDF or MJCF",
+    help="report implausible values in a robot's URDF or MJCF",
     add_options=_add_options,
     run=_run,
     place=1,

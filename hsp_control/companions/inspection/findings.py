@@ -1,4 +1,4 @@
-"""Look at a robot's description with all checks."""
+"""Apply all checks to a robot's description."""
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -46,7 +46,7 @@ _CURE = "project_inertias: true takes the nearest possible one, --fix writes it"
 
 
 def check_inertias(xml: Element) -> Iterator[Finding]:
-    """Yield the links whose inertia no body can have, and moments without a mass."""
+    """Yield the links with an inconsistent inertia, or with one but no mass."""
     for found in impossible_inertias(xml):
         severity: Severity = "error" if found.negative else "warning"
         yield Finding(severity, "inertia", f"link {found.link!r}", found.reason, _CURE)
@@ -65,13 +65,13 @@ def check_inertias(xml: Element) -> Iterator[Finding]:
 
 
 _WITHOUT = {
-    "collision": "distances do not see these links, if they have no other shape",
+    "collision": "distances leave out these links unless they have another shape",
     "visual": "capsules are drawn instead",
 }
 
 
 def check_meshes(xml: Element, source: RobotSource) -> Iterator[Finding]:
-    """Yield the meshes that are missing or cannot be read, by use and by cure."""
+    """Yield the meshes that are missing or cannot be read, by use and remedy."""
     for use, without in _WITHOUT.items():
         unusable: dict[tuple[str, str], dict[str, str]] = {}
         for link in xml.findall("link"):
@@ -120,7 +120,7 @@ def _of_position(name: str, limit: Element) -> Iterator[Finding]:
         message = f"its lower limit {lower:g} is above its upper limit {upper:g}"
         yield Finding("error", "limit", name, message, "exchange them")
     elif lower == upper:
-        message = f"lower and upper limit are both {lower:g}: taken for no limit"
+        message = f"lower and upper limit are both {lower:g}: treated as no limit"
         yield Finding("warning", "limit", name, message, "give lower and upper")
 
 
@@ -157,8 +157,8 @@ def _number(limit: Element, name: str) -> float:
 
 _SAMPLES = 64
 _NO_ROTORS = 1e3
-"""Condition number above which an arm has no rotors: those of light wrists are at least
-a thousandth of what the first joints feel."""
+"""Condition number above which rotors are missing: those of light wrists are at least a
+thousandth of the inertia at the first joints."""
 _DOUBTFUL = 1e5
 """Condition number above which efforts have few valid digits."""
 
@@ -177,14 +177,14 @@ def worst_condition(robot: Robot) -> tuple[float, str]:
 
 
 def check_mass_matrix(condition: float, dof: str) -> Iterator[Finding]:
-    """Yield the mass matrix if its `worst_condition` is doubtful."""
+    """Yield the mass matrix if its `worst_condition` is too large."""
     if condition > _DOUBTFUL:
         yield Finding(
             "warning",
             "mass matrix",
             f"joint {dof!r}",
-            f"the condition number of M reaches {condition:.1e}: hardly any mass moves "
-            "with this joint somewhere"
+            f"the condition number of M reaches {condition:.1e}: in some posture "
+            "hardly any mass moves with this joint"
             if np.isfinite(condition)
             else "M is not positive definite everywhere",
             "check the inertias beyond it, or lock it",
@@ -204,9 +204,9 @@ def check_rotors(robot: Robot, condition: float, dof: str) -> Iterator[Finding]:
         "note",
         "rotors",
         f"joint {dof!r}",
-        f"the condition number of M reaches {condition:.1e}, which no real arm has: at "
-        f"home this joint feels {felt:.1g} {unit}, and a rotor behind its gear has "
-        "0.01 to 1",
+        f"the condition number of M reaches {condition:.1e}, which no real arm has: "
+        f"at home the inertia at this joint is {felt:.1g} {unit}, and a rotor behind "
+        "its gear has 0.01 to 1",
         "give the rotors: robot: {motor_inertia: ...}, or transmissions in the URDF",
     )
 
@@ -293,10 +293,10 @@ def check_strength(robot: Robot) -> Iterator[Finding]:
 
 @dataclass(frozen=True)
 class Inspection:
-    """What was found about a robot."""
+    """The result of an inspection."""
 
-    source: RobotSource  # where the robot comes from
-    findings: tuple[Finding, ...]  # what is odd, errors first
+    source: RobotSource  # the robot's source
+    findings: tuple[Finding, ...]  # findings, errors first
     facts: Mapping[str, str]  # general facts about it: names and texts
 
     @property
@@ -321,13 +321,13 @@ class Inspection:
 
 
 def inspect(description: RobotDescription, access: Access = ANYWHERE) -> Inspection:
-    """Return what is odd about a robot.
+    """Return the findings about a robot.
 
     Checks of a URDF come first. If it has no errors, or only inertias that projection
-    repairs, the robot is loaded and looked at.
+    repairs, the robot is loaded and checked.
 
     Args:
-        description: Where it comes from, and how it is loaded.
+        description: The robot's source, and how it is loaded.
         access: Which files may be read.
 
     Raises:
@@ -347,7 +347,7 @@ def inspect(description: RobotDescription, access: Access = ANYWHERE) -> Inspect
     else:
         source = description.find(access)
         xml = parse_urdf(source)
-        # What is wrong with its elements: then the robot does not load.
+        # Errors of its elements, with which the robot does not load.
         findings += [Finding("error", "element", *each) for each in problems(xml)]
         if not findings:
             findings += [*check_inertias(xml), *check_limits(xml), *check_angles(xml)]
@@ -374,7 +374,7 @@ def inspect(description: RobotDescription, access: Access = ANYWHERE) -> Inspect
 
 
 def _of_robot(robot: Robot) -> tuple[list[Finding], dict[str, str]]:
-    """Return what is odd about a robot that was loaded, and the facts about it."""
+    """Return the findings and the facts about a loaded robot."""
     condition, dof = worst_condition(robot)
     findings = [*check_size(robot), *check_mass_matrix(condition, dof)]
     findings += check_rotors(robot, condition, dof)
@@ -407,12 +407,12 @@ def _points_of_shapes(robot: Robot) -> dict[str, Array]:
     """Return points at the ends of the links' capsules, in their frames, by link."""
     try:
         shapes = link_shapes(robot)
-    except ModelError:  # reported where they are looked at
+    except ModelError:  # reported where they are checked
         return {}
     points: dict[str, list[Array]] = {}
     for shape in shapes:
         if shape.link not in robot.frame_names:
-            continue  # what stands for the shapes of a robot without any
+            continue  # a substitute for missing shapes
         frame = robot.model.frames[robot.frame_id(shape.link)]
         place, capsule = frame.placement.actInv(shape.placement), shape.geometry
         reach = capsule.radius + getattr(capsule, "halfLength", 0.0)

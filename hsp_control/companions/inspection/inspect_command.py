@@ -1,4 +1,4 @@
-"""``hsp inspect``: what is odd about a robot's description."""
+"""``hsp inspect``: reports implausible values in a robot's description."""
 
 import argparse
 import json
@@ -23,11 +23,11 @@ from hsp_control.robot.description.urdf import read_urdf
 
 _WIDTH = 80
 _SHOWN = 12
-"""Elements that are written out where one finding is about many."""
+"""Maximum number of elements listed for one finding."""
 
 
 def inspect(options: argparse.Namespace) -> int:
-    """Print what is odd about a robot; return 2 if it does not load."""
+    """Print the findings about a robot; return 2 if it does not load."""
     run_imports(options)
     arguments, access = _arguments(options.args), robot_access(options.robot, options)
     given = "mjcf" if _is_mjcf(Path(options.robot)) else "name"
@@ -47,7 +47,7 @@ def inspect(options: argparse.Namespace) -> int:
 
 
 def write_repaired(source: RobotSource, path: Path) -> Path:
-    """Write a robot's URDF with projected inertias; all else stays, but comments."""
+    """Write a robot's URDF with projected inertias; only comments are lost."""
     xml = read_urdf(source)
     if path.exists() and path.samefile(source.urdf):
         raise ModelError(f"{path}: is the robot's own file; give another one")

@@ -1,4 +1,4 @@
-"""Numbers that no robot has: what units are taken for others looks like.
+"""Values that no robot has, as after a confusion of units.
 
 A link's radius of gyration is k = √(½ tr(I)/m), the mean distance of its mass from its
 centre. It is no larger than the link, and no smaller than that of a ball of the densest
@@ -17,10 +17,10 @@ from hsp_control.robot import Robot
 from hsp_control.robot.description.inertias import tensor_of
 
 _REACH = 0.01, 30.0
-"""What a robot's longest chain may be [m]."""
+"""Plausible range of a robot's longest chain [m]."""
 _WIDE, _LEAST_WIDE = 3.0, 0.3
-"""Largest k, as a share of the distance from a link's centre to the farthest point that
-is known of it, and of the robot's size: of what has no shape little is known."""
+"""Maximum k, as a share of the distance from a link's centre to its farthest known
+point, and of the robot's size: for links without a shape, few points are known."""
 _DENSITY = 2.3e4
 """Density of osmium and iridium [kg/m³]."""
 _DENSE = 10.0
@@ -28,11 +28,11 @@ _DENSE = 10.0
 _HEAVY = 2000.0
 """Largest mass over the cube of the robot's size [kg/m³]; an arm has 10."""
 _TURNS = 30.0
-"""Largest limit of a turning joint that means one [rad]; 1e3 and more means none."""
+"""Maximum limit of a revolute joint that is a limit [rad]; 1e3 and more means none."""
 
 
 def check_size(robot: Robot) -> Iterator[Finding]:
-    """Yield that the robot is too long, too short, or too heavy for its length."""
+    """Yield a finding if the robot is too long, short, or heavy for its length."""
     low, high = _REACH
     if not low <= robot.size <= high and robot.size > 0.0:
         yield Finding(
@@ -58,7 +58,7 @@ def check_size(robot: Robot) -> Iterator[Finding]:
 def check_gyration(
     xml: Element, robot: Robot, shapes: Mapping[str, Array]
 ) -> Iterator[Finding]:
-    """Yield the links whose mass is farther away, or nearer, than a body's can be.
+    """Yield the links whose radius of gyration is larger or smaller than possible.
 
     Args:
         xml: The URDF.
@@ -104,7 +104,7 @@ def check_gyration(
 
 
 def check_angles(xml: Element) -> Iterator[Finding]:
-    """Yield the turning joints whose limits look like degrees."""
+    """Yield the revolute joints whose limits look like degrees."""
     for joint in xml.findall("joint"):
         limit = joint.find("limit")
         if joint.get("type") != "revolute" or limit is None:

@@ -1,4 +1,4 @@
-"""How a robot's files are read, where that is no matter of course, and what is not."""
+"""How a robot's files are read where that is not obvious, and what is ignored."""
 
 from collections.abc import Iterator
 from xml.etree.ElementTree import Element
@@ -20,16 +20,16 @@ _READ = {
         "safety_controller",
     },
 }  # fmt: skip
-"""Elements that count, by what they are in."""
+"""Elements that are read, by their parents."""
 _UNREAD = {
-    "transmission": "but for its rotor: positions, speeds and efforts are the joints'",
-    "calibration": "positions count from where the model has its zero",
-    "gazebo": "it is for Gazebo alone",
+    "transmission": "except its rotor: positions, speeds and efforts are the joints'",
+    "calibration": "positions are measured from the zero of the model",
+    "gazebo": "only Gazebo uses it",
 }
 
 
 def check_unread(xml: Element) -> Iterator[Finding]:
-    """Yield the kinds of elements that nobody reads."""
+    """Yield the kinds of elements that are ignored."""
     found: dict[str, dict[str, None]] = {}
     for owner in (xml, *xml.findall("link"), *xml.findall("joint")):
         for element in owner:
@@ -46,7 +46,7 @@ def check_unread(xml: Element) -> Iterator[Finding]:
 
 
 def check_followers(xml: Element) -> Iterator[Finding]:
-    """Yield the followers that bound their leaders, or cannot be within their own."""
+    """Yield the followers whose limits bound their leaders, or cannot be met."""
     joints = {each.get("name", ""): each for each in xml.findall("joint")}
     try:
         found = followers(xml)
@@ -65,8 +65,8 @@ def check_followers(xml: Element) -> Iterator[Finding]:
         if max(lower, low) >= min(upper, high):
             message = (
                 f"its limits allow its leader {each.leader!r} to be from {low:.4g} to "
-                f"{high:.4g}, whose own are {lower:.4g} to {upper:.4g}: they do not "
-                "count"
+                f"{high:.4g}, whose own are {lower:.4g} to {upper:.4g}: the "
+                "follower's limits are ignored"
             )
             yield Finding("warning", "mimic", name, message, "correct one of them")
         elif low > lower + 1e-6 or high < upper - 1e-6:
@@ -78,7 +78,7 @@ def check_followers(xml: Element) -> Iterator[Finding]:
 
 
 def check_soft_limits(xml: Element) -> Iterator[Finding]:
-    """Yield the joints that soft limits keep nearer than their limits."""
+    """Yield the joints whose soft limits are narrower than their limits."""
     for joint in xml.findall("joint"):
         limit, safety = joint.find("limit"), joint.find("safety_controller")
         if limit is None or safety is None or joint.get("type") == "continuous":
@@ -134,7 +134,7 @@ def check_mesh_axes(xml: Element, source: RobotSource) -> Iterator[Finding]:
 
 
 def check_srdf(xml: Element, source: RobotSource) -> Iterator[Finding]:
-    """Yield that an SRDF cannot be read, or leaves out pairs of links not there."""
+    """Yield that an SRDF cannot be read, or names links that do not exist."""
     if source.srdf is None:
         return
     try:
@@ -155,5 +155,5 @@ def check_srdf(xml: Element, source: RobotSource) -> Iterator[Finding]:
         first, *others = unknown
         named = f"{first!r}{did_you_mean(first, links)}"
         named += f" and {len(others)} more" * bool(others)
-        message = f"it leaves out pairs of links that are not there: {named}"
+        message = f"it disables collisions of links that do not exist: {named}"
         yield Finding("note", "srdf", source.srdf.name, message)

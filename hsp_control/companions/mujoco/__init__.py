@@ -1,4 +1,4 @@
-"""MuJoCo: robots out of its models, and its engine as a plant.
+"""MuJoCo: robots from its models, and its engine as a plant.
 
 The package mujoco is imported when it is needed, not before.
 """

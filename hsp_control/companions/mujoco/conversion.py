@@ -1,21 +1,21 @@
 """The Pinocchio model of a robot in a compiled MuJoCo model, and its bodies' shapes.
 
-It is made of the numbers that MuJoCo computes with, so that nothing depends on how the
-MJCF was written: defaults, included files, inertias from geoms are all resolved.
+It is built from the compiled values of MuJoCo, so that nothing depends on how the MJCF
+was written: defaults, included files, inertias from geoms are all resolved.
 
-A body's joints follow one another in the body's frame (MuJoCo's documentation,
+A body's joints are chained in the body's frame (MuJoCo's documentation,
 "Computation", kinematic tree), each about its anchor ``jnt_pos``:
 
     body in parent = (body_pos, body_quat) Π anchor · motion(qpos - qpos0) · anchor⁻¹
 
-So the bodies' poses at q = qpos are MuJoCo's, and q is qpos but for the order of a
-quaternion's numbers.
+So the bodies' poses at q = qpos are MuJoCo's, and q is qpos except for the order of a
+quaternion's components.
 
-A geom collides if its contype or its conaffinity is not zero; with what, does not
-matter here: many models let a robot collide with the floor only, to be faster. As in
-MuJoCo, a mesh collides as its convex hull. What does not collide is there to be seen,
-if it is in one of the groups that MuJoCo's viewers show at first (0 to 2). Of a body
-without such geoms, those are seen that collide.
+A geom collides if its contype or its conaffinity is not zero; the pairing of these
+masks is ignored: many models let a robot collide with the floor only, to be faster. As
+in MuJoCo, a mesh collides as its convex hull. Geoms that do not collide are visuals, if
+they are in one of the groups that MuJoCo's viewers show by default (0 to 2). A body
+without visuals shows its colliding geoms.
 """
 
 from functools import cache
@@ -65,7 +65,7 @@ class _ModelBuilder:
         off = self._scene.opt.disableflags & constants("mjtDisableBit").mjDSBL_GRAVITY
         gravity = np.array(self._scene.opt.gravity)
         self.model.gravity.linear = np.zeros(3) if off else gravity
-        # For each body: the joint that it is fixed to, and its pose in it.
+        # For each body: its parent joint, and its pose in that joint's frame.
         self._places: list[tuple[int, pin.SE3]] = []
         for body in range(self._scene.nbody):
             self._places.append(self._placed(body))
@@ -74,7 +74,7 @@ class _ModelBuilder:
         self._add_sites()
 
     def _placed(self, body: int) -> tuple[int, pin.SE3]:
-        """Return where a body is, after its joints were added."""
+        """Return the placement of a body, after adding its joints."""
         scene = self._scene
         if body == 0:
             return 0, pin.SE3.Identity()
@@ -157,7 +157,7 @@ class _ModelBuilder:
         self.model.addFrame(pin.Frame(name, joint, 0, place, pin.FrameType.BODY))
 
     def _inertial_frame(self, body: int) -> pin.SE3:
-        """Return the frame of a body's inertia; where MuJoCo rounds it, as it does."""
+        """Return the frame of a body's inertia, rounded as in MuJoCo."""
         scene, same = self._scene, constants("mjtSameFrame")
         center = pose(scene.body_ipos[body], scene.body_iquat[body])
         if scene.body_sameframe[body] == same.mjSAMEFRAME_BODY:
@@ -191,13 +191,13 @@ def _scalar_joint(axis: Array, *, turns: bool) -> Any:
 
 _SHOWN_GROUPS = 3
 _DEFAULT_COLOR = np.array([0.5, 0.5, 0.5, 1.0], dtype=np.float32)
-"""Where a geom has this colour, its material's is used."""
+"""The colour of a geom for which its material's colour is used."""
 
 
 def body_shapes(selection: Selection) -> tuple[BodyShape, ...]:
     """Return the shapes of the robot's bodies, without those of the world."""
     scene, found = selection.model, []
-    meshes: dict[int, tuple[Array, Indices]] = {}  # several geoms may have one
+    meshes: dict[int, tuple[Array, Indices]] = {}  # several geoms may share one
     for body in filter(None, selection.bodies):
         geoms = [g for g in _geoms(scene, body) if int(scene.geom_type[g]) in _kinds()]
         colliding = set(_colliding(scene, body))
@@ -227,7 +227,9 @@ def body_shapes(selection: Selection) -> tuple[BodyShape, ...]:
 def excluded_pairs(selection: Selection) -> frozenset[frozenset[str]]:
     """Return the pairs of bodies that the model excludes from collisions, by name."""
     names = selection.names.bodies
-    signatures = map(int, selection.model.exclude_signature)  # two numbers in one
+    signatures = map(
+        int, selection.model.exclude_signature
+    )  # two indices in one number
     return frozenset(
         frozenset((names[signature >> 16], names[signature & 0xFFFF]))
         for signature in signatures

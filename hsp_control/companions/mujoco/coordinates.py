@@ -52,7 +52,7 @@ _KINDS = {
 
 @dataclass(frozen=True)
 class Joint:
-    """A joint of the Pinocchio model, with what MuJoCo needs of it."""
+    """A joint of the Pinocchio model, with its data for MuJoCo."""
 
     name: str  # its name
     index: int  # its index in the Pinocchio model
@@ -140,7 +140,7 @@ class MujocoCoordinates:
         qpos_address: Mapping[str, int],
         qvel_address: Mapping[str, int],
     ) -> None:
-        """Set the joints, from `joints_of`, and where MuJoCo stores their coordinates.
+        """Set the joints, from `joints_of`, and their addresses in MuJoCo.
 
         The addresses are indices in qpos and qvel by name of the MuJoCo joint.
         """
@@ -174,7 +174,7 @@ class MujocoCoordinates:
     def of(cls, robot: Robot, model: Any) -> Self:
         """Return the coordinates of a robot in a compiled MuJoCo model.
 
-        Its joints are found by their names; the model may contain more.
+        Joints are matched by their names; the model may contain more.
         """
         joints = joints_of(robot)
         known = {name: i for i, name in enumerate(Names(model).joints)}

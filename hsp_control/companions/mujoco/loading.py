@@ -1,7 +1,8 @@
-"""A robot out of an MJCF or a compiled MuJoCo model, and what it lacks, in words.
+"""A robot from an MJCF or a compiled MuJoCo model, and a report of what it lacks.
 
-A robot is rigid bodies, joints, armatures, symmetric limits and joint friction. All
-else that acts on its bodies is named here, so that nothing is silently left out.
+A robot is rigid bodies, joints, armatures, symmetric limits and joint friction.
+Everything else that acts on its bodies is reported here, so that nothing is silently
+ignored.
 """
 
 import logging
@@ -45,7 +46,7 @@ from hsp_control.robot.description.urdf import MAX_DOFS, MAX_LINKS
 
 _FOLDERS = "meshdir", "texturedir", "assetdir"
 _REFUSED = "plugin", "replicate", "composite", "flexcomp"
-"""Elements that run code, or that stand for any number of bodies."""
+"""Elements that run code, or that expand to any number of bodies."""
 _MAX_FILES = 200
 """Maximum number of files that an MJCF may include; a loop of them ends there."""
 
@@ -116,7 +117,7 @@ def _named(root: Element) -> Iterator[tuple[str, Element]]:
 
 
 def _places(main: Path, own: Path, root: Element, name: str) -> set[Path]:
-    """Return where MuJoCo may look for a file: in more places rather than in fewer."""
+    """Return all places in which MuJoCo might look for a file."""
     folders = [Path()]
     for compiler in root.iter("compiler"):
         folders += [Path(compiler.get(key, "")) for key in _FOLDERS]
@@ -184,12 +185,12 @@ def load_selection(
 
 @cache
 def _warn(robot: str, sentence: str) -> None:
-    """Log what a robot lacks, once: simulators make the same robot at every reset."""
+    """Log what a robot lacks, once: simulators build the same robot at every reset."""
     _log.warning("%s, as MuJoCo has it, but without: %s", robot, sentence)
 
 
 def _locked(selection: Selection) -> dict[str, float]:
-    """Return where the locked hinges and slides of the robot are [rad or m]."""
+    """Return the positions of the robot's locked hinges and slides [rad or m]."""
     scene, names = selection.model, selection.names.joints
     return {
         names[joint]: float(selection.qpos[scene.jnt_qposadr[joint]])
@@ -228,11 +229,11 @@ def _home(selection: Selection, model: pin.Model) -> Array:
 _OF_TENDONS = "stiffness", "damping", "frictionloss", "limited", "armature"
 
 Lack = tuple[str, list[str], str]
-"""What is lacking, the names of those that have it, and what that means."""
+"""An omitted element, the names of its owners, and the consequence."""
 
 
 def omissions(selection: Selection) -> tuple[str, ...]:
-    """Return one sentence for each kind of thing that the robot lacks."""
+    """Return one sentence for each kind of omitted element."""
     parts = _of_joints, _of_bodies, _of_actuators, _of_constraints
     return tuple(
         f"{what} {listing(names)}: {why}"
@@ -365,7 +366,7 @@ def _actuated(scene: Any, actuator: int) -> set[int]:
 
 
 def _tied(scene: Any, equality: int) -> set[int]:
-    """Return the bodies of an equality constraint; none of a flex, named as such."""
+    """Return the bodies of an equality constraint; none if it is a flex's."""
     kind, kinds = scene.eq_type[equality], constants("mjtEq")
     ends = [int(scene.eq_obj1id[equality]), int(scene.eq_obj2id[equality])]
     if kind == kinds.mjEQ_JOINT:

@@ -1,4 +1,4 @@
-"""The MJCF of a robot and of what it can touch: contact shapes, ground and solids."""
+"""The MJCF of a robot and its environment: contact shapes, ground and solids."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import KW_ONLY, dataclass, replace
@@ -56,7 +56,7 @@ _MIN_HALF_HEIGHT = 1e-3
 
 
 def supported_shape(shape: Shape) -> Shape:
-    """Return a shape that MuJoCo has."""
+    """Return a shape that MuJoCo supports."""
     if not isinstance(shape, Sphere | Capsule | Cylinder | Box):
         raise ValueError(
             f"{shape.yaml_type} is not possible here; needs a sphere, capsule, "
@@ -114,7 +114,7 @@ def geoms_of(robot: Robot, contact: ContactShape) -> list[Geom]:
         return [geom_of(contact.shape.geometry(), frame.placement * offset)]
     fixed = [s for s in link_shapes(robot, "meshes") if s.joint == frame.parentJoint]
     own = [s for s in fixed if s.link == contact.frame] or fixed
-    # For a robot without any geometry, `link_shapes` invents capsules between joints.
+    # For a robot without any geometry, `link_shapes` returns capsules between joints.
     bodies = {f.name for f in robot.model.frames if f.type == pin.FrameType.BODY}
     real = [s for s in own if s.link in bodies]
     if not real:
@@ -162,15 +162,15 @@ def _capsule(points: Array, frame: pin.SE3) -> Geom:
 class Solid(Part, error=SimulationError):
     """A fixed body: a wall, a table, a slope; with copies, stairs; a loose one: a box.
 
-    The robot touches it with the shapes that the plant's ``contacts`` declare. What is
-    loose also touches the ground and the other solids.
+    The robot touches it with the shapes that the plant's ``contacts`` declare. A loose
+    solid also touches the ground and the other solids.
 
-    MuJoCo's friction is soft: it damps the slip u as if the surfaces were to stop at
-    the rate b, until the friction cone limits the force. A shape that goes on sliding
-    is pushed off by the acceleration μ b ‖u‖, since the cone's dual couples the two.
-    The surface supplies (1 - d)/d of the acceleration with which the shape is pressed;
-    if that is less, the contact opens and closes for ever. With ``slip_damping`` b and
-    ``impedance`` d things slide by Coulomb's law, see ``docs/forces.md``.
+    MuJoCo's friction is soft: it damps the slip u at the rate b, until the friction
+    cone limits the force. A shape that continues to slide is accelerated away from the
+    surface by μ b ‖u‖, since the cone's dual couples the two. The surface supplies (1 -
+    d)/d of the acceleration with which the shape is pressed; if that is less, the
+    contact chatters. With ``slip_damping`` b and ``impedance`` d shapes slide by
+    Coulomb's law, see ``docs/forces.md``.
     """
 
     yaml_key: ClassVar[str | None] = "name"
@@ -188,17 +188,17 @@ class Solid(Part, error=SimulationError):
     mass: Positive | None = None
     """Mass of a loose body, evenly distributed [kg]; it is fixed by default."""
     friction: NonNegative = 0.8
-    """Coulomb friction coefficient of its surface [-]; the ground's does not count."""
+    """Coulomb friction coefficient of its surface [-]; it replaces the ground's."""
     slip_damping: Positive | None = None
     """Rate b at which MuJoCo's friction stops a slip [1/s]; MuJoCo's own by default,
-    about 100. The smaller, the faster shapes creep where they stick."""
+    about 100. The smaller it is, the faster sticking shapes creep."""
     impedance: ProperFraction | None = None
     """MuJoCo's impedance d of the surface [-]; its own by default, 0.9 to 0.95. The
-    smaller, the deeper things press into it."""
+    smaller it is, the deeper shapes penetrate."""
     copies: PositiveCount = 1
-    """How many there are, one beside the other [-]: the steps of stairs."""
+    """Number of copies in a row [-]: the steps of stairs."""
     spacing: Vector3 = (0.0, 0.0, 0.0)
-    """From each copy to the next, in the world [m]."""
+    """Displacement from each copy to the next, in the world [m]."""
 
     def __post_init__(self) -> None:
         if self.copies > 1 and not np.any(np.asarray(self.spacing)):
@@ -240,7 +240,7 @@ _OWN_IMPEDANCE, _OWN_SLIP_DAMPING = 0.95, 100.0
 """MuJoCo's own impedance of deep contacts, and damping of slip [1/s]."""
 _CONTACT, _GROUND, _LOOSE = 1, 2, 3  # kinds of geoms
 _COLLIDES = {_CONTACT: _GROUND, _GROUND: _CONTACT, _LOOSE: _LOOSE}
-"""With which kinds each collides, bit by bit; what is loose with all."""
+"""Bit mask of the kinds with which each collides; loose solids collide with all."""
 
 
 def write_mjcf(
@@ -282,7 +282,9 @@ def write_mjcf(
                 geom = replace(geom, placement=pin.SE3.Identity())
             element = _add_geom(parent, name, geom, solid.friction, kind)
             element.set("mass", _numbers([solid.mass or 0.0]))
-            element.set("priority", "1")  # its friction is used, not the other's
+            element.set(
+                "priority", "1"
+            )  # its friction is used, not that of the other geom
             _set_impedance(element, solid)
     lower, upper = robot.position_limits()
     bodies = {0: world}
@@ -361,12 +363,12 @@ def _set_armature_and_friction(
 
 
 def _add_pair(pairs: Element, solid: str, shape: str, of: Solid) -> None:
-    """Add a contact that has its own damping of a slip; MuJoCo's own is left out."""
+    """Add a contact with its own damping of slip instead of MuJoCo's."""
     mu = of.friction
     pair = SubElement(pairs, "pair", geom1=solid, geom2=shape, condim="3")
     pair.set("friction", _numbers([mu, mu, 0.0, 0.0, 0.0]))
-    # Negative numbers are stiffness, which friction has not, and damping, which MuJoCo
-    # divides by the impedance.
+    # Negative numbers are stiffness, which friction does not have, and damping, which
+    # MuJoCo divides by the impedance.
     assert of.slip_damping is not None
     scale = _OWN_IMPEDANCE if of.impedance is None else of.impedance
     pair.set("solreffriction", _numbers([-1.0, -of.slip_damping * scale]))

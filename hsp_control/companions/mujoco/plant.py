@@ -1,4 +1,4 @@
-"""MuJoCo as a plant: what steps it, and the robot as a MuJoCo model."""
+"""MuJoCo as a plant: its stepping, and the robot as a MuJoCo model."""
 
 import importlib
 from collections.abc import Mapping, Sequence
@@ -46,7 +46,7 @@ def import_mujoco() -> Any:
 
 
 class MujocoEngine(SampledPlant):
-    """A robot that MuJoCo moves, in whatever model it stands.
+    """A robot that MuJoCo moves, in any MuJoCo model.
 
     Attributes:
         model: The ``mujoco.MjModel``.
@@ -76,7 +76,7 @@ class MujocoEngine(SampledPlant):
         return importlib.import_module("mujoco")
 
     def describe(self) -> dict[str, Any]:
-        """Return its type, and what pushes it."""
+        """Return its type and its pushes."""
         return {
             "type": type(self).__name__,
             "mujoco": self._mujoco.__version__,
@@ -85,7 +85,7 @@ class MujocoEngine(SampledPlant):
         }
 
     def _drive(self, data: Any, t: float, q: Array, effort: Array) -> None:
-        """Write an effort, and the pushes at t, to where MuJoCo applies them."""
+        """Write an effort, and the pushes at t, into MuJoCo's data."""
         effort = effort + self.pushes.effort(t, q)
         self.coordinates.effort_to_mujoco(q, effort, data.qfrc_applied)
 
@@ -128,7 +128,7 @@ class MujocoEngine(SampledPlant):
         """Return the wrench of all contacts on each owner, shape (6,), in world axes.
 
         ``origins`` are the points about which their moments are; contacts between two
-        of one owner cancel.
+        bodies of one owner cancel.
         """
         count, names = data.ncon, list(origins)
         sums = np.zeros((len(names), 6))
@@ -186,7 +186,7 @@ class Mujoco(FrictionalPart, type="mujoco"):
 
     @property
     def push_off(self) -> float:
-        """That of its slowest solid [1/s]; see `Solid` and docs/forces.md."""
+        """Rate of its slowest solid [1/s]; see `Solid` and docs/forces.md."""
         return min((each.push_off for each in self.solids), default=0.0)
 
     def engine(self, robot: Robot, integrator: Integrator) -> "MujocoPlant":
@@ -275,7 +275,7 @@ class MujocoPlant(MujocoEngine):
     def contact_wrenches(
         self, t: float, q: Array, v: Array, tau: Array
     ) -> Mapping[str, Array]:
-        """Return those of MuJoCo's last step; zeros before the first one."""
+        """Return the wrenches of MuJoCo's last step; zeros before the first one."""
         return self._wrenches(q)
 
     def clearance(self, q: Array) -> float:

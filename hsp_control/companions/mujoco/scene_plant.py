@@ -1,7 +1,7 @@
 """A robot in a MuJoCo scene, simulated by MuJoCo.
 
-MuJoCo has no contacts between a body and its parent, except where the parent stands
-still: a base that its first link overlaps holds this link like a brake.
+MuJoCo has no contacts between a body and its parent unless the parent is fixed: a base
+that overlaps its first link acts on it like a brake.
 """
 
 import importlib
@@ -31,11 +31,11 @@ from hsp_control.simulation.plants.plant_part import PlantPart
 from hsp_control.simulation.plants.push import Push
 
 _DEEP = 1e-3
-"""Depth below which parts touch, and do not overlap [m]."""
+"""Depth up to which parts touch without overlapping [m]."""
 
 
 def own_overlaps(robot: Robot, model: Any, data: Any) -> dict[str, float]:
-    """Return how deep [m] parts of a robot overlap, by ``base and link1``."""
+    """Return the depths of overlaps of a robot's parts [m], by ``base and link1``."""
     names = Names(model)
     joints = [names.joints.index(name) for name in robot.joints]
     jointed = {int(model.jnt_bodyid[joint]) for joint in joints}
@@ -46,7 +46,7 @@ def own_overlaps(robot: Robot, model: Any, data: Any) -> dict[str, float]:
     found: dict[str, float] = {}
     for contact in data.contact[: data.ncon]:
         if min(contact.geom1, contact.geom2) < 0 or contact.dist > -_DEEP:
-            continue  # of a flex, or a touch
+            continue  # of a flex, or only touching
         pair = {int(model.geom_bodyid[g]) for g in (contact.geom1, contact.geom2)}
         if pair <= moved | mounts and pair & moved:
             name = " and ".join(names.bodies[body] for body in sorted(pair))
@@ -72,9 +72,9 @@ class MujocoScenePlant(MujocoEngine):
     """A robot in a MuJoCo scene: the user's own ``MjModel`` and ``MjData``.
 
     An effort goes through the robot's torque motors, as a control that MuJoCo limits,
-    and for joints without exactly one such motor through ``qfrc_applied``. All else in
-    ``data`` is the user's: controls of other actuators, forces on objects, mocap
-    bodies. It may be read and written between periods.
+    and for joints without exactly one such motor through ``qfrc_applied``. Everything
+    else in ``data`` belongs to the user: controls of other actuators, forces on
+    objects, mocap bodies. It may be read and written between periods.
 
     A run begins at the state that ``data`` had when the plant was made, with the
     robot's joints at the start of the run.
@@ -132,7 +132,7 @@ class MujocoScenePlant(MujocoEngine):
         self._overlaps_told = False
 
     def reset(self, t: float, q: Array, v: Array) -> None:
-        """Set the robot's state, and all else as it was; see `SampledPlant.reset`."""
+        """Set the robot's state, and reset the rest; see `SampledPlant.reset`."""
         mujoco, data = self._mujoco, self.data
         mujoco.mj_resetData(self.model, data)  # also its warnings
         mujoco.mj_setState(self.model, data, self._begin, self._kind)
@@ -165,7 +165,7 @@ class MujocoScenePlant(MujocoEngine):
         return contact_channels(self._wrenches_about(probe, origins))
 
     def describe(self) -> dict[str, Any]:
-        """Return its settings, and which joints are driven through their motors."""
+        """Return its settings, and the joints that are driven through their motors."""
         names = self.robot.dof_names
         return {
             **super().describe(),
@@ -259,7 +259,7 @@ def _switch_off_servos(
 
 
 class MujocoScene(PlantPart, type="mujoco_scene"):
-    """The MuJoCo scene that the robot is declared in, with all that is in it.
+    """The MuJoCo scene in which the robot is declared, with all its objects.
 
     The timestep, the integrator, friction and contacts are the scene's own. In Python,
     `MujocoScenePlant` takes any model and its data.
@@ -302,7 +302,7 @@ class MujocoScene(PlantPart, type="mujoco_scene"):
 
 
 def _start(model: Any, keyframe: str | None, robot: Robot) -> Any:
-    """Return the scene at its keyframe, with locked joints where the robot has them."""
+    """Return the scene at its keyframe, with locked joints at the robot's values."""
     mujoco = import_mujoco()
     data = mujoco.MjData(model)
     if keyframe is not None:

@@ -1,6 +1,6 @@
 """``hsp play`` and ``hsp live --steer``, and their options.
 
-What is slow is imported when they run.
+Slow modules are imported when they run.
 """
 
 import argparse
@@ -41,7 +41,7 @@ def _play(options: argparse.Namespace) -> int:
 
 
 PLAY = AddedCommand(
-    help="touch a simulated robot in a browser",
+    help="drag and push a simulated robot in a browser",
     add_options=_add_play_options,
     run=_play,
     own_interrupts=True,  # it saves the log
@@ -67,7 +67,7 @@ def _open(
 ) -> "AbstractContextManager[SteeringPage | None]":
     if options.robot is not None and options.steer == "simulated":
         raise LiveError(
-            "--steer: a page that moves a real robot needs a dead-man's key; say "
+            "--steer: a page that moves a real robot needs a dead-man's key; use "
             "--steer hardware"
         )
     if options.steer is None:
@@ -83,11 +83,11 @@ LIVE_PAGE = CommandPage(add_options=_add_live_options, open=_open)
 
 
 def _add_host(parser: argparse.ArgumentParser) -> None:
-    """Add the address at which a page is opened."""
+    """Add the option for the address at which a page is opened."""
     parser.add_argument(
         "--host",
         default=_HERE,
         metavar="ADDRESS",
-        help="the address of this computer at which another one, or a phone, opens the "
-        "page; default: only this computer may",
+        help="the address of this computer at which another computer or a phone opens "
+        "the page; default: this computer only",
     )

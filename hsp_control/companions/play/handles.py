@@ -1,13 +1,13 @@
-"""What a page can touch of a controller: targets, the posture, obstacles and settings.
+"""Handles of a controller on a page: targets, the posture, obstacles and settings.
 
-Whoever takes hold of one lets a stream take over from its trajectory, with a crossfade
-as in any change while running. So whatever is dragged, however wildly, the law sees a
-C² reference within bounds, and the log repeats it.
+When a handle is dragged, a stream replaces its trajectory, with a crossfade as in any
+change at run time. So the law follows a C² reference within bounds for any motion of
+the pointer, and the log can repeat it.
 
-The posture is held by its elbow, a frame of the robot at the target posture. Where that
-is dragged to, the posture follows by damped least squares, its hand staying where it is
-as far as it can; a stream moves the field's target there. The robot follows as far as
-its tasks leave it free: the field may move in time, and the theorem holds throughout.
+The handle of the posture is its elbow, a frame of the robot at the target posture. The
+posture follows a dragged elbow by damped least squares that keep the hand in place as
+far as possible; a stream moves the field's target there. The robot follows in the null
+space of its tasks: the field may depend on time, and the theorem holds throughout.
 """
 
 from abc import ABC, abstractmethod
@@ -39,7 +39,7 @@ from hsp_control.trajectories.streams.followed import FollowedStream
 from hsp_control.trajectories.streams.streamed import Streamed
 
 BACK = 1.5
-"""Time over which a grip returns to its path [s]: half a metre at 0.6 m/s at most."""
+"""Time in which a grip returns to its path [s]: half a metre at 0.6 m/s at most."""
 _FARTHEST = 1e3  # nothing is dragged farther [m]
 
 
@@ -54,8 +54,8 @@ class Grip(ABC):
         self._wanted_at: tuple[float, list[float]] | None = None
 
     def move(self, value: Any, t: float) -> None:
-        """Lead it somewhere from time t on [s]."""
-        wanted = self._wanted(np.asarray(value, dtype=float))  # it may refuse
+        """Command a place from time t on [s]."""
+        wanted = self._wanted(np.asarray(value, dtype=float))  # it may raise
         if self._stream is None:
             stream = self._new_stream()
             stream.check(value=wanted)
@@ -65,17 +65,17 @@ class Grip(ABC):
         self._wanted_at = t, [float(x) for x in value]
 
     def resume(self, t: float) -> None:
-        """Let it return to its own path from time t on [s]."""
+        """Return it to its own path from time t on [s]."""
         if self._stream is not None:
             self._follow(None, self._controller.at(t).ramp(BACK))
         self._stream = self._wanted_at = None
 
     @abstractmethod
     def describe(self, state: RobotState) -> dict[str, Any]:
-        """Return what a page must know of it."""
+        """Return its description for the page."""
 
     def where(self, state: RobotState) -> list[float]:
-        """Return where it is now, or is wanted while the time stands still.
+        """Return its present place, or the commanded one while the time stands still.
 
         That is x, y, z and a quaternion, or less.
         """
@@ -101,7 +101,7 @@ class Grip(ABC):
 def _pose(value: Array) -> Array:
     """Return a pose that a page sent."""
     if value.shape != (7,) or not (np.abs(value) < _FARTHEST).all():
-        raise StreamError(f"a pose is x, y, z and a quaternion; got {value}")
+        raise StreamError(f"a pose needs x, y, z and a quaternion; got {value}")
     return value
 
 
@@ -109,13 +109,13 @@ class TargetGrip(Grip):
     """The target of a frame's position, orientation or pose."""
 
     def __init__(self, task: Task, controller: Controller) -> None:
-        """Remember the task's own path."""
+        """Store the task's own path."""
         super().__init__(task.name, controller)
         self._frame = task.frame  # type: ignore[attr-defined]
         self._own = task.followed
         axes = task.axes if isinstance(task, FramePosition) else "xyz"
         self._axes = [axis in axes for axis in "xyz"]
-        # What of x, y, z and a quaternion the task follows.
+        # Which of x, y, z and a quaternion the task follows.
         self._kind, self._tracked = "pose", list(range(7))
         if isinstance(task, FramePosition):
             self._kind, self._tracked = "position", ["xyz".index(axis) for axis in axes]
@@ -152,7 +152,7 @@ class ObstacleGrip(Grip):
     """An obstacle of the scene; it keeps its orientation."""
 
     def __init__(self, obstacle: Obstacle, controller: Controller) -> None:
-        """Remember the obstacle's own path."""
+        """Store the obstacle's own path."""
         super().__init__(obstacle.name, controller)
         self._obstacle = obstacle
 
@@ -171,7 +171,7 @@ class ObstacleGrip(Grip):
 
     def _wanted(self, value: Array) -> Array:
         if value.shape != (3,) or not (np.abs(value) < _FARTHEST).all():
-            raise StreamError(f"a position is x, y and z; got {value}")
+            raise StreamError(f"a position needs x, y and z; got {value}")
         return value
 
     def _follow(self, stream: Stream | None, at: Changes) -> None:
@@ -179,7 +179,7 @@ class ObstacleGrip(Grip):
 
 
 def targets_of(controller: Controller) -> dict[str, TargetGrip]:
-    """Return the draggable targets by name; what a plan writes is the plan's."""
+    """Return the draggable targets by name; references of a plan are left out."""
     kinds = FramePose, FramePosition, FrameOrientation
     return {
         task.name: TargetGrip(task, controller)
@@ -194,13 +194,13 @@ def targets_of(controller: Controller) -> dict[str, TargetGrip]:
 
 
 def obstacles_of(controller: Controller) -> dict[str, ObstacleGrip]:
-    """Return the grips of the bounded obstacles that have a place, by name."""
+    """Return the grips of the bounded obstacles with a position, by name."""
     found = {}
     for obstacle in controller.scene.values():
         if not np.isfinite(obstacle.shape.bounding_radius):
             continue  # such as the floor
         grip = ObstacleGrip(obstacle, controller)
-        with suppress(HspControlError):  # it has no place
+        with suppress(HspControlError):  # it has no position
             grip.where(controller.state)
             found[obstacle.name] = grip
     return found
@@ -210,7 +210,7 @@ _JOINTS_MOVING: dict[str, Any] = {"speed": 1.0, "acceleration": 5.0, "jerk": 100
 """Bounds of the target of each joint [1/s, 1/s², 1/s³, in rad or m]."""
 _STEPS = 20
 _DAMPING, _HOLDING = 1e-2, 0.3
-"""Of the least squares: how much joints stay [m/rad], and how much the hand does."""
+"""Weights of the least squares: for the joints to stay [m/rad], and for the hand."""
 POSTURE = "posture"
 
 
@@ -218,7 +218,7 @@ class PostureGrip(Grip):
     """The target of a field's posture, by a joint in the middle of the arm."""
 
     def __init__(self, field: TargetPosture, controller: Controller) -> None:
-        """Remember the field, and choose the joint."""
+        """Store the field, and choose the joint."""
         super().__init__(POSTURE, controller)
         self._field = field
         self._robot: Robot = controller.robot
@@ -238,7 +238,7 @@ class PostureGrip(Grip):
             t for t in terms_of(self._controller.field) if isinstance(t, TargetPosture)
         ]
         weights = np.array([sample_weight(term.weight, state)[0] for term in terms])
-        if terms and not weights.any():  # the field is switched off: the newest is used
+        if terms and not weights.any():  # the field is switched off: use the newest
             weights[-1] = 1.0
         moved = np.zeros(self._robot.nv)
         for term, weight in zip(terms, weights / weights.sum(), strict=True):
@@ -299,7 +299,7 @@ class PostureGrip(Grip):
 
 
 def posture_of(controller: Controller) -> dict[str, PostureGrip]:
-    """Return the grip of the field's posture, by its name; none without one."""
+    """Return the grip of the field's posture, by name; none without such a field."""
     terms = terms_of(controller.field)
     postures = [term for term in terms if isinstance(term, TargetPosture)]
     if len(postures) != 1 or postures[0].displacement is not None:
@@ -316,7 +316,7 @@ class Handles:
     """Turns a page's commands into streams and changes of a controller."""
 
     def __init__(self, controller: Controller, period: float) -> None:
-        """Find what can be touched; nothing is touched yet."""
+        """Find the handles and knobs; none is moved yet."""
         self._controller = controller
         self.targets: dict[str, Grip] = {
             **targets_of(controller),
@@ -336,10 +336,10 @@ class Handles:
         self.knobs[knob.id], self.values[knob.id] = knob, knob.value
 
     def receive(self, message: Mapping[str, Any]) -> None:
-        """Do what a page commands; errors are reported in `message`.
+        """Execute a page's command; errors are reported in `message`.
 
         ``move`` a target or an ``obstacle``, let it ``resume`` its own path, ``set`` a
-        knob. What is ``release``d stays where it is.
+        knob. A handle that is ``release``d stays where it is.
         """
         try:
             self._do(message)
@@ -367,11 +367,11 @@ class Handles:
                 raise ValueError(f"cannot do {str(dict(message))[:200]}")
 
     def say(self, message: str, *, warning: bool = False) -> None:
-        """Keep what there is to say."""
+        """Store a message for the pages."""
         self.message, self.warning = message, warning
 
     def turn_knobs(self) -> None:
-        """Make the changes that knobs ask for; each knob's not too often."""
+        """Make the changes of the knobs, each knob's at a limited rate."""
         t = self._controller.state.t
         for name in list(self._wanted):
             if t - self._turned.get(name, -np.inf) < KNOB_PERIOD:
@@ -386,11 +386,11 @@ class Handles:
 
     @property
     def settings(self) -> dict[str, float | bool]:
-        """What the knobs are set to, or will be as soon as the time goes on."""
+        """The values of the knobs, including those that apply when time continues."""
         return {**self.values, **self._wanted}
 
     def rehearse(self) -> None:
-        """Ask for everything once, so that what it needs is bound."""
+        """Execute every command once, so that its calls are bound."""
         targets, obstacles = self.places()
         for name, pose in targets.items():
             self.receive({"do": "move", "target": name, "pose": pose})
@@ -401,7 +401,7 @@ class Handles:
             self.receive({"do": "set", "id": name, "value": off})
 
     def places(self) -> tuple[dict[str, list[float]], dict[str, list[float]]]:
-        """Return where the targets and the obstacles are, by name."""
+        """Return the places of the targets and the obstacles, by name."""
         state = self._controller.state
         return (
             {name: grip.where(state) for name, grip in self.targets.items()},

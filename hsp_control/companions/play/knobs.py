@@ -1,7 +1,7 @@
-"""What can be turned while the robot moves: each knob makes changes of the controller.
+"""Knobs, which change a setting of the controller while the robot moves.
 
-A knob knows its present value and makes the change to another one; what the change does
-to the robot, and what is refused, is the controller's business (`Controller.at`).
+A knob has its present value and makes the change to another one; the controller applies
+or refuses it (`Controller.at`).
 """
 
 from collections.abc import Callable, Iterator
@@ -21,7 +21,8 @@ from hsp_control.tasks.compliant_task import impedance_of
 from hsp_control.tasks.task import SecondOrderTask
 
 _REACH = 10.0
-"""A slider goes from a tenth of a setting to ten times it, within what is tolerated."""
+"""A slider goes from a tenth of a setting to ten times it, within the tolerated
+range."""
 _BORNE = 0.2  # largest rate times period that a slider offers; see `rate_check.RULE`
 
 
@@ -29,17 +30,17 @@ class Knob(NamedTuple):
     """One control of the page."""
 
     id: str  # its name among the knobs
-    group: str  # heading under which it is shown
-    label: str  # what it is called there
+    group: str  # its heading on the page
+    label: str  # its name there
     unit: str
-    value: float | bool  # what it is now: a number, or whether it is on
+    value: float | bool  # its present value: a number, or whether it is on
     low: float
     high: float
     turn: Callable[[Changes, Any], object]
-    note: str = ""  # what it does
+    note: str = ""  # its explanation
 
     def describe(self) -> dict[str, Any]:
-        """Return what a page must know of it."""
+        """Return its description for the page."""
         about = self._asdict()
         del about["turn"]
         kind = "switch" if isinstance(self.value, bool) else "slider"
@@ -50,10 +51,10 @@ class Knob(NamedTuple):
         """Return a value that a page sent, within the bounds."""
         if isinstance(self.value, bool):
             if not isinstance(value, bool):
-                raise ValueError(f"{self.id} is on or off; got {value!r}")
+                raise ValueError(f"{self.id} must be on or off; got {value!r}")
             return value
         if isinstance(value, bool) or not isinstance(value, int | float):
-            raise ValueError(f"{self.id} is a number; got {value!r}")
+            raise ValueError(f"{self.id} must be a number; got {value!r}")
         if not np.isfinite(value):
             raise ValueError(f"{self.id} is {value}; needs a finite number")
         return float(np.clip(value, self.low, self.high))
@@ -71,13 +72,13 @@ def _null_space(controller: Controller, period: float) -> Iterator[Knob]:
         return
     switch = FieldSwitch(field)
     if switch.whole:
-        note = "Off: the free joints have no desired velocity."
+        note = "Off: self-motion has no desired velocity."
         yield Knob("field", group, "Field", "", True, 0.0, 1.0, switch.turn, note)
     K = controller.null_space_gain
     gain = float(np.diag(K).mean())
     if np.allclose(K, gain * np.eye(len(K))):
         low, high = _span(gain, period)
-        note = "How fast the free joints take up the field's motion."
+        note = "Rate at which self-motion converges to the field."
         id_, label = "null_space_gain", "Null-space gain K_N"
         about = Changes.null_space_gain, note
         yield Knob(id_, group, label, "1/s", gain, low, high, *about)
@@ -92,10 +93,10 @@ def _null_space(controller: Controller, period: float) -> Iterator[Knob]:
 
 
 class FieldSwitch:
-    """Lets the field go (its terms stay, with weight 0), and brings it back."""
+    """Switches the field off (its terms stay, with weight 0) and on again."""
 
     def __init__(self, field: NullSpaceField) -> None:
-        """Begin with the field as it is."""
+        """Begin with the present field."""
         terms = [term for term in terms_of(field) if not isinstance(term, Rest)]
         names = [term.name for term in terms]
         self.weights: dict[str, float] = {}
@@ -127,7 +128,8 @@ def _tasks(controller: Controller, period: float) -> Iterator[Knob]:
         name, impedance = task.name, impedance_of(task)
         if impedance is not None:
             low, high, turn = 1.0 / _REACH, _REACH, partial(_stiffen, name, impedance)
-            id_, note = f"stiffness.{name}", "How hard it resists a push."
+            id_ = f"stiffness.{name}"
+            note = "Stiffness against a push, relative to that of the configuration."
             yield Knob(id_, name, "Stiffness", "×", 1.0, low, high, turn, note)
             continue
         Kp, Kv = task.gains.matrices(task.rows)
@@ -136,12 +138,12 @@ def _tasks(controller: Controller, period: float) -> Iterator[Knob]:
             ratio = float(np.diag(Kv).mean() / (2.0 * frequency))
             (low, high), turn = _span(frequency, period), partial(_tune, name, ratio)
             id_, label = f"frequency.{name}", "Natural frequency"
-            note = "How fast its error decays."
+            note = "Natural frequency of its error equation."
             yield Knob(id_, name, label, "rad/s", frequency, low, high, turn, note)
 
 
 def _span(rate: float, period: float) -> tuple[float, float]:
-    """Return from where to where a rate [1/s] may be turned."""
+    """Return the range in which a rate [1/s] may be set."""
     return rate / _REACH, min(_REACH * rate, max(_BORNE / period, rate))
 
 

@@ -1,4 +1,4 @@
-"""A live loop that a page steers: the loop's side, the page's, and what is between."""
+"""A live loop that a page steers: the loop's side, the page's, and their channel."""
 
 import json
 import socket
@@ -32,7 +32,7 @@ class Channel:
         self.lost = False
 
     def send(self, word: dict[str, Any]) -> None:
-        """Send a word; it is dropped if the other end takes no more."""
+        """Send a message; it is dropped if the buffer of the other end is full."""
         if self.lost:
             return
         try:
@@ -43,7 +43,7 @@ class Channel:
             self.lost = True
 
     def receive(self, most: int = 100) -> list[dict[str, Any]]:
-        """Return the words that have arrived, oldest first."""
+        """Return the messages that have arrived, oldest first."""
         words: list[dict[str, Any]] = []
         while len(words) < most and not self.lost:
             try:
@@ -70,7 +70,7 @@ def channel_pair() -> tuple[Channel, socket.socket]:
     return Channel(here), there
 
 
-TIMEOUT = 0.5  # silence after which the key is taken as released [s]
+TIMEOUT = 0.5  # silence after which the key is treated as released [s]
 
 
 class DeadMansKey:
@@ -82,7 +82,7 @@ class DeadMansKey:
         self._until = -float("inf")
 
     def update(self, *, held: bool) -> None:
-        """Note the page's message about it."""
+        """Process the page's message about it."""
         self._until = self._clock() + TIMEOUT if held else -float("inf")
 
     @property
@@ -91,8 +91,8 @@ class DeadMansKey:
         return self._clock() < self._until
 
 
-_SEND_PERIOD = 1.0 / 30.0  # time between two words to the page [s]
-_MESSAGES = 4  # messages that are taken in one period at most
+_SEND_PERIOD = 1.0 / 30.0  # time between two messages to the page [s]
+_MESSAGES = 4  # maximum number of messages processed in a period
 
 
 class SteeredLoop:
@@ -108,14 +108,14 @@ class SteeredLoop:
         key: DeadMansKey | None = None,
         clock: Callable[[], float] = monotonic,
     ) -> None:
-        """Begin with nothing touched."""
+        """Begin without a change."""
         self.handles = Handles(controller, period)
         self.key = key
         self._channel, self._requests = channel, requests
         self._clock, self._next = clock, -float("inf")
 
     def on_period(self, _t: float) -> None:
-        """Take messages, and say where everything is; see `run_loop`."""
+        """Process messages, and report all places; see `run_loop`."""
         self.listen()
         if self.key is not None and not self.key.held:
             self._requests.stop("the dead-man's key was released")
@@ -126,7 +126,7 @@ class SteeredLoop:
             self.send_state()
 
     def listen(self) -> None:
-        """Take the messages of the page that have arrived."""
+        """Process the messages of the page that have arrived."""
         for message in self._channel.receive(_MESSAGES):
             match message:
                 case {"do": "hold", "held": bool(held)}:
@@ -137,11 +137,11 @@ class SteeredLoop:
                     self._requests.stop("stopped from the page")
                 case _ if self._requests.reason is None:
                     self.handles.receive(message)
-        if self._channel.lost:  # nobody can steer it any more
+        if self._channel.lost:  # it can no longer be steered
             self._requests.stop("the process of the page has ended", fault=True)
 
     def send_state(self) -> None:
-        """Say where everything is, and what the knobs are set to."""
+        """Report the places of all handles and the values of the knobs."""
         targets, obstacles = self.handles.places()
         word: dict[str, Any] = {
             "targets": targets,
@@ -159,20 +159,20 @@ class SteeredLoop:
 
 
 class RemoteHandles(Handles):
-    """What can be touched in another process: that process reports where it is."""
+    """Handles and knobs in another process, which reports their places and values."""
 
     def __init__(self, controller: Controller, period: float) -> None:
-        """Begin where the controller is."""
+        """Begin with the controller's state."""
         super().__init__(controller, period)
         self._places = super().places()
         self.held = False
 
     def places(self) -> tuple[dict[str, list[float]], dict[str, list[float]]]:
-        """Return where the targets and the obstacles are, by name."""
+        """Return the places of the targets and the obstacles, by name."""
         return self._places
 
     def update(self, word: Mapping[str, Any]) -> None:
-        """Note what the loop reports; its changes are made here, too."""
+        """Store the loop's report; its changes are made here, too."""
         self._places = word["targets"], word["obstacles"]
         self.message, self.warning = word["message"], word["warning"]
         self.held = word["held"]
@@ -190,7 +190,7 @@ _KEPT = 1000
 
 
 class Mirror:
-    """What a picture needs of a live loop, as of a `Session`."""
+    """The data of a live loop for a picture, as of a `Session`."""
 
     pushes = None
     laws: tuple[str, ...] = ()
@@ -242,11 +242,11 @@ class Mirror:
         return self.recorder.meta
 
     def pull(self) -> tuple[Array, Array, float] | None:
-        """Return None: nobody pulls at this robot with a mouse."""
+        """Return None: links of a live loop cannot be pulled."""
         return None
 
     def say(self, message: dict[str, Any]) -> None:
-        """Pass on a page's commands; a preview is this process's own."""
+        """Forward a page's commands; a preview is computed in this process."""
         if message["do"] == "preview":
             self.previews = message.get("on") is True
             return
@@ -255,7 +255,7 @@ class Mirror:
             self.handles.receive(message)  # zones and distances follow it here, too
 
     def read(self) -> None:
-        """Read what has come from the loop."""
+        """Read the new messages of the loop."""
         for word in self._channel.receive():
             self.handles.update(word)
         if self._journal.read():

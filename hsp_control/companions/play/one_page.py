@@ -1,4 +1,4 @@
-"""Writes a play as one page, in a separate process: the play goes on meanwhile."""
+"""Writes a play as one page, in a separate process: the play continues meanwhile."""
 
 import subprocess
 import sys
@@ -15,7 +15,7 @@ class OnePage:
         self._process: subprocess.Popen[str] | None = None
 
     def begin(self) -> str:
-        """Save the log and begin to write its page; return what there is to say."""
+        """Save the log and begin to write its page; return a message for the user."""
         if self._process is None:
             command = ["export", str(self._save()), "--html", str(self.path)]
             self._process = subprocess.Popen(
@@ -28,7 +28,7 @@ class OnePage:
         return f"writing {self.path} …"
 
     def done(self) -> str:
-        """Return what to say once it is written, or cannot be; else nothing."""
+        """Return a message once it is written, or has failed; else None."""
         if self._process is None or self._process.poll() is None:
             return ""
         process, self._process = self._process, None

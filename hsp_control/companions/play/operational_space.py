@@ -1,12 +1,12 @@
-"""The operational-space law, to compare: what most controllers of peers do.
+"""The operational-space law, for comparison: the one of most other controllers.
 
     a = J# (a_x - J'v) + (I - J# J) K_N (g - v),    J# = W⁻¹Jᵀ(J W⁻¹Jᵀ)⁻¹
 
 With W = M it is Khatib's (1987); here W is the metric of the controller, so that both
-laws project alike, with the same tasks, field and gains. The tasks obey the same
-equation. What is missing is the motion of the null space: with P = I - J# J, nothing
-cancels P' and g', so that the null-space velocity follows a field that moves only with
-an error, and no theorem bounds it.
+laws have the same projector, tasks, field and gains. The tasks obey the same equation.
+The law lacks the motion of the null space: with P = I - J# J, nothing cancels P' and
+g', so that the null-space velocity follows a moving field only with an error, which no
+theorem bounds.
 """
 
 import numpy as np

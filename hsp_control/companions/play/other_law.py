@@ -1,7 +1,7 @@
 """The same robot with another law, stepped beside a play from the same instant.
 
-What hands do to the robot is done to it, too: targets, obstacles, settings and pulls.
-Only the law differs, so what is seen between the two is the law's.
+It receives the user's targets, obstacles, settings and pulls, too. Only the law
+differs, so any difference between the two robots is due to the law.
 """
 
 from collections.abc import Iterator, Mapping, Sequence
@@ -32,7 +32,7 @@ def laws_beside(controller: Controller, *, operational: bool) -> list[str]:
 
 
 class Playing(NamedTuple):
-    """What a play steps: the parts of which the other law has copies."""
+    """The parts of a play that are stepped; the other law has copies of them."""
 
     compensated: ComparedController
     handles: Handles
@@ -45,7 +45,7 @@ class OtherLaw:
     Attributes:
         law: The name of its law.
         controller: Its controller, in whose state the robot is.
-        handles: What hands move; see `receive`.
+        handles: Its handles; see `receive`.
     """
 
     def __init__(
@@ -56,14 +56,15 @@ class OtherLaw:
         periods: int,
         shared: object,
     ) -> None:
-        """Begin where a play is, with the law from there on.
+        """Begin at the present state of a play.
 
         Args:
             law: The name of the law.
-            playing: What the play steps.
+            playing: The parts of the play.
             times: The times of its rows, the present one first [s].
             periods: How many control periods a row has.
-            shared: Who may be named in what is copied, and is not: the play.
+            shared: An object to which copied parts may refer, and which is not copied:
+            the play.
         """
         self.law = law
         state = playing.compensated.controller.state
@@ -83,13 +84,13 @@ class OtherLaw:
         self.advance()
 
     def advance(self) -> bool:
-        """Go on to the next row; return whether it could."""
+        """Advance to the next row; return whether that succeeded."""
         instant = next(self._loop, None)
         self.handles.turn_knobs()
         return instant is not None
 
     def receive(self, message: Mapping[str, Any]) -> None:
-        """Do what a page commands; what is refused the session reports."""
+        """Execute a page's command; the session reports a refusal."""
         self.handles.receive(message)
 
     @property

@@ -1,4 +1,4 @@
-"""From a command's arguments to an experiment that can be played with."""
+"""Builds an experiment for `hsp play` from the command's arguments."""
 
 from os import PathLike
 from typing import Any
@@ -31,7 +31,7 @@ def playable(
 def playable_document(
     source: str | PathLike[str], *overrides: str, strict: bool = False, **reading: Any
 ) -> Document:
-    """Return a configuration that can be played with, or one for a robot.
+    """Return a configuration for `hsp play`, also of a robot alone.
 
     ``source`` is one for `load_experiment`, or a robot with a fixed base, by name or
     URDF: its hand holds its pose, with a ball beside its elbow. Without a control

@@ -29,7 +29,7 @@ from hsp_control.config.loaded_scenario import load_scenario
 from hsp_control.config.own_code import add_imports
 
 BEHIND = 0.1
-"""A session that is later than this goes on from now: it is slower than real time [s].
+"""A session that is later than this [s] does not catch up: it is slower than real time.
 """
 _RATE_WINDOW = 1.0
 
@@ -43,7 +43,7 @@ def play(
     one_page: OnePage | None = None,
     end: Callable[[], bool] = lambda: False,
 ) -> None:
-    """Let a session go on in real time until it ends; pages never hold it up."""
+    """Advance a session in real time until it ends; pages never delay it."""
     running, begin, rate = True, monotonic(), 1.0
     due = drawn = marked = begin
     marked_at = session.t
@@ -124,7 +124,7 @@ def play_command(options: argparse.Namespace) -> int:
         session.rehearse()
         picture = Picture(session, viewer)
         gc.collect()
-        gc.freeze()  # what is there now stays: no collection looks at it in a row
+        gc.freeze()  # objects that exist now stay: collections skip them
         stack.enter_context(_stop_at_termination())
         log = options.out / f"{experiment.name}-play.npz"
 
@@ -142,7 +142,7 @@ def play_command(options: argparse.Namespace) -> int:
             out.print("Ctrl-C ends it and saves the log.")
             play(session, picture, server.messages, save, one_page=one_page)
         out.print(f"Log: {session.rollout().save(log)}")
-        if session.over:  # and was not reset
+        if session.over:  # and it was not reset
             print(f"hsp: {session.over.partition('; reset')[0]}", file=sys.stderr)
     return 2 if session.over else 0
 

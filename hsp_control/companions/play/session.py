@@ -1,4 +1,4 @@
-"""A simulation that goes on and on, and whoever plays with it; without a picture."""
+"""A simulation without end that a user steers; without a picture."""
 
 import gc
 import logging
@@ -32,11 +32,12 @@ from hsp_control.simulation.plants import Plant
 from hsp_control.simulation.plants.push import Pushes, Spring
 
 ROW = 0.01
-"""Time between two rows of the log, at which messages are taken [s]; whole periods."""
-LONGEST = 1200.0  # longest time that is recorded [s]
-LARGEST_LOG = 3e8  # largest log [bytes]
-PULL = 300.0  # stiffness of the spring of somebody who pulls at a link [N/m]
-LARGEST_PULL = 100.0  # largest force of that spring [N]
+"""Time between two rows of the log, at which messages are processed [s]; whole
+periods."""
+LONGEST = 1200.0  # maximum recorded time [s]
+LARGEST_LOG = 3e8  # maximum size of the log [bytes]
+PULL = 300.0  # stiffness of the spring that pulls a link [N/m]
+LARGEST_PULL = 100.0  # maximum force of that spring [N]
 
 _REHEARSED = 40  # rows of a rehearsal: beyond the ramps of changes
 
@@ -44,9 +45,9 @@ _log = logging.getLogger(__name__)
 
 
 class Session:
-    """The sampled loop of `simulate`, row by row; between two, a page may change it.
+    """The sampled loop of `simulate`, row by row; a page may change it between rows.
 
-    All but the forces of a page is in the log, which repeats the run.
+    The log contains everything except a page's forces, so that it repeats the run.
     """
 
     kind: Literal["simulated"] = "simulated"
@@ -65,11 +66,11 @@ class Session:
         if self.pushes is not None:
             self.pushes.reachable = True
         self._point: Array | None = None
-        self.previews = False  # whether the page shows what the null space would let
+        self.previews = False  # whether the page shows a preview of self-motion
         self.reset()
 
     def reset(self) -> None:
-        """Begin anew: the robot at its start, and all as it was declared."""
+        """Restart: the robot at its start, and every part as declared."""
         experiment, robot = self.experiment, self.experiment.robot
         memo: dict[int, Any] = {id(robot): robot}
         self.controller: Controller = deepcopy(experiment.controller, memo)
@@ -92,14 +93,14 @@ class Session:
         self.handles = Handles(self.controller, self.period)
         law = Knob(
             "operational", "Null space", "Operational-space law instead", "", False,
-            0.0, 1.0, self._compare, "Its null space follows late.",
+            0.0, 1.0, self._compare, "Its self-motion follows the field with a lag.",
         )  # fmt: skip
         if self.controller.field.controls:
             self.handles.add(law)
-        gc.collect()  # what has been refers to itself, and would stay
+        gc.collect()  # the old run has reference cycles, and would stay in memory
 
     def rehearse(self) -> None:
-        """Do everything once, and begin anew: nothing is done first in the play."""
+        """Execute every command once, and restart: the play then does none first."""
         self.handles.rehearse()
         for _ in range(_REHEARSED):
             self.advance()
@@ -121,7 +122,7 @@ class Session:
         return self.controller.state.t
 
     def advance(self) -> None:
-        """Go on to the next row; what goes wrong ends the run, and not the session."""
+        """Advance to the next row; an error ends the run, not the session."""
         if not self.over:
             self._step()
             self.handles.turn_knobs()
@@ -149,14 +150,14 @@ class Session:
 
     @property
     def laws(self) -> list[str]:
-        """The laws that can be stepped beside it; none of what has a plan."""
+        """The laws with which it can be compared; none if it has a plan."""
         if self.experiment.scenario.plan is not None:
             return []
         operational = self.compensated.operational
         return laws_beside(self.controller, operational=operational)
 
     def compare_with(self, law: str | None) -> None:
-        """Step another law beside it from now on; None: no more."""
+        """Compare with another law from now on; None: with none."""
         if law is not None and law not in self.laws:
             raise ValueError(f"there is no {law!r} to compare with")
         if law is None:
@@ -168,7 +169,7 @@ class Session:
         self.other = OtherLaw(law, playing, times, periods, shared=self)
 
     def _step_other(self) -> None:
-        """Let the other law go on; where it fails, only it ends."""
+        """Advance the other law; if it fails, only the comparison ends."""
         if self.other is None:
             return
         try:
@@ -207,7 +208,7 @@ class Session:
             _log.warning("%s", described(error))
 
     def _compare(self, _at: Changes, operational: bool) -> None:
-        """Follow another law; it is no part of the controller, nor of its log."""
+        """Follow another law; it is part neither of the controller nor of its log."""
         self.compensated.operational = operational
         self.other = None  # its law may be the same now
         if operational:
@@ -217,11 +218,13 @@ class Session:
 
     def _pull(self, path: str, point: Array, hand: Array) -> None:
         if self.pushes is None:
-            raise ValueError("in this simulated world nobody can pull at the robot")
+            raise ValueError(
+                "this plant accepts no external force, so no link can be pulled"
+            )
         if self._point is None or not np.array_equal(point, self._point):
             joint = _joint_of(self.experiment.robot, path)
             place = self.controller.state.data.oMi[joint]
-            self._point, self._unrepeatable = point, "somebody pulled at a link"
+            self._point, self._unrepeatable = point, "a link was pulled"
             self.pushes.spring = Spring(
                 joint, place.actInv(point), hand, PULL, LARGEST_PULL
             )
@@ -230,13 +233,13 @@ class Session:
         spring.hand = hand
 
     def let_go(self) -> None:
-        """Pull no more."""
+        """Stop pulling."""
         self._point = None
         if self.pushes is not None:
             self.pushes.spring = None
 
     def pull(self) -> tuple[Array, Array, float] | None:
-        """Return where somebody pulls, the hand, both (3,) [m], and the force [N]."""
+        """Return the pulled point and the hand, both (3,) [m], and the force [N]."""
         spring = None if self.pushes is None else self.pushes.spring
         if spring is None:
             return None
@@ -252,11 +255,11 @@ class Session:
         return self.recorder.meta("", "", plant=self.plant.describe())
 
     def rollout(self) -> Rollout:
-        """Return the log so far; `hsp run` repeats it, unless somebody pulled."""
+        """Return the log so far; `hsp run` repeats it, unless a link was pulled."""
         experiment = self.experiment
         config = experiment.config
         if config is not None:
-            whole = int(self.t / self.row + 1e-6)  # Ctrl-C may come amid a row
+            whole = int(self.t / self.row + 1e-6)  # Ctrl-C may occur within a row
             config["simulation"]["duration"] = max(whole, 1) * self.row
         lost = {"changes_lost": self._unrepeatable} if self._unrepeatable else {}
         return self.recorder.rollout(
@@ -271,7 +274,7 @@ class Session:
 
     @property
     def rows_left(self) -> int:
-        """How many rows the log still takes, the present one included."""
+        """The number of rows that still fit into the log, the present one included."""
         return self._rows() - self.recorder.count + 1
 
     def _rows(self) -> int:
@@ -281,7 +284,7 @@ class Session:
 
 
 def pushes_of(plant: Plant) -> Pushes | None:
-    """Return what pushes at the robot in a plant, or in the one that it contains."""
+    """Return the part of a plant that pushes the robot, also of a wrapped plant."""
     inner: object = plant
     while inner is not None:
         pushes = getattr(inner, "pushes", None)
@@ -294,7 +297,7 @@ def pushes_of(plant: Plant) -> Pushes | None:
 def _vector(values: list[Any]) -> Array:
     vector = np.array(values, dtype=float)
     if vector.shape != (3,) or not (np.abs(vector) < 1e3).all():
-        raise ValueError(f"a point is x, y and z in metres; got {values}")
+        raise ValueError(f"a point needs x, y and z in metres; got {values}")
     return vector
 
 
@@ -303,5 +306,5 @@ def _joint_of(robot: Robot, path: str) -> int:
     names = [path_element(name) for name in robot.model.names]
     parts = path.strip("/").split("/")
     if len(parts) < 2 or parts[0] != "robot" or parts[1] not in names[1:]:
-        raise ValueError(f"{path!r} is no link that could move")
+        raise ValueError(f"{path!r} is not a moving link")
     return names.index(parts[1])

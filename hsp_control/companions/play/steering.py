@@ -44,14 +44,14 @@ from hsp_control.control.controller import Controller
 from hsp_control.declaration.plain_data import plain_data
 from hsp_control.live import OperatorRequests
 
-START = 60.0  # time in which the page's process must say its address [s]
+START = 60.0  # time in which the page's process must report its address [s]
 
 
 class PageProcess:
     """The process of a page that shows and steers a live loop; a context manager."""
 
     def __init__(self, *, port: int | None, host: str, held: bool) -> None:
-        self.held = held  # whether somebody must hold a key
+        self.held = held  # whether a key must be held
         self.channel, self._there = channel_pair()  # way to it
         self.url = ""  # page's address, with its key
         self._settings = {
@@ -73,7 +73,7 @@ class PageProcess:
         self._there.close()
         try:
             self._wait_for_address()
-        except BaseException:  # Ctrl-C, say: nobody else ends the process
+        except BaseException:  # such as Ctrl-C: nothing else ends the process
             self._process.kill()
             self.close()
             raise
@@ -93,7 +93,7 @@ class PageProcess:
         self.close()
 
     def prepare(self, scenario: Scenario) -> None:
-        """Let it draw the robot and the scene of a configuration."""
+        """Request that it draws the robot and the scene of a configuration."""
         config = plain_data(scenario, defaults=True)
         self._say({"prepare": without_sources(config)})
 
@@ -102,7 +102,7 @@ class PageProcess:
         self._say({"status": text})
 
     def begin(self, experiment: Experiment, journal: Path) -> None:
-        """Let it draw the loop: what it needs is there."""
+        """Request that it draws the loop, whose journal exists now."""
         journal.unlink(missing_ok=True)  # of another run
         self._say(
             {
@@ -132,12 +132,12 @@ class SteeringPage(NamedTuple):
     """A page that shows a live loop."""
 
     process: PageProcess
-    opening: OpeningPage  # what opens it
+    opening: OpeningPage  # opens it
 
     def let_steer(
         self, experiment: Experiment, requests: OperatorRequests, journal: Path
     ) -> Callable[[float], object]:
-        """Return what the loop does in the rest of each period, so that it steers."""
+        """Return the function that the loop calls each period for the page."""
         # With a dead-man's key it returns when the key is held for the first time, or
         # when the operator stops.
         controller, period = experiment.controller, live_period(experiment)
@@ -158,8 +158,8 @@ class SteeringPage(NamedTuple):
                 sleep(_POLL)
             if page.channel.lost:
                 raise ViewerError(
-                    "the loop's page has ended before anybody held its key; the loop "
-                    "did not begin"
+                    "the loop's page has ended before its key was held; the loop did "
+                    "not begin"
                 )
         return loop.on_period
 
@@ -182,7 +182,7 @@ def steering_page(
 
 
 def _rehearse(controller: Controller, period: float, experiment: Experiment) -> None:
-    """Do with a copy all that a page can do: nothing is done first in the loop."""
+    """Execute every command of a page with a copy, so that the loop does none first."""
     memo: dict[int, Any] = {id(controller.robot): controller.robot}
     copy = deepcopy(controller, memo)
     handles = Handles(copy, period)
@@ -192,8 +192,8 @@ def _rehearse(controller: Controller, period: float, experiment: Experiment) -> 
         handles.turn_knobs()
 
 
-_PAGE_POLL = 0.005  # time between two looks at what has come [s]
-_NICENESS = 5  # the loop comes first where processes are many
+_PAGE_POLL = 0.005  # time between two polls [s]
+_NICENESS = 5  # the loop has priority where there are many processes
 _RATE_WINDOW = 1.0  # time over which the loop's rate is measured [s]
 
 
@@ -201,11 +201,11 @@ def main() -> int:
     """Show the loop until it has ended; return 0, or 2 after one error message.
 
     This is the page's process. It draws what the loop writes into its journal, and
-    passes on the page's commands. It reads lines of JSON from its standard input. The
-    first has its settings; then it writes the page's address. ``prepare`` lets it draw
-    the robot and the scene, ``status`` sets the status line, ``begin`` lets it draw the
-    loop: until then the loop's process prepares what both need. When its input is
-    closed, the loop has ended, and so does it.
+    forwards the page's commands. It reads lines of JSON from its standard input. The
+    first has its settings; then it writes the page's address. With ``prepare`` it draws
+    the robot and the scene, ``status`` sets the status line, and with ``begin`` it
+    draws the loop: until then the loop's process prepares. It ends when its input is
+    closed, since the loop has ended then.
     """
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C stops the loop only
     os.nice(_NICENESS)
@@ -258,7 +258,7 @@ def _show(mirror: Mirror, picture: Picture, server: PageServer) -> None:
     due = marked = monotonic()
     marked_at, rate, ended = mirror.t, 0.0, False
     while not ended:
-        ended = _ended()  # then once more: the last row is drawn
+        ended = _ended()  # then continue once more, to draw the last row
         for message in server.messages():
             mirror.say(message)
         mirror.read()

@@ -34,7 +34,7 @@ def acts(term: NullSpaceField) -> bool:
 
 
 def from_the_start(controller: Controller, run: Rollout) -> Controller:
-    """Return the controller as it is before a run; its changes are all ahead."""
+    """Return the controller before a run, with all changes still to come."""
     changes = changes_of(run)
     if not changes and not any(t.remembers for t in controller.tasks):
         return controller
@@ -48,9 +48,9 @@ def changes_of(run: Rollout) -> tuple[Change, ...]:
 
 
 def null_space_projector(controller: Controller, state: RobotState) -> Array:
-    """Return P = I - J#J in the metric W, (nv, nv), J of all that is active.
+    """Return P = I - J#J in the metric W, (nv, nv), with J of all active rows.
 
-    The controller moves to the state: it is one that looks at a log.
+    The controller, which replays a log, moves to the state.
     """
     controller.compute(state.t, state.q, state.v)
     stack, nv = controller.active_stack, controller.robot.nv
@@ -65,9 +65,9 @@ _floors: "WeakKeyDictionary[Rollout, Array | None]" = WeakKeyDictionary()
 
 
 def floor_of(rollout: Rollout) -> Array | None:
-    """Return `expected_floor` for a log alone, whose controller is rebuilt; found once.
+    """Return `expected_floor` for a log alone, whose controller is rebuilt; cached.
 
-    A log may come from anybody: only packaged files are read.
+    A log may be untrusted: only packaged files are read.
     """
     if rollout not in _floors:
         packaged = only_within(packaged_folders())
@@ -77,7 +77,7 @@ def floor_of(rollout: Rollout) -> Array | None:
 
 
 _COARSEST = 1.0
-"""Largest K_N times the time between two rows: else the rows miss what decays."""
+"""Maximum K_N times the time between two rows: beyond it the rows miss the decay."""
 
 
 def expected_floor(rollout: Rollout, controller: Controller | None) -> Array | None:
@@ -88,7 +88,7 @@ def expected_floor(rollout: Rollout, controller: Controller | None) -> Array | N
 
         e_N' = -K_N e_N + h/2 P M⁻¹ τ'.
 
-    Its solution from e_N = 0 is the floor. The efforts are taken to change linearly
+    Its solution from e_N = 0 is the floor. The efforts are assumed to change linearly
     between two rows. None where the equation is not known or does not hold: without a
     controller, a control period or a gain, with contacts or a floating base, if the law
     changes during the run, or if the rows are too far apart.
@@ -135,7 +135,7 @@ def _solve(
         )
         projector = null_space_projector(controller, state)
         error = decay @ error + 0.5 * period * rest @ projector @ change
-        error = projector @ error  # the null space turns
+        error = projector @ error  # the null space rotates
         metric = controller.metric.evaluate(state, metric)
         floor[row + 1] = float(np.linalg.norm(metric.L.T @ error))
     return floor

@@ -1,4 +1,4 @@
-"""``hsp plot`` and its options; what is slow is imported when it runs."""
+"""``hsp plot`` and its options; slow modules are imported when it runs."""
 
 import argparse
 import re
@@ -61,7 +61,7 @@ def _add_options(plot: argparse.ArgumentParser) -> None:
 
 
 def _plot(options: argparse.Namespace) -> int:
-    """Draw the figures of logs, or of a file whose ending a companion knows."""
+    """Draw the figures of logs, or of a file whose ending a companion supports."""
     from hsp_control.cli.commands import file_name
     from hsp_control.cli.consoles import out, working
     from hsp_control.cli.loading import run_imports
@@ -114,12 +114,12 @@ def _plot(options: argparse.Namespace) -> int:
 
 
 def _times(text: str) -> list[float]:
-    """Return the times of frames [s]; what is no number is refused by the parser."""
+    """Return the times of frames [s]; the parser refuses text that is not a number."""
     return [float(part) for part in text.split(",")]
 
 
 def _numerically(log: Path) -> list[tuple[bool, float, str]]:
-    """Return what orders names by the numbers in them: 2, 8, 16."""
+    """Return a key that orders names by the numbers in them: 2, 8, 16."""
     parts = re.split(r"(\d+(?:\.\d+)?)", str(log.with_suffix("")))
     return [(k % 2 == 0, float(x) if k % 2 else 0.0, x) for k, x in enumerate(parts)]
 

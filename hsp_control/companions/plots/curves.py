@@ -84,7 +84,7 @@ def _fitting(axes: Axes, labels: Sequence[str]) -> int:
     """Return how many columns fit below the axes; entries run down the columns."""
     figure = axes.get_figure(root=True)
     assert figure is not None
-    # The layout comes later: a narrow figure leaves less beside the labels.
+    # The layout is computed later: a narrow figure leaves less space beside the labels.
     share = 1.1 if figure.get_figwidth() > _WIDE else 0.9
     width = axes.get_window_extent().width / figure.dpi * 72.0 / _LEGEND * share
     for columns in range(len(labels), 1, -1):
@@ -176,7 +176,7 @@ def log_scale(axes: Axes, values: Array, *, top: float = 0.0) -> None:
 
 
 def mark_steps(axes: Axes, rollout: Rollout) -> None:
-    """Shade the times at which steps are not the law's: limited, bounded or damped."""
+    """Shade the times of steps that deviate from the law: limited, bounded, damped."""
     columns, limited = rollout.columns, np.zeros(len(rollout), bool)
     if "status" in columns:
         limited = rollout["status"] >= LIMITED
@@ -203,7 +203,7 @@ def mark_frames(axes: Axes, times: Array) -> None:
 
 
 def _spaced_numbers(axes: Axes, times: Array) -> list[str]:
-    """Return the numbers of frames, those left out that would overlap."""
+    """Return the numbers of frames, without those that would overlap."""
     if len(times) > MAX_NAMED:
         return [""] * len(times)
     figure = axes.get_figure(root=True)
@@ -371,10 +371,10 @@ def draw_null_space_error(axes: Axes, rollout: Rollout) -> None:
 
 
 def draw_decay(axes: Axes, rollout: Rollout) -> None:
-    """Draw -V' beside what it is by the law, e_NᵀW K_N e_N, with a logarithmic axis.
+    """Draw -V' and its value by the law, e_NᵀW K_N e_N, with a logarithmic axis.
 
-    V = ½ e_NᵀW e_N is that of the log's rows, and V' = V (ln V)' by differences of
-    them: exact where V decays exponentially.
+    V = ½ e_NᵀW e_N is computed from the log's rows, and V' = V (ln V)' by differences
+    of them: exact where V decays exponentially.
     """
     t, power = rollout.t, decay_power(rollout)
     V = 0.5 * rollout["null_space_norm"] ** 2
@@ -420,7 +420,7 @@ def draw_field_value(axes: Axes, rollout: Rollout) -> None:
 
 
 def draw_field_terms(axes: Axes, rollout: Rollout) -> None:
-    """Draw the norm of every term's contribution to g: which term dominates when."""
+    """Draw the norm of every term's contribution to g, which shows the dominant one."""
     names = field_terms(rollout)
     norms = [np.linalg.norm(rollout[f"field.{name}.g"], axis=1) for name in names]
     draw_lines(axes, rollout.t, np.column_stack(norms), names)

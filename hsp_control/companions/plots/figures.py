@@ -100,7 +100,7 @@ def use_style() -> None:
 
 
 class StyledFigure(Figure):
-    """A figure that is drawn in the style outside of `styled` too: ticks come late."""
+    """A figure drawn in the style outside of `styled`, too: ticks are made late."""
 
     def _repr_png_(self) -> bytes:
         """Return the figure as PNG, for notebooks."""
@@ -138,14 +138,14 @@ def paper_figure(
 
     Args:
         rollout: The run.
-        absolute: Whether angles of joints are absolute where the robot has such.
-        frames: How many frames are drawn, evenly over the run.
+        absolute: Whether angles of joints are absolute if the robot defines them.
+        frames: The number of frames, evenly spaced over the run.
         times: Their times instead [s].
         title: The heading; None: the log's title.
         width: The width for a paper, such as ``84mm``, or in metres: without heading
             and foot. Below 150 mm the panels of a plane are in two columns, which at
             117 mm may be printed at 84 mm with text of 6 pt; those of space, and all
-            below 110 mm, are one below the other.
+            below 110 mm, are stacked.
 
     Raises:
         PlotError: If the log has no rows, or no frame is requested.
@@ -203,7 +203,7 @@ def paper_figure(
         draw_frames(cells.ravel().tolist(), rollout, rows, short=narrow)
         for cell in cells.ravel():
             cell.label_outer()
-            if paired:  # the axes of e, which has their labels
+            if paired:  # the axes of e, which have their labels
                 cell.set(xlabel="", ylabel="")
         strip.suptitle("(d)  Selected frames", **_HEADING)
         e = together.add_subplot()
@@ -230,12 +230,12 @@ PANELS: dict[str, tuple[Callable[[Axes, Rollout], None], str]] = {
     "joints": (curves.draw_joint_positions, "Joints"),
     "speeds": (curves.draw_speeds, "Joint speeds"),
 }
-"""The panels of `diagnostics_figure`, by name: what draws each, and its title."""
+"""The panels of `diagnostics_figure`, by name: the drawing function and the title."""
 _NARROW = 5.9  # width of a figure below which its panels are not in one row [in]
 _ONE_COLUMN = 4.33  # width up to which they are one below the other [in]
 _SHAPE = 0.72, 0.55  # height of a panel over its width, and its legend's [inches]
 _LOG_DASHES: tuple[Any, ...] = ("-", (0, (6, 1.5)), "-.", ":")
-"""Of the first log, the second and so on."""
+"""Line widths of the first log, the second and so on."""
 _THIN, _REFERENCE = 1.3, 1.1  # predictions are thinner, limits thinner still [pt]
 
 
@@ -252,11 +252,11 @@ def diagnostics_figure(
     Args:
         rollout: The run.
         others: Runs to draw in the same panels.
-        names: What the runs are called; by default as their logs say.
+        names: Names of the runs; by default those in their logs.
         panels: The names of the panels, of `PANELS`; by default most of them.
         width: The width for a paper, such as ``84mm``, or in metres: without heading
             and foot. By default it is that of a page.
-        absolute: Whether angles of joints are absolute where the robot has such.
+        absolute: Whether angles of joints are absolute if the robot defines them.
 
     Raises:
         PlotError: If a log has no rows, or there is no such panel.
@@ -279,7 +279,7 @@ def diagnostics_figure(
         if width is None:
             _add_title(figure, rollout)
         if others:
-            figure.suptitle("")  # the names of the logs stand there
+            figure.suptitle("")  # the names of the logs replace it
             own = [f"{k} {run.meta.get('name', '')}" for k, run in enumerate(runs, 1)]
             _name_logs(figure, names or differing(own))
         axes = figure.subplots(rows, columns, squeeze=False).ravel().tolist()
@@ -295,7 +295,7 @@ def diagnostics_figure(
 
 
 def _chosen_panels(runs: Sequence[Rollout], panels: Sequence[str]) -> list[str]:
-    """Return the panels that are requested, or all that can be drawn of all runs."""
+    """Return the requested panels, or all that can be drawn for all runs."""
     tasks = all(run["singular_values"].size for run in runs)
     can = {
         "determinant": tasks and all(map(measures.rows_compare, runs)),
@@ -309,7 +309,9 @@ def _chosen_panels(runs: Sequence[Rollout], panels: Sequence[str]) -> list[str]:
             near = f"{did_you_mean(name, PANELS)} (there are {listing(PANELS)})"
             raise PlotError(f"no panel {name!r}{near}")
         if not can.get(name, True):
-            raise PlotError(f"there are no {name} to draw, or none that compare")
+            raise PlotError(
+                f"the logs have no {name} to draw, or none that can be compared"
+            )
     usual = [name for name in PANELS if name not in ("joints", "speeds")]
     return [*dict.fromkeys(panels)] or [name for name in usual if can.get(name, True)]
 
@@ -328,7 +330,7 @@ def _draw_together(
             return
         for artist in (*axes.lines, *axes.patches, *axes.collections):
             if number and artist not in known:
-                artist.set_label("_")  # the first log's legend is that of all
+                artist.set_label("_")  # the first log's legend is used for all
         lines = [line for line in axes.lines if line not in known]
         thick = [
             line
@@ -446,8 +448,8 @@ def save_for_a_column(
 ) -> None:
     """Write a picture that has 300 dots per inch where it is printed 84 mm wide.
 
-    A journal's column is as wide. Text of 6 pt there is one of 6 pt w / 84 mm in a
-    figure that is w wide.
+    A journal's column is that wide. In a figure of width w, text that is printed there
+    at 6 pt has a size of 6 pt · w / 84 mm.
     """
     dots = 300.0 * 84.0 * _INCHES["mm"]
     figure.savefig(path, dpi=dots / figure.get_figwidth(), metadata=metadata)

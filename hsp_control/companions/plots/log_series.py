@@ -21,15 +21,15 @@ class TaskPath(NamedTuple):
     """The path of a point that a task controls."""
 
     name: str  # the task's name
-    # the desired position [m], shape (N, 3); the actual one along world axes that the
-    # task does not track
+    # the desired position [m], shape (N, 3); along world axes that the task does not
+    # track, the actual one
     desired: Array
     actual: Array  # the actual position [m], shape (N, 3)
     axes: str  # the world axes that the task tracks, such as ``"xy"``
 
 
 def drawn_parts(rollout: Rollout, name: str) -> dict[str, slice]:
-    """Return the columns of a task's reference that can be drawn, by what they are."""
+    """Return the columns of a task's reference that can be drawn, by their quantity."""
     about = rollout.meta["tasks"][name]
     drawn, axes = about.get("drawn", ()), about.get("axes")
     widths = {"position": len(axes or "xyz"), "orientation": 4, "direction": 3}
@@ -137,7 +137,7 @@ def field_terms(rollout: Rollout) -> list[str]:
 
 
 def held_period(rollout: Rollout) -> float | None:
-    """Return how long each effort of a run was held [s]; None if that is not known."""
+    """Return the time for which each effort of a run was held [s]; None if unknown."""
     settings = (rollout.config or {}).get("simulation")
     period = settings.get("control_period") if isinstance(settings, dict) else None
     if isinstance(period, int | float) and 0.0 < period < float("inf"):
@@ -160,10 +160,10 @@ def chosen_rows(
 class LoggedDistance(NamedTuple):
     """A minimum distance over time."""
 
-    label: str  # what it measures
+    label: str  # the measured distance
     values: Array  # the distance [m], shape (N,)
     edge: float | None  # the distance at contact [m]; None if it is not one number
-    edge_name: str = ""  # what the edge is; "" for zero, which needs no name
+    edge_name: str = ""  # name of the edge; "" for zero
 
 
 def logged_distances(rollout: Rollout) -> list[LoggedDistance]:
@@ -180,13 +180,13 @@ def logged_distances(rollout: Rollout) -> list[LoggedDistance]:
 
 
 def distance_label(meta: Mapping[str, Any], name: str) -> str:
-    """Return what a distance measures."""
+    """Return the description of a distance."""
     center = _center_of(meta, name)
     return f"joint to centre of {center}" if center else name.replace("_", " ")
 
 
 def _center_of(meta: Mapping[str, Any], name: str) -> str:
-    """Return the obstacle to whose centre a distance leads; "" if to surfaces."""
+    """Return the obstacle to whose centre a distance is measured; "" if to surfaces."""
     about = meta.get("columns", {}).get(f"distance.{name}", {})
     return str(about.get("center_of", ""))
 
@@ -205,7 +205,8 @@ def _edge(meta: Mapping[str, Any], name: str) -> tuple[float | None, str]:
 
 
 ROUNDING = 1e-12
-"""Ratio of ‖e_N(0)‖ to the speeds it is computed from, below which it is rounding."""
+"""Ratio of ‖e_N(0)‖ to the speeds from which it is computed, below which it is
+rounding."""
 
 
 class Decay(NamedTuple):
@@ -246,7 +247,7 @@ def predicted_decay(rollout: Rollout) -> Decay:
     norm, elapsed = rollout["null_space_norm"], rollout.t - rollout.t[0]
     speeds = np.linalg.norm(rollout["field.g"], axis=1)
     speeds = speeds + np.linalg.norm(rollout.v, axis=1)
-    # Without the law, in a safe stop, they are not known.
+    # They are unknown without the law, as in a safe stop.
     if not norm[0] > ROUNDING * float(np.nanmax(speeds, initial=0.0)):
         why = "no prediction: starts with $e_N$ = 0"
         return Decay(None, None, (slowest, fastest), why)

@@ -27,7 +27,7 @@ LINK = "#8C969F"
 JOINT = "#2F363D"
 """A robot's joints (near black)."""
 SHADOW = "#E3E6E9"
-"""A shadow on the floor, which helps to see depth (pale grey)."""
+"""A shadow on the floor, which shows depth (pale grey)."""
 WALL = "#F6F7F8"
 """The walls behind a three-dimensional plot."""
 
@@ -41,7 +41,7 @@ PAPER = "#FFFFFF"
 """The background."""
 
 STAGE = "#10171E"
-"""A dark background, on which the robot stands in light."""
+"""A dark background, on which the robot is lit."""
 
 EARLY, LATE = "#C9DCEA", "#0A3A5C"
 """The two ends of the time scale, light to dark blue."""

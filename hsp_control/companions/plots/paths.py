@@ -45,7 +45,7 @@ _DIGIT_WIDTH = 4.8  # width of a digit [pt]
 _NARROWEST = 115.0
 """Width or height, the larger one, of the smallest box in a figure [pt]."""
 _HEIGHT = 11.0  # height of a line of tick labels [pt]
-_CLEAR = 1.2  # labels are apart by so many of their widths and heights, added
+_CLEAR = 1.2  # distance of labels, in sums of their widths and heights
 _WALLS = ((0, 0), (1, 1), (2, 0))
 """The sides behind the scene, (axis, side): low x, high y and the floor."""
 
@@ -69,7 +69,7 @@ def _ticks(view: View, ends: Array, axis: int) -> Array:
     near = 0.07 * (high - low)  # where labels of x and y would overlap
     first, last = low + near * (axis == 1), high - near * (axis == 0)
     inside = np.zeros(0)
-    while len(inside) < 2 and count < 10:  # one tick alone gives no scale
+    while len(inside) < 2 and count < 10:  # a single tick gives no scale
         ticks = np.asarray(
             MaxNLocator(count, steps=[1, 2, 5, 10]).tick_values(low, high)
         )

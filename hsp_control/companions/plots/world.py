@@ -1,4 +1,4 @@
-"""The world of a log on paper: views, skeletons, obstacles, shadows, directions."""
+"""The world of a log in figures: views, skeletons, obstacles, shadows, directions."""
 
 from collections.abc import Callable, Mapping, Sequence
 from itertools import product
@@ -17,7 +17,7 @@ from hsp_control.companions.plots.log_series import TaskPath, task_path
 from hsp_control.simulation import Rollout
 from hsp_control.simulation.measures import task_names
 
-FLAT = 1e-6  # depth over width below which motion is taken as planar
+FLAT = 1e-6  # depth over width below which motion is treated as planar
 AZIMUTH, ELEVATION = -60.0, 22.0  # direction of the eye in an oblique view [deg]
 
 
@@ -197,7 +197,8 @@ _POINTS_OF_SHAPE: dict[str, Callable[[Mapping[str, Any]], tuple[Array, float]]] 
     ),
     "HalfSpace": lambda about: (np.zeros((0, 3)), 0.0),
 }
-"""Returns points and radius by shape; others, as a mesh, are drawn as a ball."""
+"""Functions that return points and radius by shape; others, such as a mesh, are drawn
+as a ball."""
 
 
 def parents(rollout: Rollout) -> list[int]:

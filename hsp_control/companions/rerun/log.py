@@ -1,4 +1,4 @@
-"""Writes a run for Rerun's viewer, with the names that our own view has.
+"""Writes a run for Rerun's viewer, with the names of our own view.
 
 The scene is below ``robot``, ``obstacles`` and ``paths``, as in the page; every column
 of the log is a curve below ``log``, by its own name. Needs the extra ``rerun``.
@@ -44,7 +44,7 @@ def log_to_rerun(
     Args:
         rollout: The run.
         robot: Its robot; None: the one that the log's configuration names.
-        recording: A `rerun.RecordingStream` to log into, beside what others log; None:
+        recording: A `rerun.RecordingStream` to log into, besides other data; None:
             a new one.
         path: A file ``.rrd`` to write, instead of a recording to log into; None: none,
             and the recording goes where its owner sends it.
@@ -91,7 +91,7 @@ def log_to_rerun(
 
 
 def _layout(rollout: Rollout) -> Any:
-    """Return what Rerun's viewer opens with: the scene, and beside it a few plots."""
+    """Return the layout of Rerun's viewer: the scene, and beside it a few plots."""
     from rerun import blueprint
 
     shown = {
@@ -147,7 +147,7 @@ def _log_obstacles(rerun: Any, recording: Any, motion: RunMotion) -> None:
 
 
 def _shape(rerun: Any, shape: Shape) -> Iterator[Any]:
-    """Yield what Rerun draws for an obstacle; nothing for a half-space."""
+    """Yield the entities that Rerun draws for an obstacle; none for a half-space."""
     solid = {"colors": [_rgb(palette.OBSTACLE)], "fill_mode": "solid"}
     match shape:
         case shapes.Sphere():
@@ -200,7 +200,7 @@ def _send_poses(
 
 
 def _archetypes(rerun: Any, visual: Visual, owner: str) -> Iterator[Any]:
-    """Yield what Rerun draws for a piece of a link; nothing for a mesh not found."""
+    """Yield Rerun's entities for a piece of a link; none without its mesh."""
     size, color = visual.size, [*visual.color]
     solid = {"colors": [color], "fill_mode": "solid"}
     match visual.kind:

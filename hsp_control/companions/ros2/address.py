@@ -40,8 +40,8 @@ def parse(address: str, options: Collection[str] = ()) -> TopicAddress:
         if key not in {"domain", *options}:
             known = listing(["domain", *options])
             raise HardwareError(
-                f"{where}: there is no option {key!r}"
-                f"{did_you_mean(key, ['domain', *options])} (known: {known})"
+                f"{where}: unknown option "
+                f"{key!r}{did_you_mean(key, ['domain', *options])} (known: {known})"
             )
     domain = found.pop("domain", None)
     if domain is None:
@@ -57,7 +57,7 @@ def checked_name(name: str) -> str:
     """Return a name of ROS 2 with its leading slash."""
     if not _NAME.fullmatch(name):
         raise HardwareError(
-            f"{name!r} is no name of ROS 2; needs letters, digits and '_' between "
+            f"{name!r} is not a ROS 2 name; needs letters, digits and '_' between "
             "slashes, such as /joint_states"
         )
     return name if name.startswith("/") else f"/{name}"

@@ -1,4 +1,4 @@
-"""What ``ros2://`` means to ``hsp live``; needs Cyclone DDS only where it is used."""
+"""The scheme ``ros2://`` of ``hsp live``; needs Cyclone DDS only when it is used."""
 
 from hsp_control.companions.ros2.installed import check_installed
 from hsp_control.live.hardware import Hardware, Publisher
@@ -24,11 +24,11 @@ def connect(address: str, robot: Robot, period: float) -> Hardware:
 
 
 def publish(address: str, effort_source: EffortSource) -> Publisher:
-    """Return what publishes a loop's states and poses; see `Watched`.
+    """Return a publisher of a loop's states and poses; see `Watched`.
 
     Args:
         address: ``NAME?rate=HZ&domain=N``.
-        effort_source: What computes the efforts.
+        effort_source: The source of the efforts.
 
     Raises:
         HardwareError: If Cyclone DDS is not installed, or the address is invalid.

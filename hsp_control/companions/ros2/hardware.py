@@ -23,25 +23,25 @@ from hsp_control.robot import Robot
 JOINT_STATES = "/joint_states"
 """The topic of a robot's states by default, as ros2_control's."""
 _STATES = 10
-"""Number of states from which the robot's period is found."""
+"""Number of states from which the robot's period is measured."""
 _TOLERANCE = 0.2
-"""By which part the robot's period may differ from the loop's."""
+"""Tolerance of the robot's period, relative to the loop's."""
 _POLL = 0.01
-"""How often it is looked whether somebody listens, before the run begins [s]."""
+"""Time between two checks for a subscriber, before the run begins [s]."""
 
 
 class Ros2Hardware:
     """`Hardware` that receives ``sensor_msgs/JointState`` and sends efforts.
 
     ros2_control's ``JointStateBroadcaster`` publishes these states, and its
-    ``ForwardCommandController`` of efforts, once ``JointGroupEffortController``, takes
-    these efforts as ``std_msgs/Float64MultiArray``. Joints are matched by name. The
-    field ``effort`` is not read: whether it is commanded or measured, and with or
-    without gravity, differs from robot to robot.
+    ``ForwardCommandController`` of efforts, once ``JointGroupEffortController``,
+    receives these efforts as ``std_msgs/Float64MultiArray``. Joints are matched by
+    name. The field ``effort`` is not read: whether it is commanded or measured, and
+    with or without gravity, differs from robot to robot.
 
-    A state has no number, but a stamp: one that is not later than the last one is
+    A state has a stamp instead of a number: one that is not later than the last one is
     old, and a step of n periods means that n - 1 states were lost. The clock of the
-    stamps is compared with nothing (`AgeEstimator`).
+    stamps is not compared with ours (`AgeEstimator`).
 
     Attributes:
         period: Time between two states [s].
@@ -64,11 +64,11 @@ class Ros2Hardware:
                 of v); states come from ``/joint_states`` by default.
             robot: The controller's model.
             period: The control period [s].
-            timeout: Longest time to wait [s].
+            timeout: Maximum time to wait [s].
 
         Raises:
             HardwareError: If the address is invalid, Cyclone DDS cannot start, or the
-                robot is not there; lists what is there instead.
+                robot is not there; the message lists the topics that are.
         """
         name, domain, options = parse(address, ("states", "joints"))
         self.period, self._joints = period, Joints(robot)
@@ -95,8 +95,8 @@ class Ros2Hardware:
     def read(self, timeout: float) -> Measurement | None:
         """Return the newest state; see `Hardware.read`.
 
-        What is wrong with a message, or that a second publisher sends states of these
-        joints, is the `Measurement.fault` of the last good state, once.
+        An invalid message, or a second publisher of states of these joints, is reported
+        once as the `Measurement.fault` of the last good state.
         """
         end = monotonic() + timeout
         newest: Measurement | None = None
@@ -110,7 +110,7 @@ class Ros2Hardware:
                 return None
         if newest is None:
             return None
-        # A robot's clock runs on while the loop prepares after its first read.
+        # A robot's clock advances while the loop prepares after its first read.
         if self._reads < 2:
             self._stamps.begin(self._reads * self.period)
             newest = self._last = newest._replace(t=self._stamps.t)
@@ -121,18 +121,18 @@ class Ros2Hardware:
         """Send an effort; see `Hardware.write`.
 
         Raises:
-            HardwareError: If nobody listens to the commands any more.
+            HardwareError: If the commands have no subscriber any more.
         """
         if self._publisher.matched == 0:
-            raise HardwareError(f"nobody listens to {self.commands} any more")
+            raise HardwareError(f"no subscriber of {self.commands} is left")
         data = effort[self._order].tolist()
         self._publisher.send(Float64MultiArray(MultiArrayLayout(), data))
 
     def close(self) -> None:
         """Leave the domain; a second call does nothing.
 
-        A ``ForwardCommandController`` then holds the last effort: its interface has no
-        word for an end. A robot of `serve` stops.
+        A ``ForwardCommandController`` then holds the last effort: its interface cannot
+        end a run. A robot of `serve` stops.
         """
         if not self._closed:
             self._closed = True
@@ -165,7 +165,7 @@ class Ros2Hardware:
         if self._faulty:
             return None
         self._faulty = True
-        self._stamps.sequence += 1  # else it would count as an old state
+        self._stamps.sequence += 1  # otherwise it would be an old state
         return self._last._replace(sequence=self._stamps.sequence, fault=fault)
 
     def _check_period(self, end: float) -> Measurement:

@@ -1,4 +1,4 @@
-"""Whether Cyclone DDS is there."""
+"""Whether Cyclone DDS is installed."""
 
 from hsp_control.common.exceptions import HardwareError
 

@@ -20,7 +20,7 @@ class Joints:
     """
 
     def __init__(self, robot: Robot) -> None:
-        """Look at the robot."""
+        """Read the joints of the robot."""
         if not robot.flat:
             many = next(j for j, model in robot.joints.items() if model.nv > 1)
             raise HardwareError(
@@ -36,7 +36,7 @@ class Joints:
     def state(self, message: JointState, topic: str) -> tuple[Array, Array] | None:
         """Return q, shape (nq,), and v, shape (nv,); None if it has no joint of ours.
 
-        Numbers may be NaN: what a state must be, the loop checks.
+        Numbers may be NaN: the loop checks them.
         """
         if message.name != self._known:
             order = self._found(message.name, topic)
@@ -67,7 +67,7 @@ class Joints:
         )
 
     def command_order(self, joints: str | None) -> list[int]:
-        """Return where in v the numbers of a command belong, shape (nv,)."""
+        """Return the indices in v of a command's numbers, shape (nv,)."""
         if joints is None:
             return list(range(len(self.names)))
         given = joints.split(",")
@@ -86,7 +86,7 @@ class Joints:
         return [self.names.index(name) for name in given]
 
     def _found(self, names: Sequence[str], topic: str) -> list[int]:
-        """Return where our joints are in a message; none if it has none of them."""
+        """Return the indices of our joints in a message; empty if it has none."""
         ours = [name for name in names if name in self.names]
         if not ours:
             return []

@@ -12,7 +12,7 @@ from cyclonedds.idl import IdlStruct
 from cyclonedds.idl.types import float64, int32, uint32
 
 if TYPE_CHECKING:
-    from builtins import list as sequence  # what it is, but Cyclone does not say so
+    from builtins import list as sequence  # which Cyclone does not declare
 else:
     from cyclonedds.idl.types import sequence
 
@@ -41,7 +41,7 @@ class Time(IdlStruct, typename="builtin_interfaces::msg::dds_::Time_"):
 
 @dataclass
 class Header(IdlStruct, typename="std_msgs::msg::dds_::Header_"):
-    """When something was measured, and in which frame."""
+    """The time and the frame of a measurement."""
 
     stamp: Time
     frame_id: str
@@ -153,8 +153,8 @@ TYPE_HASHES: dict[type[IdlStruct], str] = {
     PoseStamped: "10f3786d7d40fd2b54367835614bff85d4ad3b5dab62bf8bca0cc232d73b4cd8",
     TwistStamped: "5f0fcd4f81d5d06ad9b4c4c63e3ea51b82d6ae4d0558f1d475229b1121db6f64",
 }
-"""The hashes (RIHS01) by which ROS 2 since Iron distinguishes types. It compares none
-over DDS, but warns where one is missing."""
+"""The hashes (RIHS01) by which ROS 2 since Iron distinguishes types. ROS 2 does not
+compare them over DDS, but warns if one is missing."""
 
 
 def ros_name(typename: str) -> str:

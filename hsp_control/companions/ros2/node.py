@@ -1,7 +1,8 @@
-"""A participant in a DDS domain: publishers and subscriptions as ROS 2 has them.
+"""A participant in a DDS domain: publishers and subscriptions as of ROS 2.
 
-It needs no ROS 2 and no router. ROS 2 sees the topics, without the name of a node.
-Networks are Cyclone DDS's matter: its ``CYCLONEDDS_URI`` chooses interfaces and peers.
+It needs no ROS 2 and no router. ROS 2 lists the topics, without the name of a node. The
+network is configured in Cyclone DDS: its ``CYCLONEDDS_URI`` chooses interfaces and
+peers.
 """
 
 from collections.abc import Iterator
@@ -40,11 +41,12 @@ from hsp_control.companions.ros2.messages import TYPE_HASHES, ros_name
 M = TypeVar("M", bound=IdlStruct)
 
 _DEPTH = 16
-"""Most messages that wait in a subscription; where more come, the oldest are lost."""
+"""Maximum number of messages queued in a subscription; beyond it the oldest are
+lost."""
 _SLICE = 0.1
-"""Longest wait in one piece [s]: Ctrl-C is noticed between two."""
+"""Maximum duration of one wait [s]: Ctrl-C is noticed between two."""
 _ENDPOINTS = 10_000
-"""Most publishers that are looked through to explain why one is missing."""
+"""Maximum number of publishers searched to explain why one is missing."""
 
 
 class ReceivedMessage(NamedTuple, Generic[M]):
@@ -52,7 +54,7 @@ class ReceivedMessage(NamedTuple, Generic[M]):
 
     Attributes:
         message: The message.
-        publisher: A number for its publisher, other for others.
+        publisher: A number that identifies its publisher.
     """
 
     message: M
@@ -77,7 +79,7 @@ class Node:
         return TopicPublisher(self._participant, topic, kind)
 
     def subscription(self, topic: str, kind: type[M]) -> "Subscription[M]":
-        """Return a subscription of a topic; best effort, so that it fits every one.
+        """Return a subscription of a topic; best effort, to match any publisher.
 
         A state that was lost is not sent again: the next one is newer.
         """
@@ -85,7 +87,7 @@ class Node:
 
 
 class _End(Generic[M]):
-    """What both ends of a topic have: its name, and the others.
+    """The common part of both ends of a topic: its name, and its counterparts.
 
     Attributes:
         topic: The topic's name in ROS 2.
@@ -104,8 +106,8 @@ class _End(Generic[M]):
     def _user_data(self) -> Policy.Userdata:
         return Policy.Userdata(f"typehash=RIHS01_{TYPE_HASHES[self.kind]};".encode())
 
-    def _others(self, builtin: BuiltinTopic, verb: str) -> str:
-        """Return which endpoints there are instead of one that fits."""
+    def _others(self, builtin: BuiltinTopic, end: str) -> str:
+        """Return the endpoints that exist instead of a matching one."""
         reader = BuiltinDataReader(self._participant, builtin)
         there = {
             (each.topic_name, each.type_name)
@@ -123,7 +125,7 @@ class _End(Generic[M]):
             )
         same = sorted(name[2:] for name, kind in there if kind == needed)
         return (
-            f"nobody {verb} {self.topic} in domain {self._participant.get_domain_id()} "
+            f"no {end} of {self.topic} in domain {self._participant.get_domain_id()} "
             f"(topics with {ros_name(needed)}: {listing(same) if same else 'none'})"
         )
 
@@ -157,8 +159,8 @@ class TopicPublisher(_End[M]):
         return len(self._writer.get_matched_subscriptions())
 
     def why_none(self) -> str:
-        """Return why nobody receives it, as far as can be seen."""
-        return self._others(BuiltinTopicDcpsSubscription, "listens to")
+        """Return why it has no subscriber, as far as can be detected."""
+        return self._others(BuiltinTopicDcpsSubscription, "subscriber")
 
 
 class Subscription(_End[M]):
@@ -194,11 +196,11 @@ class Subscription(_End[M]):
         return len(self._reader.get_matched_publications())
 
     def why_none(self) -> str:
-        """Return why it receives nobody, as far as can be seen."""
-        return self._others(BuiltinTopicDcpsPublication, "publishes")
+        """Return why it has no publisher, as far as can be detected."""
+        return self._others(BuiltinTopicDcpsPublication, "publisher")
 
     def wait(self, timeout: float) -> bool:
-        """Wait until something is there to be taken; return whether it is."""
+        """Wait until a message is available; return whether one is."""
         end = monotonic() + timeout
         while True:
             left = max(end - monotonic(), 0.0)
@@ -208,10 +210,10 @@ class Subscription(_End[M]):
                 return False
 
     def take(self) -> list[ReceivedMessage[M]]:
-        """Return the messages that wait, oldest first; at most as many as may wait.
+        """Return the queued messages, oldest first.
 
-        One with a text that is not UTF-8 is counted and dropped. Other bytes that are
-        no message of the type do not get so far: Cyclone DDS drops them.
+        One with a text that is not UTF-8 is counted and dropped. Cyclone DDS drops
+        other bytes that are not a message of the type.
         """
         found: list[ReceivedMessage[M]] = []
         for _ in range(_DEPTH):
@@ -219,12 +221,14 @@ class Subscription(_End[M]):
                 taken = self._reader.take(1)
             except DDSException as error:
                 raise HardwareError(f"cannot receive {self.topic}: {error}") from error
-            except UnicodeDecodeError:  # all else Cyclone has checked
+            except UnicodeDecodeError:  # Cyclone has checked everything else
                 self.malformed += 1
                 continue
             if not taken:
                 break
-            if not isinstance(taken[0], InvalidSample):  # those say: a publisher left
+            if not isinstance(
+                taken[0], InvalidSample
+            ):  # those report that a publisher left
                 info: SampleInfo = taken[0].sample_info  # type: ignore[attr-defined]
                 found.append(ReceivedMessage(taken[0], info.publication_handle))
         return found

@@ -1,4 +1,4 @@
-"""A simulated robot on topics of ROS 2, for the controllers of others."""
+"""A simulated robot on topics of ROS 2, for any controller."""
 
 from collections import deque
 from collections.abc import Callable
@@ -22,15 +22,16 @@ from hsp_control.live.udp import CLOSED_BY_LOOP
 from hsp_control.robot import Robot
 
 _CATCH_UP = 10
-"""Most periods that are made up for when the process did not get the processor."""
+"""Maximum number of periods that are made up for after the process was not
+scheduled."""
 _WAITING = 0.1
 """Time between two states of a robot in lockstep that waits for an effort [s]."""
 _POLL = 0.1
-"""How often a robot that waits for an effort looks for reasons to stop [s]."""
+"""Time between two checks for a reason to stop, while waiting for an effort [s]."""
 
 
 class RobotTopics:
-    """What a robot with ros2_control would publish and receive.
+    """The topics of a robot with ros2_control.
 
     Attributes:
         commands: The topic of the efforts.
@@ -60,7 +61,7 @@ class RobotTopics:
 
     @property
     def left(self) -> bool:
-        """Whether whoever sent efforts has gone."""
+        """Whether the publisher of efforts has gone."""
         return self._sender is not None and self._subscription.matched == 0
 
     def send(self, stamp: int, q: Array, v: Array, tau: Array) -> None:
@@ -68,14 +69,14 @@ class RobotTopics:
         self._publisher.send(self._joints.message(stamp, q, v, tau))
 
     def wait(self, timeout: float) -> bool:
-        """Wait for an effort [s]; return whether one is there."""
+        """Wait for an effort, at most a time [s]; return whether one arrived."""
         return bool(self._efforts) or self._subscription.wait(timeout)
 
     def efforts(self, most: int) -> list[Array]:
-        """Return the oldest efforts that wait, shape (nv,) each.
+        """Return the oldest queued efforts, shape (nv,) each.
 
         Args:
-            most: How many.
+            most: Their maximum number.
 
         Raises:
             HardwareError: If one has another size, or a second publisher sends some.
@@ -106,12 +107,12 @@ def serve(
 
     Each period: receive efforts, advance the plant, publish the state. Stamps begin at
     the time of day, and grow by a period each. If the process overruns by some periods,
-    it makes up for them, as a robot moves on; if by more, the plant stands still, but
-    not the stamps.
+    it makes up for them, since a robot would have moved; if by more, the plant stands
+    still, but the stamps advance.
 
     The robot stops as a `SimulatedRobot` does, and where a ``ForwardCommandController``
-    would not: if whoever sent efforts has gone, if a second publisher sends some, and
-    at an effort of a wrong size.
+    would not: if the publisher of efforts has gone, if there is a second one, and at an
+    effort of the wrong size.
 
     Args:
         robot: The robot, waiting for its first effort.
@@ -150,7 +151,7 @@ def serve(
                 due = monotonic()
                 continue
             if lockstep and robot.phase == Phase.WAITING:
-                # Few states, as each that is answered makes all efforts a period late.
+                # Few states, since each answered one delays all efforts by a period.
                 topics.wait(_WAITING)
                 due = monotonic()
                 continue

@@ -1,4 +1,4 @@
-"""Time and number of states that have a stamp, and no number."""
+"""Time and number of states that have a stamp but no number."""
 
 
 class Stamps:

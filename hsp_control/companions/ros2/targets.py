@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     AnyTarget = PoseStamped | TwistStamped
 
 _POLL = 0.2
-"""How soon a listener notices that nobody needs it any more [s]."""
+"""Time until a listener notices that its stream is gone [s]."""
 _WORLD = "world"
 
 
@@ -39,7 +39,10 @@ def check_address(source: str) -> TopicAddress:
             f"source is {source!r}: type is {kind!r}; needs pose or twist"
         )
     if kind == "pose" and "tool" in address.options:
-        raise StreamError(f"source is {source!r}: poses are in no tool's axes")
+        raise StreamError(
+            f"source is {source!r}: a tool is only for type=twist; poses are in the "
+            "stream's frame"
+        )
     return address
 
 
@@ -49,7 +52,7 @@ def is_local(source: str) -> bool:
 
 
 def opened(source: str, space: Space) -> Callable[["ref[Inbox]"], None]:
-    """Join the domain of an address; return what listens to its topic."""
+    """Join the domain of an address; return the listener of its topic."""
     address = check_address(source)
     twists = address.options.get("type") == "twist"
     if space.linear not in {0, 3} or not space.width:
@@ -73,7 +76,7 @@ def _listen(
     space: Space,
     inbox: "ref[Inbox]",
 ) -> None:
-    """Put every target into the inbox for as long as it is there."""
+    """Put every target into the inbox while it exists."""
     while inbox() is not None:
         taken = subscription.take() if subscription.wait(_POLL) else []
         if there := inbox():
@@ -110,9 +113,9 @@ def _said(
 def _check_frame(what: str, named: str, known: list[str]) -> None:
     if named and named not in known:
         needed = " or ".join(map(repr, known))
-        raise StreamError(f"{what} is in the frame {named!r:.40}; needs {needed}")
+        raise StreamError(f"{what} is in frame {named!r:.40}; needs {needed}")
 
 
 def _numbers(linear: list[float], angular: list[float], space: Space) -> list[float]:
-    """Return what of a target belongs to a stream."""
+    """Return the part of a target that a stream uses."""
     return (linear if space.linear else []) + (angular if space.rotational else [])

@@ -1,4 +1,4 @@
-"""A live loop on topics of ROS 2, for those who only watch: RViz, PlotJuggler, bags."""
+"""A live loop on topics of ROS 2, for observers: RViz, PlotJuggler, bags."""
 
 from time import time_ns
 
@@ -24,9 +24,9 @@ _POSITION, _POSE = ("position",), ("position", "orientation")
 
 
 class Watched:
-    """Publishes what a controller does; `run_loop` calls it as ``on_period``.
+    """Publishes a controller's states and poses; `run_loop` calls it as ``on_period``.
 
-    `/NAME/joint_states` has the state that the controller was given, and its effort.
+    `/NAME/joint_states` has the state that the controller received, and its effort.
     For each task with a position in space, `/NAME/TASK/reference` and
     `/NAME/TASK/actual` are poses in the frame of the robot's root; a task without an
     orientation has that of the root. Stamps are the time of day.
@@ -60,7 +60,7 @@ class Watched:
                     self._pose(task, what)
 
     def __call__(self, t: float) -> None:
-        """Publish, if it is time again.
+        """Publish, if it is due.
 
         Args:
             t: The controller's time [s].
@@ -80,7 +80,7 @@ class Watched:
                     self._pose(task, what).send(PoseStamped(header, _pose_of(value)))
 
     def ended(self, ended: str, reason: str) -> None:
-        """Do nothing: the topics have no words."""
+        """Do nothing: the topics have no message for the end."""
 
     def _pose(self, task: Task, what: str) -> TopicPublisher[PoseStamped]:
         """Return a publisher; a task may be added while the loop runs."""

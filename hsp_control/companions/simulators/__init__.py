@@ -1,4 +1,4 @@
-"""Controllers for simulators that users have: robosuite, Gymnasium.
+"""Controllers for users' simulators: robosuite, Gymnasium.
 
 Each module imports its simulator, and is imported only by those who use it.
 """

@@ -28,9 +28,9 @@ except ImportError as error:
     ) from error
 
 _GAINS = Gains(natural_frequency=12.0)
-"""Gains where the settings give none; about those of robosuite's OSC_POSE."""
+"""Default gains, close to those of robosuite's OSC_POSE."""
 _NEEDED = "model", "data", "frame_skip", "do_simulation"
-"""What Gymnasium's ``MujocoEnv`` has."""
+"""Required attributes, as of Gymnasium's ``MujocoEnv``."""
 
 
 class HandTargets(
@@ -40,10 +40,10 @@ class HandTargets(
     """An environment whose actions are targets of a hand, instead of controls.
 
     At every step of the simulation the law computes the efforts of the arm: all joints
-    between the world and the hand. What they were driven with does not count any more.
-    The other entries of the environment's own action, such as those of fingers, follow
-    after the target. The environment sees zeros as the action of the arm, and so does a
-    reward that includes it.
+    between the world and the hand. Their own actuation is replaced. The other entries
+    of the environment's own action, such as those of fingers, follow after the target.
+    The environment sees zeros as the action of the arm, and so does a reward that
+    includes it.
 
     An action is a change of the hand's pose, or, if ``absolute``, the pose itself: a
     position [m], and unless only ``axes`` are tracked, a rotation vector [rad], in
@@ -66,7 +66,7 @@ class HandTargets(
         scale: tuple[float, float] = (0.05, 0.5),
         disable_servos: bool = False,
     ) -> None:
-        """Find the arm in the environment's scene, and take it over.
+        """Find the arm in the environment's scene, and take control of it.
 
         Args:
             env: The environment: Gymnasium's ``MujocoEnv`` below any wrappers, whose
@@ -127,13 +127,13 @@ class HandTargets(
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
     ) -> tuple[Any, dict[str, Any]]:
-        """Reset the environment, and aim at where the hand is."""
+        """Reset the environment, and set the target to the hand's pose."""
         observation, info = self.env.reset(seed=seed, options=options)
         self.hand.begin(self._time, *self._state)
         return observation, info
 
     def step(self, action: ArrayLike) -> tuple[Any, Any, bool, bool, dict[str, Any]]:
-        """Move the hand towards the target that an action means.
+        """Move the hand towards the target of an action.
 
         Raises:
             ShapeError: If the action has another shape.
@@ -164,7 +164,7 @@ class HandTargets(
         return self.plant.coordinates.from_mujoco(data.qpos, data.qvel)
 
     def _goal(self, target: Array) -> pin.SE3:
-        """Return the pose that the entries of an action mean."""
+        """Return the pose commanded by the entries of an action."""
         here = self.hand.pose(self._state[0])
         if not self._absolute:
             target = np.clip(target, -1.0, 1.0) * self._scale

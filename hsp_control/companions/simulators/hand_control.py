@@ -1,4 +1,4 @@
-"""A controller of one hand that is given targets while it runs."""
+"""A controller of one hand that receives targets while it runs."""
 
 from dataclasses import fields
 from math import nan
@@ -19,13 +19,13 @@ from hsp_control.tasks.frame_position import axis_indices
 from hsp_control.trajectories import ComposedPose, Stream, StreamPose
 
 _JUMP = 1.5
-"""Where the time differs from the expected one by more periods, somebody set it [-]."""
+"""Difference from the expected time beyond which the simulation was reset [periods]."""
 
 
 class HandControl:
-    """The law for one hand of a simulated arm, with targets that come step by step.
+    """The law for one hand of a simulated arm, with a target at any step.
 
-    The posture in which a run begins is the start that fields refer to.
+    The posture in which a run begins is the start for fields.
 
     Attributes:
         robot: The arm.
@@ -49,7 +49,7 @@ class HandControl:
             robot: The arm.
             frame: The hand's frame.
             source: The settings.
-            gains: The gains of the hand's task, where the settings give none.
+            gains: The gains of the hand's task, unless the settings have some.
             axes: World axes of a position, such as ``xyz``; None: the whole pose.
 
         Raises:
@@ -72,7 +72,7 @@ class HandControl:
                 limits=settings.limits,
                 scene=settings.scene,
             )
-            # The robot is the simulator's own, and what it touches is no error of it.
+            # The robot is the simulator's, and touching objects is not an error.
             own = settings.compensation.suited(controller, None, exact=True)
             self.compensated = CompensatedController(controller, own)
         self._indices = axis_indices(axes or "")  # now that the task has checked them
@@ -80,7 +80,7 @@ class HandControl:
         self._expected, self._period = nan, nan
 
     def begin(self, t: float, q: Array, v: Array) -> None:
-        """Begin a run: forget all, aim at where the hand is.
+        """Begin a run: reset all, and set the target to the hand's pose.
 
         Args:
             t: Time [s].
@@ -88,13 +88,15 @@ class HandControl:
             v: Velocity, shape (nv,).
         """
         self.compensated.restart(origin=0.0)
-        self.compensated.controller.compute(t, q, v)  # places what refers to the start
+        self.compensated.controller.compute(
+            t, q, v
+        )  # places the parts relative to the start
         self._expected = nan
 
     def has_jumped(self, t: float) -> bool:
         """Return whether a time [s] does not follow the last effort's.
 
-        Then somebody has reset the simulation, or loaded another state.
+        Then the simulation was reset, or another state was loaded.
         """
         return abs(t - self._expected) > _JUMP * self._period
 
@@ -123,7 +125,7 @@ class HandControl:
     def effort(self, t: float, q: Array, v: Array, period: float) -> Array:
         """Return the effort to hold from t on for a period [s].
 
-        It is clipped to what the motors can give.
+        It is clipped to the motors' limits.
 
         Raises:
             HspControlError: See `CompensatedController.effort`.
@@ -142,7 +144,7 @@ class HandControl:
         return pin.SE3(frame.rotation, frame.position)
 
     def _task(self, gains: Gains, stream: StreamPose | None) -> Task:
-        """Return the hand's task, which follows what `aim` leads."""
+        """Return the hand's task, which follows the targets of `aim`."""
         if self.axes is not None:
             point: HeldPoint | Stream = self._point
             if stream is not None:

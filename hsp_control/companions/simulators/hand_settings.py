@@ -19,8 +19,8 @@ from hsp_control.tasks import Gains
 from hsp_control.trajectories import StreamPose
 
 _POSTURE_RATE = 10.0**0.5
-"""With it as weight and as gain, the posture obeys e'' + 2√10 e' + 10 e = 0 in the null
-space: as of robosuite's OSC_POSE there [1/s]."""
+"""Weight and gain [1/s] with which the posture obeys e'' + 2√10 e' + 10 e = 0 in the
+null space, as with robosuite's OSC_POSE."""
 
 _UNHURRIED = StreamPose(
     delay=0.11,  # two actions at 20 Hz, and a little
@@ -31,10 +31,10 @@ _UNHURRIED = StreamPose(
     angular_acceleration=5.0,
     angular_jerk=100.0,
 )
-"""Bounds that efforts can follow, also where motors are weak for a wrist's rotors."""
+"""Bounds that efforts can follow, also if motors are weak for a wrist's rotors."""
 
 Source = str | PathLike[str] | Mapping[str, Any] | None
-"""Where settings come from: a YAML file, its data, or nothing: the defaults."""
+"""A source of settings: a YAML file, its data, or None for the defaults."""
 
 
 class HandSettings(Part, error=ConfigError):
@@ -45,7 +45,7 @@ class HandSettings(Part, error=ConfigError):
     """Gains of the hand's task; those of the simulator's own controller by default."""
     stream: StreamPose | None = _UNHURRIED
     """How the reference moves from target to target, within which bounds; ``null``: it
-    jumps to each target and stays there. Of a position the linear bounds count."""
+    jumps to each target and stays there. For a position the linear bounds apply."""
     null_space: NullSpaceSettings = NullSpaceSettings(
         gain=_POSTURE_RATE, fields=(TargetPosture("start", weights=_POSTURE_RATE),)
     )

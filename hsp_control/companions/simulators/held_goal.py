@@ -1,4 +1,4 @@
-"""References that jump to a goal and stay there, as set points do."""
+"""References that jump to a goal and stay there, like set points."""
 
 from typing import Self
 
@@ -15,7 +15,7 @@ from hsp_control.trajectories import (
 
 
 class HeldPoint(Trajectory):
-    """x(t) = the last goal, at rest; where the robot starts before the first one.
+    """x(t) = the last goal, at rest; before the first one, the start of the robot.
 
     The error equation e'' + Kv e' + Kp e = 0 holds between jumps. A stream has none.
     """
@@ -55,7 +55,7 @@ class HeldPoint(Trajectory):
 
 
 class HeldRotation(OrientationTrajectory):
-    """R(t) = the last goal, at rest; as the robot starts before the first one."""
+    """R(t) = the last goal, at rest; before the first one, the start of the robot."""
 
     def aim(self, goal: ArrayLike) -> None:
         """Jump to a rotation, body to world, shape (3, 3)."""

@@ -14,7 +14,7 @@ from hsp_control.robot import Robot
 def arm_of(
     model: Any, qpos: ArrayLike, frame: str, joints: Sequence[str] | None = None
 ) -> Robot:
-    """Return the arm from the world to a frame, with the numbers MuJoCo uses.
+    """Return the arm from the world to a frame, with MuJoCo's parameters.
 
     Its joints are those that carry the frame. All others are locked: fingers, other
     arms, objects.
@@ -27,8 +27,8 @@ def arm_of(
 
     Raises:
         FrameNotFoundError: If there is no such body or site.
-        ModelError: If no joint carries the frame, or one does that is none of
-            ``joints``: the arm's base moves.
+        ModelError: If no joint carries the frame, or one does that is not in
+        ``joints``: the arm's base moves.
     """
     names = Names(model)
     chain = list(_chain(model, _body_of(model, names, frame)))

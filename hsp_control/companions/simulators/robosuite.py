@@ -1,15 +1,15 @@
 """A controller for robosuite's arms, selected like its own OSC_POSE.
 
-Import this module, and a controller configuration may say::
+After importing this module, a controller configuration may contain::
 
     config = robosuite.load_composite_controller_config(robot="Panda")
     config["type"] = "HSP"  # as BASIC; but an arm may be of our type
     config["body_parts"]["right"]["type"] = "HSP_POSE"
     config["body_parts"]["right"]["hsp"] = "hand.yaml"  # or its data; or leave it out
 
-Actions mean what they mean to OSC_POSE, whose code interprets them: deltas or absolute
-poses, input and output ranges, reference frames. robosuite calls for an effort at every
-step of the simulation, at 500 Hz, whatever the rate of the actions.
+Actions have the meaning that they have for OSC_POSE, whose code interprets them: deltas
+or absolute poses, input and output ranges, reference frames. robosuite requests an
+effort at every step of the simulation, at 500 Hz, whatever the rate of the actions.
 """
 
 from typing import Any
@@ -43,7 +43,7 @@ _FIXED: dict[str, Any] = {
     "position_limits": None,
     "orientation_limits": None,
 }
-"""Settings of OSC_POSE that can have one value here."""
+"""Settings of OSC_POSE for which only one value is supported."""
 
 
 class HspPose(OperationalSpaceController):  # type: ignore[misc]
@@ -54,22 +54,24 @@ class HspPose(OperationalSpaceController):  # type: ignore[misc]
     """
 
     def __init__(self, hsp: Any = None, **settings: Any) -> None:
-        """Make the arm of the compiled simulation, and its controller.
+        """Build the arm of the compiled simulation, and its controller.
 
         Args:
             hsp: The path of a YAML file with `HandSettings`, or its data; None: the
                 defaults.
             **settings: Those of OSC_POSE. ``kp`` and ``damping_ratio`` are the gains of
-                the hand unless the file has some; ``uncouple_pos_ori``, ``kp_limits``
-                and ``damping_ratio_limits`` have no effect: position and orientation
-                are always decoupled, and gains do not change.
+                the hand unless the file contains gains; ``uncouple_pos_ori``,
+                ``kp_limits`` and ``damping_ratio_limits`` have no effect: position and
+                orientation are always decoupled, and gains do not change.
 
         Raises:
             HspControlError: If a setting is wrong or not supported, the base moves, or
-                an actuator is no torque motor.
+                an actuator is not a torque motor.
         """
         for key, value in _FIXED.items():
-            given = settings.get(key, value)  # perhaps an array, which has no truth
+            given = settings.get(
+                key, value
+            )  # perhaps an array, which has no truth value
             if not isinstance(given, type(value)) or given != value:
                 raise ControllerError(
                     f"{key}: {TYPE} supports {value!r} only; got {given!r}"
@@ -83,7 +85,7 @@ class HspPose(OperationalSpaceController):  # type: ignore[misc]
         self.hand = HandControl(robot, frame, hsp, gains=self._gains())
 
     def set_goal(self, action: Array) -> None:
-        """Set the goal that an action means; see OSC_POSE."""
+        """Set the goal of an action; see OSC_POSE."""
         self._follow_jumps()
         super().set_goal(action)
         position, rotation = self.goal_pos, self.goal_ori
@@ -102,7 +104,7 @@ class HspPose(OperationalSpaceController):  # type: ignore[misc]
         return self.torques
 
     def reset_goal(self, goal_update_mode: str = "achieved") -> None:
-        """Begin anew: aim at where the hand is."""
+        """Restart: set the goal to the hand's pose."""
         super().reset_goal(goal_update_mode)
         self.hand.begin(self._time, *self._state)
 
@@ -121,7 +123,7 @@ class HspPose(OperationalSpaceController):  # type: ignore[misc]
         return self._coordinates.from_mujoco(data.qpos, data.qvel)
 
     def _follow_jumps(self) -> None:
-        """Begin anew if another state was loaded into the simulation."""
+        """Restart if another state was loaded into the simulation."""
         if self.hand.has_jumped(self._time):
             self.update(force=True)
             self.reset_goal(self._goal_update_mode)

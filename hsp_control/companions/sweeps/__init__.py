@@ -4,7 +4,7 @@ from typing import TYPE_CHECKING
 
 from hsp_control.companions.shared import at_first_use
 
-if TYPE_CHECKING:  # for type checkers; a help text must not import what is slow
+if TYPE_CHECKING:  # for type checkers only: a help text must not import slow modules
     from .figure import save_sweep_figure as save_sweep_figure
     from .figure import sweep_figure as sweep_figure
     from .results import Sweep as Sweep

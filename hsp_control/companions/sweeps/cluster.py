@@ -1,4 +1,4 @@
-"""The workers: on this computer by default, or those of any Dask scheduler."""
+"""The workers: on this computer by default, or of any Dask scheduler."""
 
 import logging
 import os
@@ -15,13 +15,13 @@ if TYPE_CHECKING:
     from distributed import Client
 
 PATIENCE = 60.0
-"""For a scheduler to answer, and for the first worker to start [s]."""
+"""Maximum time for a scheduler to answer, and for the first worker to start [s]."""
 KILLS = 3
-"""How many workers of this computer a run may kill until it is given up."""
+"""Number of workers of this computer that a run may kill before it is abandoned."""
 
 # Dask's command, in a process group that ends when this process does: the pipe to it
-# closes then, however it ended. Not Dask's own processes: these import the script of
-# the user again, which would need `if __name__ == "__main__"`.
+# closes then, for any reason. Not Dask's own processes, which import the user's script
+# again, which would need `if __name__ == "__main__"`.
 _WORKERS = """
 import os, sys, threading
 def end():
@@ -39,7 +39,7 @@ _VARIABLES = {"DASK_LOGGING__DISTRIBUTED": "critical"}
 def connected(
     scheduler: "str | Client | None", workers: int | None
 ) -> "Iterator[Client]":
-    """Give a client of a scheduler, or of one with own workers on this computer.
+    """Yield a client of a scheduler, or of one with its own workers on this computer.
 
     Raises:
         SweepError: If the scheduler does not answer, or no worker can be started.
@@ -64,7 +64,7 @@ def connected(
 
 @contextmanager
 def _quiet() -> Iterator[None]:
-    """Keep Dask from telling of workers and schedulers that die: the sweep does."""
+    """Suppress Dask's reports of dead workers and schedulers: the sweep has its own."""
     loggers = list(map(logging.getLogger, ("distributed", "distributed.client")))
     before = [logger.level for logger in loggers]
     try:
@@ -83,7 +83,7 @@ def _own_workers(workers: int | None) -> "Iterator[Client]":
 
     settings: dict[str, Any] = {
         "distributed.scheduler.allowed-failures": KILLS - 1,
-        # A worker has one run, so that its death is the fault of no other.
+        # A worker has one run, so that its death is caused by that run.
         "distributed.scheduler.worker-saturation": 1.0,
     }
     with dask.config.set(settings):
@@ -137,7 +137,7 @@ def _closing(client: "Client") -> "Iterator[Client]":
     try:
         yield client
     finally:
-        with suppress(Exception):  # of a scheduler that is gone
+        with suppress(Exception):  # of a lost scheduler
             client.close(timeout=2)
 
 

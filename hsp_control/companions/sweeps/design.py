@@ -1,4 +1,4 @@
-"""Designs: which combinations of values are run."""
+"""Designs: the choice of combinations of values."""
 
 import math
 from collections.abc import Sequence
@@ -58,7 +58,7 @@ def points(
     elif design == "latin_hypercube":
         fractions = qmc.LatinHypercube(dimension, rng=rng).random(samples)
     else:
-        # Balanced only for powers of two: draw the next one and drop the rest.
+        # Balanced only for powers of two: draw the next power and drop the excess.
         exponent = (samples - 1).bit_length()
         fractions = qmc.Sobol(dimension, rng=rng).random_base2(exponent)[:samples]
     columns = [

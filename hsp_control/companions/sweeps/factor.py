@@ -30,7 +30,7 @@ class Factor:
 
     @property
     def origin(self) -> str:
-        """What messages about its values contain instead of file and line."""
+        """The origin of its values for messages, instead of file and line."""
         return f"--over {self.name}"
 
     def description(self) -> dict[str, Any]:

@@ -54,16 +54,17 @@ def sweep_figure(
 
     A panel's tint shows the influence: blue if the result increases with the parameter,
     orange if it decreases, purple for other dependence; its strength is the share of
-    the variance of ranks. Of few runs it has none.
+    the variance of ranks. With few runs it has none.
 
     Args:
         sweep: The runs.
         outcomes: The results; None: tracking, null space, distances and effort.
-        parameters: Which of those that vary; None: all, or the most influential ones.
+        parameters: A selection of those that vary; None: all, or the most influential
+        ones.
         width: The width for a paper, such as ``117mm``, or in metres: without heading.
 
     Raises:
-        PlotError: If nothing varies, or a parameter is not one that does.
+        PlotError: If nothing varies, or a parameter does not.
     """
     found = influences(sweep, outcomes)
     rows = range(min(len(found.outcomes), MAX_OUTCOMES))
@@ -96,7 +97,7 @@ def sweep_figure(
 
 
 def _columns(found: Sensitivity, parameters: Sequence[str] | None) -> list[int]:
-    """Return the places of the parameters to show, in the sweep's order or as given."""
+    """Return the indices of the parameters to show, in the sweep's or given order."""
     if parameters is None:
         # If not all parameters fit, the most influential ones are shown.
         influence = np.nan_to_num(found.share).max(axis=1, initial=0.0)
@@ -236,7 +237,7 @@ def _add_title(figure: Figure, sweep: Sweep) -> None:
 
 
 def _add_foot(figure: Figure, sweep: Sweep, found: Sensitivity, letters: int) -> None:
-    """Write how the runs were made below the panels, in lines of so many letters."""
+    """Write the origin of the runs below the panels, in lines of a maximum length."""
     identity = sweep.meta["identity"]
     failed = len(sweep) - found.runs
     parts = [

@@ -1,8 +1,8 @@
-"""What travels to the workers, so that they need no file of this computer.
+"""The data sent to the workers, so that they need no file of this computer.
 
-It is the configuration with the files that it names, the robot where no installed
-package has it, and the Python files that declare types of one's own. Dask gives it to
-each worker when it joins, also to one that replaces another.
+It contains the configuration with the files that it names, the robot unless an
+installed package has it, and the Python files that declare the user's types. Dask
+passes it to each worker when it joins, also to one that replaces another.
 """
 
 import json
@@ -35,9 +35,9 @@ from hsp_control.simulation.log_writer import versions
 
 _log = logging.getLogger(__name__)
 
-_PLACE = "<luggage>"  # stands for the folder that a worker unpacks
+_PLACE = "<luggage>"  # placeholder for the folder that a worker unpacks
 _PREFIX = "hsp-sweep-"  # of that folder
-_LARGEST = 100_000_000  # bytes of a file that travels
+_LARGEST = 100_000_000  # maximum size of a file that is sent [bytes]
 
 reading = False
 """Whether this process, a worker, is running a script for the types in it."""
@@ -45,11 +45,11 @@ _LOCK = RLock()  # a worker may have several threads
 
 
 class SweepReachedError(BaseException):
-    """A script that a worker runs for its types has come to its own sweep."""
+    """A script that a worker runs for its types has reached its own sweep."""
 
 
 class Luggage(WorkerPlugin):  # type: ignore[misc]
-    """All that a worker needs for the runs of a sweep."""
+    """Everything that a worker needs for the runs of a sweep."""
 
     def __init__(
         self, plan: SweepPlan, robot: Robot, identity: dict[str, Any],
@@ -60,7 +60,7 @@ class Luggage(WorkerPlugin):  # type: ignore[misc]
         Args:
             plan: The sweep.
             robot: The robot of its first run.
-            identity: That of the sweep.
+            identity: The sweep's identity.
             imports: Python files and modules to import first, besides those that the
                 configuration lists.
 
@@ -93,13 +93,13 @@ class Luggage(WorkerPlugin):  # type: ignore[misc]
             self.record = self.record or _record(robot)
 
     def _packed(self, file: Path) -> str:
-        """Take a file along, and return its name in the luggage."""
+        """Add a file, and return its name in the luggage."""
         name = f"{len(self.files)}/{file.name}"
         self.files[name] = file.read_bytes()
         return name
 
     def _with_files(self, value: Any, folder: Path) -> Any:
-        """Return data in which each name of a file is one in the luggage."""
+        """Return data with the names of files replaced by those in the luggage."""
         if isinstance(value, dict):
             return {k: self._with_files(each, folder) for k, each in value.items()}
         if isinstance(value, list):
@@ -115,26 +115,26 @@ class Luggage(WorkerPlugin):  # type: ignore[misc]
 
     def setup(self, worker: Any) -> None:
         """Unpack it."""
-        # Dask removes that of a worker that was killed.
+        # Dask removes the folder of a killed worker.
         self.folder = Path(worker.local_directory) / self.name
         for name, content in self.files.items():
             (self.folder / name).parent.mkdir(parents=True)
             (self.folder / name).write_bytes(content)
         self._base: Document | None = None
-        # A run that diverges overflows; its row contains that. Where the sweep was
-        # started has warned of the start already.
+        # A run that diverges overflows, which its row reports. The process that started
+        # the sweep has warned of the start already.
         warnings.simplefilter("ignore", RuntimeWarning)
         warnings.simplefilter("ignore", StartWarning)
 
     def teardown(self, worker: Any) -> None:
-        """Remove what was unpacked."""
+        """Remove the unpacked files."""
         rmtree(self.folder, ignore_errors=True)
 
     def experiment(self, changes: Any) -> Experiment:
         """Return the objects of a run.
 
         Raises:
-            SweepError: If the computer is not fit for the sweep.
+            SweepError: If the computer is not suitable for the sweep.
             HspControlError: If the run cannot be built.
         """
         with _LOCK:
@@ -143,7 +143,7 @@ class Luggage(WorkerPlugin):  # type: ignore[misc]
         experiment = build(changed(self._base, changes))
         if self.model and fingerprint(experiment.robot) != self.model:
             raise SweepError(
-                f"{experiment.robot.name} has another model on the computer of a worker"
+                f"{experiment.robot.name} has a different model on a worker's computer"
             )
         return experiment
 
@@ -171,8 +171,8 @@ def _run_script(script: Path) -> None:
     global reading
     known = sys.modules.get(script.stem)
     if known is not None and _PREFIX not in (known.__file__ or ""):
-        return  # this process has its types: it is where the sweep was started
-    sys.modules.pop(script.stem, None)  # that of an earlier sweep
+        return  # this process started the sweep, and has the types
+    sys.modules.pop(script.stem, None)  # the module of an earlier sweep
     reading = True
     try:
         import_file(script)
@@ -183,7 +183,7 @@ def _run_script(script: Path) -> None:
 
 
 def _record(robot: Robot) -> dict[str, Any] | None:
-    """Return the robot as a log has it, where its files are not in a package."""
+    """Return the robot as recorded in a log, unless its files are in a package."""
     installed = {"bundled", "example-robot-data"}
     if all(part.source.origin in installed for part in robot.parts):
         return None
@@ -197,9 +197,9 @@ def _record(robot: Robot) -> dict[str, Any] | None:
 
 
 def _declaring(named: set[str], imported: Sequence[str]) -> Iterator[Path]:
-    """Yield the files of the types that the data name, and nothing else brings.
+    """Yield the files of the types that the data name, and that no package provides.
 
-    Else an installed package does, or a module that a worker imports.
+    Other types come from an installed package, or from a module that a worker imports.
     """
     packages = {each.partition(".")[0] for each in imported}
     for part in _subclasses(Part):
@@ -214,8 +214,8 @@ def _declaring(named: set[str], imported: Sequence[str]) -> Iterator[Path]:
         file = getattr(sys.modules.get(module), "__file__", None)
         if file is None:
             raise SweepError(
-                f"{part.__name__} is declared where no file is, so that no worker can "
-                "know it; put it into a file, and import that"
+                f"{part.__name__} is not declared in a file, so that workers cannot "
+                "import it; move it into a file, and import that"
             )
         yield Path(file).resolve()
 

@@ -10,12 +10,12 @@ from hsp_control.simulation import Rollout
 from hsp_control.simulation.measures import Measure, measures
 
 CRASHED, TIMED_OUT = "crashed", "timed out"
-"""The workers died; the run took too long. Neither is a result: such runs are repeated
-when the sweep resumes."""
+"""Status if the workers died, and if the run took too long. Neither is a result: such
+runs are repeated when the sweep resumes."""
 
 
 class Row(NamedTuple):
-    """How a run ended.
+    """The outcome of a run.
 
     Attributes:
         run: Its number in the plan.
@@ -36,17 +36,17 @@ class Row(NamedTuple):
 
 
 def one_run(luggage: str, run: int, changes: Changes, time_limit: float | None) -> Row:
-    """Compute a run with the luggage that this worker has got.
+    """Compute a run with the luggage of this worker.
 
     Raises:
-        SweepError: If the computer is not fit for the sweep. Nothing else is raised:
-            one failed run must not end the sweep.
+        SweepError: If the computer is not suitable for the sweep. Nothing else is
+            raised: one failed run must not end the sweep.
     """
     from distributed import get_worker
 
     plugins, end = get_worker().plugins, perf_counter() + 60.0
     while luggage not in plugins and perf_counter() < end:
-        sleep(0.05)  # it comes on another way, perhaps later than the run
+        sleep(0.05)  # it comes by another way, perhaps later than the run
     return computed(plugins[luggage].experiment, run, changes, time_limit)
 
 
@@ -78,7 +78,7 @@ def computed(
 
 
 class _TooLongError(BaseException):
-    """A run took too long; no handler of other errors may keep it from ending."""
+    """A run took too long; not an `Exception`, so that no other handler catches it."""
 
 
 def _outcome(

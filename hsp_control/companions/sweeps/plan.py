@@ -17,7 +17,9 @@ from hsp_control.simulation.log_writer import versions
 
 Changes: TypeAlias = "Sequence[tuple[Sequence[str], Any, str]]"
 
-_TRIALS = 20  # if so many runs cannot be built, the sweep itself is wrong
+_TRIALS = (
+    20  # number of runs that cannot be built after which the sweep itself is wrong
+)
 
 
 @dataclass(frozen=True)
@@ -25,7 +27,7 @@ class SweepPlan:
     """Every run of a sweep.
 
     Attributes:
-        base: The configuration, without what varies.
+        base: The configuration, without the varied parameters.
         factors: The varied parameters.
         design: See `hsp_control.companions.sweeps.design.Design`.
         samples: The requested number of runs; None for a grid.
@@ -101,5 +103,5 @@ def changed(base: Document, changes: Changes) -> Document:
 
 
 def fingerprint(robot: Robot) -> str:
-    """Return a text that is another one for another model."""
+    """Return a text that identifies a model."""
     return hashlib.sha256(robot.model.saveToString().encode()).hexdigest()

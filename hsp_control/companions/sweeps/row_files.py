@@ -1,8 +1,8 @@
 """The rows of a sweep, in memory and in a folder of Parquet files.
 
-Rows are written some seconds after they come, each time a new file; each file has the
-whole description of the sweep. When the sweep ends, few large files replace the many.
-Whoever stops in between leaves a folder that can be read, and continued.
+Rows are written some seconds after they arrive, each time to a new file; each file has
+the whole description of the sweep. When the sweep ends, few large files replace the
+many. After an interruption the folder can be read, and continued.
 """
 
 import fcntl
@@ -27,9 +27,9 @@ from hsp_control.declaration.language import shown
 
 FORMAT = "hsp_control sweep 2"
 SECONDS = 5.0
-"""Longest time for which a row is in memory alone [s]."""
+"""Maximum time for which a row is only in memory [s]."""
 MOST = 100_000
-"""Rows of a file of a sweep that has ended."""
+"""Number of rows in a file of a completed sweep."""
 
 _KEY = b"hsp_control"  # of the metadata
 _NAME = "rows-{:06d}.parquet"
@@ -40,8 +40,8 @@ class RowFiles:
 
     Attributes:
         done: The runs that have a row that need not be computed again.
-        failures: How many of them did not complete.
-        table: All rows that are not in memory alone.
+        failures: The number of them that did not complete.
+        table: All rows that are in files.
     """
 
     def __init__(
@@ -55,8 +55,8 @@ class RowFiles:
         """Read the rows that the folder contains already.
 
         Raises:
-            SweepError: If they are those of another sweep, or the folder cannot be
-                written.
+            SweepError: If they belong to another sweep, or the folder cannot be
+            written.
         """
         self._plan, self._folder, self._lock = plan, folder, -1
         self._meta: dict[str, Any] = {
@@ -97,7 +97,8 @@ class RowFiles:
                 os.close(self._lock)
                 self._lock = -1
                 raise SweepError(f"{folder}: another sweep writes it already") from None
-            # Left by one that was killed while it wrote; nobody else writes here now.
+            # Left by a process that was killed while it wrote; no other writes here
+            # now.
             self._remove([*folder.glob(".*.part")])
             files = _files(folder)
             if files:
@@ -126,7 +127,7 @@ class RowFiles:
                 )
 
     def add(self, row: Row) -> None:
-        """Take a row; it is in a file `SECONDS` later at the latest, or when closed."""
+        """Add a row; it is in a file `SECONDS` later at the latest, or when closed."""
         self._new.append(row)
         self.done.add(row.run)
         self.failures += row.status != "completed"
@@ -134,9 +135,9 @@ class RowFiles:
             self.write()
 
     def write(self) -> None:
-        """Write the rows that are in memory alone."""
+        """Write the rows that are only in memory."""
         if self._new:
-            # In the order of runs: in which order they ended must not matter.
+            # In the order of runs, whatever the order in which they ended.
             table = self._as_table(sorted(self._new, key=lambda row: row.run))
             if self._folder is not None:
                 self._put(table)
@@ -145,7 +146,7 @@ class RowFiles:
         self._written = monotonic()
 
     def close(self) -> None:
-        """Write what there is as few files, and let others write the folder."""
+        """Write all rows as few files, and release the folder for other processes."""
         try:
             self.write()
             if self._folder is None:
@@ -160,11 +161,11 @@ class RowFiles:
 
     @property
     def meta(self) -> dict[str, Any]:
-        """What describes the rows."""
+        """The metadata of the rows."""
         return _meta(self.table)
 
     def _put(self, table: pa.Table) -> None:
-        """Write a file; under another name first, so that it is whole or not there."""
+        """Write a file atomically, under another name first."""
         assert self._folder is not None
         self._number += 1
         path = self._folder / _NAME.format(self._number)
@@ -178,7 +179,7 @@ class RowFiles:
         except OSError as error:
             reason = error.strerror or str(error)
             raise SweepError(f"{path}: cannot write the sweep: {reason}") from error
-        finally:  # Ctrl-C may come while it writes: `close` writes the rows again
+        finally:  # Ctrl-C may interrupt the writing: `close` writes the rows again
             part.unlink(missing_ok=True)
 
     def _remove(self, files: Sequence[Path]) -> None:
@@ -189,7 +190,7 @@ class RowFiles:
         if self._folder is not None and self._lock >= 0:
             with suppress(OSError):
                 (self._folder / ".lock").unlink()
-            with suppress(OSError):  # where it has no rows
+            with suppress(OSError):  # if it has no rows
                 self._folder.rmdir()
             os.close(self._lock)
             self._lock = -1
@@ -217,7 +218,7 @@ class RowFiles:
                     for row in rows
                 ],
                 pa.float64(),
-                from_pandas=True,  # NaN is no number either
+                from_pandas=True,  # NaN becomes null, too
             )
         meta = {**self._meta, "metrics": dict(sorted(described.items()))}
         return pa.table(columns).replace_schema_metadata(
@@ -226,10 +227,10 @@ class RowFiles:
 
 
 def read_rows(path: Path) -> tuple[pa.Table, dict[str, Any]]:
-    """Return the rows of a folder, or of one of its files, and what describes them.
+    """Return the rows of a folder, or of one of its files, and their metadata.
 
     Raises:
-        SweepError: If there are none, or they are no sweep's.
+        SweepError: If there are none, or they are not those of a sweep.
     """
     try:
         check_ends(path)
@@ -272,7 +273,7 @@ def _joined(tables: Sequence[pa.Table]) -> pa.Table:
     runs = table["run"].to_numpy()
     _, last = np.unique(runs[::-1], return_index=True)
     first = [name for name in table.column_names if name not in described]
-    # By name: in which order rows came must not matter.
+    # By name, whatever the order in which rows arrived.
     table = table.take(pa.array(len(runs) - 1 - last)).select(
         [*first, *sorted(described)]
     )
@@ -285,7 +286,7 @@ def _joined(tables: Sequence[pa.Table]) -> pa.Table:
 def _parameters(plan: SweepPlan) -> tuple[dict[str, pa.Array], dict[str, Any]]:
     """Return each parameter's values in all runs, and how to read them.
 
-    They are of all values of the plan, so that each file has the same types.
+    The types are those of all values of the plan, so that all files have the same.
     """
     columns, described = {}, {}
     for k, factor in enumerate(plan.factors):

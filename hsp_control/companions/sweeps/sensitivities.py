@@ -11,7 +11,7 @@ from hsp_control.common.suggestions import did_you_mean, listing
 from hsp_control.companions.sweeps.results import Column, Sweep
 
 MIN_RUNS = 8
-"""Fewest completed runs; fewer runs correlate by chance."""
+"""Minimum number of completed runs; fewer correlate by chance."""
 
 CHANCE = 0.05
 """Significance level: the probability that chance alone looks like an influence."""
@@ -33,7 +33,7 @@ class Sensitivity:
             parameter explains alone, shape (p, m), from 0 (also if not significant) to
             1. It includes non-monotonic influences, such as an optimum in the middle.
             NaN if all values differ and have no order.
-        noise: The |correlation| that chance alone exceeds in one of twenty cases.
+        noise: The |correlation| that chance alone exceeds with a probability of 5 %.
         runs: The number of completed runs.
     """
 
@@ -79,7 +79,7 @@ def sensitivity(sweep: Sweep, outcomes: Sequence[str] | None = None) -> Sensitiv
 
 
 def influences(sweep: Sweep, outcomes: Sequence[str] | None = None) -> Sensitivity:
-    """Return the same of any number of runs: NaN and 0 where there are too few."""
+    """Return the same for any number of runs: NaN and 0 if there are too few."""
     names = default_outcomes(sweep) if outcomes is None else list(outcomes)
     for name in names:
         if name not in sweep.metrics:

@@ -29,7 +29,7 @@ from hsp_control.companions.sweeps import sweep as run_sweep
 if TYPE_CHECKING:
     from distributed import Client
 
-_REASONS = 3  # printed for runs that did not complete
+_REASONS = 3  # maximum number of reasons printed for runs that did not complete
 _NUMBER = re.compile(r"-?[0-9][0-9.]*(e[-+]?[0-9]+)?")
 
 
@@ -76,8 +76,7 @@ def sweep(options: argparse.Namespace) -> int:
     if not swept.complete:
         left = swept.meta["runs"] - len(swept)
         print(
-            f"hsp: stopped by the user, {left} runs are left; the same command "
-            "continues",
+            f"hsp: stopped by the user, {left} runs are left; the same command resumes",
             file=sys.stderr,
         )
         return INTERRUPTED

@@ -27,7 +27,8 @@ if TYPE_CHECKING:
     from hsp_control.companions.sweeps.row_files import RowFiles
 
 AT_ONCE = 1000
-"""Runs that the scheduler knows: 10^5 would take it a minute, and much memory."""
+"""Runs submitted to the scheduler at a time: 10^5 would take a minute, and much
+memory."""
 
 
 @suggesting
@@ -68,14 +69,13 @@ def sweep(
         overrides: Values to change in all runs, each ``key.path=value``.
         imports: Python files or modules to import first, here and in each worker, for
             the functions and types that the configuration names. Those that declare
-            types which this process knows and the configuration names travel by
-            themselves.
+            types of the configuration in this process are sent automatically.
         scheduler: The address of a Dask scheduler, such as ``tcp://10.0.0.1:8786``, or
             a client of one; None: workers on this computer.
         workers: The number of these; None: one per core.
         fresh: Start again, and remove the rows in ``out``.
-        time_limit: The longest computation of a run [s], looked at when a row of its
-            log is due; None: any. A run that takes longer has the status ``timed out``,
+        time_limit: The maximum computation time of a run [s], checked at each row of
+            its log; None: none. A run that takes longer has the status ``timed out``,
             and is repeated when the sweep resumes.
         on_start: Called with Dask's client when there are workers.
         on_progress: Called with the number of runs that are done, of all runs, and of
@@ -87,8 +87,8 @@ def sweep(
 
     Raises:
         SweepError: If the sweep is not well defined, its folder has another one or
-            cannot be written, or there are no workers or they are not fit. Rows that
-            were computed are in the folder.
+        cannot be written, or there are no suitable workers. Rows that were computed are
+        in the folder.
         HspControlError: If the configuration cannot be built with any of the first
             values. Single runs that cannot be built, diverge or crash are rows.
     """
@@ -191,7 +191,7 @@ def _computed(
     client: "Client",
     time_limit: float | None,
 ) -> "Iterator[Row]":
-    """Yield the rows of the runs that are left, as they end."""
+    """Yield the rows of the remaining runs, as they end."""
     from distributed import as_completed
 
     from hsp_control.companions.sweeps.one_run import one_run
@@ -200,7 +200,7 @@ def _computed(
     left = (run for run in range(len(plan)) if run not in done)
 
     def submitted(most: int) -> "list[Any]":
-        """Submit some of the runs that are left."""
+        """Submit some of the remaining runs."""
         return [
             client.submit(
                 one_run, packed.name, run, plan.changes(run), time_limit,
@@ -220,14 +220,14 @@ def _computed(
     finally:
         for future in list(waiting.futures):
             future.release()
-        # A scheduler that is gone or stopped does not answer.
+        # A lost or stopped scheduler does not answer.
         tidy = Thread(target=_tidy, args=(client, packed.name), daemon=True)
         tidy.start()
         tidy.join(5.0)
 
 
 def _give(client: "Client", packed: "Luggage") -> None:
-    """Give the luggage to all workers; one that is stopped gets it when it goes on."""
+    """Send the luggage to all workers; a stopped one receives it when it continues."""
     failed: list[Exception] = []
 
     def give() -> None:
@@ -258,7 +258,9 @@ def _row(future: Any, result: Any) -> "Row":
         row: Row = result
         return row
     if future.status in ("cancelled", "lost"):
-        raise SweepError("the scheduler is gone; the same command continues")
+        raise SweepError(
+            "the scheduler does not answer any more; the same command resumes the sweep"
+        )
     _, error, _ = result
     if isinstance(error, KilledWorker):
         died = error.allowed_failures + 1

@@ -17,11 +17,11 @@ from hsp_control.common.exceptions import SweepError
 from hsp_control.common.suggestions import did_you_mean
 from hsp_control.config.yaml_reader import YamlError, read_yaml
 
-Distribution: TypeAlias = Any  # what stats.norm(0.0, 0.1) returns, for example
+Distribution: TypeAlias = Any  # as stats.norm(0.0, 0.1) returns
 Values: TypeAlias = Sequence[Any] | Distribution
 
 MAX_LEVELS = 100_000
-"""Most values in a range; more is probably a typing error."""
+"""Maximum number of values in a range; more is probably a typing error."""
 
 # Between these all quantiles are finite, and those of integers are within their ends.
 _LOWEST, _HIGHEST = 2.0**-53, 1.0 - 2.0**-53
@@ -34,7 +34,7 @@ def is_distribution(values: Values) -> bool:
 
 
 def quantiles(values: Values, fractions: Array) -> list[Any]:
-    """Return the values below which fractions in [0, 1), shape (N,), of all lie."""
+    """Return the quantiles at fractions in [0, 1), shape (N,)."""
     if isinstance(values, Sequence):
         return [values[int(place)] for place in fractions * len(values)]
     found: list[Any] = values.ppf(np.clip(fractions, _LOWEST, _HIGHEST)).tolist()
@@ -42,7 +42,7 @@ def quantiles(values: Values, fractions: Array) -> list[Any]:
 
 
 def parsed(text: str) -> Values:
-    """Return the values that a text means: a list, a range, or a distribution.
+    """Return the values that a text declares: a list, a range, or a distribution.
 
     ========================= =========================================================
     ``a,b,c``                 these values, each any YAML: ``[0,0,1],[0,1,0]``
@@ -182,7 +182,7 @@ def _check(
 
 
 _WORDS: dict[str, tuple[str, set[int], Callable[..., Values], set[int]]] = {
-    # its form, how many numbers it has, what makes it, which numbers are integers
+    # its form, its number of numbers, its constructor, which numbers are integers
     "linear": ("linear:LOW:HIGH:COUNT", {3}, _linear, {2}),
     "log": ("log:LOW:HIGH:COUNT", {3}, _logarithmic, {2}),
     "uniform": ("uniform:LOW:HIGH", {2}, _uniform, set()),

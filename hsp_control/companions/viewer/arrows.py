@@ -34,7 +34,7 @@ def unit_arrow(surface: Json, radius: float) -> Json:
     """Return an arrow along z of length 1 with the given shaft radius [m]."""
     profile = np.array([(0, 0), (1, 0), (1, 0.72), (2.5, 0.72), (0, 1)])
     thing = threejs.mesh(threejs.lathe(profile * [radius, 1.0]), surface, shadow=False)
-    # Draw it after the objects that it is seen through.
+    # Draw it after the objects through which it is visible.
     thing["object"]["renderOrder"] = 1
     return threejs.group([thing])
 
@@ -107,7 +107,7 @@ def contacts(robot: Robot, motion: RunMotion, root: str) -> Layer:
             radius = _RADIUS * size
             yield from arrow_tracks(f"{path}/force", times, position, arrow, radius)
             yield Track(f"{path}/point", "position", times, position)
-            # One without force is hidden.
+            # An arrow without force is hidden.
             touches = np.linalg.norm(force, axis=1) > 0.0
             yield Track(
                 f"{path}/point", "visible", times, touches.astype(float)[:, None]

@@ -94,7 +94,7 @@ def _measured_shapes(
         links = proximity.links
         used = sorted({k for pair in proximity.pairs for k in pair if k < len(links)})
         for k in used:
-            # By identity: a robot has one list of shapes of each kind.
+            # By identity: a robot has a single list of shapes per kind.
             if id(links[k]) not in known:
                 known.add(id(links[k]))
                 yield links[k]
@@ -135,10 +135,10 @@ class _Distance(NamedTuple):
 
 
 def distances(controller: Controller, root: str, color: str) -> Layer:
-    """Draw a bar per obstacle, from the closest link, where a field would be active.
+    """Draw a bar per obstacle, from the closest link, within a field's influence zone.
 
-    Bars are seen through all else: meshes lie inside the capsules that are measured.
-    They and the obstacle are red while a link is inside it.
+    Bars are visible through everything: meshes lie inside the capsules that are
+    measured. They and the obstacle are red while a link is inside it.
     """
     found = list(_distances(controller, root))
     obstacles = root.removesuffix("/distances") + "/obstacles"
@@ -194,14 +194,14 @@ def _distances(controller: Controller, root: str) -> Iterator[_Distance]:
             yield _Distance(_SURFACES, path, closest, "" if name == _SELF else name)
         drawn |= found.keys()
     for term in terms_of_type(field, PointDistance):
-        if isinstance(term.obstacle, Obstacle):  # in a placed field it is
+        if isinstance(term.obstacle, Obstacle):  # true in a placed field
             path = f"{root}/{path_element(f'{term.name} {term.obstacle.name}')}"
             closest = partial(_to_center, term, term.obstacle)
             yield _Distance(_CENTERS, path, closest)
 
 
 def _pairs_by_obstacle(clearance: Clearance, state: RobotState) -> dict[str, Array]:
-    """Return the numbers of the pairs: links and one obstacle, or links and links."""
+    """Return the indices of the pairs: links and one obstacle, or links and links."""
     proximity = clearance.proximity(state)
     links = len(proximity.links)
     found: dict[str, list[int]] = {}
@@ -228,7 +228,7 @@ def _between_pairs(
 def _to_center(
     cost: PointDistance, obstacle: Obstacle, state: RobotState
 ) -> ClosestPoints:
-    """Return the closest frame, and an obstacle's centre: the paper's cost, always."""
+    """Return the closest frame and an obstacle's centre, always, as in the paper."""
     center = obstacle.center.sample(state.t).position.copy()
     positions = [np.array(state.position(frame)) for frame in cost.frames]
     lengths = [np.linalg.norm(position - center) for position in positions]
@@ -238,7 +238,7 @@ def _to_center(
 # -- zones of influence ---------------------------------------------------------------
 
 _ZONE_OPACITY = 0.06
-_SWATCH_OPACITY = 0.35  # in the legend: as pale as the zone it would be invisible
+_SWATCH_OPACITY = 0.35  # in the legend, where the zone's own opacity would be invisible
 
 
 def influence(field: NullSpaceField, shown: dict[str, Shape], root: str) -> Layer:

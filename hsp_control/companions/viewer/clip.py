@@ -26,22 +26,22 @@ from hsp_control.simulation.log_columns import logged_terms
 from hsp_control.simulation.measures import FAR, LIMITED, OUT, Unreached, unreached
 
 CLOSED_SHARE = 1 / 200
-"""Gaps up to this share of the whole run are closed: nobody would see them."""
+"""Gaps up to this share of the whole run are closed: they would be invisible."""
 _SAME = 0.9
-"""Distances of which the smallest is this share of the largest are reported as one."""
+"""If the smallest distance is at least this share of the largest, one is reported."""
 
 
 class Band(NamedTuple):
-    """When something that the law reacts to is active."""
+    """The times at which something that affects the law is active."""
 
     name: str  # its name before a time, such as ``limit active``
-    caption: str  # what is shown while the time is inside: ``a limit is active``
+    caption: str  # text while the time is inside: ``a limit is active``
     color: str  # its colour, ``#RRGGBB``
     spans: list[tuple[float, float]]  # its intervals [s], ascending and apart
     run: str = ""  # in a comparison, the name of its run
 
     def of_run(self, run: str) -> "Band":
-        """Return it as a band of one run of several, which it names."""
+        """Return it as a band of one run of several, with the run's name."""
         name, caption = f"{run}: {self.name}", f"{run}: {self.caption}"
         return self._replace(run=run, name=name, caption=caption)
 
@@ -123,7 +123,7 @@ class Clip(NamedTuple):
     end: float  # last time that can be shown [s]
     tracks: list[Track]
     horizon: float | None = None  # the end of the complete clip [s]; None: ``end``
-    bands: Sequence[Band] = ()  # what the time line marks
+    bands: Sequence[Band] = ()  # marks on the time line
 
     @property
     def open(self) -> bool:
@@ -155,7 +155,7 @@ def set_clip(
 
 
 def remove_clip() -> list[PageCommand]:
-    """Return the commands that remove the clip; then commands move the scene."""
+    """Return the commands that remove the clip; commands then move the scene."""
     return [forget_clip(), page_command("still", CLIP, "begin")]
 
 

@@ -1,6 +1,6 @@
 """The pages of `hsp`: ``view``, ``export`` and ``run --view``, and their options.
 
-What is slow is imported when they run.
+Slow modules are imported when they run.
 """
 
 import argparse
@@ -76,10 +76,10 @@ class ExportFormat(NamedTuple):
 
     Attributes:
         what: What such a file is called in a message, as in "a film".
-        files: The endings, which are the names of options, and what each is.
+        files: A description of each file ending; the endings are the names of options.
         add_options: Adds the other options to the parser of `hsp export`.
         write: Writes a file and returns its path, given the run, the path, the options
-            and what takes the share that is done.
+        and a callback for the completed share.
     """
 
     what: str
@@ -155,7 +155,7 @@ RUN_PAGE = CommandPage(add_options=_add_run_options, open=_open)
 
 
 def add_page(parser: argparse.ArgumentParser) -> None:
-    """Add where a page is served, and whether it is opened."""
+    """Add the options for a page's port, and for opening it."""
     parser.add_argument(
         "--port",
         type=int,

@@ -49,8 +49,8 @@ class LatestCommands:
             if command.deletes:
                 self._drop(command.path)
             if command.path == MESHES and command.key in self._packed:
-                continue  # the same file; what is drawn from it comes later
-            self._packed.pop(command.key, None)  # the new one comes last
+                continue  # the same file; the objects that use it come later
+            self._packed.pop(command.key, None)  # the new command comes last
             if deletions or not command.deletes:
                 self._packed[command.key] = command.packed
 
@@ -95,18 +95,18 @@ class LatestCommands:
 
 
 class LegendEntry(NamedTuple):
-    """One row of the legend, and the switch of what it names."""
+    """One row of the legend, which is also a switch."""
 
     name: str
     color: str  # its colour, ``#RRGGBB`` or, if it is translucent, ``#RRGGBBAA``
     paths: tuple[str, ...]  # the nodes of the scene tree that the row shows and hides
     shown: bool = True  # whether they are shown at first
-    # Whether the row is only a switch, as what it names explains itself: films leave it
-    # out.
+    # Whether the row is only a switch, since its object needs no explanation: films
+    # leave it out.
     plain: bool = False
     # A short name: the switch is beside the views instead of in a separate row.
     short: str = ""
-    key: str = ""  # the key of the keyboard that does the same, if any
+    key: str = ""  # the equivalent key of the keyboard, if any
 
 
 def translucent(color: str, opacity: float) -> str:
@@ -176,7 +176,7 @@ def set_status(text: str) -> PageCommand:
 
 
 def forget_clip() -> PageCommand:
-    """Return the command that drops the clip from the scene; a page still plays on."""
+    """Return the command that removes the clip; an open page continues to play."""
     packed = umsgpack.packb({"type": "nothing", "path": CLIP})
     return PageCommand(CLIP, key_of(CLIP, "nothing"), packed, deletes=True)
 

@@ -126,7 +126,7 @@ class Comparison:
         return np.concatenate([run.obstacle_points() + offset for run, offset in runs])
 
     def title(self) -> str:
-        """Return the title that all runs have, or else their names."""
+        """Return the common title of the runs, or else their names."""
         titles = {str(run.motion.rows.meta.get("title") or "") for run in self._runs}
         if len(titles) == 1 and (title := titles.pop()):
             return title
@@ -136,7 +136,8 @@ class Comparison:
         """Return the legend's entries."""
         if not self._ghosts:
             return _merged(entry for run in self._runs for entry in run.legend())
-        # A ghost is all below its node; the first run is its robot and actual path.
+        # A ghost is everything below its node; the first run is its robot and actual
+        # path.
         entries = self._runs[0].legend()
         first = [e for e in entries if e.color == palette.ACTUAL or e.name == "robot"]
         shown = tuple(path for entry in first for path in entry.paths)
@@ -184,7 +185,7 @@ def run_roots(names: Sequence[str]) -> list[str]:
 
 
 def run_parts(names: Sequence[str]) -> list[list[str]]:
-    """Return the nodes of each run that together hold all that is drawn of it."""
+    """Return the nodes of each run that together contain everything drawn for it."""
     first = [f"/{name}" for name in ("robot", *LAYERS)]
     return [first, *([root] for root in run_roots(names)[1:])]
 

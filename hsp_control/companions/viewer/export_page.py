@@ -60,7 +60,7 @@ def export_html(
 
 
 def write_page(path: Path, text: str) -> Path:
-    """Write a page, as a whole or not at all.
+    """Write a page atomically: completely or not at all.
 
     Raises:
         ExportError: If it cannot be written.

@@ -24,12 +24,12 @@ from hsp_control.companions.viewer.motion import (
 from hsp_control.companions.viewer.targets import AXES, TaskTarget, read_targets
 from hsp_control.robot import Robot
 
-KEY = "f"  # which shows and hides them
+KEY = "f"  # shows and hides them
 _LENGTH, _RADIUS = 0.22, 0.003
 """Of an axis at the robot, over the size of the scene: longer than a target's mark."""
 _TARGET_LENGTH, _TARGET_RADIUS = 0.16, 0.005
-"""The same at a target: both can be seen where they coincide."""
-_NAMED = 2  # most frames whose names the legend's row has
+"""The same at a target: both remain visible where they coincide."""
+_NAMED = 2  # maximum number of frames named in the legend's row
 
 
 def frame_axes(robot: Robot, motion: RunMotion, root: str) -> Layer:
@@ -79,7 +79,7 @@ def frame_axes(robot: Robot, motion: RunMotion, root: str) -> Layer:
 
 
 def _turned(motion: RunMotion) -> list[TaskTarget]:
-    """Return the targets that have axes of their own."""
+    """Return the targets with an orientation."""
     return [each for each in read_targets(motion.rows) if each.rotation is not None]
 
 

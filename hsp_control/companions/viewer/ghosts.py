@@ -1,4 +1,4 @@
-"""Ghosts of the robot in other configurations: the page clones what it has drawn."""
+"""Ghosts of the robot in other configurations: the page clones the drawn robot."""
 
 from collections.abc import Sequence
 

@@ -87,7 +87,7 @@ class LiveView:
         self._viewer.replace_run(rollout, self._experiment.controller, status)
 
     def _send(self, recorder: LogWriter, now: float) -> None:
-        # From the last row sent on: what moves, and bands, go on from there.
+        # From the last row sent: tracks and bands continue there.
         rows = Rollout(recorder.rows(max(self._sent - 1, 0)), self._meta)
         rate = float(rows.t[-1]) / max(now - (self._begin or 0.0), 1e-9)
         # Drawn rows per second of computing, times their cost, is drawing's share.
@@ -136,7 +136,7 @@ class LiveView:
 
 def _preview(experiment: Experiment) -> Rollout:
     """Return a log of the references and obstacles, with the robot at its start."""
-    # A stream would go on to the end of the preview.
+    # A stream would continue to the end of the preview.
     robot, controller = experiment.robot, experiment.controller.preview()
     duration = experiment.scenario.simulation.duration
     recorder = LogWriter(controller, experiment.scene, _PREVIEW_ROWS)
@@ -146,7 +146,7 @@ def _preview(experiment: Experiment) -> Rollout:
         try:
             output = controller.compute(state)
             recorder.record(state, output, output.tau, {})
-        except HspControlError:  # the run may fail there, too
+        except HspControlError:  # the run may fail at the same time
             if not len(recorder.rows(0)["t"]):
                 raise
             break

@@ -1,4 +1,4 @@
-"""The page of what goes on now: the scene, its handles and its knobs."""
+"""The page of a running loop: the scene, its handles and its knobs."""
 
 import operator
 from collections.abc import Iterator, Mapping, Sequence
@@ -36,11 +36,11 @@ from hsp_control.simulation.measures import PULLED, REACHED, unreached
 FRAME = 1.0 / 30.0  # time between two pictures [s]
 _FIELD_LAYERS = ("influence", "distances", "capsules")
 _BATCHES = 64
-"""Batches of samples that wait for a page at most; what is older is left out."""
+"""Maximum number of batches of samples that wait for a page; older ones are dropped."""
 
 
 class Touched(Protocol):
-    """What hands on the page can touch, and what there is to say of it."""
+    """The handles and knobs that a user can move on the page, with their labels."""
 
     targets: dict[str, Any]
     obstacles: dict[str, Any]
@@ -50,7 +50,7 @@ class Touched(Protocol):
 
     @property
     def settings(self) -> Mapping[str, float | bool]:
-        """What the knobs are set to."""
+        """The values of the knobs."""
 
     def places(self) -> tuple[dict[str, list[float]], dict[str, list[float]]]:
         """Return where the targets and the obstacles are, by name."""
@@ -61,7 +61,7 @@ class Rows(Protocol):
 
     @property
     def count(self) -> int:
-        """How many there were so far."""
+        """The number of rows so far."""
 
     def rows(self, start: int) -> dict[str, Array]:
         """Return the columns from a row on."""
@@ -78,19 +78,19 @@ class OtherLaw(Protocol):
 
 
 class Shown(Protocol):
-    """What goes on and is shown: a play, a live loop, a loop of one's own."""
+    """A running loop that is shown: `hsp play`, a live loop, or a user's own loop."""
 
     over: str
 
-    previews: bool  # whether a preview of self-motion is wanted
+    previews: bool  # whether a preview of self-motion is shown
 
     @property
     def laws(self) -> Sequence[str]:
-        """The laws that can be stepped beside it."""
+        """The laws with which it can be compared."""
 
     @property
     def other(self) -> OtherLaw | None:
-        """The law that is stepped beside it, if any."""
+        """The law with which it is compared, if any."""
 
     @property
     def kind(self) -> str:
@@ -106,7 +106,7 @@ class Shown(Protocol):
 
     @property
     def controller(self) -> Controller | None:
-        """The controller; None: only the log's columns are known."""
+        """The controller; None: only the log's columns are available."""
 
     @property
     def recorder(self) -> Rows:
@@ -118,25 +118,25 @@ class Shown(Protocol):
 
     @property
     def handles(self) -> Touched:
-        """What can be touched."""
+        """The handles and knobs."""
 
     @property
     def pushes(self) -> object:
-        """What a hand can pull at links with; None: nothing."""
+        """The springs by which links can be pulled; None: they cannot."""
 
     @property
     def t(self) -> float:
         """The time of the present row [s]."""
 
     def pull(self) -> tuple[Array, Array, float] | None:
-        """Return where somebody pulls, the hand, both (3,) [m], and the force [N]."""
+        """Return the pulled point and the hand, both (3,) [m], and the force [N]."""
 
 
 class Picture:
     """Draws what is played on the pages of a viewer."""
 
     def __init__(self, session: Shown, viewer: Viewer) -> None:
-        """Draw it as it is, with all that can be touched."""
+        """Draw the present instant, with all handles."""
         self._session, self._viewer = session, viewer
         self._batch = 0
         color, opacity = ghost_color(1), GHOST_OPACITY
@@ -145,7 +145,7 @@ class Picture:
         self.begin()
 
     def begin(self) -> None:
-        """Draw the scene anew: the session has begun anew."""
+        """Draw the scene anew after a reset of the session."""
         session, viewer = self._session, self._viewer
         self._sent = 0
         self._compared = False
@@ -172,7 +172,7 @@ class Picture:
         del layers["paths"]
         drawn = {name for name, task in self._meta["tasks"].items() if task["drawn"]}
         if set(self._session.handles.targets) >= drawn:
-            del layers["targets"]  # the handles are there
+            del layers["targets"]  # the handles replace them
         if controller is None:
             return layers
         shown, ink = logged_shapes(motion.rows), line_color(dark=dark)
@@ -210,7 +210,7 @@ class Picture:
         ]
 
     def _acting_terms(self) -> tuple[NullSpaceField, ...]:
-        """Return the terms of the field that weigh anything now."""
+        """Return the terms of the field whose weight is not 0 now."""
         controller = self._session.controller
         if controller is None:
             return ()
@@ -225,7 +225,7 @@ class Picture:
         return None if controller is None else controller.field
 
     def _changed_field(self) -> Iterator[PageCommand]:
-        """Draw the field's layers again, if the field or what acts of it is another."""
+        """Draw the field's layers again if the field or its active terms changed."""
         field, acting = self._present_field(), self._acting_terms()
         same = len(acting) == len(self._acting) and all(
             map(operator.is_, acting, self._acting)
@@ -263,7 +263,7 @@ class Picture:
         )
 
     def _joints(self) -> Iterator[PageCommand]:
-        """Yield where the joints are within their limits, each number over its limit.
+        """Yield positions, speeds and efforts of the joints relative to their limits.
 
         Positions from 0 to 1 within the range, speeds and efforts from -1 to 1; null
         where there is no limit.
@@ -290,7 +290,7 @@ class Picture:
         return _told("force", visible=True, newtons=newtons, **ends)
 
     def _other_law(self) -> Iterator[PageCommand]:
-        """Yield which law is stepped beside it, and where it has the robot."""
+        """Yield the compared law's name, and the robot's configuration under it."""
         other = self._session.other
         law = "" if other is None else other.law
         yield _told("laws", laws=list(self._session.laws), law=law)
@@ -329,7 +329,7 @@ class Picture:
 
 
 def _told(name: str, **fields: Any) -> PageCommand:
-    """Return the newest word of a kind to the pages."""
+    """Return the newest message of a kind to the pages."""
     kind = name if name == "pose" else f"play_{name}"
     return page_command(kind, PLAY, name, **fields)
 
@@ -340,6 +340,6 @@ def _shares(values: Array) -> list[float | None]:
 
 
 def _off(rows: dict[str, Array], task: str) -> bool:
-    """Return whether a task's error is worth a word in the last row."""
+    """Return whether a task's error is large enough for a label in the last row."""
     error = rows.get(f"task.{task}.error")
     return error is not None and bool(np.linalg.norm(error[-1]) > REACHED)

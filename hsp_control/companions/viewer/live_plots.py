@@ -1,4 +1,4 @@
-"""The plots beside what goes on now: which curves, which limits, what they show."""
+"""The plots beside a running loop: their curves, limits and notes."""
 
 import re
 from collections.abc import Iterator, Mapping, Sequence
@@ -15,7 +15,7 @@ from hsp_control.companions.plots.palette import SERIES
 from hsp_control.simulation import Rollout
 from hsp_control.simulation.measures import PULL_COLUMN, effort_units, rate_unit
 
-_JOINTS = 8  # most joints that have a curve each
+_JOINTS = 8  # maximum number of joints with separate curves
 
 
 class Curve(NamedTuple):
@@ -44,8 +44,8 @@ class Line(NamedTuple):
     """A value that curves should not cross: a limit, or contact."""
 
     value: float  # in the plot's unit
-    name: str  # its label; "" needs none
-    curves: tuple[int, ...]  # the curves, by their places, that it is for
+    name: str  # its label; "": none
+    curves: tuple[int, ...]  # indices of the curves that it limits
 
 
 class LivePlot(NamedTuple):
@@ -62,7 +62,7 @@ class LivePlot(NamedTuple):
     reaches: bool = False
 
     def describe(self) -> dict[str, Any]:
-        """Return what a page must know of it."""
+        """Return its description for the page."""
         colors = [SERIES[place % len(SERIES)] for place in range(len(self.curves))]
         return {
             "title": self.title,

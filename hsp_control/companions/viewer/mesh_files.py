@@ -1,4 +1,4 @@
-"""Mesh files, which a live page gets once each, for however many links and robots."""
+"""Mesh files: a live page receives each once, for any number of links and robots."""
 
 import hashlib
 from collections.abc import Iterable, Iterator
@@ -14,7 +14,7 @@ from hsp_control.companions.viewer.commands import (
 )
 
 _FILE = ("data", "resources")
-"""What of a geometry or an object is the file's content; ``file`` stands for it."""
+"""Keys of a geometry or an object with the file's content; ``file`` replaces them."""
 
 
 class MeshFiles:
@@ -25,7 +25,7 @@ class MeshFiles:
         self._known: dict[str, PageCommand] = {}
 
     def taken_from(self, thing: Json) -> Json:
-        """Return an object with names in place of its files, which are kept here."""
+        """Return an object with names in place of its files, which are stored here."""
         geometries = [self._named(each) for each in thing.get("geometries", [])]
         return {
             **thing,
@@ -34,7 +34,7 @@ class MeshFiles:
         }
 
     def commands(self) -> Iterable[PageCommand]:
-        """Return the commands that bring the files, to be sent before the objects."""
+        """Return the commands with the files, to be sent before the objects."""
         return self._known.values()
 
     def _named(self, owner: Json) -> Json:

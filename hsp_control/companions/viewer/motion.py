@@ -1,4 +1,4 @@
-"""What moves in the scene: the rows of a log that are drawn, tracks, and layers."""
+"""Motion of the scene: the rows of a log that are drawn, tracks, and layers."""
 
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
@@ -108,7 +108,7 @@ def motion_of(
         share = shares.reshape(-1, *[1] * (column.ndim - 1))
         here, there = column[rows], column[rows + 1]
         mixed = (1.0 - share) * here + share * there
-        # On a row its own value, also beside one that is not a number.
+        # At a row its exact value, also beside a row with NaN.
         mixed = np.where(share == 0.0, here, mixed)
         columns[name] = np.where(share == 1.0, there, mixed)
     # Configurations on their geodesics, orientations on the sphere.

@@ -34,7 +34,7 @@ _log = logging.getLogger(__name__)
 
 ROOT = "/obstacles"
 _OPACITY, _PALE = 0.75, 0.05
-_EXTENT = 4.0  # edge of the square that stands for a half-space, over the scene's size
+_EXTENT = 4.0  # edge of the square that represents a half-space, over the scene's size
 _NAMED = 3  # number of obstacles that the legend names
 
 # -- shapes ---------------------------------------------------------------------------
@@ -57,7 +57,7 @@ def obstacle(shape: Shape, size: float, color: str = OBSTACLE) -> Json:
     elif solid["type"] == "BufferGeometry" and not isinstance(shape, shapes.PointCloud):
         surface |= {"side": 2}
     thing = threejs.mesh(solid, surface, pose)
-    thing["object"]["receiveShadow"] = False  # its own would show through
+    thing["object"]["receiveShadow"] = False  # shadows on it would show through
     # The drawn square ends, the half-space does not.
     thing["object"]["castShadow"] = not isinstance(shape, shapes.HalfSpace)
     return threejs.group([thing])
@@ -149,14 +149,14 @@ def _enclosing(shape: Shape, centers: Array) -> list[Array]:
 
 
 class SceneDrawing:
-    """The obstacles of a scene, and where the robot is, which somebody else draws."""
+    """The obstacles of a scene; the robot, whose place it needs, is drawn elsewhere."""
 
     def __init__(self, scene: Scene, robot: Array) -> None:
         """Store the scene, and points of the robot [m], shape (K, 3)."""
         self._scene, self._robot = scene, robot
 
     def points(self) -> Array:
-        """Return where the robot is [m], shape (K, 3)."""
+        """Return points of the robot [m], shape (K, 3)."""
         return self._robot
 
     def draw(self, size: float) -> Iterator[PageCommand]:
@@ -251,7 +251,7 @@ class _DrawnSolid(NamedTuple):
 
     name: str  # of its node
     shape: Shape
-    placement: pin.SE3  # where it is, or where it starts if it is loose
+    placement: pin.SE3  # its pose, or its initial pose if it is loose
     column: str  # where the log has its motion: the start of two columns' names
 
 

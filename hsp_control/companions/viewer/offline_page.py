@@ -35,7 +35,7 @@ _POLICY = (
 def scene_page(
     scene: LatestCommands, title: str, arrays: ArrayTable, **more: Any
 ) -> str:
-    """Return a page that shows a scene, and what is beside it; see `offline.js`."""
+    """Return a page that shows a scene and the plots beside it; see `offline.js`."""
     commands = [unpack(packed) for path, _, packed in scene.items() if path != PLOTS]
     reduced = reduce_scene(commands, arrays)
     content = {"type": "show", "commands": reduced, **more, "arrays": arrays.entries}
@@ -109,7 +109,7 @@ class InlineView:
         Args:
             scene: The commands that build the scene.
             height: The height of its frame [pixels].
-            url: Where the same scene is live, for the line below the frame.
+            url: The address of the live scene, for the line below the frame.
 
         Raises:
             ExportError: If a mesh cannot be read, or the library for it is not
@@ -123,7 +123,7 @@ class InlineView:
 
     @property
     def size(self) -> int:
-        """What it adds to the notebook [bytes]."""
+        """Its size in the notebook [bytes]."""
         return len(self._frame().encode())
 
     def __repr__(self) -> str:

@@ -123,11 +123,11 @@ _STEPS = {
     "visible": 1.0,
     "length": 1 / 64,
 }
-"""Resolution of what a track plays."""
+"""Resolution of each property that a track animates."""
 
 
 def reduce_clip(command: Json, arrays: ArrayTable) -> Json:
-    """Return a clip's command in few bytes; what stays the same has one row."""
+    """Return a clip's command in few bytes; constant values have one row."""
     clocks: list[Json] = []
     tracks = []
     for track in command["tracks"]:
@@ -196,7 +196,7 @@ def read_mesh(thing: Json, owner: str) -> list[Piece]:
             f"{INSTALL}"
         ) from None
     data = thing["data"]
-    if isinstance(data, umsgpack.Ext):  # as it is sent to a page
+    if isinstance(data, umsgpack.Ext):  # in the form in which pages receive it
         data = data.data
     content = data.encode() if isinstance(data, str) else bytes(data)
     try:

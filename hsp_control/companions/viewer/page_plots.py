@@ -30,16 +30,16 @@ class Series(NamedTuple):
     values: Array  # one per row of the log, (N,)
     color: str  # its colour, ``#RRGGBB``
     dashed: bool = False
-    # It is a prediction, not measured: the axis need not reach it.
+    # A prediction, not a measurement: the axis need not include it.
     predicted: bool = False
     band: bool = False  # fill the plot below it
 
 
 class Edge(NamedTuple):
-    """A value that curves must not fall below, drawn as a line: contact."""
+    """A lower bound of curves, drawn as a line: contact."""
 
     value: float  # the value, in the panel's unit
-    name: str  # its label; "" for zero, which needs none
+    name: str  # its label; "" for zero
 
 
 class Panel(NamedTuple):
@@ -218,7 +218,7 @@ def _range(panel: Panel, values: Array) -> tuple[float, float]:
     return low - room, high + room
 
 
-PREVIEW_ROWS = 500  # about so many rows of a run that is being computed are plotted
+PREVIEW_ROWS = 500  # approximate number of plotted rows of a run that is being computed
 
 
 def plots_of(runs: Sequence[ComparedRun]) -> PageCommand:

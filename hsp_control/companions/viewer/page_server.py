@@ -34,7 +34,7 @@ from hsp_control.companions.viewer.commands import (
 
 _LARGE = 100_000  # bytes of a message from which on it is compressed: meshes
 _MAX_SIZE = 1_000_000  # bytes; the commands that move a robot are far smaller
-_LONGEST = 4000  # most bytes of a message of a page
+_LONGEST = 4000  # maximum size of a page's message [bytes]
 
 
 def batch_messages(commands: list[bytes]) -> list[bytes]:
@@ -72,10 +72,10 @@ _LOOPBACK_NAMES = {"127.0.0.1", "localhost"}
 
 
 class Door(NamedTuple):
-    """Who is let in."""
+    """The conditions of access."""
 
     host: str  # the address that the server listens on
-    key: str  # what an address must contain
+    key: str  # the key that an address must contain
 
     def check(self, handler: RequestHandler, *, needs_key: bool = True) -> None:
         """Check a request."""
@@ -88,21 +88,25 @@ class Door(NamedTuple):
 
 
 class Hub:
-    """The scene, and the pages that show it: all that program and thread share."""
+    """The scene, and the pages that show it: the state shared by program and thread."""
 
     def __init__(self, scene: LatestCommands, *, steerable: bool) -> None:
         """Begin without a page."""
         self.scene, self.steerable = scene, steerable
-        self.lock = Lock()  # of all that is here, and of what is pending for pages
+        self.lock = (
+            Lock()
+        )  # protects all attributes, and the commands that are pending for pages
         self.pages: set[Page] = set()
         self.steering: Page | None = None  # the page that steers
-        self.received: dict[str, dict[str, Any]] = {}  # its newest words, by `receive`
+        self.received: dict[
+            str, dict[str, Any]
+        ] = {}  # its newest messages, by `receive`
         self.asked = 0
         self.end = asyncio.Event()  # of the server
-        self.failure: BaseException | None = None  # what ends it before
+        self.failure: BaseException | None = None  # error that ended it
 
     def keep(self, commands: Iterable[PageCommand]) -> None:
-        """Add commands to the scene, and to what each page gets next."""
+        """Add commands to the scene, and to the next messages to pages."""
         commands = list(commands)
         with self.lock:
             self.scene.keep(commands)
@@ -110,7 +114,7 @@ class Hub:
                 page.pending.keep(commands, deletions=True)
 
     def receive(self, message: dict[str, Any]) -> None:
-        """Keep a page's word: of each kind and object the newest, the newest last."""
+        """Keep a page's message: the newest of each kind and object, latest last."""
         about = [message.get(name, "") for name in ("do", "target", "name", "id")]
         key = json.dumps(about)
         with self.lock:
@@ -118,21 +122,21 @@ class Hub:
             self.received[key] = message
 
     def steer(self, page: "Page | None") -> None:
-        """Let a page steer from now on; what the last one held is let go."""
+        """Let a page steer from now on; whatever the previous page held is released."""
         if self.steering is not None:
             self.receive({"do": "left"})
         self.steering = page
         self.show_who_steers()
 
     def show_who_steers(self) -> None:
-        """Report to all pages whether they steer, and whether any page does."""
+        """Report to all pages whether they steer, and whether any does."""
         taken = self.steering is not None
         for page in self.pages:
             mine = self.steering is page
             page.command(PLAY, "drive", type="play_drive", mine=mine, taken=taken)
 
     def fail(self, error: BaseException) -> None:
-        """End the server: what a page held could not be let go."""
+        """End the server: what a page held could not be released."""
         self.failure = self.failure or error
         self.end.set()
 
@@ -143,17 +147,17 @@ class Hub:
         return pages
 
     def notify(self) -> None:
-        """Let pages get what is pending."""
+        """Let pages send their pending commands."""
         for page in self.pages:
             page.has_pending.set()
 
     def ask(self) -> None:
-        """Request that pages return a number once they show all that was sent."""
+        """Request that pages return a number once they show everything sent."""
         for page in self.pages:
             page.ask()
 
     def up_to_date(self, number: int) -> bool:
-        """Return whether a page shows all that was sent before this number."""
+        """Return whether a page shows everything sent before this number."""
         with self.lock:
             return any(page.answered >= number for page in self.pages)
 
@@ -162,26 +166,26 @@ class Page(WebSocketHandler):
     """One open page. A newer command replaces one of its key that was not yet sent."""
 
     def initialize(self, hub: Hub, door: Door) -> None:
-        """Store the hub, and who is let in; called by Tornado."""
+        """Store the hub and the conditions of access; called by Tornado."""
         self.hub, self._door = hub, door
         self.has_pending, self._ready = asyncio.Event(), asyncio.Event()
         self._delivery: asyncio.Task[None] | None = None
-        # A page declares it; a program that reads the scene need not.
+        # Pages declare compression; a program that reads the scene need not.
         self._unpacks = "gzip" in self.request.query_arguments
         self.answered = 0
 
     def prepare(self) -> None:
         """Check host and key, and that the connection comes from one of our pages.
 
-        Tornado compares the origin with the host, but lets in what names no origin:
-        programs, and not browsers.
+        Tornado compares the origin with the host, but accepts connections without an
+        origin: those of programs, not of browsers.
         """
         self._door.check(self)
         if "Origin" not in self.request.headers:
             raise HTTPError(403, reason="The connection names no origin")
 
     def open(self, *args: str, **kwargs: str) -> None:
-        """Send the page the stage, which must not wait for meshes, then all else."""
+        """Send the page the stage, which must not wait for meshes, then the rest."""
         try:
             self._begin()
         except BaseException:
@@ -201,7 +205,7 @@ class Page(WebSocketHandler):
             hub.show_who_steers()
 
     def on_message(self, message: str | bytes) -> None:
-        """Process an answer, or a command of a page that steers; hang up on others."""
+        """Process an answer, or a command of a page that steers; disconnect others."""
         try:
             if message == TAKEN:
                 self._ready.set()
@@ -248,12 +252,12 @@ class Page(WebSocketHandler):
             self.hub.steer(None)
 
     def _leave(self) -> None:
-        """Remove the page where Tornado would not, and hang up."""
+        """Remove the page where Tornado would not, and disconnect it."""
         self.on_close()
         self.hang_up()
 
     def ask(self) -> None:
-        """Request that the page returns a number once it shows all sent before."""
+        """Request that the page returns a number once it shows everything sent."""
         self.command("", "ask", type="ask", number=self.hub.asked)
 
     def command(self, path: str, name: str, **command: Any) -> None:
@@ -264,7 +268,7 @@ class Page(WebSocketHandler):
         self.has_pending.set()
 
     async def _deliver(self, commands: list[bytes]) -> None:
-        """Send the stage, and from then on what is pending; hang up if that fails."""
+        """Send the stage, and then the pending commands; disconnect if that fails."""
         try:
             while True:
                 for message in batch_messages(commands):
@@ -284,7 +288,7 @@ class Page(WebSocketHandler):
             self.hang_up()  # the page connects anew
 
     async def _compressed(self, message: bytes) -> bytes:
-        """Return a message compressed, which another thread does; the page sees it."""
+        """Return a message compressed by another thread; the page detects it."""
         loop = asyncio.get_running_loop()
         return await loop.run_in_executor(None, partial(gzip.compress, message, 4))
 
@@ -323,7 +327,7 @@ class Alive(RequestHandler):
     """Proves to a page that has lost its program that this server has its key."""
 
     def initialize(self, door: Door) -> None:
-        """Store who is let in; called by Tornado."""
+        """Store the conditions of access; called by Tornado."""
         self._door = door
 
     def prepare(self) -> None:
@@ -343,10 +347,10 @@ _CLOSING = 2.0
 
 
 class ServerThread:
-    """Serves the page, and what a hub has for pages, until it is closed.
+    """Serves the page, and a hub's commands to pages, until it is closed.
 
     Attributes:
-        failure: What ended it before; None: nothing.
+        failure: The error that ended it; None: none.
     """
 
     def __init__(self, hub: Hub, door: Door, port: int, meshcat: Path) -> None:
@@ -382,7 +386,7 @@ class ServerThread:
         self._thread.join()
 
     def _run(self) -> None:
-        """Serve; whatever is raised, what is open is closed, and `failure` has it."""
+        """Serve; after any exception connections are closed, and `failure` has it."""
         try:
             with asyncio.Runner(loop_factory=lambda: self._loop) as runner:
                 runner.run(self._serve())
@@ -407,7 +411,7 @@ class ServerThread:
         server.stop()
         for page in self._hub.leave():
             page.hang_up()
-        with suppress(TimeoutError):  # the loop closes what is left
+        with suppress(TimeoutError):  # the loop closes the remaining ones
             await asyncio.wait_for(server.close_all_connections(), _CLOSING)
 
 
@@ -419,7 +423,7 @@ def _listen(host: str, port: int) -> socket.socket:
             listener = socket.create_server((host, candidate))
         except OSError as error:
             number = error.errno or 0
-            if number < 0:  # of the look-up of names, no error of the system
+            if number < 0:  # from the look-up of names, not from the system
                 reason = (error.strerror or "").partition(" (while")[0]
                 raise OSError(
                     f"cannot listen on {host}: no computer has this name: {reason}"

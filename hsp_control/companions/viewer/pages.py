@@ -1,4 +1,4 @@
-"""The pages of commands: they open when all is ready, and stay open.
+"""The pages of commands: they open when everything is ready, and stay open.
 
 And ``hsp export``, which writes logs as a page for offline use, or one as films.
 """
@@ -39,7 +39,7 @@ from hsp_control.simulation.log_writer import LogWriter
 
 
 class OpeningPage:
-    """Opens a page once, when all is ready: errors are raised before."""
+    """Opens a page once, when everything is ready: errors are raised before."""
 
     def __init__(
         self,
@@ -63,7 +63,7 @@ class OpeningPage:
 
 
 def status_line(transport: SceneRecorder) -> Callable[[str], object]:
-    """Return what sets the status line of the pages of a transport."""
+    """Return a function that sets the status line of a transport's pages."""
     return lambda text: transport.send([set_status(text)])
 
 
@@ -122,7 +122,7 @@ class Screen:
             yield cls(viewer, page)
 
     def begin(self, experiment: Experiment) -> None:
-        """Show what will run, and open the page."""
+        """Show the run's start, and open the page."""
         if self._viewer is None or self._page is None:
             return
         try:
@@ -199,7 +199,8 @@ def export(
 ) -> int:
     """Write every requested file; a file that fails does not stop the others.
 
-    ``formats``: beside the page, what a file is called and what writes it, by endings.
+    ``formats``: besides the page, the name of each further format and its writer, by
+    endings.
     """
     asked = {end: path for end in formats if (path := getattr(options, end))}
     if not (options.html or asked):
@@ -232,8 +233,8 @@ def export(
 
 def _titled(runs: list[ComparedRun]) -> list[ComparedRun]:
     """Return several runs by the titles of their logs, if those can be their names."""
-    # They cannot if two have the same one, as runs of one configuration have, or if one
-    # is too long for a switch.
+    # They cannot if two are equal, as of runs of one configuration, or if one is too
+    # long for a switch.
     titles = [str(run.rollout.meta.get("title") or "") for run in runs]
     if len(set(titles)) < len(titles):
         return runs

@@ -136,7 +136,7 @@ def _visual(
 def _with_mesh(visual: Visual, file: Path) -> Visual:
     """Return a visual with the file that it is drawn from, in its unit and upright.
 
-    What the page cannot read itself is read here, as it is for distances.
+    Formats that the page cannot read are read here, as for distances.
     """
     units = mesh_units(file)
     turn = np.eye(4)
@@ -147,7 +147,7 @@ def _with_mesh(visual: Visual, file: Path) -> Visual:
         return upright._replace(file=file)
     try:
         mesh = facets(load_mesh(file, np.array(visual.size)))
-    except (RuntimeError, ValueError):  # counted as missing
+    except (RuntimeError, ValueError):  # treated as missing
         return visual
     return visual._replace(mesh=mesh) if len(mesh[1]) else visual
 

@@ -102,7 +102,7 @@ class RunDrawing:
         layer = self.layers[name]
         yield from layer.draw(size)
         if not self._shown[name]:
-            # Not the layer's own node: each row of the legend is one switch.
+            # Not the node of the layer itself: each row of the legend is one switch.
             for path in (path for entry in layer.legend() for path in entry.paths):
                 yield set_property(path, "visible", False)
 

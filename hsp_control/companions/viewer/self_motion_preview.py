@@ -1,9 +1,9 @@
-"""A preview of self-motion: where the null space lets the elbow go, hand at rest.
+"""A preview of self-motion: the curve of the elbow while the hand is at rest.
 
 From the present configuration the curve J(q) q' = 0 is followed both ways, along the
 direction of the null space that moves the elbow most, until a joint reaches its limit,
-the elbow moves no more, or the curve closes. Each step is corrected by Newton's method,
-so that the errors of the tasks stay what they are.
+the elbow stops, or the curve closes. Each step is corrected by Newton's method, so that
+the errors of the tasks stay constant.
 """
 
 from collections.abc import Iterator
@@ -29,10 +29,10 @@ from hsp_control.control.controller import Controller
 from hsp_control.robot import Robot
 
 _STEP = 0.1  # length of a step, as a norm of joint angles [rad]
-_STEPS = 36  # most steps in each direction
+_STEPS = 36  # maximum number of steps in each direction
 _CORRECTIONS = 2  # Newton's steps after each step
-_RANK = 1e-4  # least singular value of J, over its largest one, that is a task's
-_STILL = 0.02  # least velocity of the elbow over that of the joints [m/rad]
+_RANK = 1e-4  # smallest singular value of J, over the largest, that adds to its rank
+_STILL = 0.02  # smallest velocity of the elbow over that of the joints [m/rad]
 _GHOSTS = 5
 _OPACITY = 0.16
 _PERIOD = 0.5  # time between the beginnings of two previews [s]
@@ -47,7 +47,7 @@ class SelfMotion(NamedTuple):
 
 
 class SelfMotionPreview:
-    """Follows the self-motion of a controller's robot from where it is."""
+    """Follows the self-motion of a controller's robot from the present posture."""
 
     def __init__(self, controller: Controller) -> None:
         """Copy the controller: only the copy is moved."""
@@ -58,7 +58,7 @@ class SelfMotionPreview:
 
     def curve(self, t: float, q: Array) -> SelfMotion | None:
         """Return the self-motion through a configuration; None if there is none."""
-        if self._robot.unactuated:  # what contacts leave free is another question
+        if self._robot.unactuated:  # contacts would have to be included
             return None
         e, N, _ = self._look(t, q)
         elbow = self._elbow(q, N)
@@ -96,7 +96,7 @@ class SelfMotionPreview:
         return data.oMi[joint].translation.copy(), J
 
     def _elbow(self, q: Array, N: Array) -> int | None:
-        """Return the joint that the null space moves most; None if it moves none."""
+        """Return the joint that moves most in the null space; None if none does."""
         speeds = [
             float(np.linalg.norm(self._place(q, joint)[1] @ N, 2)) if N.size else 0.0
             for joint in range(1, self._robot.model.njoints)
@@ -139,7 +139,7 @@ class SelfMotionPreview:
 
 
 class PreviewDrawing:
-    """Draws previews: the elbow's curve, ghosts, and where the field's cost is least.
+    """Draws previews: the elbow's curve, ghosts, and the minimum of the field's cost.
 
     A thread computes them, as each takes some 50 ms; a picture never waits for one.
     """
@@ -159,7 +159,7 @@ class PreviewDrawing:
         self._due = 0.0
 
     def draw(self, controller: Controller | None, on: bool) -> Iterator[PageCommand]:
-        """Yield what has changed since the last picture."""
+        """Yield the commands for changes since the last picture."""
         if not on or controller is None:
             self.begin()
             yield from self._show(None, controls=False)

@@ -54,7 +54,7 @@ def draw_background(view: ViewSettings) -> Iterator[PageCommand]:
 
 
 def stage_legend(view: ViewSettings) -> list[LegendEntry]:
-    """Return the legend's entries of what lies on the floor."""
+    """Return the legend's entries of the floor."""
     return [
         LegendEntry("grid", _GRID, ("/floor/grid",), view.show.grid, plain=True),
         LegendEntry("shadow", _SHADOW, ("/floor/shadow",), plain=True),

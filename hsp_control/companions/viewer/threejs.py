@@ -266,7 +266,7 @@ def material(
 
 
 def always_visible(surface: Json) -> Json:
-    """Return a material without depth test: it is visible even inside a link."""
+    """Return a material without depth test, which is visible even inside a link."""
     return surface | {"transparent": True, "depthTest": False, "depthWrite": False}
 
 

@@ -1,4 +1,4 @@
-"""Where commands go: into a scene that is kept and, with a server, to its pages."""
+"""Transports of commands: into a stored scene and, with a server, to its pages."""
 
 import atexit
 import importlib.util
@@ -24,7 +24,7 @@ from hsp_control.companions.viewer.commands import (
 
 
 class SceneRecorder:
-    """Keeps the commands that build a scene: all that a viewer needs to draw.
+    """Stores the commands that build a scene: everything that a viewer needs to draw.
 
     Attributes:
         scene: The commands.
@@ -41,7 +41,7 @@ class SceneRecorder:
         self.scene.keep(commands)
 
     def wait_for_page(self, timeout: float) -> bool:
-        """Wait until a page shows all that was sent; return whether one does."""
+        """Wait until a page shows everything sent; return whether one does."""
         return False
 
     def wait_until_closed(self) -> None:
@@ -65,7 +65,7 @@ def open_browser(url: str) -> bool:
 
 
 def _open(url: str) -> None:
-    """Open a page through a file that leads there: arguments are seen by all users."""
+    """Open a page through a file that redirects there: all users can see arguments."""
     file = _leading_to(url)
     webbrowser.open(url if file is None else file.as_uri(), 2)
     if file is not None:
@@ -84,14 +84,16 @@ def _leading_to(url: str) -> Path | None:
     )
     try:
         own = os.environ.get("XDG_DATA_HOME") or Path.home() / ".local" / "share"
-        folder = Path(own) / "hsp_control"  # where Jupyter has such files, too
+        folder = Path(own) / "hsp_control"  # as Jupyter does
         folder.mkdir(parents=True, exist_ok=True)
         number, name = tempfile.mkstemp(".html", "open-", folder)  # mode 0600
         with os.fdopen(number, "w") as file:
             file.write(page)
-    except (OSError, RuntimeError):  # no place for it
+    except (OSError, RuntimeError):  # it cannot be written
         return None
-    atexit.register(Path(name).unlink, missing_ok=True)  # if it ends before that
+    atexit.register(
+        Path(name).unlink, missing_ok=True
+    )  # if the program ends before that
     return Path(name)
 
 
@@ -156,7 +158,7 @@ class PageServer(SceneRecorder):
     def messages(self) -> list[dict[str, Any]]:
         """Return the steering page's messages since the last call; never waits.
 
-        Of each kind and object it is the newest: no page holds the program up.
+        Of each kind and object only the newest: no page can delay the program.
         """
         self._check_open()
         with self._hub.lock:
@@ -165,7 +167,7 @@ class PageServer(SceneRecorder):
         return found
 
     def wait_for_page(self, timeout: float) -> bool:
-        """Wait until a page shows all that was sent; return whether one does."""
+        """Wait until a page shows everything sent; return whether one does."""
         self._check_open()
         deadline = time.monotonic() + timeout
         number = self._hub.asked = self._hub.asked + 1
@@ -177,7 +179,7 @@ class PageServer(SceneRecorder):
         return True
 
     def wait_until_closed(self) -> None:
-        """Wait until no page is open; a page that is reloaded is taken as open."""
+        """Wait until no page is open; one that is being reloaded is still open."""
         last_seen = time.monotonic()
         while time.monotonic() < last_seen + RELOAD_TIMEOUT:
             if self._hub.pages:
@@ -198,7 +200,7 @@ class PageServer(SceneRecorder):
 
 
 def page_key(host: str, *, fresh: bool = False) -> str:
-    """Return what a page's address must contain.
+    """Return the key that a page's address must contain.
 
     On this computer it is the user's, in a file that nobody else can read, so that an
     open page finds the next start. In a network, or if it is to be ``fresh``, it is new
@@ -216,7 +218,7 @@ def page_key(host: str, *, fresh: bool = False) -> str:
             os.write(opened, new.encode())
             os.close(opened)
         about, kept = file.stat(), file.read_text()
-    except (OSError, RuntimeError, UnicodeDecodeError):  # no place for it
+    except (OSError, RuntimeError, UnicodeDecodeError):  # it cannot be written
         return new
     private = about.st_uid == os.getuid() and not about.st_mode & 0o077
     return kept if private and len(kept) == len(new) else new

@@ -98,7 +98,7 @@ class Viewer:
         self._plotted = False
         self.transport = PageServer(port) if transport is None else transport
         try:
-            # Its meshes last: they appear where they belong, in their light.
+            # Its meshes last: they then appear at their poses, in their light.
             still = self._with_obstacles(Scene(), None)
             self.transport.send([*still, *self.drawing.draw()])
         except BaseException:
@@ -292,7 +292,7 @@ class Viewer:
         run = self._run(rollout, controller)
         playing = self._playing(None, None)
         clip = set_clip(run.clip(), play=True, keep=True, **playing)
-        # Now also the layers that were not computed meanwhile have their switches.
+        # Layers that were not computed meanwhile now have their switches, too.
         caption = self._caption(run, rollout.meta.get("title"))
         self.transport.send(
             [*clear(), *run.draw(self._size), *clip, caption, set_status(status)]
@@ -306,7 +306,7 @@ class Viewer:
 
     @property
     def has_plots(self) -> bool:
-        """Whether its pages show plots: those of its own server do."""
+        """Whether its pages show plots, as those of its server do."""
         return isinstance(self.transport, PageServer)
 
     def _plot(self, runs: Sequence[ComparedRun]) -> None:
@@ -384,7 +384,7 @@ class Viewer:
         return {"speed": speed, "loop": self.view.loop if loop is None else loop}
 
     def _move_others(self, time: float) -> list[PageCommand]:
-        """Return the commands that move all but the robot to a time [s]."""
+        """Return the commands that move everything but the robot to a time [s]."""
         if self._obstacles is None:
             return [page_command("seek", CLIP, "seek", time=float(time))]
         return [*self._obstacles.move(time), set_time(f"t = {time:.2f} s")]

@@ -1,4 +1,4 @@
-"""Watch a loop of one's own: the process of the page, which follows a journal."""
+"""Watch a user's own loop: the process of the page, which follows a journal."""
 
 import json
 import os
@@ -23,15 +23,15 @@ from hsp_control.simulation import Rollout
 from hsp_control.simulation.journal import JournalReader
 
 _input = FileIO(0, closefd=False)  # standard input; nothing waits in a buffer
-_NICENESS = 10  # the loop comes first
+_NICENESS = 10  # the loop has priority
 _POLL = 0.01
 _KEPT = 1000  # rows that are kept for the picture
-_STILL = 0.5  # time without a row after which the loop is reported to stand still [s]
+_STILL = 0.5  # time without a row after which the loop is reported as idle [s]
 _RATE_WINDOW = 1.0  # time over which the rate is measured [s]
 
 
 class Untouched:
-    """No handles: a watched loop is only looked at."""
+    """No handles: a watched loop is only shown."""
 
     def __init__(self) -> None:
         self.targets: dict[str, Any] = {}
@@ -46,7 +46,7 @@ class Untouched:
 
 
 class Watched:
-    """What a picture needs of a watched loop, from its journal; see `Shown`."""
+    """The data of a watched loop for a picture, from its journal; see `Shown`."""
 
     kind = "watched"
     pushes = None
@@ -76,11 +76,11 @@ class Watched:
         return float(self._last()["t"][0])
 
     def pull(self) -> tuple[Array, Array, float] | None:
-        """Return None: nobody pulls at this robot with a mouse."""
+        """Return None: links of a watched loop cannot be pulled."""
         return None
 
     def read(self) -> bool:
-        """Read what has come; return whether there is a new row."""
+        """Read the new part of the journal; return whether there is a new row."""
         if not self.recorder.read():
             return False
         self._move()
@@ -101,8 +101,8 @@ def main() -> int:
     """Show a journal while it grows; return 0, or 2 after one error message.
 
     It reads lines of JSON from its standard input. The first has its settings; then it
-    writes the page's address. A later one names another journal. When its input is
-    closed, the loop's program has ended, and so does it.
+    writes the page's address. A later one names another journal. It ends when its input
+    is closed, since the loop's program has ended then.
     """
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C stops the loop only
     os.nice(_NICENESS)
@@ -159,7 +159,7 @@ def _follow(server: PageServer, journal: Path, view: dict[str, Any]) -> Path | N
 
 
 class _Word:
-    """What the loop's process reports: another journal, or nothing any more."""
+    """A message of the loop's process: another journal, or the end."""
 
     def __init__(self, path: Path | None) -> None:
         self.path = path

@@ -1,4 +1,4 @@
-"""Watch a loop of one's own: the side of the loop, which writes what a page shows."""
+"""Watch a user's own loop: the side of the loop, which writes the rows to show."""
 
 import json
 import select
@@ -22,14 +22,14 @@ from hsp_control.control.controller import Controller
 from hsp_control.declaration.plain_data import plain_data
 from hsp_control.simulation.log_writer import LogWriter
 
-START = 60.0  # time in which the page's process must say its address [s]
-RATE = 30.0  # states that are taken of a controller in a second [1/s]
+START = 60.0  # time in which the page's process must report its address [s]
+RATE = 30.0  # rate at which states are copied from a controller [1/s]
 _PATIENCE = 0.5  # time after a failure without another attempt [s]
 _ROWS = 20_000  # of a journal, some 60 MB; then another one is begun
 
 
 class Watch:
-    """A page that shows a loop of one's own; see `watch`.
+    """A page that shows a user's own loop; see `watch`.
 
     Attributes:
         url: The page's address.
@@ -39,7 +39,7 @@ class Watch:
         self, process: subprocess.Popen[bytes], url: str, follower: "Follower | None"
     ) -> None:
         self.url, self._follower = url, follower
-        # Also when the program ends, or nobody has the watch any more.
+        # Also when the program ends, or the watch is no longer referenced.
         self._end = finalize(self, _end, process, follower)
 
     def open_browser(self) -> bool:
@@ -48,11 +48,11 @@ class Watch:
 
     @property
     def failure(self) -> str:
-        """Why nothing new is shown, while the loop goes on; "" if all is well."""
+        """Why nothing new is shown while the loop continues; "" without a failure."""
         return "" if self._follower is None else self._follower.failure
 
     def close(self) -> None:
-        """End the page; the loop goes on. A second call does nothing."""
+        """End the page; the loop continues. A second call does nothing."""
         self._end()
 
     def __enter__(self) -> Self:
@@ -73,13 +73,13 @@ def watch(
     show: bool = False,
     **view: Any,
 ) -> Watch:
-    """Show a loop of one's own while it runs: scene, targets, distances, plots.
+    """Show a user's own loop while it runs: scene, targets, distances, plots.
 
     ``page = hsp.viewer.watch(controller)`` before the loop; the loop itself stays as it
     is. 30 times a second a thread copies the state of the last `Controller.compute`,
-    for some microseconds, and computes with a copy of the controller what is drawn. A
-    `Recorder` has it already: what it writes is shown, and there is no thread. The page
-    is in a separate process.
+    for some microseconds, and computes the drawn quantities with a copy of the
+    controller. A `Recorder` has them already: its rows are shown, without a thread. The
+    page is in a separate process.
 
     Args:
         loop: The controller, or a `Recorder` of it.
@@ -92,8 +92,8 @@ def watch(
         The watch, with the page's address; it ends with `Watch.close`, or the program.
 
     Raises:
-        ViewerError: If what is given is neither, a view has no such field, or the page
-            does not start.
+        ViewerError: If ``loop`` is neither, a view has no such field, or the page does
+        not start.
     """
     if not isinstance(loop, Controller | Recorder):
         raise ViewerError(
@@ -143,7 +143,7 @@ def _say(process: subprocess.Popen[bytes], message: dict[str, Any]) -> None:
 
 
 def _end(process: subprocess.Popen[bytes], follower: "Follower | None") -> None:
-    """End the thread and the process; see `watched_page` for how it sees it."""
+    """End the thread and the process; `watched_page` describes how it notices."""
     if follower is not None:
         follower.end()
     for pipe in (process.stdin, process.stdout):
@@ -158,10 +158,10 @@ def _end(process: subprocess.Popen[bytes], follower: "Follower | None") -> None:
 
 
 class Follower:
-    """Takes the newest state of a controller, and writes what a copy computes for it.
+    """Reads the newest state of a controller, and writes the row that a copy computes.
 
-    All that the loop may wait for is the copying of a state, and the interpreter's
-    lock while a row is written; see ``benchmarks/companions/watching.py``.
+    The loop waits at most for the copying of a state, and for the interpreter's lock
+    while a row is written; see ``benchmarks/companions/watching.py``.
     """
 
     _begun: bool
@@ -203,7 +203,7 @@ class Follower:
                 last = taken[0], taken[1].tobytes()
                 self.write(*taken)
                 self.failure = ""
-            except HspControlError as error:  # the loop has it too, or soon will
+            except HspControlError as error:  # the loop has it, too, or soon will
                 self.failure, self._begin_anew = str(error), True
                 # A copy takes the lock for some ms: not at every failure.
                 self._ended.wait(_PATIENCE)
@@ -214,7 +214,7 @@ class Follower:
     def newest(self) -> tuple[float, Any, Any] | None:
         """Return time, q and v of the last step, copied; None before the first one."""
         controller = self._controller
-        with controller._lock:  # no step is half made
+        with controller._lock:  # no step is in progress
             if not controller._memory.begun:
                 return None
             state = controller.state
@@ -238,20 +238,22 @@ class Follower:
         old.unlink(missing_ok=True)
 
     def _catch_up(self) -> None:
-        """Make the changes that were made since; begin anew if the loop did."""
+        """Apply the changes made since; restart if the loop did."""
         controller = self._controller
         if self._begin_anew or controller._memory.runs != self._followed:
             self._copy_anew()
             self._change_journal()
         if not self._begun:
-            # What is relative to the start is placed where the loop placed it.
+            # Parts relative to the start are placed where the loop placed them.
             start = controller.setup.start.state
             self._copy.compute(start.t, start.q, start.v)
             self._begun = True
         changes, known = {id(each): each for each in controller.changes}, self._changes
         for change in (changes[key] for key in changes if key not in known):
             with controller._lock:
-                own = deepcopy(change)  # its stream goes on from where the loop's is
+                own = deepcopy(
+                    change
+                )  # its stream continues from the state of the loop's
             self._copy.change(own)
         self._changes = changes
 

@@ -1,4 +1,4 @@
-"""Bipeds that walk: the tasks that they need, and their two feet."""
+"""Bipedal walking: its tasks and its two feet."""
 
 from collections.abc import Sequence
 from dataclasses import KW_ONLY
@@ -26,9 +26,9 @@ from hsp_control.tasks import CenterOfMass, FrameOrientation, FramePose, Gains, 
 from hsp_control.tasks.frame_task import TrackingTask
 
 BODY, TRUNK = "center_of_mass", "trunk"
-"""The names of the tasks that every walk has, besides one for each foot."""
+"""Names of the tasks of every walk, besides one for each foot."""
 _SIX = 6
-"""Freedoms of a sole, which stands flat or swings."""
+"""Degrees of freedom of a sole."""
 
 
 class BipedPlan(MovingPlan):
@@ -36,13 +36,13 @@ class BipedPlan(MovingPlan):
 
     _: KW_ONLY
     steps: PositiveCount | None = None
-    """Number of steps before it slows down and stands [-]; by default it walks
-    until the end."""
+    """Number of steps before it slows down and stands [-]; by default it walks until
+    the end of the run."""
     footsteps: Points | None = None
-    """Instead of a velocity: where the feet go, one after the other; x, y and yaw from
-    the middle between the feet at the start, x forward [m, m, rad]."""
+    """Instead of a velocity: the footsteps, one after the other; x, y and yaw relative
+    to the middle between the feet at the start, x forward [m, m, rad]."""
     first: Literal["left", "right"] = "left"
-    """The foot that takes the first of the footsteps [-]."""
+    """The foot of the first footstep [-]."""
     feet: Names | None = None
     """Names of the two contacts that walk [-]; all of them by default."""
     trunk: str | None = None
@@ -52,17 +52,18 @@ class BipedPlan(MovingPlan):
     double_support: Positive = 0.15
     """Duration of the time on both feet between two swings [s]."""
     lift: Positive = 0.05
-    """How high a foot is lifted [m]."""
+    """Height to which a foot is lifted [m]."""
     crouch: NonNegative = 0.04
-    """How far the centre of mass is lowered, so that the knees stay bent [m]."""
+    """Distance by which the centre of mass is lowered, so that the knees stay bent
+    [m]."""
     acceleration: Positive = 0.4
-    """How fast the velocity changes, from step to step [m/s²]."""
+    """Maximum rate of change of the velocity, from step to step [m/s²]."""
     feedback: Positive = 4.0
     """k, the rate at which an error of the divergent component decays [1/s]."""
     margin: Fraction = 0.9
     """Share of the sole that feedback uses [-]."""
     adjusts: Flag = True
-    """Whether a push moves the next step [-]."""
+    """Whether the next step is adjusted after a push [-]."""
     contact_force: Positive = 0.03
     """Normal force at which a swing foot has landed, in robot weights [-]."""
 

@@ -1,4 +1,4 @@
-"""What a plan switches: a contact, and the task that takes its place."""
+"""Switches of a plan: of a contact, and of the task that replaces it."""
 
 from math import inf, nextafter
 
@@ -12,15 +12,15 @@ from hsp_control.trajectories.schedule import Intervals, Schedule, smooth_step
 
 
 class Switch(Written, Schedule):
-    """w(t) in [0, 1] that a plan turns on and off, each with a ramp.
+    """w(t) in [0, 1] that a plan switches on and off, each with a ramp.
 
-    Off, it is active until its ramp ends: the force of a contact fades before the
-    contact goes. On, it is active at once: the force of a contact rises from zero. A
-    change during a ramp continues from the weight of that time.
+    Switched off, it is active until its ramp ends: the force of a contact fades before
+    the contact ends. Switched on, it is active at once: the force of a contact rises
+    from zero. A change during a ramp continues from the weight of that time.
     """
 
     intervals: Intervals = ((None, None),)
-    """Not used: events say when it is active."""
+    """Not used: events determine when it is active."""
     ramp: NonNegative = 0.0
     """Not used: each change has its own."""
     on: Flag = True
@@ -36,7 +36,7 @@ class Switch(Written, Schedule):
         return np.array([-np.inf, 0.0, weight, weight])
 
     def set(self, on: bool, t: float, ramp: float = 0.0) -> None:
-        """Turn it on or off, from a time on."""
+        """Switch it on or off, from a time on."""
         self.memory[:] = t, ramp, self.weight(t), float(on)
 
     def reset(self) -> None:
@@ -45,13 +45,13 @@ class Switch(Written, Schedule):
 
     @property
     def _last(self) -> tuple[float, float, float, float]:
-        """The last `set`: when, its ramp [s], the weight before, and the one after."""
+        """The last `set`: its time, its ramp [s], the weights before and after."""
         start, ramp, origin, target = self.memory.tolist()
         return start, ramp, origin, target
 
     @property
     def is_on(self) -> bool:
-        """Whether it was last turned on, or is on from the beginning."""
+        """Whether it was last switched on, or is on from the beginning."""
         return bool(self.memory[3] > 0.0)
 
     def active(self, t: float) -> bool:
@@ -60,7 +60,7 @@ class Switch(Written, Schedule):
         return target > 0.0 or t < start + ramp
 
     def edge(self, t: float) -> float:
-        """Return when it is not active, just before or after the last `set` [s]."""
+        """Return a time just before or after the last `set` when it is inactive [s]."""
         start, ramp, _, target = self._last
         return nextafter(start, -inf) if target > 0.0 else start + ramp
 
@@ -75,14 +75,14 @@ class Switch(Written, Schedule):
 
 
 class Switched:
-    """The switches of a contact and of the task that takes its place.
+    """The switches of a contact and of the task that replaces it.
 
-    Each begins where the other ends, so that the law goes over from one to the other
-    while the force fades or rises; see `PlannedTask.weight_beyond`.
+    Each begins where the other ends, so that the law blends from one to the other while
+    the force fades or rises; see `PlannedTask.weight_beyond`.
     """
 
     contact: Switch
-    task: Switch | None  # that moves its link
+    task: Switch | None  # moves its link
 
     def reset(self) -> None:
         """Return to the state before the first switch."""
@@ -91,17 +91,17 @@ class Switched:
                 switch.reset()
 
     def unload(self, t: float, ramp: float) -> None:
-        """Let the force fade from a time on [s]; then the task moves the link."""
+        """Fade the force from a time on [s]; then the task moves the link."""
         self.contact.set(False, t, ramp)
         if self.task is not None:
             self.task.set(True, t + ramp)
 
     def lift(self, t: float) -> None:
-        """Let the task move the link now [s]."""
+        """Activate the task, which moves the link, now [s]."""
         self.unload(t, 0.0)
 
     def set_down(self, t: float, ramp: float) -> None:
-        """Let the force rise from now on [s], while the task ends."""
+        """Raise the force from now on [s], while the task ends."""
         if self.task is not None:
             self.task.set(True, t)  # it may wait for the end of a ramp
             self.task.set(False, t)

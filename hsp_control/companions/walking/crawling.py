@@ -1,4 +1,4 @@
-"""A quadruped that crawls, and its run from foot to foot."""
+"""The crawl of a quadruped, and its run from foot to foot."""
 
 from collections.abc import Sequence
 from dataclasses import KW_ONLY
@@ -24,12 +24,12 @@ FADE = 0.3
 
 
 class Crawl(QuadrupedPlan, type="crawl"):
-    """A quadruped crawls: one foot swings while three stand, and it can stop any time.
+    """A crawl of a quadruped: one foot swings while three stand; it can always stop.
 
-    On four feet the centre of mass moves above the triangle of the three that will
-    stand; there it rests while the fourth swings. The feet follow each other on each
+    On four feet the centre of mass moves above the triangle of the next three stance
+    feet; there it rests while the fourth swings. The feet follow each other on each
     side, the hind one first (McGhee and Frank 1968). A foot lands half a stride ahead
-    of its place; it is a contact when it touches, early or late, higher or lower.
+    of its place; it becomes a contact at touchdown, early or late, higher or lower.
     """
 
     gait: ClassVar[str] = "crawl"
@@ -43,7 +43,7 @@ class Crawl(QuadrupedPlan, type="crawl"):
     """Duration of the time on four feet between two swings, in which the body moves
     [s]."""
     margin: ProperFraction = 0.3
-    """By which share the triangle of the feet is made smaller for the centre of mass
+    """Share by which the support triangle is shrunk for the centre of mass
     [-]."""
 
     def begin(self, controller: Controller) -> "RunningCrawl":
@@ -61,8 +61,8 @@ class RunningCrawl(RunningQuadruped):
 
         Args:
             crawl: The plan.
-            controller: A controller that is made of its parts.
-            margin: By which share the triangle of the feet is made smaller [-].
+            controller: A controller built from its parts.
+            margin: Share by which the support triangle is shrunk [-].
         """
         super().__init__(crawl, controller)
         self._margin = margin
@@ -96,7 +96,7 @@ class RunningCrawl(RunningQuadruped):
         return self._order[self._swings % 4]
 
     def _step(self, t: float, measured: Measurement) -> None:
-        """Go on; see `RunningQuadruped`."""
+        """Advance the gait; see `RunningQuadruped`."""
         if self._mode != "standing":
             before = self._world_velocity()
             self._accelerate(t)
@@ -127,7 +127,7 @@ class RunningCrawl(RunningQuadruped):
                 self._move_over(t)
 
     def _move_over(self, t: float) -> None:
-        """Move the centre of mass above the feet that will stand."""
+        """Move the centre of mass above the next stance feet."""
         stance, swing = self.gait.stance, self.gait.swing
         self._mode, self._since = "four", t
         self._foot.unload(t + (1.0 - FADE) * stance, FADE * stance)
@@ -143,7 +143,7 @@ class RunningCrawl(RunningQuadruped):
         self._shift = to_rest(self._shift.sample(t), point, t, before_fade)
 
     def _place(self, t: float) -> None:
-        """Let the foot go half a stride ahead of its place below the body."""
+        """Aim the foot half a stride ahead of its place below the body."""
         foot, swing = self._foot, self._foot.swing
         assert swing is not None
         axes = Footstep(0.0, 0.0, self._yaw + self._velocity.turn * self.gait.swing)

@@ -16,7 +16,7 @@ from hsp_control.robot import RobotState
 from hsp_control.trajectories import ComposedPose
 
 SLOPE = 0.02
-"""Slope that is none: a sole that stands is tilted by so little [-]."""
+"""Slope below which the ground is level: the tilt of a flat sole [-]."""
 FLATNESS = 0.05
 """Largest angle between a sole and the ground at the start [rad]."""
 
@@ -24,16 +24,16 @@ FLATNESS = 0.05
 class Foot(Switched):
     """A foot with a flat sole.
 
-    A `Footstep` of it is where the middle of its sole stands, and the yaw of its frame.
+    Its `Footstep` is the middle of its sole and the yaw of its frame.
 
     Attributes:
         name: The name of its contact and of its task.
         frame: Its frame.
         normal: The normal of the ground, shape (3,) [-].
-        swing: What its references follow until it rests; None: where it is.
+        swing: The motion of its references until it rests; None: its present place.
         position: The reference of the frame's origin.
         orientation: The reference of its orientation.
-        place: Where it stands, or stood last.
+        place: Its present or last footstep.
         height: The height of its sole there [m].
         frame_height: The height of its frame's origin there [m].
     """
@@ -53,8 +53,8 @@ class Foot(Switched):
             and isinstance(pose.orientation, FedOrientation)
         ):
             raise PlanError(
-                f"the foot {name!r} does not follow the plan: make the controller of "
-                "the plan's parts"
+                f"the foot {name!r} does not follow the plan: build the controller "
+                "from the plan's parts"
             )
         self.frame, self.normal = contact.frame, contact.axes[:, 2]
         self.contact, self.task = contact.schedule, task.schedule
@@ -62,7 +62,7 @@ class Foot(Switched):
         self._points: Array = contact.points
 
     def begin(self, state: RobotState, heading: float) -> None:
-        """Stand where the robot is."""
+        """Stand at the robot's present pose."""
         self.reset()
         self.swing: Swing | None = None
         here = state.frame(self.frame)
@@ -91,11 +91,11 @@ class Foot(Switched):
 
     @property
     def sole_width(self) -> float:
-        """How wide the sole is [m]."""
+        """The width of the sole [m]."""
         return float(np.ptp(self._corners[:, 1]))
 
     def follow(self, state: RobotState) -> None:
-        """Write its references: its swing, or where it is."""
+        """Write its references: its swing, or its present place."""
         t, here = state.t, state.frame(self.frame)
         if self.rests(t):
             self.swing = None
@@ -107,7 +107,7 @@ class Foot(Switched):
             self.orientation.write(t, *self.swing.orientation(t))
 
     def stand(self, state: RobotState) -> None:
-        """Take where the foot is for where it stands."""
+        """Set the foot's present place as its footstep."""
         here = state.frame(self.frame)
         yaw = float(np.arctan2(here.rotation[1, 0], here.rotation[0, 0]))
         self._last_yaw = near(yaw, self._last_yaw)  # several turns may have been made
@@ -124,11 +124,11 @@ class Foot(Switched):
         return float(corners[:, 2].mean())
 
     def ground(self, state: RobotState) -> tuple[Array, float, Array]:
-        """Return how it stands: the ground's tilt, its height, the ground's slope.
+        """Return the ground's tilt, the foot's height, and the ground's slope.
 
         The tilt is a rotation from the level, shape (3, 3); the height is that of the
-        frame's origin [m]; the slope is the ground's gradient, shape (2,) [-]. Level
-        ground is taken as level, and the height is what it was as the foot landed.
+        frame's origin [m]; the slope is the ground's gradient, shape (2,) [-]. Nearly
+        level ground is treated as level, and the height is that at touchdown.
         """
         here = state.frame(self.frame)
         normal = here.rotation @ self.flat(self.place.yaw)[2]
@@ -140,11 +140,11 @@ class Foot(Switched):
         return pin.exp3(angle * axis), float(here.position[2]), slope
 
     def place_of(self, origin: Footstep) -> Footstep:
-        """Return the footstep whose frame's origin is at a place."""
+        """Return the footstep for a position of the frame's origin."""
         return origin.ahead(float(self._middle[0]), float(self._middle[1]))
 
     def origin_of(self, place: Footstep) -> Footstep:
-        """Return where the frame's origin is at a footstep."""
+        """Return the position of the frame's origin at a footstep."""
         return place.ahead(-float(self._middle[0]), -float(self._middle[1]))
 
     def flat(self, yaw: float) -> Array:

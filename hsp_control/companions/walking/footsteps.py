@@ -1,4 +1,4 @@
-"""Footsteps in the plane: where feet stand, and where a speed puts the next one."""
+"""Footsteps in the plane: places of the feet, and the next place at a velocity."""
 
 from math import cos, pi, sin
 from typing import NamedTuple
@@ -9,7 +9,7 @@ from hsp_control.common.arrays import Array
 
 
 class Footstep(NamedTuple):
-    """Where a foot stands on the ground: x and y [m], and its yaw [rad]."""
+    """The place of a foot on the ground: x and y [m], and its yaw [rad]."""
 
     x: float
     y: float
@@ -21,7 +21,7 @@ class Footstep(NamedTuple):
         return np.array([self.x, self.y])
 
     def ahead(self, forward: float, left: float, turn: float = 0.0) -> "Footstep":
-        """Return what lies this far forward and left [m], turned by an angle [rad]."""
+        """Return the step this far forward and left [m], turned by an angle [rad]."""
         c, s = cos(self.yaw), sin(self.yaw)
         return Footstep(
             self.x + c * forward - s * left,
@@ -41,7 +41,7 @@ class Footstep(NamedTuple):
 
 
 class Velocity(NamedTuple):
-    """How fast the body goes forward and to the left [m/s], and turns [rad/s]."""
+    """The velocity of the body forward and to the left [m/s], and turning [rad/s]."""
 
     forward: float
     left: float
@@ -55,13 +55,13 @@ class Velocity(NamedTuple):
     def towards(
         self, wanted: "Velocity", most: tuple[float, float, float]
     ) -> "Velocity":
-        """Return what is nearest to a wanted one; each part changes by this at most."""
+        """Return the velocity nearest to a desired one, with a bound on each change."""
         parts = zip(self, wanted, most, strict=True)
         return Velocity(*(a + min(max(b - a, -m), m) for a, b, m in parts))
 
 
 class Stance(NamedTuple):
-    """How the feet of a biped stand beside each other.
+    """The geometry of a biped's stance.
 
     Attributes:
         width: From the right to the left foot, when it stands [m].
@@ -78,11 +78,11 @@ class Stance(NamedTuple):
     def next(
         self, standing: Footstep, side: float, velocity: Velocity, duration: float
     ) -> Footstep:
-        """Return where the swing foot goes at a velocity of the body.
+        """Return the footstep of the swing foot at a velocity of the body.
 
-        The middle between the feet goes on by the velocity, and the foot stands beside
-        it; never nearer to the standing foot than the feet are wide, nor farther than
-        the legs reach.
+        The middle between the feet advances with the velocity, and the foot is placed
+        beside it: not nearer to the stance foot than the width of the feet, nor beyond
+        the reach of the legs.
         """
         turn = velocity.turn * duration
         middle = standing.ahead(0.0, 0.5 * side * self.width)
@@ -91,7 +91,7 @@ class Stance(NamedTuple):
         return self.kept(standing, side, foot)
 
     def kept(self, standing: Footstep, side: float, foot: Footstep) -> Footstep:
-        """Return the nearest place to a footstep that the other foot allows."""
+        """Return the nearest footstep that the other foot permits."""
         x, y = standing.local(foot.point)
         x = min(max(float(x), -self.longest), self.longest)
         y = side * min(max(side * float(y), self.narrowest), self.widest)

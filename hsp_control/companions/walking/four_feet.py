@@ -1,4 +1,4 @@
-"""A quadruped that walks: what every gait has in one run."""
+"""A walking quadruped: the common part of all gaits in one run."""
 
 from abc import abstractmethod
 from collections.abc import Mapping, Sequence
@@ -26,20 +26,20 @@ from hsp_control.control.interface import (
 from hsp_control.robot import RobotState
 
 LATE = 0.12
-"""How long a foot without ground under it is waited for [s]."""
+"""Maximum wait for a foot without ground under it [s]."""
 EARLY = 0.6
-"""Share of a swing before which no force is taken as touchdown."""
+"""Share of a swing before which no force is treated as touchdown."""
 RISE = 0.3
-"""How long the trunk takes to rise or sink with the ground [s]."""
+"""Time in which the trunk rises or sinks with the ground [s]."""
 _PRESS = 0.002
-"""How far below the ground a swing foot aims, so that it does not miss it [m]."""
+"""Depth below the ground at which a swing foot aims, so that it touches it [m]."""
 _SLOPE = 0.06
-"""Slope that is none: a foot stands on a plate, or is not yet down [-]."""
+"""Slope below which the ground is level: a foot on a plate, or not yet down [-]."""
 _UP = np.array([0.0, 0.0, 1.0])
 
 
 class PointFoot(Switched):
-    """A foot that touches the ground in a point.
+    """A point foot.
 
     Attributes:
         name: The name of its contact and of its task.
@@ -47,11 +47,11 @@ class PointFoot(Switched):
         normal: The normal of the ground, shape (3,) [-].
         position: The reference of its frame's origin.
         swing: Its motion while it swings; None while it stands.
-        followed: What its reference follows until it rests; None: where it is.
-        height: The height of its frame where it stands, or stood last [m].
-        offset: Where it stands beside the middle of the feet at the start, in axes of
-            the trunk, shape (2,) [m].
-        reach: How far before and behind its hip the leg puts it [m].
+        followed: The motion of its reference until it rests; None: its present place.
+        height: The height of its frame at its present or last stance [m].
+        offset: Its position relative to the middle of the feet at the start, in axes of
+        the trunk, shape (2,) [m].
+        reach: Its maximum distance before and behind its hip [m].
     """
 
     def __init__(self, name: str, controller: Controller) -> None:
@@ -66,8 +66,8 @@ class PointFoot(Switched):
             and isinstance(task.followed, Fed)
         ):
             raise PlanError(
-                f"the foot {name!r} does not follow the plan: make the controller of "
-                "the plan's parts"
+                f"the foot {name!r} does not follow the plan: build the controller "
+                "from the plan's parts"
             )
         self.frame, self.normal = contact.frame, contact.axes[:, 2]
         self.reach = np.inf
@@ -77,7 +77,7 @@ class PointFoot(Switched):
         self.followed: Swing | None = None
 
     def start(self, state: RobotState, middle: Footstep) -> None:
-        """Stand where the robot is; ``middle`` is below its centre of mass."""
+        """Stand at the robot's present pose; ``middle`` is below its centre of mass."""
         self.reset()
         self.swing = self.followed = None
         here = state.position(self.frame)
@@ -85,7 +85,7 @@ class PointFoot(Switched):
         self.offset: Array = middle.local(here)
 
     def follow(self, state: RobotState) -> None:
-        """Write its reference: its swing, or where it is."""
+        """Write its reference: its swing, or its present place."""
         t, swing = state.t, self.followed
         if swing is None or self.rests(t):
             self.followed = None
@@ -94,7 +94,7 @@ class PointFoot(Switched):
             self.position.write(t, *swing.position(t))
 
     def speed(self, velocity: Velocity) -> float:
-        """Return how fast the body moves above the foot at a velocity [m/s]."""
+        """Return the speed of the body above the foot at a velocity [m/s]."""
         x, y = self.offset
         forward, left, turn = velocity
         return float(np.hypot(forward - turn * y, left + turn * x))
@@ -104,7 +104,7 @@ class RunningQuadruped(RunningPlan):
     """A plan of four feet in one run."""
 
     _mode: str
-    """What it does; "standing" in each gait."""
+    """The mode; "standing" in each gait."""
 
     def __init__(self, plan: QuadrupedPlan, controller: Controller) -> None:
         """Find the references and the switches."""
@@ -125,7 +125,7 @@ class RunningQuadruped(RunningPlan):
         ):
             raise PlanError(
                 "the tasks 'trunk', 'height' and 'center_of_mass' do not follow the "
-                "plan: make the controller of the plan's parts"
+                "plan: build the controller from the plan's parts"
             )
         self._trunk, self._height, self._body = trunk, height, body
         self._trunk_frame: str = tasks["trunk"].frame  # type: ignore[attr-defined]
@@ -136,14 +136,15 @@ class RunningQuadruped(RunningPlan):
         self._begun = False
 
     def start(self, state: RobotState) -> None:
-        """Stand where the robot is; see `RunningPlan.start`."""
+        """Stand at the robot's present pose; see `RunningPlan.start`."""
         frame = state.frame(self._trunk_frame)
         mass = state.centroidal.position
         yaw = float(np.arctan2(frame.rotation[1, 0], frame.rotation[0, 0]))
         middle = Footstep(float(mass[0]), float(mass[1]), yaw)
         for foot in self._feet:
             foot.start(state, middle)
-        # The offsets are from the middle of the feet, below which the mass is to be.
+        # The offsets are relative to the middle of the feet, above which the mass is to
+        # be.
         center = np.mean([foot.offset for foot in self._feet], axis=0)
         for foot in self._feet:
             foot.offset = foot.offset - center
@@ -186,8 +187,8 @@ class RunningQuadruped(RunningPlan):
     def _check_stride(self, state: RobotState, time: float) -> None:
         """Check that the legs are long enough for the speed and for the lift.
 
-        A velocity that is a function of time is not checked: it is followed as far as
-        the legs reach (`_wanted`).
+        A velocity that is a function of time is not checked: it is limited to the reach
+        of the legs (`_wanted`).
         """
         self._stride_time = time
         for foot in self._feet:
@@ -216,19 +217,19 @@ class RunningQuadruped(RunningPlan):
 
     @abstractmethod
     def _start_gait(self, state: RobotState) -> None:
-        """Begin the gait, after all else."""
+        """Begin the gait, after everything else."""
 
     @abstractmethod
     def _combinations(self) -> Sequence[Sequence[PointFoot]]:
-        """Return which feet may be in the air together."""
+        """Return the sets of feet that may swing together."""
 
     @abstractmethod
     def _phase(self) -> tuple[float, str]:
-        """Return the number of what it does, for the log, and what numbers mean."""
+        """Return the number of the phase, for the log, and the numbers' meanings."""
 
     @abstractmethod
     def _step(self, t: float, measured: Measurement) -> None:
-        """Go on with the gait, and write the reference of the centre of mass."""
+        """Advance the gait, and write the reference of the centre of mass."""
 
     def log_channels(self) -> Mapping[str, LogChannel]:
         """Return the phase and the velocity."""
@@ -243,7 +244,7 @@ class RunningQuadruped(RunningPlan):
 
     @property
     def rests(self) -> bool:
-        """Whether it stands; see `RunningPlan.rests`."""
+        """Whether the robot stands; see `RunningPlan.rests`."""
         return self._mode == "standing"
 
     def update(self, measured: Measurement) -> None:
@@ -266,7 +267,7 @@ class RunningQuadruped(RunningPlan):
         self._last = t
 
     def _feel(self, measured: Measurement) -> None:
-        """Keep what has been sensed since the start."""
+        """Store which contacts have been sensed since the start."""
         for foot in self._feet:
             force = measured.normal_force(foot.frame, foot.normal)
             self._sensed[foot.name] |= force is not None and force > self._touch
@@ -284,7 +285,7 @@ class RunningQuadruped(RunningPlan):
     # -- the body ---------------------------------------------------------------------
 
     def _wanted(self, t: float) -> Velocity:
-        """Return the velocity that is wanted, as far as the legs reach."""
+        """Return the desired velocity, limited to the reach of the legs."""
         if self.stopping:
             return Velocity(0.0, 0.0, 0.0)
         wanted = self.gait.velocity_at(t)
@@ -293,7 +294,7 @@ class RunningQuadruped(RunningPlan):
         return wanted if excess <= 1.0 else Velocity(*(v / excess for v in wanted))
 
     def _accelerate(self, t: float) -> None:
-        """Bring the velocity nearer to the desired one, and turn with it."""
+        """Bring the velocity nearer to the desired one, and integrate the heading."""
         h = t - self._last
         most = self.gait.acceleration * h
         # A metre per second and a radian per second change equally fast.
@@ -305,7 +306,7 @@ class RunningQuadruped(RunningPlan):
         return axes.world(np.array([self._velocity.forward, self._velocity.left]))
 
     def _ground(self) -> float:
-        """Return the mean height of the feet where they stand, or stood last [m]."""
+        """Return the mean height of the feet at their present or last stance [m]."""
         return sum(foot.height for foot in self._feet) / len(self._feet)
 
     def _slope(self) -> Array:
@@ -318,7 +319,7 @@ class RunningQuadruped(RunningPlan):
     # -- a foot -----------------------------------------------------------------------
 
     def _lift_off(self, foot: PointFoot, t: float) -> None:
-        """Let a foot swing that stands no more, for the time being upwards."""
+        """Begin the swing of a foot, at first upwards."""
         foot.lift(t)
         here = self._state.position(foot.frame)
         foot.swing = foot.followed = Swing(
@@ -334,7 +335,7 @@ class RunningQuadruped(RunningPlan):
         )
 
     def _has_landed(self, foot: PointFoot, measured: Measurement) -> bool:
-        """Return whether a foot stands, perhaps since now."""
+        """Return whether a foot has landed, also in this period."""
         t, swing = measured.t, foot.swing
         if swing is None:
             return True

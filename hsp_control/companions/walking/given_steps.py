@@ -11,14 +11,13 @@ from hsp_control.companions.walking.step_planner import Next, StepPlanner
 
 REST = Velocity(0.0, 0.0, 0.0)
 _REACHED = 1e-6
-"""How far a step may be from where the legs reach [m]."""
+"""Tolerance of a step beyond the reach of the legs [m]."""
 
 
 class GivenSteps(StepPlanner):
-    """Plans the steps that a walk lists; it stands when they are done.
+    """Plans the listed steps of a walk; it stands when they are done.
 
-    They are given from where the robot stands at the start: from the middle between its
-    feet, x forward.
+    They are relative to the robot's start: to the middle between its feet, x forward.
     """
 
     def __init__(
@@ -48,7 +47,7 @@ class GivenSteps(StepPlanner):
             places[side], side = step, -side
 
     def sets_out(self, t: float, taken: int) -> bool:
-        """Return whether steps are left."""
+        """Return whether steps remain."""
         return taken < len(self._steps) and not self.stopping
 
     def first_side(self, t: float, taken: int) -> float:
@@ -63,10 +62,10 @@ class GivenSteps(StepPlanner):
         side: float,
         places: Mapping[float, Footstep],
     ) -> Next:
-        if self.stopping:  # the feet come beside each other
+        if self.stopping:  # the feet are placed beside each other
             return super()._next(velocity, t, taken, side, places)
         if taken >= len(self._steps):
             return Next(REST, None)
-        # A push may have moved the foot that stands.
+        # A push may have moved the stance foot.
         kept = self._stance.kept(places[-side], side, self._steps[taken])
         return Next(REST, kept)

@@ -1,25 +1,25 @@
 """The effect of legs on the centre of pressure, and how a plan compensates it.
 
-A leg that swings has an angular momentum L about the centre of mass. Where the trunk
-does not turn, the feet must push beside the repellent point p, at
+A swinging leg has an angular momentum L about the centre of mass. If the trunk does not
+turn, the centre of pressure is displaced from the repellent point p to
 
     p + (-L_y', L_x') / (m g)
 
 (Popovic, Goswami and Herr 2005, "Ground reference points in legged locomotion", Int. J.
-Robotics Research 24): by as much as a sole is long, for a long and fast step. A plan
-that keeps p in the middle of the sole leaves that to the sole, and where it ends to the
-arms. So here p moves the other way, by δ = K a with a the acceleration of the swing
-foot, and the centre of pressure stays in the middle. As ξ' = ω (ξ - p), the divergent
-component then is, beside where it is for p at rest,
+Robotics Research 24): by up to the length of a sole for a long and fast step. A plan
+that keeps p in the middle of the sole would need the whole sole for that, and beyond
+its edge the arms. So here p moves in the opposite direction, by δ = K a with a the
+acceleration of the swing foot, and the centre of pressure stays in the middle. As
+ξ' = ω (ξ - p), the divergent component then differs from that for p at rest by
 
     η(t) = ω ∫ exp(ω (t - τ)) δ(τ) dτ,   τ from t to touchdown,
 
-which is zero at touchdown: a foot that starts and ends at rest leaves nothing behind.
+which is zero at touchdown: a foot that starts and ends at rest has no net effect.
 
-The legs also turn as the centre of mass moves above feet that stand: with K_c of its
+The legs also rotate as the centre of mass moves above stance feet: with K_c of its
 acceleration, the centre of pressure is the p of a pendulum that is longer by g K_c.
 
-K and K_c are those of the law: from the accelerations by which its metric moves one
+K and K_c follow from the law: from the accelerations by which its metric moves one
 foot, or the centre of mass, while the other foot and the trunk stay.
 """
 
@@ -36,21 +36,21 @@ from hsp_control.law import MetricSample
 from hsp_control.robot import RobotState
 
 _FOOT, _BODY = slice(0, 3), slice(12, 15)
-"""Rows of the accelerations: those of the swinging foot, and of the centre of mass."""
+"""Rows of the accelerations: of the swing foot, and of the centre of mass."""
 _SINGULAR = 1e-6
-"""Directions whose share of the largest response is smaller are not moved."""
+"""Directions with a smaller share of the largest response are not moved."""
 _SAMPLES = 49
-"""Times of a swing at which its reaction is known; linear between them."""
+"""Number of samples of a swing's reaction; it is linear between them."""
 
 
 class Reaction(NamedTuple):
     """The reaction of a swing from some time until touchdown; zero after it.
 
     Attributes:
-        start: From when on [s].
+        start: Its start time [s].
         step: The time between two samples [s].
-        points: δ, how far the repellent point moves, shape (n, 2) [m].
-        shifts: η, how far the divergent component moves, shape (n, 2) [m].
+        points: δ, the displacement of the repellent point, shape (n, 2) [m].
+        shifts: η, the displacement of the divergent component, shape (n, 2) [m].
     """
 
     start: float
@@ -75,10 +75,10 @@ class Reaction(NamedTuple):
 
 
 def reaction_of(points: Array, start: float, step: float, frequency: float) -> Reaction:
-    """Return the reaction whose repellent point moves from point to point."""
+    """Return the reaction of a repellent point that moves through points."""
     decay = float(np.exp(-frequency * step))
     m = np.diff(points, axis=0) / (frequency * step)
-    # What each interval adds at its own beginning, exact for lines.
+    # Contribution of each interval at its beginning, exact for lines.
     own = points[:-1] + m - (points[1:] + m) * decay
     fades = decay ** np.arange(len(own))[:, None]
     later = np.cumsum((fades * own)[::-1], axis=0)[::-1] / fades
@@ -86,7 +86,7 @@ def reaction_of(points: Array, start: float, step: float, frequency: float) -> R
 
 
 class LegReaction:
-    """K of both legs: as they were when each began and ended its last swing."""
+    """K of both legs, at the beginning and at the end of the last swing of each."""
 
     def __init__(
         self, controller: Controller, trunk: str, frames: dict[float, str]
@@ -100,12 +100,12 @@ class LegReaction:
     def begin(
         self, state: RobotState, yaw: float, duration: float, frequency: float
     ) -> None:
-        """Take both legs as they are, before the first step."""
+        """Compute K of both legs before the first step."""
         self._frequency = frequency
         for side in self._frames:
             self.lifts(state, side, yaw)
             self.lands(state, side, yaw)
-        # A lead is linear in how far a foot goes and in how high it is lifted.
+        # A lead is linear in the length and in the height of a step.
         place, one = Footstep(1.0, 1.0, 0.0), np.eye(3)
         unit = Swing(0.0, duration, np.zeros(3), one, place, one, 0.0, 1.0)
         times, step = _times(0.0, duration)
@@ -115,15 +115,15 @@ class LegReaction:
         self._later = reaction_of(later, 0.0, step, frequency).shift(0.0)
 
     def lifts(self, state: RobotState, side: float, yaw: float) -> None:
-        """Take a leg as it is for where its swings begin."""
+        """Compute K of a leg at the beginning of its swing."""
         self._first[side] = self._gain(state, side, yaw)
 
     def lands(self, state: RobotState, side: float, yaw: float) -> None:
-        """Take a leg as it is for where its swings end; see `lifts`."""
+        """Compute K of a leg at the end of its swing; see `lifts`."""
         self._last[side] = self._gain(state, side, yaw)
 
     def lead(self, side: float, standing: Footstep, way: Array) -> Array:
-        """Return η where a planned swing begins, shape (2,) [m]."""
+        """Return η at the beginning of a planned swing, shape (2,) [m]."""
         turned = _turn(standing.yaw)
         local, first = way @ turned, self._first[side]
         own = first @ (self._share * local)
@@ -143,18 +143,18 @@ class LegReaction:
         return reaction_of(points, t, step, self._frequency)
 
     def pendulum(self, state: RobotState) -> float:
-        """Return how much longer than it is high the pendulum is, for the legs [m].
+        """Return the pendulum's length in excess of its height, due to the legs [m].
 
-        While both feet stand, the legs turn as the centre of mass moves: an angular
-        momentum of κ m g per velocity of it. The centre of pressure then is the p of
-        the pendulum c'' = ω² (c - p) with ω² = g / (z + κ g), as if it were longer.
+        While both feet stand, the legs rotate as the centre of mass moves, with an
+        angular momentum of κ m g times its velocity. The centre of pressure then is the
+        p of the longer pendulum c'' = ω² (c - p) with ω² = g / (z + κ g).
         """
         rate = self._rate(state, 1.0)[:, _BODY]
         gain = np.array([rate[1, 0], -rate[0, 1]]).mean() / state.centroidal.mass
         return float(max(gain, 0.0))
 
     def _gain(self, state: RobotState, side: float, yaw: float) -> Array:
-        """Return K in the axes of the standing foot, shape (2, 3) [s²]."""
+        """Return K in the axes of the stance foot, shape (2, 3) [s²]."""
         rate, turned = self._rate(state, side)[:, _FOOT], _turn(yaw)
         gain = np.array([rate[1], -rate[0]]) / (state.centroidal.mass * GRAVITY)
         return np.asarray(turned[:2, :2].T @ gain @ turned)

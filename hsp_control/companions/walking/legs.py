@@ -12,7 +12,7 @@ def root_frame(robot: Robot) -> str:
     for frame in robot.model.frames:
         if frame.parentJoint == 1 and frame.type == pin.FrameType.BODY:
             return str(frame.name)
-    raise PlanError(f"{robot.name} has no body at its root")
+    raise PlanError(f"{robot.name} has no link at its root")
 
 
 def leg_joints(robot: Robot, foot: str) -> list[int]:
@@ -23,12 +23,12 @@ def leg_joints(robot: Robot, foot: str) -> list[int]:
 
 
 def leg_freedoms(robot: Robot, foot: str) -> int:
-    """Return how many freedoms the joints from the root to a foot have."""
+    """Return the number of degrees of freedom from the root to a foot."""
     return sum(robot.model.joints[joint].nv for joint in leg_joints(robot, foot))
 
 
 def leg_length(robot: Robot, foot: str) -> float:
-    """Return how far a foot can be from the first joint of its leg [m].
+    """Return the maximum distance of a foot from the first joint of its leg [m].
 
     The sum of the distances from joint to joint: no leg reaches farther.
     """

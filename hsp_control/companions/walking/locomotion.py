@@ -1,4 +1,4 @@
-"""Plans of robots that move about: the velocity that is wanted of them."""
+"""Plans of locomotion: the desired velocity."""
 
 from dataclasses import KW_ONLY, replace
 from typing import Self
@@ -53,7 +53,7 @@ class MovingPlan(MotionPlan):
         return replace(self, velocity=velocity)
 
     def velocity_at(self, t: float) -> Velocity:
-        """Return the velocity that is wanted at time t [s]."""
+        """Return the desired velocity at time t [s]."""
         if self.velocity is None:
             return Velocity(self.speed, self.sideways, self.turn)
         return Velocity(*self.velocity.sample(t).position.tolist())

@@ -16,7 +16,7 @@ While p moves on a line from a to b during T, with m = (b - a) / (ω T),
 
 (Englsberger, Ott and Albu-Schäffer 2015, "Three-dimensional bipedal walking control
 based on divergent component of motion", IEEE Trans. Robotics 31). The exponential
-grows, so that a plan is computed backwards, from where the DCM is to come to rest.
+grows, so that a plan is computed backwards, from the final rest position of the DCM.
 """
 
 from collections.abc import Sequence
@@ -32,7 +32,7 @@ GRAVITY = 9.81
 
 
 _DURATIONS = 201
-"""How many durations of a phase are compared."""
+"""Number of durations of a phase that are compared."""
 
 
 class DcmPhase(NamedTuple):
@@ -42,8 +42,8 @@ class DcmPhase(NamedTuple):
         duration: T > 0 [s].
         start: a, where it begins, shape (2,) [m].
         end: b, where it ends, shape (2,) [m].
-        lead: How far ξ is beside that where the phase begins, because the point moves
-            beside the line, and is on it again at the end, shape (2,) [m].
+        lead: Offset of ξ at the start of the phase, because the point deviates from the
+        line, and is on it again at the end, shape (2,) [m].
     """
 
     duration: float
@@ -57,7 +57,7 @@ class DcmPhase(NamedTuple):
         return self.start + share * (self.end - self.start)
 
     def dcm(self, first: Array, t: float, frequency: float) -> Array:
-        """Return ξ(t), t [s] since the phase began, without what moves beside."""
+        """Return ξ(t), t [s] since the phase began, without the offset."""
         m = (self.end - self.start) / (frequency * self.duration)
         at = self.start + (t / self.duration) * (self.end - self.start)
         own = first - self.lead
@@ -91,10 +91,10 @@ def in_step(
     frequency: float,
     bounds: tuple[float, float],
 ) -> DcmPhase:
-    """Return a phase with the duration that fits where the DCM is when it begins.
+    """Return a phase with the duration that fits the DCM at its beginning.
 
-    A foot that lands early or late leaves the DCM beside its plan, but on its way: by
-    a duration that is as much longer or shorter the plan is in step again.
+    When a foot lands early or late, the DCM is ahead of or behind its plan, but on its
+    path: a duration that is longer or shorter by that time synchronises the plan.
     """
     T = np.linspace(*bounds, _DURATIONS)[:, None]
     m = (phase.end - phase.start) / (frequency * T)
@@ -106,7 +106,7 @@ def in_step(
 def error_after(
     error: float, t: float, frequency: float, gain: float, reach: float
 ) -> float:
-    """Return the error of the DCM after a time of feedback that the sole bounds.
+    """Return the error of the DCM after a time of feedback bounded by the sole.
 
     The repellent point is displaced by (1 + k/ω) ε, at most by r. So
 

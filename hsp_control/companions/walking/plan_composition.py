@@ -15,8 +15,8 @@ from hsp_control.tasks.frame_task import TrackingTask
 from hsp_control.trajectories import ComposedPose
 
 FRICTION = 0.35
-"""The friction coefficient of a contact that declares none: nobody knows the ground to
-which a robot comes [-]."""
+"""The friction coefficient of a contact that declares none: the ground ahead is unknown
+[-]."""
 
 
 def composed(
@@ -25,7 +25,7 @@ def composed(
     contacts: Sequence[Contact],
     feet: Collection[str],
 ) -> PlanParts:
-    """Return the parts of a controller whose references and contacts a plan feeds."""
+    """Return the parts of a controller whose references and contacts a plan sets."""
     given = {task.name: task for task in tasks}
     made, fed = [], []
     for needed in own:
@@ -48,7 +48,7 @@ def composed(
 
 
 def _followed(task: Task, needed: TrackingTask, swings: bool) -> Task:
-    """Return a task whose reference, and if it swings its presence, is the plan's."""
+    """Return a task whose reference, and for a swing its presence, the plan sets."""
     if type(task) is not type(needed):
         raise PlanError(
             f"it is a {task.yaml_type}; the plan needs a {needed.yaml_type} of this "

@@ -18,8 +18,8 @@ from hsp_control.trajectories.trajectory import Trajectory
 class Fed(Written, Trajectory):
     """x(t) in Rⁿ that a plan writes, once a control period.
 
-    From one writing to the next it is x + x' (t - t0) + ½ x'' (t - t0)², so that its
-    derivatives fit it. Before the first writing it rests where the robot starts.
+    Between two writes it is x + x' (t - t0) + ½ x'' (t - t0)², so that its derivatives
+    are consistent. Before the first it rests at the start of the robot.
     """
 
     size: PositiveCount
@@ -34,7 +34,7 @@ class Fed(Written, Trajectory):
 
     @property
     def relative(self) -> bool:
-        """Whether nothing was written, so that it depends on where the robot starts."""
+        """Whether nothing was written, so that it depends on the start of the robot."""
         return bool(np.isnan(self.memory[0]))
 
     def _unwritten(self) -> Array:
@@ -45,11 +45,12 @@ class Fed(Written, Trajectory):
     def anchored(self, start: ArrayLike | None) -> Self:
         """Return the reference itself, at rest where the robot starts."""
         if start is None:
-            raise TrajectoryError("a fed reference is missing: nothing starts here")
+            raise TrajectoryError("the reference of a plan needs a start")
         where = np.asarray(start, dtype=float)
         if where.shape != (self.size,):
             raise TrajectoryError(
-                f"the fed reference has {self.size} coordinates; needs {where.size}"
+                f"the reference of the plan has {self.size} coordinates; needs "
+                f"{where.size}"
             )
         if self.relative:
             self.write(0.0, where)
@@ -74,11 +75,11 @@ class Fed(Written, Trajectory):
 
 
 class FedOrientation(Written, OrientationTrajectory):
-    """R(t) that a plan writes; in between R turns about ω + ½ ω' (t - t0)."""
+    """R(t) that a plan writes; between two writes R rotates with ω + ½ ω' (t - t0)."""
 
     @property
     def relative(self) -> bool:
-        """Whether nothing was written, so that it depends on where the robot starts."""
+        """Whether nothing was written, so that it depends on the start of the robot."""
         return bool(np.isnan(self.memory[0]))
 
     def _unwritten(self) -> Array:

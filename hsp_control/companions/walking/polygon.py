@@ -1,4 +1,4 @@
-"""The convex hull of points of the ground: its nearest point, and ways out of it."""
+"""The convex hull of points of the ground: its nearest point, and paths out of it."""
 
 from collections.abc import Sequence
 
@@ -31,10 +31,10 @@ def nearest_inside(corners: Array, point: Array) -> Array:
 
 
 def last_inside(corners: Array, start: Array, end: Array) -> Array:
-    """Return the last point of a way that is in a convex polygon, shape (2,)."""
+    """Return the last point of a segment that is in a convex polygon, shape (2,)."""
     edges = np.roll(corners, -1, axis=0) - corners
     way, away = end - start, start - corners
-    # How far each edge is to the right of the start, and how fast the way goes there.
+    # Distance of each edge to the right of the start, and rate of approach to it.
     room = np.maximum(edges[:, 0] * away[:, 1] - edges[:, 1] * away[:, 0], 0.0)
     rate = edges[:, 1] * way[0] - edges[:, 0] * way[1]
     leaves = rate > room
@@ -49,7 +49,7 @@ def _chain(points: Sequence[tuple[float, ...]]) -> list[tuple[float, ...]]:
         while len(chain) > 1:
             a, b = chain[-2:]
             if (b[0] - a[0]) * (c[1] - a[1]) > (b[1] - a[1]) * (c[0] - a[0]):
-                break  # the way from a over b to c turns left
+                break  # the path a, b, c turns left
             chain.pop()
         chain.append(c)
     return chain

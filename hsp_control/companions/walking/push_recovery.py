@@ -1,8 +1,8 @@
 """The reaction of a biped to a push: another step, or none.
 
-What the sole of the standing foot cannot bring back moves the next step, in place and
-in time (`step_adjustment.py`). Across the standing foot no leg can step: a
-divergent component that is still within the soles is brought back where it is.
+An error that the sole of the stance foot cannot correct adjusts the next step, in place
+and in time (`step_adjustment.py`). No leg can step across the stance foot: a divergent
+component that is still within the soles is corrected without a step.
 """
 
 from functools import partial
@@ -26,7 +26,7 @@ from hsp_control.companions.walking.swing import Swing
 _DEADBAND = 0.005
 """Error of the divergent component at touchdown that needs no adjustment [m]."""
 _COMMITTED = 0.12
-"""A step is not adjusted so shortly before it lands [s]."""
+"""Time before touchdown in which a step is not adjusted [s]."""
 _SHORTEST = 0.55
 """The shortest swing that an adjustment may choose, in swings [-]."""
 _LONGEST = 1.25
@@ -34,18 +34,18 @@ _LONGEST = 1.25
 
 
 class PlannedSwing(NamedTuple):
-    """A swing as it was planned, and where the divergent component ξ is now.
+    """A planned swing, and the present divergent component ξ.
 
     Attributes:
         side: 1 if the left foot swings, -1 for the right one.
-        standing: The foot that stands.
-        swinging: The foot that swings.
-        target: Where it was to land.
+        standing: The stance foot.
+        swinging: The swing foot.
+        target: Its planned footstep.
         phase: The phase of the pendulum.
         first: ξ at its start, shape (2,) [m].
         since: The present time, from its start [s].
-        wanted: ξ as it was to be now, shape (2,) [m].
-        dcm: ξ as it is, shape (2,) [m].
+        wanted: The planned ξ at present, shape (2,) [m].
+        dcm: The present ξ, shape (2,) [m].
     """
 
     side: float
@@ -60,22 +60,22 @@ class PlannedSwing(NamedTuple):
 
 
 class PushRecovery:
-    """Decides from ξ whether and where a foot steps."""
+    """Decides from ξ whether and where to step."""
 
     def __init__(self, walk: BipedPlan, stance: Stance, frequency: float) -> None:
-        """Set the walk, how the feet stand, and ω [1/s]."""
+        """Set the walk, the stance, and ω [1/s]."""
         self._walk, self._stance, self._frequency = walk, stance, frequency
         self._shift = shift_gain(frequency, walk.double_support)
 
     def holds(self, plan: PlannedSwing, soles: Array) -> bool:
-        """Return whether soles hold a push that one sole and a step do not."""
+        """Return whether two soles withstand a push, and one with a step does not."""
         swing = self._walk.swing
         window = _SHORTEST * swing, _LONGEST * swing
         left = self._best_step(plan, swing, window).left
         return self._is_too_far(plan, left) and _is_within(soles, plan.dcm)
 
     def step(self, plan: PlannedSwing, swing: Swing, t: float) -> Adjustment | None:
-        """Return where and when a foot that swings is to land; None if as it does."""
+        """Return place and time at which a foot is to land; None if unchanged."""
         remaining = swing.end - t
         if remaining < _COMMITTED:
             return None
@@ -91,12 +91,12 @@ class PushRecovery:
         return self._best_step(plan, planned, (earliest, max(latest, earliest)))
 
     def is_better_put_down(self, plan: PlannedSwing, step: Adjustment) -> bool:
-        """Return whether the standing sole holds a push, but the step would not."""
+        """Return whether the stance sole withstands a push, but the step would not."""
         held = _is_within(plan.standing.corners(1.0), plan.dcm)
         return held and self._is_too_far(plan, step.left)
 
     def _is_too_far(self, plan: PlannedSwing, left: Array) -> bool:
-        """Return whether the sole of the next step cannot hold an error, (2,) [m]."""
+        """Return whether the next step's sole cannot correct an error, (2,) [m]."""
         standing = plan.standing.place
         reach = self._walk.margin * plan.swinging.reach
         return bool((np.abs(standing.local(standing.point + left)) > reach).any())
@@ -104,7 +104,7 @@ class PushRecovery:
     def _best_step(
         self, plan: PlannedSwing, planned: float, window: tuple[float, float]
     ) -> Adjustment:
-        """Return where and when the swing foot is to land."""
+        """Return the place and time at which the swing foot is to land."""
         standing = plan.standing.place
         return adjust(
             plan.target,
@@ -117,7 +117,7 @@ class PushRecovery:
         )
 
     def _dcm_after(self, plan: PlannedSwing, T: float) -> Array:
-        """Return what ξ will be, with feedback within the sole, shape (2,) [m]."""
+        """Return the future ξ, with feedback within the sole, shape (2,) [m]."""
         walk, frequency, place = self._walk, self._frequency, plan.standing.place
         error = place.local(place.point + plan.dcm - plan.wanted)
         left = [

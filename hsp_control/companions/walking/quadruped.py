@@ -1,4 +1,4 @@
-"""Quadrupeds that walk: the tasks that they need, and their four feet."""
+"""Quadrupedal walking: its tasks and its four feet."""
 
 from collections.abc import Sequence
 from dataclasses import KW_ONLY, replace
@@ -20,7 +20,7 @@ from hsp_control.tasks import CenterOfMass, FrameOrientation, FramePosition, Gai
 from hsp_control.tasks.frame_task import TrackingTask
 
 BANDWIDTH = 30.0
-"""α of the limits' barriers, unless it is given [1/s]. A knee that swings accelerates
+"""Default α of the limits' barriers [1/s]. A swinging knee accelerates
 by some 100 rad/s² with 1 rad left to its limit: with α = 10 1/s this is forbidden, and
 the robot falls."""
 STEEPEST = 0.7
@@ -28,15 +28,15 @@ STEEPEST = 0.7
 
 
 class QuadrupedPlan(MovingPlan):
-    """A plan of four feet that touch the ground in points.
+    """A plan of four point feet.
 
     It has the tasks ``trunk``, ``height`` and ``center_of_mass``, and one for each foot
     with the name of its contact.
 
     Attributes:
-        gait: What the robot does, for messages: it trots.
+        gait: The gait as a verb, for messages, such as ``trot``.
         center_priority: The level of the centre of mass: on two feet it cannot be kept
-            with all else.
+        together with all other tasks.
         center_gains: The gains of the centre of mass.
     """
 
@@ -46,7 +46,7 @@ class QuadrupedPlan(MovingPlan):
 
     _: KW_ONLY
     until: Positive | None = None
-    """When it slows down and stands [s]; by default it goes on until the end."""
+    """Time at which it slows down and stands [s]; by default it walks until the end."""
     feet: Names | None = None
     """Names of the four contacts that walk [-]; all of them by default."""
     trunk: str | None = None
@@ -56,9 +56,9 @@ class QuadrupedPlan(MovingPlan):
     stance: Positive = 0.05
     """Duration of the time on four feet between two swings [s]."""
     lift: Positive = 0.05
-    """How high a foot is lifted [m]."""
+    """Height to which a foot is lifted [m]."""
     acceleration: Positive = 0.5
-    """How fast the velocity changes [m/s²]."""
+    """Maximum rate of change of the velocity [m/s²]."""
     contact_force: Positive = 0.01
     """Normal force at which a swing foot has landed, in robot weights [-]."""
 
@@ -71,7 +71,7 @@ class QuadrupedPlan(MovingPlan):
             )
 
     def velocity_at(self, t: float) -> Velocity:
-        """Return the velocity that is wanted at time t [s]; zero at the end."""
+        """Return the desired velocity at time t [s]; zero at the end."""
         if self.until is not None and t >= self.until:
             return Velocity(0.0, 0.0, 0.0)
         return super().velocity_at(t)
@@ -116,7 +116,7 @@ class QuadrupedPlan(MovingPlan):
         return composed(own, tasks, contacts, names)
 
     def limits(self, limits: Limits | None) -> Limits | None:
-        """Return limits whose barriers let legs swing; see `MotionPlan.limits`."""
+        """Return limits whose barriers permit swings; see `MotionPlan.limits`."""
         if limits is None or limits.bandwidth is not None:
             return limits
         return replace(limits, bandwidth=BANDWIDTH)

@@ -58,7 +58,7 @@ def to_rest(
     """Return the quintic from a motion to rest at a target, C² at its start."""
     T = duration
     x, v, a = (np.asarray(each, dtype=float) for each in now)
-    # What is missing at the end in x, T x' and T² x''.
+    # Remaining differences at the end in x, T x' and T² x''.
     d = np.asarray(target, dtype=float) - (x + T * v + 0.5 * T * T * a)
     e, f = -T * (v + T * a), -T * T * a
     c3 = 10.0 * d - 4.0 * e + 0.5 * f

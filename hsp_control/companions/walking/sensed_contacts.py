@@ -38,10 +38,10 @@ from hsp_control.trajectories.schedule import Intervals, Schedule
 class SensedContact(Part, error=PlanError):
     """When a contact begins, and when it ends.
 
-    It begins when it is pressed with ``force``, or is at ``height``, or both if both
-    are given; then its force rises. It ends when it is pressed with less than
-    ``release`` for ``patience``, because the ground is gone, and fades as long again;
-    or when it is not wanted any more, and fades over ``ramp``.
+    It begins when its normal force reaches ``force``, or its frame ``height``, or both
+    if both are given; then its force rises. It ends when its normal force is below
+    ``release`` for ``patience``, because the ground is lost, and fades over the same
+    time; or at the end of an interval, and fades over ``ramp``.
     """
 
     yaml_key: ClassVar[str | None] = "name"
@@ -55,21 +55,21 @@ class SensedContact(Part, error=PlanError):
     """Normal force below which it has lost the ground [N]; a quarter of ``force`` by
     default."""
     patience: NonNegative = 0.02
-    """For how long the force must be below ``release`` [s]."""
+    """Time for which the force must be below ``release`` [s]."""
     ramp: Positive = 0.2
-    """How long its force takes to rise, and to fade [s]."""
+    """Time in which its force rises or fades [s]."""
     wanted: Intervals | None = None
     """Intervals in which it may be active: [start, end] [s], None for no start or no
     end; always by default."""
     starts: Flag = False
-    """Whether it is active at the start, before anything is measured [-]."""
+    """Whether it is active at the start, before the first measurement [-]."""
     task: str | None = None
-    """Name of a task that is active while it is not [-]: it moves its link."""
+    """Name of a task that is active while the contact is not [-]: it moves the link."""
     name: str = ""
     """Name of the contact [-]. In YAML, its key."""
 
     def __post_init__(self) -> None:
-        """Check that something is sensed, and that the intervals follow one another."""
+        """Check that a condition is given, and that the intervals are in order."""
         if self.force is None and self.height is None:
             raise PlanError("give force or height: what shows that it is active")
         if self.release is not None and self.force is None:
@@ -83,13 +83,13 @@ class SensedContact(Part, error=PlanError):
 
     @property
     def lets_go(self) -> float | None:
-        """Normal force below which it has lost the ground [N]; None: it never does."""
+        """Normal force below which it has lost the ground [N]; None: never."""
         if self.release is not None:
             return self.release
         return None if self.force is None else 0.25 * self.force
 
     def schedule(self) -> Schedule:
-        """Return when it may be active."""
+        """Return the schedule in which it may be active."""
         if self.wanted is None:
             return Schedule.always()
         return Schedule(self.wanted, ramp=0.0)
@@ -98,14 +98,14 @@ class SensedContact(Part, error=PlanError):
 class Sensed(MotionPlan, type="sensed"):
     """Contacts are switched by detection: measured or estimated forces, or height.
 
-    Everything else, tasks and their references, is as it is declared. A contact rises
+    Everything else, such as tasks and references, stays as declared. A contact rises
     and fades over its ramp, so that efforts stay continuous.
     """
 
     contacts: Annotated[
         dict[Name, SensedContact], Field(min_length=1), BY_NAME, READ_ONLY
     ]
-    """The contacts that are sensed, by name; others are as they are declared."""
+    """The sensed contacts, by name; others stay as declared."""
 
     def parts(
         self, robot: Robot, tasks: Sequence[Task], contacts: Sequence[Contact]
@@ -124,7 +124,7 @@ class Sensed(MotionPlan, type="sensed"):
                 if there[name].schedule is not None:
                     raise PlanError(
                         "the contact has a schedule, but the plan switches it; give "
-                        "only one, or the intervals as wanted"
+                        "only one of them"
                     )
                 if rule.task is None:
                     continue
@@ -138,7 +138,7 @@ class Sensed(MotionPlan, type="sensed"):
                     if known[rule.task].schedule is not None or rule.task in moves:
                         raise PlanError(
                             f"{rule.task!r} has a schedule, or moves two contacts; it "
-                            "is in force while the contact is not active"
+                            "must be active while the contact is not"
                         )
                 moves[rule.task] = rule
         return PlanParts(
@@ -162,7 +162,7 @@ class Sensed(MotionPlan, type="sensed"):
 
 
 class FeltContact(Switched):
-    """A contact in one run: whether it is active, and what is measured.
+    """A contact in one run: whether it is active, and its measurements.
 
     Attributes:
         name: Its name.
@@ -170,14 +170,14 @@ class FeltContact(Switched):
         force: The normal force that is measured [N]; NaN without one.
         height: The height of its frame along the normal [m].
         estimated: Whether the force is estimated.
-        events: How often it has begun or ended.
+        events: Number of times it has begun or ended.
     """
 
     def __init__(self, name: str, rule: SensedContact, controller: Controller) -> None:
         """Find its switches in a controller.
 
         Raises:
-            PlanError: If the controller is not made of the plan's parts.
+            PlanError: If the controller is not built from the plan's parts.
         """
         self.name, self._rule = name, rule
         contact = {each.name: each for each in controller.contacts}.get(name)
@@ -189,8 +189,8 @@ class FeltContact(Switched):
             or not (task is None or isinstance(task.schedule, Switch))
         ):
             raise PlanError(
-                f"the contact {name!r} does not follow the plan: make the controller "
-                "of the plan's parts"
+                f"the contact {name!r} does not follow the plan: build the controller "
+                "from the plan's parts"
             )
         self.frame: str = contact.frame
         self._normal: Array = contact.axes[:, 2]
@@ -202,19 +202,19 @@ class FeltContact(Switched):
         self.events = 0
 
     def start(self) -> None:
-        """Return to the start, before anything is measured."""
+        """Return to the start, before the first measurement."""
         self.reset()
-        self._pressed = -np.inf  # nothing was sensed yet
+        self._pressed = -np.inf  # nothing sensed yet
         self._leaving = False
         self.events = 0
 
     @property
     def active(self) -> bool:
-        """Whether it is switched on."""
+        """Whether the contact is switched on."""
         return self.contact.is_on
 
     def update(self, t: float, state: RobotState, measured: Measurement) -> None:
-        """Measure, and switch.
+        """Measure the contact, and switch it.
 
         Raises:
             PlanError: If a force is needed, and there is none.
@@ -269,7 +269,7 @@ class RunningSensed(RunningPlan):
         """Find the switches.
 
         Raises:
-            PlanError: If the controller is made of other parts.
+            PlanError: If the controller is built from other parts.
         """
         super().__init__(sensed)
         self._controller = controller
@@ -281,7 +281,7 @@ class RunningSensed(RunningPlan):
         self._begun = False
 
     def start(self, state: RobotState) -> None:
-        """Begin before anything is measured; see `RunningPlan.start`."""
+        """Begin before the first measurement; see `RunningPlan.start`."""
         for each in self._sensed:
             each.start()
         self._begun = True
@@ -295,7 +295,7 @@ class RunningSensed(RunningPlan):
             each.update(measured.t, state, measured)
 
     def log_channels(self) -> Mapping[str, LogChannel]:
-        """Return what is measured of each contact, and whether it is active."""
+        """Return the measurements of each contact, and whether it is active."""
         channels: dict[str, LogChannel] = {}
         for each in self._sensed:
             prefix = f"plan.{each.name}"

@@ -1,4 +1,4 @@
-"""The steps to come: places, phases, and when a walk stands again."""
+"""The next steps: places, phases, and the end of a walk."""
 
 from collections.abc import Callable, Mapping
 from math import hypot
@@ -16,23 +16,24 @@ from hsp_control.companions.walking.pendulum import DcmPhase
 from hsp_control.robot import RobotState
 
 PREVIEW = 4
-"""Steps that a plan looks ahead; what comes later has decayed to a thousandth."""
+"""Number of steps of a plan's preview; the effect of later ones has decayed to a
+thousandth."""
 LAST_SHIFT = 1.5
 """The last shift of the weight, in double supports [-]."""
 _NOT_BESIDE = 0.01
-"""How far feet may be from standing beside each other [m, rad]."""
+"""Tolerance of feet that stand beside each other [m, rad]."""
 _STRETCH = 0.9
 """Share of a leg's reach that a step uses [-]."""
 
 
 class Preview(NamedTuple):
-    """What is to come.
+    """The preview of a walk.
 
     Attributes:
         phases: The phases, from a shift of the weight until the robot stands.
-        swings: Which of them are swings.
+        swings: Whether each of them is a swing.
         velocity: That of the next step.
-        target: Where the next step goes; None if there is none.
+        target: The next footstep; None if there is none.
     """
 
     phases: list[DcmPhase]
@@ -46,7 +47,7 @@ class Next(NamedTuple):
 
     Attributes:
         velocity: The velocity of the body.
-        target: Where the foot goes; None if the robot is to stand.
+        target: The footstep; None if the robot is to stand.
     """
 
     velocity: Velocity
@@ -54,14 +55,14 @@ class Next(NamedTuple):
 
 
 class StepPlanner:
-    """Plans steps from the velocity that is wanted.
+    """Plans steps from the desired velocity.
 
     Attributes:
         stopping: Whether the robot is to stand as soon as it can.
     """
 
     def __init__(self, walk: BipedPlan, stance: Stance, robot: str) -> None:
-        """Set the walk, and how the feet stand."""
+        """Set the walk and the stance."""
         self._walk, self._stance = walk, stance
         self.stopping = False
         self.period = walk.swing + walk.double_support
@@ -74,7 +75,7 @@ class StepPlanner:
             )
 
     def wanted(self, t: float, taken: int) -> Velocity:
-        """Return the velocity that is wanted after some steps; none if they are all."""
+        """Return the desired velocity after some steps; zero after the last one."""
         steps = self._walk.steps
         if self.stopping or (steps is not None and taken >= steps):
             return Velocity(0.0, 0.0, 0.0)
@@ -91,7 +92,7 @@ class StepPlanner:
         point: Array,
         lead: Callable[[float, Mapping[float, Footstep], Footstep], Array],
     ) -> Preview:
-        """Return what is to come, from a phase on two feet on."""
+        """Return the preview from a phase on two feet on."""
         walk, places = self._walk, dict(places)
         phases, swings = list[DcmPhase](), list[bool]()
         first: Next | None = None
@@ -119,7 +120,7 @@ class StepPlanner:
         return Preview(phases, [*swings, False, False], *first)
 
     def sets_out(self, t: float, taken: int) -> bool:
-        """Return whether a robot that stands is to walk."""
+        """Return whether a standing robot is to walk."""
         return not self.wanted(t, taken).is_zero
 
     def first_side(self, t: float, taken: int) -> float:
@@ -150,7 +151,7 @@ class StepPlanner:
 
 
 def stance_of(feet: Mapping[float, Foot], state: RobotState, crouch: float) -> Stance:
-    """Return how the feet of a biped stand, and how far its legs reach."""
+    """Return the stance of a biped, and the reach of its legs."""
     left, right = feet[1.0], feet[-1.0]
     width = float(right.place.local(left.place.point)[1])
     soles = 0.5 * (left.sole_width + right.sole_width)
@@ -165,12 +166,12 @@ def stance_of(feet: Mapping[float, Foot], state: RobotState, crouch: float) -> S
         - (hip_height(state, each.frame) - crouch) ** 2
         for each in feet.values()
     ]
-    # Each leg reaches half of the step.
+    # Each leg contributes half of the step.
     longest = 2.0 * _STRETCH * float(np.sqrt(max(min(squares), 0.0)))
     return Stance(width, narrowest, max(3.0 * width, width + 0.1), longest)
 
 
 def _beside(place: Footstep, target: Footstep) -> bool:
-    """Return whether a foot stands where it is to stand."""
+    """Return whether a foot is at its place beside the other one."""
     away = hypot(place.x - target.x, place.y - target.y)
     return away < _NOT_BESIDE and abs(place.yaw - target.yaw) < _NOT_BESIDE

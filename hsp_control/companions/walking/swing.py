@@ -1,4 +1,4 @@
-"""A swing foot: from where it is to a place that may still change, and softly down."""
+"""The motion of a swing foot to a place that may change, with a soft touchdown."""
 
 import numpy as np
 
@@ -11,23 +11,24 @@ from hsp_control.trajectories.schedule import smooth_step
 APPROACH = 0.92
 """Share of the swing after which the foot is above its place, and only descends."""
 DESCENT = 3.6
-"""How fast a foot descends that has not touched the ground in time, in lifts per swing
-[-]: as fast as it was lifted. On two legs the body falls while it waits."""
+"""Speed at which a foot descends that has not touched the ground in time, in lifts per
+swing [-]: that of the lift. On two legs the body falls while it waits."""
 _SETTLING = 0.1
-"""How long it takes to reach that speed, in swings [-]."""
+"""Time in which it reaches that speed, in swings [-]."""
 _LEVEL = np.zeros(2)
 
 
 class Swing:
-    """The motion of a foot from take-off to touchdown; C² whatever is redirected.
+    """The motion of a foot from take-off to touchdown; C² also when redirected.
 
-    It begins at rest where the foot is, turns towards the flat ground, and is at rest
-    again above its place when it is to touch. If the ground is not there, it descends.
+    It begins at rest at the foot's place, rotates towards the flat ground, and is at
+    rest again above its target at the planned touchdown. Without ground there, it
+    descends.
 
     Attributes:
-        start: When it began [s].
-        end: When the foot is to touch the ground [s].
-        target: Where it is to stand.
+        start: Its start time [s].
+        end: The planned time of touchdown [s].
+        target: The footstep.
     """
 
     def __init__(
@@ -56,25 +57,25 @@ class Swing:
 
     @property
     def _there(self) -> Array:
-        """Where the foot is to stand, and that it has then turned: x, y, 1."""
+        """The final place, and the complete rotation: x, y, 1."""
         return np.array([self.target.x, self.target.y, 1.0])
 
     @property
     def _height(self) -> float:
-        """How high the foot is to stand there [m]."""
+        """The height of the foot there [m]."""
         return self._level + float(self._slope @ self.target.point)
 
     def _descending(self, now: FootMotion, t: float) -> Quintic:
         return to_rest(now, [self._height], t, max(self.end - t, 1e-3))
 
     def share(self, t: float) -> float:
-        """Return how much of the swing has passed at time t [s]."""
+        """Return the elapsed share of the swing at time t [s]."""
         return (t - self.start) / (self.end - self.start)
 
     def redirect(
         self, t: float, target: Footstep, end: float, *, rises: bool = True
     ) -> None:
-        """Go on to another place, of the same yaw, and touch at another time."""
+        """Redirect it to another place of the same yaw, and another touchdown time."""
         along, vertical = self._along.sample(t), self._vertical(t)
         self.target, self.end = target, end
         until = self.start + APPROACH * (end - self.start)
@@ -128,5 +129,5 @@ class Swing:
 
 
 def turned(yaw: float, rotation: Array) -> Array:
-    """Return an orientation that is turned about the vertical by an angle [rad]."""
+    """Return an orientation rotated about the vertical by an angle [rad]."""
     return exp3(np.array([0.0, 0.0, yaw])) @ rotation

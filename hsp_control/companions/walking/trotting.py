@@ -1,4 +1,4 @@
-"""A quadruped that trots, and its run from swing to swing."""
+"""The trot of a quadruped, and its run from swing to swing."""
 
 from collections.abc import Sequence
 from typing import ClassVar, Literal
@@ -17,24 +17,24 @@ from hsp_control.tasks import Gains
 READY = 0.2
 """Time on four feet before the first swing; the body waits for it [s]."""
 LEASH = 0.1
-"""How far the reference may be from the centre of mass [m]."""
+"""Maximum distance of the reference from the centre of mass [m]."""
 RETURN = 1.0
 """Rate at which it returns to its line [1/s]."""
 RETURN_SPEED = 0.1
-"""How fast it returns at most [m/s]."""
+"""Maximum speed of its return [m/s]."""
 CLOSING = 2
 """Swings without velocity before it stands, which bring the feet below the hips."""
 _COMMITTED = 0.05
-"""A step is not moved so shortly before it lands [s]."""
+"""Time before touchdown in which a step is not moved [s]."""
 
 
 class Trot(QuadrupedPlan, type="trot"):
-    """A quadruped trots: two diagonal feet swing while two stand.
+    """A trot of a quadruped: two diagonal feet swing while two stand.
 
-    It stands, trots with the given velocity, and stands again when that is zero. A
-    foot lands where the body will be, farther by what the body is too fast (the capture
-    point; Raibert 1986, Pratt et al. 2006). It starts from where it is and becomes a
-    contact when it touches the ground, early or late, higher or lower.
+    It stands, trots with the given velocity, and stands again when that is zero. A foot
+    lands at the future place of the body, shifted in proportion to its excess velocity
+    (the capture point; Raibert 1986, Pratt et al. 2006). It becomes a contact at
+    touchdown, early or late, higher or lower.
     """
 
     gait: ClassVar[str] = "trot"
@@ -76,7 +76,7 @@ class RunningTrot(RunningQuadruped):
     # -- from swing to swing ----------------------------------------------------------
 
     def _step(self, t: float, measured: Measurement) -> None:
-        """Go on; see `RunningQuadruped`."""
+        """Advance the gait; see `RunningQuadruped`."""
         acceleration = self._drive(t)
         self._go_on(measured)
         self._place(t)
@@ -98,7 +98,7 @@ class RunningTrot(RunningQuadruped):
             pulled = away * (1.0 - LEASH / far)
             self._reference = self._reference + pulled
             speed = float(np.hypot(*now))
-            if speed > 0.0:  # what it lost along its line, it does not make up for
+            if speed > 0.0:  # a delay along its line is not made up for
                 pulled = now * float(now @ pulled) / speed**2
             self._line = self._line + pulled
         return (now - before) / h
@@ -145,12 +145,12 @@ class RunningTrot(RunningQuadruped):
         return self._pairs[self._swings % 2]
 
     def _unload(self, t: float) -> None:
-        """Let the force of the next pair fade while all feet stand."""
+        """Fade the forces of the next pair while all feet stand."""
         for foot in self._pair:
             foot.unload(t, self.gait.stance)
 
     def _place(self, t: float) -> None:
-        """Let the feet that swing go to where the body will be."""
+        """Aim the swing feet at the future place of the body."""
         mass, trot = self._state.centroidal, self.gait
         velocity, wanted = mass.velocity[:2], self._reference_velocity()
         axes = Footstep(0.0, 0.0, self._yaw)

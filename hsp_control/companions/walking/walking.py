@@ -1,4 +1,4 @@
-"""A biped that walks, and its run from phase to phase."""
+"""The walk of a biped, and its run from phase to phase."""
 
 from collections.abc import Mapping
 from typing import Literal
@@ -41,33 +41,33 @@ from hsp_control.robot import RobotState
 FIRST_SHIFT = (0.4, 0.6)
 """Time to get ready, and time to shift the weight for the first step [s]."""
 LATE = 0.2
-"""How long a foot without ground under it is waited for [s]."""
+"""Maximum wait for a foot without ground under it [s]."""
 EARLY = 0.6
-"""Share of a swing before which no force is taken as touchdown."""
+"""Share of a swing before which no force is treated as touchdown."""
 LANDING = 0.5
-"""How long the force of a foot that lands takes to rise, in double supports [-]."""
+"""Time in which the force of a landed foot rises, in double supports [-]."""
 _SHIFTS = 0.5, 2.0
 """The shortest and the longest shift of the weight after a step, in those planned."""
 _HELD = 1.1
-"""Share of the soles that a walk uses that was held: what they do not reach themselves
-the law takes from the arms for a while [-]."""
+"""Share of the soles that an interrupted walk uses: for a while the law supplies the
+rest by motion of the arms [-]."""
 _CALM = 0.02
-"""Error of the divergent component with which a walk that was held goes on [m]."""
+"""Error of the divergent component below which an interrupted walk continues [m]."""
 
 _LEVEL = 0.01
-"""Change of the ground's height that is none: a sole sinks in [m]."""
+"""Change of the ground's height that is ignored: a sole sinks in [m]."""
 
 Mode = Literal["standing", "double", "single"]
 
 
 class Walk(BipedPlan, type="walk"):
-    """A biped walks on flat ground: a plan of the divergent component of motion.
+    """A walk of a biped on flat ground: a plan of the divergent component of motion.
 
     It stands, walks with the given velocity, and stands again when that is zero or the
     steps are done. The centre of mass follows the pendulum with feedback within the
-    sole (`pendulum.py`); a push that the sole cannot hold moves the next step,
-    in place and in time (`step_adjustment.py`). A swing foot starts from where it
-    is and becomes a contact when it touches the ground, early or late.
+    sole (`pendulum.py`); a push that the sole cannot withstand adjusts the next step,
+    in place and in time (`step_adjustment.py`). A swing foot becomes a contact at
+    touchdown, early or late.
 
     It has the tasks ``center_of_mass`` and ``trunk``, and one for each foot with the
     name of its contact.
@@ -82,9 +82,9 @@ class Walk(BipedPlan, type="walk"):
 class RunningWalk(RunningPlan):
     """A `Walk` in one run: phases, footsteps and feedback.
 
-    On two feet the repellent point moves from sole to sole while the force of the foot
-    that is to swing fades; on one foot it rests there. The references are those of the
-    pendulum from where the centre of mass is, so that an error of the divergent
+    On two feet the repellent point moves from sole to sole while the force of the next
+    swing foot fades; on one foot it rests there. The references are those of the
+    pendulum from the present centre of mass, so that an error of the divergent
     component decays as exp(-k t) while the repellent point stays within the soles.
     """
 
@@ -100,13 +100,13 @@ class RunningWalk(RunningPlan):
 
         Args:
             walk: The plan.
-            controller: A controller that is made of its parts.
+            controller: A controller built from its parts.
             feet: The names of the contacts that walk.
             body: The name of the task of the centre of mass.
             trunk: The name of the task of the trunk.
 
         Raises:
-            PlanError: If the controller is made of other parts.
+            PlanError: If the controller is built from other parts.
         """
         super().__init__(walk)
         self.walk = walk
@@ -116,14 +116,14 @@ class RunningWalk(RunningPlan):
         missing = [name for name in (body, trunk, *feet) if name not in tasks]
         if missing:
             raise PlanError(
-                f"the controller has no task {missing[0]!r}: make it of the plan's "
+                f"the controller has no task {missing[0]!r}: build it from the plan's "
                 "parts"
             )
         moved, turned_by = tasks[body].followed, tasks[trunk].followed
         if not (isinstance(moved, Fed) and isinstance(turned_by, FedOrientation)):
             raise PlanError(
-                f"the tasks {body!r} and {trunk!r} do not follow the plan: make the "
-                "controller of the plan's parts"
+                f"the tasks {body!r} and {trunk!r} do not follow the plan: build the "
+                "controller from the plan's parts"
             )
         self._body, self._trunk = moved, turned_by
         self._trunk_frame: str = tasks[trunk].frame  # type: ignore[attr-defined]
@@ -157,11 +157,11 @@ class RunningWalk(RunningPlan):
             "plan.phase": LogChannel(
                 phase, "-", "0 stands; 1 on two feet; 2 left, 3 right foot swings"
             ),
-            "plan.steps": LogChannel(float(self._taken), "-", "steps that were taken"),
+            "plan.steps": LogChannel(float(self._taken), "-", "steps completed"),
             "plan.dcm": LogChannel(self._dcm, "m", "divergent component of motion"),
-            "plan.dcm_reference": LogChannel(self._dcm_wanted, "m", "what is wanted"),
+            "plan.dcm_reference": LogChannel(self._dcm_wanted, "m", "desired"),
             "plan.repellent_point": LogChannel(
-                self._point, "m", "where the feet are to push, within the soles"
+                self._point, "m", "desired centre of pressure, within the soles"
             ),
             "plan.footstep": LogChannel(
                 np.array(self._target), "m and rad", "where the swing foot lands"
@@ -176,17 +176,17 @@ class RunningWalk(RunningPlan):
 
     @property
     def rests(self) -> bool:
-        """Whether it stands; see `RunningPlan.rests`."""
+        """Whether the robot stands; see `RunningPlan.rests`."""
         return self._mode == "standing"
 
     # -- the start --------------------------------------------------------------------
 
     def start(self, state: RobotState) -> None:
-        """Stand where the robot is; see `RunningPlan.start`."""
+        """Stand at the robot's present pose; see `RunningPlan.start`."""
         t, walk = state.t, self.walk
         trunk = state.frame(self._trunk_frame).rotation
         feet = list(self._feet.values())
-        # It walks where its feet point; the left one is on the left of that.
+        # It walks in the direction of its feet; the left one is on the left.
         ahead = state.frame(feet[0].frame).rotation[:, 0]
         away = state.position(feet[0].frame) - state.position(feet[1].frame)
         if ahead[0] * away[1] < ahead[1] * away[0]:
@@ -241,7 +241,7 @@ class RunningWalk(RunningPlan):
     # -- from phase to phase ----------------------------------------------------------
 
     def _go_on(self, measured: Measurement) -> None:
-        """Begin the next phase where one ends."""
+        """Begin the next phase when one ends."""
         t = measured.t
         while self._index + 1 < len(self._times) and t >= self._times[self._index + 1]:
             if self._swings[self._index]:
@@ -257,7 +257,7 @@ class RunningWalk(RunningPlan):
             if self._has_landed(measured):
                 self._land(t)
         elif self._mode == "standing":
-            # A walk that was held waits until it is calm.
+            # An interrupted walk waits until its error is small.
             error = np.abs(self._dcm - self._dcm_wanted).max() if self._held else 0.0
             if error < _CALM and self._planner.sets_out(t, self._taken):
                 self._set_out(t)
@@ -271,7 +271,7 @@ class RunningWalk(RunningPlan):
 
     def _set_out(self, t: float) -> None:
         """Shift the weight for the first step."""
-        if not self._held:  # else it goes on with the foot that was to swing
+        if not self._held:  # otherwise it continues with the foot that was to swing
             self._side = self._planner.first_side(t, self._taken)
         self._held = False
         ready, shift = FIRST_SHIFT
@@ -281,7 +281,7 @@ class RunningWalk(RunningPlan):
         self._feet[self._side].unload(t + ready, shift)
 
     def _hold(self, t: float) -> None:
-        """Keep both feet on the ground, and bring the mass back between them."""
+        """Keep both feet on the ground, and move the mass back between them."""
         foot = self._feet[self._side]
         foot.set_down(t, LANDING * self.walk.double_support)
         self._now, self._held = Velocity(0.0, 0.0, 0.0), True
@@ -289,7 +289,7 @@ class RunningWalk(RunningPlan):
         self._hull = self._soles(_HELD)
 
     def _put_down(self, t: float) -> None:
-        """Stand on one foot, and put the other one down where it is."""
+        """Stand on one foot, and put the other one down at its present place."""
         assert self._swing is not None
         foot, standing = self._feet[self._side], self._feet[-self._side]
         self._now, self._held = Velocity(0.0, 0.0, 0.0), True
@@ -304,7 +304,7 @@ class RunningWalk(RunningPlan):
         self._hull = standing.corners(_HELD)
 
     def _lift_off(self, t: float) -> None:
-        """Let the foot swing that stands no more."""
+        """Begin the swing of the unloaded foot."""
         foot, walk = self._feet[self._side], self.walk
         foot.lift(t)
         self._mode = "single"
@@ -327,7 +327,7 @@ class RunningWalk(RunningPlan):
         self._react(t)
         yaw = between(self._feet[-self._side].place, self._target).yaw
         self._yaw = to_rest(self._yaw.sample(t), [yaw], t, walk.swing)
-        # The plan begins anew, because a phase ends at a control period.
+        # Plan again, because a phase ends at a control period.
         self._times[self._index :] += t - self._times[self._index]
 
     def _has_landed(self, measured: Measurement) -> bool:
@@ -341,7 +341,7 @@ class RunningWalk(RunningPlan):
         return self._swing.share(t) > EARLY and force > self._touch
 
     def _land(self, t: float) -> None:
-        """Set the foot down, and plan what follows from where it stands."""
+        """Set the foot down, and plan the rest from its actual place."""
         foot, walk = self._feet[self._side], self.walk
         foot.set_down(t, LANDING * walk.double_support)
         foot.stand(self._state)
@@ -354,13 +354,13 @@ class RunningWalk(RunningPlan):
             return
         self._taken += 1
         self._side = -self._side
-        # From where the feet push now: a push has moved that within the sole.
+        # From the present centre of pressure, which a push has moved within the sole.
         self._plan(t, [], walk.double_support, self._point)
         if any(self._swings):
             self._feet[self._side].unload(t, self._phases[0].duration)
 
     def _follow_ground(self, t: float, ground: float) -> None:
-        """Walk as high above the ground as before."""
+        """Keep the height above the ground."""
         if abs(ground - self._ground) > _LEVEL:
             self._ground, height = ground, ground + self._above
             self._sinking = to_rest(
@@ -370,13 +370,13 @@ class RunningWalk(RunningPlan):
     def _plan(
         self, t: float, before: list[DcmPhase], shift: float, point: Array
     ) -> None:
-        """Plan the steps to come, from a phase on two feet on, until it stands.
+        """Plan the next steps, from a phase on two feet on, until it stands.
 
         Args:
             t: The present time [s].
             before: Phases before that.
-            shift: How long the weight takes to shift to the standing foot [s].
-            point: Where the repellent point is, shape (2,) [m].
+            shift: Time in which the weight shifts to the stance foot [s].
+            point: The repellent point, shape (2,) [m].
         """
         preview = self._planner.look_ahead(
             t,
@@ -403,7 +403,7 @@ class RunningWalk(RunningPlan):
     def _lead(
         self, side: float, places: Mapping[float, Footstep], target: Footstep
     ) -> Array:
-        """Return what the swing of a step adds to ξ where it begins, shape (2,) [m]."""
+        """Return the contribution of a step's swing to ξ at its start, (2,) [m]."""
         way = np.append(target.point - places[side].point, self.walk.lift)
         return self._legs.lead(side, places[-side], way)
 
@@ -426,7 +426,7 @@ class RunningWalk(RunningPlan):
     # -- feedback ---------------------------------------------------------------------
 
     def _adjust(self, t: float) -> None:
-        """Move the step, in place and in time, if the sole cannot hold a push."""
+        """Adjust the step, in place and time, if the sole cannot withstand a push."""
         assert self._swing is not None
         if self._held:
             return
@@ -442,7 +442,7 @@ class RunningWalk(RunningPlan):
         self._react(t)
 
     def _planned_swing(self, since: float) -> PlannedSwing:
-        """Return the swing of this phase, a time after it was to begin [s]."""
+        """Return the swing of this phase, a time after its planned beginning [s]."""
         phase, first = self._phases[self._index], self._dcm_starts[self._index]
         return PlannedSwing(
             self._side,
@@ -467,10 +467,10 @@ class RunningWalk(RunningPlan):
         wanted, point = wanted + self._beside, phase.point(since)
         displaced = (1.0 + gain / frequency) * (self._dcm - wanted)
         self._dcm_wanted = wanted
-        if self._mode == "single":  # along and across the sole, each for itself
+        if self._mode == "single":  # along and across the sole separately
             self._point = nearest_inside(self._hull, point + displaced)
             repels = self._point + self._reaction.point(t)
-        else:  # the error goes straight to zero, wherever it is in the hull
+        else:  # the error goes straight to zero, anywhere in the hull
             self._point = repels = last_inside(self._hull, point, point + displaced)
         height, yaw = self._sinking.sample(t), self._yaw.sample(t)
         acceleration = frequency**2 * (position[:2] - repels)
@@ -492,10 +492,10 @@ class RunningWalk(RunningPlan):
 
     @property
     def _beside(self) -> Array:
-        """How far a leg that swings leads ξ from that of its phase, shape (2,) [m]."""
+        """Offset of ξ from that of its phase by a swinging leg, shape (2,) [m]."""
         if self._mode == "single":
             return self._reaction.shift(self._state.t)
-        if self._swings[self._index]:  # it is to swing
+        if self._swings[self._index]:  # it swings next
             return self._phases[self._index].lead
         return np.zeros(2)
 
@@ -506,7 +506,7 @@ class RunningWalk(RunningPlan):
 
     @property
     def _places(self) -> dict[float, Footstep]:
-        """Where the feet stand, by side."""
+        """The footsteps of both feet, by side."""
         return {side: foot.place for side, foot in self._feet.items()}
 
     def _middle(self) -> Array:

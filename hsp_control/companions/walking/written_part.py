@@ -7,11 +7,11 @@ from hsp_control.declaration.nested import Remembering
 
 
 class Written(Remembering):
-    """A part whose memory is one array, which somebody writes while the robot moves."""
+    """A part whose memory is one array, which a plan writes while the robot moves."""
 
     @property
     def memory(self) -> Array:
-        """What was written last."""
+        """The last written values."""
         if "_memory" not in vars(self):
             vars(self)["_memory"] = self._unwritten()
         memory: Array = vars(self)["_memory"]

@@ -110,8 +110,8 @@ class SlidingContact(Contact, type="sliding"):
         if self.force.dimension == WRENCH:
             with within("force"):
                 raise ContactError(
-                    "it has 6 coordinates; a sliding contact takes 1 (it slides) or 3 "
-                    "(it carries what it presses on)"
+                    "it has 6 coordinates; a sliding contact needs 1 (it slides) or "
+                    "3 (it moves what it presses on)"
                 )
 
     @property

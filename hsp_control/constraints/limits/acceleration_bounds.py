@@ -7,7 +7,7 @@ from hsp_control.common.arrays import Array
 BEYOND_POSITION = 1e-3
 """Tolerance beyond the end of a joint's range [rad or m]."""
 BEYOND_SPEED = 0.02
-"""Tolerance beyond a speed limit, as a part of it: more than the noise of a measured
+"""Tolerance beyond a speed limit, relative to it: more than the noise of a measured
 velocity."""
 
 
@@ -18,7 +18,7 @@ class MotionLimits(NamedTuple):
     upper: Array  # upper position limit, shape (nv,) [rad or m]
     velocity: Array  # maximum speed, shape (nv,) [rad/s or m/s]
     acceleration: Array  # maximum acceleration, shape (nv,) [rad/s² or m/s²]
-    # how fast the acceleration may change: the effort's rate over the joint's largest
+    # maximum rate of the acceleration: the effort's rate over the joint's largest
     # inertia, shape (nv,) [rad/s³ or m/s³]
     jerk: Array
     bandwidth: Array  # α of the barriers, shape (1,) [1/s]
@@ -33,7 +33,7 @@ class Ends(NamedTuple):
 
     @classmethod
     def of(cls, lower: Array, upper: Array, velocity: Array) -> "Ends":
-        """Return those of the limits themselves, shape (nv,) each."""
+        """Return the ends of the limits themselves, shape (nv,) each."""
         return cls(
             lower - BEYOND_POSITION,
             upper + BEYOND_POSITION,

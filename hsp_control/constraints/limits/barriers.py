@@ -16,7 +16,7 @@ from hsp_control.common.arrays import Array, Indices
 from hsp_control.common.exceptions import LimitError
 from hsp_control.declaration import Part
 from hsp_control.declaration.quantities import Names, NonNegative, Number
-from hsp_control.engine.plans import OnlyIf, PartCall, PartCalls, says
+from hsp_control.engine.plans import OnlyIf, PartCall, PartCalls, implemented_by
 from hsp_control.geometry.scene import Start
 from hsp_control.null_space.fields import Clearance, ObstacleClearance, SelfClearance
 from hsp_control.null_space.fields.clearance import ObstacleOrName
@@ -26,22 +26,22 @@ from hsp_control.robot.gravity import Gravity
 
 _SPAN = 3e-3
 """Step of the differences of a barrier's values [s]. The curvature of a capsule jumps
-where its side ends, and so would efforts: this far ahead and behind makes a ramp of it,
-at an error of a hundredth of a m/s² at 2 m/s, 0.1 m away."""
+at the end of its side, and so would efforts: differences over this time turn the jump
+into a ramp, with an error of a hundredth of a m/s² at 2 m/s, 0.1 m away."""
 _TURN = 1e-4
 """Displacement of joints for the effect of an acceleration on distances [rad]."""
 _AHEAD = 0.5
 """A pair gets a row if its distance may come close to the minimum within this time [s]
 at its present rate."""
 _NEAR = 0.5
-"""A motor gets one if gravity uses more than this part of its permitted share, now or
+"""A motor has a row if gravity uses more than this part of its permitted share, now or
 within the time `_AHEAD` at the present rate."""
 
 
 class BarrierRows(NamedTuple):
-    """Rows A a ≥ least, which calls of the engine write."""
+    """Rows A a ≥ least, written by calls of the engine."""
 
-    number: Indices  # how many of the first are used, shape (1,)
+    number: Indices  # number of leading rows that are used, shape (1,)
     A: Array  # shape (r, nv)
     least: Array  # shape (r,)
 
@@ -52,7 +52,7 @@ class BarrierRows(NamedTuple):
 
     @property
     def used(self) -> tuple[Array, Array]:
-        """A and least of the rows that are used."""
+        """A and least of the used rows."""
         number = self.number.item()
         return self.A[:number], self.least[:number]
 
@@ -75,9 +75,9 @@ class Barrier(Part, ABC, family="barriers", error=LimitError):
                 return state.position(self.frame)[2]
 
     It may override `gradients`, which uses differences by default. h depends on q and t
-    only. Its unit should be one in which it is about as large as a distance in metres:
-    where limits contradict each other, their violations are compared. `rows` and
-    `check_start` are for placed ones.
+    only. Its unit should make it comparable with a distance in metres: if limits
+    contradict each other, their violations are compared. `rows` and `check_start` are
+    for placed ones.
     """
 
     _: KW_ONLY
@@ -93,7 +93,7 @@ class Barrier(Part, ABC, family="barriers", error=LimitError):
         return gradient(self._numbers, state)
 
     def placed(self, start: Start) -> Self:
-        """Return the barrier with values for what is relative to the start, checked.
+        """Return the barrier with values relative to the start resolved, checked.
 
         Raises:
             LimitError: If h is not one or more finite numbers, or ∇h has another shape.
@@ -121,24 +121,24 @@ class Barrier(Part, ABC, family="barriers", error=LimitError):
         return self.gradients(state.read_only), least
 
     def room(self, state: RobotState) -> int:
-        """Return how many rows `row_calls` may write; 0: `rows` has to be called."""
+        """Return the maximum number of rows of `row_calls`; 0: `rows` is used."""
         return 0
 
     def row_calls(
         self, state: RobotState, bandwidth: float, wanted: Array, rows: BarrierRows
     ) -> PartCalls:
-        """Return the calls that add to ``rows`` what `rows` returns; see `room`.
+        """Return the calls that add the results of `rows` to ``rows``; see `room`.
 
         Args:
             state: The state.
             bandwidth: α [1/s].
             wanted: The array of the unconstrained acceleration, shape (nv,).
-            rows: What is added to.
+            rows: The rows to extend.
         """
         raise NotImplementedError
 
     def check_start(self, state: RobotState) -> None:
-        """Check that none starts below the minimum."""
+        """Check that no value starts below the minimum."""
         least = self._numbers(state).min()
         if least < self.minimum:
             raise LimitError(
@@ -184,7 +184,7 @@ class MinimumDistance(Barrier):
     @property
     @abstractmethod
     def clearance(self) -> Clearance:
-        """The field that knows the pairs of shapes."""
+        """The field with the pairs of shapes."""
 
     def values(self, state: RobotState) -> Array:
         """Return the distances, shape (k,) [m]; the next call overwrites them."""
@@ -201,7 +201,7 @@ class MinimumDistance(Barrier):
     def room(self, state: RobotState) -> int:
         """Return the number of pairs; see `Barrier.room`."""
         ways = "row_calls", "rows", "values", "gradients", "_numbers"
-        own = says(self, *ways) == "row_calls"
+        own = implemented_by(self, *ways) == "row_calls"
         return len(self.clearance.proximity(state).pairs) if own else 0
 
     def rows(
@@ -220,9 +220,9 @@ class MinimumDistance(Barrier):
     ) -> PartCalls:
         """Return the calls that add rows of pairs close or approaching.
 
-        Others have one as soon as the unconstrained acceleration uses half of what b
-        permits: an effort with a limited rate could not follow a row that is violated
-        where it appears.
+        Others have one as soon as the unconstrained acceleration uses half of the value
+        that b permits: an effort with a limited rate could not follow a row that is
+        violated when it appears.
         """
         robot, turning = state.robot, {"turn": _TURN, "size": state.robot.size}
         here = self.clearance.proximity(state)
@@ -336,7 +336,7 @@ class ObstacleDistance(MinimumDistance, type="obstacle_distance"):
 
     @cached_property
     def clearance(self) -> ObstacleClearance:
-        """The field that knows the pairs of shapes."""
+        """The field with the pairs of shapes."""
         return ObstacleClearance(obstacles=self.obstacles, links=self.links)
 
     def placed(self, start: Start) -> Self:
@@ -353,13 +353,13 @@ class SelfDistance(MinimumDistance, type="self_distance"):
 
     @cached_property
     def clearance(self) -> SelfClearance:
-        """The field that knows the pairs of shapes."""
+        """The field with the pairs of shapes."""
         return SelfClearance()
 
 
 @dataclass(frozen=True, eq=False)
 class StaticEffort:
-    """Gravity uses at most a part of every motor's effort.
+    """Gravity uses at most a share of every motor's effort.
 
     Otherwise an arm reaches postures in which its motors cannot hold it, and falls. A
     motor's gravity effort, G_i(q), depends on the posture only, so this is a limit on
@@ -368,14 +368,14 @@ class StaticEffort:
 
     Attributes:
         effort: Maximum effort, shape (nv,) [N·m or N]; inf where unlimited.
-        share: The part of it that gravity may take, in (0, 1].
+        share: The share of it that gravity may use, in (0, 1].
     """
 
     effort: Array
     share: float
 
     def room(self) -> int:
-        """Return how many rows `row_calls` may write."""
+        """Return the maximum number of rows of `row_calls`."""
         return int(np.isfinite(self.effort).sum())
 
     def row_calls(
@@ -392,7 +392,7 @@ class StaticEffort:
             bandwidth: α [1/s].
             excluded: Indices in v of motors whose effort depends on contact forces:
                 those from the root to a contact.
-            rows: What is added to.
+            rows: The rows to extend.
         """
         gravity = Gravity(state.robot.model, state.dynamics, state.world)
         held = np.isfinite(self.effort)

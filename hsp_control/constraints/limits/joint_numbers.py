@@ -61,7 +61,7 @@ def by_dof(
     none: float = np.inf,
     error: type[HspControlError] = LimitError,
 ) -> Array:
-    """Return one number or nv as an array (nv,); ``none`` is what None stands for."""
+    """Return one number or nv as an array (nv,); ``none`` replaces None."""
     array = np.array(numbers, dtype=float)  # None becomes NaN
     array[np.isnan(array)] = none
     if array.ndim and array.shape != (nv,):
@@ -141,7 +141,7 @@ class ByJoint(Part, error=LimitError):
 
 
 def none_for_nothing(value: Any) -> Any:
-    """Return "none" for None: both say that there is no limit."""
+    """Return "none" for None: both mean no limit."""
     return "none" if value is None else value
 
 
@@ -175,7 +175,7 @@ def own_maximum(own: Array, robot: Robot) -> Array:
 def own_speeds(robot: Robot) -> Array:
     """Return a URDF's largest speeds (nv,), inf where it has none.
 
-    A joint without one gets the largest of the others of its unit: otherwise it would
+    A joint without one has the largest of the others of its unit: otherwise it would
     compensate for their limits at any speed.
     """
     speeds = own_maximum(robot.model.velocityLimit, robot)

@@ -101,13 +101,14 @@ class RobotLimits:
 
 
 _FAR = 2.0
-"""An angle this many times its joint's range from the middle is no angle in rad."""
+"""Distance from the middle of a joint's range, in ranges, beyond which an angle is not
+in rad."""
 _NEAR = 1.0
-"""Nearer than this it is not degrees, however small the range [rad]."""
+"""Minimum distance of an angle in degrees from the middle of the range [rad]."""
 
 
 def in_degrees(unit: str, lower: float, upper: float, position: float) -> bool:
-    """Return whether a joint's position is so far from its range that it is degrees.
+    """Return whether a joint's position is far enough from its range to be in degrees.
 
     Continuous and sliding joints are not checked.
     """
@@ -118,7 +119,7 @@ def in_degrees(unit: str, lower: float, upper: float, position: float) -> bool:
 
 
 BANDWIDTH = 10.0
-"""α of the barriers where nothing else is given [1/s]."""
+"""Default α of the barriers [1/s]."""
 
 _HELD = 0.95
 """Part of a motor's effort that gravity may use by default: the rest brakes the arm."""
@@ -155,13 +156,13 @@ class Limits(Part, error=LimitError):
     number or nv."""
     effort_rate: Maximum = "robot"
     """Maximum rate of the effort [N·m/s or N/s]: the robot's own, none, a factor,
-    numbers by joint, one number or nv. No URDF has it: the robot's own is 11 times the
-    largest of its maximum efforts each second: for a Panda 957 N·m/s, so no effort
-    changes by more than 0.96 N·m in a millisecond. With a floating base, whose contacts
-    change, it is 500 times."""
+    numbers by joint, one number or nv. URDFs do not contain it: the robot's own is 11
+    times the largest of its maximum efforts per second: for a Panda 957 N·m/s, or 0.96
+    N·m per millisecond. With a floating base, whose contacts change, it is 500
+    times."""
     velocity: Maximum = "robot"
     """Maximum speed [rad/s or m/s]: the robot's own, none, a factor, numbers by joint,
-    one number or nv. A joint without an own one has the largest of the others."""
+    one number or nv. A joint without one has the largest of the others."""
     acceleration: Positives | None = None
     """Maximum acceleration [rad/s² or m/s²], one number or nv. Unlimited by default."""
     position: Annotated[
@@ -177,18 +178,18 @@ class Limits(Part, error=LimitError):
     velocity_margin: Share = 0.02
     """Margin inside the speed limits, as a fraction of the limit [-]."""
     barriers: Annotated[Sequence[Barrier], AfterValidator(tuple)] = ()
-    """Minimum distances, and other functions of the posture that have a minimum [-]."""
+    """Minimum distances, and other functions of the posture with a minimum [-]."""
     bandwidth: Positive | None = None
     """Bandwidth α of the barriers [1/s]: 10 by default, or as a plan requires. Motors
-    can follow 5 to 20: faster barriers act so late that they need more than the effort
-    rate permits. A joint at rest may accelerate by α² times its distance from the
-    limit."""
+    can follow 5 to 20: faster barriers act so late that they exceed the effort rate. A
+    joint at rest may accelerate by α² times its distance from the limit."""
     static_effort: Annotated[
         Literal["robot", "none"] | Fraction | None, BeforeValidator(none_for_nothing)
     ] = "robot"
-    """Fraction of the effort limit that gravity may use [-], so that an arm stays where
-    its motors can hold it; for motors that carry no contact. By default 0.95 for an arm
-    on which gravity may exceed a motor's effort; none where the base floats."""
+    """Fraction of the effort limit that gravity may use [-], so that an arm stays in
+    postures in which its motors can hold it; for motors without contact forces. By
+    default 0.95 for an arm on which gravity may exceed a motor's effort; none where the
+    base floats."""
 
     def placed(self, start: Start) -> RobotLimits:
         """Return the limits in numbers, for one robot and one scene."""
@@ -274,6 +275,6 @@ LimitsOrNone = Annotated[
 
 
 def own_limits(robot: Robot) -> RobotLimits:
-    """Return the limits that the robot's URDF has, in numbers."""
+    """Return the limits of the robot's URDF, in numbers."""
     state = robot.state(0.0, robot.home(), np.zeros(robot.nv))
     return Limits().placed(Start(state, Scene()))

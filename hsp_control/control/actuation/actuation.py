@@ -40,7 +40,7 @@ from hsp_control.robot import RobotState
 
 
 class LimitsOutcome(NamedTuple):
-    """What a check of the limits found: the engine writes 0 or 1, shape (1,) each."""
+    """Results of a check of the limits: the engine writes 0 or 1, shape (1,) each."""
 
     motion: Indices
     """Whether a bound on the accelerations is violated."""
@@ -60,7 +60,7 @@ class LimitsOutcome(NamedTuple):
 
 
 class Delivered(NamedTuple):
-    """What is delivered of a law within the limits; the next step overwrites it."""
+    """The delivered part of a law within the limits; the next step overwrites it."""
 
     effort: Array  # shape (nv,) [N·m or N], zero where there is no motor
     acceleration: Array  # shape (nv,) [rad/s² or m/s²]
@@ -70,7 +70,7 @@ class Delivered(NamedTuple):
 
 
 class DeliveredAlone(NamedTuple):
-    """What is delivered where no Python looks: see `Actuation.calls_alone`."""
+    """The delivered part of a step without Python: see `Actuation.calls_alone`."""
 
     a: Array  # acceleration, shape (nv,)
     tau: Array  # effort, shape (nv,) [N·m or N]
@@ -90,7 +90,7 @@ class Actuation:
     def __init__(
         self, state: RobotState, law: BoundLaw, support: Support, limits: LimitSet
     ) -> None:
-        """Bind what every step calls, also where a limit binds."""
+        """Bind the calls of every step, also with an active limit."""
         nv = state.robot.nv
         self._state, self._law = state, law
         self._support, self._limits = support, limits
@@ -213,7 +213,7 @@ class Actuation:
         return self._state.plan(calls).steps()
 
     def calls_alone(self, delivered: "DeliveredAlone") -> PartCalls:
-        """Return the calls that follow `calls` where no Python looks at a step.
+        """Return the calls that follow `calls` in a step without Python.
 
         They do what `delivered` does.
 
@@ -399,7 +399,7 @@ class Actuation:
         return found
 
     def _nearest(self, a: Array, redistribute: bool, barriers: Barriers) -> Delivered:
-        """Return the nearest to what the law wants within the limits."""
+        """Return the nearest to the law's command within the limits."""
         count = sum(len(least) for _, least in barriers.values())
         if self._qp is None or count > self._qp.capacity:
             self._qp = self._limited_step(count)

@@ -1,4 +1,4 @@
-"""Steps within limits: the nearest to what the law wants, or the least violation.
+"""Steps within limits: the nearest to the law's command, or the least violation.
 
 The unknowns of the QP are x = (δ, g): δ the deviation from the law's acceleration, and
 g the contact forces in robot weights. The rows, in this order:
@@ -72,7 +72,7 @@ forces unique, and is small beside the cost of any deviation."""
 
 
 class QPOutcome(NamedTuple):
-    """What became of a QP: the engine writes it, shape (1,) each."""
+    """The outcome of a QP, written by the engine, shape (1,) each."""
 
     unsolved: Indices
     """1 where there is no result: none was requested, the constraints contradict each
@@ -87,7 +87,7 @@ class QPOutcome(NamedTuple):
 
 
 class Wanted(NamedTuple):
-    """What the law wants."""
+    """The law's command."""
 
     mass_matrix: Array  # M, shape (nv, nv)
     acceleration: Array  # a, shape (nv,)
@@ -107,7 +107,7 @@ class Forces(NamedTuple):
 
 
 class Places(NamedTuple):
-    """Where the rows are."""
+    """The places of the rows."""
 
     # degrees of freedom of the first rows: those without a motor, then those with a
     # limit on their effort
@@ -398,7 +398,7 @@ class LimitedStep:
     def solve(
         self, redistribute: bool, barriers: Barriers
     ) -> tuple[Status | None, float]:
-        """Write the nearest to what the law wants to `result`."""
+        """Write the nearest to the law's command to `result`."""
         if barriers or self._used:
             self._write_barriers(barriers, self._wanted.acceleration)
         (self._find_forces if redistribute else self._find_nearest)()

@@ -1,4 +1,4 @@
-"""What is remembered of the efforts sent: the last one, and what holding them did."""
+"""Memory of the sent efforts: the last one, and the effects of holding them."""
 
 from dataclasses import dataclass
 from typing import NamedTuple
@@ -12,7 +12,7 @@ from hsp_control.robot import RobotState
 
 
 class Held(NamedTuple):
-    """What was seen of the efforts that were held, as calls read it."""
+    """Observed effects of held efforts, as calls read them."""
 
     # when the period ends, NaN once that was looked at, and its length [s]
     timing: Array
@@ -32,7 +32,7 @@ class Held(NamedTuple):
 
 @dataclass
 class SentMemory:
-    """What is remembered of the efforts sent; calls read and write the arrays."""
+    """Memory of the sent efforts; calls read and write the arrays."""
 
     # the last effort, and how long it is held [s], inf: not known; shape (nv + 1,)
     last: Array

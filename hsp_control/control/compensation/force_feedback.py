@@ -1,4 +1,4 @@
-"""Integral feedback of contact forces: what is commanded is what is measured."""
+"""Integral feedback of contact forces: measured forces follow their commands."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import KW_ONLY

@@ -1,4 +1,4 @@
-"""Derivatives that somebody has written are compared with a difference, once.
+"""Derivatives of user code are compared with a difference, once.
 
 The law needs them: with a wrong one e_N does not decay, or the error does not obey its
 equation, and nothing else shows it. So where a run begins, and where a change brings

@@ -15,7 +15,7 @@ from hsp_control.common.exceptions import FieldError, SceneError
 from hsp_control.common.suggestions import did_you_mean, listing
 from hsp_control.declaration import within
 from hsp_control.declaration.quantities import Name, Names, OrInstance, Positive
-from hsp_control.engine.plans import PartCall, PartCalls, says
+from hsp_control.engine.plans import PartCall, PartCalls, implemented_by
 from hsp_control.geometry import LinkShape, Proximity, Proxy, link_shapes, self_pairs
 from hsp_control.geometry.scene import Obstacle, Start
 from hsp_control.law import FieldSample, MetricSample
@@ -70,7 +70,7 @@ class Clearance(Cost):
         return fitted
 
     def fitted(self, start: Start) -> Self:
-        """Return what `placed` returns, also if the robot starts in contact."""
+        """Return the result of `placed`, also if the robot starts in contact."""
         return self
 
     def proximity(self, state: RobotState) -> Proximity:
@@ -88,7 +88,11 @@ class Clearance(Cost):
         work = self._work(state)
         closed_form, coal = work.proximity.closed_form, work.proximity.coal
         ways = "own_calls", "differentiate", "gradient_rate", "gradient"
-        if closed_form is None or coal is not None or says(self, *ways) != "own_calls":
+        if (
+            closed_form is None
+            or coal is not None
+            or implemented_by(self, *ways) != "own_calls"
+        ):
             return super().own_calls(state, metric, form, out)
         return [
             *closed_form.calls(state),
@@ -176,7 +180,7 @@ class _Work(NamedTuple):
 
 
 ObstacleOrName = Annotated[str | Obstacle, OrInstance(Name, Obstacle)]
-"""The name of an obstacle of the scene; in Python also the obstacle itself."""
+"""The name of an obstacle of the scene, or in Python the obstacle itself."""
 
 
 class ObstacleClearance(Clearance, type="obstacle_clearance"):
@@ -280,7 +284,7 @@ _found: "WeakKeyDictionary[Robot, dict[Proxy, _Pairs]]" = WeakKeyDictionary()
 
 
 def _apart_at_home(robot: Robot, proxy: Proxy) -> _Pairs:
-    """Return the pairs of link shapes that do not overlap at home; found once."""
+    """Return the pairs of link shapes that do not overlap at home; cached."""
     known = _found.setdefault(robot, {})
     if proxy not in known:
         shapes = link_shapes(robot, proxy)

@@ -10,7 +10,7 @@ from hsp_control import engine
 from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import FieldError
 from hsp_control.declaration.imported import AS_TEXT, NAMED
-from hsp_control.engine.plans import PartCall, PartCalls, says
+from hsp_control.engine.plans import PartCall, PartCalls, implemented_by
 from hsp_control.law import FieldSample, MetricSample
 from hsp_control.null_space.fields.field import NullSpaceField
 from hsp_control.robot import RobotState
@@ -23,7 +23,7 @@ class Cost(NullSpaceField):
     """g = -W⁻¹∇f: the gradient descent of a cost f(q, t), of any sign.
 
     While the end effector is at rest, q converges to a local minimum of f under the
-    constraint of the task, with any metric (Proposition 3).
+    task's constraint, in any metric (Proposition 3).
 
     A subclass declares its parameters as fields and implements `value`::
 
@@ -42,9 +42,9 @@ class Cost(NullSpaceField):
 
     * `gradient` returns ∇f in the tangent space, shape (nv,).
     * `gradient_rate` returns (∇f)' = ∇²f v + ∂∇f/∂t, shape (nv,).
-    * `differentiate` writes both, where one computation gives both.
+    * `differentiate` writes both, if one computation gives both.
 
-    Or it implements `call` alone, which gives f and both derivatives at once.
+    Or it implements `call` alone, which computes f and both derivatives at once.
 
     f and ∇f depend on q and t only, not on v. The unit of f is chosen such that
     -W⁻¹∇f is in rad/s and m/s.
@@ -59,12 +59,12 @@ class Cost(NullSpaceField):
         raise TypeError(f"{type(self).__name__} implements neither call nor value")
 
     def derivatives(self, state: RobotState, gradient: Array, rate: Array) -> PartCalls:
-        """Return the calls that write ∇f and (∇f)' with `call`, and give f."""
+        """Return the calls that write ∇f and (∇f)' with `call`, and return f."""
         return [self.call(state).given(gradient=gradient, rate=rate)]
 
     def _has_kernel(self, *ways: str) -> bool:
         """Return whether no subclass overrides any of these methods in plain Python."""
-        return says(self, "call", "derivatives", *ways, "value") in _BY_KERNEL
+        return implemented_by(self, "call", "derivatives", *ways, "value") in _BY_KERNEL
 
     def value(self, state: RobotState) -> float:
         """Return f(q, t), which must not depend on v."""
@@ -126,14 +126,14 @@ class Cost(NullSpaceField):
         return out
 
     def _differentiated(self, state: RobotState, gradient: Array, rate: Array) -> None:
-        by_both = says(self, "differentiate", "gradient", "gradient_rate")
+        by_both = implemented_by(self, "differentiate", "gradient", "gradient_rate")
         known = self.differentiate if by_both == "differentiate" else self._by_each
         known(state, gradient, rate)
         if not np.isfinite(gradient.sum() + rate.sum()):
             self._raise_not_finite(state)
 
     def _raise_not_finite(self, state: RobotState) -> NoReturn:
-        self.value(state)  # may say what is wrong
+        self.value(state)  # may raise a more precise error
         raise FieldError(
             f"cost {self.name!r} has the gradient {self.gradient(state)!r} and the "
             f"gradient rate {self.gradient_rate(state)!r} at t = {state.t:.6g} s; "
@@ -147,7 +147,7 @@ class Cost(NullSpaceField):
         return np.array(both[which])
 
     def _derived(self, state: RobotState) -> tuple[Array, Callable[[], Any]]:
-        """Return ∇f and (∇f)', (2, nv), and what writes them and gives f."""
+        """Return ∇f and (∇f)', (2, nv), and the call that writes them and returns f."""
 
         def make() -> tuple[Array, PartCalls]:
             both = np.zeros((2, state.robot.nv))
@@ -174,7 +174,7 @@ class FunctionCost(Cost, type="function_cost"):
     """f = function(state): a cost given as a Python function.
 
     YAML gives the function's name, and ``hsp run --import FILE.py`` runs the file that
-    has it. A subclass of `Cost` has parameters of its own.
+    contains it. A subclass of `Cost` can have parameters.
     """
 
     function: Annotated[Callable[[RobotState], float], NAMED, AS_TEXT]

@@ -15,7 +15,7 @@ from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import FieldError
 from hsp_control.declaration import Part, within
 from hsp_control.declaration.quantities import NonNegative, OrInstance
-from hsp_control.engine.plans import AnyCall, PartCall, PartCalls, says
+from hsp_control.engine.plans import AnyCall, PartCall, PartCalls, implemented_by
 from hsp_control.geometry.scene import Start
 from hsp_control.law import FieldSample, MetricSample
 from hsp_control.null_space.fields.weight import (
@@ -29,7 +29,7 @@ from hsp_control.robot import RobotState
 
 
 class NullSpaceField(Part, ABC, family="fields", error=FieldError):
-    """g(q, t): a desired joint velocity, of which the null space keeps P g.
+    """g(q, t): a desired joint velocity, whose projection P g the null space follows.
 
     The null-space velocity converges exponentially to P g (Proposition 2). g is in the
     tangent space, shape (nv,) [rad/s, m/s]. Fields can be added and scaled:
@@ -43,8 +43,8 @@ class NullSpaceField(Part, ABC, family="fields", error=FieldError):
     * `value` returns one number to plot.
 
     It may override `placed` if it refers to the start, to obstacles or to frames, and
-    `minimum_distance` if it measures distances. A field has no memory: the buffers of a
-    computation are kept by the state (see `RobotState.cached`).
+    `minimum_distance` if it measures distances. A field has no memory: the state stores
+    the buffers of a computation (see `RobotState.cached`).
 
     All methods are about the field without its weight. The sum applies the weight.
 
@@ -106,7 +106,7 @@ class NullSpaceField(Part, ABC, family="fields", error=FieldError):
             form: The metric's form, see `Metric`.
             out: The sample that every step writes.
         """
-        if says(self, "own_calls", "evaluate") == "own_calls":
+        if implemented_by(self, "own_calls", "evaluate") == "own_calls":
             return self.own_calls(state, metric, form, out)
         if self.zero:
             self.evaluate(state.read_only, metric, form, out)
@@ -119,7 +119,7 @@ class NullSpaceField(Part, ABC, family="fields", error=FieldError):
     def own_calls(
         self, state: RobotState, metric: MetricSample, form: int, out: FieldSample
     ) -> PartCalls:
-        """Return the calls of a field that is the engine's; else see `evaluate`."""
+        """Return the calls of a field of the engine; otherwise see `evaluate`."""
         raise TypeError(f"{type(self).__name__} implements no evaluate")
 
     def evaluate(

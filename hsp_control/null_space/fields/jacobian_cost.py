@@ -54,7 +54,7 @@ class JacobianCost(Cost):
 
     @property
     def rows(self) -> Rows:
-        """Which rows of the Jacobian are used."""
+        """The rows of the Jacobian that are used."""
         return "position"
 
     @property
@@ -109,7 +109,7 @@ class JacobianCost(Cost):
         return PartCall(write)
 
     def value(self, state: RobotState) -> float:
-        """Return f, which the calls before the last one give."""
+        """Return f, the result of the calls before the last one."""
 
         def make() -> tuple[None, PartCalls]:
             return None, self.derivatives(state, *np.zeros((2, state.robot.nv)))[:-1]
@@ -117,7 +117,7 @@ class JacobianCost(Cost):
         return float(state.prepared(self, "value", make)[1]())
 
     def derivatives(self, state: RobotState, gradient: Array, rate: Array) -> PartCalls:
-        """Return the calls that write ∇f and (∇f)'; the last but one gives f."""
+        """Return the calls that write ∇f and (∇f)'; the last but one returns f."""
         frame, nv = state.frame(self._frame(state.robot)), state.robot.nv
         dofs, first = _chain(state.robot, self._frame(state.robot))
         selected = self._selected()
@@ -146,7 +146,7 @@ class JacobianCost(Cost):
 def _chain(robot: Robot, frame: str) -> tuple[Indices, Indices]:
     """Return the degrees of freedom that move a frame, from the root on, shape (k,).
 
-    And, of the same shape, where among them the joint of each begins.
+    And, of the same shape, the index among them at which the joint of each begins.
     """
     model = robot.model
     dofs: list[int] = []

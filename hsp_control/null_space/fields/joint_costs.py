@@ -44,8 +44,9 @@ class JointCentering(LimitedJointsCost, type="joint_centering"):
 
     Joints without limits, continuous joints and a floating root are ignored. After
     Liégeois (1977), equation (11), scaled such that (q_i - m_i)/r_i is ±1 at a limit.
-    Half a range of less than 1 rad or 1 m is replaced by that: else a finger that opens
-    by 4 cm would be drawn back at 2500 1/s, faster than any control period can follow.
+    Half a range of less than 1 rad or 1 m is replaced by that: otherwise a finger with
+    a range of 4 cm would be pulled back at 2500 1/s, faster than any control period can
+    follow.
     """
 
     def call(self, state: RobotState) -> PartCall:
@@ -100,7 +101,7 @@ class TargetPosture(Cost, type="target_posture"):
     """w_i of the joints [1/s], one number or nv."""
     displacement: Trajectory | None = None
     """Motion of the target: nv numbers that are added to it [rad or m]; none by
-    default. A stream moves it only in a change of the running controller."""
+    default. A stream can move it only in a change of the running controller."""
 
     def placed(self, start: Start) -> Self:
         """Return the cost with its posture as a configuration, checked."""
@@ -181,8 +182,8 @@ class LimitBarrier(LimitedJointsCost, type="limit_barrier"):
     """f = Σ w_i (b((q_i - lower_i)/u_i) + b((upper_i - q_i)/u_i)).
 
     u_i is ``zone`` times half the range, and b(s) = -(1 - s)² ln s below 1, 0 beyond: a
-    joint adds to f only within the distance u_i of a limit. Joints without limits,
-    continuous joints and a floating root are ignored.
+    joint contributes to f only within the distance u_i of a limit. Joints without
+    limits, continuous joints and a floating root are ignored.
     """
 
     zone: Fraction = 0.3

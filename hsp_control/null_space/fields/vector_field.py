@@ -109,9 +109,9 @@ class Rest(NullSpaceField, type="rest"):
 class Uncontrolled(Rest, type="uncontrolled"):
     """φ_N = 0: self-motion is not controlled. The paper's first simulation.
 
-    Only for demonstration. The task is tracked, but nothing damps the self-motion, and
-    the joints drift away while the task error shows nothing. It has no weight, and
-    cannot be added to other fields.
+    Only for demonstration. The task is tracked, but the self-motion is undamped, and
+    the joints drift away without any task error. It has no weight, and cannot be added
+    to other fields.
     """
 
     controls: ClassVar[bool] = False

@@ -99,7 +99,7 @@ class StateWeight(Weight):
 
 
 class SetWeight(Weight):
-    """w and w' that are written elsewhere, while the field is computed."""
+    """w and w' that are written elsewhere at run time."""
 
     numbers: InstanceOf[np.ndarray]
     """w [-] and w' [1/s], shape (2,), read in each step."""

@@ -21,7 +21,7 @@ from hsp_control.declaration.quantities import (
     numbers,
     read_only,
 )
-from hsp_control.engine.plans import PartCall, PartCalls, says
+from hsp_control.engine.plans import PartCall, PartCalls, implemented_by
 from hsp_control.geometry.scene import Start
 from hsp_control.law import CONSTANT, IDENTITY, VARYING, MetricSample
 from hsp_control.robot import RobotState
@@ -37,11 +37,11 @@ class Metric(Part, ABC, family="metrics", error=MetricError):
     A subclass declares its parameters as fields (see `Part`), sets `form` to CONSTANT
     or VARYING and implements `evaluate`, or `call`, which makes a step faster; if W
     is constant, derive from `FixedMetric` instead. It may override `placed`. A metric
-    has no memory: the buffers of a computation are kept by the state (see
+    has no memory: the state stores the buffers of a computation (see
     `RobotState.cached`).
 
     Attributes:
-        form: IDENTITY, CONSTANT or VARYING, by which the law skips terms that are zero.
+        form: IDENTITY, CONSTANT or VARYING; the law skips terms that are zero.
     """
 
     form: ClassVar[int]
@@ -70,7 +70,7 @@ class Metric(Part, ABC, family="metrics", error=MetricError):
         if self.form != VARYING:
             self.evaluate(state.read_only, out)
             return []
-        if says(self, "call", "evaluate") == "call":
+        if implemented_by(self, "call", "evaluate") == "call":
             return [self.call(state).given(out=out)]
         return [PartCall(self.evaluate, state=state.read_only, out=out)]
 
@@ -98,9 +98,9 @@ class MassMatrixMetric(Metric, type="mass_matrix"):
 
     _: KW_ONLY
     inertia: Positive | Literal["robot"] = 1.0
-    """m [kg·m²]: J# and the projector are the same whatever it is; joints of this
-    inertia descend a cost as fast as with the identity, lighter ones faster. ``robot``:
-    the geometric mean of its joints'."""
+    """m [kg·m²]: J# and the projector do not depend on it; joints of this inertia
+    descend a cost as fast as with the identity, lighter ones faster. ``robot``: the
+    geometric mean of its joints' inertias."""
 
     form: ClassVar[int] = VARYING
 
@@ -234,8 +234,7 @@ class CoordinatesMetric(FixedMetric, type="coordinates"):
     """
 
     matrix: Matrix | None = None
-    """A, invertible, shape (nv, nv) [-]; as the robot's source defines it by
-    default."""
+    """A, invertible, shape (nv, nv) [-]; by default that of the robot's source."""
 
     def __post_init__(self) -> None:
         """Check the matrix."""

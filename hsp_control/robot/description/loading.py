@@ -117,9 +117,9 @@ def guarded(model: pin.Model) -> pin.Model:
 
 def _refuse_joint(*_: object, **__: object) -> None:
     raise ModelError(
-        "a robot's model gets no more joints, as all that was made for it would not "
-        "fit: model = robot.model.copy(), model.addJoint(...), "
-        "Robot.from_pinocchio(model)"
+        "joints cannot be added to the model of a robot, whose arrays have their "
+        "sizes already; add them to a copy: model = robot.model.copy(), "
+        "model.addJoint(...), Robot.from_pinocchio(model)"
     )
 
 

@@ -183,7 +183,7 @@ def _bound_by_followers(
             yield (
                 f"joint {each.name!r}: its position limits allow its leader "
                 f"{each.leader!r} to be from {low:g} to {high:g}, whose own are "
-                f"{lower:g} to {upper:g}: they do not count"
+                f"{lower:g} to {upper:g}: the follower's limits are ignored"
             )
         # power: m v_l is the follower's speed, and its effort is m times the leader's
         for name, scale in (("velocity", 1.0 / ratio), ("effort", ratio)):

@@ -106,7 +106,7 @@ def model_of(data: Mapping[str, Any]) -> pin.Model:
     try:
         return _model_of(data)
     except (KeyError, TypeError, ValueError, IndexError, OverflowError) as error:
-        raise ModelError(f"the recorded model is none: {error!r}") from None
+        raise ModelError(f"the recorded model is invalid: {error!r}") from None
 
 
 def _model_of(data: Mapping[str, Any]) -> pin.Model:
@@ -207,7 +207,7 @@ def shapes_of(data: Sequence[Mapping[str, Any]]) -> tuple[BodyShape, ...]:
     try:
         return tuple(map(_shape_of, data))
     except (KeyError, TypeError, ValueError, IndexError) as error:
-        raise ModelError(f"the recorded shapes are none: {error!r}") from None
+        raise ModelError(f"the recorded shapes are invalid: {error!r}") from None
 
 
 def _shape_of(data: Mapping[str, Any]) -> BodyShape:
@@ -219,7 +219,7 @@ def _shape_of(data: Mapping[str, Any]) -> BodyShape:
         if not np.isfinite(vertices).all():
             raise ValueError("a mesh contains NaN or inf")
         if corners.size and not 0 <= corners.min() <= corners.max() < len(vertices):
-            raise ValueError("a mesh names a vertex that it has not")
+            raise ValueError("a mesh refers to a vertex that does not exist")
         mesh = vertices, corners
     red, green, blue, opacity = map(float, data["color"])
     return BodyShape(

@@ -1,4 +1,4 @@
-"""A stream without Python: what a program sends to a frozen controller."""
+"""A stream without Python: the targets that a program sends to a frozen controller."""
 
 from math import ceil
 from typing import Any
@@ -19,13 +19,13 @@ from hsp_control.trajectories.trajectory import TrajectorySample
 
 
 class StreamAlone:
-    """What a `Planner` does with targets and velocities that are sent now, as calls.
+    """A `Planner` for targets and velocities that are sent now, as calls.
 
     Attributes:
-        target: What is sent next, the start at first: linear coordinates, then perhaps
-            a quaternion (x, y, z, w).
-        velocity: The velocity that is sent next, linear, then angular.
-        call: What takes them, of the kind StreamAlone.
+        target: The next target to send, initially the start: linear coordinates, then
+        perhaps a quaternion (x, y, z, w).
+        velocity: The next velocity to send, linear, then angular.
+        call: The call that receives them, of the kind StreamAlone.
     """
 
     def __init__(
@@ -36,7 +36,7 @@ class StreamAlone:
         start: State,
         period: float,
     ) -> None:
-        """Begin at rest; ``period``: time between two messages, at least [s]."""
+        """Begin at rest; ``period``: minimum time between two messages [s]."""
         n, linear = chart.size, chart.linear
         self._chart = chart
         self._state = vars(State.allocate(n))
@@ -75,12 +75,12 @@ class StreamAlone:
         self.call = engine.StreamAlone(**self._arguments)
 
     def forget(self) -> None:
-        """Begin anew."""
+        """Restart."""
         for name, array in self._memory.items():
             array[:] = self._first[name]
 
     def calls(self, out: Any) -> PartCalls:
-        """Return the calls that write a sample, of whatever the stream moves."""
+        """Return the calls that write a sample of the stream's kind."""
         calls = [PartCall(engine.StreamAlone, t=TIME, **self._arguments)]
         n = self._chart.linear
         parts = out if isinstance(out, PoseSample) else (out,)
@@ -100,9 +100,9 @@ _POLICIES = "latest", "interpolate", "extrapolate"
 
 
 def _most_waypoints(policy: Policy, period: float) -> int:
-    """Return how many waypoints there can be that matter, one each period."""
+    """Return the maximum number of relevant waypoints, one each period."""
     if policy.name == "latest":
         return 1
     passed = max(min(policy.smoothing, KEPT) / period, 3.0)
     found = min(passed, CONSIDERED) + policy.delay / period
-    return min(ceil(1.1 * found) + 2, MOST)  # periods are not exactly alike
+    return min(ceil(1.1 * found) + 2, MOST)  # periods are not exactly equal

@@ -1,4 +1,4 @@
-"""Local coordinates of what a stream moves: linear ones, and a rotation vector.
+"""Local coordinates of a stream: linear ones, and a rotation vector.
 
 About an orientation R_b, R = R_b exp(y). With y = 0 where a chart begins, y' is the
 angular velocity and y'' the angular acceleration in R_b's axes, exactly; so a motion
@@ -23,7 +23,7 @@ class State:
     """x, x' and x'' in local coordinates, in order: linear, then a rotation vector."""
 
     def __init__(self, x: Array, rate: Array, acceleration: Array, base: Array) -> None:
-        """Keep the arrays."""
+        """Store the arrays."""
         self.x, self.rate, self.acceleration = x, rate, acceleration
         self.base = base
 

@@ -1,4 +1,4 @@
-"""The references that streams are in a run: of points, orientations and poses."""
+"""Streams as references in a run: of points, orientations and poses."""
 
 from copy import deepcopy
 from typing import Any, Self
@@ -15,13 +15,13 @@ from hsp_control.trajectories.trajectory import Trajectory, TrajectorySample
 
 
 class FollowedStream(Remembering):
-    """A stream in a run, as a placed task follows it: it reads what the run plans."""
+    """A stream in a run, as a placed task follows it: it reads the run's plan."""
 
     run: StreamRun
     """Its messages, and its reference [-]."""
 
     def __deepcopy__(self, memo: dict[int, Any]) -> Self:
-        """Return one with a copy of the run, which goes on by itself."""
+        """Return one with a copy of the run, which continues independently."""
         return type(self)(deepcopy(self.run, memo))
 
     def calls(self, out: Any) -> PartCalls:

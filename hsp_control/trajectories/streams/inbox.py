@@ -1,4 +1,4 @@
-"""A queue of messages: those that somebody sends, or recorded ones; who takes them."""
+"""A queue of messages, sent or recorded ones, and its readers."""
 
 import logging
 import re
@@ -14,13 +14,13 @@ from hsp_control.trajectories.streams.message import Message, Space, message_of
 
 _log = logging.getLogger(__name__)
 MOST = 5_000_000
-"""Most numbers that a log records: poses at 60 Hz for three hours, 0.1 GB."""
+"""Maximum count of numbers in a log: poses at 60 Hz for three hours, 0.1 GB."""
 BRIEF = 20_000
-"""Most numbers that are recorded where nobody writes a log."""
-CAPACITY = 4096  # most messages that wait; where more come, the oldest are dropped
-_SILENCE = 2.0  # a sender of several messages stays the only one so long [s]
-_JUMP = 1.0  # what a clock goes back, or ahead of ours, that is no delay [s]
-_MOST_SAID = 16  # different warnings about one source
+"""Maximum count of numbers recorded without a log."""
+CAPACITY = 4096  # maximum number of queued messages; beyond it the oldest are dropped
+_SILENCE = 2.0  # time for which a sender of several messages stays the only one [s]
+_JUMP = 1.0  # jump of a clock, back or ahead of ours, that is not a delay [s]
+_MOST_SAID = 16  # maximum number of different warnings about one source
 _NUMBER = re.compile(r"-?\d[\d.:e+-]*|\bnan\b|-?\binf\b")
 
 
@@ -34,21 +34,21 @@ class Received(NamedTuple):
 class Inbox:
     """A queue of messages; each reader remembers the number of its last one.
 
-    What `send`, a thread that listens or a topic of ROS 2 puts into it is there at
-    once, and the oldest are dropped where many wait. A recording is there from the
-    start, each message with its time.
+    Messages of `send`, of a listening thread or of a topic of ROS 2 are available at
+    once, and the oldest are dropped if many are queued. A recording is available from
+    the start, each message with its time.
     """
 
     def __init__(self, space: Space, source: str = "") -> None:
-        """Set what a value is, and the address that is listened to; by default none."""
+        """Set the kind of values, and the address to listen to; by default none."""
         self.space, self._source = space, source
         self.count = self.rejected = self.taken = 0
         self.reason = ""
-        self.failure = ""  # why nobody listens any more
+        self.failure = ""  # why the listener has ended
         self._waiting: deque[Received] = deque(maxlen=CAPACITY)
         self._lock = Lock()
         self._said: set[str] = set()
-        self._sender, self._until = "", -inf  # the only sender accepted, until when
+        self._sender, self._until = "", -inf  # the only accepted sender, and until when
         self._seen: dict[str, float] = {}
         self._newest, self._behind = -inf, inf  # of its clock: its time, ours after it
 
@@ -62,15 +62,15 @@ class Inbox:
 
     @property
     def source(self) -> str:
-        """The address that is listened to; empty without one."""
+        """The address that it listens to; empty without one."""
         return self._source
 
     def check_sender(self, sender: str, now: float) -> None:
-        """Raise if another one sends, who was first; ``now`` is our own time [s]."""
+        """Raise if another sender was first; ``now`` is our own time [s]."""
         if sender != self._sender and now < self._until:
             raise StreamError(
-                f"{sender} sends while {self._sender} does, which was first and is "
-                f"accepted alone until it is silent for {_SILENCE:g} s"
+                f"{sender} is ignored: {self._sender} sent first, and is the only "
+                f"sender accepted until it has been silent for {_SILENCE:g} s"
             )
 
     def receive(self, sender: str, now: float, data: Mapping[str, Any]) -> None:
@@ -80,7 +80,9 @@ class Inbox:
         if sender != self._sender:
             self._sender, self._newest, self._behind = sender, -inf, inf
         seen = {name: at for name, at in self._seen.items() if now - at < _SILENCE}
-        self._until = now + _SILENCE if sender in seen else -inf  # one is no stream
+        self._until = (
+            now + _SILENCE if sender in seen else -inf
+        )  # a single message is not a stream
         self._seen = {**seen, sender: now}
         if (t := data.get("t")) is None:
             return
@@ -98,8 +100,8 @@ class Inbox:
         if -inf < self._until <= now:
             self._until = -inf
             self._say(
-                f"{self._sender} is silent for {_SILENCE:g} s; the reference rests "
-                "where its last message ends"
+                f"{self._sender} has been silent for {_SILENCE:g} s; the reference "
+                "rests where its last message ends"
             )
 
     def put(self, **data: Any) -> None:
@@ -110,10 +112,10 @@ class Inbox:
             self._waiting.append(Received(self.count, message))
 
     def fail(self, error: BaseException) -> None:
-        """Let each reader raise: the thread that listens has ended with an error."""
+        """Make each reader raise: the listening thread has ended with an error."""
         try:
             text = str(error)
-        except Exception:  # of somebody's own type
+        except Exception:  # of a user's own type
             text = ""
         name = type(error).__name__
         self.failure = f"{name}: {text}" if text else name
@@ -127,18 +129,18 @@ class Inbox:
             self._say(f"a message is dropped: {reason}")
 
     def _say(self, what: str) -> None:
-        """Warn, once for all that differs in its numbers alone."""
+        """Warn, once for messages that differ only in their numbers."""
         kind = _NUMBER.sub("", what)
         if kind not in self._said and len(self._said) < _MOST_SAID:
             self._said.add(kind)
             _log.warning("%s: %s", self._source, what)
 
     def after(self, number: int, *, take: bool, until: float = inf) -> list[Received]:
-        """Return the messages that wait, later than a number, in order of arrival.
+        """Return the queued messages after a number, in order of arrival.
 
         Args:
-            number: The number of the last one that is known.
-            take: Whether they are nobody else's from now on who begins to read.
+            number: The number of the last known one.
+            take: Whether later readers no longer receive them.
             until: Only those whose time has come [s].
         """
         found = []
@@ -154,19 +156,19 @@ class Inbox:
         return found
 
     def __getstate__(self) -> dict[str, Any]:
-        """Return what nobody took; a copy elsewhere takes what is sent there."""
+        """Return the untaken messages; a copy elsewhere receives those sent there."""
         taken, bounded = self.taken, self._waiting.maxlen is not None
         waiting = self.after(taken if bounded else 0, take=False)
         return {
             "space": self.space,
-            "count": waiting[-1].number if waiting else taken,  # another may come now
+            "count": waiting[-1].number if waiting else taken,  # another may arrive now
             "taken": taken,
             "waiting": waiting,
             "bounded": bounded,
         }
 
     def __setstate__(self, saved: dict[str, Any]) -> None:
-        """Begin with what waited."""
+        """Begin with the queued messages."""
         self.__init__(saved["space"])  # type: ignore[misc]
         self.count, self.taken = saved["count"], saved["taken"]
         most = CAPACITY if saved["bounded"] else None
@@ -174,28 +176,28 @@ class Inbox:
 
 
 class Reader:
-    """Takes messages for one run, and records them; it begins with what nobody took.
+    """Takes messages for one run, and records them; it begins with the untaken ones.
 
     Attributes:
         inbox: The queue.
-        record: The messages that were taken, with the times ``at`` when they were.
-        lost: How many more there were than are recorded.
+        record: The messages that were taken, with the times ``at`` of taking them.
+        lost: The number of messages that were not recorded.
     """
 
     def __init__(self, inbox: Inbox, *, aside: bool = False) -> None:
-        """Begin to read; ``aside``: what is taken waits for the others all the same."""
+        """Begin to read; ``aside``: taken messages stay available for other readers."""
         self.inbox, self._aside = inbox, aside
         self._number = inbox.taken
         self._missed: list[Received] = []
         self.record: list[Message] = []
         self.lost = self._recorded = 0
-        self.logged = False  # whether a log needs all of the record
+        self.logged = False  # whether a log needs the whole record
 
     def take(self, t: float) -> list[Message]:
-        """Return what is there at a time [s] and was not taken, with its time ``at``.
+        """Return the untaken messages at a time [s], with their times ``at``.
 
         Raises:
-            StreamError: If nobody listens any more.
+            StreamError: If the listener has ended.
         """
         inbox = self.inbox
         if inbox.failure:
@@ -215,7 +217,7 @@ class Reader:
         return taken
 
     def copy(self) -> "Reader":
-        """Return a reader that goes on from here, with a record of its own."""
+        """Return a reader that continues from here, with its own record."""
         other = Reader(self.inbox, aside=True)
         other._number, other._missed = self._number, self._missed.copy()
         return other
@@ -230,7 +232,7 @@ class Reader:
             self.lost += 1
 
     def __getstate__(self) -> dict[str, Any]:
-        """Return what it reads, and what waits for it alone, but no record."""
+        """Return its queue and the messages that wait for it alone, not the record."""
         inbox, number = self.inbox, self._number
         waiting = inbox.after(number, take=False) if number < inbox.taken else []
         missed = self._missed + [each for each in waiting if each.number <= inbox.taken]
@@ -243,7 +245,7 @@ class Reader:
         }
 
     def __setstate__(self, saved: dict[str, Any]) -> None:
-        """Go on, with a record that lacks what was taken before."""
+        """Continue, with a record without earlier messages."""
         self.__init__(saved["inbox"], aside=saved["aside"])  # type: ignore[misc]
         self._number, self._missed = saved["number"], saved["missed"]
         self.lost = saved["lost"]

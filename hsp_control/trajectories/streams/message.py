@@ -11,18 +11,18 @@ from numpy.typing import ArrayLike
 from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import StreamError
 
-MOST_WAYPOINTS = 1000  # most waypoints of one message
+MOST_WAYPOINTS = 1000  # maximum number of waypoints of one message
 LARGEST = 1e6
-"""Numbers beyond this are refused [m or rad]: they are mistakes, and would
+"""Maximum magnitude of a number [m or rad]: larger ones are mistakes, and would
 overflow."""
-LATEST = 1e12  # times beyond this are refused [s]; a clock of 1970 shows 2e9
+LATEST = 1e12  # maximum time [s]; a clock that starts in 1970 shows 2e9
 NO_TOOL = "axes is 'tool'; a stream without an orientation has no tool"
 _UNIT = 1e-3
 """Deviation of a quaternion's norm from 1 that may be a sender's rounding."""
 
 
 class Space(NamedTuple):
-    """What one value of a stream is: linear coordinates, then perhaps a quaternion."""
+    """The kind of a stream's values: linear coordinates, then perhaps a quaternion."""
 
     # Number of linear coordinates; None: not known yet.
     linear: int | None
@@ -30,17 +30,17 @@ class Space(NamedTuple):
 
     @property
     def width(self) -> int | None:
-        """How many numbers a value has."""
+        """The number of components of a value."""
         return None if self.linear is None else self.linear + 4 * self.rotational
 
     @property
     def rates(self) -> int | None:
-        """How many numbers a velocity has; an angular velocity has three."""
+        """The number of components of a velocity; an angular velocity has three."""
         return None if self.linear is None else self.linear + 3 * self.rotational
 
     @property
     def words(self) -> str:
-        """What a value consists of, for messages."""
+        """The components of a value in words, for messages."""
         if self == POSE:
             return "x, y, z and a quaternion (x, y, z, w)"
         if self.rotational:
@@ -55,25 +55,25 @@ ORIENTATION = Space(0, True)
 class Message(NamedTuple):
     """Waypoints, or a velocity alone."""
 
-    t: float | None  # when it was made, by the sender's clock [s]; None: unknown, now
+    t: float | None  # its time by the sender's clock [s]; None: unknown, now
     times: Array  # times of the waypoints after ``t``, increasing, (k,) [s]
     # The waypoints, (k, width), quaternions of norm 1; None: the message is a velocity
     # alone.
     values: Array | None
     # Their velocities, (k, rates), in world axes; None: unknown.
     velocities: Array | None
-    chunk: bool = False  # whether they replace those that were to follow
-    axes: Literal["world", "tool"] | None = None  # those of a velocity alone, if given
-    at: float = -inf  # when it is taken, by the controller's clock [s]; -inf: at once
+    chunk: bool = False  # whether they replace all later ones
+    axes: Literal["world", "tool"] | None = None  # axes of a velocity alone, if given
+    at: float = -inf  # time of taking it, by the controller's clock [s]; -inf: at once
 
     @property
     def size(self) -> int:
-        """How many numbers it has."""
+        """Its number of numbers."""
         found = (self.times, self.values, self.velocities)
         return sum(each.size for each in found if each is not None)
 
     def to_dict(self) -> dict[str, Any]:
-        """Return what `message_of` reads, and the time ``at`` of one that was taken."""
+        """Return its data for `message_of`, and the time ``at`` of taking it."""
         data: dict[str, Any] = {} if self.at == -inf else {"at": self.at}
         if self.t is not None:
             data["t"] = self.t
@@ -110,7 +110,7 @@ def message_of(data: Any, space: Space) -> Message:
         axes = _axes(given, space)
         return Message(t, np.zeros(1), None, velocities, axes=axes)
     if "axes" in given:
-        raise StreamError("axes are those of a velocity that is sent without a value")
+        raise StreamError("axes are only for a velocity without a value; remove axes")
     if velocities is not None and len(velocities) != len(values):
         raise StreamError(
             f"there are {len(velocities)} velocities for {len(values)} values"
@@ -123,7 +123,7 @@ def message_of(data: Any, space: Space) -> Message:
 
 
 def parsed(text: str | bytes) -> Any:
-    """Return what a JSON text contains; NaN and Infinity are no JSON."""
+    """Return the contents of a JSON text; NaN and Infinity are not JSON."""
     return json.loads(text, parse_constant=_refuse_constant)
 
 
@@ -141,7 +141,7 @@ def _check_alternatives(given: Mapping[str, Any]) -> None:
 
 
 def _axes(given: Mapping[str, Any], space: Space) -> Literal["world", "tool"] | None:
-    """Return the axes of a velocity; None: those that its stream declares."""
+    """Return the axes of a velocity; None: those of its stream."""
     axes: Any = given.get("axes")
     if axes not in (None, "world", "tool"):
         raise StreamError(f"axes is {_shown(axes)}; needs 'world' or 'tool'")
@@ -207,7 +207,7 @@ def _normalise(values: Array) -> None:
             f"the quaternion {values[worst, -4:].tolist()} has norm "
             f"{norms[worst]:.6g}; needs 1"
         )
-    off = np.abs(norms - 1.0) > 1e-15  # else a recording would change by a bit
+    off = np.abs(norms - 1.0) > 1e-15  # otherwise a recording would change by a bit
     values[off, -4:] /= norms[off, None]
 
 
@@ -220,7 +220,7 @@ def _numbers(value: Any, name: str, ndim: int) -> Array:
         raise StreamError(f"{name} is {_shown(value)}; needs {needs}") from None
     if array.ndim != ndim:
         raise StreamError(f"{name} has shape {array.shape}; needs {needs}")
-    if not (np.abs(array) <= LARGEST).all():  # NaN neither
+    if not (np.abs(array) <= LARGEST).all():  # also NaN
         bad = array[~(np.abs(array) <= LARGEST)].ravel()[0]
         raise StreamError(
             f"{name} contains {bad:g}; needs finite numbers of at most {LARGEST:g}"

@@ -1,9 +1,8 @@
 """The reference of a stream: messages become waypoints, and a motion, piece by piece.
 
-Whenever a message arrives, the rest of the reference is planned again, from what it
-*is* (x, x', x'') and not from what was planned. A piece, once begun, never changes; so
-the reference is a C² function of time, whatever arrives and
-however often it is sampled.
+Whenever a message arrives, the rest of the reference is planned again from its present
+state (x, x', x''). A piece, once begun, never changes; so the reference is a C²
+function of time for any messages and any sampling.
 """
 
 from bisect import bisect_right
@@ -26,11 +25,11 @@ from hsp_control.trajectories.streams.velocities import (
 )
 from hsp_control.trajectories.streams.waypoints import KEPT, Passing, Waypoints
 
-_AT_ONCE = 256  # of more messages that come at once the oldest do not count
+_AT_ONCE = 256  # maximum number of simultaneous messages; the oldest others are ignored
 
 
 class Policy(NamedTuple):
-    """How messages become goals; see `Stream` for the attributes."""
+    """The conversion of messages to goals; see `Stream` for the attributes."""
 
     name: str
     delay: float
@@ -59,7 +58,7 @@ class Planner:
         self._begin = self.now = self._oldest = -inf
         self._heard = -inf
         self._silent = False
-        # the velocity that is commanded, until it fades, unless it is repeated
+        # the commanded velocity, until it fades, unless it is repeated
         self._command: VelocityCommand | None = None
         self._fades_at = inf
         self._segments: list[Segment] = [coast(0.0, inf, start)]
@@ -70,7 +69,7 @@ class Planner:
 
     @property
     def begun(self) -> bool:
-        """Whether the run has begun: what is computed at its very start is not it."""
+        """Whether the run has begun, that is advanced beyond its start."""
         return self.now > -inf
 
     @property
@@ -79,7 +78,7 @@ class Planner:
         return self.now - max(self._heard, self._begin) if self.begun else 0.0
 
     def at(self, t: float) -> State:
-        """Return the reference at a time that was planned [s]; see `Chart`."""
+        """Return the reference at a planned time [s]; see `Chart`."""
         if t < self._oldest:
             raise StreamError(
                 f"the reference at t = {t:g} s is not known any more: the run is at "
@@ -89,11 +88,11 @@ class Planner:
         return self._segments[k].state(t)
 
     def keep(self, since: float, until: float) -> None:
-        """Know the reference from a time on until a later one [s]."""
+        """Keep the reference from a time on until a later one [s]."""
         self._kept[since] = max(until, self._kept.get(since, -inf))
 
     def copy(self) -> "Planner":
-        """Return one that goes on from here by itself."""
+        """Return a copy that continues independently."""
         other = copy(self)
         other._kept = self._kept.copy()
         other._segments, other._starts = self._segments.copy(), self._starts.copy()
@@ -101,7 +100,7 @@ class Planner:
         return other
 
     def advance(self, t: float, messages: Sequence[Message]) -> None:
-        """Plan up to a time [s]: what follows by itself, then for new messages."""
+        """Plan up to a time [s]: first without, then with the new messages."""
         if not self.begun:
             self.now = self._begin = t
             return
@@ -136,7 +135,7 @@ class Planner:
             self._plan(t)
 
     def _accept(self, message: Message, t: float) -> bool:
-        """Take a message; return whether it changes what lies ahead."""
+        """Store a message; return whether it changes the future reference."""
         policy = self._policy
         self.taken += 1
         self._heard = t
@@ -153,7 +152,7 @@ class Planner:
         return True
 
     def _falls_silent(self) -> bool:
-        """Return whether the reference must come to rest now, for want of messages."""
+        """Return whether the reference must come to rest now, for lack of messages."""
         was, self._silent = self._silent, self.age > self._policy.hold_after
         return self._silent and not was
 
@@ -162,12 +161,12 @@ class Planner:
         state = self.chart.rebased(self._segments[-1].state(t))
         try:
             following = self._next(t, state)
-        except StreamError:  # so far away that no motion is found
+        except StreamError:  # too far away for a motion
             self.refused += 1
             self._command, self._fades_at = None, inf
             self.waypoints.clear()
             following = self._to_rest(t, state)
-        if self._segments[-1].start == t:  # replaced before anything could see it
+        if self._segments[-1].start == t:  # replaced before it was sampled
             del self._segments[-1], self._starts[-1]
         self._segments.append(following)
         self._starts.append(t)
@@ -191,12 +190,12 @@ class Planner:
         )
 
     def _to_rest(self, t: float, state: State) -> Segment:
-        """Return a piece that brakes, or stays."""
+        """Return a piece that brakes, or rests."""
         still = VelocityCommand(np.zeros_like(state.x), "world")
         return self._velocities.follow(t, state, still, self._policy.delay)
 
     def _forget(self, t: float) -> None:
-        """Forget pieces and waypoints that lie far behind."""
+        """Drop pieces and waypoints that are long past."""
         self.waypoints.forget(t)
         oldest = t - KEPT
         for since, until in [*self._kept.items()]:

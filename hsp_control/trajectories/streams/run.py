@@ -1,4 +1,4 @@
-"""A stream in one run: the messages that it takes, and the reference that they make."""
+"""A stream in one run: its messages, and the resulting reference."""
 
 from collections.abc import Mapping
 from copy import copy
@@ -28,14 +28,14 @@ from hsp_control.trajectories.streams.velocities import Axes
 class StreamRun:
     """A stream in one run of a controller: takes messages, and plans the reference.
 
-    A controller remembers those of its streams. A copy goes on from where this one is,
-    and takes what is sent to this one; what it takes waits for this one all the same. A
-    pickle goes on likewise, and takes what is sent to itself.
+    A controller stores the runs of its streams. A copy continues from the present
+    state, and also receives the messages to this one, without removing them. A pickle
+    continues likewise, and receives the messages to itself.
 
     Attributes:
-        declared: The stream as it was declared; the next run begins with what was sent
-            to the stream of this value, and nobody took.
-        stream: The stream, which begins where the run does.
+        declared: The declared stream; the next run begins with the untaken messages to
+        the stream of this value.
+        stream: The stream, with the start of the run.
     """
 
     def __init__(self, declared: Streamed, stream: Streamed) -> None:
@@ -66,9 +66,9 @@ class StreamRun:
         Args:
             value: The target: n coordinates, a quaternion (x, y, z, w), or for a pose
                 x, y, z and a quaternion, or a pin.SE3; None: a velocity alone.
-            velocity: The velocity at the target, in world axes; or alone, as a joystick
-                sends it: linear velocities, then angular ones [1/s].
-            axes: Those of a velocity alone: ``world``, or ``tool``, the axes of the
+            velocity: The velocity at the target, in world axes; or alone, as of a
+            joystick: linear velocities, then angular ones [1/s].
+            axes: The axes of a velocity alone: ``world``, or ``tool``, the axes of the
                 moving body; None: the stream's own.
             t: The target's time by the sender's clock [s]; None: now.
 
@@ -87,13 +87,13 @@ class StreamRun:
         velocities: ArrayLike | None = None,
         t: float | None = None,
     ) -> None:
-        """Send waypoints, which replace all that were to follow; from any thread.
+        """Send waypoints, which replace all later ones; from any thread.
 
         Args:
             values: The waypoints, shape (k, width), each as in `send`.
             times: Their times after ``t``, increasing, shape (k,) [s].
-            velocities: Their velocities; None: those that the waypoints show.
-            t: When the chunk was made, by the sender's clock [s]; None: now.
+            velocities: Their velocities; None: estimated from the waypoints.
+            t: The time of the chunk by the sender's clock [s]; None: now.
 
         Raises:
             StreamError: If it is not valid, or the stream has another source.
@@ -103,16 +103,16 @@ class StreamRun:
     def _put(self, **message: Any) -> None:
         if self.stream.listens_to:
             raise StreamError(
-                f"this stream listens to {self.stream.listens_to}; only a stream "
-                "without source and messages can be sent to"
+                f"this stream receives from {self.stream.listens_to}; send needs a "
+                "stream without source and messages"
             )
         self._inbox.put(**message)
 
     def follow(self, before: "StreamRun") -> None:
-        """Take what was sent to the stream of another run, and nobody took.
+        """Take over the untaken messages of another run's stream.
 
         Raises:
-            StreamError: If what that one moves has another number of coordinates.
+            StreamError: If that stream has another number of coordinates.
         """
         if before._space != self._space:
             raise StreamError(
@@ -130,7 +130,7 @@ class StreamRun:
 
     @property
     def reader(self) -> Reader:
-        """What takes its messages; a source is opened here."""
+        """The reader of its messages; a source is opened here."""
         if self._reader is None:
             self._reader = self._opened()
             self._reader.logged = self._logged
@@ -147,13 +147,13 @@ class StreamRun:
             return Reader(Inbox.recorded(self._space, taken), aside=True)
         return Reader(self._inbox, aside=self._aside)
 
-    # -- what became of them ----------------------------------------------------------
+    # -- statistics ----------------------------------------------------------
 
     def counts(self) -> dict[str, float]:
-        """Return the time since the last message [s], and how many there were.
+        """Return the time since the last message [s], and the numbers of messages.
 
-        ``taken``: all valid ones; ``late``: of these, those that came too late to
-        count; ``rejected``: invalid ones, and those that no motion can follow.
+        ``taken``: all valid ones; ``late``: of these, those that arrived too late to be
+        used; ``rejected``: invalid ones, and those that no motion can follow.
         """
         planner = self._planned
         return {
@@ -165,31 +165,31 @@ class StreamRun:
 
     @property
     def last_rejection(self) -> str:
-        """Why the last invalid message of another process was one; empty for none."""
+        """Why the last invalid message of another process was rejected, or ""."""
         return self.inbox.reason
 
     def log(self) -> None:
-        """Record all that is taken from now on, up to five million numbers."""
+        """Record all messages taken from now on, up to five million numbers."""
         self._logged = True
         if self._reader is not None:
             self._reader.logged = True
 
     @property
     def record(self) -> tuple[Mapping[str, Any], ...]:
-        """What it has taken, and when; see `Streamed.messages`.
+        """The messages taken, and their times; see `Streamed.messages`.
 
-        Where no log is written, only the first messages.
+        Without a log, only the first messages.
         """
         taken = self._reader.record if self._reader is not None else []
         return tuple(each.to_dict() for each in taken)
 
     @property
     def unrecorded(self) -> int:
-        """How many messages the record had no room for."""
+        """The number of messages for which the record had no room."""
         return self._reader.lost if self._reader is not None else 0
 
     def repeated(self) -> Streamed:
-        """Return the declaration of a stream that takes the same messages again."""
+        """Return the declaration of a stream that replays the same messages."""
         return replace(self.stream, source=None, messages=self.record)
 
     # -- the reference ----------------------------------------------------------------
@@ -198,21 +198,23 @@ class StreamRun:
         """Return the reference at a time [s]; messages are taken up to a later one.
 
         Raises:
-            StreamError: If there was no message for too long, or nobody listens any
-                more, or the time is long past.
+            StreamError: If there was no message for too long, the listener has ended,
+            or the time is long past.
         """
         planner = self._planned
         if t > planner.now:
-            reader = self.reader  # one that cannot be opened raises in the first step
+            reader = (
+                self.reader
+            )  # a source that cannot be opened raises in the first step
             planner.advance(t, reader.take(t) if planner.begun else [])
         return planner.at(t)
 
     def prepare(self) -> None:
-        """Make what plans, now instead of in the first step."""
+        """Create the planner now instead of in the first step."""
         _ = self._planned
 
     def keep(self, since: float, until: float) -> None:
-        """Know the reference from a time on until a later one [s]."""
+        """Keep the reference from a time on until a later one [s]."""
         self._planned.keep(since, until)
 
     @property
@@ -225,16 +227,16 @@ class StreamRun:
     # -- without Python ---------------------------------------------------------------
 
     def leave_python(self, period: float) -> None:
-        """Take only what a program sends, from the next run on; see `StreamAlone`.
+        """Receive only messages of a program, from the next run on; see `StreamAlone`.
 
         Args:
-            period: Time between two messages, at least [s].
+            period: Minimum time between two messages [s].
         """
         self._period_alone = period
 
     @property
     def alone(self) -> StreamAlone | None:
-        """What computes it without Python; None: it takes messages."""
+        """Its computation without Python; None: it receives messages in Python."""
         period = self._period_alone
         if period is not None and self._alone is None:
             bounds, how = self.stream.bounds(), self.stream.how
@@ -245,7 +247,7 @@ class StreamRun:
         return f"StreamRun of {self.declared!r}"
 
     def __deepcopy__(self, memo: dict[int, Any]) -> "StreamRun":
-        """Return one that goes on from here by itself."""
+        """Return a copy that continues independently."""
         memo[id(self)] = other = copy(self)
         other._aside = True
         other._alone = None

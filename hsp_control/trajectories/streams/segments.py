@@ -1,7 +1,7 @@
-"""Pieces of a streamed reference: quintics where they keep the bounds, else Ruckig's.
+"""Pieces of a streamed reference: quintics within the bounds, otherwise Ruckig's.
 
-A piece is a C² function of time, given in local coordinates (`Chart`); each begins with
-the state in which the piece before it ends. The engine plans them
+A piece is a C² function of time, given in local coordinates (`Chart`); each begins in
+the final state of the piece before it. The engine plans them
 (``engine/streams/planner.cpp``): the same without Python.
 """
 
@@ -19,7 +19,7 @@ from hsp_control.trajectories.streams.chart import State
 
 
 class MotionBounds(NamedTuple):
-    """Largest magnitude of the first three derivatives, for each coordinate."""
+    """Maximum magnitudes of the first three derivatives, for each coordinate."""
 
     speed: Array  # (n,) [1/s]
     acceleration: Array  # (n,) [1/s²]
@@ -47,8 +47,8 @@ def angular_bounds(speed: float, acceleration: float, jerk: float) -> MotionBoun
 
     A vector with components up to b/√3 is no longer than b. Each piece has axes of its
     own; where one begins, a component of ω may be beyond its bound while all of ω is
-    not, and is then brought back. For that the speed is planned 5 % smaller; what was
-    seen in 400 hostile streams is 0.5 %.
+    not, and is then brought back. For that the speed is planned 5 % smaller; the
+    maximum in 400 adversarial streams was 0.5 %.
     """
     curved = acceleration - speed**2 / pi
     if curved <= 0.0:
@@ -74,7 +74,7 @@ class Segment(ABC):
     """A piece of the reference, from ``start`` to ``end`` [s], about ``base``."""
 
     def __init__(self, start: float, end: float, base: Array) -> None:
-        """Set when it begins and ends, and the orientation of its chart."""
+        """Set its start and end, and the orientation of its chart."""
         self.start, self.end, self.base = start, end, base
 
     @abstractmethod
@@ -83,17 +83,17 @@ class Segment(ABC):
 
 
 _HEAD, _ROWS = 13, 52
-"""Numbers of a piece: of all of it, and of each coordinate; see
+"""Count of numbers of a piece: common ones, and per coordinate; see
 ``engine/streams/piece.hpp``."""
 COAST = 0.0
 """The first number of a piece whose x' is constant."""
 
 
 class Piece(Segment):
-    """A piece that the engine has planned: numbers."""
+    """A piece planned by the engine, as numbers."""
 
     def __init__(self, numbers: Array, base: Array) -> None:
-        """Keep what the engine wrote into `room`."""
+        """Store the numbers that the engine wrote into `room`."""
         super().__init__(float(numbers[1]), float(numbers[2]), base)
         n = (len(numbers) - _HEAD) // _ROWS
         self.numbers = numbers

@@ -1,4 +1,4 @@
-"""Where a stream's messages come from: what is sent, an address, or a recording."""
+"""The sources of a stream's messages: `send`, an address, or a recording."""
 
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
@@ -12,7 +12,7 @@ from hsp_control.trajectories.streams.inbox import Inbox
 from hsp_control.trajectories.streams.message import Message, Space, message_of, parsed
 
 Listen = Callable[["ref[Inbox]"], None]
-"""Puts what it receives into an inbox for as long as that is there."""
+"""Puts received messages into an inbox while that exists."""
 
 
 class AddressKind(Protocol):
@@ -38,7 +38,7 @@ def is_address(source: str) -> bool:
 
 
 def listening_inbox(source: str, space: Space) -> Inbox:
-    """Return the inbox of an address, one per process; unused, it closes."""
+    """Return the inbox of an address, one per process; it closes when unused."""
     known = _inboxes.get(source)
     if known is not None and not known.failure:
         if known.space != space:
@@ -47,7 +47,7 @@ def listening_inbox(source: str, space: Space) -> Inbox:
                 f"needs {space.width}"
             )
         return known
-    if source in _threads:  # of an inbox that nobody uses: the port is soon free
+    if source in _threads:  # of an unused inbox: the port is soon free
         _threads[source].join()
     listen = kind_of(source).opened(source, space)
     inbox = Inbox(space, source)
@@ -60,7 +60,7 @@ def listening_inbox(source: str, space: Space) -> Inbox:
 
 
 def _run(listen: Listen, inbox: "ref[Inbox]") -> None:
-    """Listen; a reader of the inbox gets what is raised."""
+    """Listen; errors are raised in the readers of the inbox."""
     try:
         listen(inbox)
     except BaseException as error:
@@ -69,7 +69,7 @@ def _run(listen: Listen, inbox: "ref[Inbox]") -> None:
 
 
 def kind_of(source: str) -> AddressKind:
-    """Return what understands an address."""
+    """Return the module of an address's kind."""
     kinds = entry_points("targets")
     if found := kinds.get(source.partition("://")[0]):
         kind: AddressKind = found.load()
@@ -81,7 +81,7 @@ def kind_of(source: str) -> AddressKind:
     )
 
 
-LARGEST_FILE = 100_000_000  # size of the largest recording that is read [bytes]
+LARGEST_FILE = 100_000_000  # maximum size of a recording [bytes]
 
 
 def recorded(data: Sequence[Mapping[str, Any]], space: Space) -> list[Message]:

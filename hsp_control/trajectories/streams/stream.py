@@ -46,8 +46,8 @@ class Stream(Streamed, Trajectory, type="stream"):
     points: ClassVar[tuple[str, ...]] = ("start",)
 
     start: Vector | None = None
-    """Where it is until the first message, shape (n,) [m, or the task's unit]; where
-    the robot starts by default."""
+    """The point until the first message, shape (n,) [m, or the task's unit]; the
+    robot's start by default."""
     _: KW_ONLY
     speed: PositiveNumbers = 1.0
     """Bound on |x'|, one number or n [1/s]."""
@@ -78,7 +78,7 @@ class Stream(Streamed, Trajectory, type="stream"):
         return FollowedPoint(StreamRun(self, replace(self, start=begin)))
 
     def begin(self) -> State:
-        """Return where it is before the first message; see `Streamed.begin`."""
+        """Return its value before the first message; see `Streamed.begin`."""
         if self.start is None:
             raise self._placeless()
         return Chart(self.dimension, False).begin(np.asarray(self.start), np.eye(3))
@@ -93,7 +93,7 @@ class Turning(Streamed):
 
     _: KW_ONLY
     axes: Axes = "world"  # type: ignore[misc]  # a field, where there is a tool
-    """Axes of velocities that are sent alone and name none [-]: ``world``, in a
+    """Axes of velocities that are sent alone without axes [-]: ``world``, in a
     relative task those of its reference, or ``tool``, those of the moving body."""
     angular_speed: Positive = 2.5
     """Bound on |ω| [rad/s]."""
@@ -133,7 +133,7 @@ class StreamOrientation(Turning, OrientationTrajectory, type="stream"):
         return FollowedOrientation(StreamRun(self, replace(self, rotation=begin)))
 
     def begin(self) -> State:
-        """Return where it is before the first message; see `Streamed.begin`."""
+        """Return its value before the first message; see `Streamed.begin`."""
         if self.rotation is None:
             raise self._placeless()
         return Chart(0, True).begin(np.zeros(0), matrix_of(self.rotation))
@@ -166,7 +166,7 @@ class StreamPose(Turning, PoseTrajectory, type="stream"):
     """Bound on |x'''|, one number or three [m/s³]."""
 
     def anchored(self, start: pin.SE3) -> FollowedPose:
-        """Return the stream in a new run, from where the robot starts."""
+        """Return the stream in a new run, from the robot's start."""
         given: dict[str, Any] = {
             "position": start.translation if self.position is None else self.position,
             "rotation": start.rotation if self.rotation is None else self.rotation,
@@ -174,7 +174,7 @@ class StreamPose(Turning, PoseTrajectory, type="stream"):
         return FollowedPose(StreamRun(self, replace(self, **given)))
 
     def begin(self) -> State:
-        """Return where it is before the first message; see `Streamed.begin`."""
+        """Return its value before the first message; see `Streamed.begin`."""
         if self.position is None or self.rotation is None:
             raise self._placeless()
         where = np.asarray(self.position)
@@ -188,10 +188,10 @@ class StreamPose(Turning, PoseTrajectory, type="stream"):
 
 
 def stream_for(followed: object, stream: Streamed) -> Any:
-    """Return a stream of the kind that can follow a reference.
+    """Return a stream of the kind that can replace a reference.
 
     Raises:
-        TrajectoryError: If it has a setting that a stream of this kind has not.
+        TrajectoryError: If a setting does not exist for a stream of this kind.
     """
     kind: type[Streamed] = Stream
     if isinstance(followed, PoseTrajectory):

@@ -1,4 +1,4 @@
-"""What all streams declare: where messages come from, and how they are followed."""
+"""The common fields of streams: the source of messages, and how they are followed."""
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import KW_ONLY, replace
@@ -25,57 +25,57 @@ from hsp_control.trajectories.streams.velocities import Axes
 
 
 class Streamed(Part, error=TrajectoryError):
-    """A reference that is commanded while the robot moves; a value.
+    """A reference that is commanded at run time; a value.
 
-    A controller that follows it has its stream: ``controller.stream("hand")`` takes
+    A controller that follows it has its stream: ``controller.stream("hand")`` accepts
     targets, velocities or chunks of waypoints from any thread, at any rate, late or out
     of order. The reference is C², x' and x'' are exactly its derivatives, and speed,
-    acceleration and jerk keep their bounds, whatever is sent. Until the first message
-    it stays where it starts. Invalid messages are refused; those of another process are
-    counted, and the reference goes on without them.
+    acceleration and jerk keep their bounds for any messages. Until the first message it
+    rests at its start. Invalid messages are refused; those of another process are
+    reported in the statistics, and the reference continues without them.
 
     The reference is at a target ``delay`` after the target's time, or as soon as the
-    bounds permit. On its way it follows quintics where they keep the bounds, and
-    otherwise Ruckig's fastest motion.
+    bounds permit. It follows quintics if they keep the bounds, and otherwise Ruckig's
+    fastest motion.
 
-    * ``interpolate``: the reference passes through all waypoints, with the velocities
-      and accelerations that they show. If no more follow, it brakes at the last one,
-      and comes to rest there, as it does at a single target.
+    * ``interpolate``: the reference passes through all waypoints, with velocities and
+    * accelerations estimated from them. If no more follow, it brakes and comes to rest
+    * at the last one, as at a single target.
     * ``latest``: only the newest message is followed; the reference comes to rest at
-      its last waypoint. For single targets that replace each other, such as a hand that
-      is dragged.
-    * ``extrapolate``: it goes on from the last one at the velocity that the waypoints
-      show, for a time, and then comes to rest.
+      its last waypoint. For single targets that replace each other, such as those of a
+      dragged hand.
+    * ``extrapolate``: it continues from the last one at the velocity estimated from the
+    * waypoints, for a time, and then comes to rest.
 
-    A velocity alone, as a joystick sends it, is reached within the bounds and kept; the
-    position is its integral. If no other message comes for ``dead_man``, it fades to
-    zero. One beyond the bounds keeps its direction.
+    A velocity alone, as of a joystick, is reached within the bounds and kept; the
+    position is its integral. Without another message for ``dead_man``, it fades to
+    zero. A velocity beyond the bounds keeps its direction.
     """
 
     _: KW_ONLY
     source: str | None = None
-    """Where messages come from: ``udp://HOST:PORT`` for JSON datagrams, or
+    """Source of messages: ``udp://HOST:PORT`` for JSON datagrams, or
     ``udp://HOST:PORT/PART`` of a shared port; ``ros2://TOPIC`` for poses of ROS 2; or
     the path of a recording, of JSON lines with a time ``at`` [-]; by default `send`."""
     messages: Annotated[Sequence[Mapping[str, Any]], AfterValidator(tuple)] | None = (
         None
     )
-    """A recording, instead of a source: messages with the times ``at`` [s] at which
-    they are taken; a log contains those of its run."""
+    """A recording, instead of a source: messages with their times ``at`` [s]; a log
+    contains those of its run."""
     policy: Literal["interpolate", "latest", "extrapolate"] = "interpolate"
-    """How waypoints are followed."""
+    """The way in which waypoints are followed."""
     delay: NonNegative = 0.1
-    """Time from a waypoint's own time to when the reference is there [s]. For
+    """Delay of the reference after a waypoint's own time [s]. For
     ``interpolate`` choose the time between two messages, plus their jitter, plus
     ``smoothing``."""
     smoothing: NonNegative = 0.0
     """Waypoints not farther in time than this are smoothed by a parabola [s]; for noisy
     trackers. For ``interpolate`` and ``extrapolate``."""
     extrapolation: NonNegative = 0.1
-    """How long the reference goes on at the last velocity [s]."""
+    """Time for which the reference continues at the last velocity [s]."""
     dead_man: Positive | None = None
     """Time after which a velocity that was sent alone fades to zero, unless another one
-    comes (a dead man's switch) [s]; by default ``extrapolation``."""
+    arrives (a dead man's switch) [s]; by default ``extrapolation``."""
     hold_after: Positive | None = None
     """Time without a message after which the reference comes to rest [s]; never by
     default."""
@@ -92,7 +92,9 @@ class Streamed(Part, error=TrajectoryError):
             raise StreamError("give either source or messages")
         if self.source is not None and is_address(self.source):
             kind_of(self.source).check_address(self.source)
-        if self.messages is not None:  # what they carry is checked where it is known
+        if (
+            self.messages is not None
+        ):  # their content is checked where its kind is known
             recorded(self.messages, Space(None, False))
 
     @property
@@ -102,7 +104,7 @@ class Streamed(Part, error=TrajectoryError):
 
     @property
     def listens_to(self) -> str:
-        """What its messages come from, instead of `send`; empty: nothing."""
+        """The source of its messages, instead of `send`; empty: none."""
         return self.source or ("a recording" if self.messages is not None else "")
 
     def recorded_in(self, folder: Path, allow: Callable[[Path], object]) -> Self:
@@ -117,8 +119,8 @@ class Streamed(Part, error=TrajectoryError):
         """Raise if a message is not valid, before there is a run; see `StreamRun.send`.
 
         Args:
-            dimension: How many linear coordinates there are, where the stream does not
-                define it.
+            dimension: The number of linear coordinates, if the stream does not define
+            it.
             message: The arguments of `send`.
         """
         known = self.space.linear if dimension is None else dimension
@@ -126,7 +128,7 @@ class Streamed(Part, error=TrajectoryError):
 
     @property
     def how(self) -> Policy:
-        """How messages become goals."""
+        """The conversion of messages to goals."""
         return Policy(
             self.policy,
             self.delay,
@@ -140,14 +142,14 @@ class Streamed(Part, error=TrajectoryError):
 
     @property
     def relative(self) -> bool:
-        """True: it moves in a run alone; see `Trajectory.anchored`."""
+        """True: it moves only in a run; see `Trajectory.anchored`."""
         return True
 
     def begin(self) -> State:
-        """Return where the reference is before the first message.
+        """Return the reference before the first message.
 
         Raises:
-            StreamError: If it begins where a robot starts.
+            StreamError: If it begins at a robot's start.
         """
         raise NotImplementedError
 
@@ -160,7 +162,7 @@ class Streamed(Part, error=TrajectoryError):
         raise self._placeless()
 
     def _placeless(self) -> StreamError:
-        """Return the error of a stream that is no controller's."""
+        """Return the error of a stream without a controller."""
         return StreamError(
             f"this {type(self).__name__} is declared, and moves where a controller "
             "follows it: controller.stream('hand') has what is sent; without a "

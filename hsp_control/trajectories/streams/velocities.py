@@ -1,13 +1,13 @@
 """Pieces that reach a commanded velocity and keep it: a joystick's, or a joint jog's.
 
 A velocity changes along a cubic, so that all its components keep their ratio from one
-steady velocity to another: a hand leaves its straight line or its screw for no moment.
-Where no cubic keeps the bounds, what still accelerates is brought to a steady velocity
-first; in world axes, at last, Ruckig finds a way.
+steady velocity to another: a hand never leaves its straight line or its screw. If no
+cubic keeps the bounds, an accelerating motion is first brought to a steady velocity;
+finally, in world axes, Ruckig plans the motion.
 
 In world axes the coordinates are those of `Chart`. In the tool's axes the linear ones
-are u with x' = R u instead, and x is the integral of R u: exact where the twist is
-constant (a screw), and else by polynomials to rounding error.
+are u with x' = R u instead, and x is the integral of R u: exact for a constant twist (a
+screw), and otherwise by polynomials to rounding error.
 """
 
 from math import ceil
@@ -49,7 +49,7 @@ class VelocityCommand(NamedTuple):
 
 
 class Velocities:
-    """Makes the pieces that reach a velocity, or keep it, within the bounds."""
+    """Plans the pieces that reach a velocity, or keep it, within the bounds."""
 
     def __init__(self, chart: Chart, bounds: MotionBounds) -> None:
         """Set the coordinates, and the bounds in them."""
@@ -58,7 +58,7 @@ class Velocities:
     def follow(
         self, t: float, state: State, command: VelocityCommand, delay: float
     ) -> Segment:
-        """Return what reaches a velocity, in ``delay`` [s] if the bounds permit.
+        """Return a piece that reaches a velocity, if possible in ``delay`` [s].
 
         The state is at the base of its chart. A velocity beyond the bounds keeps its
         direction. A piece that keeps the velocity has no end.
@@ -85,14 +85,14 @@ class Velocities:
 
 
 _IN_TOOL_AXES = 2.0
-"""The engine's record of a piece in which x stands for the integral of u."""
+"""The engine's record of a piece in which x is the integral of u."""
 
 
 class ToolMotion(Segment):
     """A piece in which x' = R u: u and a rotation vector are those of another piece."""
 
     def __init__(self, inner: Segment, state: State, chart: Chart) -> None:
-        """Begin in a state; ``inner`` moves what u is the rate of, from there on."""
+        """Begin in a state; u is the rate of ``inner``, from there on."""
         super().__init__(inner.start, inner.end, state.base)
         self._inner, self._chart = inner, chart
         self._begin = state.x[:3].copy()
@@ -156,14 +156,15 @@ class ToolChange(ToolMotion):
 
 
 _TURN = 0.2
-"""In no panel does the body turn farther [rad]: x is off is off by 1e-12 of the way."""
+"""Maximum rotation of the body in a panel [rad]: the error of x is 1e-12 of the
+path."""
 _DEGREE = 11
 _POINTS = np.cos(np.pi * (np.arange(_DEGREE + 1) + 0.5) / (_DEGREE + 1))
 _POWERS = np.arange(_DEGREE + 2)
 
 
 def _integral() -> Array:
-    """Return what maps values at the points to the integral's coefficients from -1.
+    """Return the matrix from values at the points to the integral's coefficients.
 
     Shape (degree + 2, degree + 1); the coefficients are of powers of a time in [-1, 1].
     """

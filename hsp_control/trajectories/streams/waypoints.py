@@ -19,19 +19,19 @@ from hsp_control.trajectories.streams.segments import (
 )
 
 _WINDOW = 2.0  # the sender's clock is compared with the controller's over this time [s]
-_NEW_CLOCK = 1.0  # a sender's time that jumps back by more shows another start [s]
+_NEW_CLOCK = 1.0  # jump back of a sender's time that indicates a restart [s]
 KEPT = 1.0
-"""Waypoints that were passed are kept so long, to estimate velocities [s]."""
-MOST = 4096  # most waypoints that are kept
+"""Time for which passed waypoints are kept, to estimate velocities [s]."""
+MOST = 4096  # maximum number of stored waypoints
 CONSIDERED = 256
-"""The reference joins one of the next waypoints, at most this many."""
+"""Maximum number of next waypoints one of which the reference joins."""
 
 
 class SenderClock:
     """The time of a sender's clock on the controller's clock.
 
-    A message needs an unknown time to arrive; the one that needed least shows the
-    difference of the clocks best.
+    A message needs an unknown time to arrive; the fastest one shows the difference of
+    the clocks best.
     """
 
     def __init__(self) -> None:
@@ -40,7 +40,7 @@ class SenderClock:
         self._newest = -np.inf
 
     def restarts_at(self, t: float) -> bool:
-        """Return whether a sender's time [s] shows that it has started again."""
+        """Return whether a sender's time [s] shows that it has restarted."""
         return t < self._newest - _NEW_CLOCK
 
     def to_controller(self, t: float, now: float) -> float:
@@ -67,11 +67,11 @@ class Waypoints:
         self.velocities: list[Array | None] = []
         self.late = 0
         self._clock = SenderClock()
-        self._made = -np.inf  # when the newest message was made
-        self._superseded = -np.inf  # what was made before this is ignored
+        self._made = -np.inf  # time of the newest message
+        self._superseded = -np.inf  # earlier messages are ignored
 
     def copy(self) -> "Waypoints":
-        """Return waypoints that go on from here by themselves."""
+        """Return a copy that continues independently."""
         other = copy(self)
         other._clock = deepcopy(self._clock)
         other.times, other.values = self.times.copy(), self.values.copy()
@@ -79,7 +79,7 @@ class Waypoints:
         return other
 
     def add(self, message: Message, now: float, delay: float, replace: bool) -> bool:
-        """Add a message's waypoints; return whether it changes what lies ahead."""
+        """Add a message's waypoints; return whether it changes the future reference."""
         made = now
         if message.t is not None:
             if self._clock.restarts_at(message.t):
@@ -121,13 +121,13 @@ class Waypoints:
         return bisect_right(self.times, t)
 
     def near(self, t: float, window: float) -> slice:
-        """Return which waypoints matter at a time: some passed ones, some ahead."""
+        """Return the relevant waypoints at a time: some passed ones, some ahead."""
         ahead = self.ahead(t)
         first = min(bisect_left(self.times, t - window), max(ahead - 3, 0))
         return slice(max(first, ahead - CONSIDERED), ahead + CONSIDERED)
 
     def forget(self, t: float) -> None:
-        """Forget waypoints that were passed long before a time [s], and the surplus."""
+        """Drop waypoints that were passed long before a time [s], and the surplus."""
         gone = max(bisect_left(self.times, t - KEPT), len(self.times) - MOST)
         gone = min(gone, max(len(self.times) - 1, 0))  # the last one is the goal
         if gone > 0:
@@ -135,7 +135,7 @@ class Waypoints:
                 del each[:gone]
 
     def clear(self) -> None:
-        """Forget all waypoints."""
+        """Remove all waypoints."""
         self._cut(0)
 
     def _cut(self, k: int) -> None:
@@ -152,10 +152,10 @@ class Waypoints:
 
 
 class Passing:
-    """Makes the pieces that go on through waypoints, within the bounds.
+    """Plans the pieces through waypoints, within the bounds.
 
-    Each waypoint has the velocity that it was given; or the derivatives that it shows
-    with its neighbours, or of the parabola nearest to those around it; see
+    Each waypoint has its given velocity; or derivatives estimated from its neighbours,
+    or those of the parabola nearest to the waypoints around it; see
     ``engine/streams/waypoints.cpp``.
     """
 
@@ -174,15 +174,15 @@ class Passing:
         extrapolation: float,
         rests: bool,
     ) -> Segment:
-        """Return the piece that goes on through waypoints, of which there is one.
+        """Return the piece through waypoints, of which there is at least one.
 
         Args:
-            t: When it begins [s].
-            state: Where it begins, at the base of its chart.
+            t: Its start time [s].
+            state: Its initial state, at the base of its chart.
             waypoints: The waypoints.
-            delay: From a waypoint's own time to when the reference is there [s].
-            smoothing: How far in time waypoints are smoothed [s].
-            extrapolation: How long it goes on at the last velocity [s].
+            delay: Delay of the reference after a waypoint's own time [s].
+            smoothing: Maximum distance in time of smoothed waypoints [s].
+            extrapolation: Time for which it continues at the last velocity [s].
             rests: Whether it comes to rest at the last one, not beyond it.
 
         Raises:

@@ -87,7 +87,9 @@ def test_a_picture_shows_the_scene_as_it_is_then(
         with pytest.raises(HTTPError) as caught:
             seen(address, wrong)
         assert said in caught.value.read().decode()
-    with pytest.raises(HardwareError, match=r"no pictures there: .*Address already"):
+    with pytest.raises(
+        HardwareError, match=r"pictures can be drawn: .*Address already"
+    ):
         show(address, plant)
 
 
@@ -113,7 +115,7 @@ def test_where_nothing_is_drawn_any_more_the_robot_stops(
     told()
     drawing.kill()
     drawing.join()
-    with pytest.raises(HardwareError, match="the process that draws there has ended"):
+    with pytest.raises(HardwareError, match="that draws its pictures has ended"):
         told()
 
 
@@ -150,7 +152,7 @@ def test_who_draws_and_hangs_is_noticed_and_ended(
         command, capture_output=True, text=True, timeout=120.0, check=True
     )
     what, _, number = said.stdout.strip().rpartition(" ")
-    assert what.endswith("the process that draws there has done nothing for 1 s")
+    assert what.endswith("draws its pictures has not responded for 1 s")
     with pytest.raises(ProcessLookupError):
         os.kill(int(number), 0)
 

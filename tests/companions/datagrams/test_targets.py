@@ -96,10 +96,10 @@ def test_a_second_sender_is_refused_until_the_first_is_silent(
     assert all(taken("b:2", 2.6 + 0.05 * k) for k in range(40))
     refused, silent = (each.partition("5005: ")[2] for each in caplog.messages)
     assert refused == (
-        "a message is dropped: b:2 sends while a:1 does, which was first and is "
-        "accepted alone until it is silent for 2 s"
+        "a message is dropped: b:2 is ignored: a:1 sent first, and is the only "
+        "sender accepted until it has been silent for 2 s"
     )
-    assert silent.startswith("a:1 is silent for 2 s; the reference rests where")
+    assert silent.startswith("a:1 has been silent for 2 s; the reference rests where")
 
 
 @pytest.mark.parametrize("source", ["udp://5005", "udp://a:5005/x/y", "udp://a:5/?"])
@@ -109,7 +109,7 @@ def test_a_wrong_address_is_named(source: str) -> None:
 
 
 def test_a_name_that_no_computer_can_have_is_told() -> None:
-    with pytest.raises(StreamError, match="cannot listen there: no name of a computer"):
+    with pytest.raises(StreamError, match="cannot listen there: not a host name"):
         opened(f"udp://{70 * 'ö'}:5005", Space(3, False))
 
 
@@ -123,7 +123,7 @@ def test_a_port_in_use_is_told_and_streams_of_one_process_share_it(port: int) ->
     with pytest.raises(StreamError, match="already carries 1 numbers; this stream"):
         Stream([0.0] * 2, source=f"udp://127.0.0.1:{port}").anchored(None).sample(0.0)
     with pytest.raises(
-        StreamError, match="another stream of this process receives all"
+        StreamError, match="another stream of this process listens there"
     ):
         listening(port, "/left")
 
@@ -214,7 +214,7 @@ def test_one_stream_of_two_poses_or_two_senders_lead_two_hands(
         if senders == 2:  # each keeps to its own hand
             sender.sendto(data, ("127.0.0.1", port))
             wait_until(lambda: all(each.run.inbox.rejected for each in streams))
-            assert re.match(r"right: \S+ sends while", streams[0].run.last_rejection)
+            assert re.match(r"right: \S+ is ignored: ", streams[0].run.last_rejection)
 
     run = experiment.run(on_row=lead)
     other.close()

@@ -101,7 +101,7 @@ def test_a_reflex_is_told_and_reset_only_when_asked(tmp_path: Path) -> None:
         arm = connect(box.address, experiment.robot, PERIOD)
         report = moved(arm, log=tmp_path / "pushed.journal")
         assert report.ended == "fault"
-        (name,) = re.findall(r"(\w+_reflex): the hand|a joint felt", report.reason)
+        (name,) = re.findall(r"(\w+_reflex): the external", report.reason)
         assert report.silent  # the arm holds itself
         assert arm.fault is not None
         assert arm.fault in report.reason

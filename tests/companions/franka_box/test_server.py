@@ -157,7 +157,7 @@ def test_datagrams_that_are_no_commands_are_ignored() -> None:
         assert rig.server.client is not None
         assert rig.server.client.malformed == 3
         assert rig.server.client.outdated >= 1
-        assert rig.tells("that is no command")
+        assert rig.tells("that is not a command")
 
 
 def test_random_bytes_never_stop_the_box() -> None:
@@ -224,4 +224,4 @@ def test_a_client_that_says_nothing_makes_room_for_the_next_one(
     monkeypatch.setattr(connection, "_PATIENCE", 0.0)
     with served() as rig, client(rig):  # it is silent
         assert serves(rig)
-        assert rig.tells("sends nothing")
+        assert rig.tells("another client is waiting")

@@ -77,7 +77,7 @@ def test_inertias_are_named_and_their_cure_helps(look: Look) -> None:
 
 @pytest.mark.parametrize(("limit", "severity", "message"), [
     (LIMIT.replace("-3", "4"), "error", "lower limit 4 is above its upper limit 3"),
-    (LIMIT.replace("-3", "3"), "warning", "both 3: taken for no limit"),
+    (LIMIT.replace("-3", "3"), "warning", "both 3: treated as no limit"),
     ("", "error", "revolute without <limit>"),
     (LIMIT.replace('effort="9"', ""), "error", "<limit> without effort"),
     (LIMIT.replace('"9"', '"-1"', 1), "error", "effort limit -1 is negative"),

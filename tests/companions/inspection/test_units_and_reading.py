@@ -117,12 +117,12 @@ def test_what_nobody_reads_is_named(look: Look) -> None:
     text = text.replace("</joint>", '<calibration rising="0.1"/></joint>', 1)
     found = {f.element: f.message for f in look(text)["not read"]}
     assert found == {
-        "<transmission>": "of 'gear' is not read: but for its rotor: positions, speeds "
+        "<transmission>": "of 'gear' is not read: except its rotor: positions, speeds "
         "and efforts are the joints'",
-        "<gazebo>": "of 'upper', 'lower' is not read: it is for Gazebo alone",
+        "<gazebo>": "of 'upper', 'lower' is not read: only Gazebo uses it",
         "<sensor>": "of 'eye' is not read",
-        "<calibration>": "of 'shoulder' is not read: positions count from where the "
-        "model has its zero",
+        "<calibration>": "of 'shoulder' is not read: positions are measured from "
+        "the zero of the model",
     }
     assert "not read" not in look(ARM)
 
@@ -141,7 +141,10 @@ def test_followers_that_bound_their_leaders_are_named(look: Look) -> None:
     text = chain(("leader", "revolute", ""), ("follower", "revolute", mimic))
     (never,) = look(text)["mimic"]
     assert never.severity == "warning"
-    assert "from -12 to -6, whose own are -3 to 3: they do not count" in never.message
+    assert (
+        "from -12 to -6, whose own are -3 to 3: the follower's limits are"
+        in never.message
+    )
     ghost = chain(("leader", "revolute", follow("ghost")))
     (error,) = look(ghost)["mimic"]
     assert (error.severity, "'ghost'" in error.message) == ("error", True)
@@ -179,7 +182,7 @@ def test_an_srdf_is_looked_at(look: Look, tmp_path: Path) -> None:
     srdf.write_text(pair.format("lowr"))
     (found,) = look(ARM)["srdf"]
     assert found.message.startswith(
-        "it leaves out pairs of links that are not there: 'lowr'"
+        "it disables collisions of links that do not exist: 'lowr'"
     )
     assert "lower" in found.message
     srdf.write_text("<robot>")

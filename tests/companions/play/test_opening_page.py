@@ -108,7 +108,7 @@ def test_a_page_that_dies_before_its_key_was_held(
     opening = SimpleNamespace(open=lambda: ready.append(True))
     page = SteeringPage(process, opening)  # type: ignore[arg-type]
     monkeypatch.setattr(steering, "_rehearse", lambda *_: None)
-    with pytest.raises(ViewerError, match="before anybody held its key"):
+    with pytest.raises(ViewerError, match="before its key was held"):
         page.let_steer(experiment, OperatorRequests(), tmp_path / "journal")
     assert ready == [True]  # it was open
     channel.close()

@@ -60,7 +60,7 @@ def test_a_figure_for_a_paper_has_its_width_and_chosen_panels(
     ):
         with pytest.raises(PlotError, match=why):
             plots.diagnostics_figure(log, **wrong)
-    with pytest.raises(PlotError, match="there are no distances to draw"):
+    with pytest.raises(PlotError, match="the logs have no distances to draw"):
         plots.diagnostics_figure(spatial()["pose"], panels=["distances"])
     files = [str(log.save(tmp_path / f"{name}.npz")) for name in ("a", "b")]
     assert main(["plot", *files, "--panels", "errors, field", "--width", "9cm"]) == 0
@@ -102,5 +102,5 @@ def test_determinants_of_different_sizes_are_not_compared(log: Rollout) -> None:
     )
     assert not [title for title in diagnostics if "Determinant" in title]
     assert "(c)  Singular values" in paper
-    with pytest.raises(PlotError, match="no determinant to draw, or none that compare"):
+    with pytest.raises(PlotError, match="the logs have no determinant to draw"):
         plots.diagnostics_figure(log, steps, panels=["determinant"])

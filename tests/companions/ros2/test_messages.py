@@ -80,7 +80,7 @@ def test_ends_of_a_topic_see_each_other() -> None:
     topic, _, _ = fresh()
     node = Node(DOMAIN)
     publisher = node.publisher(topic, JointState)
-    assert publisher.why_none().startswith(f"nobody listens to {topic} in domain ")
+    assert publisher.why_none().startswith(f"no subscriber of {topic} in domain ")
     subscription = Node(DOMAIN).subscription(topic, JointState)
     assert publisher.matched == subscription.matched == 1
     wrong = node.subscription(topic, Float64MultiArray)

@@ -123,7 +123,7 @@ def test_the_loop_drives_a_client_that_is_a_robot(tmp_path: Path) -> None:
     assert report.ended == "fault"
     assert report.reason in {
         "no new state for 201 periods",
-        f"the effort cannot be sent: nobody listens to {controller}/commands any more",
+        f"the effort cannot be sent: no subscriber of {controller}/commands is left",
     }
     efforts = [tau for _, _, _, tau in log]
     assert efforts == hardware.sent[:COUNT]
@@ -141,6 +141,6 @@ def test_mistakes_at_the_command_line_are_one_line(
 ) -> None:
     assert ros2_robot.main(["panda_obstacle", "ros2://eff?domains=1"]) == 2
     assert capsys.readouterr().err == (
-        "hsp: ros2://eff?domains=1: there is no option 'domains'; did you mean "
+        "hsp: ros2://eff?domains=1: unknown option 'domains'; did you mean "
         "'domain'? (known: domain, states, joints)\n"
     )

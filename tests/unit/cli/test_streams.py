@@ -112,7 +112,7 @@ def test_what_never_ends_is_no_log_and_no_recording(kind: str, tmp_path: Path) -
         path.symlink_to("/dev/zero")
     with pytest.raises(LogError, match="a device or a pipe"):
         Rollout.load(path)
-    with pytest.raises(LogError, match="is no journal"):
+    with pytest.raises(LogError, match="is not a journal"):
         JournalReader(path).read()
     with pytest.raises(StreamError, match="no file, but a folder, a device or a pipe"):
         read_recording(path)

@@ -118,7 +118,7 @@ def test_with_defaults_no_key_is_missing() -> None:
 def test_what_only_python_can_say_is_named() -> None:
     cost = FunctionCost(lambda q, t: 0.0)
     model = NullSpaceSettings(fields=[cost])
-    with pytest.raises(ConfigError, match=r"^fields\.0.function: YAML cannot say"):
+    with pytest.raises(ConfigError, match=r"^fields\.0.function: YAML cannot express"):
         plain_data(model)
 
 

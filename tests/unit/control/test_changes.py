@@ -231,7 +231,7 @@ def gains(frequency: float) -> hsp.Gains:
         (lambda c: c.at(1).exchange("rets", hsp.Rest()), "no field 'rets'; did you"),
         (
             lambda c: c.at(1).exchange("rest", hsp.fields.Uncontrolled()),
-            "replaces no other field",
+            "cannot replace a field",
         ),
         (
             lambda c: c.at(1).exchange(

@@ -52,7 +52,7 @@ def test_a_state_with_the_time_of_a_clock_is_said() -> None:
     robot = hsp.Robot.load("panda")
     controller = hsp.Controller(robot, [hsp.FramePosition()])
     state = robot.state(1.76e9, robot.home(), np.zeros(7))
-    with pytest.warns(ClockWarning, match=r"at t = 1760000000 s of its state: .* give"):
+    with pytest.warns(ClockWarning, match=r"has t = 1760000000 s, but .* call"):
         controller.compute(state)
 
 

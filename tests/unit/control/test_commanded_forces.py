@@ -307,7 +307,7 @@ TIPPING = SurfaceContact(
         ),
         (
             lambda: SlidingContact(TIP, force=CommandedForce([0.0, 0, 1, 0, 0, 0])),
-            "a sliding contact takes 1 .it slides. or 3",
+            "a sliding contact needs 1 .it slides. or 3",
         ),
     ],
 )

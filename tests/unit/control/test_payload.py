@@ -231,7 +231,7 @@ def test_what_static_effort_looks_at_counts_it() -> None:
         (("panda_hand", -1.0), "mass: -1.0 is negative"),
         (("panda_hand", 1.0, [0, 0, 0], [1, 2, 9]), "inertia: .*sum of the others"),
         (("panda_hand", 1.0, [0, 0, 0], [1, 2]), r"inertia: has shape \(2,\)"),
-        (("panda_hand", 0.0, [0, 0, 0], 0.1), "inertia: .*body without mass"),
+        (("panda_hand", 0.0, [0, 0, 0], 0.1), "inertia: is not 0, but the mass is"),
     ],
 )
 def test_what_is_no_payload_is_refused(change: Any, message: str) -> None:

@@ -271,7 +271,7 @@ REFUSED: dict[str, tuple[Callable[[], Any], str]] = {
     "half a joint": (lambda: chain(joint(parent=0.5)), "parent is a whole number; got"),
     "no mass": (lambda: chain(joint(mass=np.nan)), "'a': its mass is not 0 or more"),
     "less than no mass": (lambda: chain(joint(mass=-1.0)), "mass is not 0 or more"),
-    "no axis": (lambda: chain(joint(axis=(0.0,) * 3)), "its axis has not the norm 1"),
+    "no axis": (lambda: chain(joint(axis=(0.0,) * 3)), "its axis does not have norm 1"),
     "no inertia": (lambda: chain(joint(inertia=(np.nan,) * 9)), "inertia is not fin"),
     "no armature": (
         lambda: chain(joint(), armature=("x",)),
@@ -359,7 +359,7 @@ def test_a_barrier_does_not_write_beyond_its_rows() -> None:
         share=0.1, bandwidth=1.0, look_ahead=0.0, near=0.1, motors=indices(0),
         limit=one, effort=one, slope=np.eye(1), drift=one, v=one, rows=rows,
     )  # fmt: skip
-    with pytest.raises(ValueError, match="more rows than there is place for"):
+    with pytest.raises(ValueError, match="more rows than are reserved"):
         call()
     rows["number"][0] = 0
     call()

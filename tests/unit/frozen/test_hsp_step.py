@@ -54,7 +54,9 @@ def q(controller: hsp.Controller) -> np.ndarray:
 def test_no_file(tmp_path: Path) -> None:
     with pytest.raises(RuntimeError, match=r"missing\.hsp: it cannot be read"):
         Opened(tmp_path / "missing.hsp")
-    with pytest.raises(RuntimeError, match=r"it cannot be read|no frozen controller"):
+    with pytest.raises(
+        RuntimeError, match=r"it cannot be read|not a frozen controller"
+    ):
         Opened(tmp_path)
     assert LIB.hsp_open(None) is None
     assert b"no file" in LIB.hsp_last_error(None)
@@ -64,7 +66,7 @@ def test_no_file(tmp_path: Path) -> None:
 def test_another_file(content: bytes, tmp_path: Path) -> None:
     other = tmp_path / "other.hsp"
     other.write_bytes(content)
-    with pytest.raises(RuntimeError, match="it is no frozen controller"):
+    with pytest.raises(RuntimeError, match="it is not a frozen controller"):
         Opened(other)
 
 
@@ -75,12 +77,15 @@ def test_a_flipped_byte_and_a_cut_file(frozen: Path, tmp_path: Path) -> None:
         flipped = bytearray(content)
         flipped[place] ^= 1 << rng.integers(8)
         changed.write_bytes(flipped)
-        with pytest.raises(RuntimeError, match=r"changed or cut|no frozen controller"):
+        with pytest.raises(
+            RuntimeError, match=r"changed or truncated|not a frozen controller"
+        ):
             Opened(changed)
     for length in (8, 11, 12, 13, *rng.integers(len(content), size=30)):
         changed.write_bytes(content[:length])
         with pytest.raises(
-            RuntimeError, match=r"changed or cut|no frozen controller|ends too early"
+            RuntimeError,
+            match=r"changed or truncated|not a frozen controller|ends too early",
         ):
             Opened(changed)
 

@@ -273,7 +273,7 @@ def test_a_robot_that_its_friction_can_hold_is_not_frozen(friction: float) -> No
     if friction == 1.0:
         assert report.ended == "completed", report.reason
     else:
-        assert "stands to the last bit: its effort is" in report.reason
+        assert "stays the same to the last bit: its effort is" in report.reason
         assert "its sensor is dead, or it is blocked" in report.reason
 
 

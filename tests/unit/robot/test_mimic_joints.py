@@ -106,7 +106,7 @@ def test_limits_that_contradict_are_named(
     assert robot.position_limits()[1][0] == 3.0
     assert (
         "joint 'follower': its position limits allow its leader 'leader' to be from "
-        "3.9 to 4.9, whose own are -3 to 3: they do not count"
+        "3.9 to 4.9, whose own are -3 to 3: the follower's limits are ignored"
     ) in caplog.text
 
 

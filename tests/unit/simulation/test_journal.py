@@ -201,10 +201,10 @@ def test_a_heading_that_is_lost_takes_its_rows_and_no_others(tmp_path: Path) -> 
 
 DEEP = b'{"meta": ' + b"[" * 200_000 + b"]" * 200_000 + b"}"
 HEADINGS: dict[str, tuple[bytes, str]] = {
-    "no JSON": (b"{", "a heading of the journal is none"),
-    "a list": (b"[]", "a heading of the journal is none"),
-    "no columns": (b'{"meta": {}}', "a heading of the journal is none"),
-    "nested": (DEEP, "a heading of the journal is none"),
+    "no JSON": (b"{", "a heading of the journal is invalid"),
+    "a list": (b"[]", "a heading of the journal is invalid"),
+    "no columns": (b'{"meta": {}}', "a heading of the journal is invalid"),
+    "nested": (DEEP, "a heading of the journal is invalid"),
     "of 51 TiB": (
         b'{"meta": {}, "columns": {"a": [7000000000000]}}',
         "a row would have",
@@ -245,7 +245,7 @@ def test_what_is_no_journal_is_said(run: tuple[Rollout, bytes], tmp_path: Path) 
         Rollout.load(empty)
     other = run[0].save(tmp_path / "b.npz")
     assert not is_journal(other)
-    with pytest.raises(LogError, match="is no journal"):
+    with pytest.raises(LogError, match="is not a journal"):
         JournalReader(other).read()
     with pytest.raises(LogError, match="cannot write the journal"):
         JournalWriter(empty / "below")

@@ -310,13 +310,13 @@ def test_waypoints_count_from_where_the_robot_starts() -> None:
 
 LINES = [[[0.0, 0.0], [1.0, 0.0]], [[1.0, 0.0], [0.0, 1.0]]]
 REFUSED: dict[str, Callable[[], Any]] = {
-    r"^Along: at s = 2.580 along the path its own motion rests \(at 0.9 s\): no": (
+    r"^Along: at s = 2.580 along the path its own motion stops \(at 0.9 s\): it": (
      lambda: Along(Stops(POINTS, TIMES), 1.0)),
     r"^Along: at s = 1.000 along the path \(its own time is 1 s\) it has a corner": (
      lambda: Along(PiecewisePolynomial([0, 1, 2], LINES), 1.0)),
     r"^Along: at s = 1.414 along the path \(its own time is 0.7854 s\) it has a corner "
     r"or turns back": lambda: Along(Lissajous([1, 1], [2, 2], center=[0, 0]), 1.0),
-    r"^Along: at s = 0.000 along the path its own motion rests \(at 0 s\)": (
+    r"^Along: at s = 0.000 along the path its own motion stops \(at 0 s\)": (
      lambda: Along(hsp.trajectories.Blend(UniformLine([1.0], [0.0]), 0.1, start=[0.0],
                                           start_time=1.0), 1.0, interval=[0, 2])),
     r"^Along: the path has no length": lambda: Along(Hold([1.0]), 1.0, interval=[0, 1]),
@@ -332,8 +332,8 @@ REFUSED: dict[str, Callable[[], Any]] = {
      lambda: Along(Circle(0.5, 1, [0, 0]), 2.0, 2.0)),
     r"^origin: start cannot move a Along": (
      lambda: Along(Circle(0.5, 1), 1.0, origin="start").anchored([0, 0, 0])),
-    r"^Polyline: waypoint 1 is a corner of 90 degrees: no speed but 0 passes it; give "
-    r"blend_radius, or use stops": lambda: Polyline(CORNER, 1, 1),
+    r"^Polyline: waypoint 1 is a corner of 90 degrees: it can only be passed at rest; "
+    r"give blend_radius, or use stops": lambda: Polyline(CORNER, 1, 1),
     r"^Polyline: the path turns back at waypoint 1": (
      lambda: Polyline([[0.0], [1.0], [0.5]], 1, 1, 0.1)),
     r"^Polyline: waypoints 0 and 1 are the same point; a polyline does not pause": (
@@ -348,13 +348,13 @@ REFUSED: dict[str, Callable[[], Any]] = {
     r"1. speed = 0.289 would do": lambda: Polyline(CORNER, 0.5, 1, 0.1),
     r"^PolylinePose: 3 waypoints need as many rotations; there are 2": (
      lambda: PolylinePose(CORNER, 1, 9, 0.3, rotations=[R1, R2])),
-    r"^AlongPose: .* its own motion rests": (
+    r"^AlongPose: .* its own motion stops": (
      lambda: AlongPose(ComposedPose(Stops(POINTS[:3], [0, 1, 2]),
                                     OrientationPath([R1, R2], [0, 2])), 1)),
-    r"^AlongPose: at s = 1.000 along the path its own motion rests \(at 1 s\)": (
+    r"^AlongPose: at s = 1.000 along the path its own motion stops \(at 1 s\)": (
      lambda: AlongPose(ComposedPose(Line([1, 0, 0], 1, start=[0, 0, 0]),
                                     OrientationPath([R1, R2], [0, 2])), 1)),
-    r"^AlongOrientation: at s = .* its own motion rests \(at 1 s\)": (
+    r"^AlongOrientation: at s = .* its own motion stops \(at 1 s\)": (
      lambda: AlongOrientation(OrientationPath([IDENTITY, R1, R2], [0, 1, 2]), 1.0)),
 }  # fmt: skip
 

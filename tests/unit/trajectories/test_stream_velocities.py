@@ -292,7 +292,7 @@ def test_a_message_may_name_other_axes_and_its_record_repeats_them() -> None:
 @pytest.mark.parametrize(("kind", "message", "arguments"), [
     (StreamPose, "axes is 'hand'; needs 'world' or", {
         "velocity": TWIST, "axes": "hand"}),
-    (StreamPose, "axes are those of a velocity that is", {
+    (StreamPose, "axes are only for a velocity without a value", {
         "value": [0, 0, 0, 0, 0, 0, 1], "velocity": TWIST, "axes": "tool"}),
 ])  # fmt: skip
 def test_wrong_axes_are_refused(kind: Any, message: str, arguments: Any) -> None:

@@ -21,20 +21,20 @@ class Ghosts {
 
   made(color, opacity) {
     const ghost = node("/robot").clone();
-    ghost.getObjectByName("universe")?.removeFromParent();  // what does not move is there
+    ghost.getObjectByName("universe")?.removeFromParent();  // the parts that do not move
     ghost.name = "ghost";
     makeGhost(ghost, color, opacity);
     node("").add(ghost);
     return ghost;
   }
 
-  // The robot was drawn anew: what was copied is another one.
+  // The robot was drawn anew: the ghosts are copies of the old one.
   clear() {
     for (const ghost of [...this.groups.values()].flat()) ghost.removeFromParent();
     this.groups.clear();
   }
 
-  // What ghosts are is said above the first one's highest joint.
+  // The label of ghosts stands above the first one's highest joint.
   label(name, text, color) {
     const known = this.labels.get(name) ?? make("div", {className: "play-label ghost"});
     if (!this.labels.has(name)) part(".play-overlay").append(known);

@@ -36,9 +36,9 @@ class Legend {
 
   // Show the rows of a caption (viewer/commands.py); repeated ones are kept, and with them the focus.
   show(entries) {
-    const told = JSON.stringify(entries);
-    if (told === this.told) return;
-    this.told = told;
+    const shownText = JSON.stringify(entries);
+    if (shownText === this.shownText) return;
+    this.shownText = shownText;
     this.rows = entries.map((entry) => [entry, this.row(entry)]);
     this.toggle.hidden = !entries.length;
     const own = this.rows.filter(([{short}]) => !short);

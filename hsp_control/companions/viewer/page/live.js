@@ -141,7 +141,7 @@ class LivePlot extends Plot {
   range(low, high) {
     if (low === null) return this.log ? [-3, 0] : [0, 1];
     if (this.log) {
-      const least = Math.max(Math.floor(low - 0.05), -9);  // below is nothing to see
+      const least = Math.max(Math.floor(low - 0.05), -9);  // smaller values are not shown
       return [least, Math.max(Math.ceil(high + 0.05), least + 1)];
     }
     if (Math.max(-low, high) < 1e-9) return [0, 1];  // nothing but rounding

@@ -23,11 +23,11 @@ class RunSwitch {
     this.choices = [...names.keys(), null];
     this.buttons = this.choices.map((run) => {
       const text = names[run] ?? (names.length === 2 ? "both" : "all");
-      return makeButton({title: `${text} (w: the next)`}, () => this.select(run),
+      return makeButton({title: `${text} (w: next)`}, () => this.select(run),
                         ...(run === null ? [] : [Side.sample(run)]), make("span", {}, text));
     });
     part("#stage").append(make("div", {className: "run-switch", role: "group",
-                                   ariaLabel: "Runs (w: the next)"}, ...this.buttons));
+                                   ariaLabel: "Runs (w: next)"}, ...this.buttons));
     onKey(({key}) => key === "w" && (() => {
       const next = this.choices.indexOf(this.selected) + 1;
       this.select(this.choices[next % this.choices.length]);

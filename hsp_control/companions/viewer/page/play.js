@@ -5,7 +5,7 @@
 "use strict";
 
 class Play {
-  static ECHO = 400;  // ms: after a release or a change, the program's older word is not shown
+  static ECHO = 400;  // ms: after a release or a change, the program's older values are not shown
 
   constructor(viewer) {
     Object.assign(this, {viewer, sight: new Sight(viewer), mine: true, holdKey: null, taken: false});
@@ -13,10 +13,10 @@ class Play {
     this.gizmos = new Map();  // key -> Gizmo, of a target or an obstacle
     this.touched = new Map();  // key of a thing or a setting -> when the hand has changed it [ms]
     this.state = {t: 0, running: true, rate: 1, message: "", level: "info"};
-    this.laws = [];  // that can be stepped beside it
+    this.laws = [];  // with which it can be compared
     this.law = "";  // which one is; "": none
     this.ghosts = new Ghosts(viewer);
-    this.away = {};  // task -> what to say of a target that is not reached
+    this.away = {};  // task -> label of a target that is not reached
     this.setup = this.selected = this.force = this.pull = null;
   }
 
@@ -59,13 +59,13 @@ class Play {
     this.hand = new PlayHand(this, this.viewer);
     this.keys = new PlayKeys(this);
     this.viewer.scene.onBeforeRender = () => this.layOut();
-    legend.keepClosed = true;  // what is in the picture is to be touched
+    legend.keepClosed = true;  // the whole scene can be dragged
     legend.setOpen(false);
     this.panel.setOpen(!this.panel.narrow.matches);
-    // A page whose address has "full" draws fully all the same: for pictures.
+    // A page whose address has "full" draws everything all the same: for pictures.
     if (isSoftware() && !new URLSearchParams(location.search).has("full")) {
       drawLightly();
-      this.bar.say("This browser draws without a graphics card: the picture is a light one.");
+      this.bar.notify("No graphics card is used: shadows and reflections are off.");
     }
     refit();  // there is no legend to make room for
   }
@@ -89,13 +89,13 @@ class Play {
 
   showPlaces(places) { for (const [key, pose] of places) this.showAt(key, pose); }
 
-  // Show a thing where the program has it, unless the hand has it.
+  // Show a thing where the program has it, unless it is being dragged.
   showAt(key, pose) {
     const {grip} = this.hand, held = grip?.moved && grip.key === key;
     if (!held && this.isFresh(key)) this.gizmos.get(key)?.setPose(pose);
   }
 
-  // Whether the program's word on a thing or a setting is newer than what the hand has done.
+  // Whether the program's value of a thing or a setting is newer than the user's change.
   isFresh(key) { return !(performance.now() < this.touched.get(key) + Play.ECHO); }
   touch(key) { this.touched.set(key, performance.now()); }
 
@@ -124,16 +124,16 @@ class Play {
     this.showMarks();
   }
 
-  // Say something to the program, after what is pending.
+  // Send a message to the program, after the pending ones.
   send(message) {
     this.flush();
-    const heard = this.viewer.connection?.readyState === WebSocket.OPEN;
-    if (heard && (this.mine || message.do === "take_over")) {
+    const connected = this.viewer.connection?.readyState === WebSocket.OPEN;
+    if (connected && (this.mine || message.do === "take_over")) {
       this.viewer.connection.send(JSON.stringify(message));
     }
   }
 
-  // Say it with the next frame; a newer message of its key replaces it.
+  // Send it with the next frame; a newer message with its key replaces it.
   sendLater(key, message) {
     if (!this.pending.size) requestAnimationFrame(() => this.flush());
     this.pending.set(key, message);
@@ -171,7 +171,7 @@ class Play {
     this.send({do: "let_go"});
   }
 
-  // For a moment, show a thing where the hand has put it.
+  // For a moment, show a thing where the user has put it.
   hold(key) {
     this.touch(key);
     this.panel.showMoved(key, true);
@@ -181,13 +181,13 @@ class Play {
   act(what) { this.send({do: what}); }
   toggle() { this.act(this.state.running ? "pause" : "go"); }
 
-  // Step the next other law beside it; after the last one, none.
+  // Compare with the next law; after the last one with none.
   compareNext() {
     const law = this.laws[this.laws.indexOf(this.law) + 1] ?? "";
     this.send({do: "compare", law});
   }
 
-  // Ask for a preview of self-motion, or no more.
+  // Switch the preview of self-motion on or off.
   togglePreview() { this.send({do: "preview", on: !this.previewed}); }
 
   showPreview({on}) {

@@ -1,5 +1,5 @@
 // The handles of what is moved: of a target a ball, arrows along the world's axes and rings about
-// its own; of an obstacle itself, and arrows. A line to the floor tells where they are. Sizes are in
+// its own; of an obstacle itself, and arrows. A line to the floor shows their height. Sizes are in
 // pixels, whatever the distance. Where the robot hides a handle it is drawn through it, translucent. A
 // pointer finds handles by its distance from them on the screen; a finger's reach is larger.
 
@@ -29,7 +29,7 @@ class Gizmo {
   get ball() { return Gizmo.BALL; }
   get movable() { return this.target.kind !== "orientation"; }
 
-  // What the program is told: which thing, and where it is wanted.
+  // The message to the program: the name of the thing, and its desired place.
   address() { return {target: this.target.name}; }
   wish() { return {do: "move", ...this.address(), pose: this.pose()}; }
 
@@ -126,7 +126,7 @@ class Gizmo {
     return Math.min(...nearest.map((point) => point?.distanceTo(pixel) ?? Infinity));
   }
 
-  // Drag a handle: returns a function that takes pixels, moves the gizmo, and says how far.
+  // Drag a handle: returns a function of pixels that moves the gizmo and returns the way as text.
   grab(handle, sight, x, y) {
     const from = this.position.clone(), turn = this.turn.clone(), degrees = 180 / Math.PI;
     const radius = Gizmo.RING * this.enlarged;
@@ -200,8 +200,8 @@ class Gizmo {
   static way(from, to) {
     const step = to.clone().sub(from);
     const moved = ["x", "y", "z"].filter((name) => Math.abs(step[name]) > 5e-5);
-    const told = moved.map((name) => `${name} ${Gizmo.signed(100 * step[name])}`);
-    return `${told.join("  ") || "0.0"} cm`;
+    const ways = moved.map((name) => `${name} ${Gizmo.signed(100 * step[name])}`);
+    return `${ways.join("  ") || "0.0"} cm`;
   }
 
   static signed(value) {
@@ -261,8 +261,9 @@ class Gizmo {
   }
 }
 
-// Of an obstacle: it takes the place of the ball, and is dragged to where the robot is in the
-// picture. Of several, only what is pointed at or selected has arrows.
+// The handles of an obstacle. The obstacle itself replaces the ball; near the robot in the picture
+// it is dragged at the robot's depth. Of several obstacles only the one under the pointer or
+// selected has arrows.
 class Obstacle extends Gizmo {
   constructor(obstacle, viewer, alone) {
     super({pose: obstacle.position, color: "#D55E00", ...obstacle}, viewer);  // palette.OBSTACLE

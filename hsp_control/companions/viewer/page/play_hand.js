@@ -60,7 +60,7 @@ class PlayHand {
     if (event.pointerType !== "touch") this.look(event.clientX, event.clientY, event.pointerType);
   }
 
-  // End the drag; what it moved is told that it is free. Silent if another page steers.
+  // End the drag, and release in the program what it moved; not if another page steers (`silent`).
   end(silent = false) {
     const {grip, play, pane} = this;
     if (!grip) return;
@@ -109,7 +109,7 @@ class PlayHand {
             local: node(path).worldToLocal(first.point.clone())};
   }
 
-  // Look what is under a resting pointer, at most once a frame.
+  // Find what is under a pointer without a button, at most once a frame.
   look(...pointer) {
     if (!this.looking) requestAnimationFrame(() => {
       const at = this.looking, {play} = this;
@@ -136,7 +136,7 @@ class PlayHand {
   }
 }
 
-// Call a function when the user looks away: nothing stays held.
+// Call a function when the page loses the focus, so that nothing stays held.
 function whenAway(act) {
   on(window, "blur pagehide", act);
   on(document, "visibilitychange", () => { if (document.hidden) act(); });

@@ -1,4 +1,4 @@
-// What is around the scene of `hsp play`: the bar below it, the panel beside it, and what is drawn
+// The page around the scene of `hsp play`: the bar below it, the panel beside it, and the labels
 // over it in pixels.
 
 class PlayBar {
@@ -27,8 +27,8 @@ class PlayBar {
     onPress(film, () => { film.ariaPressed = camera.film(); });
   }
 
-  // Say something for a while, unless the program has something to say.
-  say(words) {
+  // Show a message for a while, until the program reports one.
+  notify(words) {
     this.status.textContent = words;
     this.timer = setTimeout(() => { this.status.textContent = ""; }, 8000);
   }
@@ -40,10 +40,10 @@ class PlayBar {
       : [this.play.simulated ? "paused" : "stopped"]);
     const ariaLabel = running ? "Pause" : "Go";
     Object.assign(this.toggle, {ariaLabel, title: `${ariaLabel} (space)`});
-    if ((this.told ?? "") !== message) {
-      this.told = this.status.textContent = message;
+    if ((this.reported ?? "") !== message) {
+      this.reported = this.status.textContent = message;
       clearTimeout(this.timer);
-      // What was done is said for a while; what is wrong stays.
+      // A report disappears after a while; a warning stays.
       if (level !== "warning") this.timer = setTimeout(() => { this.status.textContent = ""; }, 6000);
     }
     this.status.classList.toggle("warning", level === "warning");
@@ -52,7 +52,7 @@ class PlayBar {
   showLaws(laws, law) {
     this.other.hidden = !laws.length;
     this.other.ariaPressed = Boolean(law);
-    const title = law ? `The ghost: ${law}` : "The other law beside it, as a ghost";
+    const title = law ? `The ghost: ${law}` : "Compare with the other law, a ghost";
     if (this.other.title !== `${title} (o)`) this.other.title = `${title} (o)`;
   }
 
@@ -64,7 +64,8 @@ class PlayBar {
 }
 
 // The dead-man's key of a live loop: the robot moves only while somebody holds the space bar, or
-// this button. The page repeats that it is held; the loop stops the robot when it hears nothing.
+// this button. The page repeats a message while it is held; the loop stops the robot when none
+// arrives.
 class PlayHold {
   constructor(play) {
     Object.assign(this, {play, held: false, button: part(".play-bar .hold")});
@@ -82,17 +83,17 @@ class PlayHold {
     if (held === this.held) return;
     this.held = this.button.ariaPressed = held;
     clearInterval(this.timer);
-    const say = () => this.play.send({do: "hold", held});
-    say();
-    if (held) this.timer = setInterval(say, 50);  // ms; the loop waits for 500
+    const report = () => this.play.send({do: "hold", held});
+    report();
+    if (held) this.timer = setInterval(report, 50);  // ms; the loop waits for 500
   }
 }
 
 // The panel: switches, live plots, the other controls in their groups. A change is sent, and the value
-// that the program then reports, with each picture, is shown: a refused one goes back. While a slider
-// is held, and a moment after each change, what the program said before does not count.
+// that the program then reports, with each picture, is shown: a refused one goes back. While a
+// slider is held, and a moment after each change, older values from the program are ignored.
 class PlayPanel {
-  static PATIENCE = 5000;  // ms; a program that draws slowly hears of a change later
+  static PATIENCE = 5000;  // ms; a program that draws slowly confirms late
   static NARROW = "(max-width: 620px), (max-width: 860px) and (max-aspect-ratio: 6/5)";
 
   constructor(play) {
@@ -117,7 +118,7 @@ class PlayPanel {
   build({controls}, gizmos) {
     part("h2", this.box).textContent = "Controls and plots";  // the title is above the scene
     this.setters = new Map();
-    this.wanted = new Map();  // setting -> [value, when], until the program says the same
+    this.wanted = new Map();  // setting -> [value, when], until the program confirms it
     this.things = new Map(gizmos.map((gizmo) => [gizmo.key, this.thing(gizmo)]));
     const {switch: switches = [], slider: sliders = []} = Object.groupBy(controls, ({kind}) => kind);
     const rows = [...gizmos.map(({key, noun}) => [`${noun}s`, this.things.get(key)]),
@@ -195,7 +196,7 @@ class PlayPanel {
     this.play.sendLater(key, {do: "set", id, value});
   }
 
-  // Show what the program says, once it has heard of the last change or has refused it.
+  // Show the program's values, once it has confirmed or refused the last change.
   setValues(values) {
     const refused = this.play.state.level === "warning";
     for (const [id, value] of Object.entries(values)) {
@@ -263,7 +264,7 @@ class PlayPast {
   leave() { this.input.value = 0; }
 }
 
-// Each joint's position in its range, its speed and its effort, over their limits.
+// Each joint's position within its range, and its speed and effort relative to their limits.
 class PlayBars {
   static NEAR = 0.95;  // of a limit: the bar is marked
 
@@ -280,7 +281,7 @@ class PlayBars {
     part("div", this.box).replaceChildren(...heads, ...cells);
   }
 
-  // Names without the words that all have: there is little space.
+  // Names without the words that all share: there is little space.
   static short(names) {
     const words = names.map((name) => name.split("_"));
     const own = (word) => !words.every((others) => others.includes(word));
@@ -314,7 +315,7 @@ class PlayCamera {
     this.canvas.toBlob((blob) => this.save(blob, "png"));
   }
 
-  // Begin a film, or end it and save it; return whether one is being made.
+  // Start a film, or stop and save it; return whether one is being recorded.
   film() {
     if (this.recorder) {
       this.recorder.stop();
@@ -361,7 +362,7 @@ class PlayOverlay {
     part(".play-handles").replaceChildren(...this.buttons.values(), ...this.labels.values());
   }
 
-  // Put a gizmo's button at its place, and what there is to say above its radius [px].
+  // Put a gizmo's button at its place, and its text above its radius [px].
   place(key, {x, y, ahead}, radius, text, away) {
     const label = this.labels.get(key);
     label.hidden = !ahead || !text;

@@ -7,7 +7,7 @@ class Sight {
 
   constructor(viewer) { this.viewer = viewer; }
 
-  // Take over the camera's present place; call it before a series of questions.
+  // Read the camera's present pose; call it before a series of queries.
   update() {
     const {camera, scene, renderer} = this.viewer, {Vector3} = MeshCat.THREE;
     camera.updateWorldMatrix(true, false);
@@ -55,7 +55,7 @@ class Sight {
   }
 
   // The next four take the pixel at which a thing is grabbed, and return a function from later
-  // pixels to its new place or angle; null where the pointer tells none. The thing keeps its
+  // pixels to its new place or angle; null where the pointer determines none. The thing keeps its
   // offset from the pointer: it never jumps.
 
   // A point's places in the plane through it.
@@ -114,7 +114,7 @@ class Sight {
     };
   }
 
-  // Angles about an axis [rad]; more than a turn is counted on. The radius is in pixels.
+  // Angles about an axis [rad]; they continue beyond one turn. The radius is in pixels.
   about(center, axis, radius, x, y) {
     const eye = this.towards(center);
     if (Math.abs(eye.dot(axis)) < 0.2) {  // from its edge: its near side is moved

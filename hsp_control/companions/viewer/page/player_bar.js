@@ -1,7 +1,7 @@
 // The player's bar: buttons, the time line with its bands, and the keys of docs/companions/view.md.
-// A row of bands for each kind of thing that acted on the law. A band under the pointer, or with the
-// focus, is named with its times; a click goes to its start. While the player's time is inside a
-// band, its caption stands above the bar.
+// Each kind of event, such as an active limit, has a row of bands. A band under the pointer, or
+// with the focus, is named with its times; a click goes to its start. While the player's time is
+// inside a band, its caption stands above the bar.
 
 class PlayerBar {
   constructor(player, bar) {
@@ -69,9 +69,9 @@ class PlayerBar {
     this.clock.textContent = `${time.toFixed(2)} / ${horizon.toFixed(2)} s`;
     const inside = loaded ? marks.filter(({spans}) =>
       spans.some(([from, to]) => from <= time && time <= to)) : [];
-    const told = inside.map(({caption}) => caption).join("\n");
-    if (told === this.told) return;
-    this.told = told;
+    const captions = inside.map(({caption}) => caption).join("\n");
+    if (captions === this.captions) return;
+    this.captions = captions;
     this.moments.replaceChildren(...inside.map(({caption, color}) =>
       make("span", {style: `--color: ${color}`}, caption)));
   }

@@ -20,7 +20,7 @@ class Plot {
     this.figure = make("figure");
     this.outputs = entries.map(() => make("output", {ariaLive: "off"}));  // beside the names
     this.buttons = entries.map(({name, color, dashed, band}, k) => makeButton(
-      {title: "Show it alone, or all", ariaPressed: false,
+      {title: "Show this curve alone, or all", ariaPressed: false,
        style: `--color: ${Plot.shade(color)}`,
        className: dashed ? "dashed" : band ? "band" : ""},
       () => this.isolate(this.alone === k ? null : k), make("span", {}, name), this.outputs[k]));
@@ -49,7 +49,7 @@ class Plot {
     const labelled = {label, labelFont: font, labelSize: 14, labelGap: 0};
     const {clientWidth, clientHeight} = this.figure;
     this.chart?.destroy();
-    this.chart = null;  // what is told while the next one is made is not for the last one
+    this.chart = null;  // events while the next one is made are not for the last one
     this.chart = new uPlot({
       width: clientWidth || 300, height: clientHeight || Plot.HEIGHT,
       padding: [6, 20, 0, label ? 0 : 14], legend: {show: false}, scales, hooks,
@@ -82,7 +82,7 @@ class Plot {
     };
   }
 
-  // Ticks where values are exponents of ten: at most five. uPlot knows no steps of 3 or 4.
+  // Ticks where values are exponents of ten: at most five. uPlot has no steps of 3 or 4.
   static DECADES = {
     incrs: (_, axis, low, high) =>
       [[1, 2, 5, 10, 20].find((step) => step >= (high - low) / 4.5) ?? 50], space: 1,

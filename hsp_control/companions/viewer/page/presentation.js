@@ -1,6 +1,6 @@
 // Presenting: the scene, its title and what happens now, as large as the screen. Legend, panels and
 // details are put away. When the pointer has rested for two seconds, it and the bar go, too, until
-// it moves, or for the Tab key; and the camera sways about its target, until somebody takes it.
+// it moves, or for the Tab key; and the camera sways about its target, until the user moves it.
 
 class Presentation {
   static REST = 2000;  // ms
@@ -11,7 +11,7 @@ class Presentation {
       : key === "p" ? () => this.toggle()
         : key === "Escape" && this.on ? () => this.set(false) : null);
     on(window, "pointermove pointerdown focusin", ({type, movementX, movementY}) => {
-      // A browser also tells of a pointer that rests while the page moves below it.
+      // Browsers also report a resting pointer when the page moves below it.
       if (type !== "pointermove" || movementX || movementY) this.wake();
     });
     on(document, "fullscreenchange", () => {
@@ -30,7 +30,7 @@ class Presentation {
     this.on = presenting;
     document.body.classList.toggle("presenting", presenting);
     for (const button of this.buttons) button.ariaPressed = presenting;
-    // It may not be allowed, such as in a frame: then the window is all there is.
+    // It may not be allowed, such as in a frame: then the window is used.
     if (presenting) document.documentElement.requestFullscreen?.().catch(() => {});
     else if (document.fullscreenElement) document.exitFullscreen().catch(() => {});
     this.full = false;

@@ -171,7 +171,7 @@ class RunPlot extends Plot {
   range(least, most) {
     const {low, high, logarithmic, edges} = this.panel;
     if ((!this.side.zoomed && this.alone === null) || least === null) return [low, high];
-    // Values beyond the whole axis are clipped: they say nothing about the range.
+    // Values beyond the whole axis are clipped: they do not determine the range.
     const ends = [least, most].map((value) => clamp(value, low, high));
     const needed = [...ends, ...edges.map(({value}) => value)];
     const from = Math.min(...needed), to = Math.max(...needed);
@@ -230,9 +230,9 @@ class RunPlot extends Plot {
       }).join(" | ");
     });
     if (figure !== document.activeElement) return;
-    const told = this.entries.map(({name}, k) => `${name} ${this.outputs[k].textContent}`);
+    const values = this.entries.map(({name}, k) => `${name} ${this.outputs[k].textContent}`);
     Object.assign(figure, {ariaValueMin: side.start, ariaValueMax: side.end, ariaValueNow: time,
-                           ariaValueText: `${moment}: ${told.join(", ")}`});
+                           ariaValueText: `${moment}: ${values.join(", ")}`});
   }
 
   listen() {

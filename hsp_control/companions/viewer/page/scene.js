@@ -1,4 +1,4 @@
-// The scene: Meshcat's viewer, and what the program says beside Meshcat's own commands.
+// The scene: Meshcat's viewer, and the program's commands beyond Meshcat's own.
 "use strict";
 
 const viewer = newViewer(part("#meshcat-pane"));
@@ -24,7 +24,7 @@ viewer.render = () => {
   lengthLabels.update();
 };
 
-// Meshcat takes the window's height; here the element's counts, which may be a part of it.
+// Meshcat uses the window's height; here that of the element, which may be a part of it.
 const fitPane = viewer.set_3d_pane_size.bind(viewer);
 viewer.set_3d_pane_size = () => {
   const {clientWidth, clientHeight} = viewer.dom_element;
@@ -55,7 +55,7 @@ viewer.handle_command = (command) => {
   viewer.set_dirty();
 };
 
-// Without WebGL nothing can be drawn: the page says so instead of staying empty.
+// Without WebGL nothing can be drawn: the page shows a message instead of staying empty.
 function newViewer(pane) {
   try {
     return new MeshCat.Viewer(pane);
@@ -125,7 +125,7 @@ function caption({title, legend: entries, dark}) {
   viewer.scene.environment = dark && !drawsLightly ? viewer.scene.environment ?? studio() : null;
   part("#caption h1").textContent = title;
   legend.show(entries);
-  refit();  // now it is known what title and legend cover
+  refit();  // the sizes of title and legend are known now
 }
 
 function ask({number}) {
@@ -133,7 +133,8 @@ function ask({number}) {
   viewer.connection.send(String(number));
 }
 
-// Connect to the server. When it ends the page says so, and loads the next one at this address.
+// Connect to the server. When it ends the page shows a message, and loads the next one at this
+// address.
 function connect() {
   const address = new URL("scene" + location.search, location.href);  // with its key
   address.protocol = address.protocol.replace("http", "ws");
@@ -184,8 +185,8 @@ async function answersRightly() {
   const secret = await subtle.importKey("raw", bytes(key), {name: "HMAC", hash: "SHA-256"},
                                         false, ["sign"]);
   const right = new Uint8Array(await subtle.sign("HMAC", secret, bytes(question)));
-  const told = await response.text();
-  return told === [...right].map((byte) => byte.toString(16).padStart(2, "0")).join("");
+  const answer = await response.text();
+  return answer === [...right].map((byte) => byte.toString(16).padStart(2, "0")).join("");
 }
 
 // From Pinocchio's axes (z up) to those of three.js (y up).

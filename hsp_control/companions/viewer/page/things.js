@@ -38,7 +38,7 @@ function trailMesh({points, radius, color, sleeve}) {
   return mesh;
 }
 
-// The curve through points, as three.js asks for it: u from 0 to 1, at point i of n: i / (n - 1).
+// The curve through points, as three.js requires it: u from 0 to 1, at point i of n: i / (n - 1).
 // Where points coincide its direction is the one before, and at the start the first.
 function polyline(points) {
   const {Curve, Vector3} = MeshCat.THREE;

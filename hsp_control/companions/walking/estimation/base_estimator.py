@@ -45,11 +45,11 @@ class BaseEstimator(Estimator, type="base"):
     """The base is estimated from an inertial measurement unit and the legs' joints.
 
     By the contact-aided invariant extended Kalman filter
-    (`estimation/invariant_filter.py`). A contact is used while a force presses on it;
-    one without a measured force while it is fully active.
+    (`estimation/invariant_filter.py`). A contact is used while it is loaded; one
+    without a measured force while it is fully active.
 
-    It begins where the robot is measured first. Heading and place drift from there:
-    nothing on board observes them. The noise is that of a small industrial unit, the
+    It starts from the first measured pose. Heading and position drift from there: they
+    are not observable on board. The noise is that of a small industrial unit, the
     ADIS16448, as in the EuRoC data set (Burri et al. 2016, Int. J. Robotics Research).
     """
 
@@ -71,23 +71,23 @@ class BaseEstimator(Estimator, type="base"):
     """Further uncertainty of a point of contact: the links bend, and the ground
     is soft [m]."""
     contacts: Names | None = None
-    """Names of the contacts that stand still while they are pressed [-]; all that do
-    not slide by default."""
+    """Names of the contacts that do not move while they are loaded [-]; by default all
+    that do not slide."""
     contact_force: Positive = 0.1
     """Normal force from which a contact is used, in robot weights [-]."""
     start_tilt: NonNegative = 0.02
-    """How uncertain the tilt is at the start [rad]."""
+    """Initial standard deviation of the tilt [rad]."""
     start_velocity: NonNegative = 0.05
-    """How uncertain the velocity is at the start [m/s]."""
+    """Initial standard deviation of the velocity [m/s]."""
     start_gyroscope_bias: NonNegative = 3.0e-3
-    """How large a bias of the gyroscope may be at the start [rad/s]."""
+    """Initial standard deviation of the gyroscope's bias [rad/s]."""
     start_accelerometer_bias: NonNegative = 0.05
-    """How large a bias of the accelerometer may be at the start [m/s²]."""
+    """Initial standard deviation of the accelerometer's bias [m/s²]."""
 
     def begin(
         self, controller: Controller, inertial: Inertial | None
     ) -> "RunningBaseEstimator":
-        """Return what estimates; see `Estimator.begin`."""
+        """Return the estimator of a run; see `Estimator.begin`."""
         if inertial is None:
             raise EstimationError(
                 "no inertial measurement unit is there; add one to the plant, for "
@@ -124,8 +124,8 @@ class RunningBaseEstimator(RunningEstimator):
             )
         if not controller.contacts:
             raise EstimationError(
-                "there are no contacts, by which legs could say where the base is; "
-                "declare contacts, or remove the estimator"
+                "there are no contacts, from which the legs' kinematics could locate "
+                "the base; declare contacts, or remove the estimator"
             )
         there = {each.name: each for each in controller.contacts}
         still = [name for name, each in there.items() if not each.slides]
@@ -152,7 +152,7 @@ class RunningBaseEstimator(RunningEstimator):
         """Return a measurement whose base is estimated.
 
         Args:
-            measured: What is measured; of its base only the first one is used.
+            measured: The measurement; only its first base pose is used.
 
         Raises:
             EstimationError: If the unit reported nothing.
@@ -198,10 +198,12 @@ class RunningBaseEstimator(RunningEstimator):
                 R @ self._v[:3] - R_true @ v[:3], "m/s", "estimated minus true, world"
             ),
             "estimate.tilt_deviation": LogChannel(
-                np.sqrt(np.diag(P)[ROTATION][:2]), "rad", "what the filter expects"
+                np.sqrt(np.diag(P)[ROTATION][:2]),
+                "rad",
+                "standard deviation by the filter",
             ),
             "estimate.velocity_deviation": LogChannel(
-                np.sqrt(np.diag(P)[VELOCITY]), "m/s", "what the filter expects"
+                np.sqrt(np.diag(P)[VELOCITY]), "m/s", "standard deviation by the filter"
             ),
             "estimate.gyroscope_bias": LogChannel(
                 self.filter.gyroscope_bias, "rad/s", "estimated"
@@ -219,18 +221,18 @@ class RunningBaseEstimator(RunningEstimator):
     # -- the filter -------------------------------------------------------------------
 
     def _started(self, legs: LegKinematics, measured: Measurement) -> InvariantFilter:
-        """Return a filter that begins where the base is measured."""
+        """Return a filter that starts from the measured base."""
         own, (R_unit, p_unit, twist) = self._estimator, legs.unit
         R, q, v = _rotation(measured.q), measured.q, measured.v
         velocity = R @ (v[:3] + np.cross(v[3:6], p_unit) + twist[:3])
         position = q[:3] + R @ p_unit
         P = np.zeros((FIXED, FIXED))
-        upright = np.array([1.0, 1.0, 0.0])  # the heading is as given
+        upright = np.array([1.0, 1.0, 0.0])  # the heading is given
         P[ROTATION, ROTATION] = own.start_tilt**2 * np.diag(upright)
         P[VELOCITY, VELOCITY] = own.start_velocity**2 * np.eye(3)
         P[GYROSCOPE, GYROSCOPE] = own.start_gyroscope_bias**2 * np.eye(3)
         P[ACCELEROMETER, ACCELEROMETER] = own.start_accelerometer_bias**2 * np.eye(3)
-        # The errors of the group turn about the world's origin.
+        # Errors of the group are rotations about the world's origin.
         T = np.eye(FIXED)
         T[VELOCITY, ROTATION], T[POSITION, ROTATION] = skew(velocity), skew(position)
         densities = Densities(
@@ -252,7 +254,7 @@ class RunningBaseEstimator(RunningEstimator):
         measured: Measurement,
         inertial: Inertial,
     ) -> None:
-        """Give the filter the contacts that stand."""
+        """Update the filter with the stance contacts."""
         standing = [each for each in legs.contacts if self._stands(each, measured)]
         names = {each.name for each in standing}
         gone = [key for key in estimate.names if key[0] not in names]
@@ -288,7 +290,7 @@ class RunningBaseEstimator(RunningEstimator):
         return bool(force > self._touch)
 
     def _noise(self, seen: list[Seen]) -> Array:
-        """Return the covariance of what the legs see, in the unit's axes [m²]."""
+        """Return the covariance of the legs' measurements, in the unit's axes [m²]."""
         J = np.vstack([each.jacobian for each in seen])
         noise = self._estimator.joint_noise**2 * J @ J.T
         noise.ravel()[:: len(noise) + 1] += self._estimator.leg_noise**2

@@ -27,14 +27,14 @@ from hsp_control.declaration.quantities import Flag, Positive
 from hsp_control.robot import RobotState
 
 _SMALLEST = 1e-9
-"""Eigenvalues below this share of the largest belong to wrenches that are not seen."""
+"""Eigenvalues below this share of the largest belong to unobservable wrenches."""
 
 
 class ContactForces(Estimator, type="contact_forces"):
-    """Wrenches of contacts are estimated where nothing measures them.
+    """Wrenches of contacts without sensors are estimated.
 
-    Joint friction, payloads and pushes elsewhere count as forces of contacts. A wrench
-    that no motion feels (legs that are stretched) is estimated as zero.
+    Joint friction, payloads and pushes elsewhere appear as forces of contacts. A wrench
+    without an effect on motion (stretched legs) is estimated as zero.
     """
 
     stage: ClassVar[float] = 20.0
@@ -48,7 +48,7 @@ class ContactForces(Estimator, type="contact_forces"):
     def begin(
         self, controller: Controller, inertial: Inertial | None
     ) -> "RunningContactForces":
-        """Return what estimates; see `Estimator.begin`."""
+        """Return the estimator of a run; see `Estimator.begin`."""
         return RunningContactForces(self, controller)
 
 
@@ -128,12 +128,12 @@ class RunningContactForces(RunningEstimator):
 
 
 def _arm(contact: Contact, state: RobotState) -> Array:
-    """Return where the force of a contact in a point acts, from its frame's origin."""
+    """Return where the force of a point contact acts, from its frame's origin."""
     return np.asarray(contact.arms(state.frame(contact.frame))[0])
 
 
 def _rows(contact: Contact, state: RobotState) -> Array:
-    """Return the Jacobian of what a contact pushes: of a point or of a whole sole."""
+    """Return the Jacobian of a contact's wrench: of a point or of a whole sole."""
     J = state.frame(contact.frame).jacobian
     if contact.rows == 6:
         return J.copy()

@@ -15,20 +15,22 @@ The unit's readings ω and f drive it over a period h, with ω̂ = ω - b_g, f̂
 
     R⁺ = R exp(ω̂ h),    v⁺ = v + (R f̂ + g) h,    p⁺ = p + v h + ½ (R f̂ + g) h²,
 
-and d stays. To first order the error then goes on, exactly, as
+and d is constant. To first order the error then propagates exactly as
 
     ξ_R⁺ = ξ_R + B ζ_g,                                  B = -R Jl(ω̂ h) h
     ξ_v⁺ = ξ_v + h g×ξ_R + v⁺×B ζ_g - h R ζ_a
     ξ_p⁺ = ξ_p + h ξ_v + ½ h² g×ξ_R + p⁺×B ζ_g - ½ h² R ζ_a
     ξ_d⁺ = ξ_d + d×B ζ_g,
 
-which depends on the estimate only through the biases: the reason to choose this error.
-The kinematics of the legs say where a point is seen from the unit, y = Rᵀ(d - p) + n.
-The innovation in world axes is linear in the error, whatever the estimate is:
+which depends on the estimate only through the biases: this is why this error is chosen.
+The kinematics of the legs measure the position of a point relative to the unit,
+y = Rᵀ(d - p) + n. The innovation in world axes is linear in the error, whatever the
+estimate is:
 
     R̂ y + p̂ - d̂ = ξ_p - ξ_d + R̂ n.
 
-The heading and the place of the robot are not observable: their errors stay, and grow.
+The heading and the position of the robot are not observable: their errors stay, and
+grow.
 """
 
 from collections.abc import Sequence
@@ -41,11 +43,11 @@ from hsp_control.common.arrays import Array
 from hsp_control.engine.rotations import exp3, jexp3
 
 PointName: TypeAlias = tuple[str, int]
-"""A contact, and which of its points."""
+"""A contact, and the index of its point."""
 ROTATION, VELOCITY, POSITION = slice(0, 3), slice(3, 6), slice(6, 9)
-"""Where ξ_R, ξ_v and ξ_p are in the error."""
+"""Indices of ξ_R, ξ_v and ξ_p in the error."""
 GYROSCOPE, ACCELEROMETER = slice(9, 12), slice(12, 15)
-"""Where ζ_g and ζ_a are in the error; the points come behind them."""
+"""Indices of ζ_g and ζ_a in the error; the points follow."""
 FIXED = 15
 """Dimension of the error without points."""
 
@@ -106,7 +108,7 @@ class InvariantFilter:
     # -- prediction -------------------------------------------------------------------
 
     def predict(self, angular_velocity: Array, specific_force: Array, h: float) -> None:
-        """Go on by a period, driven by what the unit reports of it."""
+        """Propagate over a period, with the unit's readings."""
         turn, R = h * (angular_velocity - self.gyroscope_bias), self.rotation
         force = R @ (specific_force - self.accelerometer_bias)
         # The left Jacobian is the right one of the opposite.
@@ -121,7 +123,7 @@ class InvariantFilter:
         )
 
     def _transition(self, R: Array, B: Array, h: float) -> Array:
-        """Return the matrix that carries the error; see the head of the file."""
+        """Return the transition matrix of the error; see the head of the file."""
         Phi = np.eye(len(self.covariance))
         down = skew(self._gravity)
         Phi[ROTATION, GYROSCOPE] = B
@@ -153,13 +155,13 @@ class InvariantFilter:
     # -- points -----------------------------------------------------------------------
 
     def move(self, displacements: Array) -> None:
-        """Move the points by what is known of them, such as rolling."""
+        """Move the points by known displacements, such as rolling."""
         self.points = self.points + displacements
 
     def add(self, names: Sequence[PointName], seen: Array, noise: Array) -> None:
-        """Add points where the kinematics see them.
+        """Add points at their places by the kinematics.
 
-        Their errors are those of the unit's place, and of what was seen:
+        Their errors are those of the unit's position and of the measurement:
         ξ_d = ξ_p + R̂ n.
         """
         size, k = len(self.covariance), len(names)
@@ -173,7 +175,7 @@ class InvariantFilter:
         self.names = [*self.names, *names]
 
     def drop(self, names: Sequence[PointName]) -> None:
-        """Forget points, which do not touch the world any more."""
+        """Remove points that do not touch the world any more."""
         kept = [k for k, name in enumerate(self.names) if name not in set(names)]
         rows = [*range(FIXED), *(FIXED + 3 * k + i for k in kept for i in range(3))]
         self.covariance = self.covariance[np.ix_(rows, rows)]
@@ -183,7 +185,7 @@ class InvariantFilter:
     # -- correction -------------------------------------------------------------------
 
     def correct(self, seen: Array, noise: Array) -> None:
-        """Correct the estimate by where the kinematics see all points."""
+        """Correct the estimate by the kinematic measurements of all points."""
         if not self.names:
             return
         innovation = (seen @ self.rotation.T + self.position - self.points).ravel()
@@ -235,5 +237,5 @@ def turned_covariance(R: Array, covariance: Array) -> Array:
 
 
 def _rows(k: int) -> slice:
-    """Return where the error of point k is."""
+    """Return the indices of the error of point k."""
     return slice(FIXED + 3 * k, FIXED + 3 * k + 3)

@@ -1,4 +1,4 @@
-"""Where the robot touches the world, as its joints say, seen from a frame of it."""
+"""Positions of contact points by the joints, relative to a frame of the robot."""
 
 from collections.abc import Sequence
 from typing import NamedTuple
@@ -11,11 +11,11 @@ from hsp_control.robot import Robot, RobotState
 
 
 class Seen(NamedTuple):
-    """Points of one contact, seen from a frame and in its axes.
+    """Points of one contact, relative to a frame and in its axes.
 
     Attributes:
-        points: Where they are, shape (k, 3) [m].
-        jacobian: How they move with the joints, shape (3 k, nv).
+        points: Their positions, shape (k, 3) [m].
+        jacobian: Their Jacobian, shape (3 k, nv).
         turning: Angular velocity of the contact's frame in the first frame, for joints
             that move, shape (3,) [rad/s].
     """
@@ -26,10 +26,10 @@ class Seen(NamedTuple):
 
 
 class LegKinematics:
-    """Computes what joints say, with the root of the robot held at rest.
+    """Computes the kinematics of the joints, with the root of the robot at rest.
 
     Attributes:
-        frame: The frame from which it is seen.
+        frame: The frame of reference.
         contacts: The contacts.
     """
 
@@ -41,7 +41,7 @@ class LegKinematics:
         self._rest: Array = robot.neutral()
 
     def update(self, q: Array, v: Array) -> None:
-        """Take the joints of a configuration (nq,) and of a velocity (nv,)."""
+        """Update to the joints of a configuration (nq,) and of a velocity (nv,)."""
         root, joints, speeds = self._root, q.copy(), v.copy()
         joints[: root.nq] = self._rest[: root.nq]
         speeds[: root.nv] = 0.0
@@ -74,7 +74,7 @@ class LegKinematics:
 
 
 def rolled(contact: Contact, angular_velocity: Array, h: float) -> Array:
-    """Return how far the points of a contact roll on in a period, shape (3,) [m].
+    """Return the displacement of a contact's points by rolling in a period, (3,) [m].
 
     The centre of a ball of radius r moves with ω × r n; other contacts do not roll.
     """
