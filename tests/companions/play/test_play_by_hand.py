@@ -47,11 +47,6 @@ ELBOW = """() => {
 }"""
 
 
-@pytest.fixture(scope="module")
-def browser() -> Iterator[Any]:
-    yield from browsers.started()
-
-
 @pytest.fixture
 def played(tmp_path: Path) -> Iterator[Played]:
     with socket.socket() as probe:  # a port that no other test finds free meanwhile

@@ -89,11 +89,6 @@ LINK = """() => {
 
 
 @pytest.fixture(scope="module")
-def chromium() -> Iterator[Any]:
-    yield from browsers.started()
-
-
-@pytest.fixture(scope="module")
 def viewer() -> Iterator[Viewer]:
     robot = Robot.load("planar3r")
     with Viewer(robot, camera=[1.5, -4.5, 3.0], target=[0.4, 0.2, 0.0]) as viewer:
@@ -101,16 +96,16 @@ def viewer() -> Iterator[Viewer]:
         yield viewer
 
 
-def opened(chromium: Any, viewer: Viewer, **options: Any) -> tuple[Any, list[str]]:
-    page, wrong = browsers.opened(chromium, str(viewer.url), **options)
+def opened(browser: Any, viewer: Viewer, **options: Any) -> tuple[Any, list[str]]:
+    page, wrong = browsers.opened(browser, str(viewer.url), **options)
     assert viewer.wait_for_browser(PATIENCE)
     page.evaluate(LISTEN)
     return page, wrong
 
 
 @pytest.fixture(scope="module")
-def desktop(chromium: Any, viewer: Viewer) -> Iterator[tuple[Any, list[str]]]:
-    page, wrong = opened(chromium, viewer, viewport={"width": 960, "height": 600})
+def desktop(browser: Any, viewer: Viewer) -> Iterator[tuple[Any, list[str]]]:
+    page, wrong = opened(browser, viewer, viewport={"width": 960, "height": 600})
     yield page, wrong
     page.close()
 
@@ -615,9 +610,9 @@ def test_without_a_graphics_card_it_draws_lightly_and_says_so(page: Any) -> None
     assert "MeshStandardMaterial" not in kinds
 
 
-def test_it_fits_a_phone(chromium: Any, viewer: Viewer) -> None:
+def test_it_fits_a_phone(browser: Any, viewer: Viewer) -> None:
     page, wrong = opened(
-        chromium,
+        browser,
         viewer,
         viewport={"width": 390, "height": 844},
         is_mobile=True,
@@ -682,8 +677,8 @@ def test_it_fits_a_phone(chromium: Any, viewer: Viewer) -> None:
     assert wrong == []
 
 
-def test_a_browser_that_cannot_draw_is_told_so(chromium: Any, viewer: Viewer) -> None:
-    page = chromium.new_page()
+def test_a_browser_that_cannot_draw_is_told_so(browser: Any, viewer: Viewer) -> None:
+    page = browser.new_page()
     page.add_init_script("HTMLCanvasElement.prototype.getContext = () => null")
     page.goto(str(viewer.url))
     page.get_by_text("WebGL is off").wait_for()

@@ -6,15 +6,12 @@ import pinocchio as pin
 import pytest
 from drawn_logs import (
     GAINS,
-    PAPER,
     Arm,
     both,
     changed,
     drawn,
     legend_texts,
     lines,
-    planar,
-    spatial,
 )
 from matplotlib.axes import Axes
 
@@ -43,11 +40,6 @@ pytestmark = pytest.mark.slow
 A = np.tril(np.ones((3, 3)))
 SHADOW = mpl.colors.to_rgba(palette.SHADOW)
 NAMES = ("uncontrolled", "rest", "obstacle", "space", "pose", "several", "posture")
-
-
-@pytest.fixture(scope="module")
-def logs() -> dict[str, Rollout]:
-    return {name: planar(number) for name, number in PAPER.items()} | spatial()
 
 
 @pytest.fixture(params=NAMES)

@@ -6,7 +6,7 @@ import sys
 from pathlib import Path
 
 import pytest
-from drawn_logs import PAPER, both, changed, legend_texts, planar, spatial, visible
+from drawn_logs import both, changed, legend_texts, planar, visible
 from matplotlib.figure import Figure, SubFigure
 
 import hsp_control.companions.plots as plots
@@ -15,11 +15,6 @@ from hsp_control.cli import main
 from hsp_control.common.exceptions import PlotError
 
 pytestmark = pytest.mark.slow
-
-
-@pytest.fixture(scope="module")
-def logs() -> dict[str, Rollout]:
-    return {name: planar(number) for name, number in PAPER.items()} | spatial()
 
 
 # --- logs at the edge ----------------------------------------------------------------

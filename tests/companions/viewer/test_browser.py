@@ -45,11 +45,6 @@ SETTLE = """() => { viewer.render(); return new Promise((drawn) =>
 
 
 @pytest.fixture(scope="module")
-def browser() -> Iterator[Any]:
-    yield from browsers.started()
-
-
-@pytest.fixture(scope="module")
 def planar() -> Rollout:
     return load_experiment(PLANAR, "simulation.duration=4").run()
 

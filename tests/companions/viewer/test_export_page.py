@@ -20,11 +20,6 @@ JOINTS = 3  # the place of the plot of joint positions
 
 
 @pytest.fixture(scope="module")
-def browser() -> Iterator[Any]:
-    yield from browsers.started()
-
-
-@pytest.fixture(scope="module")
 def page_file(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A page of two runs of 4 s, with efforts that are held."""
     runs = []

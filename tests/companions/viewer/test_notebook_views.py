@@ -3,11 +3,9 @@
 Chromium without a window; where there is none these tests are skipped, but not in CI.
 """
 
-from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
-import browsers
 import numpy as np
 import pytest
 from browsers import HARMLESS, until
@@ -20,11 +18,6 @@ from hsp_control.config.experiment import Experiment
 pytestmark = pytest.mark.browser
 
 JOINT = "/robot/joint1"
-
-
-@pytest.fixture(scope="module")
-def browser() -> Iterator[Any]:
-    yield from browsers.started()
 
 
 @pytest.fixture(scope="module")

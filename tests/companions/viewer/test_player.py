@@ -29,20 +29,15 @@ TIMES = np.linspace(1.0, 3.0, 21)
 
 
 @pytest.fixture(scope="module")
-def chromium() -> Iterator[Any]:
-    yield from browsers.started()
-
-
-@pytest.fixture(scope="module")
 def viewer() -> Iterator[Viewer]:
     with Viewer(Robot.load("planar3r")) as viewer:
         yield viewer
 
 
 @pytest.fixture(scope="module")
-def opened(chromium: Any, viewer: Viewer) -> Iterator[tuple[Any, list[str]]]:
+def opened(browser: Any, viewer: Viewer) -> Iterator[tuple[Any, list[str]]]:
     size = {"width": 900, "height": 600}
-    page, wrong = browsers.opened(chromium, str(viewer.url), viewport=size)
+    page, wrong = browsers.opened(browser, str(viewer.url), viewport=size)
     assert viewer.wait_for_browser(200.0)
     browsers.draw_lightly(page)
     yield page, wrong

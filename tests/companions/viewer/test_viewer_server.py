@@ -18,6 +18,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from odd_errors import OddError
 from pages import Page, Steering, scene_request
 from played import wait_until
 from tornado.httpclient import HTTPClientError, HTTPRequest
@@ -388,10 +389,6 @@ def test_a_flood_is_no_more_than_its_newest_words(steered: PageServer) -> None:
     moves = [each for each in found if each["do"] == "move"]
     assert moves[-1]["pose"] == [9999] * 7
     assert len(moves) < 100
-
-
-class OddError(BaseException):
-    """What only a bare ``except`` or one of `BaseException` catches."""
 
 
 @pytest.mark.parametrize("raised", [SystemExit, KeyboardInterrupt])

@@ -5,14 +5,13 @@ motions of plants that solve the contact for themselves, where errors and null s
 obey their equations and the force is the commanded one.
 """
 
-from functools import cache
 from typing import Any
 
 import numpy as np
 import pytest
-from controller_cases import panda
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from loaded_robots import panda, talos
 from runs import check_null_space, continuous
 from wording import wording
 
@@ -36,13 +35,6 @@ seeds = st.integers(0, 2**32 - 1)
 GAINS = hsp.Gains(natural_frequency=8.0)
 HAND, TIP = "gripper_right_base_link", "panda_tcp"
 SOLES = ("left_sole_link", "right_sole_link")
-
-
-@cache
-def talos() -> hsp.Robot:
-    return hsp.Robot.load(
-        "talos", locked={"gripper_left_joint": 0, "gripper_right_joint": 0}
-    )
 
 
 def wall(force: CommandedForce | None, **options: Any) -> PointContact:

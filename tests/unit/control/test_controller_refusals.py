@@ -13,10 +13,10 @@ from controller_cases import (
     assert_same,
     circle,
     contents,
-    panda,
     states,
     track,
 )
+from loaded_robots import panda
 from wording import wording
 
 import hsp_control as hsp

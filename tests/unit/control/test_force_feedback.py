@@ -4,7 +4,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from controller_cases import panda
+from loaded_robots import panda
 from runs import held
 from wording import wording
 

@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from live_rigs import PERIOD, Array, Rig, gravity, law, panda, start, watched
+from live_rigs import PERIOD, Array, Rig, gravity, law, start, watched
+from loaded_robots import panda
 from places import THOROUGH
 from wording import wording
 

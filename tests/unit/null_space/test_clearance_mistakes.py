@@ -7,8 +7,9 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from clearance_cases import AIR, load, still
+from clearance_cases import AIR, still
 from field_cases import placed
+from loaded_robots import load
 from odd_robots import collision, odd_robot
 from wording import wording
 

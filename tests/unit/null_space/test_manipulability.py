@@ -9,10 +9,10 @@ from typing import Any
 import numpy as np
 import pinocchio as pin
 import pytest
-from clearance_cases import load
 from field_cases import placed
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from loaded_robots import load
 from wording import wording
 
 from hsp_control import Robot

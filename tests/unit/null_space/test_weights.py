@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from loaded_robots import load
 from oracles import slope
 from wording import wording
 
@@ -57,14 +58,6 @@ METRICS: dict[str, Metric] = {
     "constant": ConstantMetric(np.arange(1.0, 8.0)),
     "mass matrix": MassMatrixMetric(),
 }
-
-
-@cache
-def load(name: str, root: str | None = None) -> Robot:
-    """Return a robot; skip if example-robot-data is asked for and not there."""
-    if name not in {"panda", "iiwa14", "planar3r"}:
-        pytest.importorskip("example_robot_data")
-    return Robot.load(name, root=root)  # type: ignore[arg-type]
 
 
 def evaluate(field: NullSpaceField, metric: Metric, state: RobotState) -> FieldSample:

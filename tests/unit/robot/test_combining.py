@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 import pinocchio as pin
 import pytest
+from loaded_robots import load
 from robot_texts import ARM
 from wording import wording
 
@@ -28,7 +29,6 @@ from hsp_control.common.exceptions import (
     JointNotFoundError,
     ModelError,
 )
-from hsp_control.common.resources import bundled_robots
 from hsp_control.robot.description.loading import RobotPart, combine, placement
 from hsp_control.robot.description.robot_description import ToolFrame
 from hsp_control.robot.description.sources import RobotSource
@@ -37,14 +37,6 @@ from hsp_control.robot.integrators import Rk4
 LEFT = placement([0.0, 0.3, 0.1], [0.0, 0.0, 0.0])
 RIGHT = placement([0.9, -0.4, 0.2], [0.7, -0.4, 2.5])  # tilted: gravity pulls otherwise
 HERE = pin.SE3.Identity()
-
-
-@cache
-def load(name: str) -> Robot:
-    """Return a robot; skip if example-robot-data is asked for and not there."""
-    if name not in bundled_robots():
-        pytest.importorskip("example_robot_data")
-    return Robot.load(name)
 
 
 @cache

@@ -1,12 +1,12 @@
 """Rigid contacts: against Pinocchio's own solver, and by what they must conserve."""
 
 from collections.abc import Callable
-from functools import cache
 from typing import Any
 
 import numpy as np
 import pinocchio as pin
 import pytest
+from loaded_robots import load
 from wording import wording
 
 from hsp_control import Robot
@@ -25,12 +25,6 @@ FEET = {
     "solo12": ("point", ["FL_FOOT", "FR_FOOT", "HL_FOOT", "HR_FOOT"]),
     "go2": ("point", ["FL_foot", "FR_foot", "RL_foot"]),
 }
-
-
-@cache
-def load(name: str) -> Robot:
-    pytest.importorskip("example_robot_data")
-    return Robot.load(name)
 
 
 def plant_of(name: str, **options: Any) -> ContactPlant:

@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 import pinocchio as pin
 import pytest
+from loaded_robots import load
 from wording import wording
 
 from hsp_control import Controller, FramePosition, Gains, Robot, Rollout, simulate
@@ -48,14 +49,6 @@ from hsp_control.simulation.plants.sensors import (
     VelocityNoise,
 )
 from hsp_control.trajectories import Circle
-
-
-@cache
-def load(name: str) -> Robot:
-    if name == "go2":
-        pytest.importorskip("example_robot_data")
-    return Robot.load(name)
-
 
 ROBOTS = ["planar3r", "panda", "go2"]
 """Continuous joints, revolute ones, and a floating root."""

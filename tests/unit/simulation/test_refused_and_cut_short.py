@@ -19,13 +19,6 @@ from hsp_control.common.exceptions import (
 from hsp_control.null_space.fields import FunctionField
 from hsp_control.robot.integrators import Rk4, SemiImplicitEuler
 
-
-@pytest.fixture(scope="module")
-def planar_run() -> Rollout:
-    """Return 0.5 s of the planar arm, logged every 10 ms."""
-    return simulate(planar_controller(), planar_start(), duration=0.5, integrator=EXACT)
-
-
 # --- what is refused -----------------------------------------------------------------
 
 

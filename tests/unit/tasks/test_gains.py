@@ -2,11 +2,11 @@
 
 from collections.abc import Callable
 from dataclasses import replace
-from functools import cache
 from typing import Any
 
 import numpy as np
 import pytest
+from loaded_robots import panda
 from task_cases import GAINS, TIME, Case, Direction, every_task, place, placed
 from wording import wording
 
@@ -57,11 +57,6 @@ def test_the_largest_errors_of_a_robot() -> None:
     assert len(none.feedback().largest) == 0
     for each in (pose, one, part, none):  # what is placed can be placed again
         assert placed(each, robot).largest_error == each.largest_error
-
-
-@cache
-def panda() -> hsp.Robot:
-    return hsp.Robot.load("panda")
 
 
 @pytest.mark.parametrize("largest", [0.02, 0.1])

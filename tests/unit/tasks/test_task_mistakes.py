@@ -5,7 +5,8 @@ from typing import Any
 
 import numpy as np
 import pytest
-from task_cases import TOOL, load, panda, placed, planar
+from loaded_robots import load, panda
+from task_cases import TOOL, placed, planar
 from wording import wording
 
 from hsp_control import (

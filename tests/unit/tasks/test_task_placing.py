@@ -6,7 +6,8 @@ from typing import Any
 import numpy as np
 import pinocchio as pin
 import pytest
-from task_cases import load, panda, planar, single_joints
+from loaded_robots import load, panda
+from task_cases import planar, single_joints
 from wording import wording
 
 from hsp_control import (

@@ -10,8 +10,9 @@ from typing import Any
 
 import numpy as np
 import pytest
+from loaded_robots import panda
 from pinocchio import SE3, Quaternion, SE3ToXYZQUAT
-from task_cases import panda, placed
+from task_cases import placed
 from values import assert_is_a_value
 from wording import wording
 
