@@ -14,8 +14,6 @@ from played import Played
 
 import hsp_control as hsp
 
-pytestmark = [pytest.mark.browser, pytest.mark.process, pytest.mark.slow]
-
 SMALL = {"viewport": {"width": 800, "height": 500}}  # a picture takes less time
 READY = "typeof play !== 'undefined' && play.ready && play.state.t > 0"
 SHADOW = """[...document.querySelectorAll("#layers button")]
@@ -65,6 +63,9 @@ def dragged(page: Any, start: list[float], by: list[float], steps: int = 5) -> N
         page.mouse.move(start[0] + by[0] * k / steps, start[1] + by[1] * k / steps)
 
 
+@pytest.mark.slow
+@pytest.mark.process
+@pytest.mark.browser
 def test_hand_ball_and_elbow(browser: Any, played: Played, tmp_path: Path) -> None:
     """The hand comes within a millimetre of its target; the elbow ducks the ball."""
     page, wrong = browsers.opened(browser, played.url, **SMALL)

@@ -15,8 +15,6 @@ from hsp_control import Rollout, load_experiment
 from hsp_control.companions.viewer import Viewer
 from hsp_control.config.experiment import Experiment
 
-pytestmark = pytest.mark.browser
-
 JOINT = "/robot/joint1"
 
 
@@ -74,6 +72,7 @@ def logged(rollout: Rollout, moment: float) -> float:
     return float(np.interp(moment, rollout.t, rollout["joint_positions"][:, 0]))
 
 
+@pytest.mark.browser
 def test_a_viewer_is_shown_after_its_server_has_ended(
     browser: Any, tmp_path: Path, experiment: Experiment, rollout: Rollout
 ) -> None:
@@ -103,6 +102,7 @@ def test_a_viewer_is_shown_after_its_server_has_ended(
     notebook.close()
 
 
+@pytest.mark.browser
 def test_runs_are_shown_without_any_server(
     browser: Any, tmp_path: Path, experiment: Experiment, rollout: Rollout
 ) -> None:

@@ -39,8 +39,6 @@ from hsp_control.companions.viewer.commands import (
 from hsp_control.companions.viewer.transport import PageServer, page_key
 from hsp_control.geometry import Scene
 
-pytestmark = pytest.mark.process
-
 LINUX = pytest.mark.skipif(sys.platform != "linux", reason="reads /proc")
 
 
@@ -94,6 +92,7 @@ def test_closing_leaves_nothing(arm: Robot) -> None:
         viewer.show(arm.home())
 
 
+@pytest.mark.process
 def test_closing_ends_connections_and_so_does_the_program(arm: Robot) -> None:
     with Viewer(arm) as viewer:
         assert viewer.url is not None
@@ -374,6 +373,7 @@ def test_one_page_steers_at_a_time(steered: PageServer) -> None:
     wait_until(lambda: third.drives() == (True, True))
 
 
+@pytest.mark.slow
 def test_a_flood_is_no_more_than_its_newest_words(steered: PageServer) -> None:
     """10,000 messages while nobody listens: the last of each kind is what counts."""
     assert steered.url is not None
@@ -534,6 +534,7 @@ def test_the_newest_word_counts_and_order_is_kept() -> None:
     assert told.pop_all() == [b"3", b"5"]
 
 
+@pytest.mark.process
 def test_importing_the_package_pulls_in_no_viewer_and_that_no_meshcat() -> None:
     code = """if True:
         import sys, hsp_control
