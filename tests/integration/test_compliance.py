@@ -5,15 +5,15 @@ themselves; where efforts are held, the difference is said.
 """
 
 import pickle
-from functools import cache
 from typing import Any
 
 import numpy as np
 import pytest
+from loaded_robots import panda
 from scipy.integrate import simpson
 
 import hsp_control as hsp
-from hsp_control import Controller, FramePose, FramePosition, Robot, Rollout
+from hsp_control import Controller, FramePose, FramePosition, Rollout
 from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import ControllerError
 from hsp_control.control.compensation import Compensation, MomentumObserver
@@ -27,11 +27,6 @@ from hsp_control.tasks import Impedance
 PRECISE = Dop853(rtol=1e-11, atol=1e-11)
 FORCE, MOMENT = np.array([25.0, -15.0, 20.0]), np.array([1.5, -1.0, 0.7])
 POSE = Impedance([500, 700, 600, 25, 30, 20], damping_ratio=0.8)
-
-
-@cache
-def panda() -> Robot:
-    return Robot.load("panda")
 
 
 def start() -> Array:

@@ -5,7 +5,8 @@ from typing import Any
 import numpy as np
 import pinocchio as pin
 import pytest
-from task_cases import FRAMES, load
+from loaded_robots import load
+from task_cases import FRAMES
 
 import hsp_control as hsp
 from hsp_control.common.arrays import Array

@@ -10,8 +10,6 @@ from places import ROOT
 
 EXAMPLE = ROOT / "examples" / "plugin"
 
-pytestmark = pytest.mark.process
-
 
 @pytest.fixture(scope="module")
 def installed(tmp_path_factory: pytest.TempPathFactory) -> Path:
@@ -47,6 +45,7 @@ def hsp(
 DEMO = str(EXAMPLE / "demo.yaml")
 
 
+@pytest.mark.process
 def test_its_types_work_in_a_configuration(installed: Path, tmp_path: Path) -> None:
     ran = hsp(installed, "check", DEMO, where=tmp_path)
     assert ran.returncode == 0, ran.stderr
@@ -55,6 +54,7 @@ def test_its_types_work_in_a_configuration(installed: Path, tmp_path: Path) -> N
     assert "DampedPlant" in ran.stdout or "damped" in ran.stdout.lower()
 
 
+@pytest.mark.process
 def test_strict_reading_admits_it_by_name_only(installed: Path, tmp_path: Path) -> None:
     refused = hsp(installed, "check", "--strict", DEMO, where=tmp_path)
     assert refused.returncode == 2
@@ -64,6 +64,7 @@ def test_strict_reading_admits_it_by_name_only(installed: Path, tmp_path: Path) 
     assert admitted.returncode == 0, admitted.stderr
 
 
+@pytest.mark.process
 @pytest.mark.system
 @pytest.mark.slow
 def test_it_runs_plots_and_exports(installed: Path, tmp_path: Path) -> None:
@@ -80,6 +81,7 @@ def test_it_runs_plots_and_exports(installed: Path, tmp_path: Path) -> None:
         assert ran.returncode == 0, ran.stderr
 
 
+@pytest.mark.process
 @pytest.mark.slow
 def test_it_sweeps(installed: Path, tmp_path: Path) -> None:
     words = ["sweep", DEMO, "--over", "plant.damping=0:2:2", "--out", "s.parquet"]
@@ -88,6 +90,7 @@ def test_it_sweeps(installed: Path, tmp_path: Path) -> None:
     assert ran.returncode == 0, ran.stderr
 
 
+@pytest.mark.process
 @pytest.mark.system
 @pytest.mark.slow
 def test_its_robot_is_reached_by_name(installed: Path, tmp_path: Path) -> None:

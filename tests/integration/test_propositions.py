@@ -11,6 +11,7 @@ from functools import cache
 import numpy as np
 import pinocchio as pin
 import pytest
+from loaded_robots import load
 from scipy.optimize import minimize
 
 from hsp_control import (
@@ -59,11 +60,6 @@ PRECISE = Dop853(rtol=1e-11, atol=1e-11)
 
 # Differences of eighth order, at -4 h ... 4 h.
 FIRST = np.array([3, -32, 168, -672, 0, 672, -168, 32, -3]) / 840
-
-
-@cache
-def load(name: str) -> Robot:
-    return Robot.load(name)
 
 
 def differences(column: Array, step: float) -> Array:

@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 import pinocchio as pin
 import pytest
+from loaded_robots import load
 from places import THOROUGH
 
 from hsp_control import (
@@ -43,11 +44,6 @@ from hsp_control.trajectories import (
 DEFAULT = 0.03
 FREQUENCY = 10.0  # of the tasks [rad/s], and K_N [1/s]
 LIMIT = np.sqrt(32.0 / 27.0)  # of s q(s²) ε: 1.0887
-
-
-@cache
-def load(name: str) -> Robot:
-    return Robot.load(name)
 
 
 def bound(state: RobotState, output: ControlOutput, threshold: float) -> float:

@@ -1,28 +1,17 @@
 """Robots at rest, their links' shapes, and differences, for tests of clearances."""
 
 from collections.abc import Iterable
-from functools import cache
 from typing import Any
 
 import numpy as np
 import pinocchio as pin
-import pytest
 from oracles import slope
 from states import moved
 
 from hsp_control import Cost, Robot, engine
 from hsp_control.common.arrays import Array
-from hsp_control.common.resources import bundled_robots
 from hsp_control.geometry import LinkShape
 from hsp_control.trajectories import Lissajous
-
-
-@cache
-def load(name: str) -> Robot:
-    """Return a robot; skip if example-robot-data is asked for and not there."""
-    if name not in bundled_robots():
-        pytest.importorskip("example_robot_data")
-    return Robot.load(name)
 
 
 def still(robot: Robot) -> Any:

@@ -1,11 +1,11 @@
 """A Panda's controllers and states, and all that a controller returns."""
 
 from collections.abc import Callable
-from functools import cache
 from typing import Any
 
 import numpy as np
 import pytest
+from loaded_robots import panda
 
 import hsp_control as hsp
 from hsp_control.common.arrays import Array
@@ -23,11 +23,6 @@ METRICS: dict[str, Callable[[int], hsp.metrics.Metric]] = {
     "mass_matrix": lambda nv: hsp.metrics.MassMatrixMetric(),
 }
 metrics = pytest.mark.parametrize("kind", METRICS)
-
-
-@cache
-def panda() -> hsp.Robot:
-    return hsp.Robot.load("panda")
 
 
 def circle() -> hsp.Circle:

@@ -1,9 +1,9 @@
 """Robots for the live loop: small, in this process, and misbehaving to order."""
 
 from collections.abc import Callable
-from functools import cache
 
 import numpy as np
+from loaded_robots import panda
 
 import hsp_control as hsp
 from hsp_control.common.arrays import Array
@@ -12,11 +12,6 @@ from hsp_control.robot.integrators import SemiImplicitEuler
 from hsp_control.simulation.plants import IntegratedPlant, RigidBodyPlant
 
 PERIOD = 0.001
-
-
-@cache
-def panda() -> hsp.Robot:
-    return hsp.Robot.load("panda")
 
 
 def start() -> Array:

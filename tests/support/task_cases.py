@@ -7,12 +7,12 @@ error is rounding.
 
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
-from functools import cache
 from typing import Any, TypeVar
 
 import numpy as np
 import pinocchio as pin
 import pytest
+from loaded_robots import load
 
 import hsp_control as hsp
 from hsp_control import (
@@ -48,22 +48,10 @@ FRAMES = {
 BUNDLED = ("planar3r", "panda", "iiwa14")
 
 
-@cache
-def load(name: str, root: Any = None) -> Robot:
-    """Return a robot, or skip if example-robot-data is asked for and not there."""
-    if name not in BUNDLED:
-        pytest.importorskip("example_robot_data")
-    return Robot.load(name, root=root)
-
-
 def placed(part: Kind, robot: Robot) -> Kind:
     """Return a task or field for a robot that starts at rest at home."""
     at_rest = robot.state(0.0, robot.home(), np.zeros(robot.nv))
     return part.placed(Start(at_rest, Scene()))
-
-
-def panda() -> Robot:
-    return load("panda")
 
 
 def planar() -> Robot:

@@ -26,10 +26,7 @@ from hsp_control.live import run_loop
 
 pytest.importorskip("mujoco")
 pytest.importorskip("OpenGL")
-pytestmark = [
-    pytest.mark.process,
-    pytest.mark.skipif(not find_library("EGL"), reason="needs libegl1"),
-]
+DRAWS = pytest.mark.skipif(not find_library("EGL"), reason="needs libegl1")
 
 CAMERA = '<light pos="0 0 3"/><camera name="above" pos=".3 .3 .5"/></worldbody>'
 
@@ -63,6 +60,8 @@ def seen(address: str, what: str) -> tuple[float, np.ndarray]:
         return float(answer.headers["Time"]), np.asarray(picture).astype(int)
 
 
+@DRAWS
+@pytest.mark.process
 def test_a_picture_shows_the_scene_as_it_is_then(
     cell: hsp.Experiment, address: str
 ) -> None:
@@ -93,6 +92,8 @@ def test_a_picture_shows_the_scene_as_it_is_then(
         show(address, plant)
 
 
+@DRAWS
+@pytest.mark.process
 def test_a_robot_in_its_own_process_is_seen(cell: hsp.Experiment, address: str) -> None:
     with RobotProcess(cell, cameras=f"http://{address}") as robot:
         assert seen(address, "above.jpg")[0] == 0.0
@@ -103,6 +104,8 @@ def test_a_robot_in_its_own_process_is_seen(cell: hsp.Experiment, address: str) 
         seen(address, "above.jpg")
 
 
+@DRAWS
+@pytest.mark.process
 def test_where_nothing_is_drawn_any_more_the_robot_stops(
     cell: hsp.Experiment, address: str
 ) -> None:
@@ -140,6 +143,8 @@ if __name__ == "__main__":
 """
 
 
+@DRAWS
+@pytest.mark.process
 def test_who_draws_and_hangs_is_noticed_and_ended(
     cell: hsp.Experiment, address: str, tmp_path: Path
 ) -> None:

@@ -12,7 +12,8 @@ from threading import Thread
 
 import numpy as np
 import pytest
-from live_rigs import Rig, panda, start
+from live_rigs import Rig, start
+from loaded_robots import panda
 from places import ROOT
 
 import hsp_control as hsp

@@ -21,9 +21,9 @@ COMMAND = [
     *("--lockstep", "--patience", str(PATIENCE)),
 ]
 pytest.importorskip("pylibfranka", reason="needs the extra franka")
-pytestmark = pytest.mark.process
 
 
+@pytest.mark.process
 def test_the_client_computes_with_the_arms_own_model() -> None:
     with served() as rig:
         told = rig.run("""
@@ -61,6 +61,7 @@ print(json.dumps({
         )
 
 
+@pytest.mark.process
 def test_a_reflex_is_named_and_recovered_from() -> None:
     with served() as rig:
         told = rig.run("""
@@ -97,6 +98,7 @@ print(json.dumps(told))
     assert "joint 6 at 1500 N·m/s; limit 1000" in line
 
 
+@pytest.mark.process
 @pytest.mark.parametrize("controller", ["JointImpedance", "CartesianImpedance"])
 @pytest.mark.parametrize("kind", ["position", "velocity"])
 def test_motion_generators_are_tracked(kind: str, controller: str) -> None:
@@ -133,6 +135,7 @@ print(json.dumps([worst, moved, str(robot.read_once().robot_mode)]))
     assert "finished" in rig.tells("motion ended")
 
 
+@pytest.mark.process
 def test_what_is_not_served_is_refused_by_the_protocol() -> None:
     with served() as rig:
         told = rig.run("""
@@ -158,6 +161,7 @@ print(json.dumps([told, str(robot.read_once().robot_mode)]))
     assert "asynchronous joint position with joint impedance is not served" in line
 
 
+@pytest.mark.process
 def test_a_cut_link_ends_motion_and_client() -> None:
     with served(cut=0.1) as rig:
         told = rig.run("""
@@ -192,6 +196,7 @@ def started(*options: str | Path) -> "Iterator[subprocess.Popen[str]]":
             box.kill()
 
 
+@pytest.mark.process
 @pytest.mark.slow
 def test_a_client_sees_that_its_box_was_killed() -> None:
     host = next(addresses())
@@ -218,6 +223,7 @@ except franka.NetworkException as error:
         assert "libfranka: " in said
 
 
+@pytest.mark.process
 @pytest.mark.smoke
 def test_a_second_client_is_refused_and_the_first_goes_on() -> None:
     with served() as rig:
@@ -232,6 +238,7 @@ except franka.NetworkException as error:
     assert "is connected" in rig.tells("refused: ")
 
 
+@pytest.mark.process
 @pytest.mark.slow
 def test_the_example_in_the_documentation_runs(tmp_path: Path) -> None:
     """As a user does it: the command, the example, Ctrl-C, and the log."""

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from mjcf_texts import CELL
 from places import ROOT
+from wording import wording
 
 from hsp_control import Robot, load_experiment
 from hsp_control.cli.main import main
@@ -106,23 +107,22 @@ MISTAKES = [
     ("cell.xml", "cel.xml", RobotNotFoundError,
      "robot.mjcf: cel.xml: no such file"),
     ("root: base", "root: bas", FrameNotFoundError,
-     "robot.root: no body 'bas'; did you mean 'base'?"),
+     "robot.root: no ... 'bas' ... 'base'"),
     ("joints: [j1,", "joints: [k1,", JointNotFoundError,
      "robot.joints: no joint 'k1'"),
     ("keyframe: home", "keyframe: rest", ModelError,
-     "robot.keyframe: no keyframe 'rest' (the scene has home)"),
+     "robot.keyframe: no keyframe 'rest'"),
     ("mjcf: cell.xml", "name: panda, mjcf: cell.xml", ModelError,
-     "robot: give one of name, description, mjcf and parts"),
+     "robot: give one of ... mjcf ... parts"),
     ("mjcf: cell.xml, root: base", "name: panda", ModelError,
      "robot: joints is only for mjcf"),
     ("mjcf: cell.xml, root: base, joints: [j1, j2, j3, j4]", "name: panda", ModelError,
      "robot: keyframe is only for mjcf"),
-    ("keyframe: home", "mimic: false", ModelError,
-     "robot: mimic is not for mjcf, which has equality constraints"),
+    ("keyframe: home", "mimic: false", ModelError, "robot: mimic ... mjcf"),
     ("contacts: [ball]", "contacts: [bal]", FrameNotFoundError,
-     "plant.contacts: no body 'bal'; did you mean 'ball'?"),
+     "plant.contacts: no ... 'bal' ... 'ball'"),
     ("contacts: [ball]", "motor_inertia: 1", SimulationError,
-     "plant: motor_inertia: the scene has its own bodies; change them in the MJCF"),
+     "plant: motor_inertia: ... MJCF"),
 ]  # fmt: skip
 
 
@@ -133,9 +133,8 @@ def test_mistakes_have_a_line(
     path = write(folder, old, new)
     with pytest.raises(error) as caught:
         load_experiment(path)
-    where = re.escape(str(path))
-    expected = re.escape(message)
-    assert re.match(rf"{where}:\d+: {expected}", str(caught.value))
+    assert re.match(rf"{re.escape(str(path))}:\d+: ", str(caught.value))
+    assert re.search(wording(f"{path} ... : {message}"), str(caught.value))
 
 
 def test_a_scene_needs_an_mjcf(folder: Path) -> None:

@@ -1,6 +1,5 @@
 """Robots from MuJoCo's models: the same mechanics as MuJoCo computes with."""
 
-import re
 from pathlib import Path
 from typing import Any
 
@@ -9,6 +8,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from mjcf_texts import ARM, CELL, trees
+from wording import wording
 
 from hsp_control import Robot
 from hsp_control.common.exceptions import (
@@ -281,31 +281,28 @@ def test_a_mocap_body_stands_still() -> None:
 @pytest.mark.parametrize(
     ("options", "error", "message"),
     [
-        ({"root": "bse"}, FrameNotFoundError,
-         "root: no body 'bse'; did you mean 'base'? (the scene has world, base, "),
-        ({"joints": ["j5"]}, JointNotFoundError,
-         "joints: no joint 'j5' (the robot has j1, j2,"),
+        ({"root": "bse"}, FrameNotFoundError, "root: no ... 'bse' ... 'base'"),
+        ({"joints": ["j5"]}, JointNotFoundError, "joints: no joint 'j5' ... j1, j2,"),
         ({"joints": ["ball"], "root": "base"}, JointNotFoundError,
-         "joints: 'ball' is a joint of the scene, but not below the root"),
+         "joints: 'ball' ... not below the root"),
         ({"joints": "j1"}, ModelError, "joints: 'j1' is text; needs a list of names"),
         ({"joints": []}, ModelError, "no joint of 'world' moves"),
         ({"root": "finger", "locked": {"f": 0.0}}, ModelError,
          "no joint of 'finger' moves"),
-        ({"keyframe": "hom"}, ModelError,
-         "keyframe: no keyframe 'hom'; did you mean 'home'? (the scene has home)"),
-        ({"keyframe": "home", "qpos": [0.0]}, ModelError, "give one of qpos and key"),
-        ({"qpos": [0.0]}, ModelError, "qpos has shape (1,); the scene's configuration"),
-        ({"qpos": [np.nan] * 12}, ModelError, "qpos has shape (12,)"),
-        ({"locked": {"f": np.inf}}, ModelError, "locked: 'f' at inf; needs a finite"),
+        ({"keyframe": "hom"}, ModelError, "keyframe: no ... 'hom' ... 'home'"),
+        ({"keyframe": "home", "qpos": [0.0]}, ModelError, "... qpos and keyframe"),
+        ({"qpos": [0.0]}, ModelError, "qpos ... (1,)"),
+        ({"qpos": [np.nan] * 12}, ModelError, "qpos ... (12,)"),
+        ({"locked": {"f": np.inf}}, ModelError, "locked: 'f' ... inf ... finite"),
         ({"locked": {"g": 0.0}}, JointNotFoundError, "locked: no joint 'g'"),
-        ({"locked": {"ball": 0.0}}, ModelError, "locked: 'ball' is neither a hin"),
+        ({"locked": {"ball": 0.0}}, ModelError, "locked: 'ball' is neither a hinge"),
         ({"locked": {"f": 0.0}, "joints": ["j1", "f"]}, ModelError,
-         "locked: 'f' is one of the joints that move"),
+         "locked: 'f' ... joints that move"),
         ({"tool_frames": {"pen": ToolFrame("tp")}}, FrameNotFoundError,
-         "tool frame 'pen': no parent frame 'tp'; did you mean 'tip'?"),
+         "tool frame 'pen': no ... 'tp' ... 'tip'"),
     ],
 )  # fmt: skip
 def test_mistakes(options: dict[str, Any], error: type, message: str) -> None:
-    with pytest.raises(error, match=f"^{re.escape(message)}") as caught:
+    with pytest.raises(error, match=wording(message)) as caught:
         Robot.from_mujoco(compiled(CELL), **options)
     assert isinstance(caught.value, HspControlError)

@@ -9,6 +9,7 @@ import numpy as np
 import pinocchio as pin
 import pytest
 from robot_texts import ARM
+from wording import wording
 
 from hsp_control import Robot
 from hsp_control.common.arrays import Array
@@ -305,13 +306,13 @@ def test_impossible_inertias_are_refused() -> None:
 @pytest.mark.parametrize(("options", "kind", "message"), [
     ({"contacts": [ContactShape("panda_tpc", Sphere(0.1))]},
      FrameNotFoundError,
-     r"^contacts.panda_tpc: no frame 'panda_tpc'; did you mean 'panda_tcp'"),
+     "contacts.panda_tpc: no ... 'panda_tpc' ... 'panda_tcp'"),
     ({"pushes": [Push("panda_tpc")]},
      FrameNotFoundError,
-     r"^pushes.0.frame: no frame 'panda_tpc'; did you mean 'panda_tcp'"),
+     "pushes.0.frame: no ... 'panda_tpc' ... 'panda_tcp'"),
 ])  # fmt: skip
 def test_settings_that_are_none(options: Any, kind: Any, message: str) -> None:
-    with pytest.raises(kind, match=message):
+    with pytest.raises(kind, match=wording(message)):
         MujocoPlant(load("panda"), Mujoco(**options))
 
 

@@ -1,12 +1,11 @@
 """Solids in MuJoCo: where they stand, whose friction counts, and what is refused."""
 
-from functools import cache
 from typing import Any
 
 import numpy as np
 import pytest
+from loaded_robots import panda
 
-from hsp_control import Robot
 from hsp_control.common.exceptions import SimulationError
 from hsp_control.companions.mujoco import ContactShape, Solid
 from hsp_control.companions.mujoco.plant import Mujoco, MujocoPlant
@@ -14,11 +13,6 @@ from hsp_control.geometry.shapes import Box, HalfSpace, Sphere
 
 mujoco = pytest.importorskip("mujoco")
 TIP = "panda_tcp"
-
-
-@cache
-def panda() -> Robot:
-    return Robot.load("panda")
 
 
 def plant(*solids: Solid, **options: Any) -> MujocoPlant:

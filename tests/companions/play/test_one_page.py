@@ -8,8 +8,6 @@ from played import wait_until
 import hsp_control as hsp
 from hsp_control.companions.play.one_page import OnePage
 
-pytestmark = pytest.mark.process
-
 
 def written(tmp_path: Path, page: Path) -> str:
     arm = hsp.Robot.load("planar3r")
@@ -24,12 +22,14 @@ def written(tmp_path: Path, page: Path) -> str:
     return told[-1]
 
 
+@pytest.mark.process
 def test_a_play_is_written_as_one_page(tmp_path: Path) -> None:
     page = tmp_path / "mine.html"
     assert written(tmp_path, page) == f"saved: {page}"
     assert "<canvas" in page.read_text() or page.stat().st_size > 100_000
 
 
+@pytest.mark.system
 def test_what_cannot_be_written_says_why(tmp_path: Path) -> None:
     (tmp_path / "file").write_text("")
     assert "hsp: " in written(tmp_path, tmp_path / "file" / "mine.html")

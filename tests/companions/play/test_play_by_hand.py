@@ -15,8 +15,6 @@ from played import Played
 
 import hsp_control as hsp
 
-pytestmark = [pytest.mark.browser, pytest.mark.process, pytest.mark.slow]
-
 SMALL = {"viewport": {"width": 800, "height": 500}}  # a picture takes less time
 READY = "typeof play !== 'undefined' && play.ready && play.state.t > 0"
 SHADOW = """[...document.querySelectorAll("#layers button")]
@@ -48,11 +46,6 @@ ELBOW = """() => {
 }"""
 
 
-@pytest.fixture(scope="module")
-def browser() -> Iterator[Any]:
-    yield from browsers.started()
-
-
 @pytest.fixture
 def played(tmp_path: Path) -> Iterator[Played]:
     with socket.socket() as probe:  # a port that no other test finds free meanwhile
@@ -72,6 +65,9 @@ def dragged(page: Any, start: list[float], by: list[float], steps: int = 5) -> N
 
 
 @IF_THOROUGH
+@pytest.mark.slow
+@pytest.mark.process
+@pytest.mark.browser
 def test_hand_ball_and_elbow(browser: Any, played: Played, tmp_path: Path) -> None:
     """The hand comes within a millimetre of its target; the elbow ducks the ball."""
     page, wrong = browsers.opened(browser, played.url, **SMALL)

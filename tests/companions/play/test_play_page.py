@@ -20,8 +20,6 @@ from hsp_control.companions.viewer import Viewer
 from hsp_control.companions.viewer.commands import unpack
 from hsp_control.companions.viewer.ghosts import Ghosts
 
-pytestmark = pytest.mark.browser
-
 TURN = [0.0, np.sin(0.2), 0.0, np.cos(0.2)]
 HAND, ELBOW, BALL = [0.9, 0.3, 0.25, *TURN], [0.2, 0.9, 0.1, *TURN], [-0.4, 0.5, 0.3]
 SETUP: dict[str, Any] = {
@@ -89,11 +87,6 @@ LINK = """() => {
 
 
 @pytest.fixture(scope="module")
-def chromium() -> Iterator[Any]:
-    yield from browsers.started()
-
-
-@pytest.fixture(scope="module")
 def viewer() -> Iterator[Viewer]:
     robot = Robot.load("planar3r")
     with Viewer(robot, camera=[1.5, -4.5, 3.0], target=[0.4, 0.2, 0.0]) as viewer:
@@ -101,16 +94,16 @@ def viewer() -> Iterator[Viewer]:
         yield viewer
 
 
-def opened(chromium: Any, viewer: Viewer, **options: Any) -> tuple[Any, list[str]]:
-    page, wrong = browsers.opened(chromium, str(viewer.url), **options)
+def opened(browser: Any, viewer: Viewer, **options: Any) -> tuple[Any, list[str]]:
+    page, wrong = browsers.opened(browser, str(viewer.url), **options)
     assert viewer.wait_for_browser(PATIENCE)
     page.evaluate(LISTEN)
     return page, wrong
 
 
 @pytest.fixture(scope="module")
-def desktop(chromium: Any, viewer: Viewer) -> Iterator[tuple[Any, list[str]]]:
-    page, wrong = opened(chromium, viewer, viewport={"width": 960, "height": 600})
+def desktop(browser: Any, viewer: Viewer) -> Iterator[tuple[Any, list[str]]]:
+    page, wrong = opened(browser, viewer, viewport={"width": 960, "height": 600})
     yield page, wrong
     page.close()
 
@@ -168,6 +161,7 @@ def lies_under(page: Any, point: list[float], pointer: Any) -> bool:
     return float(np.linalg.norm(pixel(page, point) - pointer)) * size < 1e-3
 
 
+@pytest.mark.browser
 def test_the_ball_stays_under_the_pointer(page: Any) -> None:
     start = pixel(page, HAND)
     end = start + np.array([70.0, -45.0])
@@ -189,6 +183,7 @@ def test_the_ball_stays_under_the_pointer(page: Any) -> None:
     assert page.evaluate("viewer.controls.enabled") is True
 
 
+@pytest.mark.browser
 @pytest.mark.parametrize("axis", [0, 1, 2])
 def test_an_arrow_moves_along_its_axis(page: Any, axis: int) -> None:
     start = np.array(page.evaluate(HANDLE, ["hand", "arrow", axis]))
@@ -205,6 +200,7 @@ def test_an_arrow_moves_along_its_axis(page: Any, axis: int) -> None:
     assert pose[3:] == pytest.approx(TURN)
 
 
+@pytest.mark.browser
 @pytest.mark.parametrize("axis", [0, 1, 2])
 def test_a_ring_turns_about_its_axis(page: Any, axis: int) -> None:
     start = np.array(page.evaluate(HANDLE, ["hand", "ring", axis]))
@@ -221,6 +217,7 @@ def test_a_ring_turns_about_its_axis(page: Any, axis: int) -> None:
     assert np.delete(local, axis) == pytest.approx([0.0, 0.0], abs=1e-9)
 
 
+@pytest.mark.browser
 def test_the_keyboard_moves_by_a_centimetre(page: Any) -> None:
     page.keyboard.press("1")
     assert page.evaluate("document.activeElement.ariaLabel").startswith("Target hand")
@@ -259,6 +256,7 @@ def test_the_keyboard_moves_by_a_centimetre(page: Any) -> None:
     assert page.evaluate("play.selected") is None
 
 
+@pytest.mark.browser
 def test_a_plot_draws_the_limits_of_its_curves(page: Any) -> None:
     """Of a curve shown alone, only its own, and the axis reaches them."""
     # Two joints, at 0.9 and at 1.1, which is beyond the second one's limit of 1.
@@ -281,6 +279,7 @@ def test_a_plot_draws_the_limits_of_its_curves(page: Any) -> None:
     plot.locator("button").nth(1).click()
 
 
+@pytest.mark.browser
 def test_key_and_button_compare_laws_and_the_other_one_is_a_ghost(page: Any) -> None:
     button = page.locator(".play-bar .other")
     tell(page, "play_laws", laws=[], law="")
@@ -341,6 +340,7 @@ def test_key_and_button_compare_laws_and_the_other_one_is_a_ghost(page: Any) -> 
     page.evaluate("play.ghosts.clear()")
 
 
+@pytest.mark.browser
 @pytest.mark.smoke
 def test_keys_steer_the_run(page: Any) -> None:
     for key, do in ((" ", "pause"), (".", "step"), ("r", "reset"), ("s", "save")):
@@ -357,6 +357,7 @@ def test_keys_steer_the_run(page: Any) -> None:
     assert len(sent(page, "step")) == 2
 
 
+@pytest.mark.browser
 def test_the_key_of_a_live_loop_is_held(page: Any) -> None:
     """By the space bar or the button; whoever looks away has let go."""
     live = SETUP | {"loop": "held"}
@@ -392,6 +393,7 @@ def test_the_key_of_a_live_loop_is_held(page: Any) -> None:
     page.evaluate("play.holdKey.button.remove(); play.holdKey = null")
 
 
+@pytest.mark.browser
 def test_an_obstacle_is_dragged(page: Any) -> None:
     start = pixel(page, BALL)
     end = start + np.array([-30.0, -50.0])
@@ -403,6 +405,7 @@ def test_an_obstacle_is_dragged(page: Any) -> None:
     assert sent(page)[-1] == {"do": "release", "name": "ball"}
 
 
+@pytest.mark.browser
 def test_an_obstacle_comes_to_the_robot_that_it_is_dragged_over(page: Any) -> None:
     link = np.array(page.evaluate(LINK))
     drag(page, pixel(page, BALL), link)
@@ -422,6 +425,7 @@ def test_an_obstacle_comes_to_the_robot_that_it_is_dragged_over(page: Any) -> No
     assert page.evaluate(f"{lines}.meshes.every((mesh) => mesh.visible)")
 
 
+@pytest.mark.browser
 def test_a_link_is_pulled(page: Any) -> None:
     start = page.evaluate(LINK)
     end = np.array(start) + np.array([-60.0, -60.0])
@@ -454,6 +458,7 @@ def told_until(page: Any, values: dict[str, Any], expression: str) -> None:
           + expression)  # fmt: skip
 
 
+@pytest.mark.browser
 def test_a_refused_value_goes_back(page: Any) -> None:
     """Whether a word of the program is older is a matter of time: here it stands."""
     page.evaluate("window.usual = [Play.ECHO, PlayPanel.PATIENCE]")
@@ -482,6 +487,7 @@ def test_a_refused_value_goes_back(page: Any) -> None:
     page.evaluate("[Play.ECHO, PlayPanel.PATIENCE] = window.usual")
 
 
+@pytest.mark.browser
 def test_a_target_and_an_obstacle_return_to_their_paths(page: Any) -> None:
     for name in ("elbow", "ball"):
         page.get_by_role("button", name=f"{name}: back to its own path").click()
@@ -491,6 +497,7 @@ def test_a_target_and_an_obstacle_return_to_their_paths(page: Any) -> None:
     ]
 
 
+@pytest.mark.browser
 def test_a_target_out_of_reach_is_told_at_its_handle(page: Any) -> None:
     state = {"t": 2.0, "running": True, "rate": 1.0, "level": "info"}
     words = {"hand": "target out of reach, 0.31 m", "elbow": "target far away"}
@@ -513,6 +520,7 @@ def test_a_target_out_of_reach_is_told_at_its_handle(page: Any) -> None:
     assert away.count() == 0
 
 
+@pytest.mark.browser
 def test_labels_are_right_at_every_ratio_and_range(page: Any) -> None:
     """uPlot scales whole numbers before px, and has no steps of 3 or 4 decades."""
     assert page.evaluate("/^\\d+px/.test(Plot.FONT)")
@@ -523,6 +531,7 @@ def test_labels_are_right_at_every_ratio_and_range(page: Any) -> None:
     assert page.evaluate("Plot.number(Math.log10(3e-17), true)") == "0"
 
 
+@pytest.mark.browser
 def test_a_slow_program_does_not_turn_a_knob_back(page: Any) -> None:
     """What it says before it has heard of the change is not shown."""
     page.evaluate("play.panel.set('stiffness', 900)")
@@ -535,6 +544,7 @@ def test_a_slow_program_does_not_turn_a_knob_back(page: Any) -> None:
     assert not page.evaluate("play.panel.wanted.has('stiffness')")
 
 
+@pytest.mark.browser
 def test_bars_show_joints_against_their_limits(page: Any) -> None:
     setup = {**SETUP, "joints": ["one", "two"]}
     page.evaluate("(command) => viewer.handle_command(command)", setup)
@@ -553,6 +563,7 @@ def test_bars_show_joints_against_their_limits(page: Any) -> None:
     assert bars[1][1] == ["50%", "0%", False]
 
 
+@pytest.mark.browser
 def test_the_slider_looks_back(page: Any) -> None:
     node = "viewer.scene_tree.find(['seen']).object"
     page.evaluate(f"{node}.name = 'seen'")  # what is not in the scene is ignored
@@ -591,6 +602,7 @@ def test_the_slider_looks_back(page: Any) -> None:
     assert not page.evaluate("play.bar.past.looking")
 
 
+@pytest.mark.browser
 def test_a_picture_is_a_file_of_what_is_seen(page: Any) -> None:
     page.evaluate(
         "(() => { window.saved = null; PlayCamera.prototype.save = (blob, ending) => "
@@ -603,6 +615,7 @@ def test_a_picture_is_a_file_of_what_is_seen(page: Any) -> None:
     assert size > 5000
 
 
+@pytest.mark.browser
 def test_without_a_graphics_card_it_draws_lightly_and_says_so(page: Any) -> None:
     if not page.evaluate("isSoftware()"):
         pytest.skip("this browser has a graphics card")
@@ -615,9 +628,10 @@ def test_without_a_graphics_card_it_draws_lightly_and_says_so(page: Any) -> None
     assert "MeshStandardMaterial" not in kinds
 
 
-def test_it_fits_a_phone(chromium: Any, viewer: Viewer) -> None:
+@pytest.mark.browser
+def test_it_fits_a_phone(browser: Any, viewer: Viewer) -> None:
     page, wrong = opened(
-        chromium,
+        browser,
         viewer,
         viewport={"width": 390, "height": 844},
         is_mobile=True,
@@ -682,8 +696,9 @@ def test_it_fits_a_phone(chromium: Any, viewer: Viewer) -> None:
     assert wrong == []
 
 
-def test_a_browser_that_cannot_draw_is_told_so(chromium: Any, viewer: Viewer) -> None:
-    page = chromium.new_page()
+@pytest.mark.browser
+def test_a_browser_that_cannot_draw_is_told_so(browser: Any, viewer: Viewer) -> None:
+    page = browser.new_page()
     page.add_init_script("HTMLCanvasElement.prototype.getContext = () => null")
     page.goto(str(viewer.url))
     page.get_by_text("WebGL is off").wait_for()

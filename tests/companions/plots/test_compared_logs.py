@@ -12,14 +12,13 @@ from hsp_control.cli import main
 from hsp_control.common.exceptions import PlotError
 from hsp_control.companions.plots import palette
 
-pytestmark = pytest.mark.slow
-
 
 @pytest.fixture(scope="module")
 def log() -> Rollout:
     return planar(4)
 
 
+@pytest.mark.slow
 def test_logs_share_panels_and_a_legend_names_them(log: Rollout) -> None:
     half = changed(log, slice(50), {"tau": 2.0 * log.tau[:50]})
     figure = plots.diagnostics_figure(
@@ -44,6 +43,7 @@ def test_logs_share_panels_and_a_legend_names_them(log: Rollout) -> None:
     assert shown == ["mine", "mine,null_space.gain=20"]
 
 
+@pytest.mark.slow
 def test_a_figure_for_a_paper_has_its_width_and_chosen_panels(
     log: Rollout, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -67,6 +67,7 @@ def test_a_figure_for_a_paper_has_its_width_and_chosen_panels(
     assert (tmp_path / "a-b-errors-field.png").stat().st_size > 10_000
 
 
+@pytest.mark.slow
 def test_limits_that_joints_come_near_are_drawn_and_steps_are_marked(
     log: Rollout,
 ) -> None:
@@ -92,6 +93,7 @@ def test_limits_that_joints_come_near_are_drawn_and_steps_are_marked(
     assert second.get_x() == log.t[30]
 
 
+@pytest.mark.slow
 def test_determinants_of_different_sizes_are_not_compared(log: Rollout) -> None:
     values = log["singular_values"].copy()
     values[:40, 1] = np.nan

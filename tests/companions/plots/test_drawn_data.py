@@ -6,15 +6,12 @@ import pinocchio as pin
 import pytest
 from drawn_logs import (
     GAINS,
-    PAPER,
     Arm,
     both,
     changed,
     drawn,
     legend_texts,
     lines,
-    planar,
-    spatial,
 )
 from matplotlib.axes import Axes
 
@@ -39,15 +36,9 @@ from hsp_control.tasks.feedback import ErrorPart
 from hsp_control.trajectories import Circle as Round
 from hsp_control.trajectories import Spin
 
-pytestmark = pytest.mark.slow
 A = np.tril(np.ones((3, 3)))
 SHADOW = mpl.colors.to_rgba(palette.SHADOW)
 NAMES = ("uncontrolled", "rest", "obstacle", "space", "pose", "several", "posture")
-
-
-@pytest.fixture(scope="module")
-def logs() -> dict[str, Rollout]:
-    return {name: planar(number) for name, number in PAPER.items()} | spatial()
 
 
 @pytest.fixture(params=NAMES)
@@ -89,6 +80,7 @@ def sample_inside(shape: shapes.Shape, rng: np.random.Generator) -> np.ndarray:
 # --- what is drawn is what the log says ----------------------------------------------
 
 
+@pytest.mark.slow
 def test_joints_are_absolute_angles_of_the_planar_arm(logs: dict[str, Rollout]) -> None:
     log = logs["uncontrolled"]
     expected = log["joint_positions"] @ A.T
@@ -101,6 +93,7 @@ def test_joints_are_absolute_angles_of_the_planar_arm(logs: dict[str, Rollout]) 
     assert len(own) == 3
 
 
+@pytest.mark.slow
 def test_curves_over_time_are_columns(log: Rollout) -> None:
     efforts = lines(drawn(plots.draw_efforts, log))
     values = lines(drawn(plots.draw_singular_values, log))
@@ -115,6 +108,7 @@ def test_curves_over_time_are_columns(log: Rollout) -> None:
     np.testing.assert_array_equal(named(axes, "actual")[:, 1], log["null_space_norm"])
 
 
+@pytest.mark.slow
 def test_metres_and_radians_of_a_pose_are_apart(logs: dict[str, Rollout]) -> None:
     log = logs["pose"]
     axes = drawn(plots.draw_task_errors, log)
@@ -129,6 +123,7 @@ def test_metres_and_radians_of_a_pose_are_apart(logs: dict[str, Rollout]) -> Non
     assert axes.get_yscale() == "log"
 
 
+@pytest.mark.slow
 def test_a_task_of_a_user_s_own_says_itself_what_is_drawn() -> None:
     class Tool(FramePosition):
         @property
@@ -156,6 +151,7 @@ def test_a_task_of_a_user_s_own_says_itself_what_is_drawn() -> None:
     np.testing.assert_array_equal(target.desired, path.desired)
 
 
+@pytest.mark.slow
 def test_frames_are_even_in_time_or_where_they_are_asked_for(
     logs: dict[str, Rollout],
 ) -> None:
@@ -174,6 +170,7 @@ def test_frames_are_even_in_time_or_where_they_are_asked_for(
     assert sorted(brightness, reverse=True) == brightness
 
 
+@pytest.mark.slow
 def test_obstacles_are_their_outlines(logs: dict[str, Rollout]) -> None:
     turned = Spin([0.0, 0.0, 1.0], 2.0, rotation=pin.utils.rotate("x", 0.5))
     bumps = [[0.0, 0.1], [0.1, 0.0]]
@@ -238,6 +235,7 @@ def test_obstacles_are_their_outlines(logs: dict[str, Rollout]) -> None:
 # --- the prediction of e_N -----------------------------------------------------------
 
 
+@pytest.mark.slow
 def test_a_scalar_gain_predicts_a_line_and_the_log_lies_on_it(
     logs: dict[str, Rollout],
 ) -> None:
@@ -257,6 +255,7 @@ def test_a_scalar_gain_predicts_a_line_and_the_log_lies_on_it(
     np.testing.assert_array_equal(predicted_decay(stopped).slow, predicted[:, 1])
 
 
+@pytest.mark.slow
 def test_a_matrix_gain_predicts_a_band_and_the_log_lies_in_it(
     logs: dict[str, Rollout],
 ) -> None:

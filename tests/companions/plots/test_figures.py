@@ -6,7 +6,7 @@ import sys
 from pathlib import Path
 
 import pytest
-from drawn_logs import PAPER, both, changed, legend_texts, planar, spatial, visible
+from drawn_logs import both, changed, legend_texts, planar, visible
 from matplotlib.figure import Figure, SubFigure
 
 import hsp_control.companions.plots as plots
@@ -14,17 +14,10 @@ from hsp_control import Rollout
 from hsp_control.cli import main
 from hsp_control.common.exceptions import PlotError
 
-pytestmark = pytest.mark.slow
-
-
-@pytest.fixture(scope="module")
-def logs() -> dict[str, Rollout]:
-    return {name: planar(number) for name, number in PAPER.items()} | spatial()
-
-
 # --- logs at the edge ----------------------------------------------------------------
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["obstacle", "several", "posture"])
 def test_one_row_is_drawn(logs: dict[str, Rollout], name: str) -> None:
     short = changed(logs[name], slice(1), status="interrupted", message="by the user")
@@ -33,6 +26,7 @@ def test_one_row_is_drawn(logs: dict[str, Rollout], name: str) -> None:
         assert figure.get_supxlabel().startswith("interrupted: by the user")
 
 
+@pytest.mark.slow
 def test_a_log_without_rows_says_so(logs: dict[str, Rollout]) -> None:
     empty = changed(logs["rest"], slice(0), status="diverged")
     for draw in (plots.paper_figure, plots.diagnostics_figure):
@@ -45,6 +39,7 @@ def test_a_log_without_rows_says_so(logs: dict[str, Rollout]) -> None:
 # --- files, and what drawing leaves behind -------------------------------------------
 
 
+@pytest.mark.slow
 @pytest.mark.system
 def test_figures_are_written_in_every_format(
     logs: dict[str, Rollout], tmp_path: Path
@@ -56,6 +51,7 @@ def test_figures_are_written_in_every_format(
     assert all(5_000 < file.stat().st_size < 500_000 for file in files)
 
 
+@pytest.mark.slow
 def test_what_cannot_be_written_says_why(
     logs: dict[str, Rollout], tmp_path: Path
 ) -> None:
@@ -66,6 +62,7 @@ def test_what_cannot_be_written_says_why(
         plots.save_figures(logs["rest"], tmp_path / "file", "run")
 
 
+@pytest.mark.slow
 def test_plot_draws_beside_a_log_and_says_what_is_none(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -84,6 +81,7 @@ def test_plot_draws_beside_a_log_and_says_what_is_none(
         assert message in capsys.readouterr().err
 
 
+@pytest.mark.slow
 @pytest.mark.system
 @pytest.mark.process
 def test_matplotlib_comes_late_and_no_display_is_needed(tmp_path: Path) -> None:
@@ -100,6 +98,7 @@ assert "matplotlib.pyplot" not in sys.modules
     subprocess.run([sys.executable, "-c", program], check=True, env=environment)
 
 
+@pytest.mark.slow
 def test_a_figure_shows_itself_in_a_notebook(logs: dict[str, Rollout]) -> None:
     picture = plots.paper_figure(logs["rest"])._repr_png_()
     assert picture.startswith(b"\x89PNG")
@@ -125,6 +124,7 @@ def shown(
     return drawings[request.param]
 
 
+@pytest.mark.slow
 def test_axes_have_labels_with_units(shown: list[Figure]) -> None:
     for figure in shown:
         for axes in visible(figure):
@@ -138,6 +138,7 @@ def test_axes_have_labels_with_units(shown: list[Figure]) -> None:
                 assert not shown or ("[" in text and text.endswith("]")), text
 
 
+@pytest.mark.slow
 def test_several_lines_have_a_legend(shown: list[Figure]) -> None:
     for figure in shown:
         for axes in visible(figure):
@@ -146,6 +147,7 @@ def test_several_lines_have_a_legend(shown: list[Figure]) -> None:
             assert len(set(labels)) == len(labels)
 
 
+@pytest.mark.slow
 def test_nothing_is_clipped_and_nothing_overlaps(shown: list[Figure]) -> None:
     for figure in shown:
         renderer = figure.canvas.get_renderer()

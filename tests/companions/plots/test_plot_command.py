@@ -15,8 +15,6 @@ import hsp_control.companions.plots as plots
 from hsp_control.cli import main
 from hsp_control.companions.plots import palette
 
-pytestmark = pytest.mark.slow
-
 
 @pytest.fixture(scope="module")
 def logs() -> dict[str, hsp.Rollout]:
@@ -45,6 +43,7 @@ def gains(tmp_path: Path, logs: dict[str, hsp.Rollout]) -> list[str]:
     return [str(logs["rest"].save(file)) for file in files]
 
 
+@pytest.mark.slow
 def test_logs_of_a_pattern_are_drawn_in_the_order_of_their_numbers(
     gains: list[str],
 ) -> None:
@@ -56,6 +55,7 @@ def test_logs_of_a_pattern_are_drawn_in_the_order_of_their_numbers(
     assert named == ["$K_N$ = 16", r"a_b\$", "$K_N$"]
 
 
+@pytest.mark.slow
 def test_one_figure_goes_into_the_file_that_is_named(
     tmp_path: Path, gains: list[str], capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -71,6 +71,7 @@ def test_one_figure_goes_into_the_file_that_is_named(
     assert "-o names the file and its format" in capsys.readouterr().err
 
 
+@pytest.mark.slow
 def test_the_floor_of_a_held_effort_is_drawn_where_the_exponential_is() -> None:
     gain, short = "null_space.gain=10", "simulation.duration=0.5"
     run = hsp.load_experiment("panda_obstacle", gain, short).run()
@@ -84,6 +85,7 @@ def test_the_floor_of_a_held_effort_is_drawn_where_the_exponential_is() -> None:
     assert "expected floor of the held effort" not in words
 
 
+@pytest.mark.slow
 def test_the_fall_of_V_is_that_of_the_law() -> None:
     """In a run without sampling V' = -e_NᵀW K_N e_N: the two curves are one."""
     run = hsp.load_experiment("paper/3_equal_angles", "simulation.duration=1").run()
@@ -98,6 +100,7 @@ def test_colours_of_runs_are_none_of_joints() -> None:
     assert len(set(palette.RUNS)) == len(palette.RUNS)
 
 
+@pytest.mark.slow
 def test_a_narrow_figure_has_its_panels_one_below_the_other(
     logs: dict[str, hsp.Rollout],
 ) -> None:
@@ -107,6 +110,7 @@ def test_a_narrow_figure_has_its_panels_one_below_the_other(
     assert not figure.texts  # heading and foot are the paper's
 
 
+@pytest.mark.slow
 def test_text_of_two_columns_has_6_pt_where_it_is_printed_84_mm_wide(
     logs: dict[str, hsp.Rollout], tmp_path: Path
 ) -> None:
@@ -120,6 +124,7 @@ def test_text_of_two_columns_has_6_pt_where_it_is_printed_84_mm_wide(
     assert min(text.get_fontsize() for text in shown) * 84.0 / 117.0 > 6.0
 
 
+@pytest.mark.slow
 def test_numbers_of_frames_do_not_overlap(logs: dict[str, hsp.Rollout]) -> None:
     end = float(logs["rest"].t[-1])
     close = [0.05 * end * (1.0 + k) for k in range(8)]

@@ -12,7 +12,8 @@ from typing import Any
 
 import numpy as np
 import pytest
-from live_rigs import PERIOD, law, panda, start
+from live_rigs import PERIOD, law, start
+from loaded_robots import panda
 from ros2_rigs import DOMAIN, client, fresh
 
 from hsp_control import load_experiment

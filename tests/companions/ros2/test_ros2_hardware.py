@@ -5,7 +5,8 @@ from contextlib import contextmanager
 
 import numpy as np
 import pytest
-from live_rigs import PERIOD, law, panda, start
+from live_rigs import PERIOD, law, start
+from loaded_robots import panda
 from robot_cases import load
 from ros2_rigs import DOMAIN, MILLISECOND, Broadcaster, fresh, joint_state
 

@@ -5,7 +5,9 @@ from threading import Event, Thread
 
 import numpy as np
 import pytest
-from live_rigs import PERIOD, law, panda, watched
+from live_rigs import PERIOD, law, watched
+from loaded_robots import panda
+from odd_errors import OddError
 from played import wait_until
 from ros2_rigs import DOMAIN, fresh
 
@@ -137,10 +139,6 @@ def test_stamps_go_on_where_the_process_did_not(
     assert abs(ahead[-1]) < 1.5 * PERIOD
     steps = np.diff(stamps) * 1e-9
     assert (steps.max() > 0.1) == (late > 0.1)
-
-
-class OddError(BaseException):
-    """What only a bare ``except`` or one of `BaseException` catches."""
 
 
 @pytest.mark.parametrize("function", ["efforts", "send"])

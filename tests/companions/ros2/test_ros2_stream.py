@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 from ros2_rigs import DOMAIN, fresh
+from wording import wording
 
 from hsp_control import Stream, StreamPose
 from hsp_control.common.exceptions import StreamError
@@ -77,9 +78,9 @@ def test_a_stream_takes_what_it_needs_of_a_pose(space: Space, value: Any) -> Non
 
 
 @pytest.mark.parametrize(("wrong", "reason"), [
-    ({"frame": "camera"}, "a pose is in frame 'camera'; needs 'world'"),
-    ({"x": np.nan}, "value contains nan; needs finite numbers of at most 1e+06"),
-    ({"w": 0.0}, "the quaternion [0.5, 0.5, 0.5, 0.0] has norm 0.866025; needs 1"),
+    ({"frame": "camera"}, "... frame 'camera' ... 'world'"),
+    ({"x": np.nan}, "value ... nan ... finite ... 1e+06"),
+    ({"w": 0.0}, "... quaternion [0.5, 0.5, 0.5, 0.0] ... 0.866025 ... 1"),
 ])  # fmt: skip
 def test_wrong_poses_are_counted_and_dropped(
     wrong: dict[str, Any], reason: str
@@ -87,7 +88,7 @@ def test_wrong_poses_are_counted_and_dropped(
     inbox, publisher = opened(POSE)
     publisher.send(pose(**wrong))
     until(lambda: inbox.rejected == 1)
-    assert inbox.reason == reason
+    assert re.search(wording(reason), inbox.reason)
     publisher.send(pose())
     until(lambda: inbox.count == 1)
 

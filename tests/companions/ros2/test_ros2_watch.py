@@ -2,7 +2,8 @@
 
 import numpy as np
 import pytest
-from live_rigs import law, panda, start
+from live_rigs import law, start
+from loaded_robots import panda
 from ros2_rigs import DOMAIN, fresh
 
 from hsp_control import Controller, FramePose, FramePosition, Gains, Stream, StreamPose

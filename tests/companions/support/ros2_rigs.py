@@ -9,7 +9,8 @@ from itertools import count
 from pathlib import Path
 from threading import Event, Thread
 
-from live_rigs import panda, start
+from live_rigs import start
+from loaded_robots import panda
 
 from hsp_control.companions.ros2.messages import BILLION, Header, JointState, Time
 from hsp_control.companions.ros2.node import Node, TopicPublisher

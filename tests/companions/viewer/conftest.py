@@ -1,6 +1,7 @@
 """What tests of the view share: a short run, and an arm."""
 
 import pytest
+from clips import Recorder
 
 from hsp_control import Robot, Rollout, load_experiment
 
@@ -13,3 +14,9 @@ def run() -> Rollout:
 @pytest.fixture(scope="module")
 def arm() -> Robot:
     return Robot.load("planar3r")
+
+
+@pytest.fixture
+def recorder() -> Recorder:
+    """Take what a view would send to its page."""
+    return Recorder()

@@ -25,7 +25,6 @@ from hsp_control.companions.viewer import LiveView, Viewer, export_html
 from hsp_control.companions.viewer.commands import PLOTS, key_of
 
 pytest.importorskip("playwright.sync_api")
-pytestmark = [pytest.mark.browser, pytest.mark.slow]
 
 
 SIZE = (1000, 640)
@@ -42,11 +41,6 @@ END = "uPlot.sync('run').plots[0].scales.x.max"  # of the axis of time
 # What a page shows once it has drawn: without the two frames, a picture may be stale.
 SETTLE = """() => { viewer.render(); return new Promise((drawn) =>
   requestAnimationFrame(() => requestAnimationFrame(drawn))); }"""
-
-
-@pytest.fixture(scope="module")
-def browser() -> Iterator[Any]:
-    yield from browsers.started()
 
 
 @pytest.fixture(scope="module")
@@ -142,6 +136,8 @@ def cursors(watched: Watched) -> list[float]:
 # -- an exported page -----------------------------------------------------------------
 
 
+@pytest.mark.slow
+@pytest.mark.browser
 @pytest.mark.smoke
 def test_the_arm_is_drawn_and_moves(
     planar: Rollout, planar_page: Path, watch: Callable[..., Watched]
@@ -163,6 +159,8 @@ def test_the_arm_is_drawn_and_moves(
     assert watched.requests == [planar_page.resolve().as_uri()]
 
 
+@pytest.mark.slow
+@pytest.mark.browser
 def test_every_joint_is_where_pinocchio_has_it(
     tmp_path: Path, watch: Callable[..., Watched]
 ) -> None:
@@ -211,6 +209,8 @@ def test_every_joint_is_where_pinocchio_has_it(
     assert fingers[1]
 
 
+@pytest.mark.slow
+@pytest.mark.browser
 def test_views_by_key_button_and_configuration(
     tmp_path: Path, watch: Callable[..., Watched]
 ) -> None:
@@ -262,6 +262,8 @@ def test_views_by_key_button_and_configuration(
     np.testing.assert_allclose(looked("side")[0], [0.0, -0.993, 0.119], atol=1e-3)
 
 
+@pytest.mark.slow
+@pytest.mark.browser
 def test_timeline_plots_and_robot_move_together(
     planar: Rollout, planar_page: Path, watch: Callable[..., Watched]
 ) -> None:
@@ -308,6 +310,8 @@ def test_timeline_plots_and_robot_move_together(
     expect(0.5)
 
 
+@pytest.mark.slow
+@pytest.mark.browser
 def test_a_page_has_its_bands_and_presents(
     planar: Rollout, tmp_path: Path, watch: Callable[..., Watched]
 ) -> None:
@@ -361,6 +365,8 @@ def orange(watched: Watched) -> int:
     return int(((red > 190) & (green < 150) & (green > 70) & (blue < 90)).sum())
 
 
+@pytest.mark.slow
+@pytest.mark.browser
 def test_a_row_of_the_legend_switches_what_it_names(
     planar_page: Path, watch: Callable[..., Watched]
 ) -> None:
@@ -405,6 +411,8 @@ def test_a_row_of_the_legend_switches_what_it_names(
 # -- the live view --------------------------------------------------------------------
 
 
+@pytest.mark.slow
+@pytest.mark.browser
 def test_the_live_view_has_the_run_s_plots(
     planar: Rollout, watch: Callable[..., Watched]
 ) -> None:
@@ -458,6 +466,8 @@ def test_the_live_view_has_the_run_s_plots(
 # -- films ----------------------------------------------------------------------------
 
 
+@pytest.mark.slow
+@pytest.mark.browser
 def test_a_film_shows_its_moments_and_is_the_same_again(
     planar: Rollout, browser: Any, tmp_path: Path
 ) -> None:
@@ -481,6 +491,8 @@ def test_a_film_shows_its_moments_and_is_the_same_again(
     assert {file.name for file in tmp_path.iterdir()} == {"a.gif", "b.gif"}
 
 
+@pytest.mark.slow
+@pytest.mark.browser
 def test_films_from_the_command_line(
     planar: Rollout, browser: Any, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

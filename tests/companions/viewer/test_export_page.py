@@ -11,17 +11,10 @@ import pytest
 from hsp_control import load_experiment
 from hsp_control.companions.viewer import ComparedRun, export_html
 
-pytestmark = pytest.mark.browser
-
 pytest.importorskip("playwright.sync_api")
 
 PLANAR = "paper/4_moving_obstacle"
 JOINTS = 3  # the place of the plot of joint positions
-
-
-@pytest.fixture(scope="module")
-def browser() -> Iterator[Any]:
-    yield from browsers.started()
 
 
 @pytest.fixture(scope="module")
@@ -88,6 +81,7 @@ def numbers(texts: list[str]) -> list[float]:
     ]
 
 
+@pytest.mark.browser
 def test_the_pointer_shows_values_in_all_plots_and_leaves_the_time(page: Any) -> None:
     before = outputs(page, JOINTS)
     page.mouse.move(*place(page, JOINTS, 3.0))
@@ -108,6 +102,7 @@ def test_the_pointer_shows_values_in_all_plots_and_leaves_the_time(page: Any) ->
     assert numbers(outputs(page, JOINTS)) == pytest.approx(numbers(hovered), abs=0.02)
 
 
+@pytest.mark.browser
 def test_a_finger_taps_a_time_and_leaves_no_pointer(
     browser: Any, page_file: Path
 ) -> None:
@@ -122,6 +117,7 @@ def test_a_finger_taps_a_time_and_leaves_no_pointer(
     page.close()
 
 
+@pytest.mark.browser
 def test_all_plots_zoom_together_and_back(page: Any) -> None:
     first = span(page, 0)
     drag(page, JOINTS, 2.0, 3.0)
@@ -159,6 +155,7 @@ def test_all_plots_zoom_together_and_back(page: Any) -> None:
     assert end - start == pytest.approx(4.0 * np.exp(-0.6), abs=0.03)
 
 
+@pytest.mark.browser
 def test_a_plot_is_used_with_the_keyboard(page: Any) -> None:
     picture = page.locator("#side figure").first
     picture.focus()
@@ -196,6 +193,7 @@ def seen(page: Any, path: str) -> bool:
     )
 
 
+@pytest.mark.browser
 def test_the_switch_shows_one_run_or_both(page: Any) -> None:
     def state() -> tuple[str, bool, bool, bool]:
         pressed = page.locator(".run-switch [aria-pressed=true]").inner_text()
@@ -245,6 +243,7 @@ def test_the_switch_shows_one_run_or_both(page: Any) -> None:
     assert page.evaluate("player.playing")
 
 
+@pytest.mark.browser
 def test_the_floor_is_drawn_where_the_effort_is_held(page: Any) -> None:
     section = page.locator("#side section").nth(1)
     assert section.locator("small").inner_text() == "effort held for 2 ms"

@@ -3,28 +3,19 @@
 Chromium without a window; where there is none these tests are skipped, but not in CI.
 """
 
-from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
-import browsers
 import numpy as np
 import pytest
-from browsers import HARMLESS, until
+from browsers import HARMLESS, draw_lightly, until
 
 import hsp_control as hsp
 from hsp_control import Rollout, load_experiment
 from hsp_control.companions.viewer import Viewer
 from hsp_control.config.experiment import Experiment
 
-pytestmark = pytest.mark.browser
-
 JOINT = "/robot/joint1"
-
-
-@pytest.fixture(scope="module")
-def browser() -> Iterator[Any]:
-    yield from browsers.started()
 
 
 @pytest.fixture(scope="module")
@@ -57,7 +48,7 @@ class Notebook:
         self.views = self.page.frames[1:]
         for view in self.views:
             until(view, "document.body.dataset.ready === 'yes'")
-            browsers.draw_lightly(view)
+            draw_lightly(view)
 
     def _on_console(self, message: Any) -> None:
         if message.type in {"error", "warning"} and HARMLESS not in message.text:
@@ -82,6 +73,7 @@ def logged(rollout: Rollout, moment: float) -> float:
     return float(np.interp(moment, rollout.t, rollout["joint_positions"][:, 0]))
 
 
+@pytest.mark.browser
 def test_a_viewer_is_shown_after_its_server_has_ended(
     browser: Any, tmp_path: Path, experiment: Experiment, rollout: Rollout
 ) -> None:
@@ -111,6 +103,7 @@ def test_a_viewer_is_shown_after_its_server_has_ended(
     notebook.close()
 
 
+@pytest.mark.browser
 def test_runs_are_shown_without_any_server(
     browser: Any, tmp_path: Path, experiment: Experiment, rollout: Rollout
 ) -> None:

@@ -20,17 +20,10 @@ from hsp_control.companions.viewer.commands import (
 )
 from hsp_control.companions.viewer.threejs import collada_object
 
-pytestmark = pytest.mark.browser
-
 pytest.importorskip("playwright.sync_api")
 
 JOINT, TRAIL = "/robot/joint1", "/paths/tip/actual"
 TIMES = np.linspace(1.0, 3.0, 21)
-
-
-@pytest.fixture(scope="module")
-def chromium() -> Iterator[Any]:
-    yield from browsers.started()
 
 
 @pytest.fixture(scope="module")
@@ -40,9 +33,9 @@ def viewer() -> Iterator[Viewer]:
 
 
 @pytest.fixture(scope="module")
-def opened(chromium: Any, viewer: Viewer) -> Iterator[tuple[Any, list[str]]]:
+def opened(browser: Any, viewer: Viewer) -> Iterator[tuple[Any, list[str]]]:
     size = {"width": 900, "height": 600}
-    page, wrong = browsers.opened(chromium, str(viewer.url), viewport=size)
+    page, wrong = browsers.opened(browser, str(viewer.url), viewport=size)
     assert viewer.wait_for_browser(200.0)
     browsers.draw_lightly(page)
     yield page, wrong
@@ -95,6 +88,7 @@ def thing(page: Any, name: str) -> Any:
     return page.evaluate(f"node('{JOINT}').{name}.toArray()")
 
 
+@pytest.mark.browser
 def test_a_time_is_shown_exactly(page: Any) -> None:
     for moment in (1.0, 1.234, 2.5, 3.0):
         page.evaluate("(t) => player.seek(t)", moment)
@@ -117,6 +111,7 @@ def test_a_time_is_shown_exactly(page: Any) -> None:
     assert page.evaluate("viewer.scene_tree.children.nobody === undefined")
 
 
+@pytest.mark.browser
 def test_it_is_steered_from_the_keyboard(page: Any) -> None:
     page.keyboard.press("End")
     assert player(page, "time") == 3.0
@@ -149,6 +144,7 @@ player.addEventListener("time", ({detail}) => {
 })"""
 
 
+@pytest.mark.browser
 def test_it_is_steered_from_the_page(page: Any) -> None:
     bar = page.locator(".player")
     assert bar.is_visible()
@@ -190,6 +186,7 @@ def moments(page: Any) -> list[str]:
     return list(page.locator(".moments span").all_inner_texts())
 
 
+@pytest.mark.browser
 def test_the_time_line_has_bands_and_they_say_what_they_are(
     page: Any, viewer: Viewer
 ) -> None:
@@ -227,6 +224,7 @@ def test_the_time_line_has_bands_and_they_say_what_they_are(
         assert moments(page) == said
 
 
+@pytest.mark.browser
 def test_presenting_leaves_the_scene_its_title_and_what_happens(
     page: Any, viewer: Viewer
 ) -> None:
@@ -309,6 +307,7 @@ NODE = """<node id="n{k}"><instance_geometry url="#g{k}"><bind_material>
 </bind_material></instance_geometry></node>"""
 
 
+@pytest.mark.browser
 @pytest.mark.parametrize("parts", [1, 2])
 def test_every_triangle_of_a_mesh_file_has_its_surface(
     page: Any, viewer: Viewer, tmp_path: Any, parts: int

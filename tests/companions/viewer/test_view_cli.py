@@ -15,8 +15,6 @@ from hsp_control.cli import main
 from hsp_control.companions.viewer import pages as pages_of_commands
 from hsp_control.companions.viewer import transport
 
-pytestmark = pytest.mark.process
-
 MOVING = "paper/4_moving_obstacle"
 SHORT = ["--set", "simulation.duration=0.2"]
 
@@ -55,6 +53,7 @@ def address(printed: str) -> int:
     return port
 
 
+@pytest.mark.process
 def test_view_prints_its_address_and_keeps_no_script_waiting(
     log: Path, capsys: pytest.CaptureFixture[str], caplog: pytest.LogCaptureFixture
 ) -> None:
@@ -69,6 +68,7 @@ def test_view_prints_its_address_and_keeps_no_script_waiting(
     assert not caplog.records
 
 
+@pytest.mark.process
 @pytest.mark.smoke
 def test_run_shows_what_it_computes_and_keeps_its_log(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
@@ -78,6 +78,7 @@ def test_run_shows_what_it_computes_and_keeps_its_log(
     assert len(Rollout.load(next(tmp_path.glob("*.npz")))) == 21
 
 
+@pytest.mark.process
 def test_the_page_of_a_run_opens_once_and_shows_its_robot(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -105,6 +106,7 @@ def test_the_page_of_a_run_opens_once_and_shows_its_robot(
     assert page.last("clip", "/clip")
 
 
+@pytest.mark.process
 def test_a_port_in_use_is_said_and_the_run_goes_on(
     tmp_path: Path, log: Path, taken: int, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -129,6 +131,7 @@ def test_what_makes_no_sense_is_refused(
     assert f"did you mean '{log}'" in capsys.readouterr().err
 
 
+@pytest.mark.process
 def test_with_a_browser_it_stays_until_the_page_is_closed(
     log: Path, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:

@@ -47,11 +47,6 @@ def spatial() -> tuple[Experiment, Rollout]:
     return experiment, experiment.run()
 
 
-@pytest.fixture
-def recorder() -> Recorder:
-    return Recorder()
-
-
 def drawn(experiment: Experiment, rollout: Rollout, recorder: Recorder) -> Clip:
     viewer = Viewer(experiment.robot, transport=recorder)
     viewer.play(rollout, controller=experiment.controller)

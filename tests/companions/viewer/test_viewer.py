@@ -22,11 +22,6 @@ from hsp_control.geometry import Scene, shapes
 from hsp_control.trajectories import Hold
 
 
-@pytest.fixture
-def recorder() -> Recorder:
-    return Recorder()
-
-
 def children(recorder: Recorder, path: str) -> list[dict[str, Any]]:
     command = told(recorder, path, "object")
     return list(command["object"]["object"]["children"])

@@ -18,6 +18,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from odd_errors import OddError
 from pages import Page, Steering, scene_request
 from played import wait_until
 from tornado.httpclient import HTTPClientError, HTTPRequest
@@ -37,8 +38,6 @@ from hsp_control.companions.viewer.commands import (
 )
 from hsp_control.companions.viewer.transport import PageServer, page_key
 from hsp_control.geometry import Scene
-
-pytestmark = pytest.mark.process
 
 LINUX = pytest.mark.skipif(sys.platform != "linux", reason="reads /proc")
 
@@ -93,6 +92,7 @@ def test_closing_leaves_nothing(arm: Robot) -> None:
         viewer.show(arm.home())
 
 
+@pytest.mark.process
 def test_closing_ends_connections_and_so_does_the_program(arm: Robot) -> None:
     with Viewer(arm) as viewer:
         assert viewer.url is not None
@@ -373,6 +373,7 @@ def test_one_page_steers_at_a_time(steered: PageServer) -> None:
     wait_until(lambda: third.drives() == (True, True))
 
 
+@pytest.mark.slow
 def test_a_flood_is_no_more_than_its_newest_words(steered: PageServer) -> None:
     """10,000 messages while nobody listens: the last of each kind is what counts."""
     assert steered.url is not None
@@ -388,10 +389,6 @@ def test_a_flood_is_no_more_than_its_newest_words(steered: PageServer) -> None:
     moves = [each for each in found if each["do"] == "move"]
     assert moves[-1]["pose"] == [9999] * 7
     assert len(moves) < 100
-
-
-class OddError(BaseException):
-    """What only a bare ``except`` or one of `BaseException` catches."""
 
 
 @pytest.mark.parametrize("raised", [SystemExit, KeyboardInterrupt])
@@ -537,6 +534,7 @@ def test_the_newest_word_counts_and_order_is_kept() -> None:
     assert told.pop_all() == [b"3", b"5"]
 
 
+@pytest.mark.process
 def test_importing_the_package_pulls_in_no_viewer_and_that_no_meshcat() -> None:
     code = """if True:
         import sys, hsp_control

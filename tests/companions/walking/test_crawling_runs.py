@@ -10,7 +10,6 @@ from hsp_control.companions.walking.legs import hip_height, leg_length
 
 pytest.importorskip("example_robot_data")
 pytest.importorskip("mujoco")
-pytestmark = pytest.mark.slow
 FEET = {
     "front_left": "FL_FOOT",
     "front_right": "FR_FOOT",
@@ -27,6 +26,7 @@ def crawl() -> Rollout:
     return load_experiment("walking/solo12_trot", *settings).run()
 
 
+@pytest.mark.slow
 def test_it_crawls_and_stands_again():
     run = crawl()
     assert run.status == "completed"
@@ -39,6 +39,7 @@ def test_it_crawls_and_stands_again():
     assert np.mean(places, axis=0) == pytest.approx(mass, abs=0.01)
 
 
+@pytest.mark.slow
 def test_it_could_stop_at_any_time():
     """The centre of mass is above the triangle of the feet that bear."""
     run = crawl()
@@ -53,6 +54,7 @@ def test_it_could_stop_at_any_time():
             assert shares.min() > 0.05
 
 
+@pytest.mark.slow
 def test_a_velocity_in_time_is_followed_as_far_as_the_legs_reach():
     velocity = "{type: hold, point: [0.5, 0.1, 0]}"
     plan = f"plan={{type: crawl, acceleration: 1, velocity: {velocity}}}"
@@ -71,6 +73,7 @@ def test_a_velocity_in_time_is_followed_as_far_as_the_legs_reach():
     assert followed[-1, 1] / followed[-1, 0] == pytest.approx(0.2, rel=1e-9)
 
 
+@pytest.mark.slow
 @pytest.mark.system
 def test_it_goes_up_a_step_of_two_centimetres():
     """The trunk rises with the ground."""

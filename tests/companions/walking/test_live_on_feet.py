@@ -6,7 +6,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from live_rigs import panda, start
+from live_rigs import start
+from loaded_robots import panda
 
 import hsp_control as hsp
 from hsp_control.cli.live_experiment import check_live, simulated_robot

@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from wording import wording
 
 from hsp_control import Limits, Robot, load_experiment
 from hsp_control.common.exceptions import HspControlError, PlanError
@@ -48,19 +49,18 @@ TURNED = BallContact("HR_FOOT", radius=0.0165, normal=[1, 0, 0])
 
 
 @pytest.mark.parametrize(("trot", "tasks", "contacts", "message"), [
-    (Trot(), [], [], "^plan: a quadruped trots on four feet; there are 0 .declare"),
-    (Trot(), [], FEET[:3], "^plan: a quadruped trots on four feet; there are 3 .FL"),
-    (Crawl(), [], FEET[:3], r"^plan: a quadruped crawls on four feet; there are 3 .FL"),
-    (Trot(feet=["FL_FOO"]), [], FEET, "no contact 'FL_FOO'; did you mean 'FL_FOOT'"),
+    (Trot(), [], [], "plan: ... trots on four feet ... 0"),
+    (Trot(), [], FEET[:3], "plan: ... trots on four feet ... 3 (FL"),
+    (Crawl(), [], FEET[:3], "plan: ... crawls on four feet ... 3 (FL"),
+    (Trot(feet=["FL_FOO"]), [], FEET, "... no ... 'FL_FOO' ... 'FL_FOOT'"),
     (Trot(), [], [*FEET[:3], SurfaceContact("HR_FOOT", length=0.1, width=0.1)],
-     "^plan: contact 'HR_FOOT' is a surface; a quadruped trots on feet of type"),
-    (Trot(), [CenterOfMass()], FEET,
-     "^tasks.center_of_mass: its axes are 'xyz'; the plan needs 'xy'"),
+     "plan: contact 'HR_FOOT' is a surface"),
+    (Trot(), [CenterOfMass()], FEET, "tasks.center_of_mass: ... 'xyz' ... 'xy'"),
     (Trot(), [], [*FEET[:3], TURNED],
-     r"^plan: contact 'HR_FOOT' has the normal \[1.0, 0.0, 0.0\]; a quadrup"),
+     "plan: contact 'HR_FOOT' ... normal [1.0, 0.0, 0.0]"),
 ])  # fmt: skip
 def test_what_does_not_fit_is_said(solo, trot, tasks, contacts, message):
-    with pytest.raises(HspControlError, match=message):
+    with pytest.raises(HspControlError, match=wording(message)):
         trot.parts(solo, tasks, contacts)
 
 

@@ -15,7 +15,6 @@ from hsp_control.companions.walking import Trot
 
 pytest.importorskip("example_robot_data")
 pytest.importorskip("mujoco")
-pytestmark = pytest.mark.slow
 
 
 @cache
@@ -24,6 +23,7 @@ def trot() -> Rollout:
     return load_experiment("walking/solo12_trot", *settings).run()
 
 
+@pytest.mark.slow
 def test_it_trots_and_stands_again():
     run = trot()
     assert run.status == "completed"
@@ -34,6 +34,7 @@ def test_it_trots_and_stands_again():
     assert (run["status"] < 3).all()
 
 
+@pytest.mark.slow
 @pytest.mark.system
 def test_it_returns_to_its_line_after_a_push():
     """Across it; what it loses along it, it does not make up for."""
@@ -49,6 +50,7 @@ def test_it_returns_to_its_line_after_a_push():
 
 
 @IF_THOROUGH
+@pytest.mark.slow
 def test_down_a_ramp_a_foot_bears_while_the_other_one_still_looks_for_ground():
     """A hind foot on the platform, the diagonal one above ground that is not there."""
     until = "plan.until=2", "simulation.duration=4"
@@ -60,6 +62,7 @@ def test_down_a_ramp_a_foot_bears_while_the_other_one_still_looks_for_ground():
     assert ((hind > 0.5) & (front == 0.0) & (run["plan.phase"] == 3)).any()
 
 
+@pytest.mark.slow
 def test_a_robot_that_is_nowhere_named_trots_within_its_limits():
     """Go1 with nothing but defaults: barriers of 10 1/s would make it fall at 0.9 s."""
     feet = ["FL_foot", "FR_foot", "RL_foot", "RR_foot"]
@@ -80,6 +83,7 @@ def test_a_robot_that_is_nowhere_named_trots_within_its_limits():
     assert run.q[-1, 0] > 0.2
 
 
+@pytest.mark.slow
 def test_feet_that_find_no_ground_are_named_where_it_falls():
     run = load_experiment("walking/solo12_trot", "plant={type: rigid_body}").run()
     assert run.status == "stopped"
@@ -88,6 +92,7 @@ def test_feet_that_find_no_ground_are_named_where_it_falls():
     assert "; no ground was ever sensed at front_left, front_right, hind_" in message
 
 
+@pytest.mark.slow
 @pytest.mark.system
 def test_a_streamed_velocity_is_followed_and_repeated_from_the_log(tmp_path):
     velocity = Stream(acceleration=2.0)
@@ -118,6 +123,7 @@ def test_a_streamed_velocity_is_followed_and_repeated_from_the_log(tmp_path):
         assert np.array_equal(run[name], again[name], equal_nan=True), name
 
 
+@pytest.mark.slow
 @pytest.mark.system
 def test_it_trots_where_it_can_be_touched():
     session = Session(playable("walking/solo12_trot"))

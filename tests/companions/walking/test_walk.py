@@ -1,10 +1,12 @@
 """A walk is a value; what does not fit it is said before the first step."""
 
+import re
 from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
 import pytest
+from wording import wording
 
 from hsp_control import Controller, FramePose, Gains, Robot, load_experiment
 from hsp_control.common.exceptions import FallError, HspControlError, PlanError
@@ -47,50 +49,50 @@ def test_it_adds_what_it_needs_and_keeps_what_is_given(talos):
 @pytest.mark.parametrize(
     ("walk", "tasks", "contacts", "message"),
     [
-        (Walk(), [], [], "^plan: a biped walks on two feet; there are 0 .declare cont"),
-        (Walk(), [], FEET[:1], r"^plan: a biped walks on two feet; there are 1 \(left"),
+        (Walk(), [], [], "plan: ... walks on two feet ... 0"),
+        (Walk(), [], FEET[:1], "plan: ... walks on two feet ... 1 (left"),
         (
             Walk(),
             [],
             [*FEET, SurfaceContact("base_link", name="seat", **SOLE)],
-            r"there are 3 \(.*\); name two with feet$",
+            "... 3 ( ... feet",
         ),
-        (Walk(feet=["left_foot", "rigt"]), [], FEET, "no contact 'rigt'.* to walk on"),
+        (Walk(feet=["left_foot", "rigt"]), [], FEET, "... no contact 'rigt'"),
         (
             Walk(),
             [],
             [FEET[0], BallContact("right_sole_link", radius=0.1)],
-            "^plan: contact 'right_sole_link' is a ball; a biped walks on flat soles",
+            "plan: contact 'right_sole_link' is a ball",
         ),
         (
             Walk(),
             [],
             [FEET[0], replace(FEET[1], schedule=Schedule([(0, 9)]))],
-            "^contacts.right_foot: it has a schedule, but the plan switches it",
+            "contacts.right_foot: ... schedule ... plan",
         ),
         (
             Walk(),
             [CenterOfMass(name="trunk")],
             FEET,
-            "^tasks.trunk: it is a center_of_mass; the plan needs a frame_orientation",
+            "tasks.trunk: ... center_of_mass ... frame_orientation",
         ),
         (
             Walk(),
             [FramePose("base_link", name="left_foot")],
             FEET,
-            "^tasks.left_foot: its frame is 'base_link'; the foot's is 'left_sole",
+            "tasks.left_foot: ... 'base_link' ... 'left_sole_link'",
         ),
         (
             Walk(),
             [CenterOfMass(schedule=Schedule([(0, 9)]))],
             FEET,
-            "^tasks.center_of_mass: it has a schedule, but the plan determines when",
+            "tasks.center_of_mass: ... schedule ... plan",
         ),
-        (Walk(trunk="base_lnk"), [], FEET, "^plan.trunk: no frame 'base_lnk'; did you"),
+        (Walk(trunk="base_lnk"), [], FEET, "plan.trunk: no ... 'base_lnk'"),
     ],
 )  # fmt: skip
 def test_what_does_not_fit_is_said(talos, walk, tasks, contacts, message):
-    with pytest.raises(HspControlError, match=message):
+    with pytest.raises(HspControlError, match=wording(message)):
         walk.parts(talos, tasks, contacts)
 
 
@@ -123,20 +125,17 @@ def test_a_velocity_is_given_once_and_has_three_numbers():
 
 
 @pytest.mark.parametrize(("overrides", "message"), [
-    (["plan.speed=1.2"],
-     "talos_walk.yaml:12: plan: 1.2 m/s with 0.75 s per step are strides of "
-     "0.9 m; the legs of talos reach 0.715 m. Walk slower"),
-    (["plan.crouch=0.9"], "plan: crouch is 0.9 m; the centre of mass is only 0.877"),
+    (["plan.speed=1.2"], "... talos_walk.yaml:12: plan: 1.2 m/s ... 0.9 m ... 0.715 m"),
+    (["plan.crouch=0.9"], "... plan: crouch is 0.9 m ... 0.877"),
     (["start.joints={leg_left_5_joint: -0.5}"],
-     "plan: the sole of 'left_foot' does not lie on flat ground at the start"),
+     "... plan: ... 'left_foot' ... flat ground"),
     (["contacts.left_foot.width=0.2", "contacts.right_foot.width=0.2"],
-     "plan: the feet 'left_foot' and 'right_foot' stand 0.17 m apart; their "
-     "soles are 0.2 m wide and would meet"),
+     "... plan: ... 'left_foot' and 'right_foot' ... 0.17 m ... 0.2 m"),
 ])  # fmt: skip
 def test_what_the_robot_cannot_do_is_said_before_it_runs(overrides, message):
     with pytest.raises(HspControlError) as caught:
         load_experiment(WALK, *overrides)
-    assert message in str(caught.value)
+    assert re.search(wording(message), str(caught.value))
 
 
 def test_falls_are_found(talos):
@@ -208,12 +207,11 @@ def test_footsteps_are_taken_from_the_middle_between_the_feet():
 
 
 @pytest.mark.parametrize(("rows", "message"), [
-    ("[[0.2, 0.085, 0], [1.2, -0.085, 0]]",
-     r"footsteps\[1\] is 1 m ahead and 0.17 m beside the standing foot; talos r"),
-    ("[[0.2, -0.085, 0]]", r"footsteps\[0\] is 0.2 m ahead and -?0(.0\d+)? m besi"),
-    ("[[0.2, 0.085]]", "footsteps"),
-    ("[[0.2, 0.085, 0]], speed: 0.2", "give either footsteps or speed, not both"),
+    ("[[0.2, 0.085, 0], [1.2, -0.085, 0]]", "... footsteps[1] is 1 m ... 0.17 m"),
+    ("[[0.2, -0.085, 0]]", "... footsteps[0] is 0.2 m ... 0"),
+    ("[[0.2, 0.085]]", "... footsteps"),
+    ("[[0.2, 0.085, 0]], speed: 0.2", "... either footsteps or speed"),
 ])  # fmt: skip
 def test_footsteps_that_legs_do_not_reach_are_said(rows, message):
-    with pytest.raises(HspControlError, match=message):
+    with pytest.raises(HspControlError, match=wording(message)):
         load_experiment(WALK, GIVEN % rows)

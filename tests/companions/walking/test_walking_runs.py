@@ -15,7 +15,6 @@ from hsp_control.companions.walking import Sensed, Walk
 
 pytest.importorskip("example_robot_data")
 pytest.importorskip("mujoco")
-pytestmark = pytest.mark.slow
 SWINGING = {23: 0.25, 30: -0.25}  # the elbows, in v [rad]
 RATE, FOLLOWS = 2.0 * np.pi / 1.5, 6.0  # once in two steps [rad/s]; how fast [1/s]
 FEET = {"left_foot": "left_sole_link", "right_foot": "right_sole_link"}
@@ -43,6 +42,7 @@ def walk() -> Rollout:
     return load_experiment("walking/talos_walk", *settings).run()
 
 
+@pytest.mark.slow
 def test_it_walks_and_stands_again():
     run = walk()
     assert run.status == "completed"
@@ -56,6 +56,7 @@ def test_it_walks_and_stands_again():
 
 
 @IF_THOROUGH
+@pytest.mark.slow
 def test_it_walks_down_a_ramp_of_which_it_does_not_know():
     """Of -5 degrees, from a platform: the soles lie on it, the mass stays above it."""
     run = load_experiment("walking/talos_walk", *ramp(5.0, 0.3)).run()
@@ -67,6 +68,7 @@ def test_it_walks_down_a_ramp_of_which_it_does_not_know():
     assert sunk[0] - sunk[1] == pytest.approx(fallen, abs=0.03)
 
 
+@pytest.mark.slow
 def test_a_contact_changes_no_effort_by_a_jump():
     """Before the foot lifts its force has faded; after it lands the force rises."""
     run = walk()
@@ -77,6 +79,7 @@ def test_a_contact_changes_no_effort_by_a_jump():
     assert jumps[lifts].max() < 0.1 * np.abs(run.tau).max()
 
 
+@pytest.mark.slow
 def test_the_null_space_error_decays_within_each_phase():
     """‖e_N‖ obeys exp(-K_N t) where the law is exact and no contact changes."""
     run, gain = walk(), 6.0
@@ -99,6 +102,7 @@ def test_the_null_space_error_decays_within_each_phase():
     assert compared >= 2
 
 
+@pytest.mark.slow
 @pytest.mark.system
 def test_a_push_that_fells_is_said():
     push = "{frame: torso_2_link, force: [0, 900, 0], start: 0.1, duration: 0.3}"
@@ -109,6 +113,7 @@ def test_a_push_that_fells_is_said():
     assert run.t[-1] < 2.0
 
 
+@pytest.mark.slow
 @pytest.mark.system
 def test_a_push_that_one_sole_does_not_hold_is_held_by_both():
     """To the left, just before the right foot swings, which cannot step across."""
@@ -133,6 +138,7 @@ def test_a_push_that_one_sole_does_not_hold_is_held_by_both():
     assert begins[-1] > t[held][-1] + 0.5
 
 
+@pytest.mark.slow
 def test_the_page_s_yaml_and_python_run():
     text = (ROOT / "docs/companions/walking.md").read_text(encoding="utf-8")
     yaml_text, felt = re.findall(r"^```yaml\n(.*?)^```", text, re.MULTILINE | re.DOTALL)
@@ -152,6 +158,7 @@ def test_the_page_s_yaml_and_python_run():
     assert load_experiment(yaml.safe_load(space["walk"].to_yaml())).scenario == made
 
 
+@pytest.mark.slow
 @pytest.mark.system
 def test_it_walks_on_footsteps_that_are_given():
     """A step to the left ahead, and the other foot beside it."""

@@ -1,9 +1,11 @@
 """Check overrides, and where errors that are raised later are located."""
 
 import pickle
+import re
 
 import pytest
 from scenario_document import GOOD, Gains, Scenario, message
+from wording import wording
 
 from hsp_control.common.exceptions import FrameNotFoundError
 from hsp_control.config.document import Document
@@ -46,32 +48,27 @@ def test_overrides_create_mappings_and_fill_empty_ones() -> None:
 @pytest.mark.parametrize(
     ("override", "expected"),
     [
-        ("steps", "needs the form key=value, for example tasks.0.gains.kp=100"),
-        ("=3", "needs the form key=value, for example tasks.0.gains.kp=100"),
-        ("a..b=3", "needs the form key=value, for example tasks.0.gains.kp=100"),
-        ("robot.name=3", "robot is 'panda', which has no keys"),
+        ("steps", "... key=value ... tasks.0.gains.kp=100"),
+        ("=3", "... key=value"),
+        ("a..b=3", "... key=value"),
+        ("robot.name=3", "robot is 'panda' ... no keys"),
         ("fields.2.weight=3", "fields has no entry '2' (entries: 0 to 1)"),
         ("fields.-1.weight=3", "fields has no entry '-1' (entries: 0 to 1)"),
         ("fields.first=3", "fields has no entry 'first' (entries: 0 to 1)"),
-        ("fields.0=[1,", "not YAML: while parsing a flow node, expected the node "
-         "content, but found '<stream end>'"),
-        ("steps=!!x 1", "the tag '!!x' is not allowed: plain data only"),
-        ("steps=a\nb: 1", "not YAML: a key is not allowed here; check the "
-         "indentation, and put text that contains ': ' in quotes"),
-        ("steps=x", "steps: 'x' is text; expected an integer"),
-        ("fields.0.wieght=1", "fields.0.wieght: unknown key 'wieght'; did you mean "
-         "'weight'? (allowed: type, weight, reference)"),
-        ("fields.1={type: x}",
-         "fields.1.type: unknown type 'x' (allowed: manipulability, centering)"),
-        ("tasks.foot.gains.kp=1",
-         "tasks.foot: missing key 'frame'; required here: frame"),
+        ("fields.0=[1,", "not YAML: ... expected ... '<stream end>'"),
+        ("steps=!!x 1", "... '!!x' is not allowed"),
+        ("steps=a\nb: 1", "not YAML: a key is not allowed ... quotes"),
+        ("steps=x", "steps: 'x' ... an integer"),
+        ("fields.0.wieght=1", "fields.0.wieght: unknown ... 'wieght' ... 'weight'"),
+        ("fields.1={type: x}", "fields.1.type: unknown ... 'x'"),
+        ("tasks.foot.gains.kp=1", "tasks.foot: missing ... 'frame'"),
     ],
 )  # fmt: skip
 def test_mistakes_in_overrides(override: str, expected: str) -> None:
     words = " ".join(override.split())
     with in_yaml():
-        assert message(GOOD, override) == f"--set {words}: {expected}"
-    assert message(GOOD, override) == f"{words!r}: {expected}"
+        assert re.search(wording(f"--set {words}: {expected}"), message(GOOD, override))
+    assert re.search(wording(f"{words!r}: {expected}"), message(GOOD, override))
 
 
 def test_mistakes_of_overrides_come_last() -> None:

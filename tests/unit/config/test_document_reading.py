@@ -1,10 +1,12 @@
 """Check what is read from a text, and every message of one that is no YAML."""
 
 import os
+import re
 from pathlib import Path
 
 import pytest
 from scenario_document import GOOD, message
+from wording import wording
 
 from hsp_control.common.exceptions import ConfigError
 from hsp_control.config.document import Document
@@ -66,52 +68,45 @@ def test_every_key_path_has_a_location() -> None:
 
 
 UNREADABLE = [
-    ("", "1: is empty; a configuration must be a mapping (key: value)"),
-    ("\n# only this\n", "1: is empty; a configuration must be a mapping (key: value)"),
-    ("\n- 1\n- 2", "2: is [1, 2]; a configuration must be a mapping (key: value)"),
-    ("a: 1\nb:\n  c: 1\n  c: 2", "4: b.c: the key 'c' is given twice, first on line 3"),
-    ("a: 1\n'a': 2", "2: a: the key 'a' is given twice, first on line 1"),
-    ("a:\n  1: b", "2: a: a key must be text, and 1 is not; put it in quotes"),
-    ("true: b", "1: a key must be text, and true is not; put it in quotes"),
-    ("a: [{? [b] : c}]", "1: a.0: a key must be text, not a list or a mapping"),
-    ("a: &x {b: 1}\nc:\n  <<: *x",
-     "3: c: merge keys (<<) are not supported; write the keys out"),
-    ("a:\n- !!python/object/apply:os.system ['false']", "2: a.0: the tag "
-     "'!!python/object/apply:os.system' is not allowed: plain data only"),
-    ("a: !gain 3", "1: a: the tag '!gain' is not allowed: plain data only"),
-    ("a: !!bool on", "1: a: 'on' cannot be read as true or false"),
-    ("a: 18446744073709551616",
-     "1: a: '18446744073709551616' cannot be read as a 64-bit integer"),
-    ('a: "\\ud800"', r"1: a: '\ud800' cannot be read as text"),
-    ("a: 1\n\tb: 2", "2: not YAML: a tab in the indentation; use spaces"),
-    ("a: b: c", "1: not YAML: a key is not allowed here; check the indentation, and "
-     "put text that contains ': ' in quotes"),
+    ("", "1: is empty ... mapping"),
+    ("\n# only this\n", "1: is empty ... mapping"),
+    ("\n- 1\n- 2", "2: is [1, 2] ... mapping"),
+    ("a: 1\nb:\n  c: 1\n  c: 2", "4: b.c: ... 'c' ... twice ... line 3"),
+    ("a: 1\n'a': 2", "2: a: ... 'a' ... twice ... line 1"),
+    ("a:\n  1: b", "2: a: a key ... 1 ... in quotes"),
+    ("true: b", "1: a key ... true ... in quotes"),
+    ("a: [{? [b] : c}]", "1: a.0: a key ... not a list"),
+    ("a: &x {b: 1}\nc:\n  <<: *x", "3: c: merge keys ... not supported"),
+    ("a:\n- !!python/object/apply:os.system ['false']",
+     "2: a.0: ... '!!python/object/apply:os.system' is not allowed"),
+    ("a: !gain 3", "1: a: ... '!gain' is not allowed"),
+    ("a: !!bool on", "1: a: 'on' ... true or false"),
+    ("a: 18446744073709551616", "1: a: '18446744073709551616' ... 64-bit"),
+    ('a: "\\ud800"', r"1: a: '\ud800' ... text"),
+    ("a: 1\n\tb: 2", "2: not YAML: a tab ... spaces"),
+    ("a: b: c", "1: not YAML: a key is not allowed ... quotes"),
     ("a:\n  b: 1\n c: 2",
-     "3: not YAML: the indentation does not match the lines above"),
-    ("a: *b", "1: not YAML: found undefined alias 'b'"),
-    ("a: @home", "1: not YAML: while scanning for the next token, found character '@' "
-     "that cannot start any token"),
-    ("a: [1,\nb: 2\n", "3: not YAML: while parsing a flow sequence from line 1, "
-     "expected ',' or ']', but got '<stream end>'"),
-    ("a: 1\n---\nb: 2", "2: not YAML: expected a single document in the stream from "
-     "line 1, but found another document"),
-    ("a: 1\nb: \x07", "2: not YAML: the character U+0007 is not allowed"),
-    ('a:\n  "\\UFFFFFFFF"',
-     "2: not YAML: an escape sequence or a version number is out of range"),
-    ("a: &x [1, *x]", "1: a.1: an alias inside the value that it refers to"),
+     "3: not YAML: the indentation does not match"),
+    ("a: *b", "1: not YAML: ... undefined alias 'b'"),
+    ("a: @home", "1: not YAML: ... character '@'"),
+    ("a: [1,\nb: 2\n", "3: not YAML: ... from line 1 ... ']' ... '<stream end>'"),
+    ("a: 1\n---\nb: 2", "2: not YAML: ... single document ... line 1"),
+    ("a: 1\nb: \x07", "2: not YAML: ... U+0007"),
+    ('a:\n  "\\UFFFFFFFF"', "2: not YAML: ... out of range"),
+    ("a: &x [1, *x]", "1: a.1: an alias inside"),
     ("a:\n  " + "[" * 60, "2: nested deeper than 50 levels"),
     ("a: &a {b: &b {c: &c [1]}}\nd:\n  " + "".join(f"{{x{i}: "
         for i in range(48)) + "*a" + "}" * 48,
      "1: nested deeper than 50 levels"),
     ("a: [" + "1, " * MAX_VALUES,
-     f"1: more than {MAX_VALUES} values (aliases expanded)"),
+     f"1: more than {MAX_VALUES} values"),
 ]  # fmt: skip
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize(("text", "expected"), UNREADABLE)
 def test_what_cannot_be_read(text: str, expected: str) -> None:
-    assert message(text) == f"panda.yaml:{expected}"
+    assert re.search(wording(f"panda.yaml:{expected}"), message(text))
 
 
 @pytest.mark.slow

@@ -1,5 +1,6 @@
 """Check every message of a text that does not follow its schema."""
 
+import re
 from collections.abc import Callable
 from datetime import date
 from enum import Enum
@@ -10,6 +11,7 @@ import pytest
 from pydantic import BaseModel, Discriminator, Field, Tag
 from scenario_document import Circle, Line, Part, Positive, Trajectory, message
 from typing_extensions import TypeAliasType
+from wording import wording
 
 TASK = "robot: panda\ntasks:\n  hand:\n    frame: hand\n"
 """Four lines, after which a test adds a key to the task."""
@@ -17,90 +19,77 @@ TASK = "robot: panda\ntasks:\n  hand:\n    frame: hand\n"
 INVALID = [
     # keys
     ("robot: panda\nfields:\n- type: manipulability\n  wieght: 1",
-     "4: fields.0.wieght: unknown key 'wieght'; did you mean 'weight'? (allowed: "
-     "type, weight, reference)"),
+     "4: fields.0.wieght: unknown ... 'wieght' ... 'weight'"),
     (TASK + "    trajectory: {type: circle, radius: 1, circle: 3}",
-     "5: tasks.hand.trajectory.circle: unknown key 'circle' (allowed: type, radius, "
-     "center)"),
+     "5: tasks.hand.trajectory.circle: unknown ... 'circle'"),
     (TASK + "    gains:\n      Kp: 3",
-     "6: tasks.hand.gains.Kp: unknown key 'Kp'; did you mean 'kp'? (allowed: kp, kd)"),
-    ("steps: 2", "1: missing key 'robot'; required here: robot"),
+     "6: tasks.hand.gains.Kp: unknown ... 'Kp' ... 'kp'"),
+    ("steps: 2", "1: missing ... 'robot'"),
     (TASK + "    trajectory:\n      type: line",
-     "5: tasks.hand.trajectory: missing key 'to'; required here: type, to"),
+     "5: tasks.hand.trajectory: missing ... 'to'"),
     ("robot: a\nframes: {'tool tip': [0, 0, 0]}",
-     "2: frames.'tool tip': the key 'tool tip' should match pattern '^[a-z_.]+$'"),
+     "2: frames.'tool tip': ... '^[a-z_.]+$'"),
     # choices
     (TASK + "    trajectory:\n      type: circel\n      radius: 1",
-     "6: tasks.hand.trajectory.type: unknown type 'circel'; did you mean 'circle'? "
-     "(allowed: circle, line, segment)"),
-    (TASK + "    trajectory: {radius: 3}", "5: tasks.hand.trajectory: missing key "
-     "'type'; type is one of: circle, line, segment"),
+     "6: tasks.hand.trajectory.type: unknown ... 'circel' ... 'circle'"),
+    (TASK + "    trajectory: {radius: 3}",
+     "5: tasks.hand.trajectory: missing ... 'type'"),
     (TASK + "    trajectory:\n      radius: 3\n      tpye: circle",
-     "7: tasks.hand.trajectory.tpye: unknown key 'tpye'; did you mean 'type'? (type "
-     "is one of: circle, line, segment)"),
-    ("robot: a\nintegrator: RK45",
-     "2: integrator: unknown value 'RK45'; did you mean 'rk4'? (allowed: euler, rk4)"),
+     "7: tasks.hand.trajectory.tpye: unknown ... 'tpye' ... 'type'"),
+    ("robot: a\nintegrator: RK45", "2: integrator: unknown ... 'RK45' ... 'rk4'"),
     # types
-    ("robot: 3", "1: robot: 3 is an integer; expected text"),
-    ("robot: a\nsteps: 1.5", "2: steps: 1.5 is a decimal number; expected an integer"),
-    ("robot: a\nsteps: true", "2: steps: true is a boolean; expected an integer"),
-    ("robot: a\nview: on", "2: view: 'on' is text; expected true or false"),
-    ("robot: a\ntasks:\n- a", "2: tasks: ['a'] is a list; expected a mapping"),
+    ("robot: 3", "1: robot: 3 ... text"),
+    ("robot: a\nsteps: 1.5", "2: steps: 1.5 ... an integer"),
+    ("robot: a\nsteps: true", "2: steps: true ... an integer"),
+    ("robot: a\nview: on", "2: view: 'on' ... true"),
+    ("robot: a\ntasks:\n- a", "2: tasks: ['a'] ... a mapping"),
     ("robot: a\nfields: {type: centering}",
-     "2: fields: {type: 'centering'} is a mapping; expected a list of mappings"),
-    (TASK + "    gains: [" + "{a: [[1]]}, " * 20 + "]", "5: tasks.hand.gains: [{a: "
-     "[[...]]}, {a: [[...]]}, {a: [[..... is a list; expected a mapping of kp, kd"),
-    ("robot: a\nframes: {tip: 3}",
-     "2: frames.tip: 3 is an integer; expected a list of 3 numbers"),
+     "2: fields: {type: 'centering'} ... a list of mappings"),
+    (TASK + "    gains: [" + "{a: [[1]]}, " * 20 + "]",
+     "5: tasks.hand.gains: [{a: [[...]]}, {a: [[...]]}, ... a mapping of kp"),
+    ("robot: a\nframes: {tip: 3}", "2: frames.tip: 3 ... a list of 3 numbers"),
     # numbers
     (TASK + "    gains:\n      kp: -3.0",
-     "6: tasks.hand.gains.kp: -3.0 is negative; must be greater than 0"),
+     "6: tasks.hand.gains.kp: -3.0 ... greater than 0"),
     ("robot: a\nfields: [{type: manipulability, weight: 1.5}]",
-     "2: fields.0.weight: 1.5 is too large; must be at most 1"),
+     "2: fields.0.weight: 1.5 ... at most 1"),
     (TASK + "    gains: {kp: [1, -.inf]}",
-     "5: tasks.hand.gains.kp.1: -.inf is not a finite number"),
+     "5: tasks.hand.gains.kp.1: -.inf ... finite"),
     # unions: one message, about the alternative that was meant
-    (TASK + "    gains: {kp: fast}", "5: tasks.hand.gains.kp: 'fast' is text; "
-     "expected a number, a list of numbers or a matrix"),
-    (TASK + "    gains: {kp: {a: 1}}", "5: tasks.hand.gains.kp: {a: 1} is a mapping; "
-     "expected a number, a list of numbers or a matrix"),
+    (TASK + "    gains: {kp: fast}", "5: tasks.hand.gains.kp: 'fast' ... a number"),
+    (TASK + "    gains: {kp: {a: 1}}", "5: tasks.hand.gains.kp: {a: 1} ... a number"),
     (TASK + "    gains:\n      kp: [1,\n        fast]",
-     "7: tasks.hand.gains.kp.1: 'fast' is text; expected a number"),
-    (TASK + "    gains: {kp: [fast]}", "5: tasks.hand.gains.kp.0: 'fast' is text; "
-     "expected a number or a list of numbers"),
+     "7: tasks.hand.gains.kp.1: 'fast' ... a number"),
+    (TASK + "    gains: {kp: [fast]}", "5: tasks.hand.gains.kp.0: 'fast' ... a number"),
     (TASK + "    gains: {kp: [[1], [2, fast]]}",
-     "5: tasks.hand.gains.kp.1.1: 'fast' is text; expected a number"),
+     "5: tasks.hand.gains.kp.1.1: 'fast' ... a number"),
     (TASK + "    gains: {kp: [[1], 2]}",
-     "5: tasks.hand.gains.kp.1: 2 is an integer; expected a list of numbers"),
-    (TASK + "    gains: {kp: [[[1]]]}",
-     "5: tasks.hand.gains.kp.0.0: [1] is a list; expected a number"),
-    (TASK + "    damping: critcal", "5: tasks.hand.damping: 'critcal' is text; "
-     "expected 'critical' or a number; did you mean 'critical'?"),
+     "5: tasks.hand.gains.kp.1: 2 ... a list of numbers"),
+    (TASK + "    gains: {kp: [[[1]]]}", "5: tasks.hand.gains.kp.0.0: [1] ... a number"),
+    (TASK + "    damping: critcal", "5: tasks.hand.damping: 'critcal' ... 'critical'"),
     ("robot: a\nfields: [{type: centering, middle: {joint: x}}]",
-     "2: fields.0.middle.joint: 'x' is text; expected a number"),
-    ("robot: a\nroute: {type: circel}", "2: route.type: unknown type 'circel'; did "
-     "you mean 'circle'? (allowed: circle, line, segment)"),
+     "2: fields.0.middle.joint: 'x' ... a number"),
+    ("robot: a\nroute: {type: circel}",
+     "2: route.type: unknown ... 'circel' ... 'circle'"),
     ("robot: a\nroute:\n- {type: circle, radius: 1}\n- {type: circle, raduis: 1}",
-     "4: route.1.raduis: unknown key 'raduis'; did you mean 'radius'? (allowed: type, "
-     "radius, center)"),
+     "4: route.1.raduis: unknown ... 'raduis' ... 'radius'"),
     # lengths
     (TASK + "    trajectory: {type: line, to: [1, 2]}",
-     "5: tasks.hand.trajectory.to: [1, 2] has 2 entries, needs 3"),
+     "5: tasks.hand.trajectory.to: [1, 2] ... 2 ... 3"),
     (TASK + "    trajectory: {type: line, to: [1, 0, 0], via: [[1], [], []]}",
-     "5: tasks.hand.trajectory.via: [[1], [], []] has 3 entries, needs at most 2"),
+     "5: tasks.hand.trajectory.via: [[1], [], []] ... 3 ... at most 2"),
     (TASK + "    trajectory: {type: line, to: [1, 0, 0], via: [[1]]}",
-     "5: tasks.hand.trajectory.via.0: [1] has 1 entry, needs 3"),
-    ("robot: a\ntasks: {b: {frame: ''}}",
-     "2: tasks.b.frame: '' has 0 characters, needs at least 1"),
+     "5: tasks.hand.trajectory.via.0: [1] ... 1 ... 3"),
+    ("robot: a\ntasks: {b: {frame: ''}}", "2: tasks.b.frame: '' ... 0 ... at least 1"),
     # our own validators
     (TASK + "    trajectory: {type: line, to: [0, 0, 0]}",
-     "5: tasks.hand.trajectory: a line of length 0; move 'to' away from the origin"),
+     "5: tasks.hand.trajectory: ... length 0 ... 'to'"),
 ]  # fmt: skip
 
 
 @pytest.mark.parametrize(("text", "expected"), INVALID)
 def test_what_does_not_follow_the_schema(text: str, expected: str) -> None:
-    assert message(text) == f"panda.yaml:{expected}"
+    assert re.search(wording(f"panda.yaml:{expected}"), message(text))
 
 
 class Colour(Enum):
@@ -149,48 +138,44 @@ class Lenient(BaseModel):
 @pytest.mark.parametrize(
     ("text", "expected"),
     [
-        ("pair: [1]", "pair: [1] has 1 entry, needs 2"),
-        ("pair: []", "pair: [] has 0 entries, needs 2"),
-        ("pair: [1, 2, 3]", "pair: [1, 2, 3] has 3 entries, needs 2"),
-        ("pair: [1, x]", "pair.1: 'x' is text; expected a number"),
-        ("pair: x", "pair: 'x' is text; expected a list of 2 numbers"),
-        ("pairs: x", "pairs: 'x' is text; expected a list of lists of 2 numbers"),
-        ("rows: [[1]]", "rows.0: [1] has 1 entry, needs at least 2"),
-        ("rows: x", "rows: 'x' is text; expected a matrix"),
-        ("number: x", "number: 'x' is text; expected a number"),
-        ("count: '-5'", "count: '-5' is too small; must be greater than 0"),
-        ("count: 7", "count: 7 should be a multiple of 5"),
-        ("count: x", "count: 'x' is text; expected an integer"),
-        ("count: 5.5", "count: 5.5 is a decimal number; expected an integer"),
-        ("text: 1", "text: 1 is an integer; expected text"),
-        ("flag: maybe", "flag: 'maybe' is text; expected true or false"),
-        ("path: 1", "path: 1 is an integer; expected a path"),
-        ("choice: 3", "choice: unknown value 3 (allowed: 1, 2)"),
-        ("shapes: 1", "shapes: 1 is an integer; expected a mapping"),
-        ("shapes: {type: line}", "shapes: missing key 'to'; required here: type, to"),
-        ("colour: rad",
-         "colour: unknown value 'rad'; did you mean 'red'? (allowed: red, blue)"),
-        ("alias: x", "alias: 'x' is text; expected a number or a list of numbers"),
-        ("nested: {type: pint}", "nested.type: unknown type 'pint'; did you mean "
-         "'point'? (allowed: circle, line, segment, point)"),
-        ("nested: {type: circle, radios: 1}", "nested.radios: unknown key 'radios'; "
-         "did you mean 'radius'? (allowed: type, radius, center)"),
-        ("chosen: {type: circle, radius: x}",
-         "chosen.radius: 'x' should be a valid number"),
-        ("chosen: {type: line}", "chosen: missing key 'to'"),
-        ("chosen: {type: circle, radius: 1, x: 1}", "chosen.x: unknown key 'x'"),
-        ("modes: x", "modes: 'x' is text; expected a list of 'a', 'b' or booleans"),
-        ("modes: [c]", "modes.0: 'c' is text; expected 'a', 'b' or true or false"),
-        ("several: 1", "several: 1 is an integer; expected a list of matrices"),
-        ("bare: 1", "bare: 1 is an integer; expected a list of values"),
-        ("day: tomorrow",
-         "day: 'tomorrow' should be a valid date or datetime, input is too short"),
-        ("call: 1", "call: 1 should be callable"),
-        ("new-name: 10", "new-name: 10 is too large; must be less than 10"),
+        ("pair: [1]", "pair: [1] ... 1 ... 2"),
+        ("pair: []", "pair: [] ... 0 ... 2"),
+        ("pair: [1, 2, 3]", "pair: [1, 2, 3] ... 3 ... 2"),
+        ("pair: [1, x]", "pair.1: 'x' ... a number"),
+        ("pair: x", "pair: 'x' ... a list of 2 numbers"),
+        ("pairs: x", "pairs: 'x' ... a list of lists of 2 numbers"),
+        ("rows: [[1]]", "rows.0: [1] ... 1 ... at least 2"),
+        ("rows: x", "rows: 'x' ... a matrix"),
+        ("number: x", "number: 'x' ... a number"),
+        ("count: '-5'", "count: '-5' ... greater than 0"),
+        ("count: 7", "count: 7 ... multiple of 5"),
+        ("count: x", "count: 'x' ... an integer"),
+        ("count: 5.5", "count: 5.5 ... an integer"),
+        ("text: 1", "text: 1 ... text"),
+        ("flag: maybe", "flag: 'maybe' ... true"),
+        ("path: 1", "path: 1 ... a path"),
+        ("choice: 3", "choice: unknown ... 3"),
+        ("shapes: 1", "shapes: 1 ... a mapping"),
+        ("shapes: {type: line}", "shapes: missing ... 'to'"),
+        ("colour: rad", "colour: unknown ... 'rad' ... 'red'"),
+        ("alias: x", "alias: 'x' ... a number"),
+        ("nested: {type: pint}", "nested.type: unknown ... 'pint' ... 'point'"),
+        ("nested: {type: circle, radios: 1}",
+         "nested.radios: unknown ... 'radios' ... 'radius'"),
+        ("chosen: {type: circle, radius: x}", "chosen.radius: 'x' ... number"),
+        ("chosen: {type: line}", "chosen: missing ... 'to'"),
+        ("chosen: {type: circle, radius: 1, x: 1}", "chosen.x: unknown ... 'x'"),
+        ("modes: x", "modes: 'x' ... a list of 'a'"),
+        ("modes: [c]", "modes.0: 'c' ... 'a'"),
+        ("several: 1", "several: 1 ... a list of matrices"),
+        ("bare: 1", "bare: 1 ... a list of values"),
+        ("day: tomorrow", "day: 'tomorrow' ... valid date"),
+        ("call: 1", "call: 1 ... callable"),
+        ("new-name: 10", "new-name: 10 ... less than 10"),
     ],
 )  # fmt: skip
 def test_lenient_models(text: str, expected: str) -> None:
-    assert message(text, model=Lenient) == f"panda.yaml:1: {expected}"
+    assert re.search(wording(f"panda.yaml:1: {expected}"), message(text, model=Lenient))
 
 
 SEVERAL = """\

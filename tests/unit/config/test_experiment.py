@@ -1,6 +1,7 @@
 """YAML and Python are two faces of the same objects, and every error says where."""
 
 import json
+import re
 from pathlib import Path
 
 import jsonschema
@@ -9,6 +10,7 @@ import pytest
 import yaml
 from exported_schema import exported_schema, validator
 from scenario_document import check_place
+from wording import wording
 
 from hsp_control import (
     FramePose,
@@ -147,54 +149,52 @@ def test_a_log_of_a_robot_file_can_be_repeated_from_elsewhere(
 # Each row: what is changed, the class of the error, and what its message says.
 MISTAKES = [
     ("robot.name", "pandda", "RobotNotFoundError",
-     "robot.name: no robot 'pandda'; did you mean 'panda'?"),
+     "robot.name: no ... 'pandda' ... 'panda'"),
     ("robot.name", "missing/arm.urdf", "RobotNotFoundError",
      "robot.name: missing/arm.urdf: no such file"),
     ("robot.locked", {"panda_join1": 0.0}, "JointNotFoundError",
-     "did you mean 'panda_joint1'?"),
+     "'panda_joint1'"),
     ("robot.tool_frames.pen.parent", "panda_hnd", "FrameNotFoundError",
-     "no parent frame 'panda_hnd'; did you mean 'panda_hand'?"),
+     "no ... 'panda_hnd' ... 'panda_hand'"),
     ("start.joints", {"joint9": 1.0}, "JointNotFoundError",
      "start.joints.joint9: no joint 'joint9'"),
     ("start.configuration", [0.0] * 7, "ConfigurationError",
-     "the start is given twice"),
-    ("start.velocity", [0.0] * 3, "ShapeError", "start.velocity: v0 has shape (3,)"),
+     "start is given twice"),
+    ("start.velocity", [0.0] * 3, "ShapeError", "start.velocity: v0 ... (3,)"),
     ("start", {"coordinates": [0.0] * 7}, "ConfigurationError",
-     "start.coordinates: panda defines no joint coordinates; use joints"),
-    ("tasks", None, "ConfigError", "tasks: "),
+     "start.coordinates: panda ... joints"),
+    ("tasks", None, "ConfigError", "tasks:"),
     ("tasks.pen.frame", "pan", "FrameNotFoundError",
-     "tasks.pen.frame: no frame 'pan'; did you mean 'pen'?"),
-    ("tasks.pen.wieght", 1, "ConfigError", "unknown key 'wieght'"),
+     "tasks.pen.frame: no ... 'pan' ... 'pen'"),
+    ("tasks.pen.wieght", 1, "ConfigError", "unknown ... 'wieght'"),
     ("tasks.pen.gains", {"kp": 1}, "GainError",
-     "tasks.pen.gains: give both kp and kv, or natural_frequency; one is missing"),
+     "tasks.pen.gains: ... natural_frequency ... missing"),
     ("tasks.pen.gains", {"kp": [1, 2], "kv": 1}, "GainError",
-     "tasks.pen.gains: kp has shape (2,); needs a number, 6 numbers"),
+     "tasks.pen.gains: kp ... (2,) ... a number"),
     ("tasks.pen.trajectory.position.center", [0, 0], "TrajectoryError",
-     "tasks.pen.trajectory.position: a circle in dimension 2 needs dimension 3"),
+     "tasks.pen.trajectory.position: ... dimension 2 ... 3"),
     ("tasks.more", {"type": "joint_posture"}, "ControllerError",
-     "tasks: the tasks have 13 rows (pen: 6, more: 7)"),
-    ("null_space.gain", [1, 2], "GainError",
-     "null_space.gain: null_space_gain has shape (2,)"),
+     "tasks: ... 13 rows (pen: 6, more: 7)"),
+    ("null_space.gain", [1, 2], "GainError", "null_space.gain: ... (2,)"),
     ("null_space.metric", {"type": "coordinates"}, "MetricError",
-     "null_space.metric: panda defines no joint coordinates; give matrix"),
+     "null_space.metric: panda ... matrix"),
     ("null_space.metric", {"type": "constant", "matrix": [1, 1]}, "MetricError",
-     "null_space.metric.matrix: the metric has shape (2, 2); the robot needs (7, 7)"),
+     "null_space.metric.matrix: the metric ... (2, 2) ... (7, 7)"),
     ("null_space.fields.0", {"type": "point_distance", "frames": ["pen"],
                              "obstacle": "ball"}, "SceneError",
-     "null_space.fields.0.obstacle: no obstacle 'ball' (the scene has none)"),
+     "null_space.fields.0.obstacle: no ... 'ball'"),
     ("null_space.fields.0", {"type": "equal_joint_angles", "joints": ["a", "b"]},
      "JointNotFoundError", "null_space.fields.0.joints.0: no joint 'a'"),
     ("null_space.fields.0", {"type": "target_posture", "target": [1.0]},
      "ShapeError",
-     "null_space.fields.0.target: a posture has shape (1,); needs 7 numbers"),
+     "null_space.fields.0.target: a posture ... (1,) ... 7 numbers"),
     ("null_space.fields", [{"type": "rest"}, {"type": "uncontrolled"}],
-     "FieldError", "null_space.fields.1: 'uncontrolled' cannot be combined with other"),
+     "FieldError", "null_space.fields.1: 'uncontrolled' ... combined"),
     ("scene", {"obstacles": {"b": {"shape": {"type": "mesh", "file": "b.stl"},
                                    "center": {"type": "hold", "point": [0, 0, 0]}}}},
      "SceneError", "scene.obstacles.b.shape: mesh: no such file"),
     ("simulation.integrator.step", 0.0007, "SimulationError",
-     "simulation.integrator.step: 0.0007 s is not an integer fraction of "
-     "control_period = 0.001 s"),
+     "simulation.integrator.step: 0.0007 s ... control_period = 0.001 s"),
 ]  # fmt: skip
 
 
@@ -208,7 +208,7 @@ def test_every_mistake_is_named(
     file.write_text(yaml.safe_dump(changed(path, value), sort_keys=False))
     with pytest.raises(getattr(exceptions, error)) as caught:
         load_experiment(file)
-    assert message in str(caught.value)
+    assert re.search(wording(f"... {message}"), str(caught.value))
     assert check_place(caught.value, file)
 
 

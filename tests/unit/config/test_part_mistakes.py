@@ -1,6 +1,7 @@
 """Mistakes in the parts of a configuration: one message each, with its place."""
 
 import json
+import re
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -9,6 +10,7 @@ import pytest
 import yaml
 from places import THOROUGH
 from scenario_document import check_place, line_of
+from wording import wording
 
 from hsp_control import load_experiment
 from hsp_control.common import exceptions
@@ -59,83 +61,70 @@ def change(**keys: Any) -> dict[str, Any]:
 # Each row: the sections that are replaced, the class of the error, and its message.
 MISTAKES: list[tuple[dict[str, Any], str, str]] = [
     ({"title": 301 * "t"}, "ConfigError",
-     f"title: '{35 * 't'}...' has 301 characters, needs at most 300"),
+     f"title: '{35 * 't'}...' ... 301 ... at most 300"),
     # colours: # begins a comment
     ({"view": {"background": None}}, "ConfigError",
-     "view.background: nothing given; write a colour in quotes, \"#14202B\": "
-     "# begins a comment"),
+     "view.background: nothing given ... in quotes"),
     ({"view": {"background": "blue"}}, "ConfigError",
-     "view.background: 'blue' is not a colour, such as '#14202B'"),
+     "view.background: 'blue' ... '#14202B'"),
     # types
     ({"tasks": {"hand": {"frame": "panda_hand"}}}, "ConfigError",
-     f"tasks.hand: missing key 'type'; type is one of: {TASKS}"),
+     "tasks.hand: missing ... 'type'"),
     ({"tasks": {"hand": {"tpye": "pointing"}}}, "ConfigError",
-     "tasks.hand.tpye: unknown key 'tpye'; did you mean 'type'? (type is one of: "
-     f"{TASKS})"),
+     "tasks.hand.tpye: unknown ... 'tpye' ... 'type'"),
     ({"tasks": {"hand": {"type": "pointng"}}}, "ConfigError",
-     "tasks.hand.type: unknown type 'pointng'; did you mean 'pointing'? (allowed: "
-     f"{TASKS})"),
+     "tasks.hand.type: unknown ... 'pointng' ... 'pointing'"),
     ({"tasks": [{"type": "pointing"}]}, "ConfigError",
-     "tasks: [{type: 'pointing'}] is a list; expected a mapping"),
+     "tasks: [{type: 'pointing'}] ... a mapping"),
     # keys
-    (task(frme="a"), "ConfigError",
-     "tasks.hand.frme: unknown key 'frme'; did you mean 'frame'? (allowed: type, "
-     "priority, schedule, gains, largest_error, impedance, blend, frame, trajectory, "
-     "axes)"),
-    (task(name="x"), "ConfigError",
-     "tasks.hand.name: unknown key 'name'; the key 'hand' is the name"),
+    (task(frme="a"), "ConfigError", "tasks.hand.frme: unknown ... 'frme' ... 'frame'"),
+    (task(name="x"), "ConfigError", "tasks.hand.name: unknown ... 'hand' is the name"),
     (task(trajectory={"type": "circle", "radus": 1, "angular_rate": 1}), "ConfigError",
-     "tasks.hand.trajectory.radus: unknown key 'radus'; did you mean 'radius'? "
-     "(allowed: type, origin, radius, angular_rate, center, phase, normal, toward, "
-     "axes)"),
+     "tasks.hand.trajectory.radus: unknown ... 'radus' ... 'radius'"),
     (task(trajectory={"type": "line"}), "ConfigError",
-     "tasks.hand.trajectory: missing keys 'end', 'duration'; required here: type, end, "
-     "duration"),
+     "tasks.hand.trajectory: missing ... 'end', 'duration'"),
     (scene(name="b"), "ConfigError",
-     "scene.obstacles.a.name: unknown key 'name'; the key 'a' is the name"),
+     "scene.obstacles.a.name: unknown ... 'a' is the name"),
     ({"scene": {"obstacles": {"": {"shape": BOX, "center": HOLD}}}}, "ConfigError",
-     "scene.obstacles.'': the key '' should have at least 1 character"),
+     "scene.obstacles.'': ... at least 1"),
     ({"tasks": {"ha:nd": {"type": "frame_position"}}}, "TaskError",
-     "tasks.'ha:nd': task name 'ha:nd': use letters, digits, '_' and '-' (the columns "
-     "of the log contain it)"),
+     "tasks.'ha:nd': ... letters, digits, '_' and '-'"),
     # values
     (task(gains={"kp": [1, [2]], "kv": 1}), "ConfigError",
-     "tasks.hand.gains.kp.1: [2] is a list; expected a number"),
+     "tasks.hand.gains.kp.1: [2] ... a number"),
     (task(trajectory={"type": "hold", "point": [1, float("nan"), 2]}), "ConfigError",
-     "tasks.hand.trajectory.point.1: .nan is not a finite number"),
+     "tasks.hand.trajectory.point.1: .nan ... finite"),
     ({"null_space": {"fields": {"type": "rest"}}}, "ConfigError",
-     "null_space.fields: {type: 'rest'} is a mapping; expected a list of mappings"),
+     "null_space.fields: {type: 'rest'} ... a list of mappings"),
     (scene(orientation={"type": "spin", "axis": [0, 0, 0], "rate": 1}),
      "TrajectoryError",
-     "scene.obstacles.a.orientation: axis must be non-zero; axis = [0, 0, 0]"),
+     "scene.obstacles.a.orientation: axis ... non-zero ... [0, 0, 0]"),
     # changes
     (change(type="gains", task="hnd", gains=GAINS), "ControllerError",
-     "changes.0: there is no task 'hnd'; did you mean 'hand'? (there are hand)"),
+     "changes.0: there is no ... 'hnd' ... 'hand'"),
     (change(type="gains", task="hand", gains={"kp": [1, 1], "kv": 1}), "GainError",
-     "changes.0.gains: kp has shape (2,); needs a number, 3 numbers or a 3 × 3 matrix"),
+     "changes.0.gains: kp ... (2,) ... a number"),
     (change(type="add_task", task={"type": "pointing", "frame": "panda_hnd",
                                    "direction": [0, 0, 1]}), "FrameNotFoundError",
-     "changes.0.task.frame: no frame 'panda_hnd'; did you mean 'panda_hand'? (the "
-     "model has "),
+     "changes.0.task.frame: no ... 'panda_hnd' ... 'panda_hand'"),
     (change(type="add_task", task={"type": "frame_position", "name": "hand"}),
      "ControllerError",
-     "changes.0: two tasks are called 'hand'; give them distinct names"),
+     "changes.0: two tasks ... 'hand'"),
     (change(type="field", fields=[{"type": "joint_centering", "weights": [1, 1]}]),
      "FieldError",
-     "changes.0.fields.0.weights: weights have shape (2,); needs one number or 7"),
+     "changes.0.fields.0.weights: weights ... (2,) ... one number"),
     (change(type="null_space_gain", gain=[1, 2]), "GainError",
-     "changes.0.gain: null_space_gain has shape (2,); needs a number, 7 numbers or a "
-     "7 × 7 matrix"),
+     "changes.0.gain: null_space_gain ... (2,) ... a number"),
     (change(type="contact", contact="a", active=True), "ControllerError",
-     "changes.0: there is no contact 'a' (there are none)"),
+     "changes.0: there is no contact 'a'"),
     ({"changes": [
         {"type": "remove_task", "task": "hand", "at": 2},
         {"type": "gains", "task": "hand", "gains": GAINS, "at": 3},
-     ]}, "ControllerError", "changes.1: there is no task 'hand' (there are none)"),
+     ]}, "ControllerError", "changes.1: there is no task 'hand'"),
     ({"changes": [
         {"type": "gains", "task": "hand", "gains": GAINS, "at": 3},
         {"type": "remove_task", "task": "hand", "at": 2},
-     ]}, "ControllerError", "changes.0: there is no task 'hand' (there are none)"),
+     ]}, "ControllerError", "changes.0: there is no task 'hand'"),
 ]  # fmt: skip
 
 
@@ -154,7 +143,7 @@ def test_every_mistake_is_named(
     assert type(caught.value) is getattr(exceptions, error)
     check_place(caught.value, file)
     _, _, text = str(caught.value).removeprefix(f"{file}:").partition(": ")
-    assert text.startswith(message) if message.endswith(" ") else text == message
+    assert re.search(wording(message), text)
 
 
 # -- any mistake in any bundled configuration -----------------------------------------

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 import yaml
 from places import ROOT
+from wording import wording
 
 from hsp_control import load_experiment
 from hsp_control.common.exceptions import HspControlError
@@ -115,31 +116,30 @@ def test_the_page_s_configurations_run() -> None:
 @pytest.mark.parametrize(
     ("plant", "message"),
     [
-        ("rigidbody", r"plant.type: unknown type 'rigidbody'; did you mean 'rigid_bo"),
-        ({"type": "rigidbody"},
-         r"plant.type: unknown type 'rigidbody'; did you mean 'rigid_body'"),
+        ("rigidbody", "plant.type: unknown ... 'rigidbody' ... 'rigid_body'"),
+        ({"type": "rigidbody"}, "plant.type: unknown ... 'rigidbody' ... 'rigid_body'"),
         ({"type": "rigid_body", "payloda": 1},
-         r"plant.payloda: unknown key 'payloda'; did you mean 'payload'\?"),
+         "plant.payloda: unknown ... 'payloda' ... 'payload'"),
         ({"type": "rigid_body", "payload": {"frame": "panda_tpc", "mass": 1}},
-         r"plant.payload.frame: no frame 'panda_tpc'; did you mean 'panda_tcp'\?"),
+         "plant.payload.frame: no ... 'panda_tpc' ... 'panda_tcp'"),
         ({"type": "rigid_body", "pushes": [{"frame": "panda_tpc"}]},
-         r"plant.pushes.0.frame: no frame 'panda_tpc'; did you mean 'panda_tcp'\?"),
+         "plant.pushes.0.frame: no ... 'panda_tpc' ... 'panda_tcp'"),
         ({"type": "rigid_body", "friction": {"coulomb": [1, 2]}},
-         r"plant.friction.coulomb: has shape \(2,\); needs one number, or one"),
+         "plant.friction.coulomb: ... (2,) ... one number"),
         ({"type": "rigid_body", "motor_inertia": [1, 2]},
-         r"plant.motor_inertia: has shape \(2,\); needs one number, or one for"),
+         "plant.motor_inertia: ... (2,) ... one number"),
         ({"type": "rigid_body", "sensors": {"velocity_noise": [1]}},
-         r"plant.sensors.velocity_noise.std: has shape \(1,\); needs one number"),
+         "plant.sensors.velocity_noise.std: ... (1,) ... one number"),
         ({"type": "rigid_body", "drives": {"noise": [1]}},
-         r"plant.drives.noise.std: has shape \(1,\); needs one number, or one"),
+         "plant.drives.noise.std: ... (1,) ... one number"),
         ({"type": "rigid_body", "drives": {"dropped": 1.0}},
-         r"plant.drives.dropped.probability: 1.0 is too large; must be less than 1$"),
+         "plant.drives.dropped.probability: 1.0 ... less than 1"),
         ({"type": "rigid_body", "robot": {"name": "planar3r"}},
-         r"plant: the plant moves planar3r with the joints joint1, joint2, joint3; "),
+         "plant: ... planar3r ... joint1, joint2, joint3"),
     ],
 )  # fmt: skip
 def test_plants_that_are_none(plant: Any, message: str) -> None:
-    with pytest.raises(HspControlError, match=message):
+    with pytest.raises(HspControlError, match=wording(f"... {message}")):
         load_experiment(panda(plant))
 
 

@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from odd_errors import NamelessError
 from robot_cases import load
 
 import hsp_control as hsp
@@ -92,11 +93,6 @@ def test_what_cannot_be_repeated_says_why_and_an_error_ends_the_log(
         empty.close()
     with pytest.raises(LogError, match="log_period is 0 s; must be positive"):
         hsp.Recorder(controller, log_period=0)
-
-
-class NamelessError(Exception):
-    def __str__(self) -> str:
-        raise RuntimeError("it has no text")
 
 
 @pytest.mark.parametrize("rows", [0, 1])

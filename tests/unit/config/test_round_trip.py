@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 import yaml
 from exported_schema import validator
+from wording import wording
 
 from hsp_control import (
     Controller,
@@ -162,14 +163,13 @@ def test_an_experiment_of_parts_goes_to_yaml_and_back(tmp_path: Path) -> None:
     ("settings", "message"),
     [
         ({"simulation": {"duraton": 1}},
-         r"^experiment: simulation\.duraton: unknown key 'duraton'; did you mean"),
-        ({"plant": "rigidbody"}, r"^experiment: plant\.type: unknown type 'rigidb"),
-        ({"name": "mine", "start": {"joints": [1]}},
-         r"^mine: start\.joints: joints has shape \(1,\)"),
+         "experiment: simulation.duraton: unknown ... 'duraton'"),
+        ({"plant": "rigidbody"}, "experiment: plant.type: unknown ... 'rigidbody'"),
+        ({"name": "mine", "start": {"joints": [1]}}, "mine: start.joints: ... (1,)"),
     ],
 )  # fmt: skip
 def test_a_wrong_setting_is_named(settings: dict[str, Any], message: str) -> None:
-    with pytest.raises(HspControlError, match=message):
+    with pytest.raises(HspControlError, match=wording(message)):
         parts(**settings)
 
 

@@ -1,12 +1,14 @@
 """Mistakes about contacts, limits, priorities and the base: a located message each."""
 
 import json
+import re
 from pathlib import Path
 from typing import Any
 
 import pytest
 import yaml
 from scenario_document import check_place
+from wording import wording
 
 from hsp_control import load_experiment
 from hsp_control.common import exceptions
@@ -40,57 +42,52 @@ REMOVED = object()
 # Each row: the robot, what is changed, the class of the error, and its message.
 MISTAKES: list[tuple[dict[str, Any], str, Any, str, str]] = [
     (SOLO, f"{FOOT}.frame", "FL_FOT", "FrameNotFoundError",
-     f"{FOOT}.frame: no frame 'FL_FOT'; did you mean 'FL_FOOT'?"),
+     f"{FOOT}.frame: no ... 'FL_FOT' ... 'FL_FOOT'"),
     (SOLO, f"{FOOT}.normal", [0, 0, 0], "ContactError",
-     f"{FOOT}.normal: [0.0, 0.0, 0.0] has no direction; must not be zero"),
+     f"{FOOT}.normal: [0.0, 0.0, 0.0] ... not be zero"),
     (SOLO, FOOT, {**SOLE, "type": "sphere"}, "ConfigError",
-     f"{FOOT}.type: unknown type 'sphere' (allowed: ball, point, sliding, surface)"),
-    (SOLO, FOOT, SOLE, "ContactError",
-     f"{FOOT}: give length and width of the sole, or its corners"),
+     f"{FOOT}.type: unknown ... 'sphere'"),
+    (SOLO, FOOT, SOLE, "ContactError", f"{FOOT}: ... length and width ... corners"),
     (SOLO, FOOT, {**SOLE, "corners": LINE}, "ContactError",
-     f"{FOOT}.corners: [[0.0, 0.0, 0.0], [0.1, 0.0, 0.0], [0.2, 0.0, 0.0]] span no "
-     "surface; needs three points or more, not on one line"),
+     f"{FOOT}.corners: [[0.0, 0.0, 0.0], ... three points"),
     (SOLO, f"{FOOT}.schedule", TWICE, "ScheduleError",
-     f"{FOOT}.schedule: the interval from 1 to 3 s overlaps the previous one, which"),
+     f"{FOOT}.schedule: ... 1 to 3 s overlaps"),
     (SOLO, f"{FOOT}.schedule", {"intervals": [[0, 1]], "ramp": 2}, "ScheduleError",
-     f"{FOOT}.schedule: the interval from 0 to 1 s is shorter than its ramps, 4 s"),
+     f"{FOOT}.schedule: ... 0 to 1 s is shorter ... 4 s"),
     (SOLO, "contacts", {}, "ContactError",
-     "start.ground: solo12 has no contact to put on the ground"),
-    (SOLO, "base", "driven", "ContactError", "base: base='driven' needs no contacts"),
+     "start.ground: solo12 has no contact"),
+    (SOLO, "base", "driven", "ContactError", "base: ... 'driven' ... no contacts"),
     (PANDA, "base", "flying", "ContactError",
-     "base: panda has no free-flyer root: base is only for robots with a"),
+     "base: panda has no free-flyer root"),
     (PANDA, "contacts", {"hand": {"type": "sliding", "frame": "panda_tcp"}},
-     "ContactError", "contacts.hand.force: it is missing: a sliding contact"),
+     "ContactError", "contacts.hand.force: ... missing"),
     (PANDA, "start", {"ground": 0}, "ContactError",
-     "start.ground: panda has no free-flyer root to put on the ground"),
+     "start.ground: panda has no free-flyer root"),
     (PANDA, "limits.effort", {"scale": {"panda_joint9": 0.5}}, "JointNotFoundError",
-     "limits.effort.scale.panda_joint9: no joint 'panda_joint9'; did you mean"),
+     "limits.effort.scale.panda_joint9: no ... 'panda_joint9'"),
     (SOLO, "limits", {"effort": {"scale": {"root_joint": 0.5}}}, "LimitError",
-     "limits.effort.scale.root_joint: root_joint has no limit that could be scaled"),
+     "limits.effort.scale.root_joint: ... no limit"),
     (PANDA, "limits.effort", [1, 2], "LimitError",
-     "limits.effort: has 2 numbers; needs one number or 7"),
+     "limits.effort: ... 2 numbers ... 7"),
     (PANDA, "limits.effort", "robt", "ConfigError",
-     "limits.effort: 'robt' is text; expected 'robot', 'none', a mapping, a number or "
-     "a list of numbers; did you mean 'robot'?"),
+     "limits.effort: 'robt' ... 'robot'"),
     (PANDA, "limits.position", {"lower": [0] * 7, "upper": [0] * 7}, "LimitError",
-     "limits.position: lower must be below upper; got lower (0.0, 0.0, 0.0, 0.0, 0.0, "
-     "0.0, 0.0), upper (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)"),
+     "limits.position: lower ... below upper"),
     (PANDA, "limits.position", {"lower": [-1] * 7, "upper": [1] * 6}, "LimitError",
-     "limits.position: lower has 7 numbers and upper 6; needs as many"),
+     "limits.position: lower has 7 ... upper 6"),
     (PANDA, "limits.position", {"lower": -1, "upper": [1] * 6}, "LimitError",
-     "limits.position.upper: has 6 numbers; needs one number or 7"),
+     "limits.position.upper: ... 6 numbers ... 7"),
     (PANDA, "limits.position_margin", 4, "LimitError",
-     "limits.position: the limits of panda_joint1 leave no room: -2.8973 to 2.8973 "
-     "with a margin of 4"),
+     "limits.position: ... panda_joint1 ... -2.8973 to 2.8973 ... 4"),
     (PANDA, "limits.barriers", [{"type": "self_distnce"}], "ConfigError",
-     "limits.barriers.0.type: unknown type 'self_distnce'; did you mean 'self_dist"),
+     "limits.barriers.0.type: unknown ... 'self_distnce' ... 'self_dist"),
     (PANDA, "limits.barriers", [{"type": "obstacle_distance", "obstacles": ["ball"]}],
      "SceneError",
-     "limits.barriers.0.obstacles.0: no obstacle 'ball' (the scene has none)"),
+     "limits.barriers.0.obstacles.0: no obstacle 'ball'"),
     (PANDA, "limits.position", {"lower": [-3] * 7, "upper": [-1] * 7}, "LimitError",
-     "start: the start is outside the limits: panda_joint1 is at 0, its limits are"),
+     "start: ... panda_joint1 is at 0"),
     (PANDA, "start", {"joints": {"panda_joint4": 0.1}}, "LimitError",
-     "start: the start is outside the limits: panda_joint4 is at 0.1, its limits are"),
+     "start: ... panda_joint4 is at 0.1"),
 ]  # fmt: skip
 
 
@@ -113,7 +110,7 @@ def check(data: dict[str, Any], error: str, message: str, file: Path) -> None:
     file.write_text(yaml.safe_dump(data, sort_keys=False))
     with pytest.raises(getattr(exceptions, error)) as caught:
         load_experiment(file)
-    assert message in str(caught.value)
+    assert re.search(wording(f"... {message}"), str(caught.value))
     path = message.partition(": ")[0]
     assert check_place(caught.value, file) == ("" if " " in path else path)
 

@@ -5,9 +5,9 @@ from typing import Any
 
 import numpy as np
 import pytest
-from controller_cases import panda
 from hypothesis import given
 from hypothesis import strategies as st
+from loaded_robots import panda
 from runs import held
 
 import hsp_control as hsp

@@ -13,6 +13,7 @@ import pinocchio as pin
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from loaded_robots import talos
 from numpy.testing import assert_allclose
 from runs import check_errors, check_null_space, continuous, held
 
@@ -34,13 +35,6 @@ seeds = st.integers(0, 2**32 - 1)
 GAINS = hsp.Gains(natural_frequency=8.0)
 SOLES = ("left_sole_link", "right_sole_link")
 FEET = ("FL_FOOT", "FR_FOOT", "HL_FOOT", "HR_FOOT")
-
-
-@cache
-def talos() -> hsp.Robot:
-    return hsp.Robot.load(
-        "talos", locked={"gripper_left_joint": 0, "gripper_right_joint": 0}
-    )
 
 
 @cache

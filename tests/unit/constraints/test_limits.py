@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from controller_cases import panda
+from loaded_robots import panda
 from places import further
 
 from hsp_control import Hold, Limits, Obstacle, Robot, Sphere

@@ -9,9 +9,9 @@ from typing import Any
 
 import numpy as np
 import pytest
-from controller_cases import panda
 from hypothesis import assume, given
 from hypothesis import strategies as st
+from loaded_robots import panda
 from runs import check_null_space
 from scipy.integrate import quad, solve_ivp
 

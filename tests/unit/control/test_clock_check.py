@@ -7,6 +7,7 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
+from wording import wording
 
 import hsp_control as hsp
 from hsp_control.control.clock_check import ClockWarning
@@ -33,18 +34,18 @@ STEPS = H * np.arange(40)
 @pytest.mark.parametrize(
     ("times", "period", "message"),
     [
-        (1e3 * STEPS, H, "advances by 2 s in a period that was given as 0.002 s"),
-        (1e9 * STEPS, H, "advances by 2e.06 s in a period"),
-        (STEPS, 2.0, "advances by 0.002 s in a period that was given as 2 s"),
-        (-STEPS, H, "the clock runs back: t = -0.01 s came -0.002 s after the step"),
-        (np.zeros(200), H, "the clock stands still at t = 0 s, while efforts are held"),
+        (1e3 * STEPS, H, "... advances by 2 s ... 0.002 s"),
+        (1e9 * STEPS, H, "... advances by 2e+06 s"),
+        (STEPS, 2.0, "... advances by 0.002 s ... 2 s"),
+        (-STEPS, H, "... runs back: t = -0.01 s ... -0.002 s"),
+        (np.zeros(200), H, "... stands still at t = 0 s"),
     ],
 )
 def test_a_clock_of_something_else_is_said_once(
     times: Sequence[float], period: float, message: str
 ) -> None:
     (found,) = told(times, period)
-    assert re.search(message, found)
+    assert re.search(wording(message), found)
 
 
 def test_a_state_with_the_time_of_a_clock_is_said() -> None:

@@ -5,15 +5,15 @@ motions of plants that solve the contact for themselves, where errors and null s
 obey their equations and the force is the commanded one.
 """
 
-from functools import cache
 from typing import Any
 
 import numpy as np
 import pytest
-from controller_cases import panda
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from loaded_robots import panda, talos
 from runs import check_null_space, continuous
+from wording import wording
 
 import hsp_control as hsp
 from hsp_control import engine
@@ -35,13 +35,6 @@ seeds = st.integers(0, 2**32 - 1)
 GAINS = hsp.Gains(natural_frequency=8.0)
 HAND, TIP = "gripper_right_base_link", "panda_tcp"
 SOLES = ("left_sole_link", "right_sole_link")
-
-
-@cache
-def talos() -> hsp.Robot:
-    return hsp.Robot.load(
-        "talos", locked={"gripper_left_joint": 0, "gripper_right_joint": 0}
-    )
 
 
 def wall(force: CommandedForce | None, **options: Any) -> PointContact:
@@ -282,37 +275,33 @@ TIPPING = SurfaceContact(
     [
         (
             lambda: CommandedForce(trajectory=Stream()),
-            "trajectory: a stream cannot command a force; while the controller runs",
+            "... trajectory: a stream cannot command a force",
         ),
         (
             lambda: CommandedForce(trajectory=Hold()),
-            "trajectory: point is missing: nothing starts here",
+            "... trajectory: point is missing",
         ),
         (
             lambda: pressing(press(value=-5.0)),
-            r"contacts\.panda_tcp\.force\.value: the normal force is -5 N; a contact",
+            "... contacts.panda_tcp.force.value: ... -5 N",
         ),
         (
             lambda: pressing(press(value=[6.0, 0.0, 10.0])),
-            r"panda_tcp\.force\.value: the tangential force is \(6, 0\) N beside a no"
-            r"rmal force of 10 N: outside the friction pyramid, which allows 4",
+            "... panda_tcp.force.value: ... (6, 0) N ... 10 N ... pyramid ... 4",
         ),
         (
             lambda: pressing(press(value=[0.0, 0.0, 10.0, 0.0, 0.0, 0.0])),
-            "a contact of type point exerts no moment: needs 1 or 3",
+            "... type point ... no moment ... 1 or 3",
         ),
-        (
-            lambda: pressing(TIPPING),
-            "at point 1 of 4, its share of the wrench, is -22.5 N",
-        ),
+        (lambda: pressing(TIPPING), "... at point 1 of 4 ... -22.5 N"),
         (
             lambda: SlidingContact(TIP, force=CommandedForce([0.0, 0, 1, 0, 0, 0])),
-            "a sliding contact needs 1 .it slides. or 3",
+            "... sliding contact ... 1 (it slides) or 3",
         ),
     ],
 )
 def test_what_cannot_be_commanded(make: Any, message: str) -> None:
-    with pytest.raises(hsp.HspControlError, match=message):
+    with pytest.raises(hsp.HspControlError, match=wording(message)):
         make()
 
 

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 from compensation_cases import ALL, EVERYTHING, PANDA, Q0, H, circle, controller
+from wording import wording
 
 from hsp_control import Robot
 from hsp_control.common.arrays import Array
@@ -87,36 +88,42 @@ def walker() -> Robot:
     [
         (
             lambda: MomentumObserver(0.0),
-            "MomentumObserver: bandwidth: 0.0 is too small",
+            "MomentumObserver: bandwidth: 0.0 ... too small",
         ),
-        (lambda: VelocityFilter(10.0, 3), r"order: unknown value 3 \(allowed: 1, 2\)"),  # type: ignore[arg-type]
-        (lambda: VelocityFilter(600.0, 2).coefficients(H), "needs less than 500 Hz"),
-        (lambda: Predictor(0, 0), "a predictor needs a delay"),
-        (lambda: IntegralAction(), "needs a rate"),
-        (lambda: IntegralAction(ki={"hand": -1.0}), "ki.hand: -1.0 is negative"),
-        (lambda: StartUpRamp(1.0, -1.0), "natural_frequency: -1.0 is negative; must"),
-        (lambda: FrictionFeedForward(1.0, smoothing=0.0), "smoothing: 0.0 is too sm"),
+        (lambda: VelocityFilter(10.0, 3), "... order: unknown ... 3"),  # type: ignore[arg-type]
+        (lambda: VelocityFilter(600.0, 2).coefficients(H), "... less than 500 Hz"),
+        (lambda: Predictor(0, 0), "... predictor needs a delay"),
+        (lambda: IntegralAction(), "... needs a rate"),
+        (lambda: IntegralAction(ki={"hand": -1.0}), "... ki.hand: -1.0 ... negative"),
+        (lambda: StartUpRamp(1.0, -1.0), "... natural_frequency: -1.0 ... negative"),
+        (
+            lambda: FrictionFeedForward(1.0, smoothing=0.0),
+            "... smoothing: 0.0 ... too small",
+        ),
         (
             lambda: on(friction_feed_forward=FrictionFeedForward([1.0])),
-            r"^friction_feed_forward.coulomb: has shape \(1,\); needs one number",
+            "friction_feed_forward.coulomb: ... (1,) ... one number",
         ),
-        (lambda: MomentumObserver(clip=[-1.0] * 7), r"clip.0: -1.0 is .* greater th"),
+        (
+            lambda: MomentumObserver(clip=[-1.0] * 7),
+            "... clip.0: -1.0 ... greater than 0",
+        ),
         (
             lambda: on(momentum_observer=MomentumObserver(clip=[1.0] * 6)),
-            "^momentum_observer.clip: has 6 numbers; needs one number or 7",
+            "momentum_observer.clip: ... 6 numbers ... 7",
         ),
         (
             lambda: on(integral_action=IntegralAction(1.0, tasks=["hnad"])),
-            r"^integral_action.tasks: there is no task 'hnad'; did you mean 'hand'\?",
+            "integral_action.tasks: there is no ... 'hnad' ... 'hand'",
         ),
         (
             lambda: on(integral_action=IntegralAction(ki={"hnad": 1.0})),
-            r"^integral_action.ki: there is no task 'hnad'; did you mean 'hand'\?",
+            "integral_action.ki: there is no ... 'hnad' ... 'hand'",
         ),
     ],
 )
 def test_settings_that_make_no_sense(make: Any, message: str) -> None:
-    with pytest.raises(CompensationError, match=message):
+    with pytest.raises(CompensationError, match=wording(message)):
         make()
 
 

@@ -10,10 +10,10 @@ from controller_cases import (
     contents,
     hold_orientation,
     metrics,
-    panda,
     states,
     track,
 )
+from loaded_robots import panda
 from numpy.testing import assert_allclose, assert_array_equal
 
 import hsp_control as hsp

@@ -13,10 +13,11 @@ from controller_cases import (
     assert_same,
     circle,
     contents,
-    panda,
     states,
     track,
 )
+from loaded_robots import panda
+from wording import wording
 
 import hsp_control as hsp
 from hsp_control.common.arrays import Array
@@ -70,96 +71,83 @@ TOGETHER = {"null_space_gain": indefinite_gain(), "metric": ConstantMetric(W1)}
         (
             {"tasks": named(TCP, TCP)},
             ControllerError,
-            "^tasks: two tasks are called 'panda_tcp'; give them distinct names$",
+            "tasks: two tasks ... 'panda_tcp'",
         ),
         (
             {"tasks": lambda: [hsp.FramePosition("panda_hnad", name="hand")]},
             FrameNotFoundError,
-            r"^tasks.hand.frame: no frame 'panda_hnad'; did you mean 'panda_hand'\?",
+            "tasks.hand.frame: no ... 'panda_hnad' ... 'panda_hand'",
         ),
         (
             {"field": hsp.Rest() + hsp.TargetPosture([0.0, 1.0])},
             ShapeError,
-            r"^null_space.fields.1.target: a posture has shape \(2,\); needs 7 num",
+            "null_space.fields.1.target: ... (2,) ... 7 numbers",
         ),
         (
             {"tasks": named("one", "two", "three")},
             ControllerError,
-            r"^tasks: the tasks have 9 rows \(one: 3, two: 3, three: 3\); panda has "
-            "only 7 degrees of freedom$",
+            "tasks: ... 9 rows (one: 3, two: 3, three: 3) ... 7",
         ),
         (
             {"tasks": lambda: [track(), *named(*"abc", priority=4)()]},
             ControllerError,
-            r"^tasks: the tasks of priority 4 have 9 rows \(a: 3, b: 3, c: 3\); panda",
+            "tasks: ... priority 4 ... 9 rows (a: 3, b: 3, c: 3)",
         ),
         (
             {"tasks": lambda: [track(), [track(name="again")]]},
             ControllerError,
-            "^tasks contains lists; write the level as priority=1, 2, ... of each task",
+            "tasks contains lists ... priority=1",
         ),
-        ({"tasks": lambda: [TCP]}, ControllerError, "contains 'panda_tcp', a str"),
+        ({"tasks": lambda: [TCP]}, ControllerError, "... contains 'panda_tcp', a str"),
         (
             {"field": [hsp.Rest()]},
             ControllerError,
-            r"^field is \[Rest\(\)\], a list; needs",
+            "field is [Rest()], a list",
         ),
-        ({"metric": "identity"}, ControllerError, "did you mean hsp.metrics.IdentityM"),
-        (
-            {"limits": {"effort": 1}},
-            ControllerError,
-            r"^limits is .*; needs a Limits\(effort",
-        ),
-        ({"contacts": ["sole"]}, ControllerError, "^contacts contains 'sole', a str"),
-        ({"tasks": track}, ControllerError, r"needs several, such as \[task\]"),
-        ({"limits": "none"}, ControllerError, "in Python it is None"),
-        ({"field": hsp.Rest}, ControllerError, "Rest, a class; give an instance, Rest"),
+        ({"metric": "identity"}, ControllerError, "... hsp.metrics.IdentityMetric"),
+        ({"limits": {"effort": 1}}, ControllerError, "limits is ... a Limits(effort"),
+        ({"contacts": ["sole"]}, ControllerError, "contacts contains 'sole', a str"),
+        ({"tasks": track}, ControllerError, "... needs several ... [task]"),
+        ({"limits": "none"}, ControllerError, "... in Python it is None"),
+        ({"field": hsp.Rest}, ControllerError, "... Rest, a class ... an instance"),
         (
             {"limits": hsp.Limits(effort=[1.0, 2.0])},
             LimitError,
-            "^limits.effort: has 2 numbers; needs one number or 7$",
+            "limits.effort: ... 2 numbers ... 7",
         ),
         (
             {"field": hsp.ObstacleClearance(["ball"])},
             SceneError,
-            r"^null_space.fields.0.obstacles.0: no obstacle 'ball' \(the scene has",
+            "null_space.fields.0.obstacles.0: no obstacle 'ball'",
         ),
-        ({"start": [0.0, 1.0]}, ShapeError, r"panda needs \(7,\)"),
-        ({"base": "flying"}, ContactError, "^base: panda has no fr"),
-        ({"null_space_gain": 0.0}, GainError, "is 0; must be greater than 0"),
+        ({"start": [0.0, 1.0]}, ShapeError, "... panda needs (7,)"),
+        ({"base": "flying"}, ContactError, "base: panda has no free-flyer"),
+        ({"null_space_gain": 0.0}, GainError, "... is 0 ... greater than 0"),
         (
             {"null_space_gain": [1.0, 1, 1, 1, 1, 1, -1]},
             GainError,
-            r"null_space_gain\[6\] is -1; must be greater than 0",
+            "... null_space_gain[6] is -1 ... greater than 0",
         ),
         (
             {"null_space_gain": "fast"},
             GainError,
-            "^null_space.gain: .* 'fast'; needs n",
+            "null_space.gain: ... 'fast' ... numbers",
         ),
-        ({"null_space_gain": np.nan}, GainError, "is nan; needs finite numbers"),
+        ({"null_space_gain": np.nan}, GainError, "... is nan ... finite"),
         (
             {"null_space_gain": [1.0, 2.0]},
             GainError,
-            r"null_space_gain has shape \(2,\); needs a number, 7 numbers or a 7 × 7",
+            "... null_space_gain ... (2,) ... 7 × 7",
         ),
-        (TOGETHER, GainError, "the smallest eigenvalue of W K_N is -"),
-        (
-            {"metric": SHORT},
-            MetricError,
-            r"^null_space.metric.matrix: the metric has shape \(3, 3\); the robot",
-        ),
-        ({"singularity_threshold": 0.0}, ControllerError, "is 0.0; must be positive"),
-        (
-            {"singularity_threshold": np.nan},
-            ControllerError,
-            "is nan; must be positive",
-        ),
+        (TOGETHER, GainError, "... eigenvalue of W K_N is -"),
+        ({"metric": SHORT}, MetricError, "null_space.metric.matrix: ... (3, 3)"),
+        ({"singularity_threshold": 0.0}, ControllerError, "... is 0.0 ... positive"),
+        ({"singularity_threshold": np.nan}, ControllerError, "... is nan ... positive"),
     ],
 )
 def test_refuses(options: Parts, error: type[Exception], message: str) -> None:
     make = options.get("tasks", lambda: [track()])
-    with pytest.raises(error, match=message) as caught:
+    with pytest.raises(error, match=wording(message)) as caught:
         hsp.Controller(panda(), **(options | {"tasks": make()}))
     assert isinstance(caught.value, hsp.HspControlError)
     not_there = error is FrameNotFoundError
@@ -268,7 +256,7 @@ FAILURES: list[tuple[Parts, type[Exception], str]] = [
         (
             {"tasks": [position(Broken(value, where), "mine")]},
             NonFiniteError,
-            r"task 'mine' is not finite at t = 0\.75 s; does its trajectory return NaN",
+            "... task 'mine' is not finite at t = 0.75 s ... trajectory",
         )
         for value, where in (
             *((np.nan, "position"), (np.inf, "velocity"), (np.nan, "acceleration")),
@@ -278,7 +266,7 @@ FAILURES: list[tuple[Parts, type[Exception], str]] = [
         (
             {"tasks": [broken_task(where, value)]},
             NonFiniteError,
-            r"task 'mine' is not finite at t = 0\.75 s",
+            "task 'mine' is not finite at t = 0.75 s",
         )
         for value, where in (
             *(
@@ -291,36 +279,36 @@ FAILURES: list[tuple[Parts, type[Exception], str]] = [
     (
         {"tasks": [called(late([0.0, np.nan, 0.0], CENTER))]},
         TrajectoryError,
-        r"function\(0\.75\) must be finite",
+        "... function(0.75) ... finite",
     ),
     (
         {"tasks": [called(late([0.0, 0.0], CENTER))]},
         TrajectoryError,
-        r"function\(0\.75\) must have shape \(3\)",
+        "... function(0.75) ... (3)",
     ),
     *(
         (
             {"field": BrokenField(where=where, broken=value, name="mine")},
             NonFiniteError,
-            r"field 'mine' is not finite at t = 0\.75 s",
+            "field 'mine' is not finite at t = 0.75 s",
         )
         for value, where in ((np.nan, "g"), (np.inf, "g_dot"))
     ),
     (
         mine(late(NAN, ZERO)),
         FieldError,
-        r"field 'mine' returned g = array\(.*nan.* at t = 0\.75 s; needs 7 finite",
+        "... field 'mine' ... g = ... nan ... t = 0.75 s",
     ),
     (
         mine(late(ZERO, ZERO), rate_function=late(np.full(7, np.inf), ZERO)),
         FieldError,
-        r"field 'mine' returned g' = array\(.*inf.* at t = 0\.75 s",
+        "... field 'mine' ... g' = ... inf ... t = 0.75 s",
     ),
-    (mine(late(np.zeros(6), ZERO)), FieldError, "needs 7 finite numbers"),
+    (mine(late(np.zeros(6), ZERO)), FieldError, "... 7 finite numbers"),
     (
         {"field": hsp.FunctionCost(late(np.nan, 1.0), name="mine")},
         FieldError,
-        r"cost 'mine' returned nan at t = 0\.7",
+        "... cost 'mine' ... nan at t = 0.7",
     ),
     (
         {
@@ -332,12 +320,12 @@ FAILURES: list[tuple[Parts, type[Exception], str]] = [
             )
         },
         FieldError,
-        r"'mine'.*t = 0\.75 s",
+        "... 'mine' ... t = 0.75 s",
     ),
     (
         {"metric": BrokenMetric()},
         NonFiniteError,
-        r"the effort is not finite at t = 0\.75 s, q = \[.*\], v = \[.*\]",
+        "... effort is not finite at t = 0.75 s",
     ),
 ]
 
@@ -351,7 +339,7 @@ def test_nan_of_a_user_is_an_error_and_never_an_effort(
     controller = hsp.Controller(panda(), **parts)
     _, q, v = states(1)[0]
     before = contents(controller.compute(panda().state(0.25, q, v)))
-    with pytest.raises(error, match=message) as caught:
+    with pytest.raises(error, match=wording(message)) as caught:
         controller.compute(panda().state(0.75, q, v))
     assert type(caught.value) is error
     # The failure leaves nothing behind: the controller goes on as if new.

@@ -6,9 +6,9 @@ from typing import Any
 import limit_oracle
 import numpy as np
 import pytest
-from controller_cases import panda
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
+from loaded_robots import panda
 from places import THOROUGH
 from runs import held
 from static_rows import static_rows

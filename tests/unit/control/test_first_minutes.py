@@ -12,9 +12,10 @@ from typing import Any
 import numpy as np
 import pinocchio as pin
 import pytest
-from controller_cases import assert_same, contents, panda, states, track
+from controller_cases import assert_same, contents, states, track
 from hypothesis import given
 from hypothesis import strategies as st
+from loaded_robots import panda
 from robot_cases import load
 
 import hsp_control as hsp

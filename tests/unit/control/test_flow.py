@@ -8,10 +8,10 @@ from controller_cases import (
     circle,
     hold_orientation,
     metrics,
-    panda,
     states,
     track,
 )
+from loaded_robots import panda
 from runs import continuous
 
 import hsp_control as hsp

@@ -7,9 +7,9 @@ import limit_oracle
 import numpy as np
 import pytest
 import quadprog
-from controller_cases import panda
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from loaded_robots import panda
 
 import hsp_control as hsp
 from hsp_control import engine

@@ -11,6 +11,7 @@ import yaml
 from carriage import carriage, check_that_it_is_the_loop
 from compensators import only
 from runs import held
+from wording import wording
 
 import hsp_control as hsp
 from hsp_control import (
@@ -268,22 +269,17 @@ def test_the_robot_grows_just_above_and_dies_just_below(
         (
             {"gain": 2500.0},
             ("null_space", "gain"),
-            r"unstable at this rate: K_N times the period is 2.5 \(motion grows by a "
-            r"factor of up to 1.501 per period\); use K_N of at most 200 1/s or a "
-            r"control_period of at most 8e-05 s; the loop is stable with K_N of at "
-            r"most 1990 1/s or a control_period of at most 0.000799 s$",
+            "... K_N ... 2.5 ... 200 1/s ... 8e-05 s ... 1990 1/s ... 0.000799 s",
         ),
         (
             {"frequency": 1500.0},
             ("tasks", "hand", "gains"),
-            r"ω0 of task 'hand' times the period is 1.5 .* of at most (999|1000) 1/s "
-            r"or a control_period of at most 0.000666 s$",
+            "... ω0 of task 'hand' ... 1.5 ... 0.000666 s",
         ),
         (
             {"gain": 1100.0, "stiffness": 1100.0},
             ("null_space", "gain"),
-            r"K_N times the period is 1.1, with a field of stiffness 1100 1/s .* of at "
-            r"most (899|900) 1/s or fields of at most 0.818 times these weights or a ",
+            "... K_N ... 1.1 ... stiffness 1100 1/s ... 0.818",
         ),
     ],
 )
@@ -295,7 +291,7 @@ def test_an_unstable_rate_is_reported_with_stable_values(
     ]
     assert finding.path == path
     assert finding.radius > 1.0
-    assert re.search(message, finding.message), finding.message
+    assert re.search(wording(message), finding.message), finding.message
     with pytest.raises(hsp.errors.UnstableRateError, match="unstable at this rate"):
         check_rate(holding(**how), Q0, H)
 
@@ -410,26 +406,23 @@ LATE = {"type": "rigid_body", "sensors": {"delay": 1}}
     [
         (
             {"compensation": {"start_up_ramp": {}}, "simulation": {"duration": 1}},
-            "compensation acts once per control period: set simulation.control_period",
+            "... compensation ... simulation.control_period",
         ),
-        (
-            {"null_space": {"gain": 2500}},
-            "null_space.gain: unstable at this rate: K_N times the period is 2.5",
-        ),
+        ({"null_space": {"gain": 2500}}, "... null_space.gain: unstable ... 2.5"),
         (  # without a delay up to 2000
             {"plant": LATE, "null_space": {"gain": 1100}},
-            "null_space.gain: unstable at this rate: .* 1 period of delay",
+            "... null_space.gain: unstable ... 1 period of delay",
         ),
         (
             {"compensation": {"velocity_filter": {"cutoff": 600, "order": 2}}},
-            "compensation.velocity_filter: cutoff is 600 Hz; .* needs less than 500 Hz",
+            "... compensation.velocity_filter: ... 600 Hz ... 500 Hz",
         ),
     ],
 )
 def test_mistakes_are_told_where_they_stand(
     sections: dict[str, Any], message: str
 ) -> None:
-    with pytest.raises(hsp.HspControlError, match=message):
+    with pytest.raises(hsp.HspControlError, match=wording(message)):
         load_experiment(config(**sections))
 
 

@@ -5,6 +5,7 @@ import dataclasses
 import inspect
 import math
 import pickle
+import re
 from abc import ABC, abstractmethod
 from collections.abc import Callable
 from dataclasses import KW_ONLY
@@ -15,6 +16,7 @@ import numpy as np
 import pytest
 from pydantic import TypeAdapter, ValidationError
 from values import assert_is_a_value
+from wording import wording
 
 from hsp_control.common.exceptions import ConfigError, HspControlError
 from hsp_control.declaration import AnyOf, Part, families
@@ -296,55 +298,53 @@ def test_a_plugin_that_does_not_work_is_named(plug: Callable[..., Any]) -> None:
 # --- messages -------------------------------------------------------------------------
 
 MESSAGES: dict[str, Callable[[], Any]] = {
-    "Ball: missing argument 'radius'; required here: radius": lambda: Ball(),  # type: ignore
-    "Ball: radus: unknown argument 'radus'; did you mean 'radius'? (allowed: label, "
-    "radius, center)": lambda: Ball(radus=1),  # type: ignore
-    "Ball: takes 2 positional arguments (radius, center); the others are given by "
-    "name": (
+    "Ball: missing ... 'radius'": lambda: Ball(),  # type: ignore
+    "Ball: radus: unknown ... 'radus' ... 'radius'": lambda: Ball(radus=1),  # type: ignore
+    "Ball: takes 2 positional arguments (radius, center)": (
         lambda: Ball(1, [1, 2, 3], "red")  # type: ignore
     ),
-    "Ball: radius: 'wide' is a str; expected a number": lambda: Ball("wide"),  # type: ignore
-    "Ball: radius: -1 is negative; must be greater than 0": lambda: Ball(-1),
-    "Ball: center: [1, 2] has 2 entries, needs 3": lambda: Ball(1, [1, 2]),
-    "Ball: center.1: 'up' is a str; expected a number": lambda: Ball(1, [0, "up", 0]),
-    "Ball: center: None; expected a list of 3 numbers": (
+    "Ball: radius: 'wide' ... a number": lambda: Ball("wide"),  # type: ignore
+    "Ball: radius: -1 ... greater than 0": lambda: Ball(-1),
+    "Ball: center: [1, 2] ... 2 ... 3": lambda: Ball(1, [1, 2]),
+    "Ball: center.1: 'up' ... a number": lambda: Ball(1, [0, "up", 0]),
+    "Ball: center: None ... a list of 3 numbers": (
      lambda: Ball(1, None)),
-    "Rod: a mass of 11.0 is too much for this size": lambda: Rod(1.0, 11.0),
-    "Bag: first: 3, an int; needs a Gadget, one of hsp.gadgets": lambda: Bag(3),  # type: ignore
-    "Bag: first: a Hammer is not one of the gadgets": lambda: Bag(Hammer(1)),  # type: ignore
-    "Bag: first: {'radius': 1}, a dict; needs a Gadget, one of hsp.gadgets": (
+    "Rod: ... 11.0 ... too much": lambda: Rod(1.0, 11.0),
+    "Bag: first: 3, an int ... a Gadget": lambda: Bag(3),  # type: ignore
+    "Bag: first: a Hammer ... gadgets": lambda: Bag(Hammer(1)),  # type: ignore
+    "Bag: first: {'radius': 1}, a dict ... a Gadget": (
         lambda: Bag({"radius": 1})  # type: ignore
     ),
-    "Bag: first.type: unknown type 'bal'; did you mean 'ball'? (allowed: bag, "
-    "ball, rod)": (
+    "Bag: first.type: unknown ... 'bal' ... 'ball'": (
         lambda: Bag({"type": "bal", "radius": 1})  # type: ignore
     ),
-    "Bag: first.radus: unknown key 'radus'; did you mean 'radius'? (allowed: type, "
-    "label, radius, center)": lambda: Bag({"type": "ball", "radus": 1}),  # type: ignore
-    "Bag: first: a mass of 11.0 is too much for this size": (
+    "Bag: first.radus: unknown ... 'radus' ... 'radius'": (
+        lambda: Bag({"type": "ball", "radus": 1})  # type: ignore
+    ),
+    "Bag: first: ... 11.0 ... too much": (
         lambda: Bag({"type": "rod", "size": 1, "mass": 11})  # type: ignore
     ),
-    "Bag: spare.first.first.center.2: nan is not a finite number": (lambda: Bag(BALL,
+    "Bag: spare.first.first.center.2: nan ... finite": (lambda: Bag(BALL,
         {"type": "bag", "first": {"type": "bag", "first": {  # type: ignore
               "type": "ball", "radius": 1, "center": [0, 0, math.nan]}}})),
-    "Bag: grid: rows have different lengths [1, 2]; need the same": (
+    "Bag: grid: ... different lengths [1, 2]": (
      lambda: Bag(BALL, grid=[[1], [2, 3]])),
-    "Bag: counts.a: 'many' is a str; expected a list of numbers": (
+    "Bag: counts.a: 'many' ... a list of numbers": (
      lambda: Bag(BALL, counts={"a": "many"})),
-    "Box: number: inf is not a finite number": lambda: Box(math.inf),
-    "Box: number: True is a bool; expected a number": lambda: Box(True),
-    "Box: count: 1.5 is a float; expected an int": lambda: Box(count=1.5),  # type: ignore
-    "Box: flag: 1 is an int; expected True or False": lambda: Box(flag=1),  # type: ignore
-    "Box: name: '' has 0 characters, needs at least 1": lambda: Box(name=""),
-    "Box: names.1: 3 is an int; expected a str": lambda: Box(names=["a", 3]),  # type: ignore
-    "Box: vector: [] has 0 entries, needs at least 1": lambda: Box(vector=[]),
-    "Box: tensor: rows have different lengths; need the same": (
+    "Box: number: inf ... finite": lambda: Box(math.inf),
+    "Box: number: True ... a number": lambda: Box(True),
+    "Box: count: 1.5 ... an int": lambda: Box(count=1.5),  # type: ignore
+    "Box: flag: 1 ... True": lambda: Box(flag=1),  # type: ignore
+    "Box: name: '' ... 0 ... at least 1": lambda: Box(name=""),
+    "Box: names.1: 3 ... a str": lambda: Box(names=["a", 3]),  # type: ignore
+    "Box: vector: [] ... 0 ... at least 1": lambda: Box(vector=[]),
+    "Box: tensor: ... different lengths": (
      lambda: Box(tensor=[[[1], [2, 3]]])),
-    "Box: gain: -1 is negative; must be greater than 0": lambda: Box(gain=-1),
-    "Box: gain: 'stiff' is a str; expected a number, a list of numbers or a matrix": (
+    "Box: gain: -1 ... greater than 0": lambda: Box(gain=-1),
+    "Box: gain: 'stiff' ... a number": (
      lambda: Box(gain="stiff")),
-    "Box: weights.1: -1 is negative; must be at least 0": lambda: Box(weights=[1, -1]),
-    "Box: degree: unknown value 4 (allowed: 3, 5)": lambda: Box(degree=4),  # type: ignore
+    "Box: weights.1: -1 ... at least 0": lambda: Box(weights=[1, -1]),
+    "Box: degree: unknown ... 4 (allowed: 3, 5)": lambda: Box(degree=4),  # type: ignore
 }  # fmt: skip
 
 
@@ -352,7 +352,7 @@ MESSAGES: dict[str, Callable[[], Any]] = {
 def test_a_mistake_is_one_error_in_plain_words(message: str) -> None:
     with pytest.raises(GadgetError) as caught:
         MESSAGES[message]()
-    assert str(caught.value) == message
+    assert re.search(wording(message), str(caught.value))
     assert caught.value.__suppress_context__  # pydantic's own report is not shown
 
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from task_cases import load
+from loaded_robots import load
 
 import hsp_control as hsp
 from hsp_control.common.arrays import Array

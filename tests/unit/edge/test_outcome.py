@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from task_cases import load
+from loaded_robots import load
 
 import hsp_control as hsp
 from hsp_control.engine.plans import planned

@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from loaded_robots import load
 from states import moved
-from task_cases import FRAMES, load, unit
+from task_cases import FRAMES, unit
 
 from hsp_control import (
     Controller,

@@ -9,6 +9,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 import pytest
+from wording import wording
 
 from hsp_control import engine
 from hsp_control.common.arrays import Array
@@ -82,99 +83,90 @@ def threshold_below(**changed: Any) -> Any:
 WRONG: dict[str, tuple[Callable[[], Any], str]] = {
     "another size": (
         lambda: line(velocity=np.zeros(3)),
-        r"UniformLine: velocity has the shape \(3,\); needs \(d,\), where d = 2 as in ",
+        "UniformLine: velocity ... (3,) ... (d,) ... d = 2",
     ),
-    "no array": (
-        lambda: line(start=[0.0, 1.0]),
-        r"UniformLine: start reads float64 \(d,\); got \[0.0, 1.0\]",
-    ),
+    "no array": (lambda: line(start=[0.0, 1.0]), "UniformLine: start ... [0.0, 1.0]"),
     "integers": (
         lambda: line(start=np.zeros(2, dtype=int)),
-        r"start reads float64 \(d,\); got an array of int64 with the shape \(2,\)",
+        "... start ... int64 ... (2,)",
     ),
     "single precision": (
         lambda: line(sample(position=np.zeros(2, dtype=np.float32))),
-        r"out.position writes float64 \(d,\); got an array of float32",
+        "... out.position ... float64 ... float32",
     ),
     "another number of axes": (
         lambda: line(start=np.zeros((2, 1))),
-        r"start reads float64 \(d,\); .* the shape \(2, 1\)",
+        "... start ... (2, 1)",
     ),
-    "not packed": (
-        lambda: line(start=np.zeros(4)[::2]),
-        r"start reads float64 \(d,\); .* the strides \(16,\)",
-    ),
-    "reversed": (lambda: line(start=np.zeros(2)[::-1]), r"the strides \(-8,\)"),
+    "not packed": (lambda: line(start=np.zeros(4)[::2]), "... start ... strides (16,)"),
+    "reversed": (lambda: line(start=np.zeros(2)[::-1]), "... strides (-8,)"),
     "another byte order": (
         lambda: line(start=np.zeros(2, dtype=">f8")),
-        r"start reads float64",
+        "... start reads float64",
     ),
     "written, but read-only": (
         lambda: line(sample(position=np.broadcast_to(0.0, 2))),
-        r"out.position writes float64 \(d,\); .*read-only",
+        "... out.position ... read-only",
     ),
     "by order": (
         lambda: engine.UniformLine(np.zeros(2), velocity=np.zeros(2), out=sample()),
-        r"^UniformLine takes its arguments by name: UniformLine\(start: reads float64",
+        "UniformLine ... by name: ... start",
     ),
     "missing": (
         lambda: engine.UniformLine(start=np.zeros(2)),
-        "^UniformLine needs velocity, out$",
+        "UniformLine needs velocity, out",
     ),
     "missing in a group": (
         lambda: line(out={"position": np.zeros(2), "velocity": np.zeros(2)}),
-        "^UniformLine needs out.acceleration$",
+        "UniformLine needs out.acceleration",
     ),
     "unknown": (
         lambda: line(velocty=np.zeros(2)),
-        r"^UniformLine has no argument velocty; did you mean velocity\?$",
+        "UniformLine ... velocty ... velocity",
     ),
     "unknown, like nothing": (
         lambda: line(gain=np.zeros(2)),
-        r"^UniformLine has no argument gain; it is UniformLine\(start: reads float64",
+        "UniformLine ... gain ... (start",
     ),
     "unknown in a group": (
         lambda: line(out=Other(*np.zeros((3, 2)))),
-        "^UniformLine has no argument out.speed; ",
+        "UniformLine ... out.speed",
     ),
     "given twice": (
         lambda: line(**{"out.position": np.zeros(2)}),
-        "^UniformLine: out.position is given twice$",
+        "UniformLine: out.position ... twice",
     ),
     "no record": (
         lambda: line(out=7),
-        "^UniformLine: out is a record of position, velocity, acceleration; got 7$",
+        "UniformLine: out ... position, velocity, acceleration ... 7",
     ),
     "a record where an array stands": (
         lambda: line(start=Other(1, 2, 3)),  # type: ignore[arg-type]
-        r"UniformLine: start reads float64 \(d,\); got Other\(position=1, speed=2, ",
+        "UniformLine: start ... Other(position=1, speed=2,",
     ),
-    "no number": (
-        lambda: circle(rate="fast"),
-        "^Circle: rate is a number; got 'fast'$",
-    ),
+    "no number": (lambda: circle(rate="fast"), "Circle: rate ... number ... 'fast'"),
     "no whole number": (
         lambda: threshold_below(level=0.5),
-        "^ThresholdBelow: level is a whole number; got 0.5$",
+        "ThresholdBelow: level ... whole number ... 0.5",
     ),
     "no number that an integer holds": (
         lambda: threshold_below(level=np.inf),
-        "^ThresholdBelow: level is a whole number; got inf$",
+        "ThresholdBelow: level ... whole number ... inf",
     ),
     "no plan": (
         lambda: engine.Once(
             calls=line(), stamp=np.zeros(1, dtype=int), made=np.zeros(1, dtype=int)
         ),
-        "Once: calls is a Plan; got UniformLine",
+        "Once: calls ... a Plan ... UniformLine",
     ),
-    "no call": (lambda: Plan([3]), r"a plan makes calls.*`row`.*; number 0 is 3$"),
+    "no call": (lambda: Plan([3]), "... `row` ... number 0 is 3"),
 }
 
 
 @pytest.mark.parametrize("case", WRONG)
 def test_what_does_not_fit_is_named(case: str) -> None:
     make, message = WRONG[case]
-    with pytest.raises((TypeError, ValueError, AttributeError), match=message):
+    with pytest.raises((TypeError, ValueError, AttributeError), match=wording(message)):
         make()
 
 

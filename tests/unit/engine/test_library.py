@@ -10,8 +10,6 @@ import pytest
 
 from hsp_control.engine import _engine
 
-pytestmark = pytest.mark.process
-
 WHICH = """
 import sys
 
@@ -33,11 +31,13 @@ def asked(library: Path) -> subprocess.CompletedProcess[str]:
     )
 
 
+@pytest.mark.process
 def test_another_library_is_used_instead(tmp_path: Path) -> None:
     other = Path(shutil.copy2(_engine.__file__, tmp_path / "_engine.so"))
     assert asked(other).stdout.split() == [str(other), "1.0"]
 
 
+@pytest.mark.process
 def test_a_library_that_is_not_there_is_an_error(tmp_path: Path) -> None:
     ran = asked(tmp_path / "nowhere.so")
     assert ran.returncode != 0

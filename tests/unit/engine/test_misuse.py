@@ -15,6 +15,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from wording import wording
 
 from hsp_control import engine
 from hsp_control.engine import Dynamics, Move, Plan, PythonCall
@@ -124,7 +125,11 @@ def alone(
     code: str, *arguments: str, flags: tuple[str, ...] = ()
 ) -> subprocess.CompletedProcess[str]:
     """Run a program in a process of its own, with what this file has."""
-    here = f"import sys; sys.path.insert(0, {str(Path(__file__).parent)!r})\n"
+    folders = [
+        str(Path(__file__).parent),
+        str(Path(wording.__code__.co_filename).parent),
+    ]
+    here = f"import sys; sys.path[:0] = {folders!r}\n"
     return subprocess.run(
         [sys.executable, *flags, "-c", here + textwrap.dedent(code), *arguments],
         capture_output=True,
@@ -224,71 +229,71 @@ def every(longest: float, end: float = 1.0) -> Any:
 REFUSED: dict[str, tuple[Callable[[], Any], str]] = {
     "an axis that no point has": (
         lambda: track(indices(0, 3)),
-        "^TrackAxes: axes has the index 3; needs 0 to 2$",
+        "TrackAxes: axes ... 3 ... 0 to 2",
     ),
-    "an axis below zero": (
-        lambda: track(indices(-1, 0)),
-        "axes has the index -1; needs 0",
-    ),
+    "an axis below zero": (lambda: track(indices(-1, 0)), "... axes ... -1 ... 0"),
     "a joint that no robot has": (
         lambda: centering(np.array([[0, 0], [3, 4]])),
-        "^JointCentering: the joints' indices in q has the index 4; needs 0 to 3$",
+        "JointCentering: ... 4 ... 0 to 3",
     ),
     "memory that is read and written": (
         lambda: engine.Copy(x=(both := np.zeros(3)), out=both),
-        "^Copy: out is written, and is memory of x$",
+        "Copy: out ... memory of x",
     ),
     "memory that is partly written": (
         lambda: engine.Copy(x=(both := np.zeros(4))[:3], out=both[1:]),
-        "^Copy: out is written, and is memory of x$",
+        "Copy: out ... memory of x",
     ),
     "a block beyond q": (
         lambda: moving(4, unit_blocks=np.array([[2, 3]])),
-        "the sizes of unit_blocks has the index 3; needs 0 to 2",
+        "... unit_blocks ... 3 ... 0 to 2",
     ),
-    "steps of no length": (lambda: every(0.0), "EqualSteps: longest is more than 0"),
-    "endless steps": (lambda: every(0.1, np.inf)(), "EqualSteps: more than 1e9 steps"),
-    "too many steps": (lambda: every(1e-300)(), "EqualSteps: more than 1e9 steps"),
-    "plans without end": (lambda: nested(1001), "more than 1000 plans, one within an"),
-    "None in a plan": (lambda: Plan([None]), "number 0 is None$"),
+    "steps of no length": (lambda: every(0.0), "EqualSteps: longest ... more than 0"),
+    "endless steps": (lambda: every(0.1, np.inf)(), "EqualSteps: ... 1e9 steps"),
+    "too many steps": (lambda: every(1e-300)(), "EqualSteps: ... 1e9 steps"),
+    "plans without end": (lambda: nested(1001), "... 1000 plans"),
+    "None in a plan": (lambda: Plan([None]), "... number 0 is None"),
     "no address": (
         lambda: Plan([PythonCall(print), SimpleNamespace(row=(0, 0))]),
-        r"what has the `row` of one; number 1 is namespace\(row=\(0, 0\)\)$",
+        "... `row` ... number 1 is namespace(row=(0, 0))",
     ),
-    "a joint of no type": (
-        lambda: chain(joint(type="")),
-        "'a' is a , which the engine",
-    ),
+    "a joint of no type": (lambda: chain(joint(type="")), "... 'a' is a , ... engine"),
     "no parts": (
         lambda: chain(joint(type="JointModelComposite")),
-        "joint 'a' is a composite without parts",
+        "... 'a' is a composite without parts",
     ),
-    "a part of itself": (lambda: chain(itself()), "composites within composites, 100"),
+    "a part of itself": (lambda: chain(itself()), "... composites ... 100"),
     "too few numbers": (
         lambda: chain(joint(center=(1.0,))),
-        r"^joint 'a': center is 3 numbers; got \(1.0,\)$",
+        "joint 'a': center ... 3 ... (1.0,)",
     ),
-    "half a joint": (lambda: chain(joint(parent=0.5)), "parent is a whole number; got"),
-    "no mass": (lambda: chain(joint(mass=np.nan)), "'a': its mass is not 0 or more"),
-    "less than no mass": (lambda: chain(joint(mass=-1.0)), "mass is not 0 or more"),
-    "no axis": (lambda: chain(joint(axis=(0.0,) * 3)), "its axis does not have norm 1"),
-    "no inertia": (lambda: chain(joint(inertia=(np.nan,) * 9)), "inertia is not fin"),
+    "half a joint": (lambda: chain(joint(parent=0.5)), "... parent ... whole number"),
+    "no mass": (lambda: chain(joint(mass=np.nan)), "... 'a': ... mass ... 0 or more"),
+    "less than no mass": (lambda: chain(joint(mass=-1.0)), "... mass ... 0 or more"),
+    "no axis": (lambda: chain(joint(axis=(0.0,) * 3)), "... axis ... norm 1"),
+    "no inertia": (
+        lambda: chain(joint(inertia=(np.nan,) * 9)),
+        "... inertia ... finite",
+    ),
     "no armature": (
         lambda: chain(joint(), armature=("x",)),
-        "armature is numbers; got",
+        "... armature is numbers",
     ),
-    "infinite rotors": (lambda: chain(joint(), armature=(np.inf,)), "is not finite"),
+    "infinite rotors": (lambda: chain(joint(), armature=(np.inf,)), "... not finite"),
     "a leader of two coordinates": (
         lambda: of_follower(type="JointModelRevoluteUnbounded"),
-        "joint 'b' cannot follow",
+        "... joint 'b' cannot follow",
     ),
     "no object": (
         lambda: engine.MassMatrix(
             dynamics=Dynamics.__new__(Dynamics), q=np.zeros(1), M=np.zeros((1, 1))
         ),
-        "^MassMatrix: dynamics is a Dynamics; got <",
+        "MassMatrix: dynamics is a Dynamics; got <",
     ),
-    "half a character": (lambda: engine.Copy(**{"\udc80": 1}), r"no argument \\udc80"),
+    "half a character": (
+        lambda: engine.Copy(**{"\udc80": 1}),
+        r"... argument \udc80",
+    ),
     "a number beyond all": (lambda: PythonCall(lambda: 10**400)(), "int too large"),
 }
 
@@ -296,7 +301,7 @@ REFUSED: dict[str, tuple[Callable[[], Any], str]] = {
 @pytest.mark.parametrize("case", REFUSED)
 def test_misuse_is_refused_with_its_reason(case: str) -> None:
     make, message = REFUSED[case]
-    with pytest.raises((TypeError, ValueError, OverflowError), match=message):
+    with pytest.raises((TypeError, ValueError, OverflowError), match=wording(message)):
         make()
 
 

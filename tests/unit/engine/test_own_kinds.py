@@ -14,8 +14,6 @@ from hsp_control.common.exceptions import EngineError
 from hsp_control.engine import own_kinds
 from hsp_control.engine.inspection import listing
 
-pytestmark = pytest.mark.slow
-
 SOURCE = """
 #include <hsp/kind.hpp>
 
@@ -44,6 +42,7 @@ def source(tmp_path: Path, cache: Path, monkeypatch: pytest.MonkeyPatch) -> Path
     return file
 
 
+@pytest.mark.slow
 def test_a_file_is_compiled_once_and_used(
     source: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -90,6 +89,7 @@ extern "C" auto hsp_kinds_1() { return hsp::kinds<Large, Alive>(); }
 """
 
 
+@pytest.mark.slow
 def test_a_call_that_cannot_be_prepared_leaves_nothing_behind(source: Path) -> None:
     source.write_text(REFUSING)
     kinds = own_kinds.load(source)
@@ -101,6 +101,7 @@ def test_a_call_that_cannot_be_prepared_leaves_nothing_behind(source: Path) -> N
     assert alive() == before == 0.0
 
 
+@pytest.mark.slow
 def test_a_library_beside_its_file_needs_no_compiler(
     source: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -109,6 +110,7 @@ def test_a_library_beside_its_file_needs_no_compiler(
     assert own_kinds.load(source) is own_kinds.load(library)
 
 
+@pytest.mark.slow
 def test_what_does_not_compile_says_what_the_compiler_says(source: Path) -> None:
     source.write_text(SOURCE.replace("2.0 * x;", "2.0 * z;"))
     with pytest.raises(
@@ -117,6 +119,7 @@ def test_what_does_not_compile_says_what_the_compiler_says(source: Path) -> None
         own_kinds.load(source)
 
 
+@pytest.mark.slow
 def test_files_with_one_name_for_a_kind_do_not_get_each_others(source: Path) -> None:
     """Also a file that was edited in the meantime."""
     first = own_kinds.load(source).Doubled
@@ -128,6 +131,7 @@ def test_files_with_one_name_for_a_kind_do_not_get_each_others(source: Path) -> 
     np.testing.assert_array_equal(y, [[2.0], [3.0]])
 
 
+@pytest.mark.slow
 def test_copies_and_pickles_of_calls_have_the_own_kind(source: Path) -> None:
     """Not the engine's, where that has one of the same name."""
     source.write_text(SOURCE.replace("Doubled", "Copy"))
@@ -148,6 +152,7 @@ def test_copies_and_pickles_of_calls_have_the_own_kind(source: Path) -> None:
         own_kinds.library_of(engine.Copy)
 
 
+@pytest.mark.slow
 def test_a_library_that_returns_nothing_is_named(source: Path) -> None:
     source.write_text(
         SOURCE.replace(
@@ -158,12 +163,14 @@ def test_a_library_that_returns_nothing_is_named(source: Path) -> None:
         own_kinds.load(source)
 
 
+@pytest.mark.slow
 def test_a_kind_says_what_it_does(source: Path) -> None:
     source.write_text(SOURCE.replace("doc =", "words ="))
     with pytest.raises(EngineError, match="a kind needs a description: static"):
         own_kinds.load(source)
 
 
+@pytest.mark.slow
 def test_a_library_without_kinds_is_named(source: Path) -> None:
     source.write_text(SOURCE.replace("hsp_kinds_1", "hsp_kinds_0"))
     with pytest.raises(EngineError, match="declares no kinds: it has no function"):

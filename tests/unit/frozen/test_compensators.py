@@ -5,18 +5,13 @@ from typing import Any
 
 import numpy as np
 import pytest
-from frozen_runs import EXAMPLE, commanded, compiled, random_states, replayed
+from frozen_runs import commanded, random_states, replayed
 
 import hsp_control as hsp
 from hsp_control.common.exceptions import CompensationError, FreezeError
 
 SEED = 61
 PARTS = hsp.compensation
-
-
-@pytest.fixture(scope="module")
-def replay(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    return compiled(EXAMPLE / "replay.c", tmp_path_factory.mktemp("replay"))
 
 
 @pytest.mark.smoke

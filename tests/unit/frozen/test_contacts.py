@@ -17,7 +17,7 @@ from frozen_library import (
     WRONG_VALUE,
     Opened,
 )
-from frozen_runs import EXAMPLE, compiled, computed, random_states, replayed
+from frozen_runs import computed, random_states, replayed
 
 import hsp_control as hsp
 from hsp_control.common.exceptions import FreezeError
@@ -27,11 +27,6 @@ from hsp_control.live.safe_stop import StandingFeet
 
 SEED = 61
 H = 0.001
-
-
-@pytest.fixture(scope="module")
-def replay(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    return compiled(EXAMPLE / "replay.c", tmp_path_factory.mktemp("replay"))
 
 
 @pytest.mark.smoke

@@ -7,8 +7,6 @@ from typing import Any
 import numpy as np
 import pytest
 from frozen_runs import (
-    EXAMPLE,
-    compiled,
     computed,
     random_states,
     replayed,
@@ -23,11 +21,6 @@ from hsp_control.engine.plans import PartCall
 from hsp_control.frozen import cmake_folder, include_folder, library
 
 SEED = 61
-
-
-@pytest.fixture(scope="module")
-def replay(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    return compiled(EXAMPLE / "replay.c", tmp_path_factory.mktemp("replay"))
 
 
 @pytest.mark.smoke

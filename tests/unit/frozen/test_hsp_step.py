@@ -37,11 +37,6 @@ def frozen(
 
 
 @pytest.fixture
-def opened(frozen: Path) -> Opened:
-    return Opened(frozen)
-
-
-@pytest.fixture
 def q(controller: hsp.Controller) -> np.ndarray:
     start = controller._declared.start
     assert start is not None

@@ -31,11 +31,6 @@ def frozen(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return hsp.freeze(controller, tmp_path_factory.mktemp("frozen") / "panda.hsp")
 
 
-@pytest.fixture
-def opened(frozen: Path) -> Opened:
-    return Opened(frozen)
-
-
 def test_its_gains_are_those_of_a_live_loop() -> None:
     live = StopSettings()
     for name, value in StopGains()._asdict().items():

@@ -6,10 +6,11 @@ from pathlib import Path
 import coal
 import numpy as np
 import pytest
-from clearance_cases import ends, load, outside
+from clearance_cases import ends, outside
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
+from loaded_robots import load
 from odd_robots import collision, odd_robot
 from places import THOROUGH
 

@@ -7,7 +7,8 @@ import coal
 import numpy as np
 import pinocchio as pin
 import pytest
-from clearance_cases import load, placed
+from clearance_cases import placed
+from loaded_robots import load
 from odd_robots import FACES, OCTAHEDRON, write_stl
 
 from hsp_control import Obstacle, Robot

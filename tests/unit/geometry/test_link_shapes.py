@@ -8,7 +8,8 @@ import coal
 import numpy as np
 import pinocchio as pin
 import pytest
-from clearance_cases import ends, load, outside, placed, turned
+from clearance_cases import ends, outside, placed, turned
+from loaded_robots import load
 from odd_robots import FACES, OCTAHEDRON, collision, odd_robot, write_stl
 
 from hsp_control import Obstacle

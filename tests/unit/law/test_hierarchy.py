@@ -4,10 +4,10 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from controller_cases import panda
 from hypothesis import given
 from hypothesis import strategies as st
 from law_numbers import Numbers, numbers, resolve
+from loaded_robots import panda
 from runs import check_errors, check_null_space, continuous
 
 import hsp_control as hsp

@@ -6,7 +6,8 @@ tau = g(q) - M₀ (ω² (q ⊖ q₀) + 2 ω v), M₀ the mass matrix at q₀.
 import numpy as np
 import pinocchio as pin
 import pytest
-from live_rigs import PERIOD, panda
+from live_rigs import PERIOD
+from loaded_robots import panda
 
 from hsp_control.common.arrays import Array
 from hsp_control.live import Phase, SafeStop, StopSettings

@@ -9,7 +9,8 @@ import numpy as np
 import pinocchio as pin
 import pytest
 from lies import LIES, THE_SIGN, Lie, Sensors
-from live_rigs import PERIOD, Rig, panda, start, watched
+from live_rigs import PERIOD, Rig, start, watched
+from loaded_robots import panda
 from places import THOROUGH, further
 
 import hsp_control as hsp

@@ -23,10 +23,11 @@ from live_rigs import (
     law,
     missing,
     nan_velocity,
-    panda,
     start,
     watched,
 )
+from loaded_robots import panda
+from odd_errors import OddError
 from places import THOROUGH, further
 
 import hsp_control as hsp
@@ -315,12 +316,8 @@ class Odd(Exception):
         raise ValueError("not even a message")
 
 
-class PanicError(BaseException):
-    """What extensions in Rust raise."""
-
-
 NO_EXCEPTIONS: list[BaseException] = [
-    CancelledError(), GeneratorExit(), PanicError("panicked"), BaseException(),
+    CancelledError(), GeneratorExit(), OddError("panicked"), BaseException(),
     BaseExceptionGroup("two", [CancelledError(), GeneratorExit()]),
 ]  # fmt: skip
 ASKED: list[BaseException] = [KeyboardInterrupt(), SystemExit(3)]

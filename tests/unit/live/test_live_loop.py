@@ -8,17 +8,8 @@ from typing import Any
 
 import numpy as np
 import pytest
-from live_rigs import (
-    PERIOD,
-    Rig,
-    always,
-    law,
-    missing,
-    nan_velocity,
-    panda,
-    start,
-    watched,
-)
+from live_rigs import PERIOD, Rig, always, law, missing, nan_velocity, start, watched
+from loaded_robots import panda
 
 import hsp_control as hsp
 from hsp_control import (

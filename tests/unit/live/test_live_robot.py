@@ -6,8 +6,10 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from live_rigs import PERIOD, Array, Rig, gravity, law, panda, start, watched
+from live_rigs import PERIOD, Array, Rig, gravity, law, start, watched
+from loaded_robots import panda
 from places import THOROUGH
+from wording import wording
 
 from hsp_control import Gains, Robot
 from hsp_control.control.compensation import (
@@ -43,10 +45,10 @@ def fed(robot: SimulatedRobot, efforts: Iterable[Array]) -> Array:
 @pytest.mark.parametrize(
     ("joint", "effort", "reason"),
     [
-        (1, 87.1, "panda_joint2 was sent 87.1; its effort is limited to 87.0001"),
-        (6, -1e300, r"panda_joint7 was sent -1e\+300; its effort is limited to 12"),
+        (1, 87.1, "panda_joint2 was sent 87.1 ... 87.0001"),
+        (6, -1e300, "panda_joint7 was sent -1e+300 ... 12"),
         (3, np.nan, "an effort is not finite"),
-        (0, 0.6, "effort of panda_joint1 jumped by 0.6 in a period; 0.5 are allowed"),
+        (0, 0.6, "... panda_joint1 jumped by 0.6 ... 0.5"),
     ],
 )
 def test_efforts_beyond_its_limits_stop_it(
@@ -57,7 +59,7 @@ def test_efforts_beyond_its_limits_stop_it(
     wrong = held.copy()
     wrong[joint] = effort
     taus = fed(robot, [held, held, wrong, held])
-    with pytest.raises(AssertionError, match=reason):
+    with pytest.raises(AssertionError, match=wording(reason)):
         raise AssertionError(robot.reason)
     assert robot.phase is Phase.HOLDING
     assert np.isfinite(taus).all()

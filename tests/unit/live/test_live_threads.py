@@ -5,21 +5,14 @@ from threading import Event
 from typing import Any
 
 import pytest
-from live_rigs import PERIOD, Rig, panda, start, watched
+from live_rigs import PERIOD, Rig, start, watched
+from loaded_robots import panda
+from odd_errors import NamelessError, OddError
 
 import hsp_control as hsp
 from hsp_control.live import LoopReport, run_loop
 from hsp_control.trajectories.streams import sources
 from hsp_control.trajectories.streams import streamed as declared
-
-
-class PanicError(BaseException):
-    """What an extension in Rust raises."""
-
-
-class NamelessError(Exception):
-    def __str__(self) -> str:
-        raise RuntimeError("it has no text")
 
 
 class FailingKind:
@@ -58,7 +51,7 @@ def streamed(kind: FailingKind, monkeypatch: pytest.MonkeyPatch) -> hsp.Controll
 
 @pytest.mark.parametrize(
     "error",
-    [CancelledError("x"), GeneratorExit(), PanicError("panic"), NamelessError()],
+    [CancelledError("x"), GeneratorExit(), OddError("panic"), NamelessError()],
     ids=lambda error: type(error).__name__,
 )
 def test_what_a_streams_thread_raises_ends_in_the_safe_stop(

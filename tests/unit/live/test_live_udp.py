@@ -7,7 +7,9 @@ import numpy as np
 import pytest
 from hypothesis import assume, given
 from hypothesis import strategies as st
-from live_rigs import PERIOD, panda, start, watched
+from live_rigs import PERIOD, start, watched
+from loaded_robots import panda
+from odd_errors import OddError
 
 from hsp_control.common.exceptions import HardwareError, LiveError
 from hsp_control.live import (
@@ -299,10 +301,6 @@ def test_a_robot_that_is_held_up_says_for_how_long(
     hardware.close()
     hardware.drain()
     link.close()
-
-
-class OddError(BaseException):
-    """What only a bare ``except`` or one of `BaseException` catches."""
 
 
 @pytest.mark.slow

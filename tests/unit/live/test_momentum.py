@@ -1,7 +1,8 @@
 """What changes a joint's momentum: efforts, bounded contacts, or a lie."""
 
 import numpy as np
-from live_rigs import PERIOD, panda
+from live_rigs import PERIOD
+from loaded_robots import panda
 
 from hsp_control.common.arrays import Array
 from hsp_control.live import LiveSettings

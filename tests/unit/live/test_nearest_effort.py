@@ -4,7 +4,8 @@ from itertools import product
 
 import numpy as np
 import pytest
-from live_rigs import PERIOD, panda, start
+from live_rigs import PERIOD, start
+from loaded_robots import panda
 
 from hsp_control.common.arrays import Array
 from hsp_control.live.effort_limiter import EffortLimiter

@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from live_rigs import PERIOD, gravity, panda, start, watched
+from live_rigs import PERIOD, gravity, start, watched
+from loaded_robots import panda
 
 from hsp_control import engine
 from hsp_control.common.arrays import Array

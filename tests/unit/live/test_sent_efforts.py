@@ -2,7 +2,8 @@
 
 import numpy as np
 import pytest
-from live_rigs import PERIOD, panda, start, watched
+from live_rigs import PERIOD, start, watched
+from loaded_robots import panda
 
 from hsp_control.live import LiveSettings, Phase
 from hsp_control.live.effort_limiter import EffortLimiter

@@ -2,7 +2,8 @@
 
 import numpy as np
 import pytest
-from live_rigs import PERIOD, panda
+from live_rigs import PERIOD
+from loaded_robots import panda
 
 from hsp_control.common.arrays import Array
 from hsp_control.live import Phase, udp

@@ -2,7 +2,8 @@
 
 import numpy as np
 import pytest
-from live_rigs import PERIOD, Rig, law, missing, panda, start, watched
+from live_rigs import PERIOD, Rig, law, missing, start, watched
+from loaded_robots import panda
 
 from hsp_control.common.arrays import Array
 from hsp_control.live import LiveSettings, Measurement, StopSettings, run_loop

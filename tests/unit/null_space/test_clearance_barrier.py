@@ -5,9 +5,10 @@ from typing import Any
 import numpy as np
 import pinocchio as pin
 import pytest
-from clearance_cases import AIR, barrier_at, load, still
+from clearance_cases import AIR, barrier_at, still
 from hypothesis import given
 from hypothesis import strategies as st
+from loaded_robots import load
 from oracles import slope
 
 from hsp_control import Cost, Obstacle, load_experiment

@@ -1,14 +1,17 @@
 """Check that wrong shapes, obstacles and starts in contact are refused by name."""
 
 import json
+import re
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import pytest
-from clearance_cases import AIR, load, still
+from clearance_cases import AIR, still
 from field_cases import placed
+from loaded_robots import load
 from odd_robots import collision, odd_robot
+from wording import wording
 
 from hsp_control import NullSpaceField, Obstacle, Robot, load_experiment
 from hsp_control.common.exceptions import (
@@ -32,33 +35,32 @@ def on(robot: Robot, field: NullSpaceField) -> NullSpaceField:
 
 MISTAKES: list[tuple[Callable[[Path], Any], type[HspControlError], str]] = [
     (lambda _: ObstacleClearance([]), FieldError,
-     "ObstacleClearance: obstacles: needs at least one obstacle"),
+     "... ObstacleClearance: obstacles: ... at least one"),
     (lambda _: placed(ObstacleClearance(), still(load("panda"))), FieldError,
      "the scene has no obstacle"),
     (lambda _: on(load("panda"), ObstacleClearance(["ball", "bell"])), SceneError,
-     "obstacles.1: no obstacle 'bell'; did you mean 'ball'? (the scene has ball)"),
+     "obstacles.1: no ... 'bell' ... 'ball'"),
     (lambda _: ObstacleClearance([BALL], influence=0.0), FieldError,
-     "ObstacleClearance: influence: 0.0 is too small; must be greater than 0"),
+     "ObstacleClearance: influence: 0.0 ... greater than 0"),
     (lambda _: SelfClearance(influence=float("nan")), FieldError,
-     "SelfClearance: influence: nan is not a finite number"),
+     "SelfClearance: influence: nan ... finite"),
     (lambda _: on(load("panda"), ObstacleClearance([BALL], links=["panda_lnk3"])),
-     FieldError, "links.0: link 'panda_lnk3' has no geometry; did "
-     "you mean 'panda_link3'? (links with geometry: panda_link0, panda_link1, "),
+     FieldError, "... links.0: ... 'panda_lnk3' ... 'panda_link3'"),
     (lambda _: on(load("panda"), ObstacleClearance(links=["panda_link0"])),
-     FieldError, "there are no pairs of shapes to keep apart"),
+     FieldError, "... no pairs of shapes"),
     (lambda _: Proximity(load("panda"), link_shapes(load("panda")), [], []), FieldError,
-     "there are no pairs of shapes to keep apart"),
+     "... no pairs of shapes"),
     (lambda at: on(odd_robot(at, collision('<sphere radius="1"/>')), SelfClearance()),
-     FieldError, "there are no pairs of shapes to keep apart"),
+     FieldError, "... no pairs of shapes"),
     (lambda _: link_shapes(load("panda"), "boxes"),  # type: ignore[arg-type]
-     ModelError, "proxy 'boxes' is not one of capsules, spheres, hulls, meshes"),
+     ModelError, "... 'boxes' ... capsules, spheres, hulls, meshes"),
     (lambda at: on(load("panda"), ObstacleClearance(
         [Obstacle("it", Mesh(at / "no.stl"), AIR)])),
-     SceneError, "/no.stl"),
-    (lambda at: Mesh(at / "no.stl").geometry(), SceneError, "mesh: no such file "),
-    (lambda at: Mesh(at).geometry(), SceneError, "mesh: no such file "),
-    (lambda at: Mesh(junk(at)).geometry(), SceneError, "mesh: cannot read "),
-    (lambda at: Mesh(junk(at)).bounding_radius, SceneError, "junk.stl: "),
+     SceneError, "... /no.stl"),
+    (lambda at: Mesh(at / "no.stl").geometry(), SceneError, "... mesh: no such file"),
+    (lambda at: Mesh(at).geometry(), SceneError, "... mesh: no such file"),
+    (lambda at: Mesh(junk(at)).geometry(), SceneError, "... mesh: cannot read"),
+    (lambda at: Mesh(junk(at)).bounding_radius, SceneError, "... junk.stl"),
 ]  # fmt: skip
 
 
@@ -80,7 +82,7 @@ def test_every_mistake_is_named(
 ) -> None:
     with pytest.raises(error) as caught:
         make(tmp_path)
-    assert message in str(caught.value)
+    assert re.search(wording(message), str(caught.value))
     assert "\n" not in str(caught.value)
 
 

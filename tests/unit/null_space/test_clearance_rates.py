@@ -11,7 +11,8 @@ from typing import Any
 
 import numpy as np
 import pytest
-from clearance_cases import AIR, agree, barrier_at, flowing, load, turned
+from clearance_cases import AIR, agree, barrier_at, flowing, turned
+from loaded_robots import load
 from odd_robots import FACES, OCTAHEDRON, write_stl
 from oracles import gradient
 from states import moved

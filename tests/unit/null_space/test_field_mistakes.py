@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from field_cases import evaluate, placed
 from field_oracles import OBSTACLE, ValueOnly, load
+from wording import wording
 
 from hsp_control import (
     FunctionCost,
@@ -91,105 +92,97 @@ def at_the_centre() -> PointDistance:
     return PointDistance(["link2", "tip"], ball, name="away")
 
 
-CENTRE = (
-    r"^field 'away': frame 'tip' is at the centre of obstacle 'ball', where the cost "
-    r"is infinite$"
-)
+CENTRE = "field 'away': ... 'tip' is at the centre of ... 'ball'"
 ERRORS: dict[str, tuple[Callable[[], Any], type[HspControlError], str]] = {
     # construction
     "centering, negative weight": (lambda: JointCentering(weights=-1.0), FieldError,
-     r"^JointCentering: weights: -1.0 is negative; must be at least 0$"),
+     "JointCentering: weights: -1.0 ... at least 0"),
     "centering, infinite weight": (
      lambda: JointCentering(weights=[1, 2, 3, np.inf, 5, 6, 7]), FieldError,
-     r"^JointCentering: weights.3: inf is not a finite number$"),
+     "JointCentering: weights.3: inf ... finite"),
     "posture, word": (lambda: TargetPosture("hom"),  # type: ignore
-     FieldError, r"^TargetPosture: target: 'hom' is a str; expected 'start', 'home' or "
-     r"a list of numbers; did you mean 'home'\?"),
+     FieldError, "TargetPosture: target: 'hom' ... 'home'"),
     "equal angles, one joint": (lambda: EqualJointAngles(["joint1"]), FieldError,
-     r"^EqualJointAngles: joints: \['joint1'\] has 1 entry, needs at least 2$"),
+     "EqualJointAngles: joints: ['joint1'] ... 1 ... at least 2"),
     "distance, no frame": (lambda: PointDistance([], OBSTACLE), FieldError,
-     r"^PointDistance: frames: \[\] has 0 entries, needs at least 1$"),
+     "PointDistance: frames: [] ... 0 ... at least 1"),
     "clearance, obstacle": (lambda: ObstacleClearance([0.3]),  # type: ignore
      FieldError,
-     r"^ObstacleClearance: obstacles.0: 0.3 is a float; expected a str"),
-    "sum, empty": (lambda: FieldSum([]), FieldError,
-     r"^FieldSum: a sum of fields needs at least one term$"),
+     "ObstacleClearance: obstacles.0: 0.3 ... a str"),
+    "sum, empty": (lambda: FieldSum([]), FieldError, "FieldSum: ... at least one"),
     "sum, uncontrolled": (lambda: Uncontrolled() + Rest(), FieldError,
-     r"^FieldSum: an uncontrolled null space cannot be part of a sum$"),
+     "FieldSum: ... uncontrolled ... sum"),
     "uncontrolled, ramp": (lambda: Uncontrolled(weight=Ramp(final=1.0, duration=1.0)),
-     FieldError, r"^Uncontrolled: an uncontrolled null space has no weight$"),
+     FieldError, "Uncontrolled: ... no weight"),
     # placing
     "centering, no limits": (lambda: on("planar3r", JointCentering()), FieldError,
-     r"^no joint of planar3r has limits; use a target posture instead$"),
+     "no joint of planar3r has limits"),
     "centering, number of weights": (
      lambda: on("panda", JointCentering(weights=[1.0, 2.0])), FieldError,
-     r"^weights: weights have shape \(2,\); needs one number or 7$"),
+     "weights: weights ... (2,) ... one number"),
     "posture, shape": (lambda: on("planar3r", TargetPosture([0.0, 0.0])), ShapeError,
-     r"^target: a posture has shape \(2,\); needs 3 or 6 numbers$"),
+     "target: ... (2,) ... 3 or 6"),
     "posture, no weight": (lambda: on("planar3r", TargetPosture("home", weights=0.0)),
-     FieldError, r"^weights: every weight is 0$"),
+     FieldError, "weights: every weight is 0"),
     "equal angles, joint": (
      lambda: on("planar3r", EqualJointAngles(["joint1", "joint4"])),
-     JointNotFoundError, r"^joints.1: no joint 'joint4'; did you mean 'joint\d'\?"),
+     JointNotFoundError, "joints.1: no ... 'joint4' ... 'joint"),
     "equal angles, root": (
      lambda: on("rolling ur5", EqualJointAngles(["root_joint", "elbow_joint"])),
-     FieldError, r"^joints.0: joint 'root_joint' has 3 degrees of freedom; needs 1$"),
+     FieldError, "joints.0: ... 'root_joint' ... 3 ... 1"),
     "distance, frame": (
      lambda: on("planar3r", PointDistance(["link2", "tipp"], OBSTACLE)),
-     FrameNotFoundError, r"^frames.1: no frame 'tipp'; did you mean 'tip'\?"),
+     FrameNotFoundError, "frames.1: no ... 'tipp' ... 'tip'"),
     "distance, obstacle": (
      lambda: placed(PointDistance(["link2"], "bal"), at_rest("planar3r"), [OBSTACLE]),
      SceneError,
-     r"^obstacle: no obstacle 'bal'; did you mean 'ball'\? \(the scene has ball\)$"),
+     "obstacle: no ... 'bal' ... 'ball'"),
     "barrier, no limits": (lambda: on("planar3r", LimitBarrier()), FieldError,
-     r"^no joint of planar3r has limits; use a target posture instead$"),
+     "no joint of planar3r has limits"),
     "barrier, number of weights": (
      lambda: on("panda", LimitBarrier(weights=[1.0, 2.0])), FieldError,
-     r"^weights: weights have shape \(2,\); needs one number or 7$"),
+     "weights: weights ... (2,) ... one number"),
     "in a sum, placed": (lambda: on("planar3r", Rest() + LimitBarrier()), FieldError,
-     r"^1: no joint of planar3r has limits; use a target posture instead$"),
+     "1: no joint of planar3r has limits"),
     "posture, not placed": (lambda: used(TargetPosture("home")), FieldError,
-     r"^field 'target_posture': a controller would look up its posture; outside of "
-     r"one, call `placed` first$"),
+     "field 'target_posture': ... posture"),
     "distance, not placed": (lambda: used(PointDistance(["tip"], "ball")), FieldError,
-     r"^field 'point_distance': a controller would look up its obstacle;"),
+     "field 'point_distance': ... obstacle"),
     "clearance, one not placed": (
      lambda: used(ObstacleClearance([OBSTACLE, "box"], name="mine")), FieldError,
-     r"^field 'mine': a controller would look up its obstacles;"),
+     "field 'mine': ... obstacles"),
     # evaluation
     "value, nan": (lambda: used(cost(np.nan, name="mine")), FieldError,
-     r"^cost 'mine' returned nan at t = 0.25 s; needs one finite number$"),
+     "cost 'mine' ... nan ... t = 0.25 s"),
     "value, array": (lambda: used(cost(np.zeros(3))), FieldError,
-     r"returned array\(\[0., 0., 0.\]\) at t = 0.25 s; needs one finite number"),
+     "... returned ... [0., 0., 0.] ... t = 0.25 s"),
     "gradient, shape of q": (lambda: used(cost(gradient=np.zeros(6))), FieldError,
-     r"^cost 'function_cost' has a gradient of shape \(6,\); needs \(3,\): the "
-     r"tangent space, not the configuration$"),
+     "cost 'function_cost' ... gradient ... (6,) ... (3,)"),
     "gradient, words": (lambda: used(cost(gradient="steep")), FieldError,
-     r"^cost 'function_cost' has the gradient 'steep'; needs numbers$"),
+     "cost 'function_cost' ... gradient 'steep'"),
     "gradient, nan": (lambda: used(cost(gradient=[0.0, np.nan, 0.0])), FieldError,
-     r"^cost 'function_cost' has the gradient .*nan.* at t = 0.25 s; needs finite"),
+     "cost 'function_cost' ... gradient ... nan ... t = 0.25 s"),
     "gradient rate, shape": (
      lambda: used(cost(gradient=np.zeros(3), rate=np.zeros((3, 1)))), FieldError,
-     r"^cost 'function_cost' has a gradient rate of shape \(3, 1\); needs \(3,\)"),
+     "cost 'function_cost' ... gradient rate ... (3, 1) ... (3,)"),
     "gradient rate, infinite": (
      lambda: used(cost(gradient=np.zeros(3), rate=[0.0, np.inf, 0.0])), FieldError,
-     r"the gradient rate .*inf.*; needs finite numbers$"),
+     "... gradient rate ... inf ... finite"),
     "own cost, gradient": (lambda: used(Wrong("tip", 0.0, np.zeros(2), name="mine")),
-     FieldError, r"^cost 'mine' has a gradient of shape \(2,\); needs \(3,\)"),
+     FieldError, "cost 'mine' ... gradient ... (2,) ... (3,)"),
     "vector, shape": (lambda: used(FunctionField(lambda s: np.zeros(6))), FieldError,
-     r"^field 'function_field' returned g = array\(\[0., .*\]\) at t = 0.25 s; needs "
-     r"3 finite numbers$"),
+     "field 'function_field' ... g = ... t = 0.25 s ... 3"),
     "vector, number": (lambda: used(FunctionField(lambda s: 1.0)),  # type: ignore
-     FieldError, r"returned g = 1.0 at t"),
+     FieldError, "... g = 1.0"),
     "rate, shape": (lambda: used(
         FunctionField(lambda s: np.zeros(3), rate_function=lambda s: np.zeros(1))),
      FieldError,
-     r"^field 'function_field' returned g' = array\(\[0.\]\) at t = 0.25 s; needs 3"),
+     "field 'function_field' ... g' = ... [0.] ... t = 0.25 s ... 3"),
     "rate, infinite": (lambda: used(
      FunctionField(lambda s: np.zeros(3), rate_function=lambda s: np.full(3, np.inf))),
-     FieldError, r"returned g' = array\(\[inf, inf, inf\]\)"),
+     FieldError, "... g' = ... inf"),
     "in a sum": (lambda: used(Rest() + cost(np.nan, name="mine")), FieldError,
-     r"^cost 'mine' returned nan"),
+     "cost 'mine' returned nan"),
     "distance, at the centre": (lambda: used(at_the_centre()), FieldError, CENTRE),
     "distance, at the centre, value": (
      lambda: at_the_centre().value(arm().state(0, arm().neutral(), np.zeros(3))),
@@ -200,7 +193,7 @@ ERRORS: dict[str, tuple[Callable[[], Any], type[HspControlError], str]] = {
 @pytest.mark.parametrize("which", ERRORS)
 def test_errors(which: str) -> None:
     build, kind, message = ERRORS[which]
-    with pytest.raises(kind, match=message) as caught:
+    with pytest.raises(kind, match=wording(message)) as caught:
         build()
     assert isinstance(caught.value, HspControlError)
     assert type(caught.value) is kind

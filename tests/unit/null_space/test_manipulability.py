@@ -3,16 +3,18 @@
 `test_every_field.py` has each of them at random states, beside its oracle.
 """
 
+import re
 from typing import Any
 
 import numpy as np
 import pinocchio as pin
 import pytest
-from clearance_cases import load
 from field_cases import placed
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from loaded_robots import load
 from places import THOROUGH
+from wording import wording
 
 from hsp_control import Robot
 from hsp_control.common.arrays import Array
@@ -129,25 +131,24 @@ def test_finite_at_every_singularity(name: str) -> None:
 PANDA = {"frame": "panda_tcp"}
 MISTAKES: list[tuple[type, dict[str, Any], type[HspControlError], str]] = [
     (Manipulability, {"frame": "panda_tpc"}, FrameNotFoundError,
-     "frame: no frame 'panda_tpc'; did you mean 'panda_tcp'? (the model has "),
+     "frame: no ... 'panda_tpc' ... 'panda_tcp'"),
     (Manipulability, {"form": "rot"}, FieldError,
-     "Manipulability: form: unknown value 'rot'; did you mean 'root'?"),
+     "Manipulability: form: unknown ... 'rot' ... 'root'"),
     (Manipulability, {"rows": "positions"}, FieldError,
-     "Manipulability: rows: unknown value 'positions'; did you mean 'position'?"),
-    (InverseCondition, {"axes": "xw"}, FieldError, "axes: 'xw' must be distinct"),
-    (Manipulability, {"length": 0.0}, FieldError, "length: 0.0 is too small; must be"),
-    (InverseCondition, {"size": 1.0}, FieldError, "size: unknown argument 'size'"),
+     "Manipulability: rows: unknown ... 'positions' ... 'position'"),
+    (InverseCondition, {"axes": "xw"}, FieldError, "... axes: 'xw' ... distinct"),
+    (Manipulability, {"length": 0.0}, FieldError, "... length: 0.0 ... too small"),
+    (InverseCondition, {"size": 1.0}, FieldError, "... size: unknown ... 'size'"),
     (Manipulability, {"metric": np.ones((6, 7))}, FieldError,
-     "Manipulability: metric has shape (6, 7); needs (nv, nv), symmetric"),
+     "Manipulability: metric ... (6, 7) ... (nv, nv)"),
     (Manipulability, {"metric": np.ones((7, 7))}, FieldError,
-     "Manipulability: metric is not positive definite"),
+     "Manipulability: metric ... positive definite"),
     (Manipulability, {"metric": np.eye(6)}, FieldError,
-     "metric: metric has shape (6, 6); needs (7, 7)"),
+     "metric: metric ... (6, 6) ... (7, 7)"),
     (Manipulability, {"frame": "panda_link2"}, FieldError,
-     "3 rows of frame 'panda_link2', which only 2 degrees of freedom move; these rows "
-     "are singular everywhere"),
+     "... 3 rows ... 'panda_link2' ... 2 degrees"),
     (InverseCondition, {"frame": "panda_link5", "rows": "pose"}, FieldError,
-     "6 rows of frame 'panda_link5', which only 5 degrees"),
+     "... 6 rows ... 'panda_link5' ... 5 degrees"),
 ]  # fmt: skip
 
 
@@ -163,7 +164,7 @@ def test_every_mistake_is_named(
             kind(**(PANDA | options)),
             robot.state(0.0, robot.home(), np.zeros(robot.nv)),
         )
-    assert message in str(caught.value)
+    assert re.search(wording(message), str(caught.value))
 
 
 class Reach(JacobianCost):

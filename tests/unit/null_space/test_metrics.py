@@ -8,6 +8,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from law_cases import load
+from wording import wording
 
 from hsp_control import Cost, RobotState, TargetPosture
 from hsp_control.common.exceptions import MetricError
@@ -68,21 +69,20 @@ def test_natural_gradient_descends_where_the_plain_one_need_not() -> None:
 @pytest.mark.parametrize(
     ("W", "message"),
     [
-        (np.ones((2, 3)), r"^ConstantMetric: the metric has shape \(2, 3\); needs"),
-        (2.0, r"^ConstantMetric: matrix: 2.0 is a float; expected a list"),
-        ([], r"^ConstantMetric: matrix: \[\] has 0 entries, needs at least 1$"),
-        (np.ones((2, 2, 2)),
-         "^ConstantMetric: matrix.0.0: .* is a list; expected a number$"),
-        ([1.0, np.nan], "^ConstantMetric: matrix.1: nan is not a finite number$"),
-        ([[1.0, 2.0], [0.0, 1.0]], "^ConstantMetric: the metric is not symmetric$"),
-        ([[1.0, 2.0], [0.0]], r"rows have different lengths \[1, 2\]; need the same$"),
-        ([1.0, [2.0]], "^ConstantMetric: matrix: mixes numbers and rows; needs rows, "),
-        ([1.0, -1.0], "not positive definite: its smallest eigenvalue is -1"),
-        ([1.0, 1e-13], "not positive definite: its smallest eigenvalue is 1e-13"),
+        (np.ones((2, 3)), "ConstantMetric: ... (2, 3)"),
+        (2.0, "ConstantMetric: matrix: 2.0 ... a list"),
+        ([], "ConstantMetric: matrix: [] ... 0 ... at least 1"),
+        (np.ones((2, 2, 2)), "ConstantMetric: matrix.0.0: ... a number"),
+        ([1.0, np.nan], "ConstantMetric: matrix.1: nan ... finite"),
+        ([[1.0, 2.0], [0.0, 1.0]], "ConstantMetric: the metric is not symmetric"),
+        ([[1.0, 2.0], [0.0]], "... different lengths [1, 2]"),
+        ([1.0, [2.0]], "ConstantMetric: matrix: mixes numbers and rows"),
+        ([1.0, -1.0], "... positive definite ... -1"),
+        ([1.0, 1e-13], "... positive definite ... 1e-13"),
     ],
 )  # fmt: skip
 def test_constant_metric_refuses(W: Any, message: str) -> None:
-    with pytest.raises(MetricError, match=message):
+    with pytest.raises(MetricError, match=wording(message)):
         ConstantMetric(W)
 
 

@@ -7,7 +7,8 @@ from xml.etree import ElementTree
 import numpy as np
 import pinocchio as pin
 import pytest
-from clearance_cases import agree, flowing, load, still, turned
+from clearance_cases import agree, flowing, still, turned
+from loaded_robots import load
 from oracles import gradient
 from states import moved
 

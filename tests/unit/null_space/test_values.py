@@ -11,8 +11,9 @@ from typing import Any
 
 import numpy as np
 import pytest
-from clearance_cases import AIR, load
+from clearance_cases import AIR
 from field_cases import evaluate
+from loaded_robots import load
 from values import assert_documented, assert_is_a_value
 
 from hsp_control import NullSpaceField, Obstacle, RobotState, geometry

@@ -9,7 +9,9 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from loaded_robots import load
 from oracles import slope
+from wording import wording
 
 from hsp_control import (
     Controller,
@@ -56,14 +58,6 @@ METRICS: dict[str, Metric] = {
     "constant": ConstantMetric(np.arange(1.0, 8.0)),
     "mass matrix": MassMatrixMetric(),
 }
-
-
-@cache
-def load(name: str, root: str | None = None) -> Robot:
-    """Return a robot; skip if example-robot-data is asked for and not there."""
-    if name not in {"panda", "iiwa14", "planar3r"}:
-        pytest.importorskip("example_robot_data")
-    return Robot.load(name, root=root)  # type: ignore[arg-type]
 
 
 def evaluate(field: NullSpaceField, metric: Metric, state: RobotState) -> FieldSample:
@@ -258,25 +252,23 @@ def test_the_log_tells_who_moves_the_arm() -> None:
 # -- what cannot be --------------------------------------------------------------------
 
 MISTAKES: list[tuple[Callable[[], Any], str]] = [
-    (lambda: ConstantWeight(-1.0), "ConstantWeight: value: -1.0 is negative; must be "),
-    (lambda: ConstantWeight(np.nan), "ConstantWeight: value: nan is not a finite num"),
-    (lambda: Ramp(initial=-1.0, final=1.0, duration=1.0), "initial: -1.0 is negative"),
-    (lambda: Ramp(final=1.0, duration=0.0),
-     "Ramp: duration: 0.0 is too small; must be greater than 0"),
-    (lambda: Ramp(final=1.0), "Ramp: missing argument 'duration'"),
-    (lambda: Ramp(0.0, 1.0), "Ramp: takes none by position; argu"),  # type: ignore
-    (lambda: StateWeight(lambda s: -0.5).sample(at(0.0)), "weight is -0.5"),
-    (lambda: StateWeight(2.0), "StateWeight: function: "),  # type: ignore
-    (lambda: -1.0 * JointCentering(), "JointCentering: weight: -1.0 is negative; must"),
+    (lambda: ConstantWeight(-1.0), "ConstantWeight: value: -1.0 ... negative"),
+    (lambda: ConstantWeight(np.nan), "ConstantWeight: value: nan ... finite"),
+    (lambda: Ramp(initial=-1.0, final=1.0, duration=1.0), "... initial: -1.0 ... neg"),
+    (lambda: Ramp(final=1.0, duration=0.0), "Ramp: duration: 0.0 ... greater than 0"),
+    (lambda: Ramp(final=1.0), "Ramp: missing ... 'duration'"),
+    (lambda: Ramp(0.0, 1.0), "Ramp: ... by position"),  # type: ignore
+    (lambda: StateWeight(lambda s: -0.5).sample(at(0.0)), "... weight is -0.5"),
+    (lambda: StateWeight(2.0), "StateWeight: function:"),  # type: ignore
+    (lambda: -1.0 * JointCentering(), "JointCentering: weight: -1.0 ... negative"),
     (lambda: JointCentering(weight="much"),  # type: ignore
-     "JointCentering: weight: 'much' is a str; expected a number or a dict"),
+     "JointCentering: weight: 'much' ... a number"),
     (lambda: -1.0 * JointCentering(weight=Ramp(final=1.0, duration=1.0)),
-     "Ramp: final: -1.0 is negative; must be at least 0"),
+     "Ramp: final: -1.0 ... at least 0"),
     (lambda: -1.0 * JointCentering(weight=StateWeight(lambda s: 1.0)),
-     "ConstantWeight: value: -1.0 is negative; must be at least 0"),
-    (lambda: LimitBarrier(zone=0.0),
-     "LimitBarrier: zone: 0.0 is too small; must be greater than 0"),
-    (lambda: LimitBarrier(zone=1.1), "LimitBarrier: zone: 1.1 is too large; must be"),
+     "ConstantWeight: value: -1.0 ... at least 0"),
+    (lambda: LimitBarrier(zone=0.0), "LimitBarrier: zone: 0.0 ... greater than 0"),
+    (lambda: LimitBarrier(zone=1.1), "LimitBarrier: zone: 1.1 ... too large"),
 ]  # fmt: skip
 
 
@@ -286,7 +278,7 @@ MISTAKES: list[tuple[Callable[[], Any], str]] = [
 def test_every_mistake_is_named(make: Callable[[], Any], message: str) -> None:
     with pytest.raises(FieldError) as caught:
         make()
-    assert message in str(caught.value)
+    assert re.search(wording(message), str(caught.value))
 
 
 def test_what_is_no_weight_and_no_field() -> None:

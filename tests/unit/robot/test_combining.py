@@ -1,6 +1,7 @@
 """Several robots as one: each block is the robot alone, where it was put."""
 
 import copy
+import re
 from collections.abc import Callable
 from functools import cache
 from pathlib import Path
@@ -8,7 +9,9 @@ from pathlib import Path
 import numpy as np
 import pinocchio as pin
 import pytest
+from loaded_robots import load
 from robot_texts import ARM
+from wording import wording
 
 from hsp_control import (
     Controller,
@@ -26,7 +29,6 @@ from hsp_control.common.exceptions import (
     JointNotFoundError,
     ModelError,
 )
-from hsp_control.common.resources import bundled_robots
 from hsp_control.robot.description.loading import RobotPart, combine, placement
 from hsp_control.robot.description.robot_description import ToolFrame
 from hsp_control.robot.description.sources import RobotSource
@@ -35,14 +37,6 @@ from hsp_control.robot.integrators import Rk4
 LEFT = placement([0.0, 0.3, 0.1], [0.0, 0.0, 0.0])
 RIGHT = placement([0.9, -0.4, 0.2], [0.7, -0.4, 2.5])  # tilted: gravity pulls otherwise
 HERE = pin.SE3.Identity()
-
-
-@cache
-def load(name: str) -> Robot:
-    """Return a robot; skip if example-robot-data is asked for and not there."""
-    if name not in bundled_robots():
-        pytest.importorskip("example_robot_data")
-    return Robot.load(name)
 
 
 @cache
@@ -181,25 +175,21 @@ def source() -> RobotSource:
 
 MISTAKES: list[tuple[Callable[[], object], type[HspControlError], str]] = [
     (lambda: Robot.combine({"only": (load("panda"), HERE)}), ModelError,
-     "robots to combine must be two or more, with different names; got prefixes "
-     "['only_']"),
-    (lambda: combine([]), ModelError, "with different names; got prefixes []"),
+     "... two or more ... ['only_']"),
+    (lambda: combine([]), ModelError, "... different names ... []"),
     (lambda: combine([(RobotPart("a_", source(), HERE), load("panda").model)] * 2),
-     ModelError, "with different names; got prefixes ['a_', 'a_']"),
+     ModelError, "... different names ... ['a_', 'a_']"),
     (lambda: Robot.combine({"a": (load("panda"), HERE),
                             "b": (Robot.load("panda", gravity=[0, 0, 0]), HERE)}),
-     ModelError, "robots to combine differ in gravity; load all with one value"),
+     ModelError, "... differ in gravity"),
     (lambda: Robot.combine({"a": (load("panda"), HERE),
                             "b": (Robot.load("panda", locked={}), HERE)}),
-     ModelError, "b_panda: a robot with mimic joints cannot be combined; lock these "
-     "joints, or load the robot with mimic=False"),
+     ModelError, "... b_panda: ... mimic joints ... mimic=False"),
     (lambda: Robot.combine({"a": (pair(), HERE), "b": (load("panda"), HERE)}),
-     ModelError, "a_panda+panda is already a combined robot; combine all robots "
-     "in one call"),
-    (lambda: pair().frame_id("panda_tcp"), FrameNotFoundError,
-     "no frame 'panda_tcp'; did you mean"),
+     ModelError, "... a_panda+panda ... already"),
+    (lambda: pair().frame_id("panda_tcp"), FrameNotFoundError, "no ... 'panda_tcp'"),
     (lambda: pair().velocity_index("left_panda_joint8"), JointNotFoundError,
-     "no joint 'left_panda_joint8'; did you mean 'left_panda_joint"),
+     "no ... 'left_panda_joint8' ... 'left_panda_joint"),
 ]  # fmt: skip
 
 
@@ -211,7 +201,7 @@ def test_every_mistake_is_named(
 ) -> None:
     with pytest.raises(error) as caught:
         make()
-    assert message in str(caught.value)
+    assert re.search(wording(message), str(caught.value))
 
 
 def test_a_link_may_have_a_joints_name(tmp_path: Path) -> None:

@@ -1,7 +1,6 @@
 """Check every error of a robot that cannot be loaded."""
 
 import os
-import re
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -10,6 +9,7 @@ import pytest
 import yaml
 from places import ROOT
 from robot_texts import ARM, INERTIA, gripper, joint, link, robot_xml
+from wording import wording
 
 from hsp_control import HspControlError, Robot
 from hsp_control.common.exceptions import (
@@ -22,16 +22,16 @@ from hsp_control.robot import ToolFrame
 
 
 @pytest.mark.parametrize(("name", "message"), [
-    ("pnada", "no robot 'pnada'; did you mean 'panda'?"),
-    ("PANDA", "did you mean 'panda'?"),
-    ("xyzzy", "no robot 'xyzzy' (give a path to a .urdf file, or one of: "),
-    ("robots/panda/", "is a folder; give a .urdf file in it (it contains panda."),
-    ("robots/panda", "robots/panda is a folder; give a .urdf file in it (it contains"),
-    ("./robots/panda", "robots/panda is a folder; give a .urdf file in it (it contai"),
-    ("robots", "robots is a folder; give a .urdf file in it (it contains none)"),
+    ("pnada", "no ... 'pnada' ... 'panda'"),
+    ("PANDA", "... 'panda'"),
+    ("xyzzy", "... no robot 'xyzzy' ... .urdf"),
+    ("robots/panda/", "... is a folder ... panda.urdf"),
+    ("robots/panda", "... robots/panda is a folder ... .urdf"),
+    ("./robots/panda", "... robots/panda is a folder ... .urdf"),
+    ("robots", "... robots is a folder ... none"),
     ("", "no robot ''"),
     (300 * "a", "no robot 'aaa"),
-    ("a\0b", "no robot 'a\\x00b'"),
+    ("a\0b", r"no robot 'a\x00b'"),
     ("/nowhere/arm.urdf", "/nowhere/arm.urdf: no such file"),
     ("arm_without_folder.urdf", "arm_without_folder.urdf: no such file"),
 ])  # fmt: skip
@@ -39,7 +39,7 @@ def test_robot_not_found(
     name: str, message: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.chdir(ROOT)
-    with pytest.raises(RobotNotFoundError, match=re.escape(message)) as caught:
+    with pytest.raises(RobotNotFoundError, match=wording(message)) as caught:
         Robot.load(name)
     assert isinstance(caught.value, FileNotFoundError)
     assert isinstance(caught.value, HspControlError)
@@ -77,54 +77,52 @@ SOFT = (
     "</joint>"
 )
 NO_ROBOTS = [
-    ('<robot name="r">\n  <link name="a">\n</robot>', r":3:3: malformed XML: mism"),
-    ("", r"arm\.urdf:1:1: malformed XML: no element found"),
-    (b"\xff\xfe\x00\x00binary", r"arm\.urdf:1:\d+: malformed XML"),
-    ('<?xml version="1.0" encoding="no-such"?>' + ARM, "malformed XML: unknown enc"),
-    ("<mujoco/>", "in a URDF it is <robot>; an MJCF's robot is robot: {mjcf: FILE}"),
-    ("<robot/>", BUILD + ": No name given for the robot"),
+    ('<robot name="r">\n  <link name="a">\n</robot>', "... :3:3: malformed XML"),
+    ("", "... arm.urdf:1:1: malformed XML: no element"),
+    (b"\xff\xfe\x00\x00binary", "... arm.urdf:1: ... malformed XML"),
+    ('<?xml version="1.0" encoding="no-such"?>' + ARM, "... unknown encoding"),
+    ("<mujoco/>", "... <robot> ... robot: {mjcf: FILE}"),
+    ("<robot/>", f"... {BUILD}: No name given"),
     (ARM.replace('lower="-3" upper="3"', 'lower="3" upper="-3"', 1),
-     "joint 'shoulder': its lower limit 3 is above its upper limit -3"),
+     "... joint 'shoulder': ... 3 ... upper limit -3"),
     (robot_xml(link("a"), link("b"), joint("j", "a", "b", "fixed")),
-     "the robot has no moving joint"),
-    (grown(joint("j", "lower", "b")), BUILD + r".* child link \[b\] of joint \[j\] n"),
+     "... no moving joint"),
+    (grown(joint("j", "lower", "b")), f"... {BUILD} ... child link [b] of joint [j]"),
     (grown(joint("second", "base", "lower")),
-     "link 'lower': it is the child of the joints 'elbow' and 'second'; must be of on"),
-    (grown(link("c"), joint("own", "c", "c")),
-     "links 'c': their joints 'own' make a loop"),
-    (grown(link("c")), "links 'base', 'c': none is the child of a joint; a robot has "),
+     "... link 'lower': ... 'elbow' and 'second'"),
+    (grown(link("c"), joint("own", "c", "c")), "... links 'c': ... 'own' ... loop"),
+    (grown(link("c")), "... links 'base', 'c': ... child"),
     (grown(link("c"), link("d"), joint("cd", "c", "d"), joint("dc", "d", "c")),
-     "links 'c', 'd': their joints 'dc', 'cd' make a loop"),
+     "... links 'c', 'd': ... 'dc', 'cd' ... loop"),
     (grown("<arm>", link("c"), joint("wrist", "lower", "c"), "</arm>"),
-     "joint 'wrist': parsers skip <joint> in <arm>; must be <joint> in <robot>"),
-    (grown('<Link name="c"/>'), "link 'c': parsers skip <Link>; must be <link> in <r"),
-    (grown(link("base")), "link 'base': 2 links have this name"),
-    (grown(joint("elbow", "base", "lower")), "joint 'elbow': 2 joints have this name"),
+     "... joint 'wrist': ... <joint> in <arm> ... <robot>"),
+    (grown('<Link name="c"/>'), "... link 'c': ... <Link> ... <link>"),
+    (grown(link("base")), "... link 'base': 2 links ... name"),
+    (grown(joint("elbow", "base", "lower")), "... joint 'elbow': 2 joints ... name"),
     (ARM.replace('<mass value="2"/>', '<mass value="2"/><mass value="3"/>', 1),
-     "link 'upper': <inertial>: contains 2 elements <mass>; must be one"),
+     "... link 'upper': <inertial>: ... 2 ... <mass>"),
     (ARM.replace("<axis", '<axis xyz="1 0 0"/><axis', 1),
-     "joint 'shoulder': <joint>: contains 2 elements <axis>; must be one"),
+     "... joint 'shoulder': <joint>: ... 2 ... <axis>"),
     (ARM.replace(INERTIA, f"<collision>{TWO_SHAPES}</collision>", 1),
-     "link 'upper': <geometry>: contains sphere, box; must be one shape"),
+     "... link 'upper': <geometry>: ... sphere, box"),
     (ARM.replace('<mass value="2"/>', '<mass value="٢"/>', 1),
-     "link 'upper': <mass>: value=\"٢\" must be a number in the digits 0 to 9"),
+     "... link 'upper': <mass>: value=\"٢\" ... digits"),
     (ARM.replace('xyz="0.2 0.1 0.3"', 'xyz="0.2 0.1 ３"', 1),
-     'xyz="0.2 0.1 ３" must be 3 numbers in the digits 0 to 9'),
+     '... xyz="0.2 0.1 ３" ... digits'),
     (ARM.replace("</joint>", '<mimic joint="ghost"/></joint>', 1),
-     "joint 'shoulder' mimics 'ghost', which is not a moving joint; load its"),
+     "... joint 'shoulder' mimics 'ghost'"),
     (gripper().replace('mimic joint="shoulder"', 'mimic joint="follower"'),
-     "joint 'follower' mimics 'follower', which follows itself; load .*mimic=False"),
+     "... 'follower' mimics 'follower' ... mimic=False"),
     (gripper().replace("</joint>", '<mimic joint="follower"/></joint>', 1),
-     "joint 'follower' mimics 'shoulder', which follows it; load .*mimic=False"),
+     "... 'follower' mimics 'shoulder' ... mimic=False"),
     (gripper().replace('"shoulder" type="revolute"', '"shoulder" type="floating"'),
-     "joint 'shoulder' is mimicked but is floating; must be one of revolute, cont"),
+     "... 'shoulder' is mimicked ... floating ... revolute"),
     (gripper().replace('"follower" type="revolute"', '"follower" type="planar"'),
-     "joint 'follower' mimics but is planar; must be one of revolute, cont"),
+     "... 'follower' mimics ... planar ... revolute"),
     (gripper().replace("</joint>", SOFT, 1),
-     "joint 'shoulder': <safety_controller>: the soft limits 4 to 5 leave nothing of "
-     "its limits -3 to 3"),
+     "... joint 'shoulder': <safety_controller>: ... 4 to 5 ... -3 to 3"),
     (gripper().replace("</joint>", SOFT.replace("4", "soft"), 1),
-     "joint 'shoulder': <safety_controller>: soft_lower_limit=\"soft\" must be a num"),
+     "... joint 'shoulder': <safety_controller>: ... \"soft\" ... number"),
 ]  # fmt: skip
 
 
@@ -133,7 +131,7 @@ def test_file_that_is_no_robot(
     text: str | bytes, message: str, write: Callable[..., Path]
 ) -> None:
     path = write(text)
-    with pytest.raises(ModelError, match=message) as caught:
+    with pytest.raises(ModelError, match=wording(message)) as caught:
         Robot.load(path)
     assert str(path) in str(caught.value)
 
@@ -172,27 +170,22 @@ def test_root_and_joint_that_do_the_same(write: Callable[..., Path]) -> None:
 
 OPTIONS: list[tuple[dict[str, Any], type[Exception], str]] = [
     ({"root": "free_flier"}, ModelError,
-     "RobotDescription: root: unknown value 'free_flier'; did you mean 'free_flyer'? "
-     "(allowed: fixed, planar, free_flyer)"),
-    ({"locked": {"sholder": 0.0}}, JointNotFoundError,
-     "cannot lock 'sholder': no such joint; did you mean 'shoulder'? (the model has "
-     "shoulder, elbow)"),
+     "RobotDescription: root: unknown ... 'free_flier' ... 'free_flyer'"),
+    ({"locked": {"sholder": 0.0}}, JointNotFoundError, "... 'sholder' ... 'shoulder'"),
     ({"locked": {"universe": 0.0}}, JointNotFoundError,
-     "cannot lock 'universe': no such joint"),
+     "... 'universe' ... no such joint"),
     ({"locked": {"shoulder": 0.0, "elbow": 1.0}}, ModelError,
-     "every joint is locked; at least one must be left to control"),
+     "... every joint is locked"),
     ({"locked": {"elbow": float("nan")}}, ModelError,
-     "RobotDescription: locked.elbow: nan is not a finite number"),
+     "RobotDescription: locked.elbow: nan ... finite"),
     ({"root": "free_flyer", "locked": {"root_joint": 0.0}}, ModelError,
-     "cannot lock 'root_joint': it has 6 degrees of freedom, only joints with one can "
-     "be locked; for a fixed base use root: fixed"),
+     "... 'root_joint' ... 6 degrees ... root: fixed"),
     ({"tool_frames": {"pen": ToolFrame("lowr")}}, FrameNotFoundError,
-     "tool frame 'pen': no parent frame 'lowr'; did you mean 'lower'? (the model has "
-     "universe, "),
+     "tool frame 'pen': no ... 'lowr' ... 'lower'"),
     ({"tool_frames": {"elbow": ToolFrame("lower")}}, ModelError,  # joints are frames
-     "cannot add tool frame 'elbow': the model has a frame with this name"),
+     "... tool frame 'elbow' ... this name"),
     ({"gravity": (0.0, -9.81)}, ModelError,
-     "RobotDescription: gravity: (0.0, -9.81) has 2 entries, needs 3"),
+     "RobotDescription: gravity: (0.0, -9.81) ... 2 ... 3"),
 ]  # fmt: skip
 
 
@@ -203,7 +196,7 @@ def test_option_that_does_not_fit(
     message: str,
     write: Callable[..., Path],
 ) -> None:
-    with pytest.raises(error, match=re.escape(message)) as caught:
+    with pytest.raises(error, match=wording(message)) as caught:
         Robot.load(write(ARM), **options)
     assert isinstance(caught.value, HspControlError)
 

@@ -1,12 +1,12 @@
 """Rotors in the model: given, bundled or from a URDF, and what keeps them."""
 
-import re
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pinocchio as pin
 import pytest
+from wording import wording
 
 import hsp_control as hsp
 from hsp_control.common.exceptions import (
@@ -159,19 +159,16 @@ def test_a_plant_s_rotors_are_those_of_a_robot() -> None:
 @pytest.mark.parametrize(
     ("given", "message"),
     [
-        ("published", "'published' is a str; expected 'bundled', a number, a list"),
-        (-0.1, "-0.1 is negative; must be at least 0"),
-        (
-            [0.1, 0.2],
-            "has 2 numbers; needs one, or one for each of the 7 joints",
-        ),
-        ({"panda_joint": 0.1}, "no joint 'panda_joint' with one degree of freedom"),
-        (1e6, "the motor of 'panda_joint1' has 1e+06 kg m² (or kg); at most 1000"),
+        ("published", "'published' ... 'bundled'"),
+        (-0.1, "-0.1 ... at least 0"),
+        ([0.1, 0.2], "... 2 numbers ... 7 joints"),
+        ({"panda_joint": 0.1}, "no joint 'panda_joint'"),
+        (1e6, "... 'panda_joint1' ... 1e+06 ... 1000"),
     ],
 )
 def test_mistakes_are_named(given: Any, message: str) -> None:
     with pytest.raises(
-        (ModelError, JointNotFoundError), match="motor_inertia: " + re.escape(message)
+        (ModelError, JointNotFoundError), match=wording(f"... motor_inertia: {message}")
     ):
         hsp.Robot.load("panda", motor_inertia=given)
 

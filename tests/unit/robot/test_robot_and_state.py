@@ -8,9 +8,10 @@ from typing import Any
 
 import numpy as np
 import pytest
-from controller_cases import assert_same, contents, panda, states, track
+from controller_cases import assert_same, contents, states, track
 from hypothesis import given
 from hypothesis import strategies as st
+from loaded_robots import panda
 from robot_cases import ROBOTS, assert_equal_terms, by_pickle, draw, everything, load
 
 from hsp_control import Controller, Robot, RobotState, TargetPosture

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 from robot_cases import ROBOTS, assert_equal_terms, draw, everything, load
+from wording import wording
 
 from hsp_control import HspControlError, RobotState
 from hsp_control.common.arrays import Array
@@ -126,26 +127,25 @@ def poisoned(vector: Array, value: float, place: int = 1) -> Array:
 BAD_STATES: dict[str, tuple[Callable[[Array, Array], tuple[Any, Any, Any]], Any, str]]
 BAD_STATES = {
     "NaN in q": (lambda q, v: (0.0, poisoned(q, np.nan), v), NonFiniteError,
-                 r"configuration q\[1\] is nan; needs finite numbers"),
+                 "configuration q[1] ... nan ... finite"),
     "infinities that cancel": (
         lambda q, v: (0.0, q, poisoned(poisoned(v, np.inf), -np.inf, 2)),
-        NonFiniteError, r"velocity v\[1\] is inf; needs finite numbers"),
+        NonFiniteError, "velocity v[1] ... inf ... finite"),
     "infinite t": (lambda q, v: (np.inf, q, v), NonFiniteError,
-                   "time t is inf; needs a finite number of seconds"),
+                   "time t ... inf ... finite"),
     "short q": (lambda q, v: (0.0, q[:-1], v), ShapeError,
-                r"configuration q has shape \(18,\); solo12 needs \(19,\) "
-                r"\(nq = 19, nv = 18\)"),
+                "configuration q ... (18,) ... (19,)"),
     "q where v belongs": (lambda q, v: (0.0, q, q), ShapeError,
-                          r"velocity v has shape \(19,\); solo12 needs \(18,\)"),
+                          "velocity v ... (19,) ... (18,)"),
     "column": (lambda q, v: (0.0, q[:, None], v), ShapeError,
-               r"configuration q has shape \(19, 1\)"),
+               "configuration q has shape (19, 1)"),
     "words": (lambda q, v: (0.0, ["a"] * 19, v), ShapeError,
-              r"configuration q is \['a', .* \(list\); needs 19 numbers$"),
+              "configuration q ... ['a', ... 19 numbers"),
     "nothing": (lambda q, v: (0.0, q, {}), ShapeError,
-                r"velocity v is {} \(dict\); needs 18 numbers$"),
+                "velocity v is {} ... 18 numbers"),
     "quaternion of norm 2": (
         lambda q, v: (0.0, np.concatenate([q[:3], 2 * q[3:7], q[7:]]), v),
-        ConfigurationError, r"q\[3:7\] = \[.*\] is a quaternion of norm 2; needs n"),
+        ConfigurationError, "... q[3:7] = ... norm 2"),
 }  # fmt: skip
 
 
@@ -157,11 +157,11 @@ def test_bad_state_is_refused_and_leaves_the_old_one(what: str) -> None:
     state = robot.state(0.5, q, v)
     name = robot.frame_names[-1]
     before = everything(state, name)
-    with pytest.raises(error, match=message) as caught:
+    with pytest.raises(error, match=wording(message)) as caught:
         state.update(*spoil(q, v))
     assert isinstance(caught.value, HspControlError)
     assert isinstance(caught.value, ValueError)
-    with pytest.raises(error, match=message):
+    with pytest.raises(error, match=wording(message)):
         robot.state(*spoil(q, v))
     # Half a move would leave terms that disagree with q and v.
     assert state.t == 0.5

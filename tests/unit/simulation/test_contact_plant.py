@@ -1,12 +1,13 @@
 """Rigid contacts: against Pinocchio's own solver, and by what they must conserve."""
 
 from collections.abc import Callable
-from functools import cache
 from typing import Any
 
 import numpy as np
 import pinocchio as pin
 import pytest
+from loaded_robots import load
+from wording import wording
 
 from hsp_control import Robot
 from hsp_control.common.arrays import Array
@@ -24,12 +25,6 @@ FEET = {
     "solo12": ("point", ["FL_FOOT", "FR_FOOT", "HL_FOOT", "HR_FOOT"]),
     "go2": ("point", ["FL_foot", "FR_foot", "RL_foot"]),
 }
-
-
-@cache
-def load(name: str) -> Robot:
-    pytest.importorskip("example_robot_data")
-    return Robot.load(name)
 
 
 def plant_of(name: str, **options: Any) -> ContactPlant:
@@ -142,18 +137,18 @@ def test_contacts_are_switched_by_the_clock() -> None:
 
 MISTAKES: list[tuple[Callable[[], object], type, str]] = [
     (lambda: RigidContact("FL_FOOT", "line"), SimulationError,  # type: ignore[arg-type]
-     r"^RigidContact: kind: unknown value 'line' \(allowed: point, surface\)$"),
+     "RigidContact: kind: unknown ... 'line'"),
     (lambda: RigidContact("FL_FOOT", on=[(2, 1)]), ScheduleError,
-     r"^RigidContact: on: Schedule: the interval from 2 to 1 s is empty$"),
+     "RigidContact: on: ... from 2 to 1 s is empty"),
     (lambda: ContactPlant(load("solo12"), [RigidContact("FL_FOO")]), FrameNotFoundError,
-     r"^contacts.FL_FOO: no frame 'FL_FOO'; did you mean"),
+     "contacts.FL_FOO: no ... 'FL_FOO'"),
     (lambda: ContactPlant(load("solo12"), 2 * [RigidContact("FL_FOOT")]),
-     SimulationError, r"^two contacts have the same frame 'FL_FOO"),
+     SimulationError, "two contacts ... 'FL_FOOT'"),
     (lambda: ContactPlant(load("solo12"), [], damping=-1.0), SimulationError,
-     r"^contacts: damping is -1.0; must not be"),
+     "contacts: damping is -1.0; must not be"),
     (lambda: ContactPlant(load("solo12"), []).acceleration(
         0.0, load("solo12").home(), np.zeros(18), np.ones(18)),
-     SimulationError, r"^the effort at t = 0 s pushes the floa"),
+     SimulationError, "... t = 0 s ... floating root"),
 ]  # fmt: skip
 
 
@@ -161,5 +156,5 @@ MISTAKES: list[tuple[Callable[[], object], type, str]] = [
 def test_contacts_that_are_none(
     make: Callable[[], object], error: type, message: str
 ) -> None:
-    with pytest.raises(error, match=message):
+    with pytest.raises(error, match=wording(message)):
         make()

@@ -7,6 +7,8 @@ from typing import Any
 import numpy as np
 import pinocchio as pin
 import pytest
+from loaded_robots import load
+from wording import wording
 
 from hsp_control import Controller, FramePosition, Gains, Robot, Rollout, simulate
 from hsp_control.common.arrays import Array
@@ -47,14 +49,6 @@ from hsp_control.simulation.plants.sensors import (
     VelocityNoise,
 )
 from hsp_control.trajectories import Circle
-
-
-@cache
-def load(name: str) -> Robot:
-    if name == "go2":
-        pytest.importorskip("example_robot_data")
-    return Robot.load(name)
-
 
 ROBOTS = ["planar3r", "panda", "go2"]
 """Continuous joints, revolute ones, and a floating root."""
@@ -462,37 +456,30 @@ def ideal_plant(name: str) -> SampledPlant:
 
 REFUSED: list[tuple[Callable[[], object], str]] = [
     (lambda: Inertias(mass_factor=0.0),
-     r"^Inertias: mass_factor: 0.0 is too small; must be greater than 0$"),
-    (lambda: Inertias(com_shift=(1.0,)),
-     r"^Inertias: com_shift: \(1.0,\) has 1 entry, needs 3$"),
-    (lambda: Inertias(random_mass=1.0),
-     r"^Inertias: random_mass: 1.0 is too large; must be less than 1$"),
-    (lambda: Payload("hand", -2.0),
-     r"^Payload: mass: -2.0 is negative; must be greater than 0$"),
+     "Inertias: mass_factor: 0.0 ... greater than 0"),
+    (lambda: Inertias(com_shift=(1.0,)), "Inertias: com_shift: (1.0,) ... 1 ... 3"),
+    (lambda: Inertias(random_mass=1.0), "Inertias: random_mass: 1.0 ... less than 1"),
+    (lambda: Payload("hand", -2.0), "Payload: mass: -2.0 ... greater than 0"),
     (lambda: EffortDelay(0.5),  # type: ignore[arg-type]
-     r"^EffortDelay: periods: 0.5 is a float; expected an int$"),
-    (lambda: DroppedPeriods(1.0),
-     r"^DroppedPeriods: probability: 1.0 is too large; must be less than 1$"),
-    (lambda: Push("hand", duration=0.0),
-     r"^Push: duration: 0.0 is too small; must be greater than 0$"),
+     "EffortDelay: periods: 0.5 ... an int"),
+    (lambda: DroppedPeriods(1.0), "DroppedPeriods: probability: 1.0 ... less than 1"),
+    (lambda: Push("hand", duration=0.0), "Push: duration: 0.0 ... greater than 0"),
     (lambda: JointFriction.of(load("panda"), [1.0, 2.0]),
-     r"^coulomb: has shape \(2,\); needs one number, or one for each of the 7"),
-    (lambda: Friction(viscous=[0.1, np.inf]),
-     r"^Friction: viscous.1: inf is not a finite number$"),
+     "coulomb: ... (2,) ... one number"),
+    (lambda: Friction(viscous=[0.1, np.inf]), "Friction: viscous.1: inf ... finite"),
     (lambda: StickingPlant(load("panda"), JointFriction.of(load("panda")), -1.0),
-     r"^step is -1.0; must be positive$"),
+     "step ... -1.0 ... positive"),
     (lambda: changed(load("panda"), [Payload("panda_link0", 1.0)]),
-     r"^frame: 'panda_link0' is fixed to the world$"),
+     "frame: 'panda_link0' is fixed to the world"),
     (lambda: ImperfectPlant(ideal_plant("planar3r"), drives=[Saturation()]),
-     r"^drives.saturation.limit: the URDF of planar3r gives no effort limits; "),
+     "drives.saturation.limit: ... planar3r ... no effort limits"),
     (lambda: ImperfectPlant(ideal_plant("panda"), [PositionNoise([1.0, 2.0])]),
-     r"^sensors.position_noise.std: has shape \(2,\); needs one number, or one"),
-    (lambda: Encoder("fine"),
-     r"^Encoder: resolution: 'fine' is a str; expected a number or a list of num"),
+     "sensors.position_noise.std: ... (2,) ... one number"),
+    (lambda: Encoder("fine"), "Encoder: resolution: 'fine' ... a number"),
 ]  # fmt: skip
 
 
 @pytest.mark.parametrize(("make", "message"), REFUSED)
 def test_imperfections_that_are_none(make: Any, message: str) -> None:
-    with pytest.raises(SimulationError, match=message):
+    with pytest.raises(SimulationError, match=wording(message)):
         make()

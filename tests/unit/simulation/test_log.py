@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from closed_loops import EXACT, load, panda_controller, planar_controller, planar_start
+from closed_loops import load, panda_controller, planar_controller, planar_start
 
 from hsp_control import (
     Controller,
@@ -27,13 +27,6 @@ from hsp_control.null_space.metrics import MassMatrixMetric
 from hsp_control.robot.integrators import Rk4
 from hsp_control.simulation.limit_excess import LimitExcess
 from hsp_control.trajectories import Lissajous
-
-
-@pytest.fixture(scope="module")
-def planar_run() -> Rollout:
-    """Return 0.5 s of the planar arm, logged every 10 ms."""
-    return simulate(planar_controller(), planar_start(), duration=0.5, integrator=EXACT)
-
 
 # --- the log's columns ---------------------------------------------------------------
 

@@ -6,6 +6,7 @@ from typing import Any
 import numpy as np
 import pytest
 from closed_loops import EXACT, load, planar_controller, planar_start
+from wording import wording
 
 from hsp_control import Controller, RobotState, Rollout, simulate
 from hsp_control.common.arrays import Array
@@ -18,35 +19,28 @@ from hsp_control.common.exceptions import (
 from hsp_control.null_space.fields import FunctionField
 from hsp_control.robot.integrators import Rk4, SemiImplicitEuler
 
-
-@pytest.fixture(scope="module")
-def planar_run() -> Rollout:
-    """Return 0.5 s of the planar arm, logged every 10 ms."""
-    return simulate(planar_controller(), planar_start(), duration=0.5, integrator=EXACT)
-
-
 # --- what is refused -----------------------------------------------------------------
 
 
 NO_MULTIPLE = "is not a whole multiple of"
 TIMES: list[tuple[dict[str, float], str]] = [
-    ({"duration": 0.0}, r"^duration is 0.0 s; must be positive$"),
-    ({"duration": np.nan}, r"^duration is nan s; must be positive$"),
-    ({"duration": np.inf}, r"^duration is inf s; must be positive$"),
-    ({"duration": 0.1, "log_period": 0.0}, r"^log_period is 0.0 s; must be pos"),
-    ({"duration": 0.105}, rf"^duration = 0.105 s {NO_MULTIPLE} log_period = 0.01 s$"),
-    ({"duration": 0.005}, rf"^duration = 0.005 s {NO_MULTIPLE} log_period = 0.01 s$"),
+    ({"duration": 0.0}, "duration is 0.0 s ... positive"),
+    ({"duration": np.nan}, "duration is nan s ... positive"),
+    ({"duration": np.inf}, "duration is inf s ... positive"),
+    ({"duration": 0.1, "log_period": 0.0}, "log_period is 0.0 s ... positive"),
+    ({"duration": 0.105}, "duration = 0.105 s ... log_period = 0.01 s"),
+    ({"duration": 0.005}, "duration = 0.005 s ... log_period = 0.01 s"),
     ({"duration": 0.1, "control_period": 0.003},
-     r"^control_period: .* whole multiple of 0.003 s; give log_period, .* 0.009"),
+     "control_period: ... 0.003 s ... log_period ... 0.009"),
     ({"duration": 1e300, "log_period": 1e-300},
-     r"^duration = 1e\+300 s is inf times log_period = 1e-300 s; at most "),
-    ({"duration": 0.1, "control_period": -0.001}, r"^control_period is -0.001 s; mu"),
+     "duration = 1e+300 s ... inf ... log_period = 1e-300 s"),
+    ({"duration": 0.1, "control_period": -0.001}, "control_period is -0.001 s"),
 ]  # fmt: skip
 
 
 @pytest.mark.parametrize(("options", "message"), TIMES)
 def test_times_that_do_not_fit(options: dict[str, float], message: str) -> None:
-    with pytest.raises(SimulationError, match=message) as caught:
+    with pytest.raises(SimulationError, match=wording(message)) as caught:
         simulate(planar_controller(), planar_start(), **options)  # type: ignore
     assert caught.value.rollout is None
 

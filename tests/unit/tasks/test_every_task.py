@@ -7,6 +7,7 @@ import pinocchio as pin
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from loaded_robots import load
 from states import moved
 from task_cases import (
     GAINS,
@@ -16,7 +17,6 @@ from task_cases import (
     Direction,
     Motion,
     every_task,
-    load,
     place,
     wobble,
 )

@@ -6,7 +6,8 @@ from typing import Any
 
 import numpy as np
 import pytest
-from task_cases import SECOND, TIME, Motion, load, placed, wobble
+from loaded_robots import load
+from task_cases import SECOND, TIME, Motion, placed, wobble
 
 import hsp_control as hsp
 from hsp_control import RobotState

@@ -2,12 +2,13 @@
 
 from collections.abc import Callable
 from dataclasses import replace
-from functools import cache
 from typing import Any
 
 import numpy as np
 import pytest
+from loaded_robots import panda
 from task_cases import GAINS, TIME, Case, Direction, every_task, place, placed
+from wording import wording
 
 import hsp_control as hsp
 from hsp_control import Controller, Gains, JointPosture, Robot
@@ -56,11 +57,6 @@ def test_the_largest_errors_of_a_robot() -> None:
     assert len(none.feedback().largest) == 0
     for each in (pose, one, part, none):  # what is placed can be placed again
         assert placed(each, robot).largest_error == each.largest_error
-
-
-@cache
-def panda() -> hsp.Robot:
-    return hsp.Robot.load("panda")
 
 
 @pytest.mark.parametrize("largest", [0.02, 0.1])
@@ -134,34 +130,33 @@ def test_a_change_leads_both_gains_to_the_new_ones() -> None:
 
 GAIN_ERRORS: dict[str, tuple[Callable[[], Any], str]] = {
     "diagonal": (lambda: Gains([[1.0, 0.0], [0.0, -2.0]], 1.0),
-     r"^Gains: kp\[1, 1\] is -2; must be greater than 0$"),
+     "Gains: kp[1, 1] is -2 ... greater than 0"),
     "not square": (lambda: Gains(np.ones((2, 3)), 1.0),
-     r"^Gains: kp has shape \(2, 3\); a matrix gain must be square$"),
-    "empty": (lambda: Gains([], 1.0), r"^Gains: kp is empty; needs numbers$"),
+     "Gains: kp ... (2, 3) ... square"),
+    "empty": (lambda: Gains([], 1.0), "Gains: kp is empty; needs numbers"),
     "ragged": (lambda: Gains([[1.0], [1.0, 2.0]], 1.0),
-     r"^Gains: kp: rows have different lengths \[1, 2\]; need the same$"),
-    "none": (lambda: Gains(None, 1.0), r"^Gains: give both kp and kv, or natural_f"),
-    "nothing": (lambda: Gains(), r"^Gains: give either kp and kv, or natural_freq"),
+     "Gains: kp: ... different lengths [1, 2]"),
+    "none": (lambda: Gains(None, 1.0), "Gains: ... both kp and kv"),
+    "nothing": (lambda: Gains(), "Gains: ... either kp and kv"),
     "twice": (lambda: Gains(1.0, 1.0, natural_frequency=1.0),
-     r"^Gains: give either kp and kv, or natural_frequency and damping_ratio$"),
-    "ratio alone": (lambda: Gains(damping_ratio=1.0),
-     r"^Gains: give either kp and kv, or natural_frequency$"),
+     "Gains: ... either kp and kv ... damping_ratio"),
+    "ratio alone": (lambda: Gains(damping_ratio=1.0), "Gains: ... either kp and kv"),
     "shape of kp": (lambda: Gains([1.0, 2.0], 1.0).matrices(3),
-     r"^kp has shape \(2,\); needs a number, 3 numbers or a 3 × 3 matrix$"),
+     "kp ... (2,) ... a number"),
     "shape of kv": (lambda: Gains(1.0, np.eye(2)).matrices(3),
-     r"^kv has shape \(2, 2\); needs a number, 3 numbers or a 3 × 3 matrix$"),
+     "kv ... (2, 2) ... a number"),
     "no decay": (lambda: Gains([[1.0, 3.0], [3.0, 1.0]], 1.0).matrices(2),
-     r"^with these gains the error does not decay: .* real part 1 1/s; needs less"),
+     "... does not decay ... 1 1/s"),
     "frequency matrix": (lambda: Gains(natural_frequency=np.eye(2) + 1.0),
-     r"^Gains: natural_frequency and damping_ratio must be numbers or lists$"),
+     "Gains: natural_frequency ... numbers or lists"),
     "lists of different length": (
      lambda: Gains(natural_frequency=[1.0, 2.0], damping_ratio=[1.0, 1.0, 1.0]),
-     r"^Gains: natural_frequency has 2 entries, damping_ratio 3$"),
+     "Gains: natural_frequency ... 2 ... damping_ratio 3"),
 }  # fmt: skip
 
 
 @pytest.mark.parametrize("which", GAIN_ERRORS)
 def test_errors_of_gains(which: str) -> None:
     build, message = GAIN_ERRORS[which]
-    with pytest.raises(GainError, match=message):
+    with pytest.raises(GainError, match=wording(message)):
         build()

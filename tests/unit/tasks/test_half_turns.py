@@ -8,7 +8,8 @@ import pinocchio as pin
 import pytest
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
-from task_cases import GAINS, TIME, TOOL, Case, Pose, Tumble, frame_along, panda, place
+from loaded_robots import panda
+from task_cases import GAINS, TIME, TOOL, Case, Pose, Tumble, frame_along, place
 
 from hsp_control import Controller, FrameOrientation, Gains, Pointing, simulate
 from hsp_control.common.arrays import Array

@@ -26,6 +26,7 @@ from task_cases import (
     ToolPose,
     place,
 )
+from wording import wording
 
 import hsp_control as hsp
 from hsp_control import Controller, FramePosition, Gains, JointPosture
@@ -299,44 +300,44 @@ def later(first: Impedance) -> Any:
 
 REFUSED: dict[str, tuple[Callable[[], Any], type[Exception], str]] = {
     "two dampings": (lambda: Impedance(1.0, damping=1.0, damping_ratio=1.0), GainError,
-     "give either damping or damping_ratio"),
+     "... damping or damping_ratio"),
     "gains and impedance": (
      lambda: FramePosition(gains=Gains(1.0, 2.0), impedance=Impedance(1.0)), GainError,
-     r"give either gains \[1/s², 1/s\] or impedance \[N/m, N·s/m\], not both"),
+     "... gains [1/s², 1/s] ... impedance [N/m, N·s/m]"),
     "rows": (lambda: panda_hand(impedance=Impedance([1.0, 2.0])), GainError,
-     r"tasks.hand.impedance: stiffness has shape \(2,\); needs a number, 3 numbers"),
+     "tasks.hand.impedance: stiffness ... (2,) ... a number"),
     "another task": (lambda: hsp.CenterOfMass(impedance=Impedance(1.0)),  # type: ignore[call-arg]
-     TaskError, "impedance"),
+     TaskError, "... impedance"),
     "gains of a spring": (
      lambda: panda_hand(impedance=Impedance(1.0)).at(1.0).gains("hand", GAINS),
      ControllerError,
-     "task 'hand' has an impedance instead of gains; a change of type impedance"),
+     "... task 'hand' ... impedance instead of gains"),
     "spring of gains": (lambda: panda_hand().at(1.0).impedance("hand", Impedance(1.0)),
      ControllerError,
-     "task 'hand' has no impedance from the start, so none can follow"),
+     "... task 'hand' has no impedance"),
     "rows of a change": (
      lambda: later(Impedance(1.0)).impedance("hand", Impedance([1.0, 2.0])), GainError,
-     r"impedance: stiffness has shape \(2,\); needs a number, 3 numbers"),
+     "impedance: stiffness ... (2,) ... a number"),
     "integral action": (
      lambda: Compensation(integral_action=IntegralAction(1.0)).check(
          hsp.Robot.load("panda"), panda_hand(impedance=Impedance(1.0)).tasks),
      CompensationError,
-     "task 'hand' has an impedance: integral action would press against what"),
+     "... task 'hand' ... integral action"),
     "a cancelling observer": (lambda: Compensation(
         momentum_observer=MomentumObserver()).check(hsp.Robot.load("panda"),
         panda_hand(impedance=Impedance(1.0)).tasks),
      CompensationError,
-     "momentum_observer: the observer would cancel every force to which task 'hand'"),
+     "... momentum_observer: ... task 'hand'"),
     "clip of what is not cancelled": (lambda: MomentumObserver(clip=3.0, cancel=False),
      CompensationError,
-     "clip bounds the effort that is cancelled, and cancel is false"),
+     "... clip ... cancel is false"),
 }  # fmt: skip
 
 
 @pytest.mark.parametrize("name", REFUSED)
 def test_what_is_refused(name: str) -> None:
     make, error, message = REFUSED[name]
-    with pytest.raises(error, match=message):
+    with pytest.raises(error, match=wording(message)):
         make()
 
 

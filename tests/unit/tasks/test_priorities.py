@@ -3,7 +3,8 @@
 from typing import Any
 
 import pytest
-from task_cases import load, placed
+from loaded_robots import load
+from task_cases import placed
 
 from hsp_control import (
     CenterOfMass,

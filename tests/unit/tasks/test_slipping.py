@@ -1,10 +1,10 @@
 """A spring whose force is bounded: it slips, and takes no energy from anywhere."""
 
-from functools import cache
 from typing import Any
 
 import numpy as np
 import pytest
+from loaded_robots import panda
 from task_cases import placed
 
 import hsp_control as hsp
@@ -21,11 +21,6 @@ PARTS = (
     ErrorPart("orientation", "rad", "rad/s", 3),
 )
 ENDS = np.array([3, 6])
-
-
-@cache
-def panda() -> hsp.Robot:
-    return hsp.Robot.load("panda")
 
 
 def springs(kind: str, rng: np.random.Generator) -> Array:

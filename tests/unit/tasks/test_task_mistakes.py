@@ -5,7 +5,9 @@ from typing import Any
 
 import numpy as np
 import pytest
-from task_cases import TOOL, load, panda, placed, planar
+from loaded_robots import load, panda
+from task_cases import TOOL, placed, planar
+from wording import wording
 
 from hsp_control import (
     CenterOfMass,
@@ -44,72 +46,71 @@ POINT = Hold([0, 0, 0])
 ERRORS: dict[str, tuple[Callable[[], Any], type[HspControlError], str]] = {
     "reference of a relative pose": (
      lambda: placed(RelativePose(reference="panda_tpc"), panda()), FrameNotFoundError,
-     r"^reference: no frame 'panda_tpc'; did you mean 'panda_tcp'\?"),
+     "reference: no ... 'panda_tpc' ... 'panda_tcp'"),
     "a frame relative to itself": (
      lambda: placed(RelativePose(reference="panda_tcp"), panda()), TaskError,
-     r"^reference: frame and reference are both 'panda_tcp'; they must be differ"),
+     "reference: ... 'panda_tcp' ... different"),
     "dimension of a path in Python": (
      lambda: placed(CenterOfMass(CallableTrajectory(np.sin, 2)), panda()), TaskError,
-     r"^trajectory: the trajectory has dimension 2; the task needs 3$"),
+     "trajectory: ... dimension 2 ... 3"),
     "more rows than dofs": (lambda: placed(FramePose("tip", POSE), planar()),
-     TaskError, r"^the task has 6 rows; planar3r has 3 degrees of freedom$"),
+     TaskError, "the task has 6 rows ... 3 degrees"),
     "parts of the largest error": (
      lambda: placed(FramePose("panda_tcp", POSE, largest_error=[0.1] * 3), panda()),
-     TaskError, r"^largest_error: has 3 numbers; needs one for each part of the "
-     r"error: position \[m\] and orientation \[rad\]$"),
+     TaskError, "largest_error: ... 3 ... position [m] ... orientation [rad]"),
     "both direction and trajectory": (
      lambda: Pointing("panda_tcp", TOOL, trajectory=HOLD), TaskError,
-     r"^Pointing: give one of direction and trajectory$"),
+     "Pointing: ... direction and trajectory"),
     "joint": (lambda: placed(posture(joints=["panda_joint8"]), panda()),
      JointNotFoundError,
-     r"^joints: no joint 'panda_joint8'; did you mean 'panda_joint\d'\?"),
+     "joints: no ... 'panda_joint8' ... 'panda_joint"),
     "root": (lambda: placed(posture(joints=["root_joint"]), load("ur5", "planar")),
      TaskError,
-     r"^joints: joint 'root_joint' has 3 degrees of freedom; a posture task needs"),
+     "joints: ... 'root_joint' ... 3 degrees"),
     "no joints": (lambda: placed(posture(joints=[]), panda()), TaskError,
-     r"^joints: there is no joint$"),
+     "joints: there is no joint"),
     "twice the same joint": (
      lambda: placed(posture(joints=["panda_joint1", "panda_joint1"]), panda()),
-     TaskError, r"^joints: joint 'panda_joint1' is named twice$"),
+     TaskError, "joints: ... 'panda_joint1' ... twice"),
     "dimension of a displacement in Python": (
      lambda: placed(posture(displacement=CallableTrajectory(np.sin, 2)), panda()),
      TaskError,
-     r"^displacement: the task has 7 joints; its displacement has dimension 2$"),
+     "displacement: ... 7 joints ... dimension 2"),
     "no configuration": (
      lambda: placed(JointPosture([1.0, 0.0, 1.0, 0.0, 0.6, 0.7]), planar()),
-     ConfigurationError, r"^reference: "),
+     ConfigurationError, "reference:"),
     "gains without decay": (
      lambda: placed(CenterOfMass(gains=Gains(1 + 3 * np.ones((3, 3)), 1)), panda()),
-     GainError, r"^gains: with these gains the error does not decay"),
+     GainError, "gains: ... does not decay"),
     "a frame that only the robot knows": (
      lambda: FramePosition(trajectory=POINT).evaluate(here()), TaskError,
-     r"^task 'end_effector': a controller would look up its frame; outside of one,"),
+     "task 'end_effector': ... frame"),
     "a frame that only the robot knows, in another's axes": (
      lambda: RelativePose(reference="panda_link0").evaluate(here()), TaskError,
-     r"^task 'end_effector_from_panda_link0': a controller would look up its frame"),
+     "task 'end_effector_from_panda_link0': ... frame"),
     "an orientation that only the start knows": (
      lambda: FramePose("panda_tcp", POINT).evaluate(here()), TaskError,
-     r"^task 'panda_tcp': a controller would look up its orientation; outside of"),
+     "task 'panda_tcp': ... orientation"),
     "a point that only the start knows": (
      lambda: FramePosition("panda_tcp").evaluate(here()), TrajectoryError,
-     r"^Hold is relative to where the robot starts, which only a controller knows"),
+     "Hold ... where the robot starts"),
     "joints that only the robot knows": (
      lambda: JointPosture(np.zeros(7)).evaluate(here()), TaskError,
-     r"^task 'posture': a controller would look up its joints"),
+     "task 'posture': ... joints"),
     "a posture that only the start knows": (
      lambda: JointPosture(joints=["panda_joint1"]).evaluate(here()), TaskError,
-     r"^task 'posture': a controller would look up its reference"),
+     "task 'posture': ... reference"),
     "joint positions where the configuration is longer": (lambda: JointPosture(
         [0.0] * 3, joints=["joint1"]).measure(
         planar().state(0.0, planar().home(), np.zeros(3))),
-     TaskError, r"^task 'posture': a controller would look up its reference"),
+     TaskError, "task 'posture': ... reference"),
 }  # fmt: skip
 
 
 @pytest.mark.parametrize("which", ERRORS)
 def test_errors(which: str) -> None:
     build, kind, message = ERRORS[which]
-    with pytest.raises(kind, match=message) as caught:
+    with pytest.raises(kind, match=wording(message)) as caught:
         build()
     assert isinstance(caught.value, HspControlError)
     assert type(caught.value) is kind

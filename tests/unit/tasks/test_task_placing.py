@@ -6,7 +6,9 @@ from typing import Any
 import numpy as np
 import pinocchio as pin
 import pytest
-from task_cases import load, panda, planar, single_joints
+from loaded_robots import load, panda
+from task_cases import planar, single_joints
+from wording import wording
 
 from hsp_control import (
     CenterOfMass,
@@ -278,33 +280,33 @@ def test_the_first_state_is_the_start_unless_one_is_given() -> None:
 
 MISTAKES: dict[str, tuple[Callable[[], Task], type[HspControlError], str]] = {
     "frame": (lambda: FramePose("panda_tpc", name="hand"), FrameNotFoundError,
-     r"^tasks.hand.frame: no frame 'panda_tpc'; did you mean 'panda_tcp'\?"),
+     "tasks.hand.frame: no ... 'panda_tpc' ... 'panda_tcp'"),
     "trajectory": (lambda: FramePosition(trajectory=Hold([0, 0]), name="hand"),
      TrajectoryError,
-     r"^tasks.hand.trajectory: point has 2 coordinates \[0.0, 0.0\]; needs 3$"),
+     "tasks.hand.trajectory: ... [0.0, 0.0] ... 3"),
     "blend": (
      lambda: FramePose(trajectory=HoldPose(POINT, TURNED), blend=1.0, name="hand"),
-     TaskError, r"^tasks.hand.blend: HoldPose has its own beginning; remove blend$"),
+     TaskError, "tasks.hand.blend: HoldPose ... blend"),
     "gains": (lambda: FramePosition(gains=Gains([1, 2], 3), name="hand"), GainError,
-     r"^tasks.hand.gains: kp has shape \(2,\); needs a number, 3 numbers or a 3"),
+     "tasks.hand.gains: kp ... (2,) ... 3 × 3"),
     "joints": (lambda: JointPosture(joints=["joint1"], name="hand"),
-     JointNotFoundError, r"^tasks.hand.joints: no joint 'joint1'"),
+     JointNotFoundError, "tasks.hand.joints: no joint 'joint1'"),
     "reference": (lambda: JointPosture([0.0] * 6, name="hand"), ShapeError,
-     r"^tasks.hand.reference: a posture has shape \(6,\); needs 7 numbers$"),
+     "tasks.hand.reference: a posture ... (6,) ... 7 numbers"),
     "displacement": (lambda: JointPosture(displacement=Hold([0.0]), name="hand"),
      TrajectoryError,
-     r"^tasks.hand.displacement: point has 1 coordinates \[0.0\]; needs 7$"),
+     "tasks.hand.displacement: ... [0.0] ... 7"),
 }  # fmt: skip
 
 
 @pytest.mark.parametrize("which", MISTAKES)
 def test_the_message_has_the_key_path(which: str) -> None:
     make, kind, message = MISTAKES[which]
-    with pytest.raises(kind, match=message) as raised:
+    with pytest.raises(kind, match=wording(message)) as raised:
         Controller(panda(), [FramePosition(axes="x"), make()])
     assert type(raised.value) is kind
     running = Controller(panda(), [FramePosition(axes="x")])
-    with pytest.raises(kind, match=message.replace("^tasks.hand", "task")):
+    with pytest.raises(kind, match=wording(message.replace("tasks.hand", "task", 1))):
         running.at(1.0).add(make())
     assert running.changes == ()
 

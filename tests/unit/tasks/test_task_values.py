@@ -10,9 +10,11 @@ from typing import Any
 
 import numpy as np
 import pytest
+from loaded_robots import panda
 from pinocchio import SE3, Quaternion, SE3ToXYZQUAT
-from task_cases import panda, placed
+from task_cases import placed
 from values import assert_is_a_value
+from wording import wording
 
 import hsp_control.tasks as tasks
 import hsp_control.trajectories as paths
@@ -164,55 +166,55 @@ def test_a_point_and_an_orientation_are_held() -> None:
 
 Wrong = dict[str, list[tuple[Any, str]]]
 _WRONG_TASK: Wrong = {
-    "priority": [(0, "priority: 0 is too small; must be at least 1"),
-     (1.5, "priority: 1.5 is a float; expected an int")],
-    "schedule": [([(0, 1)], "schedule: .* a list; needs a Schedule"),
-     ({"intervals": [[0, 1]], "rmap": 1}, "schedule.rmap: unknown key 'rmap'; did")],
+    "priority": [(0, "priority: 0 ... at least 1"),
+     (1.5, "priority: 1.5 ... an int")],
+    "schedule": [([(0, 1)], "schedule: ... a list ... a Schedule"),
+     ({"intervals": [[0, 1]], "rmap": 1}, "schedule.rmap: unknown ... 'rmap'")],
     "name": [(3, "name: 3 "), ("a b", "task name 'a b'")],
 }  # fmt: skip
 _WRONG_GAINS: Wrong = {
     "gains": [(3.0, "gains: 3.0, a float; needs a Gains"),
-     ({"kp": -1, "kv": 1}, "gains.kp: -1 is negative; must be greater than 0"),
-     ({"Kp": 1}, "gains.Kp: unknown key 'Kp'; did you mean 'kp'")],
-    "largest_error": [(0, "largest_error: 0 is too small; must be greater than 0"),
-     ([0.1, -1], "largest_error.1: -1 is negative; must be greater than 0"),
-     (np.inf, "largest_error: inf is not a finite number"),
-     ("robt", "largest_error: 'robt' is a str; expected 'robot', 'none', a number")],
+     ({"kp": -1, "kv": 1}, "gains.kp: -1 ... greater than 0"),
+     ({"Kp": 1}, "gains.Kp: unknown ... 'Kp' ... 'kp'")],
+    "largest_error": [(0, "largest_error: 0 ... greater than 0"),
+     ([0.1, -1], "largest_error.1: -1 ... greater than 0"),
+     (np.inf, "largest_error: inf ... finite"),
+     ("robt", "largest_error: 'robt' ... 'robot'")],
 }  # fmt: skip
 _WRONG_TRACKING: Wrong = {
     **_WRONG_TASK,
     **_WRONG_GAINS,
-    "blend": [(0.0, "blend: 0.0 is too small; must be greater than 0")],
+    "blend": [(0.0, "blend: 0.0 ... greater than 0")],
 }
 _WRONG_SPRING: Wrong = {
     "impedance": [
-        (100.0, "impedance: 100.0, a float; needs an Imp"),
+        (100.0, "impedance: 100.0 ... an Impedance"),
         ({"damping": 3}, "impedance: missing key 'stiffness'"),
-        ({"stiffness": -1}, "impedance.stiffness: -1 is negative; must be at least 0"),
+        ({"stiffness": -1}, "impedance.stiffness: -1 ... at least 0"),
     ]
 }
-_WRONG_FRAME: Wrong = {"frame": [(7, "frame: 7 is an int; expected a str")]}
+_WRONG_FRAME: Wrong = {"frame": [(7, "frame: 7 ... a str")]}
 _WRONG_POINT: list[tuple[Any, str]] = [
-    (SE3.Identity(), "trajectory: an SE3; needs a Trajectory: give its .translation"),
-    ({"type": "hodl"}, "trajectory.type: unknown type 'hodl'; did you mean 'hold'"),
+    (SE3.Identity(), "trajectory: an SE3 ... .translation"),
+    ({"type": "hodl"}, "trajectory.type: unknown ... 'hodl' ... 'hold'"),
     ({"type": "circle", "radius": 1}, "trajectory: missing key 'angular_rate'"),
-    (HoldPose([0, 0, 0], np.eye(3)), "trajectory: a HoldPose is not one of the traj"),
+    (HoldPose([0, 0, 0], np.eye(3)), "trajectory: a HoldPose"),
 ]
 _WRONG_TURN: list[tuple[Any, str]] = [
-    (Hold([0, 0, 0]), "trajectory: a Hold is not one of the orientations"),
-    ("hold", r"'hold', a str; .* did you mean hsp.trajectories.HoldOrientation"),
+    (Hold([0, 0, 0]), "trajectory: a Hold ... orientations"),
+    ("hold", "'hold', a str ... hsp.trajectories.HoldOrientation"),
 ]
 _WRONG_POSE: list[tuple[Any, str]] = [
-    (HoldOrientation(), "trajectory: a HoldOrientation is not one of the poses or tr"),
+    (HoldOrientation(), "trajectory: a HoldOrientation ... poses"),
     ({"type": "spin"}, "trajectory.type: unknown type 'spin'"),
 ]
 _WRONG_AXES: list[tuple[Any, str]] = [
-    ("xx", "axes: 'xx' must be distinct letters of x, y and z"),
-    (["x"], r"axes: \['x'\] is a list; expected a str"),
+    ("xx", "axes: 'xx' ... distinct"),
+    (["x"], "axes: ['x'] ... a str"),
 ]
 WRONG: dict[type[Part], Wrong] = {
     AngularMomentum: {**_WRONG_TASK, "trajectory": _WRONG_POINT,
-     "rate": [(-1, "rate: -1 is negative"), (np.inf, "rate: inf is not a finite")]},
+     "rate": [(-1, "rate: -1 ... negative"), (np.inf, "rate: inf ... finite")]},
     CenterOfMass: {**_WRONG_TRACKING, "trajectory": _WRONG_POINT, "axes": _WRONG_AXES},
     FrameOrientation: {**_WRONG_TRACKING, **_WRONG_SPRING, **_WRONG_FRAME,
      "trajectory": _WRONG_TURN},
@@ -220,37 +222,37 @@ WRONG: dict[type[Part], Wrong] = {
      "trajectory": _WRONG_POSE},
     FramePosition: {**_WRONG_TRACKING, **_WRONG_SPRING, **_WRONG_FRAME,
      "trajectory": _WRONG_POINT, "axes": _WRONG_AXES},
-    Gains: {"kp": [(0, "kp: 0 is too small; must be greater than 0")],
-     "kv": [([1.0, np.nan], "kv.1: nan is not a finite number")],
-     "natural_frequency": [(1.0, "give either kp and kv, or natural_frequency and")],
-     "damping_ratio": [(1.0, "give either kp and kv, or .* and damping_ratio")]},
-    Impedance: {"stiffness": [(0, "stiffness is 0 in every direction, where a damping"),
-        ([1.0, np.nan], "stiffness.1: nan is not a finite number"),
-        ([[1, 0, 0], [0, 1, 0]], r"stiffness has shape \(2, 3\); a matrix gain"),
-        ([[1, 0.2], [0.1, 1]], r"stiffness is .*; a matrix must be symmetric"),
-        ([[1, 2], [2, 1]], "with the eigenvalue -1; no eigenvalue may be negative")],
-     "damping": [(-3, "damping: -3 is negative; must be at least 0"),
-        ([[2, 1], [0, 2]], "damping is .*; a matrix must be symmetric"),
-        ([[1, 2], [2, 1]], "damping is .* no eigenvalue may be negative"),
-        ([1, 0], r"damping is \[1.0, 0.0\]: it does not damp all that the stiffness")],
-     "damping_ratio": [([1, 2], r"damping_ratio: \[1, 2\] is a list; expected")],
-     "largest_force": [(0, "largest_force: 0 is too small; must be greater than 0"),
-        ([40, -1], "largest_force.1: -1 is negative; must be greater than 0"),
-        ("robt", "largest_force: 'robt' is a str; expected 'robot', 'none', a")]},
+    Gains: {"kp": [(0, "kp: 0 ... greater than 0")],
+     "kv": [([1.0, np.nan], "kv.1: nan ... finite")],
+     "natural_frequency": [(1.0, "either kp and kv")],
+     "damping_ratio": [(1.0, "either kp and kv ... damping_ratio")]},
+    Impedance: {"stiffness": [(0, "stiffness is 0 in every direction"),
+        ([1.0, np.nan], "stiffness.1: nan ... finite"),
+        ([[1, 0, 0], [0, 1, 0]], "stiffness ... (2, 3)"),
+        ([[1, 0.2], [0.1, 1]], "stiffness ... symmetric"),
+        ([[1, 2], [2, 1]], "eigenvalue -1")],
+     "damping": [(-3, "damping: -3 ... at least 0"),
+        ([[2, 1], [0, 2]], "damping is ... symmetric"),
+        ([[1, 2], [2, 1]], "damping is ... eigenvalue"),
+        ([1, 0], "damping is [1.0, 0.0] ... damp")],
+     "damping_ratio": [([1, 2], "damping_ratio: [1, 2] ... list")],
+     "largest_force": [(0, "largest_force: 0 ... greater than 0"),
+        ([40, -1], "largest_force.1: -1 ... greater than 0"),
+        ("robt", "largest_force: 'robt' ... 'robot'")]},
     JointPosture: {**_WRONG_TASK, **_WRONG_SPRING, **_WRONG_GAINS, "reference": [
-        ("hom", "reference: 'hom' is a str; expected 'start', 'home' or a list"),
+        ("hom", "reference: 'hom' ... 'start'"),
         ([], "reference"),
-        ([0.0, np.nan], "reference.1: nan is not a finite number")],
+        ([0.0, np.nan], "reference.1: nan ... finite")],
      "joints": [("joint1", "joints: 'joint1'"), ([3], "joints.0: 3 is an int")],
-     "displacement": [(Spin([0, 0, 1], 1), "displacement: a Spin is not one of")]},
+     "displacement": [(Spin([0, 0, 1], 1), "displacement: a Spin")]},
     Pointing: {**_WRONG_TASK, **_WRONG_GAINS, **_WRONG_FRAME, "direction": [
         ([0, 0, 0], "direction must be non-zero"),
-        ([1, 0], r"direction: \[1, 0\] has 2 entries, needs 3"),
-        (None, "give one of direction and trajectory")],
+        ([1, 0], "direction: [1, 0] ... 2 ... 3"),
+        (None, "direction and trajectory")],
      "axis": [([0, 0, 0], "axis must be non-zero"), ("x", "axis: 'x' is a str")],
-     "trajectory": [(HoldOrientation(), "give one of direction and trajectory")]},
+     "trajectory": [(HoldOrientation(), "direction and trajectory")]},
     RelativePose: {**_WRONG_TRACKING, **_WRONG_FRAME, "trajectory": _WRONG_POSE,
-     "reference": [(None, "reference: .* expected a str")]},
+     "reference": [(None, "reference: ... expected a str")]},
 }  # fmt: skip
 """For each field, wrong values and what is said about them."""
 
@@ -268,7 +270,8 @@ def test_wrong_values_are_refused(
     cls: type[Part], field: str, value: Any, message: str
 ) -> None:
     """By one error of the family, which names the field."""
-    with pytest.raises(cls.error, match=f"^{cls.__name__}: .*{message}") as raised:
+    name = cls.__name__
+    with pytest.raises(cls.error, match=wording(f"{name}: ... {message}")) as raised:
         replace(EXAMPLES[cls], **{field: value})  # type: ignore[type-var]
     assert field in str(raised.value)
     assert "\n" not in str(raised.value)

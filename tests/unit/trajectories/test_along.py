@@ -14,6 +14,7 @@ from hypothesis import strategies as st
 from oracles import slope
 from scipy.integrate import quad
 from trajectory_cases import CORNER, IDENTITY, POINTS, R1, R2, R3, SPIN, TIMES
+from wording import wording
 
 import hsp_control as hsp
 from hsp_control.common.arrays import Array
@@ -310,58 +311,55 @@ def test_waypoints_count_from_where_the_robot_starts() -> None:
 
 LINES = [[[0.0, 0.0], [1.0, 0.0]], [[1.0, 0.0], [0.0, 1.0]]]
 REFUSED: dict[str, Callable[[], Any]] = {
-    r"^Along: at s = 2.580 along the path its own motion stops \(at 0.9 s\): it": (
+    "Along: at s = 2.580 ... stops (at 0.9 s)": (
      lambda: Along(Stops(POINTS, TIMES), 1.0)),
-    r"^Along: at s = 1.000 along the path \(its own time is 1 s\) it has a corner": (
+    "Along: at s = 1.000 ... (its own time is 1 s) ... corner": (
      lambda: Along(PiecewisePolynomial([0, 1, 2], LINES), 1.0)),
-    r"^Along: at s = 1.414 along the path \(its own time is 0.7854 s\) it has a corner "
-    r"or turns back": lambda: Along(Lissajous([1, 1], [2, 2], center=[0, 0]), 1.0),
-    r"^Along: at s = 0.000 along the path its own motion stops \(at 0 s\)": (
+    "Along: at s = 1.414 ... 0.7854 s) ... corner or turns back": (
+     lambda: Along(Lissajous([1, 1], [2, 2], center=[0, 0]), 1.0)),
+    "Along: at s = 0.000 ... stops (at 0 s)": (
      lambda: Along(hsp.trajectories.Blend(UniformLine([1.0], [0.0]), 0.1, start=[0.0],
                                           start_time=1.0), 1.0, interval=[0, 2])),
-    r"^Along: the path has no length": lambda: Along(Hold([1.0]), 1.0, interval=[0, 1]),
-    r"^Along: where a path of CallableTrajectory begins and ends is not known: give "
-    r"interval": lambda: Along(hsp.trajectories.CallableTrajectory(np.sin, 1), 1.0),
-    r"^Along: the path goes from 0 to 1 s; interval is \[0, 2\]": (
+    "Along: the path has no length": lambda: Along(Hold([1.0]), 1.0, interval=[0, 1]),
+    "Along: ... CallableTrajectory ... give interval": (
+     lambda: Along(hsp.trajectories.CallableTrajectory(np.sin, 1), 1.0)),
+    "Along: ... 0 to 1 s ... [0, 2]": (
      lambda: Along(Line([1], 1, start=[0]), 1, interval=[0, 2])),
-    r"^Along: interval must increase; it is \[1, 1\]": (
+    "Along: interval ... [1, 1]": (
      lambda: Along(Line([1], 1, start=[0]), 1, interval=[1, 1])),
-    r"^Along: at s = 0.000 along the path, which bends there with a radius of 0.5, a "
-    r"speed of 2 needs an acceleration of 8 across it; acceleration = 2. speed = 1 "
-    r"would do": (
+    "Along: at s = 0.000 ... radius of 0.5 ... 8 across ... speed = 1 would do": (
      lambda: Along(Circle(0.5, 1, [0, 0]), 2.0, 2.0)),
-    r"^origin: start cannot move a Along": (
+    "origin: start cannot move a Along": (
      lambda: Along(Circle(0.5, 1), 1.0, origin="start").anchored([0, 0, 0])),
-    r"^Polyline: waypoint 1 is a corner of 90 degrees: it can only be passed at rest; "
-    r"give blend_radius, or use stops": lambda: Polyline(CORNER, 1, 1),
-    r"^Polyline: the path turns back at waypoint 1": (
+    "Polyline: waypoint 1 ... 90 degrees ... blend_radius": (
+     lambda: Polyline(CORNER, 1, 1)),
+    "Polyline: the path turns back at waypoint 1": (
      lambda: Polyline([[0.0], [1.0], [0.5]], 1, 1, 0.1)),
-    r"^Polyline: waypoints 0 and 1 are the same point; a polyline does not pause": (
+    "Polyline: waypoints 0 and 1 ... same point": (
      lambda: Polyline([[0.0, 0.0]] * 2, 1, 1)),
-    r"^Polyline: a path needs at least two waypoints": lambda: Polyline([[0.0]], 1, 1),
-    r"^Polyline: one blend does not fit between waypoints 0 and 1, which are 1 apart; "
-    r"blend_radius = 1 would": lambda: Polyline(CORNER, 1, 1, 1.1),
-    r"^Polyline: two blends do not fit between waypoints 1 and 2, which are 1 apart; "
-    r"blend_radius = 0.5 would": lambda: Polyline([*CORNER, [0, 1, 1]], 1, 1, 0.6),
-    r"^Polyline: at s = 0.9\d\d along the path, which bends there with a radius of "
-    r"0.0839, a speed of 0.5 needs an acceleration of 2.98 across it; acceleration = "
-    r"1. speed = 0.289 would do": lambda: Polyline(CORNER, 0.5, 1, 0.1),
-    r"^PolylinePose: 3 waypoints need as many rotations; there are 2": (
+    "Polyline: a path needs at least two waypoints": lambda: Polyline([[0.0]], 1, 1),
+    "Polyline: one blend ... 0 and 1 ... blend_radius = 1 would": (
+     lambda: Polyline(CORNER, 1, 1, 1.1)),
+    "Polyline: two blends ... 1 and 2 ... blend_radius = 0.5 would": (
+     lambda: Polyline([*CORNER, [0, 1, 1]], 1, 1, 0.6)),
+    "Polyline: at s = 0.9 ... radius of 0.0839 ... 2.98 ... speed = 0.289 would do": (
+     lambda: Polyline(CORNER, 0.5, 1, 0.1)),
+    "PolylinePose: 3 waypoints ... 2": (
      lambda: PolylinePose(CORNER, 1, 9, 0.3, rotations=[R1, R2])),
-    r"^AlongPose: .* its own motion stops": (
+    "AlongPose: ... its own motion stops": (
      lambda: AlongPose(ComposedPose(Stops(POINTS[:3], [0, 1, 2]),
                                     OrientationPath([R1, R2], [0, 2])), 1)),
-    r"^AlongPose: at s = 1.000 along the path its own motion stops \(at 1 s\)": (
+    "AlongPose: at s = 1.000 ... stops (at 1 s)": (
      lambda: AlongPose(ComposedPose(Line([1, 0, 0], 1, start=[0, 0, 0]),
                                     OrientationPath([R1, R2], [0, 2])), 1)),
-    r"^AlongOrientation: at s = .* its own motion stops \(at 1 s\)": (
+    "AlongOrientation: ... stops (at 1 s)": (
      lambda: AlongOrientation(OrientationPath([IDENTITY, R1, R2], [0, 1, 2]), 1.0)),
 }  # fmt: skip
 
 
 @pytest.mark.parametrize("message", REFUSED)
 def test_refusals_say_where_and_what_would_do(message: str) -> None:
-    with pytest.raises(TrajectoryError, match=message):
+    with pytest.raises(TrajectoryError, match=wording(message)):
         REFUSED[message]()
 
 

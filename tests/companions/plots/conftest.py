@@ -1,0 +1,12 @@
+"""What tests of figures share."""
+
+import pytest
+from drawn_logs import PAPER, planar, spatial
+
+from hsp_control import Rollout
+
+
+@pytest.fixture(scope="module")
+def logs() -> dict[str, Rollout]:
+    """Return runs by what they show: those of the paper, and spatial ones."""
+    return {name: planar(number) for name, number in PAPER.items()} | spatial()
