@@ -6,6 +6,7 @@
 #include "check.hpp"
 #include "distance_rows.hpp"
 #include "holding_rows.hpp"
+#include "mixed_parts.hpp"
 #include "nearest_effort.hpp"
 #include "sent_effort.hpp"
 #include "support.hpp"
@@ -15,6 +16,6 @@ const Kind* const* limit_kinds() {
   return kinds<NearestEffort, Copy, AccelerationBounds, Within, EffortWindow, ExpectedVelocity,
                Observe, IsPlain, CheckLimits, ForceMap, MinimumNormForces, CommandedForce,
                WithinCones, Displace, DistancesAt, NearPairs, ApproachedPairs, DistanceRows,
-               HoldingRows, Clear, CheckRows, PlaceRows>();
+               HoldingRows, Clear, CheckRows, PlaceRows, KeepPart, MixParts>();
 }
 }  // namespace hsp

@@ -3,6 +3,6 @@
 
 namespace hsp {
 const Kind* const* stream_kinds() {
-  return kinds<PieceState, RebasedState, WaypointPiece, VelocityPiece, StreamAlone>();
+  return kinds<PieceState, WaypointPiece, VelocityPiece, StreamAlone>();
 }
 }  // namespace hsp

@@ -9,8 +9,8 @@
 namespace hsp {
 const Kind* const* trajectory_kinds() {
   return kinds<Circle, Lissajous, UniformLine, Polynomial, PiecewisePolynomial, Blend, Crossfade,
-               OrientationPath, Spin, BlendOrientation, CrossfadeOrientation, Screw,
-               OrientationOfChart, Extrapolation, ExtrapolatedOrientation, Along, AlongOrientation,
-               AlongPose>();
+               CrossfadeOfStreams, OrientationPath, Spin, BlendOrientation, OffsetCoefficients,
+               CrossfadeOrientation, CrossfadeOrientationOfStreams, Screw, OrientationOfChart,
+               Extrapolation, ExtrapolatedOrientation, Along, AlongOrientation, AlongPose>();
 }
 }  // namespace hsp

@@ -94,8 +94,8 @@ class Controller(Commanded):
                 stack, damped = step.active, step.damped
             else:
                 mixture = now.mixture
-                mixture.resolve(self._state.t)  # references, and the law
-                delivered = mixture.deliver(modifier)  # within the limits
+                # references, the law, and what it delivers within the limits
+                delivered = mixture.step(self._state.t, modifier)
                 stack, damped = self.active_stack, mixture.damped
                 stack.check(delivered.effort)
                 now.bind_step()

@@ -74,7 +74,16 @@ class Evolution(Generic[Value]):
 
     def at(self, t: float) -> Value:
         """Return x(t)."""
-        return self.with_rate(t)[0] if self.transitions else self.initial
+        x: Value = self.initial
+        for each in self.transitions:
+            if each.start > t:
+                break
+            s = each.share(t)[0]
+            if s == 1.0:
+                x = each.target
+            elif s > 0.0:
+                x = x + s * (each.target - x)
+        return x
 
     def with_rate(self, t: float) -> tuple[Value, Value]:
         """Return x(t) and x'(t)."""

@@ -18,6 +18,8 @@ for the period h, then has the transition
     x(h) = x + h x' + ½ h² x'',     x'(h) = x' + h x''.
 """
 
+from typing import NamedTuple
+
 import numpy as np
 
 from hsp_control.common.arrays import Array, Indices
@@ -57,21 +59,34 @@ class GainsInForce:
 
     def plan(self, setup: Setup, t: float) -> None:
         """Follow a setup from now on; t is the present time [s]."""
+        self.go_over_to(self.planned(setup), t)
+
+    def planned(self, setup: Setup) -> "PlannedGains":
+        """Return what is to be followed for a setup, which may be later."""
         tasks = {each.key: each.task for each in setup.tasks}
         known = {id(task): self.feedback[key] for key, task in self._tasks.items()}
-        self.feedback = {
+        feedback = {
             key: known.get(id(task)) or self._feedback_of(key, task)
             for key, task in tasks.items()
         }
+        changing = any(changes_impedance(each.task, each.gains) for each in setup.tasks)
+        return PlannedGains(setup, tasks, feedback, changing)
+
+    def go_over_to(self, planned: "PlannedGains", t: float) -> object:
+        """Follow it from now on; t is the present time [s].
+
+        Returns:
+            What held the arrays of what was followed before.
+        """
+        before = self._tasks, self.feedback
+        self._setup, self._tasks, self.feedback, self._changing = planned
         for kept in (self._waiting, self._memory.offsets):
-            for key in kept.keys() - tasks.keys():
+            for key in kept.keys() - self._tasks.keys():
                 del kept[key]
-        self._tasks, self._setup = tasks, setup
-        self._changing = any(
-            changes_impedance(each.task, each.gains) for each in setup.tasks
-        )
         self._written: set[int] = set()
+        self._gain_written = False
         self.write(t)
+        return before
 
     def _feedback_of(self, key: int, task: Task) -> FeedbackInForce:
         """Return the feedback of a task that is new, or follows a new trajectory."""
@@ -86,13 +101,15 @@ class GainsInForce:
 
     def write(self, t: float) -> None:
         """Write the gains of a time [s]."""
-        for each in self._setup.tasks:
+        for each in self._setup.tasks:  # what is constant is written once
             if not (each.gains.constant and each.key in self._written):
                 numbers = self._waiting.get(each.key)
                 numbers = each.gains.at(t) if numbers is None else numbers
                 self.feedback[each.key].numbers[:] = numbers
         self._written = set(self._tasks)
-        self.null_space[:] = self._setup.gain.at(t)
+        if not (self._gain_written and self._setup.gain.constant):
+            self.null_space[:] = self._setup.gain.at(t)
+            self._gain_written = True
 
     @property
     def stiffening(self) -> bool:
@@ -134,6 +151,15 @@ class GainsInForce:
         else:
             self._waiting[planned.key] = following
         in_force.numbers[:] = following
+
+
+class PlannedGains(NamedTuple):
+    """What `GainsInForce` follows."""
+
+    setup: Setup
+    tasks: dict[int, Task]  # by key
+    feedback: dict[int, FeedbackInForce]  # by key
+    changing: bool  # whether an impedance changes
 
 
 def changes_impedance(task: Task, numbers: Evolution[Array]) -> bool:

@@ -4,11 +4,11 @@ from typing import NamedTuple
 
 import numpy as np
 
-from hsp_control.control.actuation.limits_in_force import LimitsInForce
+from hsp_control.control.actuation.limits_in_force import LimitsAt, LimitsInForce
 from hsp_control.control.bound_step import BoundStep
 from hsp_control.control.changes import TimeLine
 from hsp_control.control.declared import DeclaredController
-from hsp_control.control.gains_in_force import GainsInForce
+from hsp_control.control.gains_in_force import GainsInForce, PlannedGains
 from hsp_control.control.memory import RunMemory
 from hsp_control.control.mixture import Mixture
 from hsp_control.control.model_in_force import ModelInForce
@@ -46,6 +46,7 @@ class InForce:
         self.tools = ToolsInForce(state)
         self.step = None
         self.later = None
+        self._over: tuple[object, ...] | None = None  # what is not followed any more
 
     def begin(self, time_line: TimeLine) -> None:
         """Make all that computes, and follow a time line."""
@@ -59,6 +60,7 @@ class InForce:
     def follow(self, time_line: TimeLine) -> None:
         """Follow a time line from now on; what its steps call is bound."""
         self._memory.follow(time_line.streams())
+        self._over = None
         self._plan(time_line)
         self.model.plan(self.setup.payloads, self.setup.gravity, self.latest)
         self.tools.plan(self.setup.tools, self.latest)
@@ -91,9 +93,13 @@ class InForce:
         end = max(each.end for each in time_line.open)
         over = time_line.settled_at(end)
         following = mixture.following(over.setup)
+        following.active = None  # a stack of before the change, which goes now
         following.prepare([end])
         step = following.bound_step(self._memory.origin)
-        self.later = AfterChanges(end + MEMORY, over, following, step)
+        gains = self.gains.planned(over.setup)
+        limits = self.limits.planned(over.setup.limits, end)
+        at = end + MEMORY
+        self.later = AfterChanges(at, over, following, step, gains, limits)
 
     def advance(self, t: float) -> None:
         """Write what is in force at a time [s]."""
@@ -108,7 +114,11 @@ class InForce:
         # come to stays written; their calls are bound anew with the next change.
         self.model.write(t)
         self.tools.write(t)
-        self._plan(later.time_line)
+        # To free it takes longer than a step: the next change does.
+        over = self.time_line, self.setup, self.mixture, self.step, later
+        self.time_line, self.setup = later.time_line, later.time_line.setup
+        gains = self.gains.go_over_to(later.gains, t)
+        self._over = *over, gains, self.limits.go_over_to(later.limits)
         later.mixture.active = self.mixture.active
         self.mixture, self.later = later.mixture, None
         self._go_on(later.step)
@@ -159,3 +169,5 @@ class AfterChanges(NamedTuple):
     time_line: TimeLine
     mixture: Mixture
     step: BoundStep | None
+    gains: PlannedGains
+    limits: LimitsAt

@@ -18,6 +18,7 @@ from hsp_control.control.active_stack import ActiveStack
 from hsp_control.control.actuation import Actuation, Delivered, Status
 from hsp_control.control.actuation.limits_in_force import LimitSet, LimitsInForce
 from hsp_control.control.actuation.support import Support
+from hsp_control.control.bound_mixture import BoundMixture
 from hsp_control.control.bound_step import BoundStep
 from hsp_control.control.fitting import priority_of
 from hsp_control.control.gains_in_force import GainsInForce
@@ -38,6 +39,8 @@ them, weighted by the stack's `share`."""
 _Active = tuple[frozenset[int], frozenset[tuple[int, int]]]
 """The contacts and the tasks that are active, by identity: to compare their values
 would cost more than the step."""
+_Mixed = tuple[tuple[ActiveStack, ...], tuple[LimitSet, ...]]
+"""The stacks and the sets of limits that are mixed."""
 
 
 class Mixture:
@@ -76,6 +79,7 @@ class Mixture:
         self._gains, self._threshold = gains, threshold
         self._stacks: dict[_Active, ActiveStack] = {}
         self._actuations: dict[tuple[ActiveStack, LimitSet], Actuation] = {}
+        self._bound: dict[_Mixed, BoundMixture | None] = {}
         self.field, self.active = setup.field, None
         self._follow(setup)
 
@@ -104,6 +108,12 @@ class Mixture:
             for (stack, limits), each in self._actuations.items()
             if stack in alive and id(limits.limits) in sets
         }
+        self._bound = {
+            (stacks, mixed): each
+            for (stacks, mixed), each in self._bound.items()
+            if alive.issuperset(stacks) and sets.issuperset(id(x.limits) for x in mixed)
+        }
+        self._active: dict[tuple[tuple[int, ...], Set[int]], ActiveStack] = {}
         self._fading = [each for each in setup.tasks if not each.always]
         self.levels = _levels(setup.tasks, self._state.robot)
         self.steady = setup.steady and setup.limits.end == -np.inf
@@ -112,10 +122,33 @@ class Mixture:
         # name; empty: none
         self.damped = ""
 
+    def step(self, t: float, modifier: AccelerationModifier | None) -> Delivered:
+        """Resolve the law at the state and its time [s], and return what is delivered.
+
+        Without a modifier it is one call, if it was bound; see `prepare`.
+        """
+        sets = [*self._sets(t)]
+        if modifier is None:
+            limits = self._limits.sets
+            key = tuple(each for _, each in sets), tuple(each for each, _ in limits)
+            if bound := self._bound.get(key):
+                shares = [share * of for share, _ in sets for _, of in limits]
+                if found := bound.make(t, shares):
+                    self._parts, self.damped = [*key[0]], ""
+                    for share, active in sets:
+                        active.share = share
+                    self.active = active
+                    return found
+        self._resolve(t, sets)
+        return self._deliver(modifier)
+
     def resolve(self, t: float) -> None:
         """Resolve the law for each set of tasks that is active."""
+        self._resolve(t, self._sets(t))
+
+    def _resolve(self, t: float, sets: Iterable[tuple[float, ActiveStack]]) -> None:
         self._parts, self.damped = [], ""
-        for share, active in self._sets(t):
+        for share, active in sets:
             active.share = share
             self._parts.append(active)
             outcome = active.resolve(t)
@@ -152,7 +185,7 @@ class Mixture:
             }
             yield share - following, self._stack(standing, off)
 
-    def deliver(self, modifier: AccelerationModifier | None) -> Delivered:
+    def _deliver(self, modifier: AccelerationModifier | None) -> Delivered:
         """Return what is delivered of the law that was resolved last."""
         # While one set of limits follows another, it is the mixture of the steps within
         # each of them.
@@ -198,8 +231,28 @@ class Mixture:
     def prepare(self, times: Iterable[float]) -> None:
         """Bind what steps call at some times [s], now instead of in a step."""
         for t in times:
-            for _, stack in self._sets(t):
+            stacks = tuple(stack for _, stack in self._sets(t))
+            for stack in stacks:
                 self.bind(stack)
+            if not self.steady:
+                limits = tuple(self._limits.sets_at(t))
+                self._bind_mixture(stacks, limits)
+                for k in range(
+                    1, len(stacks) - 1
+                ):  # where it has no share: see `_sets`
+                    self._bind_mixture(stacks[:k] + stacks[k + 1 :], limits)
+
+    def _bind_mixture(
+        self, stacks: tuple[ActiveStack, ...], limits: tuple[LimitSet, ...]
+    ) -> None:
+        """Bind a step in which these are mixed, if it can be one call."""
+        if (stacks, limits) in self._bound:
+            return
+        actuations = [self.actuation(one, each) for one in stacks for each in limits]
+        bound = None
+        if all(each.direct for each in actuations):
+            bound = BoundMixture(self._state.effort, stacks, actuations)
+        self._bound[stacks, limits] = bound
 
     def bind(self, stack: ActiveStack) -> None:
         """Bind what a step with a stack calls."""
@@ -226,6 +279,13 @@ class Mixture:
         return self._stack(standing, off)
 
     def _stack(self, standing: Sequence[PlannedContact], off: Set[int]) -> ActiveStack:
+        """Return the stack of some contacts and of the tasks that are not off."""
+        known = tuple(map(id, standing)), frozenset(off)
+        if known not in self._active:
+            self._active[known] = self._made(standing, off)
+        return self._active[known]
+
+    def _made(self, standing: Sequence[PlannedContact], off: Set[int]) -> ActiveStack:
         on = (each for each in self._setup.tasks if each.key not in off)
         tasks = frozenset((each.key, id(each.task)) for each in on)
         key = frozenset(map(id, standing)), tasks

@@ -46,6 +46,7 @@ class ModelInForce:
         self._own = self._gravity.initial
         self._change = np.zeros(3)  # from it: a plant may have another one
         self._dynamics = [*dynamics]
+        self._constant = False
         self._bind()
 
     def follow(self, dynamics: Dynamics | None) -> None:
@@ -62,10 +63,15 @@ class ModelInForce:
         if [*map(id, payloads)] != [*map(id, self._payloads)]:
             self._payloads = payloads
             self._bind()
+        self._constant = False
         self.write(t)
+        shares = all(each.share.constant for each in payloads)
+        self._constant = shares and gravity.constant
 
     def write(self, t: float) -> None:
         """Let the model be that of a time [s]."""
+        if self._constant:  # and written
+            return
         for k, each in enumerate(self._payloads):
             self._shares[:, k] = each.share.with_rates(t)
         self._change[:] = self._gravity.at(t) - self._own

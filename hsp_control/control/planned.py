@@ -155,7 +155,7 @@ class PlannedLimits:
     """The limits of a controller: sets that follow one another.
 
     While one follows another, both count, and what each delivers is mixed; see
-    `Mixture.deliver`. So a limit can go to infinity, or come from there.
+    `Mixture.step`. So a limit can go to infinity, or come from there.
     """
 
     # each set of limits, None for none, in order of time; and its share, in [0, 1]. The

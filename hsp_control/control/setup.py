@@ -35,6 +35,8 @@ _MOST = 500
 """Events that are looked at: a schedule may repeat itself for hours."""
 _BETWEEN = 6
 """Times that are looked at between two of them."""
+_AFTER = 1e-6
+"""How long after the last one is looked at, where rounding hides no end [s]."""
 
 
 @dataclass(frozen=True)
@@ -88,20 +90,23 @@ class Setup:
     def instants(self, begin: float) -> Iterator[float]:
         """Yield times from a beginning on at which the active sets differ [s].
 
-        They are those at which a task or a contact may come or go, and some between
-        two of them: of several that fade at once, each may have the largest weight.
+        They are those at which a task, a contact or limits may come or go, and some
+        between two of them: of several that fade at once, each may have the largest
+        weight.
         """
         events = set[float]()
         for task in self.tasks:
             events |= _events(task.presence, task.task.schedule)
         for contact in self.contacts:
             events |= _events(contact.presence, contact.contact.schedule)
+        for _, share in self.limits.sets:
+            events |= _events(share, None)
         later = sorted(t for t in events if isfinite(t) and t > begin)
         ordered = [begin, *later][:_MOST]
         for one, following in pairwise(ordered):
             for k in range(_BETWEEN):
                 yield one + k / _BETWEEN * (following - one)
-        yield ordered[-1]
+        yield ordered[-1] + _AFTER
 
     @property
     def steady(self) -> bool:

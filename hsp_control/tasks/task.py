@@ -139,6 +139,28 @@ class Task(Part, ABC, family="tasks", error=TaskError):
         """Return the feedback for small errors at a state, for the rate check."""
         return in_force.feedback
 
+    def fed_back(self, feedback: Feedback, error: Array, error_rate: Array) -> Array:
+        """Return what the error equation feeds back: it is e'' = -fed_back.
+
+        By default Kv e' + Kp s(e) + offset; of a task of first order K e + offset, and
+        the equation is e' = -fed_back. A task of your own with another feedback, which
+        need not be linear, overrides this, and adds what it returns to a_x in
+        `evaluate`; the first step checks that its equation follows. Near e = 0 it
+        should be that of the gains, which are what the check of the control period
+        looks at.
+
+        Args:
+            feedback: The gains and the offset.
+            error: e, shape (m,) [m or rad].
+            error_rate: e', shape (m,) [m/s or rad/s].
+
+        Returns:
+            A new array, shape (m,) [m/s² or rad/s²].
+        """
+        if self.order == 1:
+            return np.asarray(feedback.Kp @ error + feedback.offset)
+        return feedback.acceleration(error, error_rate)
+
     def placed(self, start: Start) -> Self:
         """Return the task for a robot and a start, checked.
 

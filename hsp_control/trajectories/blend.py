@@ -12,13 +12,11 @@ from hsp_control.common.arrays import Array
 from hsp_control.declaration.quantities import Number, Positive, Vector, Vector3
 from hsp_control.declaration.rotation import Rotation, matrix_of
 from hsp_control.engine.plans import PartCall
-from hsp_control.engine.rotations import cross3, jexp3_dot, jlog3, log3
 from hsp_control.trajectories import checks
 from hsp_control.trajectories.orientation import (
     OrientationSample,
     OrientationTrajectory,
 )
-from hsp_control.trajectories.piecewise_polynomial import QUINTIC
 from hsp_control.trajectories.trajectory import Trajectory
 
 
@@ -156,12 +154,8 @@ def offset_coefficients(
         desired: R_d, ω_d and ω_d' at the same time.
         duration: T [s], after which y is zero.
     """
-    (R, omega, omega_dot), (R_d, omega_d, omega_d_dot) = start, desired
-    w = R.T @ (omega - omega_d)
-    w_dot = R.T @ (omega_dot - omega_d_dot - cross3(omega, R @ w))
-    y = log3(R_d.T @ R)
-    y_dot = jlog3(y) @ w
-    y_ddot = jlog3(y) @ (w_dot - jexp3_dot(y, y_dot) @ y_dot)
-    T, rest = duration, np.zeros(3)
-    rows = np.stack([y, T * y_dot, T * T * y_ddot, rest, rest, rest])
-    return np.asarray(QUINTIC @ rows)
+    coefficients = np.zeros((6, 3))
+    engine.OffsetCoefficients(
+        start=start, desired=desired, duration=duration, coefficients=coefficients
+    )()
+    return coefficients

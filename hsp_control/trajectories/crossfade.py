@@ -1,6 +1,5 @@
 """A smooth change from one reference to another, both of which may move."""
 
-from copy import deepcopy
 from dataclasses import KW_ONLY, replace
 from functools import cached_property
 from typing import Any, TypeVar
@@ -22,11 +21,7 @@ from hsp_control.trajectories.orientation import (
 )
 from hsp_control.trajectories.pose import ComposedPose, PoseTrajectory
 from hsp_control.trajectories.streams.followed import FollowedStream
-from hsp_control.trajectories.trajectory import (
-    Trajectory,
-    TrajectorySample,
-    write_sample,
-)
+from hsp_control.trajectories.trajectory import Trajectory, TrajectorySample
 
 AnyReference = Trajectory | OrientationTrajectory | PoseTrajectory
 
@@ -96,7 +91,9 @@ class Crossfade(Trajectory, type="crossfade"):
 
     def calls(self, out: TrajectorySample) -> PartCalls:
         """Return the calls that write ``out``; see `Trajectory.calls`."""
-        return _calls(self, out) or super().calls(out)
+        if not _streams(self):
+            return super().calls(out)
+        return [PartCall(engine.CrossfadeOfStreams, **_mixed(self, out), t=TIME)]
 
 
 class CrossfadeOrientation(OrientationTrajectory, type="crossfade"):
@@ -152,7 +149,7 @@ class CrossfadeOrientation(OrientationTrajectory, type="crossfade"):
         end = self.start_time + self.duration
         if t >= end:  # a stream may have dropped R_0
             return self.after.sample(t, out)
-        if self._streams:  # for copies, which have their own blend
+        if self._follows_streams:  # for copies, whose blend is another one
             self.keep_start(end)
         if t < self.start_time:
             return self.before.sample(t, out)
@@ -160,22 +157,26 @@ class CrossfadeOrientation(OrientationTrajectory, type="crossfade"):
 
     def calls(self, out: OrientationSample) -> PartCalls:
         """Return the calls that write ``out``; see `Trajectory.calls`."""
-        return _calls(self, out) or super().calls(out)
+        if not self._follows_streams:
+            return super().calls(out)
+        self.keep_start(self.start_time + self.duration)
+        given = {
+            **_mixed(self, out),
+            "coefficients": np.zeros((6, 3)),
+            "found": np.zeros(1, dtype=np.int64),
+        }
+        return [PartCall(engine.CrossfadeOrientationOfStreams, **given, t=TIME)]
 
     def keep_start(self, until: float) -> None:
-        """Make streams keep R_0 at the start of the change until a time."""
-        for stream in self._streams:
+        """Let streams know until a time how it was where the change began."""
+        for stream in _streams(self):
             stream.run.keep(self.start_time, until)
-        for earlier in self._earlier:
+        for earlier in parts_within(self.before, CrossfadeOrientation):
             earlier.keep_start(until)
 
     @cached_property
-    def _streams(self) -> tuple[FollowedStream, ...]:
-        return tuple(parts_within(self.before, FollowedStream))
-
-    @cached_property
-    def _earlier(self) -> tuple["CrossfadeOrientation", ...]:
-        return tuple(parts_within(self.before, CrossfadeOrientation))
+    def _follows_streams(self) -> bool:
+        return bool(_streams(self))
 
     @cached_property
     def _coefficients(self) -> Array:
@@ -259,48 +260,28 @@ def _check_overlapping(part: Crossfade | CrossfadeOrientation) -> None:
         )
 
 
-def _calls(part: Crossfade | CrossfadeOrientation, out: Any) -> PartCalls:
-    """Return the calls of a change of streams, whose past is dropped."""
-    if any(True for _ in parts_within(part, FollowedStream)):
-        return [PartCall(_ChangeOfStreams(part, out), t=TIME)]
-    return []
+def _streams(part: Crossfade | CrossfadeOrientation) -> tuple[FollowedStream, ...]:
+    """Return the streams that follow a change, or that it leads away from."""
+    return tuple(parts_within(part, FollowedStream))
 
 
-class _ChangeOfStreams:
-    """Writes the sample of a change of streams; its mixing is bound in advance."""
-
-    def __init__(self, part: Crossfade | CrossfadeOrientation, out: Any) -> None:
-        self._part, self._out = part, out
-        self._before, self._after = deepcopy(out), deepcopy(out)
-        given = {"before": self._before, "after": self._after, "out": out}
-        kind: Any = engine.Crossfade
-        self._coefficients = np.zeros((6, 3))
-        if isinstance(part, CrossfadeOrientation):
-            kind = engine.CrossfadeOrientation
-            given["coefficients"] = self._coefficients
-        self._known = False  # whether these are computed: during the change, not before
-        times = {"start_time": part.start_time, "duration": part.duration}
-        call = PartCall(kind, **times, **given, t=TIME)
-        self._mix = Plan(planned([call]).steps())
-
-    def __call__(self, t: float) -> None:
-        """Write the sample at a time [s]; see `CrossfadeOrientation.sample`."""
-        part, out = self._part, self._out
-        before: Any = part.before
-        after: Any = part.after
-        end = part.start_time + part.duration
-        if t >= end:  # a stream may have dropped the past
-            write_sample(t, after.sample, out)
-            return
-        if isinstance(part, CrossfadeOrientation):
-            part.keep_start(end)
-            if t >= part.start_time and not self._known:
-                self._coefficients[:] = part._coefficients
-                self._known = True
-        write_sample(t, before.sample, self._before if t >= part.start_time else out)
-        if t >= part.start_time:
-            write_sample(t, after.sample, self._after)
-            self._mix(t)
+def _mixed(part: Crossfade | CrossfadeOrientation, out: Any) -> dict[str, Any]:
+    """Return the arguments of a change of streams: each of the two is a plan."""
+    before: Any = part.before
+    after: Any = part.after
+    (sample_before, calls_before), (sample_after, calls_after) = (
+        before.supplied(),
+        after.supplied(),
+    )
+    return {
+        "start_time": part.start_time,
+        "duration": part.duration,
+        "compute_before": Plan(planned(calls_before).steps()),
+        "compute_after": Plan(planned(calls_after).steps()),
+        "before": sample_before,
+        "after": sample_after,
+        "out": out,
+    }
 
 
 def crossfade(

@@ -212,6 +212,28 @@ class Actuation:
         calls = [*calls, plain]
         return self._state.plan(calls).steps()
 
+    def keeping(self, acceleration: Array, effort: Array, kept: Indices) -> PartCall:
+        """Return the call that keeps what is delivered, after `calls`.
+
+        Args:
+            acceleration: Where it writes the acceleration, shape (nv,).
+            effort: Where it writes the effort, shape (nv,) [N·m or N].
+            kept: Where it writes which it is, shape (1,): 0 where Python has to look.
+        """
+        return PartCall(
+            engine.KeepPart,
+            law=self._law.outcome,
+            limits=self.outcome,
+            nearest=self.is_nearest,
+            own_acceleration=self._law.acceleration,
+            own_effort=self._state.effort,
+            nearest_acceleration=self.nearest.acceleration,
+            nearest_effort=self.nearest.effort,
+            acceleration=acceleration,
+            effort=effort,
+            kept=kept,
+        )
+
     def calls_alone(self, delivered: "DeliveredAlone") -> PartCalls:
         """Return the calls that follow `calls` in a step without Python.
 

@@ -1,7 +1,7 @@
 """The limits in force: the numbers that every step reads, as changes make them."""
 
 from collections.abc import Callable, Sequence
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -60,6 +60,18 @@ class LimitSet:
         self.update()
 
 
+Measured = list[tuple[str, Callable[[], Array]]]
+"""What returns the distances of barriers in a step, by the barriers' names."""
+
+
+class LimitsAt(NamedTuple):
+    """What `LimitsInForce` follows, and finds in force at a time."""
+
+    all: list[tuple[LimitSet, Evolution[float]]]
+    sets: list[tuple[LimitSet, float]]
+    measured: Measured
+
+
 class LimitsInForce:
     """The sets of limits in force, and what is remembered of the efforts sent.
 
@@ -76,37 +88,52 @@ class LimitsInForce:
         self._all: list[tuple[LimitSet, Evolution[float]]] = []
         # each set in force, and its share in (0, 1]
         self.sets: list[tuple[LimitSet, float]] = []
-        # what returns the distances of barriers in a step, by the barriers' names
-        self.measured: list[tuple[str, Callable[[], Array]]] = []
+        self.measured: Measured = []
         self.plan(planned, -np.inf)
 
     def plan(self, planned: PlannedLimits, t: float) -> None:
         """Follow other limits from now on; t is the present time [s]."""
-        if not self._rate:
-            self.sent.forget_rate()
+        self.go_over_to(self.planned(planned, t))
+
+    def planned(self, planned: PlannedLimits, t: float) -> "LimitsAt":
+        """Return what is in force at a time [s], which may be later."""
         state, known = self._state, {id(each.limits): each for each in self.all}
-        self._all = [
+        all_of_them = [
             (known.get(id(limits)) or LimitSet(limits, state, self.sent), share)
             for limits, share in planned.sets
         ]
-        self._rate = any(each.rate for each, _ in self._all)
-        self.write(t, always=True)
+        now = [(each, share.at(t)) for each, share in all_of_them]
+        sets = [pair for pair in now if pair[1] > 0.0]
+        return LimitsAt(all_of_them, sets, self._measured(sets))
 
-    def write(self, t: float, *, always: bool = False) -> None:
+    def go_over_to(self, planned: "LimitsAt") -> object:
+        """Follow it from now on; return what held what was followed before."""
+        before = self._all, self.sets, self.measured
+        if not self._rate:
+            self.sent.forget_rate()
+        self._all, self.sets, self.measured = planned
+        self._rate = any(each.rate for each, _ in self._all)
+        return before
+
+    def write(self, t: float) -> None:
         """Find the sets that are in force at a time [s]."""
-        if always or len(self._all) > 1:
+        if len(self._all) > 1:
             shares = [(each, share.at(t)) for each, share in self._all]
-            before = [] if always else [each for each, _ in self.sets]
+            before = [each for each, _ in self.sets]
             self.sets = [pair for pair in shares if pair[1] > 0.0]
             if [each for each, _ in self.sets] != before:
-                self.measured = self._measured()
+                self.measured = self._measured(self.sets)
 
-    def _measured(self) -> list[tuple[str, Callable[[], Array]]]:
+    def sets_at(self, t: float) -> list[LimitSet]:
+        """Return the sets that are in force at a time [s]."""
+        return [each for each, share in self._all if share.at(t) > 0.0]
+
+    def _measured(self, sets: Sequence[tuple[LimitSet, float]]) -> "Measured":
         """Return what returns the distances of barriers, by their names.
 
         The engine's steps write those of shapes; an own barrier is evaluated again.
         """
-        limits, state = [each.limits for each, _ in self.sets], self._state
+        limits, state = [each.limits for each, _ in sets], self._state
         barriers = [b for each in limits if each is not None for b in each.barriers]
         return [
             (name, _distances(each, state))

@@ -122,18 +122,19 @@ def _check_equation(task: Task, by: str, state: RobotState) -> None:
     left = np.linalg.norm(middle.jacobian @ a - needed)
     if left > _SOLVED * (1.0 + np.linalg.norm(needed)):
         return
+    wanted = -task.fed_back(feedback, middle.error, middle.error_rate)
     if task.order == 1:
-        wanted = -(feedback.Kp @ middle.error + feedback.offset)
         values = np.array([at(k, a).error.copy() for k in range(5)])
         words = "e", "e' = -(K e + offset)"
     else:
-        wanted = -feedback.acceleration(middle.error, middle.error_rate)
         values = np.array([at(k, a).error_rate.copy() for k in range(5)])
         words = "e'", "e'' = -(Kv e' + Kp e + offset)"
+    advice = "correct J or a_x, or override fed_back: it declares another equation"
+    if (own := declared_by(task, ("fed_back",))) != type(task).__name__:
+        words = words[0], f"{words[0]}' = -{own}(feedback, e, e')"
+        advice = "correct J, a_x or fed_back"
     rate = f"where J a + J'v = a_x, {words[1]}"
-    declared = Declared(
-        _named(task), by, words[0], rate, _of_row(task), "correct J or a_x"
-    )
+    declared = Declared(_named(task), by, words[0], rate, _of_row(task), advice)
     declared.compare(values, wanted, state.t)
 
 

@@ -4,18 +4,13 @@ from math import ceil
 from typing import Any
 
 import numpy as np
-import pinocchio as pin
 
 from hsp_control import engine
-from hsp_control.common.arrays import Array
 from hsp_control.engine.plans import TIME, PartCall, PartCalls
-from hsp_control.trajectories.orientation import OrientationSample
-from hsp_control.trajectories.pose import PoseSample
 from hsp_control.trajectories.streams.chart import Chart, State
+from hsp_control.trajectories.streams.piece_calls import MotionBounds, coast
 from hsp_control.trajectories.streams.planner import Policy
-from hsp_control.trajectories.streams.segments import MotionBounds, coast
 from hsp_control.trajectories.streams.waypoints import CONSIDERED, KEPT, MOST
-from hsp_control.trajectories.trajectory import TrajectorySample
 
 
 class StreamAlone:
@@ -39,15 +34,13 @@ class StreamAlone:
         """Begin at rest; ``period``: minimum time between two messages [s]."""
         n, linear = chart.size, chart.linear
         self._chart = chart
-        self._state = vars(State.allocate(n))
-        value: Array = start.x[:linear]
-        if chart.rotational:
-            value = np.append(value, pin.Quaternion(start.base).coeffs())
+        self._state = State.allocate(n)
+        value = chart.value(start)
         self.target, self.velocity = value.copy(), np.zeros(n)
         integers = ("count", "commanded", "silent", "sent", "differs", "alone")
         most = _most_waypoints(policy, period)
         self._memory: dict[str, Any] = {
-            "piece": coast(0.0, np.inf, start).numbers,
+            "piece": coast(0.0, np.inf, start),
             "times": np.zeros(most),
             "values": np.zeros((most, len(value))),
             "velocity": np.zeros(n),
@@ -69,7 +62,7 @@ class StreamAlone:
             "dead_man": policy.dead_man,
             "hold_after": policy.hold_after,
             "bounds": bounds,
-            "out": self._state,
+            "out": vars(self._state),
             **self._memory,
         }
         self.call = engine.StreamAlone(**self._arguments)
@@ -80,20 +73,9 @@ class StreamAlone:
             array[:] = self._first[name]
 
     def calls(self, out: Any) -> PartCalls:
-        """Return the calls that write a sample of the stream's kind."""
-        calls = [PartCall(engine.StreamAlone, t=TIME, **self._arguments)]
-        n = self._chart.linear
-        parts = out if isinstance(out, PoseSample) else (out,)
-        state = [self._state[name] for name in ("x", "rate", "acceleration")]
-        for part in parts:
-            if isinstance(part, TrajectorySample):
-                for own, other in zip(state, part, strict=True):
-                    calls.append(PartCall(engine.Copy, x=own[:n], out=other, t=TIME))
-            elif isinstance(part, OrientationSample):
-                y = TrajectorySample(*(own[n:] for own in state))
-                given = {"base": self._state["base"], "y": y, "out": part}
-                calls.append(PartCall(engine.OrientationOfChart, t=TIME, **given))
-        return calls
+        """Return the calls that write a sample, of whatever the stream moves."""
+        advance = PartCall(engine.StreamAlone, t=TIME, **self._arguments)
+        return [advance, *self._chart.calls(self._state, out)]
 
 
 _POLICIES = "latest", "interpolate", "extrapolate"

@@ -9,14 +9,20 @@ that continues in another chart is C². Wherever |y| < 3π/2, measured in world 
 (`tests/unit/trajectories/test_streams.py` compares with 10⁵ random motions).
 """
 
-from typing import Self
+from typing import Any, Self
 
 import numpy as np
+import pinocchio as pin
 
 from hsp_control import engine
 from hsp_control.common.arrays import Array
+from hsp_control.engine.plans import TIME, AnyCall, PartCall, PartCalls
+from hsp_control.engine.rotations import exp3
 from hsp_control.trajectories.orientation import OrientationSample
+from hsp_control.trajectories.pose import PoseSample
 from hsp_control.trajectories.trajectory import TrajectorySample
+
+_NEAR = 1e-3  # [m, or the stream's unit, or rad]
 
 
 class State:
@@ -31,6 +37,12 @@ class State:
     def allocate(cls, n: int) -> Self:
         """Return a state of zeros with n coordinates."""
         return cls(np.zeros(n), np.zeros(n), np.zeros(n), np.eye(3))
+
+    def rotation_vector(self, linear: int) -> TrajectorySample:
+        """Return views of what follows the linear coordinates: y, y' and y''."""
+        return TrajectorySample(
+            self.x[linear:], self.rate[linear:], self.acceleration[linear:]
+        )
 
 
 class Chart:
@@ -47,17 +59,34 @@ class Chart:
         rest = np.zeros(self.size)
         return State(x, rest, rest.copy(), rotation.copy())
 
-    def rebased(self, state: State) -> State:
-        """Return the same state in the chart in which its rotation vector is zero."""
-        if not self.rotational:
-            return state
-        found = State.allocate(self.size)
-        given = {"linear": self.linear, "state": vars(state), "out": vars(found)}
-        engine.RebasedState(**given)()
-        return found
+    def value(self, state: State) -> Array:
+        """Return a state at the base of its chart as a stream's value."""
+        return self._value(state.x, state.base)
 
-    def write_orientation(self, state: State, out: OrientationSample) -> None:
-        """Write R, ω and ω' of a state, in world axes."""
-        n = self.linear
-        y = TrajectorySample(state.x[n:], state.rate[n:], state.acceleration[n:])
-        engine.OrientationOfChart(base=state.base, y=y, out=out)()
+    def value_near(self, state: State) -> Array:
+        """Return another value than that of a state, not far from it."""
+        return self._value(state.x + _NEAR, state.base @ exp3(np.full(3, _NEAR)))
+
+    def _value(self, x: Array, rotation: Array) -> Array:
+        value: Array = x[: self.linear].copy()
+        if self.rotational:
+            value = np.append(value, pin.Quaternion(rotation).coeffs())
+        return value
+
+    def calls(self, state: State, out: Any) -> PartCalls:
+        """Return the calls that write a sample of a state, of whatever the chart moves.
+
+        Args:
+            state: The state, which is written before, at a `TIME`.
+            out: A `TrajectorySample`, an `OrientationSample` or a `PoseSample`.
+        """
+        n, found = self.linear, list[AnyCall]()
+        for part in out if isinstance(out, PoseSample) else (out,):
+            if isinstance(part, OrientationSample):
+                given = {"base": state.base, "y": state.rotation_vector(n), "out": part}
+                found.append(PartCall(engine.OrientationOfChart, t=TIME, **given))
+                continue
+            arrays = state.x, state.rate, state.acceleration
+            for own, other in zip(arrays, part, strict=True):
+                found.append(PartCall(engine.Copy, x=own[:n], out=other, t=TIME))
+        return found

@@ -4,7 +4,7 @@ from copy import deepcopy
 from typing import Any, Self
 
 from hsp_control.declaration.nested import Remembering
-from hsp_control.engine.plans import PartCalls
+from hsp_control.engine.plans import TIME, PartCall, PartCalls, planned
 from hsp_control.trajectories.orientation import (
     OrientationSample,
     OrientationTrajectory,
@@ -26,11 +26,15 @@ class FollowedStream(Remembering):
 
     def calls(self, out: Any) -> PartCalls:
         """Return the calls that write a sample; see `Trajectory.calls`."""
-        if self.run.alone is not None:
-            return self.run.alone.calls(out)
-        self.run.prepare()
-        calls: PartCalls = super().calls(out)  # type: ignore[misc]
-        return calls
+        run = self.run
+        if run.alone is not None:
+            return run.alone.calls(out)
+        return [PartCall(run.bring, t=TIME), *run.chart.calls(run.state, out)]
+
+    def _write(self, t: float, out: Any) -> None:
+        """Write a sample at a time [s]."""
+        self.run.bring(t)
+        planned(self.run.chart.calls(self.run.state, out)).run(t)
 
 
 class FollowedPoint(FollowedStream, Trajectory):
@@ -44,9 +48,7 @@ class FollowedPoint(FollowedStream, Trajectory):
     def sample(self, t: float, out: TrajectorySample | None = None) -> TrajectorySample:
         """Return x(t), x'(t) and x''(t); see `Trajectory.sample`."""
         out = self._output(out)
-        state = self.run.at(t)
-        out.position[:], out.velocity[:] = state.x, state.rate
-        out.acceleration[:] = state.acceleration
+        self._write(t, out)
         return out
 
 
@@ -58,7 +60,7 @@ class FollowedOrientation(FollowedStream, OrientationTrajectory):
     ) -> OrientationSample:
         """Return R(t), ω(t) and ω'(t); see `OrientationTrajectory.sample`."""
         out = self._output(out)
-        self.run.chart.write_orientation(self.run.at(t), out)
+        self._write(t, out)
         return out
 
 
@@ -69,8 +71,5 @@ class FollowedPose(FollowedStream, PoseTrajectory):
         """Return the pose at time t; see `PoseTrajectory.sample`."""
         if out is None:
             out = PoseSample.allocate()
-        state, position = self.run.at(t), out.position
-        position.position[:], position.velocity[:] = state.x[:3], state.rate[:3]
-        position.acceleration[:] = state.acceleration[:3]
-        self.run.chart.write_orientation(state, out.orientation)
+        self._write(t, out)
         return out

@@ -205,13 +205,11 @@ class Reader:
         if inbox.count == self._number and not self._missed:
             return []
         received = inbox.after(self._number, take=not self._aside, until=t)
-        received, self._missed = self._missed + received, []
+        if self._missed:
+            received, self._missed = self._missed + received, []
         if received:
             self._number = received[-1].number
-        taken = [
-            each.message if each.message.at > -inf else each.message._replace(at=t)
-            for each in received
-        ]
+        taken = [each.message.taken_at(t) for each in received]
         for each in taken:
             self._add(each)
         return taken

@@ -69,8 +69,13 @@ class Message(NamedTuple):
     @property
     def size(self) -> int:
         """Its number of numbers."""
-        found = (self.times, self.values, self.velocities)
-        return sum(each.size for each in found if each is not None)
+        size = self.times.size
+        size += 0 if self.values is None else self.values.size
+        return size + (0 if self.velocities is None else self.velocities.size)
+
+    def taken_at(self, t: float) -> "Message":
+        """Return it as it is taken at a time [s], unless it has one."""
+        return self if self.at > -inf else Message(*self[:-1], t)
 
     def to_dict(self) -> dict[str, Any]:
         """Return its data for `message_of`, and the time ``at`` of taking it."""

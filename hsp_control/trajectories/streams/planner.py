@@ -8,7 +8,6 @@ function of time for any messages and any sampling.
 from bisect import bisect_right
 from collections.abc import Sequence
 from copy import copy
-from itertools import groupby
 from math import inf
 from typing import NamedTuple
 
@@ -17,14 +16,21 @@ import numpy as np
 from hsp_control.common.exceptions import StreamError
 from hsp_control.trajectories.streams.chart import Chart, State
 from hsp_control.trajectories.streams.message import Message
-from hsp_control.trajectories.streams.segments import MotionBounds, Segment, coast
+from hsp_control.trajectories.streams.piece_calls import (
+    MotionBounds,
+    PassingTimes,
+    PieceCalls,
+    coast,
+)
+from hsp_control.trajectories.streams.segments import Piece, Segment
 from hsp_control.trajectories.streams.velocities import (
     Axes,
-    Velocities,
     VelocityCommand,
+    velocity_piece,
 )
-from hsp_control.trajectories.streams.waypoints import KEPT, Passing, Waypoints
+from hsp_control.trajectories.streams.waypoints import KEPT, Waypoints
 
+_SOON = 1e-3  # [s]
 _AT_ONCE = 256  # maximum number of simultaneous messages; the oldest others are ignored
 
 
@@ -41,6 +47,16 @@ class Policy(NamedTuple):
     axes: Axes
 
 
+def _together(messages: Sequence[Message]) -> list[tuple[float, list[Message]]]:
+    """Return messages by the time when they are taken, in their order."""
+    found: list[tuple[float, list[Message]]] = []
+    for each in messages:
+        if not found or found[-1][0] != each.at:
+            found.append((each.at, []))
+        found[-1][1].append(each)
+    return found
+
+
 class Planner:
     """Plans the reference of one run."""
 
@@ -52,20 +68,27 @@ class Planner:
         start: State,
     ) -> None:
         """Begin at rest."""
-        self.chart, self._policy = chart, policy
-        self._passing = Passing(chart, bounds)
-        self._velocities = Velocities(chart, bounds)
+        self._policy = policy
+        how = PassingTimes(policy.delay, policy.smoothing, policy.extrapolation)
+        self._calls = PieceCalls(chart, bounds, how)
+        self._still = VelocityCommand(np.zeros(chart.size), "world")
         self._begin = self.now = self._oldest = -inf
         self._heard = -inf
         self._silent = False
         # the commanded velocity, until it fades, unless it is repeated
         self._command: VelocityCommand | None = None
         self._fades_at = inf
-        self._segments: list[Segment] = [coast(0.0, inf, start)]
+        self._segments: list[Segment] = [Piece(coast(0.0, inf, start))]
         self._starts = [-inf]
         self.taken = self.refused = 0
         self.waypoints = Waypoints()
         self._kept: dict[float, float] = {}
+        self._due = -inf  # before this time nothing happens without messages
+
+    @property
+    def state(self) -> State:
+        """The state that `bring` writes: always the same arrays."""
+        return self._calls.state
 
     @property
     def begun(self) -> bool:
@@ -77,35 +100,53 @@ class Planner:
         """Time since the last message, or since the run began [s]."""
         return self.now - max(self._heard, self._begin) if self.begun else 0.0
 
-    def at(self, t: float) -> State:
-        """Return the reference at a planned time [s]; see `Chart`."""
+    def bring(self, t: float) -> None:
+        """Bring `state` to the reference at a time that was planned [s]; see `Chart`.
+
+        Raises:
+            StreamError: If the time is long past.
+        """
         if t < self._oldest:
             raise StreamError(
                 f"the reference at t = {t:g} s is not known any more: the run is at "
                 f"{self.now:g} s; begin another one with controller.restart()"
             )
-        k = max(bisect_right(self._starts, t) - 1, 0)
-        return self._segments[k].state(t)
+        k = -1 if t >= self._starts[-1] else max(bisect_right(self._starts, t) - 1, 0)
+        self._segments[k].write(t, self._calls)
 
     def keep(self, since: float, until: float) -> None:
         """Keep the reference from a time on until a later one [s]."""
         self._kept[since] = max(until, self._kept.get(since, -inf))
+        self._due = -inf
 
     def copy(self) -> "Planner":
         """Return a copy that continues independently."""
         other = copy(self)
+        other._calls = copy(self._calls)
         other._kept = self._kept.copy()
         other._segments, other._starts = self._segments.copy(), self._starts.copy()
         other.waypoints = self.waypoints.copy()
         return other
+
+    def rehearse(self) -> None:
+        """Plan a move once on a copy, so that no step is the first one that does."""
+        other = self.copy()
+        other._calls = self._calls
+        self._segments[0].write(0.0, self._calls)
+        value = self._calls.chart.value_near(self.state)
+        other.advance(0.0, [])
+        other.advance(_SOON, [Message(None, np.zeros(1), value[None], None, at=_SOON)])
+        other.bring(2.0 * _SOON)
 
     def advance(self, t: float, messages: Sequence[Message]) -> None:
         """Plan up to a time [s]: first without, then with the new messages."""
         if not self.begun:
             self.now = self._begin = t
             return
-        for at, group in groupby(messages, key=lambda each: each.at):
-            together = [*group]
+        if not messages and t < self._due:
+            self.now = t
+            return
+        for at, together in _together(messages):
             surplus = max(len(together) - _AT_ONCE, 0)
             self.taken += surplus
             self.waypoints.late += surplus
@@ -117,6 +158,22 @@ class Planner:
                 f"{self._policy.stop_after:g}"
             )
         self._forget(t)
+        self._due = self._next_event()
+
+    def _next_event(self) -> float:
+        """Return the time until which neither a piece begins nor anything is forgotten.
+
+        That is, without messages [s].
+        """
+        policy, heard = self._policy, max(self._heard, self._begin)
+        if self._kept:
+            return -inf
+        due = min(self._segments[-1].end, self._fades_at, heard + policy.stop_after)
+        if not self._silent:
+            due = min(due, heard + policy.hold_after)
+        for times in (self._starts[1:2], self.waypoints.times[:1]):
+            due = min([due, *(time + KEPT for time in times)])
+        return due
 
     def _step(self, t: float, messages: Sequence[Message]) -> None:
         """Plan up to a time at which messages arrive."""
@@ -158,46 +215,42 @@ class Planner:
 
     def _plan(self, t: float) -> None:
         """Begin another piece at a time."""
-        state = self.chart.rebased(self._segments[-1].state(t))
-        try:
-            following = self._next(t, state)
-        except StreamError:  # too far away for a motion
+        self._segments[-1].write(t, self._calls)
+        following = self._next(t)
+        if following is None:  # too far away for a motion
             self.refused += 1
             self._command, self._fades_at = None, inf
             self.waypoints.clear()
-            following = self._to_rest(t, state)
-        if self._segments[-1].start == t:  # replaced before it was sampled
+            following = self._to_rest(t)
+            if following is None:
+                raise StreamError("no motion within the bounds was found")
+        if self._segments[-1].start == t:  # replaced before anything could see it
             del self._segments[-1], self._starts[-1]
         self._segments.append(following)
         self._starts.append(t)
 
-    def _next(self, t: float, state: State) -> Segment:
+    def _next(self, t: float) -> Segment | None:
         policy, waypoints = self._policy, self.waypoints
         if self._silent:
-            return self._to_rest(t, state)
+            return self._to_rest(t)
         if self._command is not None:
-            return self._velocities.follow(t, state, self._command, policy.delay)
+            return velocity_piece(t, self._command, self._calls)
         if not waypoints.times:
-            return self._to_rest(t, state)
-        return self._passing.through(
-            t,
-            state,
-            waypoints,
-            delay=policy.delay,
-            smoothing=policy.smoothing,
-            extrapolation=policy.extrapolation,
-            rests=policy.name != "extrapolate" and waypoints.velocities[-1] is None,
-        )
+            return self._to_rest(t)
+        rests = policy.name != "extrapolate" and waypoints.velocities[-1] is None
+        numbers = self._calls.through(t, waypoints, rests)
+        return None if numbers is None else Piece(numbers)
 
-    def _to_rest(self, t: float, state: State) -> Segment:
-        """Return a piece that brakes, or rests."""
-        still = VelocityCommand(np.zeros_like(state.x), "world")
-        return self._velocities.follow(t, state, still, self._policy.delay)
+    def _to_rest(self, t: float) -> Segment | None:
+        """Return a piece that brakes, or stays."""
+        return velocity_piece(t, self._still, self._calls)
 
     def _forget(self, t: float) -> None:
         """Drop pieces and waypoints that are long past."""
         self.waypoints.forget(t)
         oldest = t - KEPT
+        if not self._kept and (len(self._starts) == 1 or self._starts[1] > oldest):
+            return
         for since, until in [*self._kept.items()]:
             if until < oldest:
                 del self._kept[since]

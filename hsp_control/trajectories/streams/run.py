@@ -194,8 +194,10 @@ class StreamRun:
 
     # -- the reference ----------------------------------------------------------------
 
-    def at(self, t: float) -> State:
-        """Return the reference at a time [s]; messages are taken up to a later one.
+    def bring(self, t: float) -> None:
+        """Bring `state` to the reference at a time [s].
+
+        Messages are taken up to a later time than the last one.
 
         Raises:
             StreamError: If there was no message for too long, the listener has ended,
@@ -207,11 +209,12 @@ class StreamRun:
                 self.reader
             )  # a source that cannot be opened raises in the first step
             planner.advance(t, reader.take(t) if planner.begun else [])
-        return planner.at(t)
+        planner.bring(t)
 
-    def prepare(self) -> None:
-        """Create the planner now instead of in the first step."""
-        _ = self._planned
+    @property
+    def state(self) -> State:
+        """The state that `bring` writes, always the same arrays: what plans is made."""
+        return self._planned.state
 
     def keep(self, since: float, until: float) -> None:
         """Keep the reference from a time on until a later one [s]."""
@@ -222,6 +225,7 @@ class StreamRun:
         if self._planner is None:
             bounds, how = self.stream.bounds(), self.stream.how
             self._planner = Planner(self.chart, bounds, how, self._start)
+            self._planner.rehearse()
         return self._planner
 
     # -- without Python ---------------------------------------------------------------

@@ -7,23 +7,13 @@ the final state of the piece before it. The engine plans them
 
 from abc import ABC, abstractmethod
 from math import pi, sqrt
-from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from hsp_control import engine
 from hsp_control.common.arrays import Array
-from hsp_control.common.exceptions import StreamError, TrajectoryError
-from hsp_control.trajectories.streams.chart import State
-
-
-class MotionBounds(NamedTuple):
-    """Maximum magnitudes of the first three derivatives, for each coordinate."""
-
-    speed: Array  # (n,) [1/s]
-    acceleration: Array  # (n,) [1/s²]
-    jerk: Array  # (n,) [1/s³]
+from hsp_control.common.exceptions import TrajectoryError
+from hsp_control.trajectories.streams.piece_calls import MotionBounds, PieceCalls
 
 
 def linear_bounds(
@@ -71,59 +61,25 @@ PLANNED = 0.95
 
 
 class Segment(ABC):
-    """A piece of the reference, from ``start`` to ``end`` [s], about ``base``."""
+    """A piece of the reference, from ``start`` to ``end`` [s]."""
 
-    def __init__(self, start: float, end: float, base: Array) -> None:
-        """Set its start and end, and the orientation of its chart."""
-        self.start, self.end, self.base = start, end, base
+    def __init__(self, start: float, end: float) -> None:
+        """Set when it begins and ends."""
+        self.start, self.end = start, end
 
     @abstractmethod
-    def state(self, t: float) -> State:
-        """Return the state at time t [s], between start and end."""
-
-
-_HEAD, _ROWS = 13, 52
-"""Count of numbers of a piece: common ones, and per coordinate; see
-``engine/streams/piece.hpp``."""
-COAST = 0.0
-"""The first number of a piece whose x' is constant."""
+    def write(self, t: float, calls: PieceCalls) -> None:
+        """Write the state at time t [s], between start and end, to ``calls.state``."""
 
 
 class Piece(Segment):
     """A piece planned by the engine, as numbers."""
 
-    def __init__(self, numbers: Array, base: Array) -> None:
-        """Store the numbers that the engine wrote into `room`."""
-        super().__init__(float(numbers[1]), float(numbers[2]), base)
-        n = (len(numbers) - _HEAD) // _ROWS
+    def __init__(self, numbers: Array) -> None:
+        """Keep what the engine wrote."""
+        super().__init__(float(numbers[1]), float(numbers[2]))
         self.numbers = numbers
-        self._found = State.allocate(n)
-        self._state = engine.PieceState(piece=numbers, out=vars(self._found))
 
-    def state(self, t: float) -> State:
-        """Return the state at time t [s]."""
-        self._state(float(t))
-        found = self._found
-        x, rate, acceleration = found.x.copy(), found.rate.copy(), found.acceleration
-        return State(x, rate, acceleration.copy(), self.base)
-
-
-def coast(start: float, end: float, state: State) -> Piece:
-    """Return a piece with x' constant; at rest if it is zero."""
-    numbers = room(len(state.x))
-    numbers[:3] = COAST, start, end
-    numbers[4:_HEAD] = state.base.ravel()
-    numbers[_HEAD:][: 2 * len(state.x)] = *state.x, *state.rate
-    return Piece(numbers, state.base)
-
-
-def room(n: int) -> Array:
-    """Return room for the numbers of a piece with n coordinates."""
-    return np.zeros(_HEAD + _ROWS * n)
-
-
-def found_motion(segment: Segment | None) -> Segment:
-    """Return a segment; raise if there is none."""
-    if segment is None:
-        raise StreamError("no motion within the bounds was found")
-    return segment
+    def write(self, t: float, calls: PieceCalls) -> None:
+        """Write the state at time t [s]; see `Segment.write`."""
+        calls.evaluate(self.numbers, t)

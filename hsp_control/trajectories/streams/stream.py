@@ -25,12 +25,9 @@ from hsp_control.trajectories.streams.followed import (
     FollowedPose,
 )
 from hsp_control.trajectories.streams.message import ORIENTATION, POSE, Space
+from hsp_control.trajectories.streams.piece_calls import MotionBounds
 from hsp_control.trajectories.streams.run import StreamRun
-from hsp_control.trajectories.streams.segments import (
-    MotionBounds,
-    angular_bounds,
-    linear_bounds,
-)
+from hsp_control.trajectories.streams.segments import angular_bounds, linear_bounds
 from hsp_control.trajectories.streams.streamed import Streamed
 from hsp_control.trajectories.streams.velocities import Axes
 from hsp_control.trajectories.trajectory import Trajectory

@@ -13,8 +13,8 @@ from hsp_control.declaration.part import Part
 from hsp_control.declaration.quantities import NonNegative, Positive
 from hsp_control.trajectories.streams.chart import State
 from hsp_control.trajectories.streams.message import Space, message_of
+from hsp_control.trajectories.streams.piece_calls import MotionBounds
 from hsp_control.trajectories.streams.planner import Policy
-from hsp_control.trajectories.streams.segments import MotionBounds
 from hsp_control.trajectories.streams.sources import (
     is_address,
     kind_of,

@@ -15,19 +15,10 @@ from typing import Literal, NamedTuple
 
 import numpy as np
 
-from hsp_control import engine
 from hsp_control.common.arrays import Array
 from hsp_control.engine.rotations import cross3, jexp3
-from hsp_control.trajectories.orientation import OrientationSample
-from hsp_control.trajectories.streams.chart import Chart, State
-from hsp_control.trajectories.streams.segments import (
-    COAST,
-    MotionBounds,
-    Piece,
-    Segment,
-    found_motion,
-    room,
-)
+from hsp_control.trajectories.streams.piece_calls import COAST, PieceCalls, base_of
+from hsp_control.trajectories.streams.segments import Piece, Segment
 
 Axes = Literal["world", "tool"]
 """The axes in which a velocity is commanded: the world's, or the moving body's."""
@@ -48,64 +39,41 @@ class VelocityCommand(NamedTuple):
         )
 
 
-class Velocities:
-    """Plans the pieces that reach a velocity, or keep it, within the bounds."""
+def velocity_piece(
+    t: float, command: VelocityCommand, calls: PieceCalls
+) -> Segment | None:
+    """Return what reaches a velocity from where ``calls.state`` is at a time [s].
 
-    def __init__(self, chart: Chart, bounds: MotionBounds) -> None:
-        """Set the coordinates, and the bounds in them."""
-        self._chart, self._bounds = chart, bounds
-
-    def follow(
-        self, t: float, state: State, command: VelocityCommand, delay: float
-    ) -> Segment:
-        """Return a piece that reaches a velocity, if possible in ``delay`` [s].
-
-        The state is at the base of its chart. A velocity beyond the bounds keeps its
-        direction. A piece that keeps the velocity has no end.
-
-        Raises:
-            StreamError: If no motion within the bounds is found.
-        """
-        numbers = room(self._chart.size)
-        planned = engine.VelocityPiece(
-            t=float(t),
-            linear=self._chart.linear,
-            tool=float(command.axes == "tool"),
-            delay=delay,
-            bounds=self._bounds,
-            state=vars(state),
-            velocity=command.velocity.astype(float),
-            piece=numbers,
-        )()
-        piece = found_motion(Piece(numbers, state.base) if planned else None)
-        if planned != _IN_TOOL_AXES:
-            return piece
-        kind = ToolCoast if numbers[0] == COAST else ToolChange
-        return kind(piece, state, self._chart)
-
-
-_IN_TOOL_AXES = 2.0
-"""The engine's record of a piece in which x is the integral of u."""
+    None: no motion within the bounds is found. See `PieceCalls.follow`.
+    """
+    numbers, as_integral = calls.follow(
+        t, command.velocity, tool=command.axes == "tool"
+    )
+    if numbers is None:
+        return None
+    if not as_integral:
+        return Piece(numbers)
+    kind = ToolCoast if numbers[0] == COAST else ToolChange
+    return kind(Piece(numbers), calls)
 
 
 class ToolMotion(Segment):
     """A piece in which x' = R u: u and a rotation vector are those of another piece."""
 
-    def __init__(self, inner: Segment, state: State, chart: Chart) -> None:
-        """Begin in a state; u is the rate of ``inner``, from there on."""
-        super().__init__(inner.start, inner.end, state.base)
-        self._inner, self._chart = inner, chart
-        self._begin = state.x[:3].copy()
+    def __init__(self, inner: Piece, calls: PieceCalls) -> None:
+        """Begin in ``calls.state``; ``inner`` moves what u is the rate of."""
+        super().__init__(inner.start, inner.end)
+        self._inner, self._begin = inner, calls.state.x[:3].copy()
 
-    def state(self, t: float) -> State:
-        """Return the state at time t [s]."""
-        found, turned = self._inner.state(t), OrientationSample.allocate()
-        self._chart.write_orientation(found, turned)
-        R, omega, _ = turned
-        found.x[:3] = self._at(t)
-        found.rate[:3] = velocity = R @ found.rate[:3]
-        found.acceleration[:3] = R @ found.acceleration[:3] + cross3(omega, velocity)
-        return found
+    def write(self, t: float, calls: PieceCalls) -> None:
+        """Write the state at time t [s]; see `Segment.write`."""
+        state = calls.state
+        self._inner.write(t, calls)
+        calls.turn()
+        R, omega, _ = calls.turned
+        state.rate[:3] = velocity = R @ state.rate[:3]
+        state.acceleration[:3] = R @ state.acceleration[:3] + cross3(omega, velocity)
+        state.x[:3] = self._at(t)
 
     def _at(self, t: float) -> Array:
         """Return x at time t, the integral of R u."""
@@ -115,11 +83,16 @@ class ToolMotion(Segment):
 class ToolCoast(ToolMotion):
     """A constant twist in the tool's axes: the body moves along a screw."""
 
+    def __init__(self, inner: Piece, calls: PieceCalls) -> None:
+        """Keep the twist, which is that of all of the piece."""
+        super().__init__(inner, calls)
+        inner.write(inner.start, calls)
+        self._twist = calls.state.rate.copy()
+
     def _at(self, t: float) -> Array:
-        start = self._inner.state(self.start)
-        elapsed, u, omega = t - self.start, start.rate[:3], start.rate[3:]
+        elapsed, u, omega = t - self.start, self._twist[:3], self._twist[3:]
         moved = elapsed * jexp3(-elapsed * omega) @ u  # ∫ exp(s ω) ds u
-        return np.asarray(self._begin + self.base @ moved)
+        return np.asarray(self._begin + base_of(self._inner.numbers) @ moved)
 
 
 class ToolChange(ToolMotion):
@@ -128,25 +101,27 @@ class ToolChange(ToolMotion):
     R u is a polynomial between Chebyshev's points of each panel, and x is its integral.
     """
 
-    def __init__(self, inner: Segment, state: State, chart: Chart) -> None:
+    def __init__(self, inner: Piece, calls: PieceCalls) -> None:
         """Integrate the velocity over all of the piece."""
-        super().__init__(inner, state, chart)
-        ends = inner.state(inner.start).rate[3:], inner.state(inner.end).rate[3:]
-        fastest = max(map(np.linalg.norm, ends))
+        super().__init__(inner, calls)
+        fastest = 0.0
+        for end in (inner.start, inner.end):
+            inner.write(end, calls)
+            fastest = max(fastest, float(np.linalg.norm(calls.state.rate[3:])))
         panels = ceil(fastest * (inner.end - inner.start) / _TURN) or 1
         self._width = (inner.end - inner.start) / panels
         self._begins, self._integrals = [self._begin], []
         for k in range(panels):
             middle = self.start + (k + 0.5) * self._width
             times = middle + 0.5 * self._width * _POINTS
-            velocities = np.array([self._velocity(t) for t in times])
+            velocities = np.array([self._velocity(t, calls) for t in times.tolist()])
             self._integrals.append(0.5 * self._width * _INTEGRAL @ velocities)
             self._begins.append(self._begins[-1] + self._integrals[-1].sum(axis=0))
 
-    def _velocity(self, t: float) -> Array:
-        found, turned = self._inner.state(t), OrientationSample.allocate()
-        self._chart.write_orientation(found, turned)
-        return np.asarray(turned.rotation @ found.rate[:3])
+    def _velocity(self, t: float, calls: PieceCalls) -> Array:
+        self._inner.write(t, calls)
+        calls.turn()
+        return np.asarray(calls.turned.rotation @ calls.state.rate[:3])
 
     def _at(self, t: float) -> Array:
         passed = (t - self.start) / self._width

@@ -1,4 +1,4 @@
-"""Waypoints on the controller's clock, and the pieces that pass through them."""
+"""Waypoints on the controller's clock."""
 
 from bisect import bisect_left, bisect_right
 from collections import deque
@@ -6,17 +6,8 @@ from copy import copy, deepcopy
 
 import numpy as np
 
-from hsp_control import engine
 from hsp_control.common.arrays import Array
-from hsp_control.trajectories.streams.chart import Chart, State
 from hsp_control.trajectories.streams.message import Message
-from hsp_control.trajectories.streams.segments import (
-    MotionBounds,
-    Piece,
-    Segment,
-    found_motion,
-    room,
-)
 
 _WINDOW = 2.0  # the sender's clock is compared with the controller's over this time [s]
 _NEW_CLOCK = 1.0  # jump back of a sender's time that indicates a restart [s]
@@ -91,7 +82,8 @@ class Waypoints:
         if made < (self._made if newer else self._superseded):
             self.late += 1
             return False
-        times = made + delay + message.times
+        due = made + delay
+        times = [due + time for time in message.times.tolist()]
         behind = times[-1] <= now and bool(self.times) and self.times[-1] > now
         if behind and not newer:
             self.late += 1
@@ -108,23 +100,24 @@ class Waypoints:
         given = message.velocities
         rates: list[Array | None] = [None] * len(times) if given is None else [*given]
         if not self.times or times[0] > self.times[-1]:
-            self.times += times.tolist()
+            self.times += times
             self.values += [*message.values]
             self.velocities += rates
             return True
         for time, value, velocity in zip(times, message.values, rates, strict=True):
-            self._insert(float(time), value, velocity)
+            self._insert(time, value, velocity)
         return True
 
     def ahead(self, t: float) -> int:
         """Return the index of the first waypoint later than a time [s]."""
         return bisect_right(self.times, t)
 
-    def near(self, t: float, window: float) -> slice:
-        """Return the relevant waypoints at a time: some passed ones, some ahead."""
+    def near(self, t: float, window: float) -> tuple[int, int]:
+        """Return which waypoints matter at a time: from the first to before the end."""
         ahead = self.ahead(t)
         first = min(bisect_left(self.times, t - window), max(ahead - 3, 0))
-        return slice(max(first, ahead - CONSIDERED), ahead + CONSIDERED)
+        end = min(ahead + CONSIDERED, len(self.times))
+        return max(first, ahead - CONSIDERED), end
 
     def forget(self, t: float) -> None:
         """Drop waypoints that were passed long before a time [s], and the surplus."""
@@ -149,67 +142,3 @@ class Waypoints:
         self.times.insert(k, time)
         self.values.insert(k, value)
         self.velocities.insert(k, velocity)
-
-
-class Passing:
-    """Plans the pieces through waypoints, within the bounds.
-
-    Each waypoint has its given velocity; or derivatives estimated from its neighbours,
-    or those of the parabola nearest to the waypoints around it; see
-    ``engine/streams/waypoints.cpp``.
-    """
-
-    def __init__(self, chart: Chart, bounds: MotionBounds) -> None:
-        """Set the coordinates, and the bounds in them."""
-        self._chart, self._bounds = chart, bounds
-
-    def through(
-        self,
-        t: float,
-        state: State,
-        waypoints: Waypoints,
-        *,
-        delay: float,
-        smoothing: float,
-        extrapolation: float,
-        rests: bool,
-    ) -> Segment:
-        """Return the piece through waypoints, of which there is at least one.
-
-        Args:
-            t: Its start time [s].
-            state: Its initial state, at the base of its chart.
-            waypoints: The waypoints.
-            delay: Delay of the reference after a waypoint's own time [s].
-            smoothing: Maximum distance in time of smoothed waypoints [s].
-            extrapolation: Time for which it continues at the last velocity [s].
-            rests: Whether it comes to rest at the last one, not beyond it.
-
-        Raises:
-            StreamError: If no motion within the bounds is found.
-        """
-        near = waypoints.near(t, smoothing)
-        times = np.array(waypoints.times[near])
-        given = waypoints.velocities[near]
-        velocities = np.zeros((len(times), self._chart.size))
-        for row, velocity in zip(velocities, given, strict=True):
-            if velocity is not None:
-                row[:] = velocity
-        numbers = room(self._chart.size)
-        found = engine.WaypointPiece(
-            t=float(t),
-            linear=self._chart.linear,
-            delay=delay,
-            smoothing=smoothing,
-            extrapolation=extrapolation,
-            more=float(near.stop < len(waypoints.times)),
-            rests=float(rests),
-            bounds=self._bounds,
-            state=vars(state),
-            times=times,
-            values=np.array(waypoints.values[near]),
-            velocities=velocities,
-            given=np.array([velocity is not None for velocity in given]),
-            piece=numbers,
-        )()
-        return found_motion(Piece(numbers, state.base) if found else None)

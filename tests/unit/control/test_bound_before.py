@@ -3,11 +3,13 @@
 import pickle
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from typing import Literal
 
 import numpy as np
 import pytest
 
 import hsp_control as hsp
+from hsp_control import engine
 from hsp_control.common.arrays import Array
 from hsp_control.control.changes import Changes
 from hsp_control.engine import plans
@@ -62,9 +64,17 @@ def nothing_bound(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
     with monkeypatch.context() as patched:
         for name in ("plan", "bind_move"):
             patched.setattr(RobotState, name, refused)
-        for module in (plans, trajectory):  # all calls are bound by it
+        for module in (plans, trajectory):  # all calls of plans are bound by it
             patched.setattr(module, "bind", refused)
+        patched.setattr(engine, "_BY_NAME", _Refused())  # and of what plans streams
         yield
+
+
+class _Refused(dict[str, object]):
+    """Kinds none of which a step makes a call of."""
+
+    def __missing__(self, name: str) -> object:
+        raise AssertionError(f"a call of {name} is bound in a step")
 
 
 @pytest.mark.parametrize("kind", CHANGES)
@@ -163,12 +173,30 @@ def test_a_schedule_is_bound_beforehand(monkeypatch: pytest.MonkeyPatch) -> None
             step(made, k)
 
 
-def test_a_target_is_bound_when_it_is_set(monkeypatch: pytest.MonkeyPatch) -> None:
-    made = controller()
+@pytest.mark.parametrize("pose", [False, True])
+def test_a_target_is_bound_when_it_is_set(
+    pose: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """So is the move that is planned when a target arrives."""
+    made = controller(*([hsp.FramePose(name="hand")] if pose else []))
     step(made, 0)
     for k in range(1, 40):
         if k % 10 == 1:
-            made.set_target("hand", [0.4, 0.1, 0.5])
+            turned = [np.cos(0.01 * k), np.sin(0.01 * k), 0.0, 0.0] if pose else []
+            made.set_target("hand", [0.4, 0.1, 0.5, *turned])
+        with nothing_bound(monkeypatch):
+            step(made, k)
+
+
+def test_a_velocity_is_bound_when_it_is_sent(monkeypatch: pytest.MonkeyPatch) -> None:
+    """In the tool's axes, where the integral is Python's, too; and where it fades."""
+    made = controller(hsp.FramePose(name="hand"))
+    step(made, 0)
+    twist = np.array([0.02, 0.0, 0.01, 0.0, 0.1, 0.0])
+    for k in range(1, 400):
+        if k in (1, 10, 20):
+            axes: Literal["tool", "world"] = "world" if k == 10 else "tool"
+            made.set_velocity("hand", twist, axes=axes)
         with nothing_bound(monkeypatch):
             step(made, k)
 

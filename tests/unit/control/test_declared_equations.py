@@ -64,7 +64,7 @@ class Height(SecondOrderTask):
         out.jacobian_dot[:] = J_dot[2], 2.0 * (x * J_dot[0] + x_dot * J[0])
         out.error[:] = desired.position - [z, x * x]
         out.error_rate[:] = desired.velocity - [z_dot, 2.0 * x * x_dot]
-        fed_back = feedback.acceleration(out.error, out.error_rate)
+        fed_back = self.fed_back(feedback, out.error, out.error_rate)
         out.acceleration[:] = desired.acceleration + fed_back
         self.wrong(out, state)
         return out
@@ -119,6 +119,45 @@ def test_what_is_wrong_in_a_task_is_named(what: str) -> None:
     assert message.startswith("tasks.Height: task 'Height': ")
     assert words in message
     assert what == "v in e" or "Height.evaluate is wrong" in message
+
+
+class Bounded(Height):
+    """One whose feedback grows no more where the error is large."""
+
+    def fed_back(self, feedback: Feedback, error: Array, error_rate: Array) -> Array:
+        damped = feedback.Kv @ error_rate + feedback.offset
+        return np.asarray(damped + feedback.Kp @ np.tanh(5.0 * error) / 5.0)
+
+
+class Undeclared(Height):
+    """One that feeds back what it does not declare."""
+
+    def evaluate(
+        self,
+        state: hsp.RobotState,
+        out: TaskSample | None = None,
+        feedback: Feedback | None = None,
+    ) -> TaskSample:
+        out, feedback = self.given(state, out, feedback)
+        out = super().evaluate(state, out, feedback)
+        out.acceleration[:] += feedback.Kp @ (
+            np.tanh(5.0 * out.error) / 5.0 - out.error
+        )
+        return out
+
+
+def test_a_feedback_that_is_not_linear_is_declared() -> None:
+    """With `fed_back` its equation is its own, and checked; without, it is refused."""
+    task = Bounded(right)
+    first_step(task)
+    robot_state = ROBOT.state(0.0, HOME, np.zeros(7))
+    placed = task.placed(Start(robot_state, {}))
+    found, linear = (each.evaluate(robot_state) for each in (placed, Height(right)))
+    assert np.abs(found.acceleration - linear.acceleration).max() > 1e-3
+    with pytest.raises(RateError, match="override fed_back: it declares another"):
+        first_step(Undeclared(right))
+    with pytest.raises(RateError, match=r"e'' = -Bounded.fed_back\(feedback, e, e'\)"):
+        first_step(Bounded(scaled("acceleration", 1, 0.98)))
 
 
 def test_a_task_that_comes_later_is_checked_when_it_comes() -> None:

@@ -1,0 +1,74 @@
+"""A step that mixes tasks or limits is one call, and delivers what its parts do."""
+
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+
+import hsp_control as hsp
+from hsp_control.control.actuation import Actuation, Status
+from hsp_control.control.changes import Changes
+
+H, BEGIN, RAMP = 1e-3, 0.010, 0.020
+ROBOT = hsp.Robot.load("panda")
+POSTURE = hsp.JointPosture("start", joints=["panda_joint1"], name="bent", priority=2)
+TURNED = hsp.FrameOrientation("panda_tcp", name="turned", priority=2)
+
+CHANGES: dict[str, Callable[[Changes], object]] = {
+    "add": lambda at: at.add(POSTURE),
+    "remove": lambda at: at.remove("turned"),
+    "exchange": lambda at: at.remove("turned").add(POSTURE),
+    "limits": lambda at: at.limits(hsp.Limits(bandwidth=30.0)),
+    "no limits": lambda at: at.limits(None),
+    "both": lambda at: at.remove("turned").limits(hsp.Limits(bandwidth=30.0)),
+}
+
+
+def controller(kind: str, speed: float | None = None) -> hsp.Controller:
+    """Return one in the middle of a change; with a bound on speeds that binds."""
+    tasks = [hsp.FramePosition("panda_tcp", name="hand"), TURNED]
+    limits = hsp.Limits() if speed is None else hsp.Limits(velocity=np.full(7, speed))
+    made = hsp.Controller(ROBOT, tasks, hsp.JointCentering(), limits=limits)
+    made.applied(made.compute(0.0, ROBOT.home(), np.zeros(7)).tau, H)
+    CHANGES[kind](made.at(BEGIN).ramp(RAMP))
+    return made
+
+
+def moves(k: int) -> tuple[float, np.ndarray, np.ndarray]:
+    """Return the time, q and v of the k-th step."""
+    swing = 0.3 * np.sin(np.arange(7.0))
+    return k * H, ROBOT.integrate(ROBOT.home(), k * H * swing), swing
+
+
+@pytest.mark.parametrize("kind", CHANGES)
+def test_no_part_is_delivered_by_python(
+    kind: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    made = controller(kind)
+
+    def refused(*_: object) -> object:
+        raise AssertionError("a part of the mixture is delivered by Python")
+
+    monkeypatch.setattr(Actuation, "deliver", refused)
+    for k in range(1, 45):
+        made.applied(made.compute(*moves(k)).tau, H)
+
+
+@pytest.mark.parametrize("speed", [None, 0.31])
+@pytest.mark.parametrize("kind", CHANGES)
+def test_it_delivers_what_its_parts_do(kind: str, speed: float | None) -> None:
+    """As with a modifier, which is called part by part, and here adds nothing."""
+    whole, parts = controller(kind, speed), controller(kind, speed)
+    statuses = set()
+    for k in range(1, 45):
+        out = whole.compute(*moves(k))
+        apart = parts.compute(*moves(k), modifier=lambda _, __, a: (a, None))
+        np.testing.assert_allclose(out.tau, apart.tau, rtol=0, atol=1e-9)
+        np.testing.assert_allclose(
+            out.acceleration, apart.acceleration, rtol=0, atol=1e-8
+        )
+        assert out.status == apart.status
+        statuses.add(out.status)
+        for each in (whole, parts):
+            each.applied(out.tau, H)
+    assert speed is None or Status.LIMITED in statuses
