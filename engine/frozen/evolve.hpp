@@ -18,10 +18,12 @@ struct Evolve {
   InOut<'n'> initial;       // x before all transitions that are kept
   InOut<'k', 'n'> targets;  // in order of time
   InOut<'k', 2> times;      // when each begins, and how long it takes [s]
-  InOutInts<1> count;       // number of transitions
-  double least, most;       // bounds of commands
-  std::int64_t definite;    // size of x as a matrix that must be positive definite; 0: not a matrix
+  InOutInts<1> count;       // how many there are
+  double least, most;       // bounds of what may be commanded
+  In<'h', 'n'> cone;        // rows a with a·x ≥ 0, but for rounding
+  std::int64_t definite;    // size of x as a matrix that has to be positive definite; 0: it is none
   Out<'n'> x, rate;         // x' of the ramps [1/s]
+  InOut<1> ramp;            // of the last transition that has begun [s]
   Scratch<'n'> factor;      // of such a matrix
 
   void check() const {
@@ -33,10 +35,11 @@ struct Evolve {
     x = initial;
     rate.setZero();
     for (Index k = 0; k < used(); ++k) {
-      const double start = times(k, 0), ramp = times(k, 1);
+      const double start = times(k, 0);
       if (start > t) break;
+      ramp[0] = times(k, 1);
       const auto [s, s_dot, s_ddot] =
-          ramp == 0.0 ? SmoothStep{1.0, 0.0, 0.0} : smooth_step(t, start, ramp);
+          ramp[0] == 0.0 ? SmoothStep{1.0, 0.0, 0.0} : smooth_step(t, start, ramp[0]);
       const auto target = targets.row(k).transpose();
       if (s == 1.0) {
         x = target;
@@ -52,6 +55,9 @@ struct Evolve {
   template <class Values> bool permits(const Values& wanted) {
     if (!wanted.allFinite() || (wanted.array() < least).any() || (wanted.array() > most).any())
       return false;
+    const double rounding = 1e-9 * (1.0 + wanted.cwiseAbs().maxCoeff());
+    for (Index k = 0; k < cone.rows(); ++k)
+      if (cone.row(k).dot(wanted) < -rounding) return false;
     if (definite == 0) return true;
     Eigen::Map<Matrix> L(factor.data(), definite, definite);
     const Eigen::Map<const Matrix> given(wanted.data(), definite, definite);
@@ -59,12 +65,18 @@ struct Evolve {
     return cholesky(L, L);
   }
 
-  // Go to a value from a time on, not before the last one; returns whether there is room for it.
-  template <class Values> bool then(double t, double ramp, const Values& wanted) {
+  // x after all transitions.
+  auto last() const {
+    return Eigen::Map<const Vector>(
+        used() == 0 ? initial.data() : targets.data() + (used() - 1) * targets.cols(), x.size());
+  }
+
+  // Go to a value from a time on, which is none before the last one; whether there is room for it.
+  template <class Values> bool then(double t, double duration, const Values& wanted) {
     settle(t);
     if (used() == targets.rows()) return false;
     targets.row(used()) = wanted.transpose();
-    times.row(used()) << t, ramp;
+    times.row(used()) << t, duration;
     ++count[0];
     return true;
   }

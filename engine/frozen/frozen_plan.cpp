@@ -39,15 +39,14 @@ Bytes body_of(std::string_view content) {
 const Kind& kind_named(const Kind* const* kinds, const std::string& name) {
   for (; *kinds; ++kinds)
     if ((*kinds)->name == name) return **kinds;
-  throw std::runtime_error("it has calls of the kind " + name +
-                           ", which this library does not have");
+  throw std::runtime_error("it has calls of the kind " + name + ", which no step of this library makes");
 }
 
 const Kind& kind_named(const std::string& library, const std::string& name) {
   if (!library.empty()) return kind_named(library_kinds(library), name);
   if (name == kind_of<Move>().name) return kind_of<Move>();
   std::vector<const Kind*> all;
-  for (const auto* kinds : rooms())
+  for (const auto* kinds : step_rooms())
     for (; *kinds; ++kinds) all.push_back(*kinds);
   all.push_back(nullptr);
   return kind_named(all.data(), name);
@@ -126,6 +125,7 @@ Plan::Row FrozenPlan::Object::row() const {
 // packets, which determines the order of sums.
 void FrozenPlan::read_memory(Bytes& bytes) {
   initial_ = bytes.take(bytes.number<std::uint64_t>());
+  entries_.assign(initial_.size(), '\0');
   arena_.reset(static_cast<char*>(::operator new(initial_.size(), alignment)));
   restart();
 }
@@ -179,6 +179,12 @@ Argument FrozenPlan::read_array(Bytes& bytes, const Field& field) {
   if (offset > initial_.size() || size > initial_.size() - offset ||
       (field.entry != 'b' && offset % 8))
     throw std::runtime_error("an array is beyond the memory");
+  // What one call has checked as an index another one must not overwrite by a real number.
+  for (std::uint64_t at = offset; at < offset + size; ++at) {
+    if (entries_[at] != '\0' && entries_[at] != field.entry)
+      throw std::runtime_error("arrays of different types overlap");
+    entries_[at] = field.entry;
+  }
   found.data = arena_.get() + offset;
   return found;
 }
@@ -190,9 +196,8 @@ void FrozenPlan::read_port(Bytes& bytes) {
   port.meaning = bytes.text();
   port.entry = bytes.number<char>();
   const char role = bytes.number<char>();
-  const Field field{.rank = 1};
-  if (port.entry != 'd' && port.entry != 'i')
-    throw std::runtime_error("a port has an unknown type");
+  const Field field{.entry = port.entry, .rank = 1};
+  if (port.entry != 'd' && port.entry != 'i') throw std::runtime_error("a port is of no type");
   const Argument array = read_array(bytes, field);
   port.size = array.shape[0];
   port.data = array.data;
@@ -204,7 +209,14 @@ void FrozenPlan::read_port(Bytes& bytes) {
     const double* first = port.payloads->asked.data();
     port.frame = (static_cast<double*>(port.data) - first) / 10;
     if (port.data < first || port.frame >= port.payloads->asked.rows())
-      throw std::runtime_error("a payload has no frame");
+      throw std::runtime_error("a payload is of no frame");
+  } else if (role == 's') {
+    port.impedance = &input<EvolveImpedance>(bytes);
+    const auto& numbers = port.impedance->numbers;
+    port.first = static_cast<double*>(port.data) - numbers.data();
+    port.count = port.size == 1 ? numbers.cols() : port.size;  // one for each row
+    if (port.data < numbers.data() || port.first + port.count > numbers.size() || port.count < 1)
+      throw std::runtime_error("an input is of no impedance");
   } else if (role != 'o') throw std::runtime_error("a port has no role");
   const Index size = port.input      ? port.input->x.size()
                      : port.target   ? port.target->sent_target.size()

@@ -12,6 +12,7 @@
 #include "../streams/stream_alone.hpp"
 #include "bytes.hpp"
 #include "evolve.hpp"
+#include "evolve_impedance.hpp"
 #include "payloads.hpp"
 
 namespace hsp::frozen {
@@ -27,7 +28,9 @@ struct Port {
   StreamAlone *target = nullptr, *velocity = nullptr;
   Payloads* payloads = nullptr;
   Index frame = 0;  // of a payload
-  bool is_input() const { return input || target || velocity || payloads; }
+  EvolveImpedance* impedance = nullptr;
+  Index first = 0, count = 0;  // of which numbers of an impedance
+  bool is_input() const { return input || target || velocity || payloads || impedance; }
 };
 
 class FrozenPlan {
@@ -76,7 +79,8 @@ class FrozenPlan {
   void* shared(std::uint32_t index, std::string_view type) const;
 
   std::unique_ptr<char, Aligned> arena_;
-  std::string initial_;  // the arena as in the file
+  std::string initial_;  // the arena as it was in the file
+  std::string entries_;  // the type of which each byte of it is; 0: of none so far
   std::vector<Object> objects_;
   std::vector<Port> ports_;
   void *move_ = nullptr, *stop_ = nullptr;

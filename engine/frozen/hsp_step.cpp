@@ -174,6 +174,10 @@ hsp_status change(hsp_controller& of, const char* name, const double* values, st
     if (!port->payloads->permits(wanted)) return HSP_WRONG_VALUE;
     return port->payloads->then(port->frame, now, ramp, wanted) ? HSP_OK : HSP_TOO_MANY;
   }
+  if (port->impedance) {
+    if (!port->impedance->permits(port->first, port->count, wanted)) return HSP_WRONG_VALUE;
+    return port->impedance->then(now, ramp) ? HSP_OK : HSP_TOO_MANY;
+  }
   // A target's motion is bounded already: no ramp.
   if (!port->input && duration > 0.0) return HSP_WRONG_VALUE;
   if (port->target) return port->target->send_target(wanted) ? HSP_OK : HSP_WRONG_VALUE;
@@ -216,9 +220,9 @@ const char* sentence(hsp_status status) {
       return "the input or output has another number of values, see hsp_port_of";
     case HSP_WRONG_VALUE:
       return "a pointer is null, or a value is not finite, out of bounds, a gain that is not "
-             "positive definite, a quaternion that has not norm 1, an inertia of no body, or a "
-             "ramp of "
-             "a target";
+             "positive definite, an impedance that is not symmetric, not negative, damped where it "
+             "is stiff and stable at this period, a quaternion that has not norm 1, an inertia of "
+             "no body, or a ramp of a target";
     case HSP_TOO_MANY:
       return "the input still follows 8 ramps, which is the most";
     case HSP_FAILED:

@@ -104,9 +104,10 @@ HSP_API const hsp_port* hsp_port_at(const hsp_controller* controller, size_t num
 HSP_API const hsp_port* hsp_port_of(const hsp_controller* controller,
                                     const char* name) HSP_NOEXCEPT;
 
-/* Change an input from the next step on: at once, or by a smooth ramp of a duration [s], like
- * `controller.at(t).ramp(duration)` in Python. A ramp starts from the present value, and may begin
- * during another one. Before the first step both apply at once. */
+/* Let an input have other values from the next step on: at once, or by a smooth ramp of a duration
+ * [s], as `controller.at(t).ramp(duration)` does in Python. A ramp goes on from what is then in
+ * force, and may begin while another is under way; one of a spring waits where it would add energy.
+ * Before the first step both are at once. */
 HSP_API hsp_status hsp_set(hsp_controller* controller, const char* name, const double* values,
                            size_t size) HSP_NOEXCEPT;
 HSP_API hsp_status hsp_ramp(hsp_controller* controller, const char* name, const double* values,

@@ -2,5 +2,5 @@
 #include "rooms.hpp"
 
 namespace hsp {
-const Kind* const* plan_kinds() { return kinds<Once, OnlyIf, EqualSteps>(); }
+const Kind* const* plan_kinds() { return kinds<Once, OnlyIf>(); }
 }  // namespace hsp

@@ -28,13 +28,22 @@ const Kind* const* trajectory_kinds();
 // The kinds of a library of a user's own, which stays loaded. Throws std::runtime_error.
 const Kind* const* library_kinds(const std::string& path);
 
-inline std::vector<const Kind* const*> rooms() {
+// What a step may be made of. None of them repeats anything as often as a number in memory says, so
+// that a step ends whatever its memory holds.
+inline std::vector<const Kind* const*> step_rooms() {
   return {
-      plan_kinds(),       compensation_kinds(), contact_kinds(),  dynamics_kinds(),   edge_kinds(),
-      field_kinds(),      frozen_kinds(),       geometry_kinds(), integrator_kinds(), law_kinds(),
-      limit_kinds(),      linalg_kinds(),       metric_kinds(),   qp_kinds(),         robot_kinds(),
-      simulation_kinds(), stream_kinds(),       task_kinds(),     trajectory_kinds(),
+      plan_kinds(),   compensation_kinds(), contact_kinds(),  dynamics_kinds(), edge_kinds(),
+      field_kinds(),  frozen_kinds(),       geometry_kinds(), law_kinds(),      limit_kinds(),
+      linalg_kinds(), metric_kinds(),       qp_kinds(),       robot_kinds(),    stream_kinds(),
+      task_kinds(),   trajectory_kinds(),
   };
+}
+
+inline std::vector<const Kind* const*> rooms() {
+  auto all = step_rooms();
+  all.push_back(integrator_kinds());
+  all.push_back(simulation_kinds());
+  return all;
 }
 
 }  // namespace hsp

@@ -35,10 +35,11 @@ struct StreamAlone {
   enum Policy { LATEST, INTERPOLATE, EXTRAPOLATE };
   enum Sent { NOTHING, TARGET, VELOCITY };
   static constexpr double infinite = std::numeric_limits<double>::infinity();
-  static constexpr double largest = 1e6;    // magnitude of a sent number: see `message.py`
-  static constexpr double unit = 1e-3;      // deviation of a quaternion's norm from 1
-  static constexpr double kept = 1.0;       // time for which passed waypoints are kept [s]
-  static constexpr Index considered = 256;  // waypoints before and after a time: see `planner.py`
+  static constexpr double largest = 1e6;      // of a number that is sent: see `message.py`
+  static constexpr double unit = 1e-3;        // deviation of a quaternion's norm from 1
+  static constexpr double kept = 1.0;         // how long waypoints that were passed are [s]
+  static constexpr Index most_besides = 100;  // pieces of a step that lead to no waypoint
+  static constexpr Index considered = 256;    // waypoints before and after a time: see `planner.py`
 
   void check() const {
     check_piece(piece.size(), out.x.size());
@@ -103,8 +104,11 @@ struct StreamAlone {
 
   void advance(double t, Piece& present) {
     now[0] = t;
+    // Each piece but the last two leads to a waypoint, or fades. So there are no more of them; but
+    // for times so large that a millisecond is rounded away.
     double due;
-    while ((due = std::min(present.end(), fades_at[0])) <= t) {
+    for (Index pieces = 0; (due = std::min(present.end(), fades_at[0])) <= t; ++pieces) {
+      if (pieces > times.size() + most_besides) return lose(t, present);
       if (due == fades_at[0] && commanded[0]) {
         velocity.setZero();
         fades_at[0] = infinite;
@@ -165,9 +169,14 @@ struct StreamAlone {
     if (next(t, planner, state, present)) return;
     count[0] = commanded[0] = 0;  // too far away for a motion
     fades_at[0] = infinite;
-    // If it cannot even come to rest, the result is not finite, and the step is refused.
-    if (planner.to_rest(t, state, delay, present)) return;
-    present.begin(PieceForm::COAST, t, infinite, state.base);
+    // Where it cannot even rest, what follows is not finite, and the step is refused.
+    if (!planner.to_rest(t, state, delay, present)) lose(t, present);
+  }
+
+  // There is no motion: no reference is finite from now on.
+  void lose(double t, Piece& present) {
+    fades_at[0] = infinite;
+    present.begin(PieceForm::COAST, t, infinite, memory.state.base);
     present.body().setConstant(std::numeric_limits<double>::quiet_NaN());
   }
 

@@ -1,4 +1,5 @@
 #include "../src/rooms.hpp"
+#include "follow_impedance.hpp"
 #include "impedance_gains.hpp"
 #include "relative_kinematics.hpp"
 #include "track_direction.hpp"
@@ -10,6 +11,6 @@ namespace hsp {
 const Kind* const* task_kinds() {
   return kinds<FeedbackAcceleration, DemandAtRest, TrackAxes, TrackPosture, TrackOrientation,
                TrackPose, TrackDirection, RelativeKinematics, SpringStiffness, SpringPulls,
-               ImpedanceGains>();
+               ImpedanceGains, FollowImpedance>();
 }
 }  // namespace hsp

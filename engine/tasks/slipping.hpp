@@ -38,7 +38,8 @@ struct Group {
   Index first, size;
   double most;
 
-  Group(Index g, const Ints<'g'>& ends, const Impedance& impedance)
+  template <class Impedance_>
+  Group(Index g, const Ints<'g'>& ends, const Impedance_& impedance)
       : first(g == 0 ? 0 : ends[g - 1]), size(ends[g] - first) {
     const double inverse = impedance.inverse_force[first];
     most = inverse > 0.0 ? 1.0 / inverse : std::numeric_limits<double>::infinity();
@@ -63,8 +64,8 @@ struct BoundedStiffness {
   Scratch<'g'> c;
 
   // Write S where a bound acts; return whether one does, else S is K, and is not written.
-  template <class E, class Out_>
-  bool write(const Impedance& impedance, const Ints<'g'>& ends, const E& e, Out_& S) {
+  template <class Impedance_, class E, class Out_>
+  bool write(const Impedance_& impedance, const Ints<'g'>& ends, const E& e, Out_& S) {
     s = impedance.K.lazyProduct(e);
     bool acts = false;
     for (Index g = 0; g < ends.size(); ++g) {

@@ -1,14 +1,7 @@
 """The gains in force: the arrays that every step reads, as changes make them.
 
-Changes of an impedance add no energy: they wait where they would. With
-E = ½ e'ᵀΛe' + U(e), U the energy of the spring, and an external force f,
-
-    E' = fᵀx' - e'ᵀ(D + D_ζ) e' + ∂U/∂t.
-
-A spring that becomes stiffer while it is stretched stores energy that nobody gave. So
-the numbers in force follow those that were planned only as fast as ∂U/∂t is no more
-than what the damping takes out: E' <= fᵀx', to first order in the period. Where they
-are behind, they catch up in half of the change's ramp, so that no effort jumps.
+Changes of an impedance add no energy: they wait where they would; see
+`FollowedImpedance`.
 
 Nor may a change make the running loop unstable. `check_rate` looks at a loop with its
 delays and compensators before it runs. Where a change is made while it runs, the period
@@ -22,11 +15,12 @@ from typing import NamedTuple
 
 import numpy as np
 
-from hsp_control.common.arrays import Array, Indices
+from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import UnstableRateError
 from hsp_control.control.active_stack import ActiveStack
 from hsp_control.control.evolution import Evolution
-from hsp_control.control.memory import RunMemory
+from hsp_control.control.followed_impedance import FollowedImpedance
+from hsp_control.control.memory import RunMemory, Waiting
 from hsp_control.control.planned import PlannedTask
 from hsp_control.control.setup import Setup
 from hsp_control.declaration import within
@@ -34,8 +28,6 @@ from hsp_control.robot import RobotState
 from hsp_control.tasks import Task
 from hsp_control.tasks.compliant_task import impedance_of
 from hsp_control.tasks.feedback import FeedbackInForce
-from hsp_control.tasks.impedance import parts_of
-from hsp_control.tasks.slipping import spring_force
 
 _SMALLEST = 1e-15
 """Smallest scale of gains that is tried."""
@@ -52,6 +44,7 @@ class GainsInForce:
         self.feedback: dict[int, FeedbackInForce] = {}
         self.null_space = np.zeros((nv, nv))  # K_N, shape (nv, nv) [1/s]
         self._tasks: dict[int, Task] = {}
+        self._followed: dict[int, FollowedImpedance] = {}
 
     def force_offset(self, contact: str) -> Array:
         """Return what compensators add to a contact's commanded force, (1,) [N]."""
@@ -69,8 +62,13 @@ class GainsInForce:
             key: known.get(id(task)) or self._feedback_of(key, task)
             for key, task in tasks.items()
         }
+        followed = {
+            each.key: self._follower(each, feedback[each.key])
+            for each in setup.tasks
+            if impedance_of(each.task) is not None
+        }
         changing = any(changes_impedance(each.task, each.gains) for each in setup.tasks)
-        return PlannedGains(setup, tasks, feedback, changing)
+        return PlannedGains(setup, tasks, feedback, followed, changing)
 
     def go_over_to(self, planned: "PlannedGains", t: float) -> object:
         """Follow it from now on; t is the present time [s].
@@ -78,8 +76,10 @@ class GainsInForce:
         Returns:
             What held the arrays of what was followed before.
         """
-        before = self._tasks, self.feedback
-        self._setup, self._tasks, self.feedback, self._changing = planned
+        before = self._tasks, self.feedback, self._followed
+        self._setup, self._tasks, self.feedback, self._followed, self._changing = (
+            planned
+        )
         for kept in (self._waiting, self._memory.offsets):
             for key in kept.keys() - self._tasks.keys():
                 del kept[key]
@@ -87,6 +87,15 @@ class GainsInForce:
         self._gain_written = False
         self.write(t)
         return before
+
+    def _follower(
+        self, planned: PlannedTask, in_force: FeedbackInForce
+    ) -> FollowedImpedance:
+        """Return what lets a task's impedance follow what is planned."""
+        own = self._followed.get(planned.key)
+        if own is not None and own.numbers is in_force.numbers:
+            return own
+        return FollowedImpedance(in_force, planned.task.part_ends())
 
     def _feedback_of(self, key: int, task: Task) -> FeedbackInForce:
         """Return the feedback of a task that is new, or follows a new trajectory."""
@@ -103,8 +112,8 @@ class GainsInForce:
         """Write the gains of a time [s]."""
         for each in self._setup.tasks:  # what is constant is written once
             if not (each.gains.constant and each.key in self._written):
-                numbers = self._waiting.get(each.key)
-                numbers = each.gains.at(t) if numbers is None else numbers
+                waits = self._waiting.get(each.key)
+                numbers = each.gains.at(t) if waits is None else waits.numbers
                 self.feedback[each.key].numbers[:] = numbers
         self._written = set(self._tasks)
         if not (self._gain_written and self._setup.gain.constant):
@@ -134,23 +143,20 @@ class GainsInForce:
         t: float,
         period: float,
     ) -> None:
-        in_force = self.feedback[planned.key]
-        following = next_numbers(
-            in_force.numbers,
-            planned.gains,
-            planned.task.part_ends(),
-            in_force.mobility,
-            active.rows.error[rows],
-            active.rows.error_rate[rows],
-            t,
-            period,
-        )
-        if following is None:
-            self._waiting.pop(planned.key, None)
-            following = planned.gains.at(t + period)
+        key, gains = planned.key, planned.gains
+        followed, waits = self._followed[key], self._waiting.get(key)
+        begun = [each.ramp for each in gains.transitions if each.start <= t]
+        if begun:
+            followed.ramp[0] = begun[-1]
+        elif waits is not None:
+            followed.ramp[0] = waits.ramp
+        error, rate = active.rows.error[rows], active.rows.error_rate[rows]
+        if followed.move(gains.at(t), gains.at(t + period), error, rate, period):
+            self._waiting[key] = Waiting(
+                followed.numbers.copy(), float(followed.ramp[0])
+            )
         else:
-            self._waiting[planned.key] = following
-        in_force.numbers[:] = following
+            self._waiting.pop(key, None)
 
 
 class PlannedGains(NamedTuple):
@@ -159,58 +165,13 @@ class PlannedGains(NamedTuple):
     setup: Setup
     tasks: dict[int, Task]  # by key
     feedback: dict[int, FeedbackInForce]  # by key
+    followed: dict[int, FollowedImpedance]  # by key, of those with an impedance
     changing: bool  # whether an impedance changes
 
 
 def changes_impedance(task: Task, numbers: Evolution[Array]) -> bool:
     """Return whether a task has an impedance that changes."""
     return impedance_of(task) is not None and not numbers.constant
-
-
-def next_numbers(
-    now: Array,
-    planned: Evolution[Array],
-    ends: Indices,
-    mobility: Array,
-    e: Array,
-    e_dot: Array,
-    t: float,
-    period: float,
-) -> Array | None:
-    """Return the numbers of an impedance for the next period."""
-    then = planned.at(t + period)
-    step = then - now
-    if not np.allclose(now, planned.at(t), rtol=1e-4, atol=1e-9):  # it has waited
-        begun = [each.ramp for each in planned.transitions if each.start <= t]
-        step *= min(2.0 * period / max(begun[-1] if begun else 0.3, period), 1.0)
-    needed = spring_energy(now + step, ends, e) - spring_energy(now, ends, e)
-    if needed > 0.0:
-        given = period * dissipated(now, mobility, e_dot)
-        if needed > given:
-            return np.asarray(now + given / needed * step)
-    return None if np.array_equal(now + step, then) else now + step
-
-
-def spring_energy(numbers: Array, ends: Indices, e: Array) -> float:
-    """Return U(e) = sᵀe - ½ sᵀK⁺s: ½ eᵀK e, and linear where s is at its bound."""
-    force = spring_force(numbers, ends, e)
-    length = np.linalg.pinv(parts_of(numbers).K, hermitian=True) @ force
-    return float(force @ e - 0.5 * force @ length)
-
-
-def dissipated(numbers: Array, mobility: Array, e_dot: Array) -> float:
-    """Return e'ᵀ(D + D_ζ) e' [W], with D_ζ = 2 ζ C S⁻¹ Cᵀ, K = C Cᵀ, S² = Cᵀ Λ⁻¹ C."""
-    K, D, ratio, *_ = parts_of(numbers)
-    power = float(e_dot @ D @ e_dot)
-    if ratio[0] > 0.0:
-        stiffness, axes = np.linalg.eigh(K)
-        C = axes * np.sqrt(np.maximum(stiffness, 0.0))
-        squares, modes = np.linalg.eigh(C.T @ mobility @ C)
-        along = modes.T @ C.T @ e_dot
-        frequencies = np.sqrt(np.maximum(squares, np.finfo(float).tiny))
-        # Where the arm has no mobility it does not move.
-        power += float(2.0 * ratio[0] * (along**2 / frequencies).sum())
-    return power
 
 
 def check_held(old: Setup, new: Setup, state: RobotState, period: float) -> None:

@@ -2,6 +2,7 @@
 
 from collections.abc import Iterable
 from dataclasses import dataclass, field
+from typing import NamedTuple
 
 import numpy as np
 
@@ -10,6 +11,13 @@ from hsp_control.control.actuation.sent_effort import SentMemory
 from hsp_control.control.change import Change
 from hsp_control.control.clock_check import ClockCheck
 from hsp_control.trajectories.streams.run import StreamRun
+
+
+class Waiting(NamedTuple):
+    """An impedance that is not the planned one."""
+
+    numbers: Array  # in force; see `Impedance.numbers`
+    ramp: float  # how long the change takes for which it waits [s]
 
 
 @dataclass
@@ -31,8 +39,8 @@ class RunMemory:
     now: float = -np.inf  # latest time of a step [s]
     # changes as they were given that no step has seen, and the time of the last one
     unseen: tuple[float, tuple[Change, ...]] = (-np.inf, ())
-    # of tasks, by key: the numbers of an impedance that wait, and what compensators add
-    waiting: dict[int, Array] = field(default_factory=dict)
+    # of tasks, by key: an impedance that waits, and what compensators add
+    waiting: dict[int, Waiting] = field(default_factory=dict)
     offsets: dict[int, Array] = field(default_factory=dict)
     # what compensators add to commanded normal forces, by contact, shape (1,) [N]
     forces: dict[str, Array] = field(default_factory=dict)

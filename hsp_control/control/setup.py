@@ -12,7 +12,7 @@ from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import ControllerError
 from hsp_control.common.suggestions import did_you_mean, listing
 from hsp_control.constraints.contacts import CommandedForce
-from hsp_control.constraints.contacts.contact import NORMAL
+from hsp_control.constraints.contacts.contact import WRENCH
 from hsp_control.control.evolution import ABSENT, Evolution
 from hsp_control.control.model_in_force import PlannedPayload
 from hsp_control.control.planned import (
@@ -190,7 +190,7 @@ def _set_weight(term: PlannedTerm) -> PlannedTerm:
 
 def _set_force(planned: PlannedContact) -> PlannedContact:
     force = planned.contact.force
-    if force is None or force.trajectory is not None or force.dimension != NORMAL:
+    if force is None or force.trajectory is not None or force.dimension == WRENCH:
         return planned
     numbers = np.array(force.followed.sample(0.0).position)
     set_force = CommandedForce(trajectory=SetPoint(numbers))

@@ -122,12 +122,14 @@ def _image(
         move = _bare(bound, delivered, sending)
     else:
         move = chain.move()
-    inputs = [*inputs_of(own, bound, period)]
+    inputs = [*inputs_of(own, bound, held)]
     inputs += model_inputs(own, bound, payloads)
     first = [call for each in inputs for call in each.calls]
     values = move.values
     origin = np.zeros(1)  # the first step's time is written there
-    calls = Plan([*first, *values["calls"].calls])
+    after = [call for each in inputs for call in each.after]
+    following = engine.OnlyIf(calls=Plan(after), condition=delivered.delivered)
+    calls = Plan([*first, *values["calls"].calls, *([following] if after else [])])
     move = engine.Move(**values | {"calls": calls, "origin": origin})
     ports: list[Port] = [
         *_ports(own, bound, delivered, held),

@@ -33,8 +33,9 @@ _PACKET = 16
 of it."""
 
 
-RAMPED, TARGET, VELOCITY, PAYLOAD = b"i", b"t", b"v", b"p"
-"""What is set: a value that may ramp, what a stream follows, or what is carried."""
+RAMPED, TARGET, VELOCITY, PAYLOAD, SPRING = b"i", b"t", b"v", b"p", b"s"
+"""What is set: a value that may ramp, what a stream follows, what is carried, or some
+numbers of an impedance."""
 
 
 class Port(NamedTuple):
@@ -44,8 +45,8 @@ class Port(NamedTuple):
     unit: str
     meaning: str
     array: Any  # float64 or int64, contiguous
-    # what takes what is set, of the kind Evolve, StreamAlone or
-    # Payloads; None: an output
+    # what takes what is set, of the kind Evolve, StreamAlone, Payloads or
+    # EvolveImpedance; None: an output
     input: Call | None = None
     role: bytes = RAMPED
 

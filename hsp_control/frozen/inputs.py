@@ -1,48 +1,65 @@
 """What a program sets while a frozen controller runs: gains, K_N, and targets.
 
 Gains are as on a controller's time line: they crossfade to a new value, and go on from
-what is then in force; see `Evolution`, and ``engine/frozen/evolve.hpp``.
+what is then in force; see `Evolution`, and ``engine/frozen/evolve.hpp``. An impedance
+does so, too, and waits where it would add energy; see `FollowedImpedance`.
 """
 
 from collections.abc import Iterator, Mapping, Sequence
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from hsp_control import engine
 from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import FreezeError
+from hsp_control.constraints.contacts.contact import NORMAL
 from hsp_control.control.bound_step import BoundStep
 from hsp_control.control.change_model import MOST_GRAVITY
 from hsp_control.control.controller import Controller
+from hsp_control.control.followed_impedance import FollowedImpedance
 from hsp_control.declaration import within
 from hsp_control.declaration.nested import parts_within
 from hsp_control.declaration.quantities import LARGEST
 from hsp_control.engine import Call
-from hsp_control.frozen.image import PAYLOAD, TARGET, VELOCITY, Port
+from hsp_control.frozen.image import PAYLOAD, SPRING, TARGET, VELOCITY, Port
 from hsp_control.law import VARYING
 from hsp_control.null_space.fields.weight import SetWeight
+from hsp_control.tasks import Task
 from hsp_control.tasks.compliant_task import impedance_of
+from hsp_control.tasks.impedance import Impedance
 from hsp_control.trajectories.hold import SetPoint
 from hsp_control.trajectories.streams.alone import StreamAlone
 from hsp_control.trajectories.streams.followed import FollowedStream
 
 _MOST = 8
 """How many ramps of one input may be under way."""
+_SIDES = (1, 0), (-1, 0), (0, 1), (0, -1)
+"""Of a friction pyramid, along its tangents."""
 
 
 class Input(NamedTuple):
-    """An input, and the calls that bring it up to a time."""
+    """An input, the calls that bring it up to a time, and those after a step."""
 
     port: Port
     calls: tuple[Call, ...]
+    after: tuple[Call, ...] = ()
 
 
-def inputs_of(own: Controller, bound: BoundStep, period: float) -> Iterator[Input]:
-    """Yield the inputs of a controller whose efforts are held for a period [s]."""
+def inputs_of(own: Controller, bound: BoundStep, held: Array) -> Iterator[Input]:
+    """Yield the inputs of a controller.
+
+    Args:
+        own: The controller.
+        bound: Its step.
+        held: How long its efforts are held, shape (1,) [s].
+    """
+    period = float(held[0])
     for task in own.tasks:
-        if impedance_of(task) is not None:
-            continue  # changes of it wait where they would add energy
+        impedance = impedance_of(task)
+        if impedance is not None:
+            yield from _springs(task, impedance, bound, held)
+            continue
         # A scalar error is unstable from these on, whatever the other one is.
         Kp, Kv, *_ = own.feedback(task.name)
         if task.order == 1:
@@ -67,6 +84,47 @@ def inputs_of(own: Controller, bound: BoundStep, period: float) -> Iterator[Inpu
     yield Input(port, (evolve, engine.ScaledIdentity(k=k, out=K_N)))
 
 
+def _springs(
+    task: Task, impedance: Impedance, bound: BoundStep, held: Array
+) -> Iterator[Input]:
+    """Yield the stiffness of a task, and its damping as it was declared."""
+    in_force = next(x.in_force for x in bound.active.stacked if x.name == task.name)
+    followed, numbers = FollowedImpedance(in_force, task.part_ends()), in_force.numbers
+    flat, rows = numbers.reshape(-1), bound.active.rows
+    now = _evolution(flat, 0.0, LARGEST)
+    planned = followed.planned.reshape(-1), followed.ramp
+    evolve = engine.EvolveImpedance(
+        planned=now | {"x": planned[0], "ramp": planned[1]},
+        G=in_force.mobility,
+        period=held,
+        waits=followed.waits,
+        numbers=numbers,
+    )
+    then = now | {"x": followed.then.reshape(-1), "ramp": np.zeros(1)}
+    here = bound.active.task_rows[task.name]
+    errors = {"e": rows.error[here], "e_dot": rows.error_rate[here], "period": held}
+    after = (
+        engine.EvolveAhead(planned=then, period=held),
+        engine.FollowImpedance(**followed.call.values | errors),
+    )
+    square = task.rows**2
+    parts = [("stiffness", "N/m or N·m/rad", "stiffness, which waits for its energy")]
+    if impedance.damping is None:
+        parts.append(("damping_ratio", "-", "damping ratio of each mode"))
+    else:
+        parts.append(("damping", "N·s/m or N·m·s/rad", "damping"))
+    places = {
+        "stiffness": slice(square),
+        "damping": slice(square, 2 * square),
+        "damping_ratio": slice(2 * square, 2 * square + 1),
+    }
+    for name, unit, meaning in parts:
+        array = flat[places[name]]
+        port = Port(f"{task.name}.{name}", unit, meaning, array, evolve, SPRING)
+        first = name == "stiffness"  # whose calls are those of all
+        yield Input(port, (evolve,) if first else (), after if first else ())
+
+
 def _weights(own: Controller) -> Iterator[Input]:
     """Yield the weights of fields that are numbers; of one name that of the last."""
     terms = {each.field.name: each.field.weight for each in own.setup.terms}
@@ -80,15 +138,22 @@ def _weights(own: Controller) -> Iterator[Input]:
 
 
 def _forces(own: Controller) -> Iterator[Input]:
-    """Yield the commanded normal forces that are numbers."""
+    """Yield the commanded forces that are numbers: normal ones, or with tangents."""
     for each in own.setup.contacts:
         force = each.contact.force
-        if force is not None and isinstance(force.followed, SetPoint):
-            evolve = _evolving(force.followed.numbers, 0.0, LARGEST, 0)
-            name = f"{each.contact.name}.force"
-            meaning = "normal force, positive when it presses"
-            port = Port(name, "N", meaning, force.followed.numbers, evolve)
-            yield Input(port, (evolve,))
+        if force is None or not isinstance(force.followed, SetPoint):
+            continue
+        x = force.followed.numbers
+        if force.dimension == NORMAL:
+            values, meaning = _evolution(x, 0.0, LARGEST), "normal force, which presses"
+        else:  # within the friction pyramid
+            side, meaning = each.contact.side, "two tangents and the normal"
+            rows = [[0, 0, 1], *([i, j, side] for i, j in _SIDES)]
+            cone = {"cone": np.array(rows, dtype=float)}
+            values = _evolution(x, -LARGEST, LARGEST) | cone
+        evolve = engine.Evolve(**values)
+        port = Port(f"{each.contact.name}.force", "N", meaning, x, evolve)
+        yield Input(port, (evolve,))
 
 
 def model_inputs(
@@ -189,14 +254,24 @@ def _matrix(name: str, unit: str, meaning: str, own: Array, most: float) -> Inpu
 def _evolving(
     x: Array, least: float, most: float, definite: int, rate: Array | None = None
 ) -> Call:
-    return engine.Evolve(
-        initial=x.copy(),
-        targets=np.zeros((_MOST, len(x))),
-        times=np.zeros((_MOST, 2)),
-        count=np.zeros(1, dtype=np.int64),
-        least=least,
-        most=most,
-        definite=definite,
-        x=x,
-        rate=np.zeros(len(x)) if rate is None else rate,
-    )
+    values = _evolution(x, least, most, definite)
+    return engine.Evolve(**values if rate is None else values | {"rate": rate})
+
+
+def _evolution(
+    x: Array, least: float, most: float, definite: int = 0
+) -> dict[str, Any]:
+    """Return the arguments of an Evolve that begins with what x is."""
+    return {
+        "initial": x.copy(),
+        "targets": np.zeros((_MOST, len(x))),
+        "times": np.zeros((_MOST, 2)),
+        "count": np.zeros(1, dtype=np.int64),
+        "least": least,
+        "most": most,
+        "cone": np.zeros((0, len(x))),
+        "definite": definite,
+        "x": x,
+        "rate": np.zeros(len(x)),
+        "ramp": np.zeros(1),
+    }

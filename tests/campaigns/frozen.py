@@ -2,14 +2,16 @@
 
 Of each bundled configuration that can be frozen: the states of a run of ten seconds,
 and states that are drawn around its start, slow ones near it and fast ones far away.
-Each is a step of both, and status and effort have to be equal.
+Each is a step of both, and status and effort have to be equal. Then the same once more
+with all compensators that can be frozen with the configuration.
 """
 
 import tempfile
 from collections import Counter
 from collections.abc import Iterator
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from frozen_library import LIB, Opened
@@ -18,8 +20,13 @@ from rich.progress import Progress
 import hsp_control as hsp
 from campaigns.results import keep
 from hsp_control.common.arrays import Array
-from hsp_control.common.exceptions import FreezeError, HspControlError
+from hsp_control.common.exceptions import (
+    CompensationError,
+    FreezeError,
+    HspControlError,
+)
 from hsp_control.common.resources import bundled_configs
+from hsp_control.control.compensation import Compensation
 
 PERIOD = 1e-3
 """Of a configuration whose law is evaluated at all times [s]."""
@@ -31,6 +38,16 @@ BATCH = 1000
 """Steps of one run of drawn states."""
 SPREADS = (0.05, 0.05), (0.5, 0.5), (1.5, 3.0)
 """How far from the start [rad or m], and how fast [rad/s or m/s]."""
+BARE = Compensation(momentum_observer=None)
+"""No compensators."""
+COMPENSATORS: dict[str, Any] = {
+    "velocity_filter": hsp.compensation.VelocityFilter(80.0),
+    # a clip, so that a hand which is to yield does so
+    "momentum_observer": hsp.compensation.MomentumObserver(30.0, clip=5.0),
+    "integral_action": hsp.compensation.IntegralAction(1.0, limit=1.0),
+    "start_up_ramp": hsp.compensation.StartUpRamp(0.3),
+}
+"""All kinds that can be frozen."""
 
 
 @dataclass
@@ -39,6 +56,7 @@ class Tally:
 
     Attributes:
         refused: Why it cannot be frozen; empty: it can.
+        compensators: The names of those that are on.
         run: Steps of the run.
         drawn: Steps at states that were drawn.
         different: Steps whose status or effort differs in a bit.
@@ -47,6 +65,7 @@ class Tally:
     """
 
     refused: str = ""
+    compensators: tuple[str, ...] = ()
     run: int = 0
     drawn: int = 0
     different: int = 0
@@ -55,18 +74,26 @@ class Tally:
 
 
 class Pair:
-    """A controller in Python, and the same without."""
+    """A controller in Python, perhaps with compensators, and the same without."""
 
     def __init__(
-        self, controller: hsp.Controller, file: Path, period: float, tally: Tally
+        self,
+        controller: hsp.Controller,
+        compensation: Compensation,
+        file: Path,
+        period: float,
+        tally: Tally,
     ) -> None:
-        self._declared, self._period, self._tally = controller, period, tally
+        self._declared, self._compensation = controller, compensation
+        self._period, self._tally = period, tally
         self._opened = Opened(file)
         self.begin()
 
     def begin(self) -> None:
         """Begin a run."""
-        self._own = self._declared.preview()
+        self._own = hsp.compensation.CompensatedController(
+            self._declared.preview(), self._compensation
+        )
         LIB.hsp_restart(self._opened.handle)
         self._raised = 0
 
@@ -74,16 +101,16 @@ class Pair:
         """Make a step of both, and compare."""
         status = self._opened.step(t, q, v)
         try:
-            output = self._own.compute(t, q, v)
+            tau = self._own.effort(t, q, v, self._period)
         except HspControlError:
             self._tally.raised += 1
             self._tally.different += status >= 0
             # A library that is refused for long stops the robot; Python goes on.
             self._raised += 1
             return
-        self._own.applied(output.tau, self._period)
         self._raised = 0
-        same = status == output.status and np.array_equal(self._opened.tau, output.tau)
+        expected = self._own.output.status
+        same = status == expected and np.array_equal(self._opened.tau, tau)
         self._tally.different += not same
         self._tally.status[status] += 1
 
@@ -93,22 +120,56 @@ class Pair:
         return self._raised == 5
 
 
-def compared(name: str, drawn: int, duration: float, seed: int) -> Iterator[Tally]:
-    """Yield what came of a configuration so far."""
+def compensated(experiment: hsp.Experiment, period: float) -> Compensation:
+    """Return all compensators that can be frozen with a configuration."""
+    found = BARE
+    for name, each in COMPENSATORS.items():
+        more = replace(found, **{name: each})
+        with tempfile.TemporaryDirectory() as folder:
+            file = Path(folder) / "frozen.hsp"
+            try:
+                hsp.freeze(
+                    experiment.controller, file, compensation=more, period=period
+                )
+            except (FreezeError, CompensationError):
+                continue
+        found = more
+    return found
+
+
+def compared(
+    name: str, drawn: int, duration: float, seed: int, *, compensators: bool = False
+) -> Iterator[Tally]:
+    """Yield what came of a configuration so far.
+
+    Args:
+        name: The configuration's name.
+        drawn: How many states are drawn.
+        duration: How long its run is [s].
+        seed: Of the states that are drawn.
+        compensators: Whether all that can be frozen are on; nothing is compared if that
+            is none.
+    """
     tally = Tally()
     period = hsp.load_experiment(name).scenario.simulation.control_period or PERIOD
-    given = f"simulation.duration={duration}", f"simulation.log_period={period}"
-    experiment = hsp.load_experiment(name, *given)
+    at = f"simulation.duration={duration}", f"simulation.log_period={period}"
+    experiment = hsp.load_experiment(name, *at)
+    compensation = compensated(experiment, period) if compensators else BARE
+    tally.compensators = compensation.names
+    if compensators and not compensation.names:
+        tally.refused = "no compensator can be frozen with it"
+        yield tally
+        return
     with tempfile.TemporaryDirectory() as folder:
         file = Path(folder) / "frozen.hsp"
+        given = {"compensation": compensation, "period": period}
         try:
-            start = experiment.q0
-            hsp.freeze(experiment.controller, file, period=period, start=start)
+            hsp.freeze(experiment.controller, file, start=experiment.q0, **given)
         except FreezeError as error:
             tally.refused = str(error)
             yield tally
             return
-        pair = Pair(experiment.controller, file, period, tally)
+        pair = Pair(experiment.controller, compensation, file, period, tally)
         run = experiment.run()
         for t, q, v in zip(run.t, run.q, run.v, strict=True):
             pair.step(float(t), q, v)
@@ -131,13 +192,15 @@ def compared(name: str, drawn: int, duration: float, seed: int) -> Iterator[Tall
 
 
 def campaign(progress: Progress, seed: int, share: float) -> bool:
-    """Compare all bundled configurations."""
+    """Compare all bundled configurations, without compensators and with them."""
     good, drawn = True, max(1, round(share * DRAWN))
+    given = drawn, DURATION * min(share, 1.0), seed
     for name in bundled_configs():
-        bar = progress.add_task(f"frozen {name}", total=drawn)
-        for tally in compared(name, drawn, DURATION * min(share, 1.0), seed):
-            progress.update(bar, completed=tally.drawn)
-            counts = vars(tally) | {"wanted": DRAWN, "seed": seed}
-            keep(f"frozen-{name.replace('/', '_')}", counts)
-        good &= not tally.different
+        for kind in ("", "-compensated"):
+            bar = progress.add_task(f"frozen {name}{kind}", total=drawn)
+            for tally in compared(name, *given, compensators=bool(kind)):
+                progress.update(bar, completed=tally.drawn)
+                counts = vars(tally) | {"wanted": DRAWN, "seed": seed}
+                keep(f"frozen-{name.replace('/', '_')}{kind}", counts)
+            good &= not tally.different
     return good

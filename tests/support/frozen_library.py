@@ -1,6 +1,7 @@
 """``hsp_step.h`` in Python, by ctypes: for tests of what it refuses."""
 
 import ctypes
+import struct
 import zlib
 from pathlib import Path
 from typing import Any
@@ -119,3 +120,37 @@ def summed(content: bytes) -> bytes:
     """Return a file's content with the checksum that it then has."""
     body = content[_HEADER:]
     return content[:8] + zlib.crc32(body).to_bytes(4, "little") + body
+
+
+class Layout:
+    """Where things are in the content of a file."""
+
+    def __init__(self, content: bytes) -> None:
+        self._content = content
+        (build,) = struct.unpack_from("=I", content, _HEADER)
+        at = _HEADER + 4 + build
+        (size,) = struct.unpack_from("=Q", content, at)
+        self.memory = at + 8
+        self.objects = self.memory + size
+
+    def place(self, kind: str, name: str, rank: int = 1) -> int:
+        """Return where the place of an array is written, of the first call of a kind.
+
+        Args:
+            kind: The kind.
+            name: The argument's.
+            rank: Of the array.
+        """
+        content = self._content
+        call = content.index(_text(kind), self.objects)
+        return content.index(_text(name), call) + 4 + len(name) + 8 * rank
+
+    def array(self, kind: str, name: str, rank: int = 1) -> int:
+        """Return where the entries of an array begin."""
+        at = self.place(kind, name, rank)
+        (offset,) = struct.unpack_from("=Q", self._content, at)
+        return self.memory + int(offset)
+
+
+def _text(text: str) -> bytes:
+    return struct.pack("=I", len(text)) + text.encode()

@@ -31,10 +31,20 @@ def test_random_states(robot: str) -> None:
     assert tally.status[2] > 0  # limits were met
 
 
-@pytest.mark.parametrize("config", ["panda_limits", "whole_body/solo12_trunk"])
-def test_frozen_controllers(config: str) -> None:
-    for tally in frozen.compared(config, 3000, 0.2, SEED):
+@pytest.mark.parametrize(
+    ("config", "compensators"),
+    [
+        ("panda_limits", ()),
+        ("panda_limits", tuple(frozen.COMPENSATORS)),
+        ("whole_body/solo12_trunk", ()),
+    ],
+)
+def test_frozen_controllers(config: str, compensators: tuple[str, ...]) -> None:
+    for tally in frozen.compared(
+        config, 3000, 0.2, SEED, compensators=bool(compensators)
+    ):
         assert not tally.different
+    assert {*tally.compensators} == {*compensators}
     assert (tally.run, tally.drawn) == (201, 3000)
     assert sum(tally.status.values()) > 3000
 

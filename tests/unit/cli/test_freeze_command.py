@@ -6,7 +6,6 @@ import subprocess
 import sys
 from pathlib import Path
 
-import numpy as np
 import pytest
 from frozen_library import Opened
 
@@ -66,25 +65,30 @@ PAGE = Path(__file__).parents[3] / "docs/how_to/without_python.md"
 
 @pytest.mark.process
 @pytest.mark.smoke
-def test_the_page_is_a_program_that_runs(tmp_path: Path) -> None:
-    """Its first commands and its C, in a shell, in an empty folder."""
+def test_the_page_leads_to_an_arm_that_moves(tmp_path: Path) -> None:
+    """Its first section, in a shell, in an empty folder."""
     if not shutil.which("cc"):
         pytest.skip("there is no C compiler")
-    blocks = re.findall(r"```(sh|c)\n(.*?)```", PAGE.read_text("utf-8"), re.DOTALL)
-    frozen, program, built = (text for _, text in blocks[:3])
-    (tmp_path / "loop.c").write_text(program, "utf-8")
-    hsp = f'hsp() {{ {sys.executable} -m hsp_control "$@"; }}\n'
-    script = hsp + frozen + built + "./loop\n"
+    section = PAGE.read_text("utf-8").split("\n## ")[1]
+    found = re.findall(r"`([\w.]+)`[^`]*:\n\n```\w+\n(.*?)```", section, re.DOTALL)
+    assert [name for name, _ in found] == ["panda.yaml", "loop.c", "arm.py"]
+    for name, text in found:
+        (tmp_path / name).write_text(text, "utf-8")
+    commands = "".join(re.findall(r"```sh\n(.*?)```", section, re.DOTALL))
+    shell = f'hsp() {{ {sys.executable} -m hsp_control "$@"; }}\n'
+    shell += f'python() {{ {sys.executable} "$@"; }}\n'
     run = subprocess.run(
-        ["bash", "-euc", script],
+        ["bash", "-euc", shell + commands],
         cwd=tmp_path,
         capture_output=True,
         text=True,
         check=False,
     )
     assert run.returncode == 0, run.stderr
-    assert np.isfinite(float(run.stdout.splitlines()[-1]))
     assert not run.stderr
+    moved = re.search(r"The hand moved by (\S+) m\.", run.stdout)
+    assert moved
+    assert float(moved[1]) == pytest.approx(0.2, abs=0.01)
 
 
 def test_nothing_to_freeze(capsys: pytest.CaptureFixture[str]) -> None:

@@ -141,7 +141,35 @@ def test_a_commanded_force_along_a_plane_is_frozen_as_it_is(
     states = random_states(controller.robot, q, 50, SEED, away=0.02, speed=0.05)
     expected = computed(controller, states)
     np.testing.assert_array_equal(replayed(replay, frozen, states), expected)
-    assert not any(name.endswith(".force") for name in Opened(frozen).ports)
+
+
+@pytest.mark.parametrize("ramp", [0.0, 0.02])
+def test_a_commanded_force_along_a_plane(ramp: float, tmp_path: Path) -> None:
+    """Within its friction pyramid; bit by bit while ramps overlap."""
+    declared = pressing([0.5, -0.3, 6.0])
+    foot, side = declared.contacts[0].name, declared.contacts[0].side
+    opened = Opened(hsp.freeze(declared, tmp_path / "frozen.hsp"))
+    controller = declared.preview()
+    q, v = declared.setup.start.state.q, np.zeros(18)
+    new = {4: [1.0, 0.2, 9.0], 11: [-0.4, 0.0, 3.0], 40: [0.0, 0.0, 0.0]}
+    for k in range(80):
+        v[6:] = 0.01 * np.sin(0.3 * k)
+        output = controller.compute(k * H, q, v)
+        controller.applied(output.tau, H)
+        assert opened.step(k * H, q, v) == output.status
+        np.testing.assert_array_equal(opened.tau, output.tau)
+        if k in new:
+            force = CommandedForce(value=new[k])
+            controller.at(k * H).ramp(ramp).force(foot, force)
+            assert opened.ramp(f"{foot}.force", new[k], ramp) == OK
+    most = side * 5.0
+    assert opened.set(f"{foot}.force", [most, -most, 5.0]) == OK
+    for wrong in (
+        [1.001 * most, 0.0, 5.0],
+        [0.0, -1.001 * most, 5.0],
+        [0.0, 0.0, -1.0],
+    ):
+        assert opened.set(f"{foot}.force", wrong) == WRONG_VALUE
 
 
 def test_what_nothing_carries_is_not_stopped(tmp_path: Path) -> None:

@@ -8,12 +8,14 @@ import pytest
 from frozen_library import (
     BUSY,
     LIB,
+    NOT_FINITE,
     OK,
     WRONG_CLOCK,
     WRONG_NAME,
     WRONG_SIZE,
     WRONG_STATE,
     WRONG_VALUE,
+    Layout,
     Opened,
     pointer,
     summed,
@@ -137,6 +139,51 @@ def test_a_changed_file_that_opens_steps_and_stops(
             assert all(opened.error for status in said if status < 0)
             stepped += 1
     assert stepped > 20
+
+
+def test_a_number_has_one_type(frozen: Path, tmp_path: Path) -> None:
+    """What was checked as an index is never written as a real number."""
+    content, other = bytearray(frozen.read_bytes()), tmp_path / "other.hsp"
+    layout = Layout(bytes(content))
+    index, real = layout.place("Once", "stamp"), layout.place("JointJacobians", "q")
+    content[real : real + 8] = content[index : index + 8]
+    other.write_bytes(summed(bytes(content)))
+    with pytest.raises(RuntimeError, match="arrays of different types overlap"):
+        Opened(other)
+
+
+def test_a_step_repeats_nothing_as_often_as_a_file_says(
+    frozen: Path, tmp_path: Path
+) -> None:
+    """Kinds that do so are those of simulations, which no file may have."""
+    content, other = frozen.read_bytes(), tmp_path / "other.hsp"
+    for kind in (b"EqualSteps", b"Periods"):
+        named = len(kind).to_bytes(4, "little") + kind
+        changed = content.replace(b"\x04\0\0\0Copy", named, 1)
+        other.write_bytes(summed(changed))
+        with pytest.raises(
+            RuntimeError, match=f"of the kind {kind.decode()}, which no"
+        ):
+            Opened(other)
+
+
+@pytest.mark.timeout(60)
+@pytest.mark.parametrize("times", [0.0, -1e200])
+def test_a_stream_whose_times_are_wrong_ends(times: float, tmp_path: Path) -> None:
+    robot = hsp.Robot.load("panda")
+    hand = hsp.FramePosition("panda_tcp", hsp.Stream(policy="interpolate"))
+    declared = hsp.Controller(robot, [hand], start=robot.home())
+    file = hsp.freeze(declared, tmp_path / "stream.hsp")
+    content, v = bytearray(file.read_bytes()), np.zeros(7)
+    layout = Layout(bytes(content))
+    for name in ("fades_at", "now"):
+        at = layout.array("StreamAlone", name)
+        content[at : at + 8] = np.float64(times).tobytes()
+    file.write_bytes(summed(bytes(content)))
+    opened = Opened(file)
+    opened.step(0.0, robot.home(), v)
+    assert opened.step(0.001, robot.home(), v) == NOT_FINITE
+    assert "not finite" in opened.error
 
 
 # -- steps --------------------------------------------------------------------------

@@ -40,6 +40,17 @@ def test_targets_are_planned_for_without_any(policy: Policy, tmp_path: Path) -> 
     check_quiet(experiment, controller, tmp_path, "hand.target", "hand.velocity")
 
 
+@pytest.mark.skipif(sys.platform != "linux", reason="glibc's names, Linux' seccomp")
+def test_a_spring_follows_without_any(tmp_path: Path) -> None:
+    experiment = hsp.load_experiment("panda_obstacle")
+    soft = hsp.Impedance([300.0, 400.0, 500.0])
+    hand = hsp.FramePosition("panda_tcp", impedance=soft, name="hand")
+    start = experiment.q0
+    controller = hsp.Controller(experiment.robot, [hand], start=start)
+    inputs = "hand.stiffness", "hand.damping_ratio"
+    check_quiet(experiment, controller, tmp_path, *inputs)
+
+
 def check_quiet(
     experiment: hsp.Experiment, controller: hsp.Controller, tmp_path: Path, *sent: str
 ) -> None:

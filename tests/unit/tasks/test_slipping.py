@@ -5,12 +5,12 @@ from typing import Any
 import numpy as np
 import pytest
 from loaded_robots import panda
+from spring_energy import spring_energy
 from task_cases import placed
 
 import hsp_control as hsp
 from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import GainError
-from hsp_control.control.gains_in_force import spring_energy
 from hsp_control.tasks.feedback import ErrorPart
 from hsp_control.tasks.impedance import parts_of
 from hsp_control.tasks.slipping import slipped, spring_force
