@@ -1,6 +1,7 @@
 #include "../src/rooms.hpp"
 #include "deliver.hpp"
 #include "evolve.hpp"
+#include "load.hpp"
 #include "offset_effort.hpp"
 #include "payloads.hpp"
 #include "safe_stop.hpp"
@@ -8,6 +9,6 @@
 namespace hsp {
 const Kind* const* frozen_kinds() {
   return kinds<Deliver, ForcesWithin, DeliverWithForces, OffsetEffort, Subtract, HasMoved, Evolve,
-               ScaledIdentity, BodyInJoint, Payloads, Brake, ScaleIntoLimits>();
+               ScaledIdentity, BodyInJoint, Payloads, Brake, ScaleIntoLimits, EstimateLoad>();
 }
 }  // namespace hsp

@@ -127,7 +127,9 @@ def _image(
     first = [call for each in inputs for call in each.calls]
     values = move.values
     origin = np.zeros(1)  # the first step's time is written there
-    calls = Plan([*first, *values["calls"].calls])
+    stopped = stopping(own, bound, stop, held, origin, first, delivered.tau)
+    before = [] if stopped is None else stopped.before
+    calls = Plan([*first, *values["calls"].calls, *before])
     move = engine.Move(**values | {"calls": calls, "origin": origin})
     ports: list[Port] = [
         *_ports(own, bound, delivered, held),
@@ -135,8 +137,9 @@ def _image(
     ]
     ports += targets_of(own, streams)
     read = Port("origin", "s", "what the clock read in the first step", origin)
-    stopped, outputs = stopping(own, bound, stop, held, origin, first)
-    return Image(move, [*ports, *outputs, read], stopped)
+    if stopped is None:
+        return Image(move, [*ports, read], None)
+    return Image(move, [*ports, *stopped.outputs, read], stopped.move)
 
 
 def _bare(bound: BoundStep, delivered: DeliveredAlone, sending: PartCalls) -> Move:
