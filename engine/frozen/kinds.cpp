@@ -2,6 +2,7 @@
 #include "deliver.hpp"
 #include "evolve.hpp"
 #include "evolve_impedance.hpp"
+#include "load.hpp"
 #include "offset_effort.hpp"
 #include "payloads.hpp"
 #include "safe_stop.hpp"
@@ -10,6 +11,6 @@ namespace hsp {
 const Kind* const* frozen_kinds() {
   return kinds<Deliver, ForcesWithin, DeliverWithForces, OffsetEffort, Subtract, HasMoved, Evolve,
                EvolveImpedance, EvolveAhead, ScaledIdentity, BodyInJoint, Payloads, Brake,
-               ScaleIntoLimits>();
+               ScaleIntoLimits, EstimateLoad>();
 }
 }  // namespace hsp

@@ -10,6 +10,7 @@ from hsp_control.common.arrays import Array, Indices
 from hsp_control.constraints.contacts import Contact
 from hsp_control.control.actuation.support import Support
 from hsp_control.control.evolution import PRESENT
+from hsp_control.control.load import LoadEstimate
 from hsp_control.control.planned import PlannedContact
 from hsp_control.engine.plans import AnyCall, PartCall, PartCalls
 from hsp_control.robot import RobotState
@@ -24,7 +25,7 @@ class StopGains(NamedTuple):
     """Natural frequency of what then holds it [rad/s]."""
     rest_speed: float = 0.01
     """Joint speed below which holding begins [rad/s or m/s]."""
-    longest_damping: float = 2.0
+    longest_damping: float = 0.5
     """Maximum duration of braking [s]."""
 
 
@@ -41,14 +42,15 @@ Steeper ones, such as a wall, may only be pushed: the joints that are held do it
 class BoundStop:
     """The calls of a safe stop at a state, and what they remember.
 
-    Damping: tau = g(q) - s k M(q) v. The kinetic energy obeys T' = -s k vᵀM v. This is
+    Damping: tau = g(q) - d - s k M(q) v, with the load d that acted on the joints before
+    the stop (`LoadEstimate`; 0 where a robot floats, whose feet push it, too). The kinetic energy obeys T' = -s k vᵀM v. This is
     negative for any true inertia of the robot, because the model's M is positive
     definite. (Coriolis terms do no work; compensating them with a wrong model would.)
     With an exact model T falls like exp(-2 k t) for heavy and light joints alike, so
     that one gain k is enough. s, in [0, 1], scales the whole vector into the effort
     limits: damping that is clipped joint by joint can accelerate the robot.
 
-    Hold: tau = g(q) - s M₀ (ω² (q ⊖ q₀) + 2 ω v) with M₀ at the configuration q₀ where
+    Hold: tau = g(q) - d - s M₀ (ω² (q ⊖ q₀) + 2 ω v) with M₀ at the configuration q₀ where
     the robot came to rest: the PD control with gravity compensation of Takegaki and
     Arimoto (1981), stable for any inertia.
 
@@ -63,6 +65,7 @@ class BoundStop:
         state: Where the robot is.
         feet: The contacts that can carry it; see `STEEPEST`.
         limits: Limits of the efforts, shape (nv,).
+        load: What acted on the joints besides their efforts before.
         damped_for: How long it has damped, shape (1,) [s].
         holding: Whether it holds, shape (1,).
         held_q: Where it holds, q₀, shape (nq,).
@@ -93,6 +96,7 @@ class BoundStop:
         self._support = Support(planned, state, robot.unactuated)
         self._standing = np.ones(self._support.size)
         self.limits = np.full(nv, np.inf)
+        self.load = LoadEstimate(nv, period.item())
         self.damped_for = np.zeros(1)
         self.holding: Indices = np.zeros(1, dtype=np.int64)
         self.held_q, self._held_mass = robot.neutral(), np.zeros((nv, nv))
@@ -113,6 +117,7 @@ class BoundStop:
         """Go on where a stop at another state is."""
         for mine, its in zip(self._memory, before._memory, strict=True):
             mine[:] = its
+        self.load.go_on(before.load)
 
     @property
     def _memory(self) -> tuple[Array, Indices, Array, Array]:
@@ -138,6 +143,7 @@ class BoundStop:
                 acceleration=rest,
                 effort=gravity,
             ),
+            PartCall(engine.Subtract, x=self.load.load, out=gravity),
             PartCall(
                 engine.Brake,
                 **self._gains._asdict(),
@@ -163,6 +169,15 @@ class BoundStop:
             calls += [carried, braked]
         given = {"base": gravity, "direction": force, "limits": self.limits}
         return [*calls, PartCall(engine.ScaleIntoLimits, **given, tau=self.tau)]
+
+    def calls_before(self, acts: Array) -> PartCalls:
+        """Return the calls of a period before the stop, whose effort is (nv,).
+
+        They estimate the load. None of a robot whose base floats.
+        """
+        if self.state.robot.unactuated:
+            return []
+        return [self.load.call(self.state, acts)]
 
     def _of_joints(self, force: Array) -> tuple[Array, PartCall]:
         """Return the efforts (nv,) that exert a force (nv,) with the feet's help."""

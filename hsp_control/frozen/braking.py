@@ -1,6 +1,7 @@
 """The safe stop of a frozen controller: what `hsp live` does, for ``hsp_stop``."""
 
 from collections.abc import Sequence
+from typing import NamedTuple
 
 import numpy as np
 
@@ -18,6 +19,17 @@ LIKE_LIVE = StopGains()
 """Those that `hsp live` has by default."""
 
 
+class Stopping(NamedTuple):
+    """The safe stop of a frozen controller."""
+
+    move: Move
+    """It, as one move."""
+    before: list[Call]
+    """What a step does for it at its end: it estimates the load."""
+    outputs: list[Port]
+    """What can be read of it."""
+
+
 def stopping(
     own: Controller,
     bound: BoundStep,
@@ -25,8 +37,9 @@ def stopping(
     period: Array,
     origin: Array,
     first: Sequence[Call],
-) -> tuple[Move | None, list[Port]]:
-    """Return the safe stop as one move, and its outputs; None: nothing carries it.
+    acts: Array,
+) -> Stopping | None:
+    """Return the safe stop; None: nothing carries the robot.
 
     A robot on feet stands on the contacts of the controller meanwhile.
 
@@ -37,19 +50,24 @@ def stopping(
         period: How long each effort is held, shape (1,) [s].
         origin: What the clock reads at time 0, shape (1,) [s].
         first: The calls that bring the model up to a time.
+        acts: The effort that a step delivers, shape (nv,).
     """
     robot, state = own.robot, bound.state
     if robot.unactuated and not own.contacts:
-        return None, []
+        return None
     stop = BoundStop(state, own.contacts, gains, period)
     if own.limits is None:
         stop.limits[:] = own_maximum(robot.model.effortLimit, robot)
     else:
         stop.limits[:] = own.limits.effort
     stop.limits[list(robot.unactuated)] = 0.0  # no motor is there
+    stop.load.permit(stop.limits)
     values = state.bind_move(state.plan(stop.calls()).steps(), origin).values
     calls = Plan([*first, *values["calls"].calls])
     effort = Port("stop.tau", "N·m or N", "the effort that brakes, or holds", stop.tau)
     held = Port("stop.holding", "-", "whether it holds", stop.holding)
     rate = Port("stop.damping", "1/s", "how it brakes", np.array([gains.damping]))
-    return engine.Move(**values | {"calls": calls}), [effort, held, rate]
+    load = Port("stop.load", "N·m or N", "what acted besides the efforts", stop.load.load)
+    move = engine.Move(**values | {"calls": calls})
+    before = state.plan(stop.calls_before(acts)).steps()
+    return Stopping(move, before, [effort, held, rate, load])

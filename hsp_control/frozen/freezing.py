@@ -129,7 +129,9 @@ def _image(
     origin = np.zeros(1)  # the first step's time is written there
     after = [call for each in inputs for call in each.after]
     following = engine.OnlyIf(calls=Plan(after), condition=delivered.delivered)
-    calls = Plan([*first, *values["calls"].calls, *([following] if after else [])])
+    stopped = stopping(own, bound, stop, held, origin, first, delivered.tau)
+    last = [*([following] if after else []), *(stopped.before if stopped else [])]
+    calls = Plan([*first, *values["calls"].calls, *last])
     move = engine.Move(**values | {"calls": calls, "origin": origin})
     ports: list[Port] = [
         *_ports(own, bound, delivered, held),
@@ -137,8 +139,9 @@ def _image(
     ]
     ports += targets_of(own, streams)
     read = Port("origin", "s", "time of the clock in the first step", origin)
-    stopped, outputs = stopping(own, bound, stop, held, origin, first)
-    return Image(move, [*ports, *outputs, read], stopped)
+    if stopped is None:
+        return Image(move, [*ports, read], None)
+    return Image(move, [*ports, *stopped.outputs, read], stopped.move)
 
 
 def _bare(bound: BoundStep, delivered: DeliveredAlone, sending: PartCalls) -> Move:

@@ -144,6 +144,7 @@ def run_loop(
             for _ in range(_WARM_UP):
                 chain.effort(first._replace(t=start_time, applied=None), period)
                 safe_stop.effort(reader.state)
+                safe_stop.observe(reader.state, limiter.applied)
                 limiter.reset(first.q)
             end = np.inf if duration is None else start_time + duration - 0.5 * period
             warn_of_slow_efforts(robot, first.q, limits)
@@ -153,7 +154,7 @@ def run_loop(
             chain.begin(first.inertial, robot.state(start_time, first.q, first.v))
             controller.compute(start_time, first.q, first.v)  # begins
             loop_log.begin()
-            safe_stop.begin()
+            safe_stop.restart()
             loop = LiveRun(
                 chain,
                 hardware,
@@ -304,6 +305,8 @@ class LiveRun:
         if tau is not None and not limiter.apply(tau, reader.state.q, inertia):
             self.stop("fault", f"the effort is not finite: {tau.tolist()}")
         self.send(before)
+        if self.phase == Phase.RUNNING and reader.measurement is not None:
+            self.safe_stop.observe(reader.state, limiter.applied)
         response = reader.effort_sent(limiter.applied)
         self.report_applied_effort()
         self.log_row(response)
@@ -390,7 +393,7 @@ class LiveRun:
         self.phase = Phase.DAMPING
         self.ended, self.reason, self.error = ended, reason, error
         self.safe_stop.begin()
-        self.reader.stop()
+        self.reader.stop(self.safe_stop.load)
 
     def fail(self, error: BaseException) -> None:
         """Stop after an error of a user's code or of the law."""

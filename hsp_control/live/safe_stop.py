@@ -90,6 +90,7 @@ class SafeStop:
         self._effort_limits = effort_limits
         self.feet = StandingFeet(robot, ()) if feet is None else feet
         self._bound: BoundStop | None = None
+        self._acts = np.zeros(robot.nv)
         self.begin()
 
     def begin(self) -> None:
@@ -120,6 +121,29 @@ class SafeStop:
         held = self.held_for >= self._settings.hold - 0.5 * self._period
         return self.phase == Phase.HOLDING and held
 
+    @property
+    def load(self) -> Array:
+        """What acted on the joints besides their efforts before the stop, (nv,)."""
+        robot = self._robot
+        return np.zeros(robot.nv) if self._bound is None else self._bound.load.load
+
+    def restart(self) -> None:
+        """Forget all, also the load."""
+        if self._bound is not None:
+            self._bound.load.forget()
+        self.begin()
+
+    def observe(self, state: RobotState, acts: Array) -> None:
+        """Learn from a period before the stop.
+
+        Args:
+            state: The robot's state.
+            acts: The effort that acts from now on, shape (nv,).
+        """
+        self._bound_to(state).load.permit(self._effort_limits)
+        self._acts[:] = acts
+        self._learn()
+
     def effort(self, state: RobotState) -> Array:
         """Return the effort of this period at the state, shape (nv,); once a period."""
         bound = self._bound_to(state)
@@ -140,4 +164,6 @@ class SafeStop:
         if before is not None:
             bound.go_on(before)
         self._make: Callable[[], object] = state.plan(bound.calls()).call()
+        learning = state.plan(bound.calls_before(self._acts))
+        self._learn: Callable[[], object] = learning.call()
         return bound

@@ -33,7 +33,7 @@ class StopSettings(Part, error=LiveError):
     is critically damped."""
     rest_speed: Positive = 0.01
     """Joint speed below which holding begins [rad/s or m/s]."""
-    longest_damping: Positive = 2.0
+    longest_damping: Positive = 0.5
     """Maximum duration of braking [s], for measured speeds that noise keeps above
     ``rest_speed``."""
     hold: NonNegative = 0.2

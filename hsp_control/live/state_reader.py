@@ -510,9 +510,9 @@ class StateReader:
         self._last_arrival = self._clock()
         self._due = self._last_arrival + (1.0 + _READ_MARGIN) * self._period
 
-    def stop(self) -> None:
-        """Begin braking: the joints are braked from now on."""
-        self._motion.stop()
+    def stop(self, load: Array) -> None:
+        """Begin braking the joints; see `TrustedMotion.stop`."""
+        self._motion.stop(load)
 
     def read(self, applied: Array, limits: RobotLimits | None) -> None:
         """Read the period's measurement; predict the state if there is none."""

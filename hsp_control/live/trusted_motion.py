@@ -152,6 +152,7 @@ class TrustedMotion:
         self.complete = True
         self._useless = False  # whether joints do not follow their efforts
         self.stopping = False  # whether the joints are braked
+        self._load: Array = np.zeros(self._robot.nv)  # since then
         self._driving: Driving | None = None
         self._moving = False  # whether the robot's clock has begun
         self._positions = np.ones(self._robot.nv, dtype=bool)
@@ -175,9 +176,13 @@ class TrustedMotion:
         """Joints whose positions are trusted, shape (nv,)."""
         return self._positions
 
-    def stop(self) -> None:
-        """Begin braking: a joint that accelerates now has a wrong sensor or motor."""
+    def stop(self, load: Array) -> None:
+        """Begin braking: a joint that accelerates now has a wrong sensor or motor.
+
+        ``load`` is what acts on the joints besides their efforts, shape (nv,).
+        """
         self.stopping = True
+        self._load = load.copy()
 
     def applied(
         self, q: Array, v: Array, tau: Array, inertia: Array | None = None
@@ -186,6 +191,7 @@ class TrustedMotion:
 
         ``inertia`` is its mass matrix, shape (nv, nv); None: it is computed.
         """
+        tau = tau + self._load
         self._expected.apply(q, v, tau)
         if self.complete and self._moving:
             self._sensors.judge(q, v, tau)

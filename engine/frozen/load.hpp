@@ -1,0 +1,46 @@
+// What acts on the joints besides their efforts: a safe stop goes on with what it was before.
+#pragma once
+#include <algorithm>
+#include <hsp/kind.hpp>
+
+namespace hsp {
+
+struct EstimateLoad {
+  static constexpr const char* doc =
+      "The load some periods ago, within ± bound: a low-pass of M v' - (tau - N).";
+  double rate;         // of the low-pass [1/s]
+  double longest_gap;  // no change is taken across more [s]
+  In<1> time;
+  In<'n', 'n'> M;
+  In<'n'> v, nonlinear_effects;
+  In<'n'> acts;  // the effort from now on
+  In<'n'> bound;
+  InOut<1> last_time;
+  InOut<'n'> last_v, driving;  // v and tau - N at the last state
+  InOut<'n'> estimate;
+  InOut<'w', 'n'> past;  // the last estimates, in a ring
+  InOutInts<1> count;    // of the states
+  Out<'n'> load;
+  Scratch<'n'> change, rest;
+
+  void operator()() {
+    const double passed = time[0] - last_time[0];
+    if (count[0] && passed > 0.0 && passed <= longest_gap) {
+      // An impulse, M Δv - h (tau - N), moves the estimate: no velocity that is wrong by x moves it
+      // by more than rate M x.
+      change = v - last_v;
+      rest.noalias() = M.lazyProduct(change);
+      rest -= passed * driving;
+      estimate += rate * rest - std::min(rate * passed, 1.0) * estimate;
+    }
+    last_v = v;
+    last_time = time;
+    driving = acts - nonlinear_effects;
+    const Index at = count[0] % past.rows();
+    load = past.row(at).transpose().cwiseMax(-bound).cwiseMin(bound);
+    past.row(at) = estimate.transpose();
+    ++count[0];
+  }
+};
+
+}  // namespace hsp

@@ -1,0 +1,89 @@
+"""What acts on the joints besides their efforts, as it was before a safe stop."""
+
+from math import ceil
+
+import numpy as np
+
+from hsp_control import engine
+from hsp_control.common.arrays import Array, Indices
+from hsp_control.engine.plans import PartCall
+from hsp_control.robot import RobotState
+
+_RATE = 3.0
+"""Rate K of the low-pass [1/s]."""
+_BEFORE = 0.1
+"""How old the estimate is that is used [s]: what is wrong is found within this time,
+or is small."""
+_CONTACT = 0.3
+"""Largest load of a joint, relative to its effort limit: as much as a contact [-]."""
+_LONGEST_GAP = 0.02
+"""Time between two states across which the load is not estimated [s]."""
+
+
+class LoadEstimate:
+    """A slow momentum observer, which a safe stop freezes.
+
+    With d the load, M v' = tau - N + d, so d' = K (M v' - (tau - N) - d). It is
+    estimated while the robot runs and its measurements are consistent, and not in the
+    stop, in which what is measured may be wrong.
+
+    How much a wrong measurement leaves in it is bounded: an error x of the velocity is
+    an impulse M x, and changes the estimate by K M x at most; one that begins less than
+    0.1 s before the stop by nothing. Frozen in the stop, that moves joints that are
+    braked by -k M v at K x / k: 0.15 x with k = 20 1/s.
+
+    Attributes:
+        bound: Largest load, shape (nv,) [N·m or N].
+        load: The estimate of 0.1 s ago, shape (nv,) [N·m or N].
+    """
+
+    def __init__(self, nv: int, period: float) -> None:
+        """Begin without a load; ``period`` is that between two states [s]."""
+        self.bound, self.load = np.zeros((2, nv))
+        self._time = np.zeros(1)
+        self._v, self._driving, self._estimate = np.zeros((3, nv))
+        self._past = np.zeros((max(ceil(_BEFORE / period - 1e-9), 1), nv))
+        self._count: Indices = np.zeros(1, dtype=np.int64)
+
+    def permit(self, limits: Array) -> None:
+        """Set the bound by the efforts' limits, shape (nv,); none is known where inf.
+
+        Where no limit is known, no load is estimated.
+        """
+        self.bound[:] = np.where(np.isfinite(limits), _CONTACT * limits, 0.0)
+
+    def forget(self) -> None:
+        """Begin anew."""
+        for each in self._memory:
+            each[:] = 0
+
+    def go_on(self, before: "LoadEstimate") -> None:
+        """Go on where another estimate of the robot is."""
+        for mine, its in zip(self._memory, before._memory, strict=True):
+            mine[:] = its
+
+    @property
+    def _memory(self) -> tuple[Array | Indices, ...]:
+        numbers = self._time, self._v, self._driving, self._estimate, self._past
+        return *numbers, self._count, self.load
+
+    def call(self, state: RobotState, acts: Array) -> PartCall:
+        """Return the call that learns from a state; ``acts`` is its effort, (nv,)."""
+        return PartCall(
+            engine.EstimateLoad,
+            rate=_RATE,
+            longest_gap=_LONGEST_GAP,
+            time=state.time,
+            M=state.inertia,
+            v=state.v,
+            nonlinear_effects=state.effects,
+            acts=acts,
+            bound=self.bound,
+            last_time=self._time,
+            last_v=self._v,
+            driving=self._driving,
+            estimate=self._estimate,
+            past=self._past,
+            count=self._count,
+            load=self.load,
+        )
