@@ -67,9 +67,8 @@ def stopping(
     effort = Port("stop.tau", "N·m or N", "the effort that brakes, or holds", stop.tau)
     held = Port("stop.holding", "-", "whether it holds", stop.holding)
     rate = Port("stop.damping", "1/s", "how it brakes", np.array([gains.damping]))
-    load = Port(
-        "stop.load", "N·m or N", "what acted besides the efforts", stop.load.load
-    )
+    besides, unit = "what acts besides the efforts, as it was before", "N·m or N"
+    load = Port("stop.load", unit, besides, stop.load.load)
     move = engine.Move(**values | {"calls": calls})
     before = state.plan(stop.calls_before(acts)).steps()
     return Stopping(move, before, [effort, held, rate, load])
