@@ -52,8 +52,8 @@ class BoundStop:
     limits: damping that is clipped joint by joint can accelerate the robot.
 
     Hold: tau = g(q) - d - s M₀ (ω² (q ⊖ q₀) + 2 ω v) with M₀ at the configuration q₀
-    where the robot came to rest: the PD control with gravity compensation of Takegaki and
-    Arimoto (1981), stable for any inertia.
+    where the robot came to rest: the PD control with gravity compensation of Takegaki
+    and Arimoto (1981), stable for any inertia.
 
     A robot with a floating base stands on its feet meanwhile. A generalized force x is
     then the sum of the forces of joints and feet, x = Sᵀ tau + Jᵀ f. Its rows without

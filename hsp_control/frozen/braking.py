@@ -13,6 +13,7 @@ from hsp_control.control.controller import Controller
 from hsp_control.control.stop import BoundStop
 from hsp_control.control.stop import StopGains as StopGains
 from hsp_control.engine import Call, Move, Plan
+from hsp_control.engine.plans import Step
 from hsp_control.frozen.image import Port
 
 LIKE_LIVE = StopGains()
@@ -24,7 +25,7 @@ class Stopping(NamedTuple):
 
     move: Move
     """It, as one move."""
-    before: list[Call]
+    before: Sequence[Step]
     """What a step does for it at its end: it estimates the load."""
     outputs: list[Port]
     """What can be read of it."""
