@@ -11,7 +11,7 @@ from hsp_control.robot import RobotState
 
 _RATE = 3.0
 """Rate K of the low-pass [1/s]."""
-_BEFORE = 0.1
+_BEFORE = 0.2
 """How old the estimate is that is used [s]: what is wrong is found within this time,
 or is small."""
 _CONTACT = 0.3
@@ -29,12 +29,12 @@ class LoadEstimate:
 
     How much a wrong measurement leaves in it is bounded: an error x of the velocity is
     an impulse M x, and changes the estimate by K M x at most; one that begins less than
-    0.1 s before the stop by nothing. Frozen in the stop, that moves joints that are
+    0.2 s before the stop by nothing. Frozen in the stop, that moves joints that are
     braked by -k M v at K x / k: 0.15 x with k = 20 1/s.
 
     Attributes:
         bound: Largest load, shape (nv,) [N·m or N].
-        load: The estimate of 0.1 s ago, shape (nv,) [N·m or N].
+        load: The estimate of 0.2 s ago, shape (nv,) [N·m or N].
     """
 
     def __init__(self, nv: int, period: float) -> None:

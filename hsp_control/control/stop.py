@@ -42,17 +42,18 @@ Steeper ones, such as a wall, may only be pushed: the joints that are held do it
 class BoundStop:
     """The calls of a safe stop at a state, and what they remember.
 
-    Damping: tau = g(q) - d - s k M(q) v, with the load d that acted on the joints before
-    the stop (`LoadEstimate`; 0 where a robot floats, whose feet push it, too). The kinetic energy obeys T' = -s k vᵀM v. This is
-    negative for any true inertia of the robot, because the model's M is positive
-    definite. (Coriolis terms do no work; compensating them with a wrong model would.)
+    Damping: tau = g(q) - d - s k M(q) v, with the load d that acted on the joints
+    before the stop (`LoadEstimate`; 0 where a robot floats, whose feet push it, too).
+    Where d is right, the kinetic energy obeys T' = -s k vᵀM v. This is negative for any
+    true inertia of the robot, because the model's M is positive definite. (Coriolis
+    terms do no work; compensating them with a wrong model would.)
     With an exact model T falls like exp(-2 k t) for heavy and light joints alike, so
     that one gain k is enough. s, in [0, 1], scales the whole vector into the effort
     limits: damping that is clipped joint by joint can accelerate the robot.
 
-    Hold: tau = g(q) - d - s M₀ (ω² (q ⊖ q₀) + 2 ω v) with M₀ at the configuration q₀ where
-    the robot came to rest: the PD control with gravity compensation of Takegaki and
-    Arimoto (1981), stable for any inertia.
+    Hold: tau = g(q) - d - s M₀ (ω² (q ⊖ q₀) + 2 ω v) with M₀ at the configuration q₀
+    where the robot came to rest: the PD control with gravity compensation of Takegaki
+    and Arimoto (1981), stable for any inertia.
 
     A robot with a floating base stands on its feet meanwhile. A generalized force x is
     then the sum of the forces of joints and feet, x = Sᵀ tau + Jᵀ f. Its rows without

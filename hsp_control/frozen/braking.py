@@ -13,6 +13,7 @@ from hsp_control.control.controller import Controller
 from hsp_control.control.stop import BoundStop
 from hsp_control.control.stop import StopGains as StopGains
 from hsp_control.engine import Call, Move, Plan
+from hsp_control.engine.plans import Step
 from hsp_control.frozen.image import Port
 
 LIKE_LIVE = StopGains()
@@ -24,7 +25,7 @@ class Stopping(NamedTuple):
 
     move: Move
     """It, as one move."""
-    before: list[Call]
+    before: Sequence[Step]
     """What a step does for it at its end: it estimates the load."""
     outputs: list[Port]
     """What can be read of it."""
@@ -67,9 +68,8 @@ def stopping(
     effort = Port("stop.tau", "N·m or N", "the effort that brakes, or holds", stop.tau)
     held = Port("stop.holding", "-", "whether it holds", stop.holding)
     rate = Port("stop.damping", "1/s", "how it brakes", np.array([gains.damping]))
-    load = Port(
-        "stop.load", "N·m or N", "what acted besides the efforts", stop.load.load
-    )
+    besides, unit = "what acts besides the efforts, as it was before", "N·m or N"
+    load = Port("stop.load", unit, besides, stop.load.load)
     move = engine.Move(**values | {"calls": calls})
     before = state.plan(stop.calls_before(acts)).steps()
     return Stopping(move, before, [effort, held, rate, load])

@@ -82,6 +82,26 @@ def test_it_brakes_and_holds(payload: float, opened: Opened) -> None:
     assert np.abs(v).max() < 1e-4
 
 
+def test_it_goes_on_with_the_load_that_the_steps_showed(opened: Opened) -> None:
+    """The robot stands under the law's efforts: it carries what they carry."""
+    experiment = hsp.load_experiment("panda_limits")
+    assert experiment.controller.limits is not None
+    limits = np.array(experiment.controller.limits.effort)
+    expected = SafeStop(experiment.robot, StopSettings(), limits, H)
+    q, v = experiment.q0, np.zeros(7)
+    state = hsp.RobotState(experiment.robot)
+    for k in range(600):
+        assert opened.step(k * H, q, v) >= OK
+        expected.observe(state.update(k * H, q, v), opened.tau)
+    np.testing.assert_array_equal(opened.get("stop.load", 7), expected.load)
+    assert np.abs(expected.load).max() > 0.1
+    for k in range(600, 900):
+        opened.stop(k * H, q, v)
+        np.testing.assert_array_equal(opened.tau, expected.effort(state))
+    assert LIB.hsp_restart(opened.handle) == OK
+    np.testing.assert_array_equal(opened.get("stop.load", 7), 0.0)
+
+
 def test_joints_without_ends_are_held_too(tmp_path: Path) -> None:
     experiment = hsp.load_experiment("tiago_reach")
     controller, robot = experiment.controller, experiment.robot

@@ -1,0 +1,112 @@
+"""The load that a safe stop goes on with: how it is found, and what a lie leaves."""
+
+import numpy as np
+import pinocchio as pin
+import pytest
+from live_rigs import PERIOD, panda, start
+
+import hsp_control as hsp
+from hsp_control.common.arrays import Array
+from hsp_control.live.safe_stop import SafeStop
+from hsp_control.live.settings import StopSettings
+
+LIMITS = np.full(7, 100.0)
+"""So a load may be 30 N·m."""
+RATE, BEFORE = 3.0, 0.2
+"""Of the estimate [1/s], and how old it is when it is used [s]."""
+LOAD = np.array([0.0, 4.0, -1.0, -5.0, 0.2, -2.0, 0.1])
+ZERO = np.zeros(7)
+
+
+def stop(limits: Array = LIMITS) -> SafeStop:
+    return SafeStop(panda(), StopSettings(), limits, PERIOD)
+
+
+def observe(
+    safe: SafeStop, load: Array, states: int, v: Array = ZERO, begin: int = 0
+) -> None:
+    """Show states at one posture, which efforts and a load hold."""
+    state = panda().state(0.0, start(), v)
+    for k in range(begin, begin + states):
+        state.update(k * PERIOD, start(), v)
+        safe.observe(state, state.nonlinear_effects - load)
+
+
+def test_a_load_is_found_by_a_low_pass_and_used_later() -> None:
+    safe = stop()
+    late = round(BEFORE / PERIOD)
+    observe(safe, LOAD, late)
+    np.testing.assert_array_equal(safe.load, 0.0)
+    observe(safe, LOAD, 1000, begin=late)
+    found = 1.0 - (1.0 - RATE * PERIOD) ** 999
+    np.testing.assert_allclose(safe.load, found * LOAD, rtol=1e-9, atol=1e-12)
+    assert found > 0.9
+
+
+def test_a_load_is_bounded_by_that_of_a_contact() -> None:
+    for sign in (1.0, -1.0):
+        safe = stop()
+        observe(safe, sign * 1000.0 * np.ones(7), 1000)
+        np.testing.assert_array_equal(safe.load, sign * 0.3 * LIMITS)
+    unknown = stop(np.full(7, np.inf))  # nobody knows what is much there
+    observe(unknown, LOAD, 1000)
+    np.testing.assert_array_equal(unknown.load, 0.0)
+
+
+def test_a_wrong_velocity_leaves_a_bounded_load() -> None:
+    """An error x is an impulse M x, and leaves K M x at most: K x / k in the stop."""
+    safe, wrong = stop(), 0.5 * np.eye(7)[3]
+    observe(safe, ZERO, 300)
+    momentum = panda().state(0.0, start(), ZERO).mass_matrix @ wrong
+    late = round(BEFORE / PERIOD)
+    observe(safe, ZERO, late, v=wrong, begin=300)
+    np.testing.assert_allclose(safe.load, 0.0, atol=1e-12)
+    observe(safe, ZERO, 1, v=wrong, begin=300 + late)
+    np.testing.assert_allclose(safe.load, RATE * momentum, rtol=1e-9, atol=1e-12)
+    observe(safe, ZERO, 1000, v=wrong, begin=301 + late)
+    assert (np.abs(safe.load) < 0.1 * RATE * np.abs(momentum).max()).all()
+
+
+def test_nothing_is_learnt_across_a_gap() -> None:
+    safe = stop()
+    observe(safe, ZERO, 10)
+    observe(safe, ZERO, 300, v=np.ones(7), begin=40)  # 30 periods later
+    np.testing.assert_allclose(safe.load, 0.0, atol=1e-12)
+
+
+def test_a_new_run_forgets_the_load_and_a_stop_keeps_it() -> None:
+    safe = stop()
+    observe(safe, LOAD, 1000)
+    before = safe.load.copy()
+    safe.begin()
+    state = panda().state(1.0, start(), ZERO)
+    tau = safe.effort(state)
+    np.testing.assert_array_equal(safe.load, before)
+    np.testing.assert_allclose(tau, state.nonlinear_effects - before, rtol=1e-12)
+    safe.restart()
+    np.testing.assert_array_equal(safe.load, 0.0)
+    np.testing.assert_allclose(safe.effort(state), state.nonlinear_effects)
+
+
+@pytest.mark.parametrize("observed", [False, True])
+def test_an_arm_with_an_unknown_load_does_not_sink(observed: bool) -> None:
+    """At rest; without what was learnt before the stop it sinks."""
+    model = panda().model.copy()
+    hand = model.frames[model.getFrameId("panda_tcp")]
+    load = pin.Inertia(1.0, np.zeros(3), 1e-3 * np.eye(3))
+    model.appendBodyToJoint(hand.parentJoint, load, hand.placement)
+    loaded = hsp.Robot.from_pinocchio(model)
+    q, v, safe = start(), np.zeros(7), stop()
+    state = panda().state(0.0, q, v)
+    if observed:
+        held = loaded.inverse_dynamics(q, v, v)
+        observe(safe, state.nonlinear_effects - held, 1500)
+    safe.begin()
+    fastest = 0.0
+    for k in range(500):
+        tau = safe.effort(state.update(2.0 + k * PERIOD, q, v))
+        v = v + PERIOD * loaded.forward_dynamics(q, v, tau)
+        q = loaded.integrate(q, PERIOD * v)
+        fastest = max(fastest, float(np.abs(v).max()))
+    assert (fastest < 0.02) == observed, fastest
+    assert (fastest > 0.1) != observed, fastest
