@@ -128,9 +128,9 @@ class Mixture:
         Without a modifier it is one call, if it was bound; see `prepare`.
         """
         sets = [*self._sets(t)]
-        if modifier is None:
+        if modifier is None and self._bound:
             limits = self._limits.sets
-            key = tuple(each for _, each in sets), tuple(each for each, _ in limits)
+            key = tuple([each for _, each in sets]), tuple([each for each, _ in limits])
             if bound := self._bound.get(key):
                 shares = [share * of for share, _ in sets for _, of in limits]
                 if found := bound.make(t, shares):
