@@ -25,6 +25,7 @@ extensions = [
     "lecture",
 ]
 exclude_patterns = ["_build", "_site", "lecture"]
+suppress_warnings = ["toc.empty_glob"]  # companions may have been taken away
 smartquotes = False  # a prime is a rate
 default_role = "py:obj"  # a name in backticks is a link wherever it is one of ours
 

@@ -86,7 +86,8 @@ def tests_of(file: str) -> tuple[str, ...]:
     """Return the tests of a file's room; those of all rooms if it has none."""
     _, room, *rest = file.split("/")
     if room == "companions":
-        named = [f"tests/companions/{rest[0]}"]
+        own = f"hsp_control/companions/{rest[0]}/tests"
+        named = [own if (ROOT / own).is_dir() else f"tests/companions/{rest[0]}"]
     else:
         named = [f"tests/unit/{each}" for each in ROOMS.get(room, (room,))]
     there = tuple(each for each in named if (ROOT / each).is_dir())

@@ -11,6 +11,7 @@ from yaml_keys import yaml_page
 
 SCHEMA = "../configs/hsp_control.schema.json"
 BENCHMARKS = "../benchmarks"
+COMPANIONS = "../hsp_control/companions"
 
 
 def write(app: Sphinx) -> None:
@@ -30,26 +31,31 @@ def write(app: Sphinx) -> None:
         pages[f"results/{file.stem}"] = _page(file)
     for file in benchmarks.glob("companions/*/results.md"):
         pages[f"results/{file.parent.name}"] = _page(file)
-    (folder / "results").mkdir(exist_ok=True)
+    for file in (Path(app.srcdir) / COMPANIONS).glob("*/page.md"):
+        pages[f"companions/{file.parent.name}"] = _page(file)
+    for name in ("results", "companions"):
+        (folder / name).mkdir(exist_ok=True)
     for name, page in pages.items():
         path = folder / f"{name}.md"
         if not path.exists() or path.read_text() != page:  # Sphinx reads it again
             path.write_text(page)
+    for stale in (folder / "companions").glob("*.md"):  # of what was taken away
+        if f"companions/{stale.stem}" not in pages:
+            stale.unlink()
 
 
-def _page(results: Path) -> str:
-    """Return tables as a page, whose links to pages of the site are absolute."""
-    return re.sub(r"\]\((?:\.\./)+docs/", "](/", results.read_text(encoding="utf-8"))
+def _page(file: Path) -> str:
+    """Return a page from elsewhere, whose links to pages of the site are absolute."""
+    return re.sub(r"\]\((?:\.\./)+docs/", "](/", file.read_text(encoding="utf-8"))
 
 
 def _here(app: Sphinx, name: str, source: list[str]) -> None:
-    """Let links to tables of benchmarks lead to their pages in the site."""
-    pattern = r"\]\((?:\.\./)+benchmarks/(?:results/(\w+)|companions/(\w+)/results)\.md"
-    source[0] = re.sub(
-        pattern,
-        lambda found: f"](/reference/generated/results/{found[1] or found[2]}.md",
-        source[0],
-    )
+    """Let links to tables and pages outside of docs lead to their pages in the site."""
+    at = "](/reference/generated"
+    tables = r"\]\((?:\.\./)+benchmarks/(?:results/(\w+)|companions/(\w+)/results)\.md"
+    text = re.sub(tables, lambda f: f"{at}/results/{f[1] or f[2]}.md", source[0])
+    pages = r"\]\((?:\.\./)+hsp_control/companions/(\w+)/page\.md"
+    source[0] = re.sub(pages, rf"{at}/companions/\1.md", text)
 
 
 def setup(app: Sphinx) -> dict[str, bool]:

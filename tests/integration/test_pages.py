@@ -10,6 +10,7 @@ from places import ROOT, THOROUGH
 pytestmark = pytest.mark.filterwarnings("error:the first effort of joint:UserWarning")
 
 FOLDERS = ("docs", "docs/tutorial", "docs/how_to", "docs/companions")
+ELSEWHERE = "hsp_control/companions/*/page.md"
 PAGES = [
     "README.md",
     *sorted(
@@ -17,6 +18,7 @@ PAGES = [
         for folder in FOLDERS
         for page in (ROOT / folder).glob("*.md")
     ),
+    *sorted(page.relative_to(ROOT).as_posix() for page in ROOT.glob(ELSEWHERE)),
     "docs/development/engine.md",
 ]
 WITH_BLOCKS = [page for page in PAGES if blocks_of(page)]

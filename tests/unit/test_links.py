@@ -11,7 +11,10 @@ from pathlib import Path
 import pytest
 from places import ROOT
 
-PATTERNS = ("*.md", "*/*.md", "robots/*/*.md", "docs/**/*.md", "notebooks/*.ipynb")
+PATTERNS = (
+    *("*.md", "*/*.md", "robots/*/*.md", "docs/**/*.md", "notebooks/*.ipynb"),
+    "hsp_control/companions/*/*.md",
+)
 BUILT = ("_build", "generated")
 LINK = re.compile(r"\]\(([^)\s]+)\)|^\[[^\]]+\]: (\S+)|<img src=\"([^\"]+)\"", re.M)
 CODE = re.compile(r"^(```|~~~|::::?).*?^\1|`[^`\n]+`", re.M | re.S)
