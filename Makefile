@@ -27,7 +27,7 @@ help: ## list the targets
 
 # The bytecode of what these import is written, whatever the shell says: without it each
 # later start takes longer, and tests start hundreds of processes.
-demo test test-system thorough docs wheel-test: export PYTHONDONTWRITEBYTECODE :=
+demo without-python test test-system thorough docs wheel-test: export PYTHONDONTWRITEBYTECODE :=
 # Without the field its terms weigh nothing: both runs log the same distance.
 LOOK := --set 'title=The same hand path. Only one elbow avoids the ball.' \
   --set 'view.background="\#10171E"'

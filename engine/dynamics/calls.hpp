@@ -50,8 +50,7 @@ struct Carry {
 };
 
 struct ChangeGravity {
-  static constexpr const char* doc =
-      "Set gravity to the robot's own plus a change of it [m/s²].";
+  static constexpr const char* doc = "Set gravity to the robot's own plus a change of it [m/s²].";
   Shared<Dynamics> dynamics;
   In<3> change;
 

@@ -10,8 +10,7 @@
 namespace hsp {
 
 struct SelfMotions {
-  static constexpr const char* doc =
-      "Write φ_N of a and of a_damped, and their damping P K_N P v.";
+  static constexpr const char* doc = "Write φ_N of a and of a_damped, and their damping P K_N P v.";
   In<'m', 'n'> J, J_dot;
   In<'m'> a_x;
   In<'n', 'n'> W, L;

@@ -39,7 +39,8 @@ Bytes body_of(std::string_view content) {
 const Kind& kind_named(const Kind* const* kinds, const std::string& name) {
   for (; *kinds; ++kinds)
     if ((*kinds)->name == name) return **kinds;
-  throw std::runtime_error("it has calls of the kind " + name + ", which no step of this library makes");
+  throw std::runtime_error("it has calls of the kind " + name +
+                           ", which no step of this library makes");
 }
 
 const Kind& kind_named(const std::string& library, const std::string& name) {

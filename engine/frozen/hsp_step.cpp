@@ -215,7 +215,7 @@ const char* sentence(hsp_status status) {
     case HSP_BUSY:
       return "another thread uses this handle: open one for each thread";
     case HSP_WRONG_NAME:
-      return "there is no input or output of this name; hsp_port_at lists them";
+      return "there is no such input or output; hsp_port_at lists them, and which are inputs";
     case HSP_WRONG_SIZE:
       return "the input or output has another number of values, see hsp_port_of";
     case HSP_WRONG_VALUE:

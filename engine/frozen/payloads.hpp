@@ -40,7 +40,8 @@ struct Payloads {
   InOut<'k', 9> inertias;
   InOutInts<'k'> changes;  // their number: the first takes it up, the others put it down
   InOut<'k', 'm'> starts, ramps;
-  Scratch<1> carries;  // whether the dynamics have payloads
+  Scratch<1> carries;                     // whether the dynamics have payloads
+  static constexpr double largest = 1e6;  // of a mass, a center, an inertia
 
   void check() const {
     check_indices("joints", joints, dynamics->joints(), 1);
@@ -65,7 +66,7 @@ struct Payloads {
 
   // Whether a frame may carry this.
   template <class Values> static bool permits(const Values& body) {
-    if (!body.allFinite() || body[0] < 0.0) return false;
+    if (!(body.cwiseAbs().array() <= largest).all() || body[0] < 0.0) return false;
     const Eigen::SelfAdjointEigenSolver<Matrix3> solver(moments(body), Eigen::EigenvaluesOnly);
     const Vector3 principal = solver.eigenvalues();
     const double rounding = 1e-9 * principal[2];

@@ -72,7 +72,10 @@ class Robot {
       peer_size_ = sizeof peer_;
       const auto size =
           recvfrom(socket_, data, sizeof data, 0, reinterpret_cast<sockaddr*>(&peer_), &peer_size_);
-      if (size < 0) return false;
+      if (size < 0) {
+        if (newest_ == 0 && ++starting_ < 12) continue;  // the robot may take a minute to start
+        return false;
+      }
       if (static_cast<std::size_t>(size) < sizeof head + 4) continue;
       const std::size_t body = size - 4;
       std::uint32_t check;
@@ -110,6 +113,7 @@ class Robot {
  private:
   int socket_;
   std::uint64_t session_, newest_ = 0, sent_ = 0;
+  int starting_ = 0;  // how often no state has arrived yet
   sockaddr_in peer_{};
   socklen_t peer_size_ = sizeof peer_;
 };

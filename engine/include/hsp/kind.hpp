@@ -196,8 +196,8 @@ template <class T> std::vector<Field> fields() {
 
 // The table of a struct's members, made once.
 template <class T> const Kind& kind_of() {
-  static_assert(requires { T::doc; },
-                "a kind needs a description: static constexpr const char* doc");
+  static_assert(
+      requires { T::doc; }, "a kind needs a description: static constexpr const char* doc");
   static const std::vector<Field> fields = detail::fields<T>();
   static const Kind kind = {.name = detail::kept(detail::type_name<T>()),
                             .doc = T::doc,

@@ -292,6 +292,7 @@ def test_a_new_run_carries_nothing(tmp_path: Path) -> None:
     [
         (-1.0, [0.0, 0.0, 0.0]),
         (np.nan, [0.0, 0.0, 0.0]),
+        (1e300, [0.0, 0.0, 0.0]),
         (1.0, [0.1, 0.1, 0.3]),  # more about one axis than about both others
         (1.0, [-0.1, 0.1, 0.1]),
         (0.0, [0.1, 0.1, 0.1]),  # without mass
