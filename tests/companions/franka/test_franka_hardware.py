@@ -257,7 +257,7 @@ def test_a_load_that_the_robot_did_not_take_is_refused() -> None:
     taken = {"mass": 0.5, "center": [0.0, 0.0, 0.1], "inertia": [0.0] * 9}
     connection._check_load(settings, taken)
     for name, other in (("mass", 0.0), ("center", [0.0] * 3), ("inertia", [0.1] * 9)):
-        with pytest.raises(HardwareError, match=f"{name} .* after set_load"):
+        with pytest.raises(HardwareError, match=f"reports {name} .* set_load"):
             connection._check_load(settings, taken | {name: other})
 
 

@@ -124,7 +124,7 @@ def test_it_fails_if_its_page_dies(arguments: list[str]) -> None:
 
 
 @pytest.mark.parametrize(("arguments", "message"), [
-    (["--steer", "--robot=arm://x"], "say --steer hardware"),
+    (["--steer", "--robot=arm://x"], "use --steer hardware"),
     (["--port=7100"], "need --steer"),
 ])  # fmt: skip
 def test_what_makes_no_sense_is_refused(

@@ -66,7 +66,7 @@ def test_a_pose_has_its_orientation_and_a_plane_is_no_pose() -> None:
 @pytest.mark.parametrize(("address", "message"), [
     ("ros2://a?rate=0", r"the rate is '0'; needs a number above 0"),
     ("ros2://a?rate=fast", r"the rate is 'fast'; needs"),
-    ("ros2://a?rates=1", r"no option 'rates'; did you mean 'rate'\?"),
+    ("ros2://a?rates=1", r"unknown option 'rates'; did you mean 'rate'\?"),
 ])  # fmt: skip
 def test_mistakes_are_named(address: str, message: str) -> None:
     with pytest.raises(HardwareError, match=message):

@@ -59,7 +59,7 @@ def test_its_calls_read_what_is_written_later():
 def test_it_rests_where_the_robot_starts_until_it_is_fed():
     reference = Fed(3)
     assert reference.relative
-    with pytest.raises(TrajectoryError, match="nothing starts here"):
+    with pytest.raises(TrajectoryError, match="needs a start"):
         reference.anchored(None)
     with pytest.raises(TrajectoryError, match="has 3 coordinates; needs 2"):
         reference.anchored([1.0, 2.0])

@@ -270,7 +270,9 @@ def test_a_robots_model_gets_no_more_joints() -> None:
     robot = own.robot
     before = own.compute(0.0, robot.home(), np.zeros(NV)).tau.copy()
     joint = pin.JointModelRX(), pin.SE3.Identity(), "more"
-    with pytest.raises(ModelError, match=r"no more joints.*model = robot.model.copy"):
+    with pytest.raises(
+        ModelError, match=r"joints cannot be added.*model = robot.model.copy"
+    ):
         robot.model.addJoint(0, *joint)
     np.testing.assert_array_equal(
         own.compute(0.0, robot.home(), np.zeros(NV)).tau, before

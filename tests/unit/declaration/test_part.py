@@ -427,7 +427,7 @@ def test_what_python_shows_of_a_part() -> None:
     )
     assert TypeAdapter(Ball).json_schema()["description"] == "A round one."
     assert len(str(inspect.signature(StreamPose))) < 650
-    assert "policy: How waypoints are followed." in str(StreamPose.__doc__)
+    assert "policy: The way in which waypoints are followed." in str(StreamPose.__doc__)
 
 
 def test_docstrings_of_fields_are_inherited() -> None:
@@ -447,7 +447,7 @@ def test_docstrings_of_fields_are_inherited() -> None:
         "label": label, "radius": "Radius, at most 1 cm [m].", "center": "Center [m]."
     }  # fmt: skip
     assert Ball.documentation["radius"] == "Radius [m]."
-    assert Circle.documentation["origin"].startswith("What the points are counted from")
+    assert Circle.documentation["origin"].startswith("Origin of the points")
     scope: dict[str, Any] = {"Part": Part, "__name__": "typed_in"}
     exec('class Typed(Part):\n    a: float\n    """A [-]."""', scope)
     assert scope["Typed"].documentation == {}  # without source text

@@ -497,7 +497,7 @@ def test_a_declaration_moves_nothing_and_says_who_does(kind: Any) -> None:
 
 
 def test_a_stream_that_hears_something_else_cannot_be_sent_to() -> None:
-    with pytest.raises(StreamError, match=r"listens to goals\.jsonl; only"):
+    with pytest.raises(StreamError, match=r"receives from goals\.jsonl"):
         Stream([0.0], source="goals.jsonl").anchored(None).run.send([0.0])
 
 
