@@ -1,7 +1,9 @@
 // What acts on the joints besides their efforts: a safe stop goes on with what it was before.
 #pragma once
 #include <algorithm>
+#include <cstdlib>
 #include <hsp/kind.hpp>
+#include <stdexcept>
 
 namespace hsp {
 
@@ -23,6 +25,9 @@ struct EstimateLoad {
   Out<'n'> load;
   Scratch<'n'> change, rest;
 
+  void check() const {
+    if (!past.rows()) throw std::invalid_argument("past needs a row at least");
+  }
   void operator()() {
     const double passed = time[0] - last_time[0];
     if (count[0] && passed > 0.0 && passed <= longest_gap) {
@@ -36,7 +41,7 @@ struct EstimateLoad {
     last_v = v;
     last_time = time;
     driving = acts - nonlinear_effects;
-    const Index at = count[0] % past.rows();
+    const Index at = std::abs(count[0] % past.rows());
     load = past.row(at).transpose().cwiseMax(-bound).cwiseMin(bound);
     past.row(at) = estimate.transpose();
     ++count[0];

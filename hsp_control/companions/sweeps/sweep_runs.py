@@ -254,9 +254,8 @@ def _row(future: Any, result: Any) -> "Row":
 
     from hsp_control.companions.sweeps.one_run import CRASHED, Row
 
-    if future.status == "finished":
-        row: Row = result
-        return row
+    if isinstance(result, Row):
+        return result  # whatever has become of its worker since then
     if future.status in ("cancelled", "lost"):
         raise SweepError(
             "the scheduler does not answer any more; the same command resumes the sweep"

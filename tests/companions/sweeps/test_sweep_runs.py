@@ -10,6 +10,7 @@ import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -24,7 +25,7 @@ from sweep_runs import MOVING, OVER, QUICK
 import hsp_control as hsp
 from hsp_control.common.exceptions import ConfigError, HspControlError, SweepError
 from hsp_control.companions.sweeps import Sweep, cluster, sweep_runs
-from hsp_control.companions.sweeps.one_run import computed
+from hsp_control.companions.sweeps.one_run import Row, computed
 from hsp_control.companions.sweeps.row_files import RowFiles, read_rows
 
 # Some tenths of a second each.
@@ -293,7 +294,7 @@ def test_a_dead_scheduler_keeps_the_rows_and_the_same_command_ends_it(
     dying.wait()
     worker.wait()
     assert process.returncode == 2, errors.decode()
-    assert b"the scheduler is gone" in errors
+    assert b"the scheduler does not answer" in errors
     assert b"Traceback" not in errors
     finish(out, Sweep.load(out), whole, scheduler)
 
@@ -489,6 +490,14 @@ def test_a_run_that_takes_too_long_is_a_row_and_tried_again_another_time(
 def test_a_time_limit_is_positive(limit: float) -> None:
     with pytest.raises(SweepError, match=r"time_limit is .* must be positive"):
         hsp.sweeps.sweep(MOVING, {"null_space.gain": [1, 2]}, time_limit=limit)
+
+
+def test_a_row_that_has_arrived_stays_whatever_becomes_of_its_worker() -> None:
+    """Which the next run may kill before anybody looks at the future."""
+    row = Row(2, "completed", "")
+    assert sweep_runs._row(SimpleNamespace(status="cancelled"), row) is row
+    with pytest.raises(SweepError, match="the scheduler does not answer"):
+        sweep_runs._row(SimpleNamespace(status="cancelled"), None)
 
 
 def test_what_is_no_exception_is_a_row() -> None:
