@@ -99,7 +99,7 @@ bench: $(STAMP) $(ENGINE) ## compare with other controllers, in .venv-peers
 	@.venv-peers/bin/python -W "ignore:to-Python converter" benchmarks/side_by_side.py
 	@.venv-peers/bin/python -W "ignore:to-Python converter" \
 	  benchmarks/whole_body_side_by_side.py
-	@.venv-peers/bin/python -W "ignore:to-Python converter" benchmarks/companions/walking/walking_side_by_side.py
+	@.venv-peers/bin/python -W "ignore:to-Python converter" hsp_control/companions/walking/benchmark/walking_side_by_side.py
 	@.venv-peers/bin/python -W "ignore:to-Python converter" benchmarks/limit_side_by_side.py
 	@.venv-peers/bin/python -W "ignore:to-Python converter" benchmarks/scaling.py
 

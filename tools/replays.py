@@ -38,7 +38,7 @@ def main() -> None:
     known = bundled_configs()
     names = [name for name in sys.argv[1:] if name != "--brief"]
     brief = len(names) < len(sys.argv) - 1
-    for name in names or REPLAYS:
+    for name in names or filter(known.__contains__, REPLAYS):
         page = FOLDER / f"{name.replace('/', '-')}.html"
         if page.exists() and page.stat().st_mtime > known[name].stat().st_mtime:
             continue

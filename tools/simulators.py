@@ -35,7 +35,7 @@ def main() -> int:
         "pytest",
         "-W",
         "ignore",
-        "tests/companions/simulators",
+        "hsp_control/companions/simulators/tests",
     ]
     return subprocess.run([*command, *sys.argv[1:]], cwd=ROOT, check=False).returncode
 

@@ -1,6 +1,6 @@
 """Robots, simulated robots, targets and watchers on ROS 2's topics.
 
-See docs/companions/ros2.md. Messages go over DDS, as those of ROS 2, without an
+See hsp_control/companions/ros2/page.md. Messages go over DDS, as those of ROS 2, without an
 installed ROS 2. Only `address`, `installed` and `backend` may be imported without
 Cyclone DDS, which the extra `hsp_control[ros2]` installs.
 """

@@ -161,7 +161,7 @@ class Follower:
     """Reads the newest state of a controller, and writes the row that a copy computes.
 
     The loop waits at most for the copying of a state, and for the interpreter's lock
-    while a row is written; see ``benchmarks/companions/watching.py``.
+    while a row is written; see ``hsp_control/companions/viewer/benchmark/watching.py``.
     """
 
     _begun: bool
