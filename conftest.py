@@ -71,6 +71,12 @@ def may_be_of_the_system(file: Path) -> bool:
     return SYSTEM in file.parents or bool(STARTS_OTHERS.search(file.read_text("utf-8")))
 
 
+def taken_away(companion: str) -> bool:
+    """Return whether neither a folder nor a file of this name is among companions."""
+    folder = COMPANIONS / companion
+    return not (folder.is_dir() or folder.with_suffix(".py").is_file())
+
+
 def pytest_ignore_collect(collection_path: Path, config: pytest.Config) -> bool | None:
     """Import no file for `make test-system` that has nothing for it: most have not.
 
@@ -81,7 +87,7 @@ def pytest_ignore_collect(collection_path: Path, config: pytest.Config) -> bool 
     if config.option.markexpr == "system" and not may_be_of_the_system(collection_path):
         return True
     needed = NEEDED.findall(collection_path.read_text("utf-8"))
-    return None if all((COMPANIONS / each).exists() for each in needed) else True
+    return True if any(map(taken_away, needed)) else None
 
 
 @pytest.hookimpl(tryfirst=True)  # others choose by it

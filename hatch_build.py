@@ -180,7 +180,7 @@ def wheel_tag(library: str) -> str:
 
 
 def configs_of_companions() -> dict[str, str]:
-    """Return where the configurations of companions are in a wheel: beside the others."""
+    """Return where a wheel has the configurations of companions: beside others."""
     return {
         str(file): f"hsp_control/data/configs/{file.relative_to(folder)}"
         for folder in sorted(ROOT.glob("hsp_control/companions/*/configs"))
@@ -189,7 +189,7 @@ def configs_of_companions() -> dict[str, str]:
 
 
 class EngineHook(BuildHookInterface):  # type: ignore[misc]
-    """Builds the engine where a wheel is built, also an editable one; adds configurations."""
+    """Builds the engine where a wheel is built, also an editable one."""
 
     def dependencies(self) -> list[str]:
         """Return what is needed besides what pyproject.toml says."""

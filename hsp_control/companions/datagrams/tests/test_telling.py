@@ -8,13 +8,13 @@ import socket
 import subprocess
 from collections.abc import Iterator
 from contextlib import suppress
+from pathlib import Path
 from threading import Thread
 
 import numpy as np
 import pytest
 from live_rigs import Rig, start
 from loaded_robots import panda
-from places import ROOT
 
 import hsp_control as hsp
 from hsp_control.common.exceptions import HardwareError
@@ -88,9 +88,7 @@ def test_it_tells_what_a_policy_needs(states: socket.socket) -> None:
 
 
 def test_the_page_s_client_hears_and_answers(capsys: pytest.CaptureFixture) -> None:
-    page = (ROOT / "hsp_control/companions/datagrams/policies.md").read_text(
-        encoding="utf-8"
-    )
+    page = (Path(__file__).parents[1] / "policies.md").read_text(encoding="utf-8")
     (client,) = re.findall(r"^```python\n(.*?)^```", page, re.MULTILINE | re.DOTALL)
     assert len(client.splitlines()) <= 12
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as goals:

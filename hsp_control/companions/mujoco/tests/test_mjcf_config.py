@@ -7,7 +7,6 @@ from typing import Any
 import numpy as np
 import pytest
 from mjcf_texts import CELL
-from places import ROOT
 from wording import wording
 
 from hsp_control import Robot, load_experiment
@@ -84,7 +83,7 @@ def test_the_plant_may_be_another_mjcf_or_no_mjcf(folder: Path) -> None:
 def test_the_examples_of_the_documentation_run(
     folder: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    text = (ROOT / "hsp_control/companions/mujoco/page.md").read_text(encoding="utf-8")
+    text = (Path(__file__).parents[1] / "page.md").read_text(encoding="utf-8")
     (folder / "scene.xml").write_text(CELL)
     monkeypatch.chdir(folder)
     blocks = re.findall(r"```(python|yaml)\n(.*?)```", text, flags=re.DOTALL)

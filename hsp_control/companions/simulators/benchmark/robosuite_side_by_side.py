@@ -1,13 +1,14 @@
-"""robosuite's OSC_POSE and this law's HSP_POSE in robosuite's own environment.
+r"""robosuite's OSC_POSE and this law's HSP_POSE in robosuite's own environment.
 
     make sims    # makes .venv-sims
-    .venv-sims/bin/python hsp_control/companions/simulators/benchmark/robosuite_side_by_side.py
+    .venv-sims/bin/python \
+        hsp_control/companions/simulators/benchmark/robosuite_side_by_side.py
 
 A Panda in the environment Lift, 500 steps of the simulation a second, goals as absolute
 poses. Circle: 0.1 m at 2 rad/s, turning by ±0.3 rad about the vertical, five turns. Set
 point: 5 cm aside, 5 cm up and 0.2 rad, at once. Both controllers have the gains of
 OSC_POSE (kp = 150, critically damped), and its attraction to the first posture. Writes
-a table into hsp_control/companions/simulators/benchmark/results.md.
+a table into results.md.
 """
 
 import logging

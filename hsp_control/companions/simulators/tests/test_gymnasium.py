@@ -13,7 +13,6 @@ import pytest
 import yaml
 from arm_environment import STRONGEST, ArmEnv
 from gymnasium.utils.env_checker import check_env
-from places import ROOT
 
 from hsp_control.common.exceptions import (
     ControllerError,
@@ -145,9 +144,7 @@ def test_what_does_not_fit_is_refused(tmp_path: Path, arm: ArmEnv) -> None:
 
 
 def test_what_the_page_shows_runs() -> None:
-    text = (ROOT / "hsp_control/companions/simulators/page.md").read_text(
-        encoding="utf-8"
-    )
+    text = (Path(__file__).parents[1] / "page.md").read_text(encoding="utf-8")
     _, snippet = re.findall(r"^```python\n(.*?)^```", text, re.MULTILINE | re.DOTALL)
     space: dict[str, Any] = {}
     exec(compile(snippet, "simulators.md", "exec"), space)

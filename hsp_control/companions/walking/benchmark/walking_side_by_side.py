@@ -1,11 +1,12 @@
-"""Compare this law with TSID while Talos stands and walks under the same plan.
+r"""Compare this law with TSID while Talos stands and walks under the same plan.
 
-    .venv-peers/bin/python hsp_control/companions/walking/benchmark/walking_side_by_side.py
+    .venv-peers/bin/python \
+        hsp_control/companions/walking/benchmark/walking_side_by_side.py
 
 Both stand in the same closed loop on MuJoCo: the plan gets the measurement of the
 period, writes references and switches contacts, and the controller follows. Times of a
 step are taken in one run, of all controllers in turn at each of its states. Writes a
-section of hsp_control/companions/walking/benchmark/results.md.
+section of results.md.
 """
 
 # ruff: noqa: E402

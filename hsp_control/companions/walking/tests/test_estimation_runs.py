@@ -1,12 +1,12 @@
 """Robots walk and trot on an estimated base, with a noisy unit, on MuJoCo."""
 
 import re
+from pathlib import Path
 from unittest.mock import patch
 
 import numpy as np
 import pytest
 import yaml
-from places import ROOT
 
 from hsp_control import load_experiment
 from hsp_control.control.compensation import CompensatedController
@@ -66,9 +66,7 @@ def test_solo_trots_on_an_estimated_base_and_again_the_same(tmp_path):
 
 
 def test_the_page_s_yaml_runs():
-    text = (ROOT / "hsp_control/companions/walking/estimation.md").read_text(
-        encoding="utf-8"
-    )
+    text = (Path(__file__).parents[1] / "estimation.md").read_text(encoding="utf-8")
     (given,) = re.findall(r"^```yaml\n(.*?)^```", text, re.MULTILINE | re.DOTALL)
     data = yaml.safe_load(given)
     data["simulation"]["duration"] = 0.05

@@ -3,11 +3,12 @@
 import re
 from functools import cache
 from math import radians, tan
+from pathlib import Path
 
 import numpy as np
 import pytest
 import yaml
-from places import IF_THOROUGH, ROOT
+from places import IF_THOROUGH
 from ramps import ramp
 
 from hsp_control import Rollout, load_experiment
@@ -140,7 +141,7 @@ def test_a_push_that_one_sole_does_not_hold_is_held_by_both():
 
 @pytest.mark.slow
 def test_the_page_s_yaml_and_python_run():
-    text = (ROOT / "hsp_control/companions/walking/page.md").read_text(encoding="utf-8")
+    text = (Path(__file__).parents[1] / "page.md").read_text(encoding="utf-8")
     yaml_text, felt = re.findall(r"^```yaml\n(.*?)^```", text, re.MULTILINE | re.DOTALL)
     (snippet,) = re.findall(r"^```python\n(.*?)^```", text, re.MULTILINE | re.DOTALL)
     assert len(yaml_text.splitlines()) <= 10
