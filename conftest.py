@@ -39,7 +39,8 @@ collect_ignore_glob = [
 
 ROOT = Path(__file__).parent
 COMPANIONS = ROOT / "hsp_control" / "companions"
-sys.path += map(str, sorted(COMPANIONS.glob("*/tests/support")))
+SUPPORT = sorted(COMPANIONS.glob("*/tests/support"))
+sys.path += map(str, SUPPORT)
 
 gc.disable()  # while tests are collected: of what they are made of nothing is garbage
 
@@ -62,13 +63,25 @@ def pytest_sessionfinish() -> None:
 
 SYSTEM = ROOT / "tests" / "system"
 STARTS_OTHERS = re.compile(r"mark\.(process|browser|system)\b")
-NEEDED = re.compile(r"^(?:from|import) hsp_control\.companions\.(\w+)", re.MULTILINE)
+IMPORTED = re.compile(
+    r"^(?:from|import) (?:hsp_control\.companions\.(\w+)|(\w+) import)", re.MULTILINE
+)
 
 
 @cache
 def may_be_of_the_system(file: Path) -> bool:
     """Return whether a file of tests can have those of `make test-system`."""
     return SYSTEM in file.parents or bool(STARTS_OTHERS.search(file.read_text("utf-8")))
+
+
+@cache
+def needed(file: Path) -> frozenset[str]:
+    """Return the companions that a file of tests imports, also by its helpers."""
+    found = IMPORTED.findall(file.read_text("utf-8"))
+    folders = [ROOT / "tests" / "support", *SUPPORT]
+    helpers = [folder / f"{name}.py" for _, name in found if name for folder in folders]
+    theirs = (needed(helper) for helper in helpers if helper.is_file())
+    return frozenset(name for name, _ in found if name).union(*theirs)
 
 
 def taken_away(companion: str) -> bool:
@@ -86,8 +99,7 @@ def pytest_ignore_collect(collection_path: Path, config: pytest.Config) -> bool 
         return None
     if config.option.markexpr == "system" and not may_be_of_the_system(collection_path):
         return True
-    needed = NEEDED.findall(collection_path.read_text("utf-8"))
-    return True if any(map(taken_away, needed)) else None
+    return True if any(map(taken_away, needed(collection_path))) else None
 
 
 @pytest.hookimpl(tryfirst=True)  # others choose by it
