@@ -51,7 +51,7 @@ def checkout(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 def built_on(companion: str) -> set[str]:
     """Return a companion and those that import it."""
-    graph = grimp.build_graph("hsp_control")
+    graph = grimp.build_graph("hsp_control", cache_dir=None)
     package = f"hsp_control.companions.{companion}"
     importers = graph.find_downstream_modules(package, as_package=True)
     return {companion} | {each.split(".")[2] for each in importers

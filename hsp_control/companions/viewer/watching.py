@@ -17,8 +17,7 @@ from hsp_control.companions.viewer.transport import LOOPBACK, open_browser
 from hsp_control.config import Recorder
 from hsp_control.config.recorder import declaration_of
 from hsp_control.config.scenario import ViewSettings
-from hsp_control.control.changes import Change
-from hsp_control.control.controller import Controller
+from hsp_control.control.interface import Change, Controller
 from hsp_control.declaration.plain_data import plain_data
 from hsp_control.simulation.log_writer import LogWriter
 
