@@ -12,7 +12,8 @@ import subprocess
 import sys
 from pathlib import Path
 
-ROOT = Path(__file__).resolve().parent.parent
+HERE = Path(__file__).resolve().parent
+ROOT = HERE.parents[3]
 ALONE = ["robosuite==1.5.2"]
 BESIDE = ["mujoco==3.3.7", "opencv-python-headless", "pillow", "termcolor", "tqdm"]
 TESTS = ["hypothesis", "pytest>=8", "pytest-timeout"]
@@ -29,14 +30,7 @@ def main() -> int:
     """Install everything, and return the exit code of the tests."""
     pip("--editable", str(ROOT), *BESIDE, *TESTS)
     pip("--no-deps", *ALONE)
-    command = [
-        sys.executable,
-        "-m",
-        "pytest",
-        "-W",
-        "ignore",
-        "hsp_control/companions/simulators/tests",
-    ]
+    command = [sys.executable, "-m", "pytest", "-W", "ignore", str(HERE)]
     return subprocess.run([*command, *sys.argv[1:]], cwd=ROOT, check=False).returncode
 
 
