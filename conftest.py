@@ -64,7 +64,8 @@ def pytest_sessionfinish() -> None:
 SYSTEM = ROOT / "tests" / "system"
 STARTS_OTHERS = re.compile(r"mark\.(process|browser|system)\b")
 IMPORTED = re.compile(
-    r"^(?:from|import) (?:hsp_control\.companions\.(\w+)|(\w+) import)", re.MULTILINE
+    r"^(?:from|import) (?:hsp_control\.companions\.(\w+)|(\w+)(?: import|$))",
+    re.MULTILINE,
 )
 
 

@@ -50,11 +50,16 @@ def checkout(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def built_on(companion: str) -> set[str]:
-    """Return a companion and those that import it."""
+    """Return a companion, and those that import it or name it in a configuration."""
     graph = grimp.build_graph("hsp_control", cache_dir=None)
     package = f"hsp_control.companions.{companion}"
     importers = graph.find_downstream_modules(package, as_package=True)
-    return {companion} | {each.split(".")[2] for each in importers
+    named = {
+        file.relative_to(ROOT / FOLDER).parts[0]
+        for file in (ROOT / FOLDER).glob("*/configs/**/*.yaml")
+        if f"type: {companion}" in file.read_text(encoding="utf-8")
+    }
+    return {companion} | named | {each.split(".")[2] for each in importers
                           if each.startswith("hsp_control.companions.")}  # fmt: skip
 
 
