@@ -2,7 +2,7 @@
 
     .venv/bin/python benchmarks/forces.py
 
-Runs configs/forces/ with other forces, speeds, masses and friction coefficients, and a
+Runs the configurations forces/* with other forces, speeds, masses and friction coefficients, and a
 ball without any controller. Writes the tables of benchmarks/results/forces.md.
 """
 

@@ -64,7 +64,7 @@ def commands(text: str) -> list[list[str]]:
 
 PAGES = sorted(
     page.relative_to(ROOT).as_posix()
-    for folder in ("docs", "robots", "examples")
+    for folder in ("docs", "robots", "examples", "hsp_control/companions")
     for page in (ROOT / folder).rglob("*.md")
     if not {"_build", "generated"} & set(page.parts)
     and commands(page.read_text(encoding="utf-8"))
@@ -95,7 +95,7 @@ def test_the_compensators_of_the_document_are_a_configuration() -> None:
 
 
 def test_the_view_s_document_is_true() -> None:
-    text = (ROOT / "docs/companions/view.md").read_text(encoding="utf-8")
+    text = (ROOT / "hsp_control/companions/viewer/page.md").read_text(encoding="utf-8")
     (view,) = blocks(text, "yaml")
     configuration = {**yaml.safe_load(view), **yaml.safe_load(SMALL)}
     assert load_experiment(configuration).scenario.view.show.ellipsoid
@@ -117,7 +117,9 @@ def test_the_export_s_document_is_true(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.chdir(tmp_path)
-    text = (ROOT / "docs/companions/export.md").read_text(encoding="utf-8")
+    text = (ROOT / "hsp_control/companions/viewer/export.md").read_text(
+        encoding="utf-8"
+    )
     known = command_line().parse_args(["export", "log.npz"])
     for option in re.findall(r"`--(?:no-)?(\w+)`", text):
         assert {"from": "first", "to": "last"}.get(option, option) in vars(known)

@@ -9,8 +9,8 @@ from places import ROOT, THOROUGH
 # No page starts a robot with a jump of its effort.
 pytestmark = pytest.mark.filterwarnings("error:the first effort of joint:UserWarning")
 
-FOLDERS = ("docs", "docs/tutorial", "docs/how_to", "docs/companions")
-ELSEWHERE = "hsp_control/companions/*/page.md"
+FOLDERS = ("docs", "docs/tutorial", "docs/how_to")
+ELSEWHERE = "hsp_control/companions/*/*.md"
 PAGES = [
     "README.md",
     *sorted(
