@@ -46,7 +46,7 @@ class CheckedSource(Protocol):
     """Where the checked data come from."""
 
     def __contains__(self, path: KeyPath) -> bool:
-        """Say whether there is a value at the key path."""
+        """Return whether there is a value at the key path."""
 
     def mark(self, path: KeyPath) -> tuple[int, ...] | None:
         """Return the place of a key path in the text, None if there is no text."""
