@@ -239,13 +239,16 @@ class Play {
     this.keepInSight(sight);
   }
 
-  // The camera moves back where a target has left the picture, unless the user has turned it.
+  // The camera moves back where a target comes to the edge of the picture, unless the user has
+  // turned it.
   keepInSight(sight) {
     if (this.hand.grip || this.bar.past.looking) return;
-    const {left, right, top, bottom} = sight.box, low = bottom - barHeight;
+    const {left, right, top, bottom, width, height} = sight.box;
+    const edge = 0.08 * Math.min(width, height), low = bottom - barHeight;
+    const within = (x, one, other) => x > one + edge && x < other - edge;
     const out = [...this.gizmos.values()].filter(({noun, position}) => {
       const {x, y, ahead} = sight.project(position);
-      return noun === "Target" && !(ahead && x > left && x < right && y > top && y < low);
+      return noun === "Target" && !(ahead && within(x, left, right) && within(y, top, low));
     });
     if (out.length) requestAnimationFrame(() => views.widen(out.map(({position}) => position)));
   }
