@@ -46,9 +46,9 @@ class CompensatedStep:
             own: The controller, whose step is bound.
             bound: Its step.
             compensation: The compensators.
-            delivered: Where what is delivered is written.
+            delivered: The array into which the delivered effort is written.
             period: How long each effort is held, shape (1,) [s].
-            sending: What records that it was sent.
+            sending: The call that records the effort as sent.
 
         Raises:
             FreezeError: If a compensator is computed in Python.
@@ -87,7 +87,7 @@ class CompensatedStep:
             self.stages.append(calls)
 
     def move(self) -> Move:
-        """Return the step as one move, of what is measured."""
+        """Return the step as one move from the measured state."""
         state, bound, shared = self._state, self._bound, self._shared
         time, q, v = self._measured
         moved = [

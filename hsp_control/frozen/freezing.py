@@ -90,10 +90,10 @@ def _image(
     payloads: Sequence[str] | None,
     stop: StopGains,
 ) -> Image:
-    """Return a step as one move, and what has a name outside of it.
+    """Return a step as one move, and its named inputs and outputs.
 
     Args:
-        own: A controller at the beginning of its run, which is used up.
+        own: A controller at the beginning of its run; it is of no use afterwards.
         compensation: As of `freeze`.
         period: As of `freeze`.
         start: As of `freeze`.
@@ -145,7 +145,7 @@ def _image(
 
 
 def _bare(bound: BoundStep, delivered: DeliveredAlone, sending: PartCalls) -> Move:
-    """Return a step that also decides what is delivered, and records that it is."""
+    """Return a step that also selects the delivered effort, and records it."""
     state = bound.state
     after = bound.actuation.calls_alone(delivered)
     values, recorded = bound.move.values, OnlyIf(sending, delivered.delivered)
@@ -156,7 +156,7 @@ def _bare(bound: BoundStep, delivered: DeliveredAlone, sending: PartCalls) -> Mo
 def _ports(
     own: Controller, bound: BoundStep, delivered: DeliveredAlone, period: Array
 ) -> Iterator[Port]:
-    """Yield what can be set, or read after a step."""
+    """Yield the inputs, and the outputs of a step."""
     effort, rate = "N·m or N", "rad/s² or m/s²"
     yield Port("tau", effort, "the last delivered effort", delivered.tau)
     yield Port(

@@ -1,4 +1,4 @@
-"""What a program sets while a frozen controller runs: gains, K_N, and targets.
+"""The inputs of a frozen controller while it runs: gains, K_N, and targets.
 
 Gains are as on a controller's time line: they crossfade to a new value, and go on from
 what is then in force; see `Evolution`, and ``engine/frozen/evolve.hpp``. An impedance
@@ -159,7 +159,7 @@ def _forces(own: Controller) -> Iterator[Input]:
 def model_inputs(
     own: Controller, bound: BoundStep, carrying: Sequence[str] | None
 ) -> Iterator[Input]:
-    """Yield gravity, and what frames carry.
+    """Yield gravity, and the payloads of frames.
 
     Args:
         own: The controller.
@@ -261,7 +261,7 @@ def _evolving(
 def _evolution(
     x: Array, least: float, most: float, definite: int = 0
 ) -> dict[str, Any]:
-    """Return the arguments of an Evolve that begins with what x is."""
+    """Return the arguments of an Evolve that begins at the present x."""
     return {
         "initial": x.copy(),
         "targets": np.zeros((_MOST, len(x))),

@@ -1,4 +1,4 @@
-"""What of a controller cannot run without Python, and where it was declared."""
+"""The parts of a controller that cannot run without Python, with their keys."""
 
 from collections.abc import Iterator
 
@@ -58,7 +58,7 @@ def check_steady(own: Controller) -> None:
 
 
 def check_stack(own: Controller, bound: BoundStep, compensators: bool) -> None:
-    """Check what a step has bound: that contacts hold all of the base.
+    """Check that the contacts of a bound step constrain every motion of the base.
 
     Args:
         own: The controller.
@@ -125,7 +125,7 @@ def check_parts(own: Controller) -> None:
 
 
 def _plans_of(own: Controller, state: RobotState) -> Iterator[tuple[Path, StepPlan]]:
-    """Yield the key of each part of the law, and its calls, of no further use."""
+    """Yield the key of each part of the law, and its calls, for checks only."""
     nv, form = own.robot.nv, own.metric.form
     for task in own.tasks:
         if task.followed is not None:

@@ -616,6 +616,28 @@ def test_a_picture_is_a_file_of_what_is_seen(page: Any) -> None:
 
 
 @pytest.mark.browser
+def test_the_bar_stands_beside_the_panel(page: Any) -> None:
+    bar, panel = (
+        page.locator(name).bounding_box() for name in (".play-bar", ".play-panel")
+    )
+    assert bar["x"] >= 0
+    assert bar["x"] + bar["width"] <= panel["x"]
+    box = "document.querySelector('.play-bar').getBoundingClientRect()"
+    assert page.evaluate(f"barHeight === innerHeight - {box}.top")
+
+
+@pytest.mark.browser
+def test_a_target_that_moves_out_of_the_picture_stays_in_sight(page: Any) -> None:
+    page.evaluate("window.first = views.command; views.begin(first)")  # not turned
+    far = [0.4, -2.2, 0.0, 0.0, 0.0, 0.0, 1.0]
+    assert not 0.0 < pixel(page, far)[1] < 500.0
+    tell(page, "play_targets", poses={"hand": far})
+    inside = f"(({PIXEL})({far[:3]}))[1]"
+    until(page, f"{inside} > 0 && {inside} < innerHeight - barHeight")
+    page.evaluate("views.begin(window.first)")
+
+
+@pytest.mark.browser
 def test_without_a_graphics_card_it_draws_lightly_and_says_so(page: Any) -> None:
     if not page.evaluate("isSoftware()"):
         pytest.skip("this browser has a graphics card")
