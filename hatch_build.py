@@ -133,7 +133,10 @@ def _built(kind: str, place: Path) -> Path:
     environment = os.environ | {"PATH": path}
     if compiler() is None:
         environment.pop("CXX", None)
-    for command in ([*configure, *options], ["cmake", "--build", str(place)]):
+    make = ["cmake", "--build", str(place)]
+    if kind != "Release":  # Python's alone
+        make += ["--target", "_engine"]
+    for command in ([*configure, *options], make):
         done = subprocess.run(
             command, capture_output=True, text=True, check=False, env=environment
         )
