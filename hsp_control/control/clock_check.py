@@ -41,7 +41,7 @@ class ClockCheck:
                 f"a change at t = {at:.10g} s begins in {(at - now) / 86400.0:.0f} "
                 "days: times count from the first step; for now it is "
                 "at(controller.state.t)",
-                of=6,  # whoever calls a method of `Controller.at`
+                of=7,  # whoever calls a method of `Controller.at`
             )
 
     def look(self, t: float, period: float, stamp: int) -> None:

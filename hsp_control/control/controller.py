@@ -1,6 +1,7 @@
 """The controller: from tasks, a null-space field and a metric to one effort."""
 
 from collections.abc import Callable, Collection, Mapping, Sequence
+from contextlib import suppress
 from copy import deepcopy
 from math import isfinite
 from time import perf_counter
@@ -101,6 +102,25 @@ class Controller(Commanded):
                 now.bind_step()
             self._memory.acceleration = delivered.acceleration
             return ControlOutput(delivered, stack, damped, now.limits.measured)
+
+    def _rehearse(self) -> None:
+        # To make a change takes milliseconds, after which the processor's caches hold
+        # nothing of a step, and the next one would cost many times as much.
+        memory, now = self._memory, self._in_force
+        # of the last step, whose arrays the calls write
+        memory.acceleration = memory.acceleration.copy()
+        active, damped = now.mixture.active, now.mixture.damped
+        # What fails here fails in a step as well, which says so, or is not there yet.
+        with suppress(Exception):
+            now.mixture.rehearse(self._state.t)
+            self._advance()
+            step = now.step
+            if step is None:
+                delivered = now.mixture.step(self._state.t, None)
+            else:
+                delivered = step.make_here(self._state.t)
+            ControlOutput(delivered, self.active_stack, "", now.limits.measured)
+        now.mixture.active, now.mixture.damped = active, damped
 
     def _observe(
         self,
