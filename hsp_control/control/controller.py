@@ -27,6 +27,9 @@ from hsp_control.engine import Dynamics, Plan
 from hsp_control.law import TaskSample
 from hsp_control.robot import RobotState
 
+_REHEARSALS = 3
+"""The first fills the processor's caches, the others train its predictions."""
+
 
 class Controller(Commanded):
     """Computes tau = M a + N with the law of Hsu, Hauser and Sastry over a metric.
@@ -112,14 +115,15 @@ class Controller(Commanded):
         active, damped = now.mixture.active, now.mixture.damped
         # What fails here fails in a step as well, which says so, or is not there yet.
         with suppress(Exception):
-            now.mixture.rehearse(self._state.t)
-            self._advance()
-            step = now.step
-            if step is None:
-                delivered = now.mixture.step(self._state.t, None)
-            else:
-                delivered = step.make_here(self._state.t)
-            ControlOutput(delivered, self.active_stack, "", now.limits.measured)
+            for _ in range(_REHEARSALS):
+                now.mixture.rehearse(self._state.t)
+                self._advance()
+                delivered = (
+                    now.mixture.step(self._state.t, None)
+                    if now.step is None
+                    else now.step.make_here(self._state.t)
+                )
+                ControlOutput(delivered, self.active_stack, "", now.limits.measured)
         now.mixture.active, now.mixture.damped = active, damped
 
     def _observe(

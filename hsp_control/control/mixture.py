@@ -114,7 +114,11 @@ class Mixture:
         self._active: dict[tuple[tuple[int, ...], Set[int]], ActiveStack] = {}
         self._fading = [each for each in setup.tasks if not each.always]
         self.levels = _levels(setup.tasks, self._state.robot)
+        self._same_sets = setup.steady
         self.steady = setup.steady and setup.limits.end == -np.inf
+        self._only: list[
+            tuple[float, ActiveStack]
+        ] = []  # if it is the same at all times
         self._parts: list[ActiveStack] = []
         # tasks of the first level with a bounded inverse in the last `resolve`, by
         # name; empty: none
@@ -159,6 +163,8 @@ class Mixture:
 
     def _sets(self, t: float) -> list[tuple[float, ActiveStack]]:
         """Return the share of each set that is active at a time, and its stack."""
+        if self._only:
+            return self._only
         tasks = [(each.weight(t), each) for each in self._fading]
         contacts = [(each.share(t), each) for each in self._setup.contacts]
         edges = {
@@ -182,6 +188,8 @@ class Mixture:
                 sets.append((share - following, self._stack(standing, off)))
             on.add(id(each))
             share = following
+        if self._same_sets:
+            self._only = sets
         return sets
 
     def _deliver(self, modifier: AccelerationModifier | None) -> Delivered:
