@@ -16,6 +16,7 @@ namespace {
 using hsp::Index;
 using hsp::frozen::FrozenPlan;
 using hsp::frozen::Port;
+using hsp::frozen::SentTo;
 
 constexpr double infinite = std::numeric_limits<double>::infinity();
 constexpr double most_periods = 100.0;  // from one step to the next
@@ -159,6 +160,21 @@ hsp_status step(hsp_controller& of, double t, const double* q, const double* v, 
   return status;
 }
 
+// Send a part of a message to a stream; return whether it is valid.
+template <class Values> bool sent(hsp::StreamAlone& stream, SentTo part, const Values& wanted) {
+  switch (part) {
+    case SentTo::TARGET:
+      return stream.send_target(wanted);
+    case SentTo::VELOCITY:
+      return stream.send_velocity(wanted);
+    case SentTo::RATE:
+      return stream.send_rate(wanted);
+    case SentTo::TIME:
+      return stream.send_time(wanted[0]);
+  }
+  return false;
+}
+
 // Change an input to values from now on.
 hsp_status change(hsp_controller& of, const char* name, const double* values, std::size_t size,
                   double duration) {
@@ -180,8 +196,7 @@ hsp_status change(hsp_controller& of, const char* name, const double* values, st
   }
   // A target's motion is bounded already: no ramp.
   if (!port->input && duration > 0.0) return HSP_WRONG_VALUE;
-  if (port->target) return port->target->send_target(wanted) ? HSP_OK : HSP_WRONG_VALUE;
-  if (port->velocity) return port->velocity->send_velocity(wanted) ? HSP_OK : HSP_WRONG_VALUE;
+  if (port->stream) return sent(*port->stream, port->part, wanted) ? HSP_OK : HSP_WRONG_VALUE;
   if (!port->input->permits(wanted)) return HSP_WRONG_VALUE;
   return port->input->then(now, ramp, wanted) ? HSP_OK : HSP_TOO_MANY;
 }
