@@ -77,7 +77,7 @@ class Pair:
         self.command = command(self.controller, chain)
         start = declared.setup.start.state
         self.q, self.nv, self.k = start.q, start.robot.nv, 0
-        self.tasks = [each.task for each in declared.setup.tasks]
+        self.tasks: list[hsp.Task] = []  # placed, with the streams of this run
 
     def presence(self, name: str, x: float, ramp: float) -> None:
         self.change(name, x, (self.k - 1) * H, ramp)
@@ -85,8 +85,9 @@ class Pair:
 
     def change(self, name: str, x: float, at: float, ramp: float) -> None:
         """Let a task of the controller in Python be present from a time on."""
-        place = [each.name for each in self.tasks].index(name)
-        task = self.tasks[place]
+        tasks = self.tasks or [x.task for x in self.controller.setup.tasks]
+        place = [each.name for each in tasks].index(name)
+        task = tasks[place]
         self.controller.change(ChangePresence(task, place, x, at=at, ramp=ramp))
 
     def run(
@@ -103,6 +104,8 @@ class Pair:
             q = robot.integrate(self.q, 0.02 * np.sin(0.1 * k + np.arange(self.nv)))
             v = fast * np.cos(0.1 * k + np.arange(self.nv))
             tau = self.command.effort(t, q, v, H)
+            if not self.tasks:
+                self.tasks = [x.task for x in self.controller.setup.tasks]
             status = self.command.output.status
             assert self.opened.step(t, q, v) == status, k
             np.testing.assert_array_equal(self.opened.tau, tau, err_msg=f"{k}")
