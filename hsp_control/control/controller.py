@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike
 from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import ControllerError, NonFiniteError
 from hsp_control.control.active_stack import ActiveStack
+from hsp_control.control.actuation import Actuation
 from hsp_control.control.bound_step import BoundStep, FreeStep
 from hsp_control.control.changes import Change
 from hsp_control.control.commanded import Commanded
@@ -405,6 +406,14 @@ class Controller(Commanded):
         self._memory.sent.clear()
         self._in_force.limits.update()
         return self._settled_step
+
+    def stack_alone(self, without: Collection[str]) -> tuple[ActiveStack, Actuation]:
+        """Return the stack without some tasks, and what delivers it, for `step_alone`.
+
+        Args:
+            without: The names of the tasks.
+        """
+        return self._in_force.mixture.stack_alone(without)
 
     @property
     def step_plan(self) -> Plan:

@@ -229,11 +229,22 @@ class Mixture:
         if not self.steady:
             return None
         ((_, stack),) = self._sets(0.0)  # at any time
-        last = self._setup.limits.last
-        # Several sets may be None, one after another.
-        limits = next(each for each in self._limits.all if each.limits is last)
-        actuation = self.actuation(stack, limits)
+        actuation = self.actuation(stack, self._steady_limits)
         return BoundStep(self._state, stack, actuation, self._limits, origin)
+
+    def stack_alone(self, without: Collection[str]) -> tuple[ActiveStack, Actuation]:
+        """Return the stack without some tasks, and what delivers it within the limits.
+
+        Neither contacts nor limits change.
+        """
+        stack = self.stack_without((), without)
+        return stack, self.actuation(stack, self._steady_limits)
+
+    @property
+    def _steady_limits(self) -> LimitSet:
+        # Several sets may be None, one after another.
+        last = self._setup.limits.last
+        return next(each for each in self._limits.all if each.limits is last)
 
     def prepare(self, times: Iterable[float]) -> None:
         """Bind what steps call at some times [s], now instead of in a step."""
@@ -330,7 +341,9 @@ def _weight(pair: tuple[float, object]) -> float:
 def _mean(shares: Sequence[float], parts: Sequence[Array]) -> Array:
     """Return the weighted mean; not even by rounding does it leave their range."""
     x = np.array(parts)
-    mean = np.maximum(np.array(shares) @ x, x.min(axis=0))
+    # in this order, as the engine's
+    mean = sum(share * each for share, each in zip(shares, parts, strict=True))
+    mean = np.maximum(mean, x.min(axis=0))
     return np.asarray(np.minimum(mean, x.max(axis=0)))
 
 
