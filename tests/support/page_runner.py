@@ -33,6 +33,7 @@ from urllib.request import urlopen
 
 import yaml
 from places import ROOT
+from typing_commands import READY
 
 from hsp_control import load_experiment
 from hsp_control.declaration import Part, imported
@@ -234,6 +235,10 @@ class Shell:
                 self._background.append(self._start(line.rstrip("& "), where))
             elif block.kind == "Ctrl-C":
                 self._interrupted(line, where)
+            elif re.fullmatch(r"hsp [\w ./=-]+", line) and not block.kind:
+                words = line.split()[1:]
+                status, said = READY.run(words, self._folder, self._environment)
+                assert status == 0, f"{where}: {line}\n{said}"
             else:
                 done = subprocess.run(
                     ["bash", "-ec", line], cwd=self._folder, env=self._environment,

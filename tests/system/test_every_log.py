@@ -1,10 +1,9 @@
 """Every command that takes a log takes each that anything of ours writes."""
 
-import sys
 from pathlib import Path
 
 import pytest
-from typing_commands import PATIENCE, hsp, in_this_process, typed
+from typing_commands import PATIENCE, hsp, in_this_process, script
 
 CONFIG = """
 robot: {name: panda}
@@ -73,7 +72,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     hsp("run mine.yaml", folder)
     hsp(f"live mine.yaml {PATIENCE}", folder)
     hsp("play mine.yaml --no-browser", folder)
-    typed([sys.executable, "logs.py"], folder)
+    script("logs.py", folder)
     return folder
 
 
