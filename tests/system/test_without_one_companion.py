@@ -13,11 +13,11 @@ from contextlib import contextmanager
 from pathlib import Path
 
 import pytest
-from places import IF_THOROUGH, ROOT
+from places import ROOT, further
 
 grimp = pytest.importorskip("grimp")  # what lint-imports builds upon
 
-pytestmark = [pytest.mark.slow, IF_THOROUGH]
+pytestmark = pytest.mark.slow
 
 TIME_LIMIT = 1200.0  # s; only ends what hangs
 FOLDER = "hsp_control/companions"
@@ -81,7 +81,7 @@ def deleted(checkout: Path, names: set[str]) -> Iterator[None]:
 
 @pytest.mark.timeout(TIME_LIMIT)
 @pytest.mark.parametrize("check", CHECKS)
-@pytest.mark.parametrize("companion", COMPANIONS)
+@pytest.mark.parametrize("companion", further(*COMPANIONS))
 def test_what_remains_is_whole(companion: str, check: str, checkout: Path) -> None:
     with deleted(checkout, built_on(companion)):
         done = subprocess.run(

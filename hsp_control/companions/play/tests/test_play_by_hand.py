@@ -10,7 +10,7 @@ import browsers
 import numpy as np
 import pytest
 from browsers import until
-from places import IF_THOROUGH
+from places import further
 from played import Played
 
 import hsp_control as hsp
@@ -47,11 +47,11 @@ ELBOW = """() => {
 
 
 @pytest.fixture
-def played(tmp_path: Path) -> Iterator[Played]:
+def played(robot: str, tmp_path: Path) -> Iterator[Played]:
     with socket.socket() as probe:  # a port that no other test finds free meanwhile
         probe.bind(("127.0.0.1", 0))
         port = str(probe.getsockname()[1])
-    process = Played("panda", "--out", str(tmp_path), "--port", port)
+    process = Played(robot, "--out", str(tmp_path), "--port", port)
     yield process
     process.close()
 
@@ -64,10 +64,10 @@ def dragged(page: Any, start: list[float], by: list[float], steps: int = 5) -> N
         page.mouse.move(start[0] + by[0] * k / steps, start[1] + by[1] * k / steps)
 
 
-@IF_THOROUGH
 @pytest.mark.slow
 @pytest.mark.process
 @pytest.mark.browser
+@pytest.mark.parametrize("robot", further("panda"))
 def test_hand_ball_and_elbow(browser: Any, played: Played, tmp_path: Path) -> None:
     """The hand comes within a millimetre of its target; the elbow ducks the ball."""
     page, wrong = browsers.opened(browser, played.url, **SMALL)

@@ -74,13 +74,13 @@ def test_the_command_tells_and_draws_what_it_found(
 
 @pytest.mark.process
 def test_reasons_that_differ_in_numbers_alone_are_told_once(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    tmp_path: Path, scheduler: str, capsys: pytest.CaptureFixture[str]
 ) -> None:
     # Not refused for their rate: the motion shall tell.
     settings = [*QUICK, "simulation.control_period=0.01", "simulation.check_rate=false"]
     options = [word for setting in settings for word in ("--set", setting)]
     over = ["--over", "null_space.gain=10,900,1100,-1,-2.5"]
-    out = ["--out", str(tmp_path / "failing.parquet"), "--workers", "1"]
+    out = ["--out", str(tmp_path / "failing.parquet"), "--scheduler", scheduler]
     assert main(["sweep", MOVING, *options, *over, *out]) == 2
     printed, error = capsys.readouterr()
     assert error.endswith("hsp: 4 of 5 runs did not complete\n")

@@ -3,12 +3,11 @@
 import json
 import os
 import signal
-import socket
 import subprocess
 import sys
 import time
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager, suppress
+from collections.abc import Callable
+from contextlib import suppress
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -19,8 +18,8 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
 from distributed import Client
-from places import IF_THOROUGH
-from sweep_runs import MOVING, OVER, QUICK
+from places import further
+from sweep_runs import MOVING, OVER, QUICK, SCHEDULER, WORKER, open_port
 
 import hsp_control as hsp
 from hsp_control.common.exceptions import ConfigError, HspControlError, SweepError
@@ -31,7 +30,8 @@ from hsp_control.companions.sweeps.row_files import RowFiles, read_rows
 # Some tenths of a second each.
 SECONDS = 3
 SLOWER = [QUICK[1], f"simulation.duration={SECONDS}"]
-GAINS = {"null_space.gain": "1:20:20"}
+GAINS = {"null_space.gain": "1:20:12"}
+RUNS = 12
 
 
 def same(one: Sweep, other: Sweep) -> None:
@@ -46,40 +46,6 @@ def same(one: Sweep, other: Sweep) -> None:
             assert column.tolist() == other[name].tolist()
         else:
             assert column.tobytes() == other[name].tobytes(), name
-
-
-@pytest.fixture(scope="module")
-def scheduler() -> Iterator[str]:
-    """The address of a scheduler, started by hand, with two workers."""
-    command = [sys.executable, "-P", "-m"]
-    quiet = {**os.environ, "DASK_LOGGING__DISTRIBUTED": "critical"}
-    with open_port() as port:
-        address = f"tcp://127.0.0.1:{port}"
-    options = ["--host", "127.0.0.1", "--port", str(port), "--no-dashboard"]
-    started = [
-        subprocess.Popen(
-            [*command, "distributed.cli.dask_scheduler", *options], env=quiet
-        )
-    ]
-    for _ in range(2):
-        options = [address, "--nthreads", "1", "--no-dashboard"]
-        started.append(
-            subprocess.Popen(
-                [*command, "distributed.cli.dask_worker", *options], env=quiet
-            )
-        )
-    yield address
-    for process in reversed(started):
-        process.terminate()
-        process.wait(60)
-
-
-@contextmanager
-def open_port() -> Iterator[int]:
-    """A port that nobody uses."""
-    with socket.socket() as listening:
-        listening.bind(("127.0.0.1", 0))
-        yield listening.getsockname()[1]
 
 
 @pytest.fixture(scope="module")
@@ -142,13 +108,13 @@ def test_the_file_is_parquet_that_describes_itself(file: Path, swept: Sweep) -> 
 
 @pytest.mark.process
 @pytest.mark.slow
-def test_anything_in_the_configuration_can_vary() -> None:
+def test_anything_in_the_configuration_can_vary(scheduler: str) -> None:
     over = {
         "start.velocity": ["rest", "flow"],
         "tasks.tip.trajectory.center": [[1.0, 1.0], [1.1, 1.0]],
         "null_space.metric.type": "identity,coordinates",
     }
-    found = hsp.sweeps.sweep(MOVING, over, overrides=QUICK, workers=1)
+    found = hsp.sweeps.sweep(MOVING, over, overrides=QUICK, scheduler=scheduler)
     assert found.complete
     assert found.completed.all()
     assert set(found["start.velocity"]) == {"rest", "flow"}
@@ -160,10 +126,10 @@ def test_anything_in_the_configuration_can_vary() -> None:
 
 @pytest.mark.process
 @pytest.mark.slow
-def test_failures_are_rows_with_their_reason() -> None:
+def test_failures_are_rows_with_their_reason(scheduler: str) -> None:
     over = {"null_space.gain": [10.0, -1.0, 900.0]}
     held = [*QUICK, "simulation.control_period=0.01", "simulation.check_rate=false"]
-    found = hsp.sweeps.sweep(MOVING, over, overrides=held, workers=1)
+    found = hsp.sweeps.sweep(MOVING, over, overrides=held, scheduler=scheduler)
     assert found["status"].tolist() == ["completed", "refused", "diverged"]
     assert "--over null_space.gain: null_space.gain" in found["message"][1]
     assert "the motion diverged" in found["message"][2]
@@ -187,11 +153,11 @@ def test_neither_workers_nor_a_cluster_change_a_bit(
         assert client.status == "running"  # whose it is closes it
 
 
-def sweep_command(out: Path, *more: str) -> list[str]:
+def sweep_command(out: Path) -> list[str]:
     settings = [word for setting in SLOWER for word in ("--set", setting)]
-    over = ["--over", "null_space.gain=1:20:20"]
+    over = ["--over", f"null_space.gain={GAINS['null_space.gain']}"]
     command = [sys.executable, "-c", EACH_ROW_AT_ONCE, "sweep", MOVING]
-    return [*command, *settings, *over, "--out", str(out), *more]
+    return [*command, *settings, *over, "--out", str(out), "--workers", "1"]
 
 
 EACH_ROW_AT_ONCE = """
@@ -202,12 +168,10 @@ raise SystemExit(main())
 """
 
 
-def started(out: Path, rows: int, *more: str) -> "subprocess.Popen[bytes]":
+def started(out: Path, rows: int) -> "subprocess.Popen[bytes]":
     """Start a sweep and return when it has written some rows, and some are left."""
     process = subprocess.Popen(
-        sweep_command(out, *(more or ("--workers", "1"))),
-        stdout=subprocess.PIPE,
-        stderr=subprocess.PIPE,
+        sweep_command(out), stdout=subprocess.PIPE, stderr=subprocess.PIPE
     )
     until(lambda: len(list(out.glob("rows-*.parquet"))) >= rows)
     assert process.poll() is None
@@ -223,7 +187,7 @@ def until(condition: Callable[[], bool], patience: float = 120.0) -> None:
 
 def finish(out: Path, kept: Sweep, whole: Sweep, scheduler: str) -> None:
     """The same command computes what is left, and only that."""
-    assert 2 <= len(kept) < 20
+    assert 2 <= len(kept) < RUNS
     assert not kept.complete
     ended = hsp.sweeps.sweep(
         MOVING, GAINS, overrides=SLOWER, out=out, scheduler=scheduler
@@ -235,12 +199,12 @@ def finish(out: Path, kept: Sweep, whole: Sweep, scheduler: str) -> None:
 
 @pytest.mark.process
 @pytest.mark.slow
-@IF_THOROUGH
+@pytest.mark.parametrize("rows", further(3))
 def test_a_killed_sweep_goes_on_where_it_was(
-    tmp_path: Path, whole: Sweep, scheduler: str
+    rows: int, tmp_path: Path, whole: Sweep, scheduler: str
 ) -> None:
     out = tmp_path / "killed.parquet"
-    process = started(out, 3)
+    process = started(out, rows)
     workers = psutil.Process(process.pid).children(recursive=True)
     assert len(workers) >= 2  # the nanny and its worker
     process.kill()
@@ -277,25 +241,25 @@ def test_a_dead_scheduler_keeps_the_rows_and_the_same_command_ends_it(
     out = tmp_path / "dead.parquet"
     with open_port() as port:
         address = f"tcp://127.0.0.1:{port}"
-    command = [sys.executable, "-P", "-m"]
-    options = ["--host", "127.0.0.1", "--port", str(port), "--no-dashboard"]
-    dying = subprocess.Popen(
-        [*command, "distributed.cli.dask_scheduler", *options],
-        stderr=subprocess.DEVNULL,
+    dying, worker = (
+        subprocess.Popen(
+            [sys.executable, "-P", "-m", *command], stderr=subprocess.DEVNULL
+        )
+        for command in ([*SCHEDULER, "--port", str(port)], [*WORKER, address])
     )
-    options = [address, "--nthreads", "1", "--no-dashboard", "--no-nanny"]
-    worker = subprocess.Popen(
-        [*command, "distributed.cli.dask_worker", *options], stderr=subprocess.DEVNULL
-    )
-    process = started(out, 2, "--scheduler", address)
-    dying.kill()
-    _, errors = process.communicate(timeout=30)
+
+    def kill(done: int, total: int, failures: int) -> None:
+        if done == 2:
+            dying.kill()
+
+    with pytest.raises(SweepError, match="the scheduler does not answer any more"):
+        hsp.sweeps.sweep(
+            MOVING, GAINS, overrides=SLOWER, out=out, scheduler=address,
+            on_progress=kill,
+        )  # fmt: skip
     worker.kill()
     dying.wait()
     worker.wait()
-    assert process.returncode == 2, errors.decode()
-    assert b"the scheduler does not answer" in errors
-    assert b"Traceback" not in errors
     finish(out, Sweep.load(out), whole, scheduler)
 
 
@@ -311,13 +275,13 @@ def running(word: str, parent: psutil.Process) -> list[psutil.Process]:
 
 @pytest.mark.process
 @pytest.mark.slow
-@IF_THOROUGH
-def test_a_killed_worker_is_replaced(whole: Sweep) -> None:
+@pytest.mark.parametrize("after", further((2, 9)))
+def test_a_killed_worker_is_replaced(after: tuple[int, int], whole: Sweep) -> None:
     killed: list[int] = []
 
     def kill(done: int, total: int, failures: int) -> None:
         """After the first rows, the process that computes."""
-        if done in (2, 9):
+        if done in after:
             (nanny,) = running("--nworkers", psutil.Process())
             each = running("spawn_main", nanny)
             each[-1].kill()
@@ -326,7 +290,7 @@ def test_a_killed_worker_is_replaced(whole: Sweep) -> None:
     found = hsp.sweeps.sweep(
         MOVING, GAINS, overrides=SLOWER, workers=1, on_progress=kill
     )
-    assert killed == [2, 9]
+    assert killed == [*after]
     same(found, whole)
 
 
@@ -348,19 +312,18 @@ class Deadly(hsp.Cost, type="deadly"):
 @pytest.mark.process
 @pytest.mark.slow
 def test_a_run_that_kills_three_workers_is_a_row_and_tried_again_another_time(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    tmp_path: Path, scheduler: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     script, out = tmp_path / "deadly.py", tmp_path / "crash.parquet"
     script.write_text(DEADLY)
     more = [*QUICK, "null_space.fields=[{type: deadly, strength: 1}]"]
     over = {"null_space.fields.0.strength": [1.0, 2.0, 3.0]}
-    options: Any = {"overrides": more, "out": out, "workers": 2, "imports": [script]}
+    options: Any = {"overrides": more, "out": out, "imports": [script]}
     monkeypatch.setattr(cluster, "_VARIABLES", {"HSP_TEST_DEADLY": "1"})
-    found = hsp.sweeps.sweep(MOVING, over, **options)
+    found = hsp.sweeps.sweep(MOVING, over, workers=1, **options)
     assert found["status"].tolist() == ["completed", "crashed", "completed"]
     assert found["message"][1].startswith("3 workers died")
-    monkeypatch.undo()
-    found = hsp.sweeps.sweep(MOVING, over, **options)
+    found = hsp.sweeps.sweep(MOVING, over, scheduler=scheduler, **options)
     assert found["status"].tolist() == 3 * ["completed"]
 
 
@@ -408,7 +371,8 @@ def test_files_travel_where_no_worker_has_them(tmp_path: Path, scheduler: str) -
     (folder / "block.obj").write_text(TETRAHEDRON)
     (folder / "arm.yaml").write_text(ARM)
     over = {"null_space.gain": [1.0, 2.0]}
-    here = hsp.sweeps.sweep(folder / "arm.yaml", over, workers=1)
+    run = hsp.load_experiment(folder / "arm.yaml", "null_space.gain=2").run()
+    nearest = run["distance.point_distance"].min()
 
     def gone(_: object) -> None:
         for each in folder.iterdir():
@@ -418,8 +382,7 @@ def test_files_travel_where_no_worker_has_them(tmp_path: Path, scheduler: str) -
         folder / "arm.yaml", over, scheduler=scheduler, on_start=gone
     )
     assert there.completed.all(), there["message"]
-    assert "distance.point_distance.min" in there
-    same(there, here)
+    assert there["distance.point_distance.min"][1] == nearest
 
 
 TETRAHEDRON = """v 0 0 0
@@ -463,7 +426,7 @@ def test_a_computer_that_is_not_fit_ends_the_sweep() -> None:
 @pytest.mark.process
 @pytest.mark.slow
 def test_a_run_that_takes_too_long_is_a_row_and_tried_again_another_time(
-    tmp_path: Path,
+    tmp_path: Path, scheduler: str
 ) -> None:
     endless = [  # a quarter of an hour
         "simulation.integrator={type: rk4, step: 0.0005}",
@@ -479,10 +442,10 @@ def test_a_run_that_takes_too_long_is_a_row_and_tried_again_another_time(
     for _ in range(2):
         found = hsp.sweeps.sweep(
             MOVING, {"null_space.gain": [1, 2]}, overrides=endless, out=out,
-            workers=1, time_limit=1.0, on_progress=note,
+            scheduler=scheduler, time_limit=0.3, on_progress=note,
         )  # fmt: skip
         assert found["status"].tolist() == ["timed out", "timed out"]
-        assert found["message"].tolist() == 2 * ["took longer than 1 s"]
+        assert found["message"].tolist() == 2 * ["took longer than 0.3 s"]
     assert done == [0, 1, 2, 0, 1, 2]
 
 
