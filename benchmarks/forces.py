@@ -3,7 +3,8 @@
     .venv/bin/python benchmarks/forces.py
 
 Runs the configurations forces/* with other forces, speeds, masses and friction
-coefficients, and a ball without any controller. Writes the tables of benchmarks/results/forces.md.
+coefficients, and a ball without any controller. Writes the tables of
+benchmarks/results/forces.md.
 """
 
 from typing import NamedTuple
