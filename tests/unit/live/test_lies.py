@@ -326,7 +326,7 @@ def test_noise_of_hours_is_no_lie(period: float) -> None:
     filtered, last = np.zeros(7), 0.0
     part = 1.0 - np.exp(-2.0 * np.pi * 20.0 * period)
     delay = 0.005
-    for k in range(8000):
+    for k in range(8000 if THOROUGH else 4000):
         t = k * period
         q = q0 + size * np.sin(rate * t) / rate
         v = size * np.cos(rate * max(t - delay, 0.0)) + rng.normal(0.0, 0.05, 7)
