@@ -39,11 +39,11 @@ def find_hand(model: pin.Model) -> Hand:
 
     It is a link on the last joint of the longest chain of joints. Joints at the end of
     a chain that are called a jaw's, finger's or gripper's, or move a link that is, are
-    no part of the arm. Where the chain branches in its second half into three or more, or into two of similar
-    lengths, these are fingers, and it ends there. One much shorter branch does not end
-    it: it is a part of the arm's mechanism. Of the links on that joint one that is
-    called a TCP, a place to grasp, a tool or an end effector comes first, then the last
-    one, no finger or sensor if possible.
+    no part of the arm. Where the chain branches in its second half into three or more,
+    or into two of similar lengths, these are fingers, and it ends there. One much
+    shorter branch does not end it: it is a part of the arm's mechanism. Of the links on
+    that joint one that is called a TCP, a place to grasp, a tool or an end effector
+    comes first, then the last one, no finger or sensor if possible.
     """
     whole: list[list[int]] = [[]]
     for joint in range(1, model.njoints):
