@@ -1,4 +1,4 @@
-"""Actions of a Gymnasium environment that mean where the hand goes, not torques."""
+"""Actions of a Gymnasium environment that are targets of the hand, not torques."""
 
 import gymnasium
 import numpy as np

@@ -1,4 +1,4 @@
-"""A hand that is a spring: somebody pushes it with 20 N, and it gives way by F/k."""
+"""A hand that is a spring: a push of 20 N deflects it by F/k."""
 
 import hsp_control as hsp
 

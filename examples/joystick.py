@@ -1,4 +1,4 @@
-"""A joystick leads the hand along its own axes; when it is silent, the hand stops."""
+"""A joystick moves the hand along its own axes; without messages the hand stops."""
 
 import select
 import struct
@@ -26,7 +26,7 @@ def events(stick):
 
 
 def pretended(t: float) -> np.ndarray:
-    """Return what a stick does in a turn to and fro, and then nothing."""
+    """Return the stick's deflection: back and forth, and then none."""
     return np.array([np.sin(3 * t), np.cos(3 * t), 0.0]) if t < 2.5 else np.zeros(3)
 
 

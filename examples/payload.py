@@ -8,7 +8,7 @@ for declared in (True, False):
     load = hsp.changes.ChangePayload(
         frame="panda_hand", mass=2.0, center=[0, 0, 0.06], at=1.0, ramp=0.3
     )
-    push = hsp.plants.Push(  # the weight of what nobody has declared
+    push = hsp.plants.Push(  # the weight of an undeclared payload
         frame="panda_hand", force=[0, 0, -2.0 * 9.81], start=1.0, duration=2.0
     )
     experiment = hsp.Experiment(

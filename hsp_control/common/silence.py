@@ -1,22 +1,22 @@
-"""For how long another process has given no sign of life."""
+"""The time since another process last gave a sign of life."""
 
 _LOOK = 0.1
 """Longest time between two looks that is added [s]: this process may stand, too."""
 
 
 class Silence:
-    """The time without a sign, but for the time in which this process itself stood."""
+    """The time without a sign, less the time for which this process was suspended."""
 
     def __init__(self, now: float) -> None:
         """Begin at a time [s]."""
         self._looked, self._lasts = now, 0.0
 
     def look(self, now: float, *, heard: bool) -> float:
-        """Return how long it lasts [s].
+        """Return this time [s].
 
         Args:
             now: The time of this look [s].
-            heard: Whether there was a sign since the last look.
+            heard: Whether a sign arrived since the last look.
         """
         self._lasts = 0.0 if heard else self._lasts + min(now - self._looked, _LOOK)
         self._looked = now

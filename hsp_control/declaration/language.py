@@ -124,7 +124,7 @@ def misfit(value: object, kinds: Sequence[type[Any]]) -> str:
 
 
 def _told(value: object) -> str:
-    """Return a value that has a short `repr`, or else what it is."""
+    """Return the `repr` of a value if it is short, otherwise its kind."""
     if isinstance(value, np.ndarray):
         return f"an array of shape {value.shape}"
     if isinstance(value, Callable):  # type: ignore[arg-type]

@@ -44,7 +44,7 @@ def _written_part(part: str | int) -> str:
 
 @contextmanager
 def within(*path: str | int) -> Iterator[None]:
-    """Say at which key path an error inside the block belongs.
+    """Prefix errors that are raised inside the block with a key path.
 
     Blocks may be nested; the outer path comes first::
 

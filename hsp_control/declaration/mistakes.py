@@ -46,7 +46,7 @@ class CheckedSource(Protocol):
     """Where the checked data come from."""
 
     def __contains__(self, path: KeyPath) -> bool:
-        """Say whether there is a value at the key path."""
+        """Return whether there is a value at the key path."""
 
     def mark(self, path: KeyPath) -> tuple[int, ...] | None:
         """Return the place of a key path in the text, None if there is no text."""
@@ -223,7 +223,10 @@ def explained(finding: Mistake, key: str = "key") -> str:
         case "missing":
             return _missing(key, value, keys(expected, required=True))
         case "union_tag_invalid" if tag := expected.discriminator:
-            return f"unknown {tag} {_unknown(value, tagged(expected.options, tag))}"
+            types = list(map(str, tagged(expected.options, tag)))
+            own = "; --import FILE.py imports a type of your own"
+            advice = "" if _near(value, types) else spoken(own, "")
+            return f"unknown {tag} {_unknown(value, types)}{advice}"
         case "union_tag_not_found" if tag := expected.discriminator:
             return f"missing key {tag!r}; {_tags(expected, tag)}"
         case "misspelt_tag" if tag := expected.discriminator:

@@ -1,10 +1,9 @@
 """What is saved of a plan: its memory, its calls, the robots that they share.
 
 A plan is calls on arrays of NumPy. Arrays that overlap are one block, so that what one
-call writes another one reads, and each block begins where it began to a processor's
-packets: the order of a sum, and so its last bit, may follow from that. The
-kinds of calls are named, and their arguments by their members' names; nothing here is
-of one kind.
+call writes another one reads, and each block keeps its alignment to the processor's
+vectors: the order of a sum, and so its last bit, may depend on it. The kinds of calls
+are named, and their arguments by their members' names; nothing here is of one kind.
 
 ``engine/frozen/frozen_plan.cpp`` reads what `Image.content` returns:
 
@@ -33,19 +32,22 @@ _PACKET = 16
 of it."""
 
 
-RAMPED, TARGET, VELOCITY, PAYLOAD, SPRING = b"i", b"t", b"v", b"p", b"s"
-"""What is set: a value that may ramp, what a stream follows, what is carried, or some
-numbers of an impedance."""
+RAMPED, PAYLOAD, SPRING = b"i", b"p", b"s"
+"""What is set: a value that may ramp, what is carried, or some numbers of an
+impedance."""
+TARGET, VELOCITY, RATE, TIME = b"t", b"v", b"r", b"c"
+"""What is sent to a stream: a target, or a velocity; velocity and time of the next
+target."""
 
 
 class Port(NamedTuple):
-    """An array of the plan that has a name outside of it."""
+    """A named input or output: an array of the plan."""
 
     name: str
     unit: str
     meaning: str
     array: Any  # float64 or int64, contiguous
-    # what takes what is set, of the kind Evolve, StreamAlone, Payloads or
+    # the call that receives the input, of the kind Evolve, StreamAlone, Payloads or
     # EvolveImpedance; None: an output
     input: Call | None = None
     role: bytes = RAMPED
@@ -55,10 +57,10 @@ class Image:
     """A plan, its memory, and the names of some of its arrays."""
 
     def __init__(self, move: Move, ports: Sequence[Port], stop: Move | None) -> None:
-        """Collect what a move makes, and what stops the robot instead.
+        """Collect the calls of a move, and those of the safe stop.
 
         Raises:
-            FreezeError: If a function of Python is among it.
+            FreezeError: If a Python function is among them.
         """
         self._objects: list[bytes] = []
         self._found: dict[int, int] = {}  # the number of an object, by its identity

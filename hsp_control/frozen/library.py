@@ -1,4 +1,4 @@
-"""Where the library is that runs frozen controllers, its header, and what finds it."""
+"""Paths of the library that runs frozen controllers, its header, its CMake package."""
 
 import shlex
 import sys
@@ -27,7 +27,7 @@ def include_folder() -> Path:
 
 
 def compiler_flags() -> str:
-    """Return what a compiler needs to build a program that steps, for a shell.
+    """Return the compiler's flags for a program that runs a frozen controller.
 
     ``cc loop.c $(hsp freeze --flags)``: the header's folder, the library, and where the
     program finds it when it runs, as ``pkg-config`` would print them.

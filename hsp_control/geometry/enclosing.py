@@ -23,7 +23,7 @@ def convex_hull(mesh: Any) -> Any:
 
 
 def hull_corners(points: Array) -> Array:
-    """Return those of the points (k, 3) that are their hull's vertices; all without."""
+    """Return the points (k, 3) that are vertices of the hull; all if it is flat."""
     from scipy.spatial import ConvexHull, QhullError  # here: SciPy takes long to import
 
     try:

@@ -352,7 +352,7 @@ def _halton(number: int, dimension: int) -> float:
 
 
 def _nearest(seen: Sequence[Judgement], least: float) -> str:
-    """Return in words how near the rejected postures are to qualifying."""
+    """Describe how close the rejected postures came to the criteria."""
     clear = [each for each in seen if each.clear]
     if not clear:
         best = max(seen, key=lambda each: each.distance)

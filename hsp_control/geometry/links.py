@@ -54,7 +54,7 @@ class LinkShape:
 
 
 def link_shapes(robot: Robot, proxy: Proxy = "capsules") -> list[LinkShape]:
-    """Return the shapes of the robot's links; they are found once for each robot.
+    """Return the shapes of the robot's links, which are computed once per robot.
 
     A robot without collision geometry gets capsules between its joints, and a warning;
     meshes that do not exist are left out, with a warning.

@@ -152,7 +152,7 @@ class Proximity:
 
     def measure(self, state: RobotState) -> Array:
         """Return all distances at a state, shape (k,) [m]; computed once per state."""
-        # The array belongs to the state, and to all that show it: ids are reused.
+        # The array is that of the state and of its read-only views: ids are reused.
         if self._measured is state.stamp_array and (
             self._stamp == self._stamp_of(state)
         ):

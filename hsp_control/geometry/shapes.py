@@ -188,7 +188,8 @@ class Mesh(Shape, type="mesh"):
     """An STL, OBJ, DAE, glTF, PLY or OFF file [-]; in YAML a relative path begins at
     the configuration's folder, see `located`."""
     scale: Positive = 1.0
-    """Length of the file's unit [m]; of a DAE, which says its own, a factor [-]."""
+    """Length of the file's unit [m]; of a DAE, which gives its own unit, a factor
+    [-]."""
     convex: Flag = False
     """Whether its convex hull is used instead [-]."""
 

@@ -76,7 +76,7 @@ class CentroidalMotion:
 
     @property
     def mass(self) -> float:
-        """Total mass, with what is carried [kg]."""
+        """Total mass, payloads included [kg]."""
         return float(self._mass[0])
 
     @cached_property

@@ -65,8 +65,7 @@ class RobotModel(Structure):
     def largest_gravity(self) -> Array:
         """Largest effort against gravity of each motor, shape (nv,) [N·m or N].
 
-        It is as if all that a joint carries were stretched level: a bound, which an arm
-        does not reach.
+        An upper bound: as if all links beyond a joint were stretched out horizontally.
         """
         model, most = self.model, np.zeros(self.nv)
         g = float(np.linalg.norm(model.gravity.linear))
@@ -99,9 +98,9 @@ class RobotModel(Structure):
         """Maximum rate of the efforts, shape (nv,) [N·m/s or N/s]; inf for none.
 
         No URDF has one. It is 11 times the largest maximum effort each second, for all
-        joints of the same unit, a little less than a Panda may at 87 N·m: a light wrist
-        has to react to a push as quickly as a shoulder. It is 500 times where legs meet
-        the ground.
+        joints of the same unit, a little less than a Panda permits at 87 N·m: a light
+        wrist has to react to a push as quickly as a shoulder. For robots on legs the
+        factor is 500.
         """
         effort = self._largest_effort()
         rate = np.full(self.nv, np.inf)
@@ -195,7 +194,7 @@ class RobotModel(Structure):
     ) -> Array:
         """Return the effort M(q) a + N(q, v), shape (nv,) (RNEA).
 
-        ``dynamics``: those of a robot that carries something.
+        ``dynamics``: those with a payload, for example.
         """
         effort = np.empty(self.nv)
         given = {"q": _packed(q), "v": _packed(v), "acceleration": _packed(a)}
@@ -209,7 +208,7 @@ class RobotModel(Structure):
         """Return the acceleration M(q)⁻¹ (tau - N(q, v)), shape (nv,).
 
         By RNEA, CRBA and a Cholesky factor of M, which is as sparse as the tree.
-        ``dynamics``: those of a robot that carries something.
+        ``dynamics``: those with a payload, for example.
 
         Raises:
             ModelError: If M is singular.

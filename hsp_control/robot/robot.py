@@ -90,7 +90,7 @@ class Robot(RobotModel):
             xacro_args: Arguments of a xacro file, by name.
             srdf: An SRDF whose disabled pairs of links never collide. None: the one of
                 the same name beside the URDF, if there is one.
-            motor_inertia: Inertia of the rotors as the joints feel it [kg·m² or kg]:
+            motor_inertia: Inertia of the rotors reflected to the joints [kg·m² or kg]:
                 one number, 0 for the bare links, one for each joint, by name, or
                 ``bundled``: those in the README of a bundled robot. None: those of the
                 URDF's transmissions.
@@ -143,7 +143,7 @@ class Robot(RobotModel):
 
         Bodies and sites are its frames, under their names. Bodies that are not below
         the root are not part of it; those above the root stand still. MuJoCo's features
-        that the robot lacks, such as a closed loop, is in `source.omitted`, and logged
+        that the robot lacks, such as a closed loop, are in `source.omitted`, and logged
         once as a warning. `MujocoCoordinates` converts states.
 
         Args:

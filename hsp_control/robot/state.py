@@ -78,7 +78,7 @@ class RobotState:
 
         Args:
             robot: The robot.
-            dynamics: Those of another state, which may carry something; None: the
+            dynamics: Those of another state, which may have a payload; None: the
                 robot's own.
             local: Frames of another state that changes have moved in their joints;
                 None: all are where the model has them.
@@ -210,7 +210,7 @@ class RobotState:
 
     @property
     def seen(self) -> "RobotState":
-        """This state, as users may have it: t, q and v change only by `update`."""
+        """This state as users see it: t, q and v change only by `update`."""
         if self._seen is None:
             self._seen = SeenState(self)
         return self._seen
@@ -243,7 +243,7 @@ class RobotState:
         return int(model.frames[self.robot.frame_id(frame)].parentJoint)
 
     def local_motion(self, frame: str) -> LocalMotion:
-        """Return the motion of a frame in its joint; who writes it forgets the frame.
+        """Return a frame's motion in its joint; after writing it, `forget_frame`.
 
         Raises:
             FrameNotFoundError: If the robot has no such frame.
@@ -394,7 +394,7 @@ class RobotState:
         return self._displaced
 
     def another(self) -> "RobotState":
-        """Return a state of the same robot, with what it carries and its tools."""
+        """Return a state of the same robot, with its payloads and tools."""
         return RobotState(self.robot, self.dynamics, self._local)
 
     def snapshot(self) -> "RobotState":
@@ -513,7 +513,7 @@ def _fits(data: pin.Data, world: WorldKinematics) -> bool:
 def _copy(
     robot: "Robot", local: dict[str, LocalMotion], t: float, q: Array, v: Array
 ) -> RobotState:
-    """Return a state of its own: what a copy, or a pickle, is."""
+    """Return an independent state, for copies and pickles."""
     return RobotState(robot, None, deepcopy(local)).update(t, q, v)
 
 

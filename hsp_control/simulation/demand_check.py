@@ -324,6 +324,6 @@ def _slip(controller: Controller, contact: SlidingContact, t: float) -> float:
 
 
 def _mass(contact: SlidingContact, state: RobotState) -> float:
-    """Return what a contact's frame weighs along the normal [kg]."""
+    """Return the effective mass of a contact's frame along the normal [kg]."""
     row = contact.axes[:, 2] @ state.frame(contact.frame).jacobian[:3]
     return 1.0 / float(row @ np.linalg.solve(state.mass_matrix, row))

@@ -61,7 +61,7 @@ class InitialState(Part, error=ConfigurationError):
 
     ``joints: auto``, in YAML also ``start: auto``, and ``pose`` are found: regular for
     the tasks, within limits, clear of collisions and near the middle of the limits. The
-    same is found every time, and the log holds what was found.
+    search is deterministic, and the log has its result.
     """
 
     joints: (

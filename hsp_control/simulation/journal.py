@@ -1,8 +1,8 @@
 """The journal of a log: rows appended as they come, so that a killed run loses none.
 
 An ``.npz`` has all rows of a column in one place and its directory at the end, so it
-can only be written when a run is over. Until then the rows stand in a file to which
-is only appended: the line `MAGIC`, then frames, each of
+can only be written when a run is over. Until then the rows are in a file that is only
+appended to: the line `MAGIC`, then frames, each of
 
     kind     1 byte: H a heading, R a row, N a note, E the end
     length   4 bytes, of the payload
@@ -175,7 +175,7 @@ class JournalReader:
         self._parts: list[tuple[Shapes, list[Array]]] = []
 
     def read(self) -> int:
-        """Read the frames that have come; return how many rows there are of them.
+        """Read the new frames; return how many rows they have.
 
         Raises:
             LogError: If the file is no journal, or cannot be read.
@@ -194,7 +194,7 @@ class JournalReader:
         return self.count - before
 
     def _take(self, kind: bytes, payload: bytes) -> None:
-        """Use a frame."""
+        """Process a frame."""
         if kind == _HEADING:
             heading = json.loads(payload)
             shapes = {n: tuple(s) for n, s in heading["columns"].items()}
@@ -223,7 +223,7 @@ class JournalReader:
             self.meta, self.ended = {**self.meta, **json.loads(payload)}, True
 
     def whole(self) -> int:
-        """Read what has come, and return how many bytes of all are whole frames."""
+        """Read the new bytes; return how many of all bytes are in whole frames."""
         self.read()
         begun = self.path.is_file() and self.path.stat().st_size >= len(MAGIC)
         return self._at if begun else 0

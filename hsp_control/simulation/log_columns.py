@@ -77,7 +77,7 @@ class LogColumns:
             self.descriptions[name] = {"unit": unit, "meaning": meaning, **more}
 
     def widen(self, name: str, length: int) -> None:
-        """Give a column of vectors at least so many numbers."""
+        """Widen a column of vectors to at least this many numbers."""
         if length > self._shapes[name][0]:
             self._shapes[name], self._laid_out = (length,), False
 
@@ -143,7 +143,7 @@ class TaskColumns:
         self.update()
 
     def update(self) -> None:
-        """Add columns for the tasks that there are, if they are others."""
+        """Add columns for the present tasks, if they have changed."""
         # By identity: equal tasks of two runs may have streams in different states.
         levels = self._controller.planned_levels
         known = [(each.key, id(each.task)) for level in levels for each in level]
@@ -165,7 +165,7 @@ class TaskColumns:
 
     def _log_name(self, task: Task) -> str:
         """Return the name in the log of a new task."""
-        # It goes on with the columns of one that has gone, if they are the same.
+        # It reuses the columns of a removed one, if they are the same.
         name, k, taken = task.name, 2, {*self._names.values()}
         while name in taken or (
             name in self.logged and task_meta(self.logged[name]) != task_meta(task)
@@ -174,7 +174,7 @@ class TaskColumns:
         return name
 
     def _add(self, name: str, task: Task, width: int) -> None:
-        """Add a task's columns; its reference has so many numbers."""
+        """Add a task's columns; its reference has the given size."""
         column, m, prefix = self._columns.add, task.rows, f"task.{name}"
         parts = task.error_parts
         unit = " and ".join(dict.fromkeys(part.unit for part in parts))
@@ -195,7 +195,7 @@ class TaskColumns:
         column(f"{prefix}.actual", (width,), unit, "actual value")
 
     def write(self, state: RobotState) -> None:
-        """Write references, what follows them, and what streams have received."""
+        """Write references, tracked values, and what streams have received."""
         row = self._columns.row
         for name, task in self.logged.items():
             reference, actual = task.measure(state.read_only)
@@ -265,7 +265,7 @@ class TermColumns:
         self.update()
 
     def update(self) -> None:
-        """Add columns for the terms that there are, if they are others."""
+        """Add columns for the present terms, if they have changed."""
         controller, column = self._controller, self._columns.add
         if controller.field is self._field:
             return
@@ -314,7 +314,7 @@ class BarrierColumns:
         self.update()
 
     def update(self) -> None:
-        """Add columns for the barriers that there are, if they are others."""
+        """Add columns for the present barriers, if they have changed."""
         limits = self._controller.limits
         if limits is self._limits:
             return

@@ -52,7 +52,7 @@ class LogWriter:
 
     Attributes:
         path: The journal that gets each row at once; None: rows stay in memory only.
-        plan: What the robot follows; its streams are recorded. None: no plan.
+        plan: The plan that the robot follows; its streams are recorded. None: no plan.
     """
 
     def __init__(

@@ -90,7 +90,7 @@ def distances(rollout: Log) -> list[str]:
 
 
 def barriers(rollout: Log) -> list[str]:
-    """Return the names of the barriers of one's own whose value is in the log."""
+    """Return the names of user-defined barriers whose value is in the log."""
     names = (name for name in rollout.columns if name.startswith("barrier."))
     return [name.removeprefix("barrier.") for name in names]
 
@@ -148,9 +148,9 @@ def unreached(
 
     A target is out of reach, of this robot within its limits, if an error remains that
     the law would remove: it rests, and the law is damped at a singularity or a limit is
-    active. An error of friction or a load, where the law is exact, is not meant; nor is
-    a target that moves on while the robot follows as near as it can. ``moved``, when
-    each part of an error moved last [s], is kept from these rows to the next ones.
+    active. Errors from friction or a load, where the law is exact, are excluded, and so
+    are targets that move on while the robot follows as closely as it can. ``moved``,
+    when each part of an error moved last [s], is kept from these rows to the next ones.
     """
     moved = {} if moved is None else moved
     times, none = columns["t"], np.zeros(len(columns["t"]))
@@ -288,7 +288,7 @@ def measures(rollout: Log) -> dict[str, Measure]:
 
 
 def measure_name(part: LoggedErrorPart) -> str:
-    """Return how the names of a task's measures begin."""
+    """Return the prefix of the names of a task's measures."""
     return f"tracking.{part.label.replace(' ', '.')}"
 
 

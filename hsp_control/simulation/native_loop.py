@@ -42,7 +42,7 @@ class _Timing(NamedTuple):
 
 
 class NativeLoop:
-    """Moves a plant on while its controller's steps are free, see `FreeStep`."""
+    """Advances a plant while its controller's steps are free, see `FreeStep`."""
 
     def __init__(
         self,
@@ -60,7 +60,7 @@ class NativeLoop:
     def advance(
         self, start: float, end: float, periods: int, k: int, tau: Array
     ) -> tuple[Array, Array, int] | None:
-        """Move on from the beginning of period k, under tau, to that of a later one.
+        """Advance from the beginning of period k, under tau, to that of a later one.
 
         Returns (q, v) there, in new arrays, and which period begins; None where the
         controller has no free steps, or a part of one is no native call.
@@ -80,7 +80,7 @@ class NativeLoop:
         tau: Array,
         step: FreeStep,
     ) -> int:
-        """Make periods from the k-th on; return how many."""
+        """Run periods from the k-th on; return their number."""
         if step is not self._step:
             self._step, self._loop = step, self._bind(step)
         if self._loop is None:

@@ -105,7 +105,7 @@ def summary_text(rollout: Log) -> str:
 
 
 def _task_rows(rollout: Log, found: Mapping[str, Measure]) -> Iterator[tuple[str, str]]:
-    """Yield how well each task was tracked, and in which rows its target was not."""
+    """Yield each task's errors, and the rows in which its target was not reached."""
     tasks = rollout.meta["tasks"]
     away = {each.task: each for each in unreached(rollout.columns, tasks)}
     for k, task in enumerate(tasks):
@@ -127,7 +127,7 @@ def _text(measure: Measure) -> str:
 
 
 def beyond_limits(rollout: Log) -> str:
-    """Return that a field demands more than limits give, if it does at the end."""
+    """Return a warning if a field demands more than limits permit at the end."""
     last = slice(-max(len(rollout) // 10, 1), None)
     asked = np.linalg.norm(rollout["field.g"][-1])
     missing = rollout["null_space_norm"][-1]
@@ -156,7 +156,7 @@ def force_rows(rollout: Log) -> Iterator[tuple[str, str]]:
 
 
 def unexplained_rows(rollout: Log) -> Iterator[str]:
-    """Yield the effort that an observer finds unexplained, one sentence."""
+    """Yield the effort that an observer finds beside the model, in one sentence."""
     found = rollout.columns.get("observer.disturbance")
     if found is None:
         return

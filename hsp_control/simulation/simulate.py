@@ -335,7 +335,8 @@ class SimulationSettings(Part, error=SimulationError):
     stage of the integrator."""
     check_rate: Flag = True
     """Whether the loop is checked for stability at its control period: an unstable loop
-    is an error, a doubtful one a warning. Without a control period nothing is done."""
+    is an error, a doubtful one a warning. Without a control period nothing is
+    checked."""
     integrator: Integrator | None = None
     """The integrator of the robot's motion; by default ``rk4`` in steps of at most 1 ms
     for the plant ``rigid_body`` under efforts that are held, and otherwise

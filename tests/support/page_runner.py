@@ -8,11 +8,14 @@ file. What cannot run so has a comment before it in the page, which no reader se
     <!-- slow: a minute -->                only `make test-system` runs it
     <!-- Ctrl-C: serves a page -->         it runs until it has said something
     <!-- part of: {robot: {name: panda}} -->    YAML that is no whole configuration
+    <!-- part of: forces/talos_wall -->         such YAML, laid over a bundled one
+    <!-- lines of: engine/... -->          text that stands so in a file of the checkout
     <!-- background: a robot -->           it goes on until the page ends
     <!-- fails: unstable gains -->         its status is 2, as the page says
     <!-- given: arm.urdf: robots/planar3r/planar3r.urdf -->    the reader's own file
 """
 
+import json
 import os
 import re
 import shlex
@@ -20,6 +23,7 @@ import shutil
 import signal
 import subprocess
 import sys
+import tomllib
 from collections.abc import Iterator
 from contextlib import ExitStack, chdir, contextmanager, suppress
 from fcntl import LOCK_EX, flock
@@ -33,6 +37,7 @@ from urllib.request import urlopen
 
 import yaml
 from places import ROOT
+from typing_commands import READY
 
 from hsp_control import load_experiment
 from hsp_control.declaration import Part, imported
@@ -40,13 +45,16 @@ from hsp_control.declaration import Part, imported
 OUTPUT = {"text", "math", "bibtex"}
 """Languages of blocks that show what is printed, or a formula."""
 _FENCE = re.compile(r"^```([\w{].*?|)\n(.*?)^```$", re.MULTILINE | re.DOTALL)
-_KINDS = "not run|slow|Ctrl-C|background|fails|part of"
+_KINDS = "not run|slow|Ctrl-C|background|fails|part of|lines of"
 _MARK = re.compile(rf"<!-- ({_KINDS}): ((?:(?!-->).)*) -->\s*$", re.DOTALL)
 _GIVEN = re.compile(r"<!-- given: (\S+): (\S+) -->")
 _FILE = re.compile(r"`([\w./-]+\.(\w+))`[^`]*:\s*$")
 _ENDINGS = {"python": "py", "sh": "sh", "yaml": "yaml", "c": "c", "cpp": "cpp"}
+_SYNTAX = {"json": json.loads, "toml": tomllib.loads}
 _PATIENCE = "--set live.missing=2000 --set live.watchdog=2000 --set live.age=60"
 """On a busy computer: what `hsp live` is given besides what the page says."""
+_BRIEFLY = "--duration 1"
+"""What `hsp live` is given where the page does not say how long it runs [s]."""
 _SHORT = "simulation.duration=0.02"
 
 
@@ -143,10 +151,14 @@ def run_page(page: str, folder: Path, *, whole: bool) -> dict[str, Any]:
             if block.kind == "not run" or (block.kind == "slow" and not whole):
                 continue
             where = f"{page}:{block.line}"
-            if block.file:
+            if block.kind == "lines of":
+                _check_lines(block, where)
+            elif block.file:
                 path = folder / block.file
                 path.parent.mkdir(parents=True, exist_ok=True)
                 path.write_text(block.text, encoding="utf-8")
+                if block.language in _SYNTAX:
+                    _SYNTAX[block.language](block.text)
                 if block.language == "yaml":
                     _check_yaml(block, where)
             elif block.language == "python":
@@ -175,11 +187,39 @@ def _give(path: Path, source: str) -> None:
         shutil.copy(ROOT / source, path)
 
 
+def _check_lines(block: Block, where: str) -> None:
+    """Check that each line of C++ stands in the file that the comment names."""
+    there = set(_without_comments((ROOT / block.reason).read_text(encoding="utf-8")))
+    missing = [line for line in _without_comments(block.text) if line not in there]
+    assert not missing, f"{where}: not in {block.reason}: {missing}"
+
+
+def _without_comments(text: str) -> list[str]:
+    return [line.partition("//")[0].strip() for line in text.splitlines()]
+
+
+def _base(reason: str) -> dict[str, Any]:
+    """Return the rest of a configuration: its text, or a bundled one by name."""
+    given = yaml.safe_load(reason)
+    if isinstance(given, dict):
+        return given
+    text = (ROOT / "configs" / f"{given}.yaml").read_text(encoding="utf-8")
+    return dict(yaml.safe_load(text))
+
+
+def _laid_over(base: dict[str, Any], over: dict[str, Any]) -> dict[str, Any]:
+    """Return a configuration with the values of another, group by group."""
+    both = {key: _laid_over(base[key], value)
+            for key, value in over.items()
+            if isinstance(value, dict) and isinstance(base.get(key), dict)}  # fmt: skip
+    return base | over | both
+
+
 def _check_yaml(block: Block, where: str) -> None:
     """Run a configuration for a moment; a part of one together with its rest."""
     data = yaml.safe_load(block.text)
     if block.kind == "part of":
-        data = yaml.safe_load(block.reason) | data
+        data = _laid_over(_base(block.reason), data)
     try:
         status = load_experiment(data, _SHORT).run().status
     except Exception as error:
@@ -230,10 +270,15 @@ class Shell:
                     Path(name).symlink_to(ROOT / name)
             if re.match(r"hsp live\b", line) and "live.missing" not in line:
                 line = f"{line} {_PATIENCE}"
+                line += "" if "--duration" in line else f" {_BRIEFLY}"
             if line.endswith("&") or block.kind == "background":
                 self._background.append(self._start(line.rstrip("& "), where))
             elif block.kind == "Ctrl-C":
                 self._interrupted(line, where)
+            elif re.fullmatch(r"hsp [\w ./=-]+", line) and not block.kind:
+                words = line.split()[1:]
+                status, said = READY.run(words, self._folder, self._environment)
+                assert status == 0, f"{where}: {line}\n{said}"
             else:
                 done = subprocess.run(
                     ["bash", "-ec", line], cwd=self._folder, env=self._environment,

@@ -80,7 +80,8 @@ def _plot(options: argparse.Namespace) -> int:
         raise PlotError("-o names the file and its format; leave out --out, --format")
     names = [name.strip() for name in options.names.split(",") if name.strip()]
     if names and len(names) != len(logs):
-        raise PlotError(f"--names has {len(names)} names for {len(logs)} logs")
+        plural = "" if len(logs) == 1 else "s"
+        raise PlotError(f"--names has {len(names)} names for {len(logs)} log{plural}")
     if not names and logs == sorted(logs):  # as a shell expands *: 16, 2, 8
         logs = sorted(logs, key=_numerically)
     runs = [Rollout.load(log) for log in logs]

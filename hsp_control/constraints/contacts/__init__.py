@@ -1,4 +1,4 @@
-"""Contacts: where a robot stands, and the forces that can act there."""
+"""Contacts: the surfaces on which a robot stands, and the forces that can act there."""
 
 from hsp_control.common.entry_points import own_names
 

@@ -34,7 +34,7 @@ NORMAL, FORCE, WRENCH = 1, 3, 6
 
 
 class CommandedForce(Part, error=ContactError):
-    """A force that the environment shall exert on the robot at a contact, in time.
+    """The commanded force of the environment on the robot at a contact, over time.
 
     It is given in the axes of the contact: two tangents and the normal, so that a
     positive normal force presses. One number is the normal force alone, three are the
@@ -53,7 +53,7 @@ class CommandedForce(Part, error=ContactError):
     (6,) [N, N·m]."""
     _: KW_ONLY
     trajectory: Trajectory | None = None
-    """Instead: the command in time, of dimension 1, 3 or 6 [N, N·m]."""
+    """Instead of `value`: the command over time, of dimension 1, 3 or 6 [N, N·m]."""
 
     def __post_init__(self) -> None:
         if (self.value is None) == (self.trajectory is None):
@@ -177,7 +177,7 @@ class Contact(Part, ABC, family="contacts", error=ContactError):
     schedule: Schedule | None = None
     """When the contact is active [-]; always by default."""
     force: CommandedForce | None = None
-    """The force that the environment shall exert here [N]; by default that which the
+    """The commanded force of the environment on the robot [N]; by default the one that
     balance requires."""
     name: str = ""
     """Name of the contact in the log [-]; that of its frame by default."""
@@ -243,7 +243,7 @@ class Contact(Part, ABC, family="contacts", error=ContactError):
         return self.schedule is None or self.schedule.active(t)
 
     def weight(self, t: float) -> float:
-        """Return how active it is at time t [s], in [0, 1]; see `Schedule`."""
+        """Return the activation at time t [s], in [0, 1]; see `Schedule`."""
         return 1.0 if self.schedule is None else self.schedule.weight(t)
 
     @cached_property

@@ -174,7 +174,8 @@ class SurfaceContact(Contact, type="surface"):
     """Centre of a rectangular sole in the frame, shape (3,) [m]; the frame's origin by
     default."""
     corners: Annotated[Points, AfterValidator(_surface)] | None = None
-    """Instead: at least three corners of the sole in the frame, shape (k, 3) [m]."""
+    """Instead of a rectangle: at least three corners of the sole in the frame, shape
+    (k, 3) [m]."""
 
     def __post_init__(self) -> None:
         sizes = [self.length is not None, self.width is not None]

@@ -96,7 +96,7 @@ def find_file(source: RobotSource, name: str) -> Path | None:
 
 
 def where_to_put(name: str) -> str:
-    """Return where a missing file is looked for, and how that is changed."""
+    """Return where a missing file is searched, and how to change that."""
     scheme, _, rest = name.rpartition("://")
     if scheme not in ("package", "model"):
         return "the path is relative to the URDF"

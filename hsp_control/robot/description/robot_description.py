@@ -82,7 +82,7 @@ class OneRobot(Part, error=ModelError):
     """SRDF file whose disabled pairs of links never collide; by default the one of the
     same name beside the URDF, if there is one."""
     motor_inertia: MotorInertias | None = None
-    """Inertia of the rotors as the joints feel it, times their reductions squared
+    """Inertia of the rotors reflected to the joints, with their reductions squared
     [kg·m² or kg]: one number, or one for each joint in a list or by name; 0: the bare
     links. ``bundled``: those in the README of a bundled robot. By default those in the
     ``<transmission>`` elements of the URDF."""

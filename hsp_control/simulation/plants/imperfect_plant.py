@@ -27,7 +27,7 @@ class ImperfectPlant(SampledPlant):
     """A plant whose measurements and efforts pass through imperfect sensors and drives.
 
     The measured state and the applied effort are logged beside the true state and the
-    commanded effort. A copy, or a pickle, must be reset before it moves on.
+    commanded effort. A copy, or a pickle, must be reset before it is advanced.
     """
 
     def __init__(
@@ -69,7 +69,7 @@ class ImperfectPlant(SampledPlant):
         return q, v
 
     def advance(self, t: float, end: float, tau: Array) -> tuple[Array, Array]:
-        """Move on under the output of the drives; see `SampledPlant.advance`."""
+        """Advance under the output of the drives; see `SampledPlant.advance`."""
         effort, delay = tau, 0.0
         for drive in self._driving:
             if isinstance(drive, RunningLag):

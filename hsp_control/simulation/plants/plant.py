@@ -116,7 +116,7 @@ class ContinuousPlant(Plant, ABC):
 
 
 class SampledPlant(Plant, ABC):
-    """A plant with its own state, which moves on under an effort that is held.
+    """A plant with its own state, which is advanced under an effort that is held.
 
     Examples are an engine with its own integrator, joints with stiction, drives with
     delays, and a real robot. A run is one `reset`, then one `measure` and one `advance`
@@ -133,7 +133,7 @@ class SampledPlant(Plant, ABC):
 
     @abstractmethod
     def advance(self, t: float, end: float, tau: Array) -> tuple[Array, Array]:
-        """Move on from t to ``end`` [s] under an effort of shape (nv,).
+        """Advance from t to ``end`` [s] under an effort of shape (nv,).
 
         Returns:
             The true (q, v) at ``end``, shapes (nq,) and (nv,), in new arrays.
@@ -203,7 +203,7 @@ class IntegratedPlant(SampledPlant):
         steps.q[:], steps.v[:], self.effort[:] = self._q, self._v, tau
 
     def moved(self, steps: Steps) -> tuple[Array, Array]:
-        """Go on where native steps have ended; return (q, v) there, as `advance`."""
+        """Continue where native steps have ended; return (q, v) there, as `advance`."""
         self._q, self._v = steps.q.copy(), steps.v.copy()
         return self._q, self._v
 

@@ -59,6 +59,7 @@ class Play {
     this.hand = new PlayHand(this, this.viewer);
     this.keys = new PlayKeys(this);
     this.viewer.scene.onBeforeRender = () => this.layOut();
+    new ResizeObserver(() => this.leaveRoom()).observe(this.bar.row);
     legend.keepClosed = true;  // the whole scene can be dragged
     legend.setOpen(false);
     this.panel.setOpen(!this.panel.narrow.matches);
@@ -68,6 +69,13 @@ class Play {
       this.bar.notify("No graphics card is used: shadows and reflections are off.");
     }
     refit();  // there is no legend to make room for
+  }
+
+  // The picture has room for what the bar covers of it.
+  leaveRoom() {
+    const {bottom} = this.viewer.dom_element.getBoundingClientRect();
+    barHeight = Math.max(0, bottom - this.bar.row.getBoundingClientRect().top);
+    refit();
   }
 
   // After a reset the plots are the same: they keep what is shown alone.
@@ -228,6 +236,21 @@ class Play {
     }
     this.layOutSpring(sight);
     this.ghosts.layOut(sight);
+    this.keepInSight(sight);
+  }
+
+  // The camera moves back where a target comes to the edge of the picture, unless the user has
+  // turned it.
+  keepInSight(sight) {
+    if (this.hand.grip || this.bar.past.looking) return;
+    const {left, right, top, bottom, width, height} = sight.box;
+    const edge = 0.08 * Math.min(width, height), low = bottom - barHeight;
+    const within = (x, one, other) => x > one + edge && x < other - edge;
+    const out = [...this.gizmos.values()].filter(({noun, position}) => {
+      const {x, y, ahead} = sight.project(position);
+      return noun === "Target" && !(ahead && within(x, left, right) && within(y, top, low));
+    });
+    if (out.length) requestAnimationFrame(() => views.widen(out.map(({position}) => position)));
   }
 
   // The hand's end of the spring is where the pointer is; the link's end moves with it.

@@ -211,9 +211,10 @@ function girth() {
 
 // Look at a target from an eye, or along a direction from a distance at which all balls
 // around the points are visible. An eye is chosen for a wide window: in a narrower one it
-// moves back until the points are in sight, or as much of them as in the wide one.
+// moves back until the points are in sight, or as much of them as in the wide one. With `widened`
+// all points are seen in any case.
 function camera(command) {
-  const {eye, direction, points, field_of_view: fov} = command;
+  const {eye, direction, points, field_of_view: fov, widened} = command;
   const radius = Math.max(command.radius, girth());
   const center = vector(command.target), up = vector(command.up);
   const toEye = eye ? vector(eye).sub(center) : vector(direction);
@@ -227,11 +228,12 @@ function camera(command) {
   const offsets = points.map((point) => vector(point).sub(center));
   const needed = (offset) => {
     const x = Math.abs(offset.dot(right)) + radius, y = Math.abs(offset.dot(above)) + radius;
-    const across = x / wide, upwards = eye ? 0 : y / (tall * (1 - bar - title));
+    const across = x / wide, upwards = eye && !widened ? 0 : y / (tall * (1 - bar - title));
     return offset.dot(toEye) + Math.max(across, upwards);
   };
   let away = Math.max(...offsets.map(needed));
-  if (eye) away = clamp(away, distance, distance * Math.max(WIDE / aspect, 1));
+  const farthest = widened ? Infinity : distance * Math.max(WIDE / aspect, 1);
+  if (eye) away = clamp(away, distance, farthest);
   const lens = viewer.camera;
   Object.assign(lens, {fov, near: away / 100, far: away * 100});
   lens.up.copy(up);
