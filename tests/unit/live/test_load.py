@@ -12,8 +12,8 @@ from hsp_control.live.settings import StopSettings
 
 LIMITS = np.full(7, 100.0)
 """So a load may be 30 N·m."""
-RATE, BEFORE = 3.0, 0.2
-"""Of the estimate [1/s], and how old it is when it is used [s]."""
+RATE, BEFORE, AHEAD = 3.0, 0.2, 0.05
+"""Of the estimate [1/s], how old it is when it is used, and its head start [s]."""
 LOAD = np.array([0.0, 4.0, -1.0, -5.0, 0.2, -2.0, 0.1])
 ZERO = np.zeros(7)
 
@@ -32,15 +32,29 @@ def observe(
         safe.observe(state, state.nonlinear_effects - load)
 
 
-def test_a_load_is_found_by_a_low_pass_and_used_later() -> None:
+def test_a_load_is_found_by_a_mean_then_by_a_low_pass_and_used_later() -> None:
     safe = stop()
-    late = round(BEFORE / PERIOD)
+    late, mean = round(BEFORE / PERIOD), int((1.0 / RATE - AHEAD) / PERIOD)
     observe(safe, LOAD, late)
     np.testing.assert_array_equal(safe.load, 0.0)
-    observe(safe, LOAD, 1000, begin=late)
-    found = 1.0 - (1.0 - RATE * PERIOD) ** 999
+    observe(safe, LOAD, mean + 1, begin=late)
+    found = mean * PERIOD / (mean * PERIOD + AHEAD)
     np.testing.assert_allclose(safe.load, found * LOAD, rtol=1e-9, atol=1e-12)
-    assert found > 0.9
+    assert found > 0.8
+    observe(safe, LOAD, 500, begin=late + mean + 1)
+    found = 1.0 - (1.0 - found) * (1.0 - RATE * PERIOD) ** 500
+    np.testing.assert_allclose(safe.load, found * LOAD, rtol=1e-9, atol=1e-12)
+
+
+def test_a_wrong_first_velocity_moves_a_braked_joint_no_faster_than_itself() -> None:
+    """The gain is at most k = 1/T₀: an error x leaves k M x at most."""
+    safe, wrong = stop(np.full(7, 1e4)), 0.3 * np.eye(7)[1]
+    observe(safe, ZERO, 1)
+    observe(safe, ZERO, 1 + round(BEFORE / PERIOD), v=wrong, begin=1)
+    momentum = panda().state(0.0, start(), ZERO).mass_matrix @ wrong
+    gain = 1.0 / (AHEAD + PERIOD)
+    np.testing.assert_allclose(safe.load, gain * momentum, rtol=1e-9, atol=1e-9)
+    assert gain < StopSettings().damping
 
 
 def test_a_load_is_bounded_by_that_of_a_contact() -> None:
