@@ -99,7 +99,9 @@ bench: $(STAMP) $(ENGINE) ## compare with other controllers, in .venv-peers
 	@.venv-peers/bin/python -W "ignore:to-Python converter" benchmarks/side_by_side.py
 	@.venv-peers/bin/python -W "ignore:to-Python converter" \
 	  benchmarks/whole_body_side_by_side.py
-	@.venv-peers/bin/python -W "ignore:to-Python converter" benchmarks/companions/walking/walking_side_by_side.py
+	@for script in $(wildcard hsp_control/companions/walking/benchmark/walking_side_by_side.py); do \
+	  .venv-peers/bin/python -W "ignore:to-Python converter" "$$script"; \
+	done
 	@.venv-peers/bin/python -W "ignore:to-Python converter" benchmarks/limit_side_by_side.py
 	@.venv-peers/bin/python -W "ignore:to-Python converter" benchmarks/scaling.py
 
@@ -118,7 +120,7 @@ wheel: $(STAMP) $(ENGINE) ## build the wheel into dist/
 sims: $(STAMP) $(ENGINE) ## robosuite's own arms and our law in them, in .venv-sims
 	@if ! .venv-sims/bin/python -m pip --version > /dev/null 2>&1; then \
 	  $(call new-venv,$(BIN)/python,.venv-sims); fi
-	@.venv-sims/bin/python tools/simulators.py $(ARGS)
+	@.venv-sims/bin/python hsp_control/companions/simulators/tests/in_robosuite.py $(ARGS)
 
 lerobot: $(STAMP) $(ENGINE) ## LeRobot's own commands on our arm, in .venv-lerobot (8 GB)
 	@if ! .venv-lerobot/bin/python -m pip --version > /dev/null 2>&1; then \

@@ -133,7 +133,10 @@ def _built(kind: str, place: Path) -> Path:
     environment = os.environ | {"PATH": path}
     if compiler() is None:
         environment.pop("CXX", None)
-    for command in ([*configure, *options], ["cmake", "--build", str(place)]):
+    make = ["cmake", "--build", str(place)]
+    if kind != "Release":  # Python's alone
+        make += ["--target", "_engine"]
+    for command in ([*configure, *options], make):
         done = subprocess.run(
             command, capture_output=True, text=True, check=False, env=environment
         )
@@ -179,6 +182,15 @@ def wheel_tag(library: str) -> str:
     return f"{python}-{mine.platform if compiler() else zig_made}"
 
 
+def configs_of_companions() -> dict[str, str]:
+    """Return where a wheel has the configurations of companions: beside others."""
+    return {
+        str(file): f"hsp_control/data/configs/{file.relative_to(folder)}"
+        for folder in sorted(ROOT.glob("hsp_control/companions/*/configs"))
+        for file in sorted(folder.rglob("*.yaml"))
+    }
+
+
 class EngineHook(BuildHookInterface):  # type: ignore[misc]
     """Builds the engine where a wheel is built, also an editable one."""
 
@@ -193,6 +205,8 @@ class EngineHook(BuildHookInterface):  # type: ignore[misc]
         build_data["tag"] = wheel_tag(library.name)
         for each in (library, *library.parent.glob("libhsp_step.*")):
             build_data["artifacts"].append(str(each.relative_to(ROOT)))
+        if version == "standard":  # an editable one reads the checkout
+            build_data["force_include"] |= configs_of_companions()
 
 
 if __name__ == "__main__":

@@ -2,8 +2,9 @@
 
     .venv/bin/python benchmarks/forces.py
 
-Runs configs/forces/ with other forces, speeds, masses and friction coefficients, and a
-ball without any controller. Writes the tables of benchmarks/results/forces.md.
+Runs the configurations forces/* with other forces, speeds, masses and friction
+coefficients, and a ball without any controller. Writes the tables of
+benchmarks/results/forces.md.
 """
 
 from typing import NamedTuple

@@ -117,7 +117,7 @@ def column_figure(panels: int) -> tuple[Figure, list[Axes]]:
 
 
 def draw_sweep() -> None:
-    """Draw what the sweep of docs/companions/sweeps.md finds."""
+    """Draw what the sweep of hsp_control/companions/sweeps/page.md finds."""
     found = hsp.sweeps.sweep(
         "panda_obstacle",
         {

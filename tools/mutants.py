@@ -29,7 +29,7 @@ from mutations import Edit, edits
 
 ROOT = Path(__file__).resolve().parents[1]
 CODE = ("hsp_control", "engine")
-COPIED = (*CODE, "tests", "robots", "configs", "docs", "pyproject.toml")
+COPIED = (*CODE, "conftest.py", "tests", "robots", "configs", "docs", "pyproject.toml")
 TESTS_FAILED = 1
 """The exit status of pytest when tests ran and one failed."""
 LONGEST, MEMORY = 900.0, 16 << 30
@@ -86,8 +86,7 @@ def tests_of(file: str) -> tuple[str, ...]:
     """Return the tests of a file's room; those of all rooms if it has none."""
     _, room, *rest = file.split("/")
     if room == "companions":
-        own = f"hsp_control/companions/{rest[0]}/tests"
-        named = [own if (ROOT / own).is_dir() else f"tests/companions/{rest[0]}"]
+        named = [f"hsp_control/companions/{rest[0]}/tests"]
     else:
         named = [f"tests/unit/{each}" for each in ROOMS.get(room, (room,))]
     there = tuple(each for each in named if (ROOT / each).is_dir())

@@ -10,7 +10,7 @@ second: enough to check that the site can be built.
 import sys
 from pathlib import Path
 
-from hsp_control import load_experiment, viewer
+import hsp_control as hsp
 from hsp_control.common.resources import bundled_configs
 
 FOLDER = Path(__file__).resolve().parents[1] / "docs" / "_static" / "replays"
@@ -38,13 +38,13 @@ def main() -> None:
     known = bundled_configs()
     names = [name for name in sys.argv[1:] if name != "--brief"]
     brief = len(names) < len(sys.argv) - 1
-    for name in names or REPLAYS:
+    for name in names or filter(known.__contains__, REPLAYS):
         page = FOLDER / f"{name.replace('/', '-')}.html"
         if page.exists() and page.stat().st_mtime > known[name].stat().st_mtime:
             continue
         print(f"{name} ...", flush=True)
         runs = [_run(name, *each, brief=brief) for each in _compared(name)]
-        viewer.export_html(runs, page)
+        hsp.viewer.export_html(runs, page)
 
 
 def _compared(name: str) -> list[tuple[str, dict[str, object]]]:
@@ -53,12 +53,12 @@ def _compared(name: str) -> list[tuple[str, dict[str, object]]]:
 
 def _run(
     name: str, said: str, null_space: dict[str, object], *, brief: bool
-) -> viewer.ComparedRun:
+) -> "hsp.viewer.ComparedRun":
     changes = [f"null_space.{key}={value}" for key, value in null_space.items()]
     if brief:
         changes.append("simulation.duration=0.1")
-    experiment = load_experiment(name, *changes)
-    return viewer.ComparedRun(
+    experiment = hsp.load_experiment(name, *changes)
+    return hsp.viewer.ComparedRun(
         said, experiment.robot, experiment.run(), experiment.controller
     )
 

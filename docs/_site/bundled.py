@@ -1,11 +1,10 @@
-"""The pages of what has a name: configurations, robots, errors of a Franka arm."""
+"""The pages of what has a name: configurations and robots."""
 
 import yaml
 from prose import paragraphs, plain
 
 from hsp_control.cli.robot_table import number, rows, task
 from hsp_control.common.resources import bundled_configs
-from hsp_control.companions.franka.reflexes import table
 
 ROBOTS = """\
 # Robots
@@ -25,7 +24,7 @@ def configurations_page() -> str:
     lines = [
         "# Configurations",
         "",
-        "Each is a file in `configs/` and runs by name.",
+        "Each is a file in `configs/`, or in a companion's folder, and runs by name.",
         "",
     ]
     for name, file in bundled_configs().items():
@@ -49,11 +48,3 @@ def robots_page() -> str:
         )
         lines.append(f"| {' | '.join(cells)} |")
     return "\n".join(lines) + "\n"
-
-
-def franka_errors_page() -> str:
-    """Return the page of the errors of a Franka arm, which its messages quote."""
-    return (
-        "# Errors of a Franka arm\n\nThe names that the arm gives to an abort; "
-        "`hsp live` prints the same advice.\n\n" + table() + "\n"
-    )

@@ -10,6 +10,8 @@ from sphinx.errors import ExtensionError
 from sphinx.util.docutils import SphinxDirective
 from sphinx.util.osutil import relative_uri
 
+from hsp_control.common.resources import bundled_configs
+
 _FRAME = (
     '<figure class="replay"><iframe src="{address}" loading="lazy" title="{title}" '
     'allow="fullscreen"></iframe><figcaption>{title}. '
@@ -28,6 +30,8 @@ class Replay(SphinxDirective):
 
     def run(self) -> list[nodes.Node]:
         """Return the frame; `tools/replays.py` has written its page."""
+        if self.arguments[0] not in bundled_configs():  # of a companion taken away
+            return []
         name = self.arguments[0].replace("/", "-") + ".html"
         page = Path(self.env.srcdir) / "_static" / "replays" / name
         if not page.is_file():

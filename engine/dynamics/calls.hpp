@@ -126,7 +126,7 @@ struct ForwardDynamics {
 
   void check() const { check_sizes(*dynamics.object, q.size(), v.size()); }
   void operator()() {
-    [[maybe_unused]] const MayAllocate crba(true);  // with followers
+    [[maybe_unused]] const MayAllocate crba(true);
     if (!dynamics->forward_dynamics(q, v, effort, acceleration))
       acceleration.setConstant(std::numeric_limits<double>::quiet_NaN());
   }
@@ -153,10 +153,7 @@ struct MassMatrixRate {
   Out<'n', 'n'> M_dot;
 
   void check() const { check_sizes(*dynamics.object, q.size(), v.size()); }
-  void operator()() {
-    [[maybe_unused]] const MayAllocate crba(true);  // with followers
-    dynamics->mass_matrix_rate(q, v, M_dot);
-  }
+  void operator()() { dynamics->mass_matrix_rate(q, v, M_dot); }
 };
 
 // The centroidal map A gives momentum and angular momentum about the centre of mass c, A v.

@@ -87,7 +87,7 @@ class Dynamics {
   void mass_matrix(const ConstVector& q, Square M);  // CRBA
   // Along v, payloads included.
   void mass_matrix_rate(const ConstVector& q, const ConstVector& v, Square M_dot);
-  // M⁻¹ (tau - N); false if M is singular, which is detected for models with followers only.
+  // M⁻¹ (tau - N); false if M is singular.
   bool forward_dynamics(const ConstVector& q, const ConstVector& v, const ConstVector& tau,
                         Eigen::Map<Vector> a);
   // The centroidal map: A v = (momentum, angular momentum about the centre of mass c), and A'

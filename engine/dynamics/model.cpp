@@ -120,11 +120,10 @@ void Dynamics::put_down() {
 }
 
 void Dynamics::carry(const Carried& body) {
-  auto& [model, data, own, own_gravity, carried, zero, step, there, factor] = *pinocchio_;
   if (body.share > 0.0)
-    model.inertias[body.joint] +=
+    pinocchio_->model.inertias[body.joint] +=
         pin::Inertia(body.share * body.mass, body.center, body.share * body.inertia);
-  carried.push_back(body);
+  pinocchio_->carried.push_back(body);
 }
 
 void Dynamics::change_gravity(const Vector3& change) {

@@ -44,8 +44,9 @@ struct Dynamics::Pinocchio {
   Model::InertiaVector own;  // without payloads
   Vector3 own_gravity;
   std::vector<Carried> carried;
-  Vector zero, step, there;            // two of v's size, one of q's
-  Eigen::LLT<Eigen::MatrixXd> factor;  // of M, of models with followers
+  Data::Matrix6x momenta, momentum_rates;  // of the Jacobian's columns, at the world's origin
+  Vector zero;                             // of v's size
+  Eigen::LLT<Eigen::MatrixXd> factor;      // of M, of models with followers
 
   // Data is made where it stays: its factorisations may not be copied before they are made.
   explicit Pinocchio(const Model& given)
@@ -53,21 +54,21 @@ struct Dynamics::Pinocchio {
         data(model),
         own(model.inertias),
         own_gravity(model.gravity.linear()),
+        momenta(6, model.nvExtended),
+        momentum_rates(6, model.nvExtended),
         zero(Vector::Zero(model.nv)),
-        step(zero),
-        there(Vector::Zero(model.nq)),
         factor(model.nv) {}
 
   bool has_followers() const { return !model.mimicking_joints.empty(); }
-  const Data::MatrixXs& mass_matrix(const ConstVector& q);  // both triangles
+  void joint_jacobians(const ConstVector& q, const ConstVector& v);  // into `data`
+  const Data::MatrixXs& mass_matrix(const ConstVector& q);           // both triangles
   void write_mass_matrix_of_followers(const ConstVector& q);
-  void write_rate_by_differences(const ConstVector& q, const ConstVector& v, Square M_dot);
-  // A and A' of `centroidal_map`, of models with followers; returns the centre of mass.
-  Vector3 map_of_followers(const ConstVector& q, const ConstVector& v, Jacobian A, Jacobian A_dot);
+  // At the placements, velocities and Jacobians of `data`.
+  void compute_momenta();
+  void compute_momentum_rates(bool of_masses);
+  template <class Sum, class F> void add_symmetric(Sum& sum, const F& f) const;
   // At the placements and velocities of `data`; u = J v, l = A v/m.
   MassFlow mass_flow(const Vector3& c, const Vector3& u, const Vector3& l) const;
-  // q ⊕ h v, until the next call.
-  ConstVector moved(const ConstVector& q, const ConstVector& v, double h);
 };
 
 inline ConstVector view(const Vector& x) { return {x.data(), x.size()}; }

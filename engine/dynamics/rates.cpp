@@ -1,8 +1,18 @@
-// The forward dynamics, and the rates of the mass matrix and of the momentum.
-#include <pinocchio/algorithm/aba.hpp>
-#include <pinocchio/algorithm/centroidal.hpp>
+// What follows from the joints' Jacobians and the bodies' inertias: the mass matrix of models with
+// followers, the rates of the mass matrix and of the momentum, and the forward dynamics.
+//
+// Let Y be the inertia of all bodies beyond a joint, at the world's origin, and s_k a column of the
+// joint's Jacobian. Its momentum is h_k = Y s_k, with the rate h_k' = Y' s_k + Y s_k', and
+//
+//   M_kl = h_k · s_l,   M_kl' = h_k' · s_l + h_k · s_l',   A_k = h_k,   A_k' = h_k'
+//
+// where l is a column of k's joint, or of one that carries it (Orin, Goswami and Lee 2013). Columns
+// of a follower are added to its leader's. Pinocchio's own algorithms (4.1) assume that each joint
+// has its own columns; its CRBA of followers accumulates into memory that it does not clear.
+#include <pinocchio/algorithm/cholesky.hpp>
 #include <pinocchio/algorithm/joint-configuration.hpp>
-#include <pinocchio/algorithm/rnea.hpp>
+
+#include <hsp/rotations.hpp>
 
 #include "pinocchio.hpp"
 
@@ -13,57 +23,92 @@ void Dynamics::difference(const ConstVector& start, const ConstVector& end,
   pin::difference(pinocchio_->model, start, end, displacement);
 }
 
-ConstVector Dynamics::Pinocchio::moved(const ConstVector& q, const ConstVector& v, double h) {
-  step = h * v;
-  pin::integrate(model, q, step, there);
-  return view(there);
+void Dynamics::Pinocchio::compute_momenta() {
+  auto& Y = data.oYcrb;
+  Y[0].setZero();
+  for (int i = 1; i < model.njoints; ++i) Y[i] = data.oMi[i].act(model.inertias[i]);
+  for (int i = model.njoints - 1; i > 0; --i) {
+    const auto& joint = model.joints[i];
+    momenta.middleCols(joint.idx_vExtended(), joint.nvExtended()) =
+        Y[i].matrix().lazyProduct(data.J.middleCols(joint.idx_vExtended(), joint.nvExtended()));
+    Y[model.parents[i]] += Y[i];
+  }
 }
 
-// C + Cᵀ, with Coriolis' matrix C. Pinocchio has none of models with followers: there it is by
-// differences of the fourth order. The ramps of payloads are added.
+void Dynamics::Pinocchio::compute_momentum_rates(bool of_masses) {
+  compute_momenta();
+  auto& rate = data.doYcrb;
+  rate[0].setZero();
+  for (int i = 1; i < model.njoints; ++i)
+    rate[i] = data.oMi[i].act(model.inertias[i]).variation(data.oMi[i].act(data.v[i]));
+  if (of_masses)
+    for (const Carried& body : carried)
+      rate[body.joint] +=
+          body.rate *
+          data.oMi[body.joint].act(pin::Inertia(body.mass, body.center, body.inertia)).matrix();
+  for (int i = model.njoints - 1; i > 0; --i) {
+    const auto& joint = model.joints[i];
+    const Index first = joint.idx_vExtended(), count = joint.nvExtended();
+    momentum_rates.middleCols(first, count) = rate[i].lazyProduct(data.J.middleCols(first, count));
+    momentum_rates.middleCols(first, count) +=
+        data.oYcrb[i].matrix().lazyProduct(data.dJ.middleCols(first, count));
+    rate[model.parents[i]] += rate[i];
+  }
+}
+
+// Add f(k, l) of columns to the entries of their rows of v, over each joint and its ancestors.
+template <class Sum, class F> void Dynamics::Pinocchio::add_symmetric(Sum& sum, const F& f) const {
+  for (int i = 1; i < model.njoints; ++i) {
+    const auto& joint = model.joints[i];
+    for (int a = 0; a < joint.nvExtended(); ++a) {
+      const int k = joint.idx_vExtended() + a, row = joint.idx_v() + a;
+      for (int j = i; j > 0; j = model.parents[j]) {
+        const auto& carrier = model.joints[j];
+        for (int b = 0; b < carrier.nvExtended(); ++b) {
+          const int l = carrier.idx_vExtended() + b, column = carrier.idx_v() + b;
+          if (l > k) break;
+          const double value = f(k, l);
+          sum(row, column) += value;
+          if (l != k) sum(column, row) += value;
+        }
+      }
+    }
+  }
+}
+
+void Dynamics::Pinocchio::write_mass_matrix_of_followers(const ConstVector& q) {
+  joint_jacobians(q, view(zero));
+  compute_momenta();
+  data.M.setZero();
+  data.M.diagonal() = model.armature;
+  add_symmetric(data.M, [this](int k, int l) { return momenta.col(k).dot(data.J.col(l)); });
+}
+
 void Dynamics::mass_matrix_rate(const ConstVector& q, const ConstVector& v, Square M_dot) {
   auto& own = *pinocchio_;
-  if (own.has_followers()) own.write_rate_by_differences(q, v, M_dot);
-  else {
-    const auto& C = pin::computeCoriolisMatrix(own.model, own.data, q, v);
-    M_dot = C + C.transpose();
-  }
-  // M is linear in the inertias: the contribution of a body is the difference with and without it.
-  for (const Carried& body : own.carried) {
-    if (body.rate == 0.0) continue;
-    M_dot -= body.rate * own.mass_matrix(q);
-    auto& inertia = own.model.inertias[body.joint];
-    const pin::Inertia without = inertia;
-    inertia += pin::Inertia(body.mass, body.center, body.inertia);
-    M_dot += body.rate * own.mass_matrix(q);
-    inertia = without;
-  }
-}
-
-void Dynamics::Pinocchio::write_rate_by_differences(const ConstVector& q, const ConstVector& v,
-                                                    Square M_dot) {
-  const double h = 1e-3 / std::max(1.0, v.lpNorm<Eigen::Infinity>());
+  own.joint_jacobians(q, v);
+  own.compute_momentum_rates(true);
   M_dot.setZero();
-  for (const double steps : {-2.0, -1.0, 1.0, 2.0}) {
-    const double weight = std::abs(steps) == 1.0 ? 8.0 : -1.0;
-    M_dot +=
-        std::copysign(weight / (12.0 * h), weight * steps) * mass_matrix(moved(q, v, steps * h));
-  }
+  own.add_symmetric(M_dot, [&own](int k, int l) {
+    return own.momentum_rates.col(k).dot(own.data.J.col(l)) +
+           own.momenta.col(k).dot(own.data.dJ.col(l));
+  });
 }
 
-// ABA, which does not support followers: M and N there.
 bool Dynamics::forward_dynamics(const ConstVector& q, const ConstVector& v, const ConstVector& tau,
                                 Eigen::Map<Vector> a) {
   auto& own = *pinocchio_;
-  if (!own.has_followers()) {
-    a = pin::impl::abaLocalConvention(own.model, own.data, q, v, tau);
-    return true;
-  }
   inverse_dynamics(q, v, view(own.zero), a);
   a = tau - a;
-  own.factor.compute(own.mass_matrix(q));
-  own.factor.solveInPlace(a);
-  return own.factor.info() == Eigen::Success;
+  const auto& M = own.mass_matrix(q);
+  if (own.has_followers()) {
+    own.factor.compute(M);
+    own.factor.solveInPlace(a);
+    return own.factor.info() == Eigen::Success;
+  }
+  pin::cholesky::decompose(own.model, own.data);  // U D Uᵀ, as sparse as the tree
+  pin::cholesky::solve(own.model, own.data, a);
+  return own.data.D.minCoeff() > 0.0;
 }
 
 // With shares s_k of masses m_k at p_k, and m the whole mass, c = (Σ m_i c_i + Σ s_k m_k p_k)/m has
@@ -97,21 +142,27 @@ MassFlow Dynamics::Pinocchio::mass_flow(const Vector3& c, const Vector3& u,
   return {velocity, acceleration, momentum};
 }
 
+// The sum of the momenta is about the world's origin; it is moved to the centre of mass.
 MassFlow Dynamics::centroidal_map(const ConstVector& q, const ConstVector& v, Vector3& c,
                                   Jacobian A, Jacobian A_dot) {
-  auto& data = pinocchio_->data;
-  if (pinocchio_->has_followers()) {
-    c = pinocchio_->map_of_followers(q, v, A, A_dot);
-  } else {
-    data.vcom[0].setZero();  // read before it is written
-    pin::computeCentroidalMapTimeVariation(pinocchio_->model, data, q, v);
-    c = data.com[0];
-    A = data.Ag;
-    A_dot = data.dAg;
+  auto& own = *pinocchio_;
+  own.joint_jacobians(q, v);
+  own.compute_momentum_rates(false);
+  A.setZero();
+  A_dot.setZero();
+  for (int i = 1; i < own.model.njoints; ++i) {
+    const auto& joint = own.model.joints[i];
+    for (int k = 0; k < joint.nvExtended(); ++k) {
+      A.col(joint.idx_v() + k) += own.momenta.col(joint.idx_vExtended() + k);
+      A_dot.col(joint.idx_v() + k) += own.momentum_rates.col(joint.idx_vExtended() + k);
+    }
   }
-  if (pinocchio_->carried.empty()) return {};
+  c = own.data.oYcrb[0].lever();
+  A.bottomRows<3>() -= skew(c).lazyProduct(A.topRows<3>());
+  A_dot.bottomRows<3>() -= skew(c).lazyProduct(A_dot.topRows<3>());
+  if (own.carried.empty()) return {};
   const double m = mass();
-  return pinocchio_->mass_flow(c, A.topRows<3>() * v / m, A.bottomRows<3>() * v / m);
+  return own.mass_flow(c, A.topRows<3>() * v / m, A.bottomRows<3>() * v / m);
 }
 
 }  // namespace hsp

@@ -12,6 +12,6 @@ namespace hsp {
 const Kind* const* field_kinds() {
   return kinds<JointCentering, TargetPosture, EqualJointAngles, LimitBarrier, PointDistance,
                SelectRows, ChainGradient, Manipulability, InverseCondition, Barrier,
-               GradientDescent, RampWeight, AddWeighted>();
+               GradientDescent, RampWeight, ProductWeight, AddWeighted>();
 }
 }  // namespace hsp

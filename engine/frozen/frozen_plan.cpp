@@ -84,6 +84,17 @@ std::unique_ptr<Dynamics> read_dynamics(Bytes& bytes) {
   return std::make_unique<Dynamics>(joints, gravity, armature);
 }
 
+Index size_of(const StreamAlone& stream, SentTo part) {
+  switch (part) {
+    case SentTo::TARGET:
+      return stream.sent_target.size();
+    case SentTo::TIME:
+      return 1;
+    default:
+      return stream.sent_velocity.size();
+  }
+}
+
 std::int64_t entries(const Argument& array, int rank) {
   std::int64_t count = 1;
   constexpr std::int64_t most = std::int64_t{1} << 40;
@@ -203,9 +214,10 @@ void FrozenPlan::read_port(Bytes& bytes) {
   port.size = array.shape[0];
   port.data = array.data;
   if (role == 'i') port.input = &input<Evolve>(bytes);
-  else if (role == 't') port.target = &input<StreamAlone>(bytes);
-  else if (role == 'v') port.velocity = &input<StreamAlone>(bytes);
-  else if (role == 'p') {
+  else if (role == 't' || role == 'v' || role == 'r' || role == 'c') {
+    port.stream = &input<StreamAlone>(bytes);
+    port.part = static_cast<SentTo>(role);
+  } else if (role == 'p') {
     port.payloads = &input<Payloads>(bytes);
     const double* first = port.payloads->asked.data();
     port.frame = (static_cast<double*>(port.data) - first) / 10;
@@ -220,8 +232,7 @@ void FrozenPlan::read_port(Bytes& bytes) {
       throw std::runtime_error("an input is of no impedance");
   } else if (role != 'o') throw std::runtime_error("a port has no role");
   const Index size = port.input      ? port.input->x.size()
-                     : port.target   ? port.target->sent_target.size()
-                     : port.velocity ? port.velocity->sent_velocity.size()
+                     : port.stream   ? size_of(*port.stream, port.part)
                      : port.payloads ? 10
                                      : port.size;
   if (size != port.size || (port.is_input() && port.entry != 'd'))

@@ -17,6 +17,9 @@
 
 namespace hsp::frozen {
 
+// What of a message an input of a stream is.
+enum class SentTo : char { TARGET = 't', VELOCITY = 'v', RATE = 'r', TIME = 'c' };
+
 // An array of the plan that has a name outside of it.
 struct Port {
   std::string name, unit, meaning;
@@ -25,12 +28,13 @@ struct Port {
   void* data;
   // The receivers of a set value; all are null for an output.
   Evolve* input = nullptr;
-  StreamAlone *target = nullptr, *velocity = nullptr;
+  StreamAlone* stream = nullptr;
+  SentTo part = SentTo::TARGET;  // of a message to a stream
   Payloads* payloads = nullptr;
   Index frame = 0;  // of a payload
   EvolveImpedance* impedance = nullptr;
   Index first = 0, count = 0;  // of which numbers of an impedance
-  bool is_input() const { return input || target || velocity || payloads || impedance; }
+  bool is_input() const { return input || stream || payloads || impedance; }
 };
 
 class FrozenPlan {

@@ -16,6 +16,7 @@ namespace {
 using hsp::Index;
 using hsp::frozen::FrozenPlan;
 using hsp::frozen::Port;
+using hsp::frozen::SentTo;
 
 constexpr double infinite = std::numeric_limits<double>::infinity();
 constexpr double most_periods = 100.0;  // from one step to the next
@@ -62,8 +63,9 @@ struct hsp_controller {
   int refused = 0;                     // periods in a row without a new effort
   hsp::Vector expected_q, expected_v;  // the last accepted state, and the state predicted from it
   bool blind = false;                  // whether hsp_stop uses the predicted state
-  std::atomic<hsp_status> error = HSP_OK;  // of the last request
-  char failure[512] = "";                  // an exception's message
+  std::atomic<hsp_status> error = HSP_OK;     // of the last request
+  std::atomic<const char*> reason = nullptr;  // why a value was refused, if that is known
+  char failure[512] = "";                     // an exception's message
   std::atomic_flag busy = ATOMIC_FLAG_INIT;
 };
 
@@ -74,6 +76,7 @@ template <class Request> hsp_status made(hsp_controller* controller, Request req
   if (!controller) return HSP_WRONG_VALUE;
   if (controller->busy.test_and_set(std::memory_order_acquire)) return HSP_BUSY;
   hsp_status status = HSP_FAILED;
+  controller->reason = nullptr;
   try {
     status = request(*controller);
   } catch (const std::exception& error) {
@@ -159,30 +162,77 @@ hsp_status step(hsp_controller& of, double t, const double* q, const double* v, 
   return status;
 }
 
+// Refuse a value, with a sentence.
+hsp_status refused(hsp_controller& of, const char* reason) {
+  of.reason = reason;
+  return HSP_WRONG_VALUE;
+}
+
+constexpr const char* null_state = "q, v or tau is a null pointer";
+
+// What a port accepts.
+const char* accepted(const Port& port) {
+  if (port.payloads)
+    return "a payload needs a mass of 0 or more, and the inertia of a body, in finite numbers; "
+           "without a mass all 0";
+  if (port.impedance)
+    return "a stiffness or damping needs to be finite, symmetric and without an eigenvalue below "
+           "0, and with the other one damped and stable at this period";
+  if (port.input)
+    return port.input->definite ? "a gain needs to be finite and positive definite, with entries "
+                                  "below what is stable at this period"
+           : port.input->cone.rows()
+               ? "a force needs to be finite, to push, and to stay within the "
+                 "friction pyramid at each point"
+               : "a value is not finite or beyond the input's bounds, or 0 "
+                 "where it has to be positive";
+  if (port.part == SentTo::TIME) return "the time of a target needs to be finite, 1e12 s at most";
+  return "a target or velocity needs finite numbers, 1e6 at most, and a quaternion norm 1";
+}
+
+// Send a part of a message to a stream; return whether it is valid.
+template <class Values> bool sent(hsp::StreamAlone& stream, SentTo part, const Values& wanted) {
+  switch (part) {
+    case SentTo::TARGET:
+      return stream.send_target(wanted);
+    case SentTo::VELOCITY:
+      return stream.send_velocity(wanted);
+    case SentTo::RATE:
+      return stream.send_rate(wanted);
+    case SentTo::TIME:
+      return stream.send_time(wanted[0]);
+  }
+  return false;
+}
+
 // Change an input to values from now on.
 hsp_status change(hsp_controller& of, const char* name, const double* values, std::size_t size,
                   double duration) {
   const Port* port = name ? of.plan.port(name) : nullptr;
   if (!port || !port->is_input()) return HSP_WRONG_NAME;
   if (static_cast<std::size_t>(port->size) != size) return HSP_WRONG_SIZE;
-  if (!values || !(duration >= 0.0 && duration < infinite)) return HSP_WRONG_VALUE;
+  if (!values) return refused(of, "the pointer to the values is null");
+  if (!(duration >= 0.0 && duration < infinite))
+    return refused(of, "the duration of a ramp needs to be 0 s or more, and finite");
   const Eigen::Map<const hsp::Vector> wanted(values, port->size);
   // Before the first step they apply from the beginning.
   const double now = of.last ? of.plan.move().time[0] : -infinite;
   const double ramp = of.last ? duration : 0.0;
   if (port->payloads) {
-    if (!port->payloads->permits(wanted)) return HSP_WRONG_VALUE;
+    if (!port->payloads->permits(wanted)) return refused(of, accepted(*port));
     return port->payloads->then(port->frame, now, ramp, wanted) ? HSP_OK : HSP_TOO_MANY;
   }
   if (port->impedance) {
-    if (!port->impedance->permits(port->first, port->count, wanted)) return HSP_WRONG_VALUE;
+    if (!port->impedance->permits(port->first, port->count, wanted))
+      return refused(of, accepted(*port));
     return port->impedance->then(now, ramp) ? HSP_OK : HSP_TOO_MANY;
   }
   // A target's motion is bounded already: no ramp.
-  if (!port->input && duration > 0.0) return HSP_WRONG_VALUE;
-  if (port->target) return port->target->send_target(wanted) ? HSP_OK : HSP_WRONG_VALUE;
-  if (port->velocity) return port->velocity->send_velocity(wanted) ? HSP_OK : HSP_WRONG_VALUE;
-  if (!port->input->permits(wanted)) return HSP_WRONG_VALUE;
+  if (!port->input && duration > 0.0)
+    return refused(of, "what is sent to a stream has no ramp: set it; its motion is bounded");
+  if (port->stream)
+    return sent(*port->stream, port->part, wanted) ? HSP_OK : refused(of, accepted(*port));
+  if (!port->input->permits(wanted)) return refused(of, accepted(*port));
   return port->input->then(now, ramp, wanted) ? HSP_OK : HSP_TOO_MANY;
 }
 
@@ -219,10 +269,8 @@ const char* sentence(hsp_status status) {
     case HSP_WRONG_SIZE:
       return "the input or output has another number of values, see hsp_port_of";
     case HSP_WRONG_VALUE:
-      return "a pointer is null, or a value is not finite, out of bounds, a gain that is not "
-             "positive definite, an impedance that is not symmetric, not negative, damped where it "
-             "is stiff and stable at this period, a quaternion that has not norm 1, an inertia of "
-             "no body, or a ramp of a target";
+      return "a pointer is null, or the input does not accept this value or ramp; see "
+             "hsp_last_error";
     case HSP_TOO_MANY:
       return "the input still follows 8 ramps, which is the most";
     case HSP_FAILED:
@@ -266,14 +314,14 @@ double hsp_period(const hsp_controller* controller) noexcept {
 hsp_status hsp_step(hsp_controller* controller, double t, const double* q, const double* v,
                     double* tau) noexcept {
   return made(controller, [&](hsp_controller& of) {
-    return q && v && tau ? step(of, t, q, v, tau, false) : HSP_WRONG_VALUE;
+    return q && v && tau ? step(of, t, q, v, tau, false) : refused(of, null_state);
   });
 }
 
 hsp_status hsp_stop(hsp_controller* controller, double t, const double* q, const double* v,
                     double* tau) noexcept {
   return made(controller, [&](hsp_controller& of) {
-    return q && v && tau ? step(of, t, q, v, tau, true) : HSP_WRONG_VALUE;
+    return q && v && tau ? step(of, t, q, v, tau, true) : refused(of, null_state);
   });
 }
 
@@ -314,7 +362,7 @@ hsp_status hsp_get(hsp_controller* controller, const char* name, double* values,
     const Port* port = name ? of.plan.port(name) : nullptr;
     if (!port) return HSP_WRONG_NAME;
     if (static_cast<std::size_t>(port->size) != size) return HSP_WRONG_SIZE;
-    if (!values) return HSP_WRONG_VALUE;
+    if (!values) return refused(of, "the pointer to the values is null");
     for (std::size_t i = 0; i < size; ++i)
       values[i] = port->entry == 'd'
                       ? static_cast<const double*>(port->data)[i]
@@ -326,6 +374,8 @@ hsp_status hsp_get(hsp_controller* controller, const char* name, double* values,
 const char* hsp_last_error(const hsp_controller* controller) noexcept {
   if (!controller) return opening;
   const hsp_status error = controller->error;
+  const char* reason = controller->reason;
+  if (error == HSP_WRONG_VALUE && reason) return reason;
   return error == HSP_FAILED ? controller->failure : error < 0 ? sentence(error) : "";
 }
 

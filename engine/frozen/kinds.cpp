@@ -3,6 +3,7 @@
 #include "evolve.hpp"
 #include "evolve_impedance.hpp"
 #include "load.hpp"
+#include "mixed_sets.hpp"
 #include "offset_effort.hpp"
 #include "payloads.hpp"
 #include "safe_stop.hpp"
@@ -11,6 +12,6 @@ namespace hsp {
 const Kind* const* frozen_kinds() {
   return kinds<Deliver, ForcesWithin, DeliverWithForces, OffsetEffort, Subtract, HasMoved, Evolve,
                EvolveImpedance, EvolveAhead, ScaledIdentity, BodyInJoint, Payloads, Brake,
-               ScaleIntoLimits, EstimateLoad>();
+               ScaleIntoLimits, EstimateLoad, ChooseSets, KeepLevel, MixSets>();
 }
 }  // namespace hsp

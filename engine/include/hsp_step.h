@@ -54,7 +54,7 @@ typedef enum hsp_status {
   HSP_BUSY = -4,         /* another thread uses this handle; tau is left as it is */
   HSP_WRONG_NAME = -5,   /* there is no such input or output */
   HSP_WRONG_SIZE = -6,   /* an input or output has another number of values */
-  HSP_WRONG_VALUE = -7,  /* a value is not finite, or outside of its bounds */
+  HSP_WRONG_VALUE = -7,  /* the input does not accept a value: see hsp_last_error */
   HSP_TOO_MANY = -8,     /* more than 8 ramps of one input at a time */
   HSP_FAILED = -9,       /* something else, which `hsp_last_error` names */
   HSP_STOPPED = -10      /* of hsp_step: the stop has begun, tau is its effort; see hsp_restart */

@@ -15,7 +15,8 @@ namespace hsp {
 const Kind* const* limit_kinds() {
   return kinds<NearestEffort, Copy, AccelerationBounds, Within, EffortWindow, ExpectedVelocity,
                Observe, IsPlain, CheckLimits, ForceMap, MinimumNormForces, CommandedForce,
-               WithinCones, Displace, DistancesAt, NearPairs, ApproachedPairs, DistanceRows,
-               HoldingRows, Clear, CheckRows, PlaceRows, KeepPart, MixParts>();
+               WrenchShares, SlidingFriction, WithinCones, Displace, DistancesAt, NearPairs,
+               ApproachedPairs, DistanceRows, HoldingRows, Clear, CheckRows, PlaceRows, KeepPart,
+               MixParts>();
 }
 }  // namespace hsp

@@ -21,8 +21,8 @@ struct KeepPart {
   enum Kept { NEITHER, OWN, NEAREST };
 
   void operator()() {
-    const bool exact = law.finite[0] && law.damped_level[0] == 0 && !limits.beyond[0];
-    kept[0] = nearest[0] ? NEAREST : exact && !limits.violated[0] ? OWN : NEITHER;
+    const bool own = law.finite[0] && !limits.beyond[0] && !limits.violated[0];
+    kept[0] = nearest[0] ? NEAREST : own ? OWN : NEITHER;
     if (kept[0] == OWN) {
       acceleration = own_acceleration;
       effort = own_effort;

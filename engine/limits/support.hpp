@@ -120,6 +120,85 @@ struct CommandedForce {
   }
 };
 
+struct WrenchShares {
+  static constexpr const char* doc =
+      "The map from a force and a moment about the points' middle, in the axes of a contact, to "
+      "the "
+      "forces of least norm at the points that have this sum.";
+  FrameMotion<In> frame;
+  In<'k', 3> points;  // in the frame's axes
+  In<3> shift;        // of all of them, in world axes
+  In<3, 3> axes;      // of the contact, as columns
+  Out<'f', 6> out;    // three rows for each point
+  Scratch<'k', 3> arms;
+  Scratch<6, 'f'> total;
+  Scratch<6, 6> turned;
+
+  void check() const { check_at_least("the rows of out", out.rows(), 3 * points.rows()); }
+  void operator()() {
+    constexpr double negligible = 1e-9;  // relative to the largest singular value
+    for (Index k = 0; k < points.rows(); ++k)
+      arms.row(k) = (frame.rotation * points.row(k).transpose() + shift).transpose();
+    const Vector3 middle = arms.colwise().mean().transpose();
+    total.setZero();
+    for (Index k = 0; k < points.rows(); ++k) {
+      const Vector3 arm = axes.transpose() * (arms.row(k).transpose() - middle);
+      total.block<3, 3>(0, 3 * k).setIdentity();
+      total.block<3, 3>(3, 3 * k) = skew(arm);
+    }
+    orthogonalise_rows(total, turned);
+    const double largest = std::sqrt(total.rowwise().squaredNorm().maxCoeff());
+    out.setZero();
+    for (Index r = 0; r < 6; ++r) {
+      const double square = total.row(r).squaredNorm();
+      if (std::sqrt(square) > negligible * largest)
+        out += (total.row(r).transpose() / square).lazyProduct(turned.row(r));
+    }
+  }
+};
+
+struct SlidingFriction {
+  static constexpr const char* doc =
+      "The tangential force of a point that slides, f_t = -μ f_n tanh(‖u‖/u_s) u/‖u‖, with u its "
+      "velocity once all errors are zero: that of v + e_N + J# e'.";
+  // Measurement noise cancels in it, and a hand that sticks is pushed where it is to go.
+  FrameMotion<In> frame;
+  In<3> point, shift;  // in the frame's axes; from there, in world axes
+  In<3, 3> axes;       // two tangents and the normal, as columns
+  In<'n'> v, null_space_error;
+  In<'n', 'n'> L;  // of the metric
+  In<'m', 'n'> jacobian;
+  In<'m'> error_rate;
+  double friction, smoothing;  // μ; u_s [m/s]
+  InOut<3> reference;          // f, whose normal force is given [N]
+  Scratch<'m', 'n'> rows;
+  Scratch<'m', 'm'> turned;
+  Scratch<'n'> intended;
+
+  void operator()() {
+    constexpr double negligible = 1e-6;  // relative to the largest singular value
+    rows = jacobian;
+    solve_rows(L, rows);
+    orthogonalise_rows(rows, turned);
+    const double largest = std::sqrt(rows.rowwise().squaredNorm().maxCoeff());
+    intended.setZero();
+    for (Index r = 0; r < rows.rows(); ++r) {
+      const double square = rows.row(r).squaredNorm();
+      if (std::sqrt(square) > negligible * largest)
+        intended += turned.row(r).dot(error_rate) / square * rows.row(r).transpose();
+    }
+    solve_lower_transposed(L, intended);
+    intended += v + null_space_error;
+    const Vector6 twist = frame.jacobian.lazyProduct(intended);
+    const Vector3 arm = frame.rotation * point + shift;
+    const Vector3 slip = axes.transpose() * (twist.head<3>() + twist.tail<3>().cross(arm));
+    const double speed = std::hypot(slip[0], slip[1]);
+    if (speed > 0.0)
+      reference.head<2>() =
+          -friction * std::tanh(speed / smoothing) / speed * reference[2] * slip.head<2>();
+  }
+};
+
 struct WithinCones {
   static constexpr const char* doc =
       "Whether forces are within friction cones, cone f ≥ 0, and lower ≤ f ≤ upper.";

@@ -7,10 +7,11 @@
 
 namespace hsp {
 
-// Equal to `StreamRun` for messages without a time, to the last bit.
+// Equal to `StreamRun`, to the last bit, for one target and one velocity each period.
 struct StreamAlone {
   static constexpr const char* doc =
-      "A reference that follows targets and velocities, sent at any time.";
+      "A reference that follows targets and velocities, sent at any time. A target may have a "
+      "velocity, and a time by the sender's clock.";
   double linear;
   double policy;                                                 // `Policy`
   double delay, smoothing, extrapolation, dead_man, hold_after;  // [s]
@@ -18,16 +19,29 @@ struct StreamAlone {
   InOut<'p'> piece;
   InOut<'k'> times;  // of waypoints, in order [s]
   InOut<'k', 'w'> values;
-  InOutInts<1> count;                    // number of waypoints
+  InOut<'k', 'n'> rates;                              // their velocities, if given
+  View<bool, Access::InOut, Order::Rows, 'k'> given;  // whether they are
+  InOutInts<1> count;                                 // number of waypoints
   InOut<'n'> velocity;                   // the command: linear, then angular, in world axes
   InOutInts<1> commanded;                // whether it is followed, instead of waypoints
   InOut<1> now, begun, heard, fades_at;  // [s]
   InOutInts<1> silent;
   InOut<'w'> sent_target;  // message that is used in the next step
   InOut<'n'> sent_velocity;
-  InOutInts<1> sent;     // `Sent`, the last one
-  InOutInts<1> differs;  // whether the message differs from the last one, or from a velocity
-  InOutInts<1> alone;    // whether a velocity was sent, which ends all waypoints
+  InOutInts<1> sent;      // `Sent`, the last one
+  InOutInts<1> differs;   // whether a velocity differs from the one sent before it
+  InOutInts<1> alone;     // whether a velocity was sent, which ends all waypoints
+  InOutInts<1> targeted;  // whether a target was
+  // What is known of the next target, and of the one that was sent.
+  InOut<'n'> next_rate, sent_rate;
+  InOut<1> next_time, sent_time;  // by the sender's clock [s]
+  InOutInts<1> next_moves, sent_moves, next_timed, sent_timed;
+  // `Waypoints` and `SenderClock` in Python: the newest message, the time before which others are
+  // ignored, the newest time of the sender's clock; when messages came, and how far that clock was
+  // behind then, in a ring of increasing numbers.
+  InOut<1> made, superseded, newest;
+  InOut<'s'> seen_at, seen_behind;
+  InOutInts<1> seen_first, seen_count;
   ChartState<Out> out;
   PlannerMemory memory;
   PassingMemory<'k'> passing;
@@ -38,6 +52,9 @@ struct StreamAlone {
   static constexpr double largest = 1e6;      // of a number that is sent: see `message.py`
   static constexpr double unit = 1e-3;        // deviation of a quaternion's norm from 1
   static constexpr double kept = 1.0;         // how long waypoints that were passed are [s]
+  static constexpr double window = 2.0;       // over which clocks are compared [s]
+  static constexpr double new_clock = 1.0;    // jump back of a clock that has restarted [s]
+  static constexpr double latest = 1e12;      // time of a clock [s]
   static constexpr Index most_besides = 100;  // pieces of a step that lead to no waypoint
   static constexpr Index considered = 256;    // waypoints before and after a time: see `planner.py`
 
@@ -46,6 +63,7 @@ struct StreamAlone {
     check_linear(linear, out.x.size());
     check_values(values.cols(), linear, out.x.size());
     check_at_least("times", times.size(), 1);
+    check_at_least("seen_at", seen_at.size(), 1);
   }
 
   void operator()(double t) {
@@ -71,8 +89,29 @@ struct StreamAlone {
       if (off > 1e-15)
         for (Index i = 0; i < 4; ++i) sent_target[n + i] /= norm;
     }
+    sent_rate = next_rate;
+    sent_time = next_time;
+    sent_moves = next_moves;
+    sent_timed = next_timed;
+    next_moves[0] = next_timed[0] = false;
     sent[0] = TARGET;
-    differs[0] = true;
+    targeted[0] = true;
+    return true;
+  }
+
+  // Store the velocity of the next target; return whether it is valid.
+  template <class Values> bool send_rate(const Values& wanted) {
+    if (!(wanted.cwiseAbs().array() <= largest).all()) return false;
+    next_rate = wanted;
+    next_moves[0] = true;
+    return true;
+  }
+
+  // Store the time of the next target; return whether it is valid.
+  bool send_time(double wanted) {
+    if (!(std::abs(wanted) <= latest)) return false;
+    next_time[0] = wanted;
+    next_timed[0] = true;
     return true;
   }
 
@@ -124,40 +163,109 @@ struct StreamAlone {
     forget(std::max(old, near(t)));
   }
 
-  // Whether the message changes the future reference.
+  // Whether the messages change the future reference.
   bool take(double t) {
     if (sent[0] == NOTHING) return false;
     heard[0] = t;
-    const bool same = commanded[0] && !differs[0] && velocity == sent_velocity;
-    const bool changed = !same || silent[0];
-    if (alone[0] || policy == LATEST) count[0] = 0;
-    commanded[0] = sent[0] == VELOCITY;
-    fades_at[0] = infinite;
-    if (sent[0] == TARGET) {
-      add(t + delay);
-    } else {
-      velocity = sent_velocity;
-      fades_at[0] = t + dead_man;
-    }
+    const bool last = sent[0] == TARGET;
+    bool changed = false;
+    if (last && alone[0]) changed |= take_velocity(t);
+    if (targeted[0]) changed |= take_target(t);
+    if (!last) changed |= take_velocity(t);
     sent[0] = NOTHING;
-    differs[0] = alone[0] = false;
+    differs[0] = alone[0] = targeted[0] = false;
     return changed;
   }
 
+  bool take_velocity(double t) {
+    if (t < made[0]) return false;
+    made[0] = superseded[0] = t;
+    count[0] = 0;
+    const bool same = commanded[0] && !differs[0] && velocity == sent_velocity;
+    commanded[0] = true;
+    velocity = sent_velocity;
+    fades_at[0] = t + dead_man;
+    return !same || silent[0];
+  }
+
+  bool take_target(double t) {
+    double at = t;
+    if (sent_timed[0]) {
+      if (sent_time[0] < newest[0] - new_clock) {
+        count[0] = 0;
+        made[0] = superseded[0] = -infinite;
+      }
+      at = by_own_clock(sent_time[0], t);
+    }
+    const bool replaces = policy == LATEST;
+    if (at < (replaces ? made[0] : superseded[0])) return false;
+    const double due = at + delay;
+    if (!replaces && due <= t && used() > 0 && times[used() - 1] > t) return false;
+    made[0] = std::max(at, made[0]);
+    if (replaces) {
+      superseded[0] = at;
+      count[0] = 0;
+    }
+    add(due);
+    commanded[0] = false;
+    fades_at[0] = infinite;
+    return true;
+  }
+
+  // A time of the sender's clock; its message has arrived now. The fastest of the last messages
+  // shows the difference of the clocks best.
+  double by_own_clock(double time, double t) {
+    const Index size = seen_at.size();
+    Index first = std::clamp<Index>(seen_first[0], 0, size - 1),
+          seen = std::clamp<Index>(seen_count[0], 0, size);
+    if (time < newest[0] - new_clock) {
+      seen = 0;
+      newest[0] = time;
+    }
+    newest[0] = std::max(newest[0], time);
+    while (seen > 0 && seen_at[first] < t - window) {
+      first = (first + 1) % size;
+      --seen;
+    }
+    while (seen > 0 && seen_behind[(first + seen - 1) % size] >= t - time) --seen;
+    if (seen == size) {
+      first = (first + 1) % size;
+      --seen;
+    }
+    const Index last = (first + seen) % size;
+    seen_at[last] = t;
+    seen_behind[last] = t - time;
+    seen_first[0] = first;
+    seen_count[0] = seen + 1;
+    return time + seen_behind[first];
+  }
+
   void add(double time) {
-    if (used() > 0 && times[used() - 1] == time) --count[0];
-    if (used() == times.size()) forget(1);
-    times[used()] = time;
-    values.row(used()) = sent_target.transpose();
-    ++count[0];
+    Index k = from(time);
+    if (k == used() || times[k] != time) {
+      if (used() == times.size()) {
+        forget(1);
+        k = std::max<Index>(k - 1, 0);
+      }
+      for (Index i = used(); i > k; --i) copy(i - 1, i);
+      ++count[0];
+    }
+    times[k] = time;
+    values.row(k) = sent_target.transpose();
+    rates.row(k) = sent_rate.transpose();
+    given[k] = sent_moves[0] != 0;
+  }
+
+  void copy(Index k, Index to) {
+    times[to] = times[k];
+    values.row(to) = values.row(k);
+    rates.row(to) = rates.row(k);
+    given[to] = given[k];
   }
 
   void forget(Index gone) {
     if (gone == 0) return;
-    for (Index k = gone; k < used(); ++k) {
-      times[k - gone] = times[k];
-      values.row(k - gone) = values.row(k);
-    }
+    for (Index k = gone; k < used(); ++k) copy(k, k - gone);
     count[0] = used() - gone;
   }
 
@@ -189,10 +297,10 @@ struct StreamAlone {
     const Index first = near(t), end = std::min(after(t) + considered, used());
     const Waypoints way{{times.data() + first, end - first},
                         {values.row(first).data(), end - first, values.cols()},
-                        {nullptr, 0, 0},
-                        nullptr,
+                        {rates.row(first).data(), end - first, rates.cols()},
+                        given.data() + first,
                         end < used(),
-                        policy != EXTRAPOLATE};
+                        policy != EXTRAPOLATE && !given[used() - 1]};
     return passing.plan(planner, t, state, way, {delay, smoothing, extrapolation}, present);
   }
 };

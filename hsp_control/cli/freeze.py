@@ -42,6 +42,7 @@ def freeze(options: argparse.Namespace) -> int:
             period=live_period(experiment),
             start=experiment.q0,
             payloads=options.payload,
+            presences=options.presence,
             stop=experiment.scenario.live.stop.gains,
         )
     out.print(f"Frozen: {file}", highlight=False)

@@ -66,6 +66,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except KeyboardInterrupt:
         print("hsp: stopped by the user", file=sys.stderr)
         return INTERRUPTED
+    except SystemExit as error:  # of somebody's own code; its status may be 0
+        print(f"hsp: ended early by SystemExit({error.code!r})", file=sys.stderr)
     return FAILURE
 
 

@@ -186,6 +186,13 @@ def add_freeze(freeze: argparse.ArgumentParser) -> None:
         metavar="FRAME",
         help="a frame that may carry a payload; default: those of the tasks",
     )
+    freeze.add_argument(
+        "--presence",
+        action="append",
+        default=[],
+        metavar="TASK",
+        help="a task that comes and goes, by an input",
+    )
     where = freeze.add_mutually_exclusive_group()
     for name, what in (
         ("--cmake-dir", "the folder that CMake's find_package(hsp_step) needs"),

@@ -17,11 +17,22 @@ def bundled_robots() -> dict[str, Path]:
     return {path.parent.name: path.parent for path in _urdf_files()}
 
 
+def config_folders() -> list[Path]:
+    """Return the folders of bundled configurations.
+
+    A checkout has some in its companions; a wheel has all in one folder.
+    """
+    return [bundled("configs"), *sorted(_PACKAGE.glob("companions/*/configs"))]
+
+
 def bundled_configs() -> dict[str, Path]:
     """Return the file of each bundled configuration, by name (``paper/1_...``)."""
-    root = bundled("configs")
-    files = sorted(root.rglob("*.yaml"))
-    return {file.relative_to(root).with_suffix("").as_posix(): file for file in files}
+    found = {
+        file.relative_to(folder).with_suffix("").as_posix(): file
+        for folder in config_folders()
+        for file in folder.rglob("*.yaml")
+    }
+    return dict(sorted(found.items()))
 
 
 def _urdf_files() -> Iterator[Path]:

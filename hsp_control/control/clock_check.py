@@ -3,7 +3,8 @@
 import warnings
 
 _FEW = 5
-"""Steps in a row before a clock is called wrong: one may be late, or made twice."""
+"""Steps in a row before a clock is called wrong: one may be late, or made twice. One
+that comes so many periods too early is enough."""
 _LATE = 1e6
 """A state later than eleven days has the time of a clock, not of a run [s]."""
 _STILL = 100
@@ -41,7 +42,7 @@ class ClockCheck:
                 f"a change at t = {at:.10g} s begins in {(at - now) / 86400.0:.0f} "
                 "days: times count from the first step; for now it is "
                 "at(controller.state.t)",
-                of=6,  # whoever calls a method of `Controller.at`
+                of=7,  # whoever calls a method of `Controller.at`
             )
 
     def look(self, t: float, period: float, stamp: int) -> None:
@@ -71,7 +72,8 @@ class ClockCheck:
             return
         self._count = self._count + 1 if kind == self._kind else 1
         self._kind = kind
-        if self._count == (_STILL if kind == "still" else _FEW):
+        enough = _STILL if kind == "still" else 1 if passed < -_FEW * held else _FEW
+        if self._count >= enough:
             self._tell(_MESSAGES[kind].format(t=t, passed=passed, period=held))
 
     def _tell(self, message: str, of: int = 4) -> None:

@@ -1,5 +1,6 @@
 """Commands of a running controller: changes, targets and velocities."""
 
+from abc import abstractmethod
 from dataclasses import replace
 from typing import Any
 
@@ -126,6 +127,10 @@ class Commanded(Composition):
         """
         return self._sent(task, velocity=velocity, axes=axes)
 
+    @abstractmethod
+    def _rehearse(self) -> None:
+        """Make the next step's calls once, where the robot is, and move nothing."""
+
     def _sent(self, task: str, **message: Any) -> StreamHandle:
         """Send a message to a task's stream, which takes over if there is none yet."""
         present = self._followed(task)
@@ -155,19 +160,24 @@ class Commanded(Composition):
             HspControlError: If its parts do not fit the robot.
         """
         with self._lock:
-            here, now, given = None, self._in_force.latest, change
-            begun = self._memory.begun
-            self._memory.clock.change(change.at, max(now, 0.0))
-            if begun:
-                change = replace(change, at=max(change.at, now))
-                here = self._here()
-            known = self._in_force.kept
-            time_line = known.with_change(change, here)
-            if period := self._memory.sent.period:
-                state = (here or time_line.start).state
-                check_held(self.setup, time_line.setup, state, period)
-            if begun:
-                check_rates(time_line.setup, self.setup, self._state)
-            self._in_force.go_over_to(time_line)
-            if begun:
-                self._memory.made(now, given)
+            self._change(change)
+            if self._memory.begun:  # when all that the change used is freed
+                self._rehearse()
+
+    def _change(self, change: Change) -> None:
+        here, now, given = None, self._in_force.latest, change
+        begun = self._memory.begun
+        self._memory.clock.change(change.at, max(now, 0.0))
+        if begun:
+            change = replace(change, at=max(change.at, now))
+            here = self._here()
+        known = self._in_force.kept
+        time_line = known.with_change(change, here)
+        if period := self._memory.sent.period:
+            state = (here or time_line.start).state
+            check_held(self.setup, time_line.setup, state, period)
+        if begun:
+            check_rates(time_line.setup, self.setup, self._state)
+        self._in_force.go_over_to(time_line)
+        if begun:
+            self._memory.made(now, given)

@@ -1,6 +1,7 @@
 """The controller: from tasks, a null-space field and a metric to one effort."""
 
 from collections.abc import Callable, Collection, Mapping, Sequence
+from contextlib import suppress
 from copy import deepcopy
 from math import isfinite
 from time import perf_counter
@@ -11,6 +12,7 @@ from numpy.typing import ArrayLike
 from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import ControllerError, NonFiniteError
 from hsp_control.control.active_stack import ActiveStack
+from hsp_control.control.actuation import Actuation
 from hsp_control.control.bound_step import BoundStep, FreeStep
 from hsp_control.control.changes import Change
 from hsp_control.control.commanded import Commanded
@@ -25,6 +27,9 @@ from hsp_control.control.output import ControlOutput, Diagnostics
 from hsp_control.engine import Dynamics, Plan
 from hsp_control.law import TaskSample
 from hsp_control.robot import RobotState
+
+_REHEARSALS = 3
+"""The first fills the processor's caches, the others train its predictions."""
 
 
 class Controller(Commanded):
@@ -101,6 +106,26 @@ class Controller(Commanded):
                 now.bind_step()
             self._memory.acceleration = delivered.acceleration
             return ControlOutput(delivered, stack, damped, now.limits.measured)
+
+    def _rehearse(self) -> None:
+        # To make a change takes milliseconds, after which the processor's caches hold
+        # nothing of a step, and the next one would cost many times as much.
+        memory, now = self._memory, self._in_force
+        # of the last step, whose arrays the calls write
+        memory.acceleration = memory.acceleration.copy()
+        active, damped = now.mixture.active, now.mixture.damped
+        # What fails here fails in a step as well, which says so, or is not there yet.
+        with suppress(Exception):
+            for _ in range(_REHEARSALS):
+                now.mixture.rehearse(self._state.t)
+                self._advance()
+                delivered = (
+                    now.mixture.step(self._state.t, None)
+                    if now.step is None
+                    else now.step.make_here(self._state.t)
+                )
+                ControlOutput(delivered, self.active_stack, "", now.limits.measured)
+        now.mixture.active, now.mixture.damped = active, damped
 
     def _observe(
         self,
@@ -381,6 +406,14 @@ class Controller(Commanded):
         self._memory.sent.clear()
         self._in_force.limits.update()
         return self._settled_step
+
+    def stack_alone(self, without: Collection[str]) -> tuple[ActiveStack, Actuation]:
+        """Return the stack without some tasks, and what delivers it, for `step_alone`.
+
+        Args:
+            without: The names of the tasks.
+        """
+        return self._in_force.mixture.stack_alone(without)
 
     @property
     def step_plan(self) -> Plan:

@@ -1,20 +1,34 @@
-"""What a plan, an estimator or another part of its own may know of this room.
+"""What companions may know of this room.
 
-Walking imports from nowhere else here, and so a contract keeps it: what is not named
-below may move. A `MotionPlan` gives a controller its tasks and contacts step by step,
-an `Estimator` the state that it computes with; both read a `Measurement`, write
-`LogChannel` columns, and may ask a `FallDetector` or a `RunningObserver`.
+They import from nowhere else here, and so a contract keeps it: what is not named below
+may move. A `MotionPlan` gives a controller its tasks and contacts step by step, an
+`Estimator` the state that it computes with; both read a `Measurement`, write
+`LogChannel` columns, and may ask a `FallDetector` or a `RunningObserver`. Pages steer a
+`Controller` by `Changes` and streams, and draw what it computes.
 """
 
+from .active_stack import ActiveStack as ActiveStack
+from .changes import Change as Change
+from .changes import Changes as Changes
+from .compensation import CompensatedController as CompensatedController
+from .compensation import Compensation as Compensation
+from .compensation.automatic_observer import largest_cancelled as largest_cancelled
+from .compensation.momentum_observer import MomentumObserver as MomentumObserver
 from .compensation.momentum_observer import RunningObserver as RunningObserver
 from .controller import Controller as Controller
 from .estimator import Estimator as Estimator
 from .estimator import RunningEstimator as RunningEstimator
 from .falling import FallDetector as FallDetector
+from .first_state import StartWarning as StartWarning
+from .measurement import NO_WRENCHES as NO_WRENCHES
 from .measurement import Inertial as Inertial
 from .measurement import LogChannel as LogChannel
 from .measurement import Measurement as Measurement
 from .motion_plan import MotionPlan as MotionPlan
 from .motion_plan import PlanParts as PlanParts
 from .motion_plan import RunningPlan as RunningPlan
+from .output import ControlOutput as ControlOutput
 from .planned import HELD as HELD
+from .targets import DELAY as DELAY
+from .targets import RAMP as RAMP
+from .targets import new_stream as new_stream

@@ -11,6 +11,9 @@ from hsp_control.robot import RobotState
 
 _RATE = 3.0
 """Rate K of the low-pass [1/s]."""
+_HEAD_START = 0.05
+"""Time T₀ that is counted besides that since the first state [s]: 1/k, so that an error
+of a velocity in the first period moves a braked joint no faster than the error."""
 _BEFORE = 0.2
 """How old the estimate is that is used [s]: what is wrong is found within this time,
 or is small."""
@@ -27,10 +30,15 @@ class LoadEstimate:
     estimated while the robot runs and its measurements are consistent, and not in the
     stop, in which what is measured may be wrong.
 
+    At first, t after the first state, the gain is 1/(t + T₀) instead of K, until that
+    is smaller. Then the estimate is the mean ∫ (M v' - (tau - N)) dt / (t + T₀), and a
+    constant load is known up to T₀/(t + T₀) of it: 17 % after 0.25 s, 47 % with K.
+
     How much a wrong measurement leaves in it is bounded: an error x of the velocity is
-    an impulse M x, and changes the estimate by K M x at most; one that begins less than
-    0.2 s before the stop by nothing. Frozen in the stop, that moves joints that are
-    braked by -k M v at K x / k: 0.15 x with k = 20 1/s.
+    an impulse M x, and changes the estimate by M x times the gain at most; one that
+    begins less than 0.2 s before the stop by nothing. Frozen in the stop, that moves
+    joints that are braked by -k M v at K x / k: 0.15 x with k = 20 1/s. An error that
+    begins at a time t in the first 0.3 s moves them at x / (k (t + T₀)): x at most.
 
     Attributes:
         bound: Largest load, shape (nv,) [N·m or N].
@@ -40,7 +48,7 @@ class LoadEstimate:
     def __init__(self, nv: int, period: float) -> None:
         """Begin without a load; ``period`` is that between two states [s]."""
         self.bound, self.load = np.zeros((2, nv))
-        self._time = np.zeros(1)
+        self._learnt, self._time = np.zeros((2, 1))
         self._v, self._driving, self._estimate = np.zeros((3, nv))
         self._past = np.zeros((max(ceil(_BEFORE / period - 1e-9), 1), nv))
         self._count: Indices = np.zeros(1, dtype=np.int64)
@@ -64,14 +72,16 @@ class LoadEstimate:
 
     @property
     def _memory(self) -> tuple[Array | Indices, ...]:
-        numbers = self._time, self._v, self._driving, self._estimate, self._past
-        return *numbers, self._count, self.load
+        times = self._learnt, self._time
+        numbers = self._v, self._driving, self._estimate, self._past
+        return *times, *numbers, self._count, self.load
 
     def call(self, state: RobotState, acts: Array) -> PartCall:
         """Return the call that learns from a state; ``acts`` is its effort, (nv,)."""
         return PartCall(
             engine.EstimateLoad,
             rate=_RATE,
+            head_start=_HEAD_START,
             longest_gap=_LONGEST_GAP,
             time=state.time,
             M=state.inertia,
@@ -79,6 +89,7 @@ class LoadEstimate:
             nonlinear_effects=state.effects,
             acts=acts,
             bound=self.bound,
+            learnt=self._learnt,
             last_time=self._time,
             last_v=self._v,
             driving=self._driving,

@@ -4,12 +4,10 @@ from collections.abc import (
     Callable,
     Collection,
     Iterable,
-    Iterator,
     Sequence,
     Set,
 )
 from copy import copy
-from itertools import pairwise
 
 import numpy as np
 
@@ -116,7 +114,11 @@ class Mixture:
         self._active: dict[tuple[tuple[int, ...], Set[int]], ActiveStack] = {}
         self._fading = [each for each in setup.tasks if not each.always]
         self.levels = _levels(setup.tasks, self._state.robot)
+        self._same_sets = setup.steady
         self.steady = setup.steady and setup.limits.end == -np.inf
+        self._only: list[
+            tuple[float, ActiveStack]
+        ] = []  # if it is the same at all times
         self._parts: list[ActiveStack] = []
         # tasks of the first level with a bounded inverse in the last `resolve`, by
         # name; empty: none
@@ -127,7 +129,7 @@ class Mixture:
 
         Without a modifier it is one call, if it was bound; see `prepare`.
         """
-        sets = [*self._sets(t)]
+        sets = self._sets(t)
         if modifier is None and self._bound:
             limits = self._limits.sets
             key = tuple([each for _, each in sets]), tuple([each for each, _ in limits])
@@ -137,6 +139,7 @@ class Mixture:
                     self._parts, self.damped = [*key[0]], ""
                     for share, active in sets:
                         active.share = share
+                        self.damped = self.damped or active.damped
                     self.active = active
                     return found
         self._resolve(t, sets)
@@ -158,32 +161,36 @@ class Mixture:
                 self.damped = active.damped
         self.active = active
 
-    def _sets(self, t: float) -> Iterator[tuple[float, ActiveStack]]:
-        """Yield the share of each set that is active at a time, and its stack."""
+    def _sets(self, t: float) -> list[tuple[float, ActiveStack]]:
+        """Return the share of each set that is active at a time, and its stack."""
+        if self._only:
+            return self._only
         tasks = [(each.weight(t), each) for each in self._fading]
         contacts = [(each.share(t), each) for each in self._setup.contacts]
-        coming = sorted(
-            (pair for pair in (*tasks, *contacts) if 0.0 < pair[0] < 1.0),
-            key=lambda pair: -pair[0],
-        )
         edges = {
             id(each): each.edge(t)
             for share, each in contacts
             if share < 1.0 and each.active(t)  # also at the time when it begins
         }
-        shares = [1.0, *(share for share, _ in coming), 0.0]
-        for k, (share, following) in enumerate(pairwise(shares)):
-            if share == following:
-                continue
-            on = {id(each) for _, each in coming[:k]}
-            standing = [each for w, each in contacts if w >= 1.0 or id(each) in on]
-            lifted = [edge for key, edge in edges.items() if key not in on]
-            off = {
-                each.key
-                for _, each in tasks
-                if each.weight_beyond(t, lifted) < 1.0 and id(each) not in on
-            }
-            yield share - following, self._stack(standing, off)
+        coming = [pair for pair in (*tasks, *contacts) if 0.0 < pair[0] < 1.0]
+        coming.sort(key=_weight, reverse=True)
+        sets, on, share = list[tuple[float, ActiveStack]](), set[int](), 1.0
+        for following, each in (*coming, _NOTHING):
+            if share != following:
+                standing = [c for w, c in contacts if w >= 1.0 or id(c) in on]
+                lifted = [edge for key, edge in edges.items() if key not in on]
+                off = [
+                    task.key
+                    for w, task in tasks
+                    if (task.weight_beyond(t, lifted) if lifted else w) < 1.0
+                    and id(task) not in on
+                ]
+                sets.append((share - following, self._stack(standing, off)))
+            on.add(id(each))
+            share = following
+        if self._same_sets:
+            self._only = sets
+        return sets
 
     def _deliver(self, modifier: AccelerationModifier | None) -> Delivered:
         """Return what is delivered of the law that was resolved last."""
@@ -222,11 +229,22 @@ class Mixture:
         if not self.steady:
             return None
         ((_, stack),) = self._sets(0.0)  # at any time
-        last = self._setup.limits.last
-        # Several sets may be None, one after another.
-        limits = next(each for each in self._limits.all if each.limits is last)
-        actuation = self.actuation(stack, limits)
+        actuation = self.actuation(stack, self._steady_limits)
         return BoundStep(self._state, stack, actuation, self._limits, origin)
+
+    def stack_alone(self, without: Collection[str]) -> tuple[ActiveStack, Actuation]:
+        """Return the stack without some tasks, and what delivers it within the limits.
+
+        Neither contacts nor limits change.
+        """
+        stack = self.stack_without((), without)
+        return stack, self.actuation(stack, self._steady_limits)
+
+    @property
+    def _steady_limits(self) -> LimitSet:
+        # Several sets may be None, one after another.
+        last = self._setup.limits.last
+        return next(each for each in self._limits.all if each.limits is last)
 
     def prepare(self, times: Iterable[float]) -> None:
         """Bind what steps call at some times [s], now instead of in a step."""
@@ -254,6 +272,14 @@ class Mixture:
             bound = BoundMixture(self._state.effort, stacks, actuations)
         self._bound[stacks, limits] = bound
 
+    def rehearse(self, t: float) -> None:
+        """Make the calls of every mixture that is bound, at the state's time t [s]."""
+        for (stacks, limits), bound in self._bound.items():
+            count = len(stacks) * len(limits)
+            if bound is None or bound.make(t, [1.0 / count] * count) is None:
+                self._resolve(t, [(1.0 / len(stacks), each) for each in stacks])
+                self._deliver(None)
+
     def bind(self, stack: ActiveStack) -> None:
         """Bind what a step with a stack calls."""
         stack.bind()
@@ -278,12 +304,15 @@ class Mixture:
         off = {each.key for each in tasks if each.task.name in without}
         return self._stack(standing, off)
 
-    def _stack(self, standing: Sequence[PlannedContact], off: Set[int]) -> ActiveStack:
+    def _stack(
+        self, standing: Sequence[PlannedContact], off: Collection[int]
+    ) -> ActiveStack:
         """Return the stack of some contacts and of the tasks that are not off."""
         known = tuple(map(id, standing)), frozenset(off)
-        if known not in self._active:
-            self._active[known] = self._made(standing, off)
-        return self._active[known]
+        found = self._active.get(known)
+        if found is None:
+            found = self._active[known] = self._made(standing, known[1])
+        return found
 
     def _made(self, standing: Sequence[PlannedContact], off: Set[int]) -> ActiveStack:
         on = (each for each in self._setup.tasks if each.key not in off)
@@ -301,10 +330,20 @@ class Mixture:
         return self._stacks[key]
 
 
+_NOTHING = 0.0, None
+"""What comes after all that has a weight."""
+
+
+def _weight(pair: tuple[float, object]) -> float:
+    return pair[0]
+
+
 def _mean(shares: Sequence[float], parts: Sequence[Array]) -> Array:
     """Return the weighted mean; not even by rounding does it leave their range."""
     x = np.array(parts)
-    mean = np.maximum(np.array(shares) @ x, x.min(axis=0))
+    # in this order, as the engine's
+    mean = sum(share * each for share, each in zip(shares, parts, strict=True))
+    mean = np.maximum(mean, x.min(axis=0))
     return np.asarray(np.minimum(mean, x.max(axis=0)))
 
 

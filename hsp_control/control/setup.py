@@ -12,7 +12,6 @@ from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import ControllerError
 from hsp_control.common.suggestions import did_you_mean, listing
 from hsp_control.constraints.contacts import CommandedForce
-from hsp_control.constraints.contacts.contact import WRENCH
 from hsp_control.control.evolution import ABSENT, Evolution
 from hsp_control.control.model_in_force import PlannedPayload
 from hsp_control.control.planned import (
@@ -25,7 +24,7 @@ from hsp_control.control.planned import (
 from hsp_control.control.tools_in_force import PlannedTool
 from hsp_control.geometry.scene import Start
 from hsp_control.null_space.fields import FieldSum, NullSpaceField
-from hsp_control.null_space.fields.weight import SetWeight
+from hsp_control.null_space.fields.weight import Ramp, SetWeight
 from hsp_control.null_space.metrics import Metric
 from hsp_control.trajectories.crossfade import settled
 from hsp_control.trajectories.hold import SetPoint
@@ -64,9 +63,9 @@ class Setup:
         return FieldSum(terms)
 
     def with_set_numbers(self) -> "Setup":
-        """Return the setup in which weights and normal forces are written elsewhere.
+        """Return the setup in which weights and commanded forces are written elsewhere.
 
-        Those that are numbers.
+        Those that are numbers; of a weight that is a ramp, a factor is.
         """
         terms = tuple(_set_weight(each) for each in self.terms)
         contacts = tuple(_set_force(each) for each in self.contacts)
@@ -182,15 +181,17 @@ class Setup:
 
 
 def _set_weight(term: PlannedTerm) -> PlannedTerm:
-    if term.weight is None or not term.field.controls:
+    own, known = term.field.weight, term.weight
+    if not term.field.controls or (known is None and type(own) is not Ramp):
         return term
-    numbers = np.array([term.weight.target, 0.0])
-    return replace(term, field=replace(term.field, weight=SetWeight(numbers)))
+    numbers = np.array([1.0 if known is None else known.target, 0.0])
+    weight = SetWeight(numbers, own if type(own) is Ramp else None)
+    return replace(term, field=replace(term.field, weight=weight))
 
 
 def _set_force(planned: PlannedContact) -> PlannedContact:
     force = planned.contact.force
-    if force is None or force.trajectory is not None or force.dimension == WRENCH:
+    if force is None or force.trajectory is not None:
         return planned
     numbers = np.array(force.followed.sample(0.0).position)
     set_force = CommandedForce(trajectory=SetPoint(numbers))

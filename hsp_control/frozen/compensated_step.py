@@ -11,16 +11,18 @@ from collections.abc import Iterable
 import numpy as np
 
 from hsp_control import engine
-from hsp_control.common.arrays import Array
+from hsp_control.common.arrays import Array, Indices
 from hsp_control.common.exceptions import FreezeError
-from hsp_control.control.actuation.actuation import DeliveredAlone
+from hsp_control.control.active_stack import ActiveStack
+from hsp_control.control.actuation.actuation import Actuation, DeliveredAlone
 from hsp_control.control.bound_step import BoundStep
 from hsp_control.control.compensation.compensation import STAGES, Compensation
 from hsp_control.control.compensation.stage import Alone, AloneCalls
 from hsp_control.control.controller import Controller
 from hsp_control.declaration import within
 from hsp_control.engine import Move, Plan
-from hsp_control.engine.plans import AnyCall, OnlyIf, PartCall, PartCalls
+from hsp_control.engine.plans import AnyCall, OnlyIf, PartCall, PartCalls, Step
+from hsp_control.frozen.task_sets import TaskSets
 from hsp_control.robot import RobotState
 
 
@@ -39,6 +41,7 @@ class CompensatedStep:
         delivered: DeliveredAlone,
         period: Array,
         sending: PartCalls,
+        damped: Indices,
     ) -> None:
         """Begin the compensators.
 
@@ -49,6 +52,7 @@ class CompensatedStep:
             delivered: The array into which the delivered effort is written.
             period: How long each effort is held, shape (1,) [s].
             sending: The call that records the effort as sent.
+            damped: Where the first level with a bounded inverse is, shape (1,).
 
         Raises:
             FreezeError: If a compensator is computed in Python.
@@ -68,7 +72,7 @@ class CompensatedStep:
             acted=np.zeros(nv),
             disturbance=caused,
             starting=np.zeros(1, dtype=np.int64),
-            damped=bound.active.law.outcome.damped_level,
+            damped=damped,
             status=delivered.status,
         )
         self.stages: list[AloneCalls] = []
@@ -86,8 +90,12 @@ class CompensatedStep:
                     )
             self.stages.append(calls)
 
-    def move(self) -> Move:
-        """Return the step as one move from the measured state."""
+    def move(self, sets: TaskSets | None) -> Move:
+        """Return the step as one move from the measured state.
+
+        Args:
+            sets: The sets of tasks, if some come and go.
+        """
         state, bound, shared = self._state, self._bound, self._shared
         time, q, v = self._measured
         moved = [
@@ -98,31 +106,40 @@ class CompensatedStep:
         ]
         before = [*_all(each.measure for each in self.stages), *moved]
         observe = [*_all(each.observe for each in self.stages)]
-        law: Array = bound.active.law.acceleration
-        nothing = np.zeros(len(shared.effort))
-        given = shared.a, shared.effort, self._delivered
-        act = [
-            _copy(law, shared.a),
-            _copy(nothing, shared.effort),
-            *_all(each.act for each in self.stages),
-            *bound.actuation.calls_with_offset(*given),
-        ]
+        if sets is None:
+            parts = bound.active, bound.actuation, self._delivered
+            act = [*bound.active.calls, *self._deliver(*parts)]
+        else:
+            act = sets.calls(self._delivered, self._deliver)
         finish = [
             *self._sending,
             _copy(self._delivered.tau, shared.acted),
             *_all(each.finish for each in self.stages),
         ]
-        after = [*act, OnlyIf(finish, self._delivered.delivered)]
+        after = [OnlyIf(finish, self._delivered.delivered)]
         kinematics = state.bind_move().values
         calls = [
             *state.plan(before).steps(),
             *kinematics["calls"].calls,
             *state.plan(observe).steps(),
-            *bound.active.calls,
+            *act,
             *state.plan(after).steps(),
         ]
         own = {"time": time, "q": q, "v": v, "stamp": np.zeros(1, dtype=np.int64)}
         return engine.Move(**kinematics | own | {"calls": Plan(calls)})
+
+    def _deliver(
+        self, active: ActiveStack, actuation: Actuation, part: DeliveredAlone
+    ) -> list[Step]:
+        """Return the calls that deliver what a stack resolves, with the stages."""
+        shared = self._shared
+        calls = [
+            _copy(active.law.acceleration, shared.a),
+            _copy(np.zeros(len(shared.effort)), shared.effort),
+            *_all(each.act for each in self.stages),
+            *actuation.calls_with_offset(shared.a, shared.effort, part),
+        ]
+        return self._state.plan(calls).steps()
 
 
 def _copy(x: Array, out: Array) -> PartCall:

@@ -11,24 +11,33 @@ from hsp_control import engine
 from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import FreezeError
 from hsp_control.common.keywords import suggesting
-from hsp_control.control.actuation.actuation import DeliveredAlone
+from hsp_control.control.active_stack import ActiveStack
+from hsp_control.control.actuation.actuation import Actuation, DeliveredAlone
 from hsp_control.control.bound_step import BoundStep
 from hsp_control.control.compensation import Compensation
 from hsp_control.control.controller import Controller
 from hsp_control.control.stop import LARGEST, StopGains
 from hsp_control.declaration import within
 from hsp_control.engine import Move, Plan
-from hsp_control.engine.plans import OnlyIf, PartCalls
+from hsp_control.engine.plans import OnlyIf, PartCalls, Step
 from hsp_control.frozen.braking import LIKE_LIVE, stopping
 from hsp_control.frozen.compensated_step import CompensatedStep
 from hsp_control.frozen.image import Image, Port
-from hsp_control.frozen.inputs import inputs_of, model_inputs, streams_of, targets_of
+from hsp_control.frozen.inputs import (
+    inputs_of,
+    model_inputs,
+    presences_of,
+    streams_of,
+    targets_of,
+)
 from hsp_control.frozen.refusals import (
     check_parts,
+    check_sets,
     check_stack,
     check_steady,
     check_streams,
 )
+from hsp_control.frozen.task_sets import Reported, TaskSets, reported
 
 
 @suggesting
@@ -40,6 +49,7 @@ def freeze(
     period: float = 0.001,
     start: ArrayLike | None = None,
     payloads: Sequence[str] | None = None,
+    presences: Sequence[str] = (),
     stop: StopGains = LIKE_LIVE,
 ) -> Path:
     """Write a controller for a program without Python, which ``hsp_step.h`` runs.
@@ -57,6 +67,8 @@ def freeze(
             default the controller's start, or else where its run began.
         payloads: Frames that may carry something, which is an input of each; None:
             those of the tasks.
+        presences: Tasks that come and go, by inputs: the file has a step of each set of
+            them, 2^k for k tasks.
         stop: How ``hsp_stop`` brakes the robot, and then holds it.
 
     Returns:
@@ -75,7 +87,7 @@ def freeze(
                 f"{most / period:g} at most"
             )
     own = controller.without_python(period)
-    image = _image(own, compensation, period, start, payloads, stop)
+    image = _image(own, compensation, period, start, payloads, presences, stop)
     file = Path(path)
     file.parent.mkdir(parents=True, exist_ok=True)
     file.write_bytes(image.content())
@@ -88,6 +100,7 @@ def _image(
     period: float,
     start: ArrayLike | None,
     payloads: Sequence[str] | None,
+    presences: Sequence[str],
     stop: StopGains,
 ) -> Image:
     """Return a step as one move, and its named inputs and outputs.
@@ -98,6 +111,7 @@ def _image(
         period: As of `freeze`.
         start: As of `freeze`.
         payloads: As of `freeze`.
+        presences: As of `freeze`.
         stop: As of `freeze`.
     """
     check_steady(own)
@@ -114,16 +128,22 @@ def _image(
         stream.forget()  # the step that has bound all
     held, delivered = np.array([period]), DeliveredAlone.allocate(robot.nv)
     sending = bound.limits.applying_all(delivered.tau, delivered.a, held)
+    sets = TaskSets(own, bound, presences) if presences else None
+    says = reported(own, bound) if sets is None else sets.reported
     chain = None
     if compensation is not None:
-        chain = CompensatedStep(own, bound, compensation, delivered, held, sending)
+        given = delivered, held, sending, says.damped_level
+        chain = CompensatedStep(own, bound, compensation, *given)
+        check_sets(compensation, sets)
     check_stack(own, bound, chain is not None and bool(chain.stages))
     if chain is None or not chain.stages:
-        move = _bare(bound, delivered, sending)
+        move = _bare(bound, delivered, sending, sets)
     else:
-        move = chain.move()
-    inputs = [*inputs_of(own, bound, held)]
+        move = chain.move(sets)
+    inputs = [*inputs_of(own, bound, held, says)]
     inputs += model_inputs(own, bound, payloads)
+    if sets is not None:
+        inputs += presences_of(sets)
     first = [call for each in inputs for call in each.calls]
     values = move.values
     origin = np.zeros(1)  # the first step's time is written there
@@ -134,7 +154,7 @@ def _image(
     calls = Plan([*first, *values["calls"].calls, *last])
     move = engine.Move(**values | {"calls": calls, "origin": origin})
     ports: list[Port] = [
-        *_ports(own, bound, delivered, held),
+        *_ports(own, says, delivered, held),
         *(each.port for each in inputs),
     ]
     ports += targets_of(own, streams)
@@ -144,17 +164,34 @@ def _image(
     return Image(move, [*ports, *stopped.outputs, read], stopped.move)
 
 
-def _bare(bound: BoundStep, delivered: DeliveredAlone, sending: PartCalls) -> Move:
+def _bare(
+    bound: BoundStep,
+    delivered: DeliveredAlone,
+    sending: PartCalls,
+    sets: TaskSets | None,
+) -> Move:
     """Return a step that also selects the delivered effort, and records it."""
-    state = bound.state
-    after = bound.actuation.calls_alone(delivered)
-    values, recorded = bound.move.values, OnlyIf(sending, delivered.delivered)
-    calls = [*values["calls"].calls, *state.plan([*after, recorded]).steps()]
+    state, recorded = bound.state, OnlyIf(sending, delivered.delivered)
+    if sets is None:
+        after = bound.actuation.calls_alone(delivered)
+        values, following = bound.move.values, state.plan([*after, recorded]).steps()
+    else:
+        values = state.bind_move([], bound.move.values["origin"]).values
+
+        def delivering(
+            _: ActiveStack, actuation: Actuation, part: DeliveredAlone
+        ) -> list[Step]:
+            alone = state.plan(actuation.calls_alone(part)).steps()
+            return [*actuation.calls(), *alone]
+
+        record = state.plan([recorded]).steps()
+        following = [*sets.calls(delivered, delivering), *record]
+    calls = [*values["calls"].calls, *following]
     return engine.Move(**values | {"calls": Plan(calls)})
 
 
 def _ports(
-    own: Controller, bound: BoundStep, delivered: DeliveredAlone, period: Array
+    own: Controller, says: Reported, delivered: DeliveredAlone, period: Array
 ) -> Iterator[Port]:
     """Yield the inputs, and the outputs of a step."""
     effort, rate = "N·m or N", "rad/s² or m/s²"
@@ -168,12 +205,11 @@ def _ports(
     yield Port("status", "-", "outcome of the step", delivered.status)
     yield Port("delivered", "-", "whether there is an effort", delivered.delivered)
     yield Port("period", "s", "how long an effort is held", period)
-    damped = bound.active.law.outcome.damped_level
+    damped = says.damped_level
     yield Port("damped_level", "-", "first level with a bounded inverse, or 0", damped)
-    rows = bound.active.rows
     for task in own.tasks:
-        here, units = bound.active.task_rows[task.name], task.error_parts
+        e, units = says.errors[task.name], task.error_parts
         unit = " and ".join(dict.fromkeys(each.unit for each in units))
         rates = " and ".join(dict.fromkeys(each.rate_unit for each in units))
-        yield Port(f"{task.name}.error", unit, "e, reference - robot", rows.error[here])
-        yield Port(f"{task.name}.error_rate", rates, "e'", rows.error_rate[here])
+        yield Port(f"{task.name}.error", unit, "e, reference - robot", e.error)
+        yield Port(f"{task.name}.error_rate", rates, "e'", e.error_rate)

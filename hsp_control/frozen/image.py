@@ -32,9 +32,12 @@ _PACKET = 16
 of it."""
 
 
-RAMPED, TARGET, VELOCITY, PAYLOAD, SPRING = b"i", b"t", b"v", b"p", b"s"
-"""What is set: a value that may ramp, what a stream follows, what is carried, or some
-numbers of an impedance."""
+RAMPED, PAYLOAD, SPRING = b"i", b"p", b"s"
+"""What is set: a value that may ramp, what is carried, or some numbers of an
+impedance."""
+TARGET, VELOCITY, RATE, TIME = b"t", b"v", b"r", b"c"
+"""What is sent to a stream: a target, or a velocity; velocity and time of the next
+target."""
 
 
 class Port(NamedTuple):

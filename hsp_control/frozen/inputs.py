@@ -13,7 +13,12 @@ import numpy as np
 from hsp_control import engine
 from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import FreezeError
-from hsp_control.constraints.contacts.contact import NORMAL
+from hsp_control.constraints.contacts.contact import (
+    NORMAL,
+    WRENCH,
+    Contact,
+    shares,
+)
 from hsp_control.control.bound_step import BoundStep
 from hsp_control.control.change_model import MOST_GRAVITY
 from hsp_control.control.controller import Controller
@@ -22,7 +27,16 @@ from hsp_control.declaration import within
 from hsp_control.declaration.nested import parts_within
 from hsp_control.declaration.quantities import LARGEST
 from hsp_control.engine import Call
-from hsp_control.frozen.image import PAYLOAD, SPRING, TARGET, VELOCITY, Port
+from hsp_control.frozen.image import (
+    PAYLOAD,
+    RATE,
+    SPRING,
+    TARGET,
+    TIME,
+    VELOCITY,
+    Port,
+)
+from hsp_control.frozen.task_sets import Reported, TaskSets
 from hsp_control.law import VARYING
 from hsp_control.null_space.fields.weight import SetWeight
 from hsp_control.tasks import Task
@@ -46,19 +60,22 @@ class Input(NamedTuple):
     after: tuple[Call, ...] = ()
 
 
-def inputs_of(own: Controller, bound: BoundStep, held: Array) -> Iterator[Input]:
+def inputs_of(
+    own: Controller, bound: BoundStep, held: Array, says: Reported
+) -> Iterator[Input]:
     """Yield the inputs of a controller.
 
     Args:
         own: The controller.
         bound: Its step.
         held: How long its efforts are held, shape (1,) [s].
+        says: What it says of its tasks.
     """
     period = float(held[0])
     for task in own.tasks:
         impedance = impedance_of(task)
         if impedance is not None:
-            yield from _springs(task, impedance, bound, held)
+            yield from _springs(task, impedance, bound, held, says)
             continue
         # A scalar error is unstable from these on, whatever the other one is.
         Kp, Kv, *_ = own.feedback(task.name)
@@ -85,12 +102,12 @@ def inputs_of(own: Controller, bound: BoundStep, held: Array) -> Iterator[Input]
 
 
 def _springs(
-    task: Task, impedance: Impedance, bound: BoundStep, held: Array
+    task: Task, impedance: Impedance, bound: BoundStep, held: Array, says: Reported
 ) -> Iterator[Input]:
     """Yield the stiffness of a task, and its damping as it was declared."""
     in_force = next(x.in_force for x in bound.active.stacked if x.name == task.name)
     followed, numbers = FollowedImpedance(in_force, task.part_ends()), in_force.numbers
-    flat, rows = numbers.reshape(-1), bound.active.rows
+    flat, error = numbers.reshape(-1), says.errors[task.name]
     now = _evolution(flat, 0.0, LARGEST)
     planned = followed.planned.reshape(-1), followed.ramp
     evolve = engine.EvolveImpedance(
@@ -101,8 +118,7 @@ def _springs(
         numbers=numbers,
     )
     then = now | {"x": followed.then.reshape(-1), "ramp": np.zeros(1)}
-    here = bound.active.task_rows[task.name]
-    errors = {"e": rows.error[here], "e_dot": rows.error_rate[here], "period": held}
+    errors = {"e": error.error, "e_dot": error.error_rate, "period": held}
     after = (
         engine.EvolveAhead(planned=then, period=held),
         engine.FollowImpedance(**followed.call.values | errors),
@@ -126,15 +142,29 @@ def _springs(
 
 
 def _weights(own: Controller) -> Iterator[Input]:
-    """Yield the weights of fields that are numbers; of one name that of the last."""
+    """Yield the weights of fields that are numbers, and the presence of others.
+
+    Of one name it is that of the last.
+    """
     terms = {each.field.name: each.field.weight for each in own.setup.terms}
     for name, weight in terms.items():
         if not isinstance(weight, SetWeight):
             continue
         w, rate = weight.numbers[:1], weight.numbers[1:]
-        evolve = _evolving(w, 0.0, LARGEST, 0, rate)
-        meaning = "weight of the field"
-        yield Input(Port(f"{name}.weight", "-", meaning, w, evolve), (evolve,))
+        if weight.ramp is None:
+            at, meaning, most = f"{name}.weight", "weight of the field", LARGEST
+        else:
+            at, meaning, most = f"{name}.presence", "factor of the field's weight", 1.0
+        evolve = _evolving(w, 0.0, most, 0, rate)
+        yield Input(Port(at, "-", meaning, w, evolve), (evolve,))
+
+
+def presences_of(sets: TaskSets) -> Iterator[Input]:
+    """Yield how far each of the tasks that come and go is present."""
+    for k, name in enumerate(sets.names):
+        x, meaning = sets.presences[k : k + 1], "how far the task is present, in [0, 1]"
+        evolve = _evolving(x, 0.0, 1.0, 0)
+        yield Input(Port(f"{name}.presence", "-", meaning, x, evolve), (evolve,))
 
 
 def _forces(own: Controller) -> Iterator[Input]:
@@ -146,14 +176,25 @@ def _forces(own: Controller) -> Iterator[Input]:
         x = force.followed.numbers
         if force.dimension == NORMAL:
             values, meaning = _evolution(x, 0.0, LARGEST), "normal force, which presses"
-        else:  # within the friction pyramid
-            side, meaning = each.contact.side, "two tangents and the normal"
-            rows = [[0, 0, 1], *([i, j, side] for i, j in _SIDES)]
-            cone = {"cone": np.array(rows, dtype=float)}
+        else:  # within the friction pyramids at the points
+            meaning = "two tangents and the normal"
+            if force.dimension == WRENCH:
+                meaning += ", and the moments about them"
+            cone = {"cone": _pyramids(each.contact, own)}
             values = _evolution(x, -LARGEST, LARGEST) | cone
         evolve = engine.Evolve(**values)
-        port = Port(f"{each.contact.name}.force", "N", meaning, x, evolve)
+        unit = "N, N·m" if force.dimension == WRENCH else "N"
+        port = Port(f"{each.contact.name}.force", unit, meaning, x, evolve)
         yield Input(port, (evolve,))
+
+
+def _pyramids(contact: Contact, own: Controller) -> Array:
+    """Return rows with a·x ≥ 0 for the commands that push and do not slip anywhere."""
+    assert contact.force is not None
+    frame = own.setup.start.state.frame(contact.frame)
+    S = shares(contact.force.dimension, contact.arms_in_axes(frame))
+    one = [[0, 0, 1], *([i, j, contact.side] for i, j in _SIDES)]
+    return np.vstack([np.array(one) @ S[k : k + 3] for k in range(0, len(S), 3)])
 
 
 def model_inputs(
@@ -227,7 +268,8 @@ def streams_of(own: Controller) -> dict[str, StreamAlone]:
 def targets_of(own: Controller, streams: Mapping[str, StreamAlone]) -> Iterator[Port]:
     """Yield the targets and velocities that a program sends.
 
-    They have no time of their own: they are sent when the next step is made.
+    They are sent when the next step is made; a target may have a velocity, and a time
+    by the program's clock.
     """
     for task in own.tasks:
         if task.name not in streams:
@@ -241,6 +283,12 @@ def targets_of(own: Controller, streams: Mapping[str, StreamAlone]) -> Iterator[
         meaning = "how it moves until it fades: linear, then angular, in world axes"
         at = f"{task.name}.velocity"
         yield Port(at, "1/s", meaning, stream.velocity, stream.call, VELOCITY)
+        meaning = "how the next target moves: linear, then angular, in world axes"
+        at = f"{task.name}.target_velocity"
+        yield Port(at, "1/s", meaning, stream.rate, stream.call, RATE)
+        meaning = "when the next target is, by any clock of the sender"
+        at = f"{task.name}.target_time"
+        yield Port(at, "s", meaning, stream.time, stream.call, TIME)
 
 
 def _matrix(name: str, unit: str, meaning: str, own: Array, most: float) -> Input:

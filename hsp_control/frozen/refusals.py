@@ -5,8 +5,8 @@ from collections.abc import Iterator
 import numpy as np
 
 from hsp_control.common.exceptions import FreezeError
-from hsp_control.constraints.contacts.contact import WRENCH
 from hsp_control.control.bound_step import BoundStep
+from hsp_control.control.compensation import Compensation
 from hsp_control.control.controller import Controller
 from hsp_control.declaration import within
 from hsp_control.declaration.nested import parts_within
@@ -14,6 +14,7 @@ from hsp_control.engine import PythonCall
 from hsp_control.engine.inspection import calls
 from hsp_control.engine.plans import PartCall, StepPlan, planned, supplied
 from hsp_control.frozen.image import refusal
+from hsp_control.frozen.task_sets import TaskSets
 from hsp_control.law import FieldSample, MetricSample, TaskSample
 from hsp_control.null_space.fields.field import terms_of
 from hsp_control.null_space.fields.weight import Ramp, SetWeight, Weight
@@ -34,27 +35,19 @@ def check_steady(own: Controller) -> None:
         with within("changes"):
             raise FreezeError(
                 "a frozen controller follows no time line: remove the changes; gains, "
-                "K_N and weights are inputs, which hsp_ramp changes"
+                "K_N, weights and presences are inputs, which hsp_ramp changes"
             )
     for each in setup.tasks:
         if not each.always:
             with within("tasks", each.task.name, "schedule"):
                 raise FreezeError(
-                    "a frozen controller has the same tasks at all times; remove the "
-                    "schedule"
+                    "a frozen controller follows no schedule: remove it, and freeze "
+                    "with the presence of the task as an input (--presence)"
                 )
     for one in setup.contacts:
-        contact = one.contact
-        reasons = {
-            "schedule": one.always or "a frozen controller stands on the same feet",
-            "force": contact.force is None
-            or not (contact.slides or contact.force.dimension == WRENCH)
-            or "the forces of a sliding contact, and moments, are computed in Python",
-        }
-        for name, reason in reasons.items():
-            if reason is not True:
-                with within("contacts", contact.name, name):
-                    raise FreezeError(reason)
+        if not one.always:
+            with within("contacts", one.contact.name, "schedule"):
+                raise FreezeError("a frozen controller stands on the same feet")
 
 
 def check_stack(own: Controller, bound: BoundStep, compensators: bool) -> None:
@@ -78,6 +71,20 @@ def check_stack(own: Controller, bound: BoundStep, compensators: bool) -> None:
     if compensators and not bound.direct and active.contacts:
         with within("compensation"):
             raise FreezeError("compensators are frozen without contacts only")
+
+
+def check_sets(compensation: Compensation, sets: TaskSets | None) -> None:
+    """Check that no error is integrated while tasks come and go.
+
+    Raises:
+        FreezeError: If one is.
+    """
+    if sets is not None and compensation.integral_action is not None:
+        with within("compensation", "integral_action"):
+            raise FreezeError(
+                "it integrates the errors of tasks that are always present; here "
+                f"{', '.join(sets.names)} come and go"
+            )
 
 
 def check_streams(own: Controller) -> None:

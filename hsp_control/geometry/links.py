@@ -20,7 +20,7 @@ from hsp_control.geometry.enclosing import (
     enclosing_ellipsoid_capsule,
     hull_corners,
 )
-from hsp_control.geometry.mesh_loading import mesh_of
+from hsp_control.geometry.mesh_loading import mesh_of, why_unread
 from hsp_control.robot import Robot
 from hsp_control.robot.description import mesh_files
 from hsp_control.robot.description.access import XmlError, read_xml
@@ -153,7 +153,7 @@ def _shapes_of_urdf(robot: Robot, part: RobotPart) -> list[LinkShape]:
     try:
         geometry = pin.buildGeomFromUrdfString(full, text, pin.GeometryType.COLLISION)
     except (ValueError, RuntimeError) as error:
-        reason = (str(error).strip() or type(error).__name__).splitlines()[0]
+        reason = why_unread(error)
         raise ModelError(f"{source.urdf}: a collision mesh: {reason}") from error
     if missing:
         _report_missing(part, missing, left=len(geometry.geometryObjects))

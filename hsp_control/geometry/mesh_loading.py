@@ -29,6 +29,13 @@ def load_mesh(file: Path, scale: Array) -> Any:
     return mesh_of(vertices @ units.turn.T, triangles)
 
 
+def why_unread(error: Exception) -> str:
+    """Return the reason in an error of Coal's reader, which says much besides."""
+    text = str(error).strip() or type(error).__name__
+    lines = text.rpartition("message: ")[2].splitlines()
+    return ": ".join(line for line in lines if not line.startswith("Hint: "))
+
+
 def facets(mesh: Any) -> tuple[Array, Indices]:
     """Return a mesh's vertices, shape (k, 3), and triangles, shape (n, 3)."""
     corners = [mesh.tri_indices(k) for k in range(mesh.num_tris)]

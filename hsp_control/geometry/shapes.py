@@ -32,7 +32,7 @@ from hsp_control.declaration.quantities import (
     plain,
 )
 from hsp_control.geometry.enclosing import convex_hull
-from hsp_control.geometry.mesh_loading import load_mesh
+from hsp_control.geometry.mesh_loading import load_mesh, why_unread
 from hsp_control.robot.description import mesh_files
 
 
@@ -220,7 +220,7 @@ class Mesh(Shape, type="mesh"):
         try:
             mesh = load_mesh(file, np.full(3, self.scale))
         except (RuntimeError, ValueError) as error:
-            reason = str(error).strip().splitlines()[-1]
+            reason = why_unread(error)
             raise SceneError(f"mesh: cannot read {file}: {reason}") from error
         vertices = np.array(mesh.vertices())
         if len(vertices) == 0:

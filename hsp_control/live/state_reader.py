@@ -440,7 +440,7 @@ class StateReader:
         self._monitor = MeasurementMonitor(robot, limits, settings, self._period)
         self._reckoning = DeadReckoning(robot, self._period, dynamics)
         self._frozen = FrozenState(robot, self._period, settings.missing)
-        self._motion = TrustedMotion(robot, settings, self._period)
+        self._motion = TrustedMotion(robot, settings, self._period, dynamics)
         self._robot_clock = RobotClock(
             start_time,
             self._period,

@@ -5,6 +5,7 @@ from math import ceil, exp
 import numpy as np
 
 from hsp_control.common.arrays import Array, Flags, Indices
+from hsp_control.engine import Dynamics
 from hsp_control.live.reaction_check import ReactionCheck
 from hsp_control.live.settings import LiveSettings
 from hsp_control.robot import Robot
@@ -88,8 +89,13 @@ class StillSensors:
             still, self._alive, self._alive + part * (noise - self._alive)
         )
 
-    def judge(self, q: Array, v: Array, tau: Array) -> None:
-        """Find the dead ones, at a state under the effort that acts, shape (nv,)."""
+    def judge(
+        self, q: Array, v: Array, tau: Array, dynamics: Dynamics | None = None
+    ) -> None:
+        """Find the dead ones, at a state under the effort that acts, shape (nv,).
+
+        ``dynamics``: those of a robot that carries something.
+        """
         quiet = (self._count >= self._quiet) & self._judged
         if not quiet.any():
             self.dead = self._none
@@ -97,11 +103,11 @@ class StillSensors:
         dead = quiet & (self._alive > _ALIVE)
         self.beyond = np.zeros(v.size)
         if not self._robot.unactuated:
-            inertia = self._robot.state(0.0, q, v).mass_matrix
-            free = self._robot.forward_dynamics(q, v, tau)
+            inertia = self._robot.mass_matrix(q, dynamics)
+            free = self._robot.forward_dynamics(q, v, tau, dynamics)
             silent = np.flatnonzero(quiet)
             self.beyond[silent] = _holding(silent, inertia, free)
-            gravity = self._robot.inverse_dynamics(q, 0.0 * v, 0.0 * v)
+            gravity = self._robot.inverse_dynamics(q, 0.0 * v, 0.0 * v, dynamics)
             allowed = self._friction + _GRAVITY * np.abs(gravity)
             dead |= np.abs(self.beyond) > allowed
             self._reaction.expect(quiet, inertia, free)

@@ -7,6 +7,7 @@ import numpy as np
 from hsp_control.common.arrays import Array, Flags, Indices
 from hsp_control.common.exceptions import HspControlError
 from hsp_control.control.measurement import Measurement
+from hsp_control.engine import Dynamics
 from hsp_control.live.momentum_check import Driving, MomentumCheck, smaller
 from hsp_control.live.response_check import ResponseCheck
 from hsp_control.live.settings import LiveSettings
@@ -48,8 +49,10 @@ class ExpectedMotion:
         (nv,).
     """
 
-    def __init__(self, robot: Robot, error: float, period: float) -> None:
-        self._robot, self._error = robot, error
+    def __init__(
+        self, robot: Robot, error: float, period: float, dynamics: Dynamics
+    ) -> None:
+        self._robot, self._error, self._dynamics = robot, error, dynamics
         self._rate = min(_BANDWIDTH, 0.3 / period)
         self._rates = np.array([0.0, _ALONE, self._rate])
         self._sources = np.zeros((3, robot.nv))
@@ -67,7 +70,7 @@ class ExpectedMotion:
         if self._robot.unactuated:  # the forces at the feet are unknown
             return
         try:
-            acceleration = self._robot.forward_dynamics(q, v, tau)
+            acceleration = self._robot.forward_dynamics(q, v, tau, self._dynamics)
         except HspControlError:
             return
         if np.isfinite(acceleration).all():
@@ -126,10 +129,18 @@ class TrustedMotion:
         last: The last measurement, as it came; None before the first.
     """
 
-    def __init__(self, robot: Robot, settings: LiveSettings, period: float) -> None:
+    def __init__(
+        self,
+        robot: Robot,
+        settings: LiveSettings,
+        period: float,
+        dynamics: Dynamics | None = None,
+    ) -> None:
+        """``dynamics``: those of a robot that carries something."""
         self._robot, self._error = robot, settings.velocity_error
+        self._dynamics = dynamics = dynamics or robot.dynamics()
         self._check = VelocityCheck(robot, settings, period)
-        self._expected = ExpectedMotion(robot, settings.velocity_error, period)
+        self._expected = ExpectedMotion(robot, self._error, period, dynamics)
         limits = settings.effort_limits(robot)
         self._sensors = StillSensors(robot, settings, limits, period)
         self._momentum = MomentumCheck(robot, settings, limits, period)
@@ -193,14 +204,15 @@ class TrustedMotion:
         """
         tau = tau + self._load
         self._expected.apply(q, v, tau)
+        robot, dynamics = self._robot, self._dynamics
         if self.complete and self._moving:
-            self._sensors.judge(q, v, tau)
-        if self._robot.unactuated:
+            self._sensors.judge(q, v, tau, dynamics)
+        if robot.unactuated:
             return
         if inertia is None:
-            inertia = self._robot.state(0.0, q, v).mass_matrix
+            inertia = robot.mass_matrix(q, dynamics)
         effort = inertia @ self._expected.acceleration
-        gravity = self._robot.inverse_dynamics(q, 0.0 * v, 0.0 * v)
+        gravity = robot.inverse_dynamics(q, 0.0 * v, 0.0 * v, dynamics)
         self._driving = Driving(inertia, effort, gravity)
 
     def update(self, new: Measurement, passed: float, jumps: Flags) -> Measurement:

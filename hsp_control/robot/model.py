@@ -180,10 +180,13 @@ class RobotModel(Structure):
     def _own(self) -> Dynamics:
         return self.dynamics()
 
-    def mass_matrix(self, q: Array) -> Array:
-        """Return M(q), shape (nv, nv) (CRBA)."""
+    def mass_matrix(self, q: Array, dynamics: Dynamics | None = None) -> Array:
+        """Return M(q), shape (nv, nv) (CRBA).
+
+        ``dynamics``: those of a robot that carries something.
+        """
         M = np.empty((self.nv, self.nv))
-        engine.MassMatrix(dynamics=self._own, q=_packed(q), M=M)()
+        engine.MassMatrix(dynamics=dynamics or self._own, q=_packed(q), M=M)()
         return M
 
     def inverse_dynamics(
@@ -204,11 +207,11 @@ class RobotModel(Structure):
     ) -> Array:
         """Return the acceleration M(q)⁻¹ (tau - N(q, v)), shape (nv,).
 
-        Computed by ABA; with mimic joints, which ABA does not support, by CRBA and a
-        linear solve. ``dynamics``: those with a payload, for example.
+        By RNEA, CRBA and a Cholesky factor of M, which is as sparse as the tree.
+        ``dynamics``: those with a payload, for example.
 
         Raises:
-            ModelError: If M is singular (only detected with mimic joints).
+            ModelError: If M is singular.
         """
         acceleration = np.empty(self.nv)
         given = {"q": _packed(q), "v": _packed(v), "effort": _packed(tau)}
@@ -239,7 +242,7 @@ class RobotModel(Structure):
         return Term(acceleration, calls)
 
     def _check_acceleration(self, acceleration: Array) -> None:
-        if self.mimics and np.isnan(acceleration).any():
+        if np.isnan(acceleration).any():
             raise ModelError(
                 f"{self.name}: the mass matrix is singular at this configuration"
             )

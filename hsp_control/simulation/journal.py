@@ -228,6 +228,17 @@ class JournalReader:
         begun = self.path.is_file() and self.path.stat().st_size >= len(MAGIC)
         return self._at if begun else 0
 
+    def ends_damaged(self) -> bool:
+        """Return whether all bytes of the frame after the last one are there.
+
+        Of a file that nobody writes any more it is damaged, and not merely unfinished.
+        """
+        data = self.path.read_bytes()[self._at :]
+        if len(data) < _FRAME.size:
+            return False
+        _, length, _ = _FRAME.unpack_from(data)
+        return bool(_FRAME.size + length <= len(data))
+
     def rows(self, first: int) -> dict[str, Array]:
         """Return the columns from a row on, as far as they are kept."""
         kept = sum(len(rows) for _, rows in self._parts)

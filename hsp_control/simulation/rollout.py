@@ -217,10 +217,10 @@ def _read_journal(path: Path) -> tuple[dict[str, Array], dict[str, Any]]:
     complete_columns(columns, meta["robot"]["continuous"])
     if not reader.ended:
         meta = {**meta, "status": "interrupted", "message": KILLED}
-    if reader.damaged:
-        lost = f"{reader.damaged} damaged rows of the journal are left out"
+    if damaged := reader.damaged + reader.ends_damaged():
+        lost = f"{damaged} damaged rows of the journal are left out"
         _log.warning("%s: %s", path, lost)
-        meta = {**meta, "damaged": reader.damaged}
+        meta = {**meta, "damaged": damaged}
         meta["message"] = "; ".join(filter(None, (meta.get("message"), lost)))
     return columns, meta
 

@@ -5,7 +5,7 @@
     loop.send("127.0.0.1:5005", [x, y, z + 0.01, *quaternion])
 
 The loop must tell its state there: ``hsp live CONFIG --publish udp://127.0.0.1:5006``.
-The keys of a state are in ``docs/companions/policies.md``.
+The keys of a state are in ``hsp_control/companions/datagrams/policies.md``.
 """
 
 import json

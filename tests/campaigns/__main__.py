@@ -12,7 +12,7 @@ from functools import partial
 
 from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
 
-from campaigns import faults, frozen, random_states, soak
+from campaigns import changes, faults, frozen, random_states, soak
 from campaigns.cases import KINDS, Count, count_cases, warm_up
 from campaigns.results import keep
 from hsp_control.common.resources import bundled_robots
@@ -62,6 +62,7 @@ def main(arguments: Iterable[str] | None = None) -> int:
         "states": states,
         **{kind: partial(cases, kind=kind) for kind in CASES},
         "soak": soak.campaign,
+        "changes": changes.campaign,
         "faults": faults.campaign,
         "frozen": frozen.campaign,
     }

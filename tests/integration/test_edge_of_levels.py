@@ -30,21 +30,18 @@ def rests_at(name: str, q0: Array, away: Array, *below: hsp.Task) -> float:
     return float(np.linalg.norm(left))
 
 
-@pytest.mark.parametrize("postures", [False, True], ids=["two", "three"])
 @pytest.mark.parametrize("name", ["panda", "ur5"])
-def test_the_hand_is_as_near_as_it_can_be_whatever_is_asked_below(
-    name: str, postures: bool
-) -> None:
+def test_the_hand_is_as_near_as_it_can_be_whatever_is_asked_below(name: str) -> None:
     """A position half a metre too far, above an orientation, above a posture."""
     robot, q0 = load(name), load(name).home()
     start = robot.state(0.0, q0, np.zeros(robot.nv)).frame(FRAMES[name])
     away = 1.5 * np.array([0.6, 0.5, 0.6]) / np.linalg.norm([0.6, 0.5, 0.6])
     turned = HoldOrientation(start.rotation @ pin.exp3(np.array([0.0, 0.8, 0.0])))
-    below: list[hsp.Task] = [hsp.FrameOrientation(FRAMES[name], turned, priority=2)]
-    if postures:
-        below.append(hsp.JointPosture(q0, priority=3))
+    second = hsp.FrameOrientation(FRAMES[name], turned, priority=2)
+    third = hsp.JointPosture(q0, priority=3)
     alone = rests_at(name, q0, away)
-    assert rests_at(name, q0, away, *below) - alone <= SHORT
+    for below in ([second], [second, third]):
+        assert rests_at(name, q0, away, *below) - alone <= SHORT
 
 
 def test_an_orientation_that_is_met_gives_way_too() -> None:

@@ -9,6 +9,7 @@ from places import ROOT
 
 import hsp_control as hsp
 from hsp_control import Rollout, load_experiment
+from hsp_control.common.resources import bundled_configs
 
 mujoco = pytest.importorskip("mujoco")
 WIPER = "panda_tcp"
@@ -121,14 +122,14 @@ def test_the_page_about_forces_is_true() -> None:
     assert out.forces[2] == 20.0
     first, box = re.findall(r"^```yaml\n(.*?)^```", text, re.MULTILINE | re.DOTALL)
     talos = yaml.safe_load(
-        (ROOT / "configs" / "forces" / "talos_wall.yaml").read_text(encoding="utf-8")
+        bundled_configs()["forces/talos_wall"].read_text(encoding="utf-8")
     )
     talos["contacts"] |= yaml.safe_load(first)["contacts"]
     talos["changes"] = yaml.safe_load(first)["changes"]
     talos["plant"]["solids"] = yaml.safe_load(first)["plant"]["solids"]
     load_experiment(talos)
     pandas = yaml.safe_load(
-        (ROOT / "configs" / "forces" / "pandas_box.yaml").read_text(encoding="utf-8")
+        bundled_configs()["forces/pandas_box"].read_text(encoding="utf-8")
     )
     pandas["contacts"] = yaml.safe_load(box)["contacts"]
     load_experiment(pandas)

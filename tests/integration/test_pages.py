@@ -1,16 +1,20 @@
 """Every page runs as it stands: README, tutorial, recipes, companions and the rest."""
 
 from pathlib import Path
+from typing import Any
 
+import numpy as np
 import pytest
 from page_runner import OUTPUT, blocks_of, run_page, runs_commands
 from places import ROOT, THOROUGH
 
+from hsp_control.null_space.fields.weight import sample_weight
+
 # No page starts a robot with a jump of its effort.
 pytestmark = pytest.mark.filterwarnings("error:the first effort of joint:UserWarning")
 
-FOLDERS = ("docs", "docs/tutorial", "docs/how_to", "docs/companions")
-ELSEWHERE = "hsp_control/companions/*/page.md"
+FOLDERS = ("docs", "docs/tutorial", "docs/how_to")
+ELSEWHERE = "hsp_control/companions/*/*.md"
 PAGES = [
     "README.md",
     *sorted(
@@ -37,26 +41,65 @@ NOT_RUN = [
 ]
 
 
-def test_what_the_tutorial_prints_is_true(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    space = run_page("docs/tutorial/ten_minutes.md", tmp_path, whole=False)
+# --- what a page claims of the names that its Python leaves ---------------------------
+
+
+def the_readme(space: dict[str, Any]) -> None:
+    """The law's exponential on the user's own cost."""
+    rollout = space["rollout"]
+    assert np.isfinite(space["output"].tau).all()
+    assert Path("out/elbow.npz").is_file()
+    decay = np.exp(-8.0 * rollout.t) * rollout["null_space_norm"][0]
+    np.testing.assert_allclose(rollout["null_space_norm"], decay, rtol=1e-4, atol=1e-8)
+
+
+def the_tutorial(space: dict[str, Any]) -> None:
     assert space["error"].max() < 1e-9
     assert space["difference"] < 1e-8
+
+
+def the_live_page(space: dict[str, Any]) -> None:
+    assert space["report"].ended == "completed"
+    fields, state = space["controller"].field.terms, space["controller"].state
+    weights = {each.name: sample_weight(each.weight, state)[0] for each in fields}
+    assert weights == {"obstacle_clearance": 0.0, "target_posture": 0.0, "calm": 1.0}
+    assert space["run"].status == "completed"
+
+
+CLAIMS = {
+    "README.md": the_readme,
+    "docs/tutorial/ten_minutes.md": the_tutorial,
+    "docs/live.md": the_live_page,
+}
+
+
+def runs(page: str, folder: Path, monkeypatch: pytest.MonkeyPatch, whole: bool) -> None:
+    space = run_page(page, folder, whole=whole)
+    monkeypatch.chdir(folder)
+    if page in CLAIMS:
+        CLAIMS[page](space)
 
 
 @pytest.mark.parametrize(
     "page", [each for each in WITH_BLOCKS if each not in WITH_COMMANDS]
 )
-def test_python_and_configurations_of_a_page_run(page: str, tmp_path: Path) -> None:
-    run_page(page, tmp_path, whole=False)
+def test_python_and_configurations_of_a_page_run(
+    page: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    runs(page, tmp_path, monkeypatch, whole=False)
 
 
 @pytest.mark.process
 @pytest.mark.timeout(900)
 @pytest.mark.parametrize("page", WITH_COMMANDS)
-def test_a_page_runs_with_its_commands(page: str, tmp_path: Path) -> None:
-    run_page(page, tmp_path, whole=True)
+def test_a_page_runs_with_its_commands(
+    page: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    runs(page, tmp_path, monkeypatch, whole=True)
+
+
+def test_each_page_with_claims_is_run() -> None:
+    assert set(CLAIMS) <= set(WITH_BLOCKS)
 
 
 @pytest.mark.parametrize(("page", "block"), NOT_RUN)

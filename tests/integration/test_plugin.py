@@ -7,6 +7,7 @@ from pathlib import Path
 
 import pytest
 from places import ROOT
+from typing_commands import READY
 
 EXAMPLE = ROOT / "examples" / "plugin"
 
@@ -26,20 +27,12 @@ def installed(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder
 
 
-def hsp(
-    folder: Path | None, *words: str, where: Path
-) -> "subprocess.CompletedProcess[str]":
-    """Run a command with the example installed, or without it."""
-    paths = [str(ROOT), *([str(folder)] if folder else [])]
-    environment = os.environ | {"PYTHONPATH": os.pathsep.join(paths)}
-    return subprocess.run(
-        [sys.executable, "-m", "hsp_control", *words],
-        env=environment,
-        cwd=where,
-        capture_output=True,
-        text=True,
-        check=False,
-    )
+def hsp(installed: Path, line: str, where: Path, status: int = 0) -> str:
+    """Run a command with the example installed, and return what it prints."""
+    environment = os.environ | {"PYTHONPATH": str(installed)}
+    found, printed = READY.run(line.split(), where, environment)
+    assert found == status, f"hsp {line}\n{printed}"
+    return printed
 
 
 DEMO = str(EXAMPLE / "demo.yaml")
@@ -47,56 +40,44 @@ DEMO = str(EXAMPLE / "demo.yaml")
 
 @pytest.mark.process
 def test_its_types_work_in_a_configuration(installed: Path, tmp_path: Path) -> None:
-    ran = hsp(installed, "check", DEMO, where=tmp_path)
-    assert ran.returncode == 0, ran.stderr
-    assert "FrameHeight, 1 rows" in ran.stdout
-    assert "elbow_height" in ran.stdout
-    assert "DampedPlant" in ran.stdout or "damped" in ran.stdout.lower()
+    said = hsp(installed, f"check {DEMO}", tmp_path)
+    assert "FrameHeight, 1 rows" in said
+    assert "elbow_height" in said
+    assert "DampedPlant" in said or "damped" in said.lower()
 
 
 @pytest.mark.process
 def test_strict_reading_admits_it_by_name_only(installed: Path, tmp_path: Path) -> None:
-    refused = hsp(installed, "check", "--strict", DEMO, where=tmp_path)
-    assert refused.returncode == 2
-    assert "is of the package hsp_example" in refused.stderr
-    assert "--allow hsp_example" in refused.stderr
-    admitted = hsp(installed, "check", "--allow", "hsp_example", DEMO, where=tmp_path)
-    assert admitted.returncode == 0, admitted.stderr
+    refused = hsp(installed, f"check --strict {DEMO}", tmp_path, status=2)
+    assert "is of the package hsp_example" in refused
+    assert "--allow hsp_example" in refused
+    hsp(installed, f"check --allow hsp_example {DEMO}", tmp_path)
 
 
 @pytest.mark.process
 @pytest.mark.system
-@pytest.mark.slow
 def test_it_runs_plots_and_exports(installed: Path, tmp_path: Path) -> None:
-    short = ["--set", "simulation.duration=0.3"]
-    ran = hsp(installed, "run", DEMO, "--out", ".", *short, where=tmp_path)
-    assert ran.returncode == 0, ran.stderr
+    hsp(installed, f"run {DEMO} --out . --set simulation.duration=0.3", tmp_path)
     log = "demo-simulation.duration=0.3.npz"
-    for words in (
-        ["plot", log],
-        ["export", log, "--html", "demo.html"],
-        ["run", log, "--out", "again"],
+    for line in (
+        f"plot {log}",
+        f"export {log} --html demo.html",
+        f"run {log} --out again",
     ):
-        ran = hsp(installed, *words, where=tmp_path)
-        assert ran.returncode == 0, ran.stderr
+        hsp(installed, line, tmp_path)
 
 
 @pytest.mark.process
 @pytest.mark.slow
 def test_it_sweeps(installed: Path, tmp_path: Path) -> None:
-    words = ["sweep", DEMO, "--over", "plant.damping=0:2:2", "--out", "s.parquet"]
-    short = ["--set", "simulation.duration=0.2", "--workers", "1"]
-    ran = hsp(installed, *words, *short, where=tmp_path)
-    assert ran.returncode == 0, ran.stderr
+    line = f"sweep {DEMO} --over plant.damping=0:2:2 --out s.parquet --workers 1"
+    hsp(installed, f"{line} --set simulation.duration=0.2", tmp_path)
 
 
 @pytest.mark.process
 @pytest.mark.system
-@pytest.mark.slow
 def test_its_robot_is_reached_by_name(installed: Path, tmp_path: Path) -> None:
-    words = ["live", DEMO, "--robot", "example://anywhere", "--duration", "0.2"]
-    ran = hsp(installed, *words, where=tmp_path)
-    assert ran.returncode == 0, ran.stderr
-    ran = hsp(installed, "live", DEMO, "--robot", "exmaple://x", where=tmp_path)
-    assert ran.returncode == 2
-    assert "did you mean example://ADDRESS?" in ran.stderr
+    live = f"live {DEMO} --robot"
+    hsp(installed, f"{live} example://anywhere --duration 0.2", tmp_path)
+    said = hsp(installed, f"{live} exmaple://x", tmp_path, status=2)
+    assert "did you mean example://ADDRESS?" in said

@@ -257,7 +257,7 @@ def test_effort_is_bounded_in_the_singularity(which: str) -> None:
 
 # --- random starts -------------------------------------------------------------------
 
-STARTS = 1250 if THOROUGH else 400
+STARTS = 1250 if THOROUGH else 200
 ROBOTS = {
     "planar3r": "xy", "panda": "pose", "iiwa14": "pose", "ur5": "xyz", "kinova": "xyz",
     "xarm7": "pose", "talos_arm": "pose", "tiago_no_hand": "pose",

@@ -191,5 +191,19 @@ LIES: dict[str, Lie] = {
     for name, lie in lies.items()
 }
 
+
+def is_seen_at_rest(lie: Lie) -> bool:
+    """Return whether a lie changes what is measured of an arm that stands."""
+    sensors = Sensors(np.ones(7, dtype=bool), 2, np.random.default_rng(0))
+    q, tau = 0.1 * np.arange(7), np.arange(7.0)
+    for k in range(4):
+        true = Measurement(k, k * PERIOD, q, np.zeros(7), applied=tau)
+        told = sensors(true, lie)
+        names = ("t", "q", "v", "applied")
+        if any(np.any(getattr(told, n) != getattr(true, n)) for n in names):
+            return True
+    return False
+
+
 THE_SIGN: Lie = _both(lambda s: (2.0 * _begun(s).q - s.q[-1], -s.v[-1]))
 """Position and velocity agree with each other, and nothing with the efforts."""

@@ -37,6 +37,7 @@ from urllib.request import urlopen
 
 import yaml
 from places import ROOT
+from typing_commands import READY
 
 from hsp_control import load_experiment
 from hsp_control.declaration import Part, imported
@@ -52,6 +53,8 @@ _ENDINGS = {"python": "py", "sh": "sh", "yaml": "yaml", "c": "c", "cpp": "cpp"}
 _SYNTAX = {"json": json.loads, "toml": tomllib.loads}
 _PATIENCE = "--set live.missing=2000 --set live.watchdog=2000 --set live.age=60"
 """On a busy computer: what `hsp live` is given besides what the page says."""
+_BRIEFLY = "--duration 1"
+"""What `hsp live` is given where the page does not say how long it runs [s]."""
 _SHORT = "simulation.duration=0.02"
 
 
@@ -267,10 +270,15 @@ class Shell:
                     Path(name).symlink_to(ROOT / name)
             if re.match(r"hsp live\b", line) and "live.missing" not in line:
                 line = f"{line} {_PATIENCE}"
+                line += "" if "--duration" in line else f" {_BRIEFLY}"
             if line.endswith("&") or block.kind == "background":
                 self._background.append(self._start(line.rstrip("& "), where))
             elif block.kind == "Ctrl-C":
                 self._interrupted(line, where)
+            elif re.fullmatch(r"hsp [\w ./=-]+", line) and not block.kind:
+                words = line.split()[1:]
+                status, said = READY.run(words, self._folder, self._environment)
+                assert status == 0, f"{where}: {line}\n{said}"
             else:
                 done = subprocess.run(
                     ["bash", "-ec", line], cwd=self._folder, env=self._environment,

@@ -14,12 +14,12 @@ THOROUGH = os.environ.get("HSP_THOROUGH") == "1"
 
 
 def further(*cases: Any) -> tuple[Any, ...]:
-    """Return cases that show what others do as well, for `make thorough`; else none."""
+    """Return cases that show what others do as well, for `make thorough`; else none.
+
+    A test whose only cases these are is skipped.
+    """
     return cases if THOROUGH else ()
 
-
-IF_THOROUGH = pytest.mark.skipif(not THOROUGH, reason="only in make thorough")
-"""Of a test that shows what others do as well, and takes long."""
 
 ON_MUJOCO = pytest.mark.skipif(
     find_spec("hsp_control.companions.mujoco") is None, reason="of another companion"

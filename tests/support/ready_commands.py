@@ -1,8 +1,8 @@
-"""A process that has imported `hsp_control` forks one for every command.
+"""A process that has imported `hsp_control` forks one for every command or script.
 
 Each command still begins with no types, robots or logs of another one, and ends on its
 own: what is saved is the CPU of its imports, half a second to one. How `hsp` itself
-starts is seen where pages and plays run (`page_runner.py`, `played`).
+starts is seen where plays and commands that need a shell run (`page_runner.py`).
 """
 
 import atexit
@@ -23,7 +23,7 @@ PARTS = (
 
 
 class ReadyCommands:
-    """Runs commands of `hsp`, each in a fork of one process."""
+    """Runs commands of `hsp` and scripts, each in a fork of one process."""
 
     def __init__(self) -> None:
         self._process: subprocess.Popen[str] | None = None
@@ -32,7 +32,7 @@ class ReadyCommands:
     def run(
         self, arguments: list[str], folder: Path, environment: dict[str, str]
     ) -> tuple[int, str]:
-        """Return a command's status, and what it printed."""
+        """Return the status of a command, or of a script ``name.py``, and its words."""
         try:
             return self._asked(
                 {"arguments": arguments, "folder": str(folder), "env": environment}
@@ -87,7 +87,9 @@ def serve() -> None:
 
 
 def _become(request: dict[str, Any], output: int) -> None:
-    """Do what `python -m hsp_control` does in a folder, and end."""
+    """Do in a folder what `python -m hsp_control` or `python name.py` does, and end."""
+    from runpy import run_path
+
     from hsp_control.cli import main
 
     os.chdir(request["folder"])
@@ -98,6 +100,11 @@ def _become(request: dict[str, Any], output: int) -> None:
     os.dup2(os.open(os.devnull, os.O_RDONLY), 0)
     os.dup2(output, 1)
     os.dup2(output, 2)
+    first = request["arguments"][0]
+    if first.endswith(".py"):
+        sys.argv = request["arguments"]
+        run_path(first, run_name="__main__")
+        sys.exit()
     sys.exit(main(request["arguments"]))
 
 

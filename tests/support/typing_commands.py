@@ -29,6 +29,13 @@ def hsp(line: str, folder: Path, status: int = 0) -> str:
     return printed
 
 
+def script(name: str, folder: Path) -> str:
+    """Run a script in a folder, and return what it prints."""
+    found, printed = READY.run([name], folder, without_display())
+    assert found == 0, f"python {name}\n{printed}"
+    return printed
+
+
 def played(command: list[str], folder: Path) -> str:
     """Begin a play, and end it two seconds after it has said how one ends it."""
     with subprocess.Popen(

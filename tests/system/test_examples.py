@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from page_runner import Running, Shell
 from places import ROOT
-from typing_commands import hsp, in_this_process, typed
+from typing_commands import hsp, script, typed
 
 from hsp_control import Rollout
 
@@ -45,24 +45,19 @@ def skip_without(name: str) -> None:
 @pytest.mark.parametrize("name", [each for each in SCRIPTS if "franka" not in each])
 def test_a_script_runs(name: str, folder: Path) -> None:
     skip_without(name)
-    printed = typed([sys.executable, name], folder)
-    assert printed
+    assert script(name, folder)
     logs = sorted((folder / "out").glob("*.npz")) if (folder / "out").exists() else []
     for log in logs:
         run = Rollout.load(log)
         assert run.status == "completed"
         if run.t[-1] > 1.0:
             assert np.isfinite(run.tau).all()
-        in_this_process(f"view {log} --no-browser", folder)
 
 
 @pytest.mark.parametrize("name", CONFIGURATIONS)
 def test_a_configuration_runs(name: str, folder: Path) -> None:
     skip_without(name)
-    printed = hsp(f"run {name}", folder)
-    assert "completed" in printed
-    (log,) = (folder / "out").glob("*.npz")
-    in_this_process(f"view {log} --no-browser", folder)
+    assert "completed" in hsp(f"run {name}", folder)
 
 
 def test_a_franka_s_box_is_moved(folder: Path) -> None:
@@ -79,7 +74,7 @@ def test_the_lesson_s_cells_run(folder: Path) -> None:
     assert not any(cell.get("outputs") for cell in cells)
     code = ["".join(each["source"]) for each in cells if each["cell_type"] == "code"]
     (folder / "lesson.py").write_text("\n".join(code))
-    printed = typed([sys.executable, "lesson.py"], folder)
+    printed = script("lesson.py", folder)
     *_, slow, quick = printed.splitlines()
     for line in (slow, quick):
         _, measured, predicted = map(float, line.split())

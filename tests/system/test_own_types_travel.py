@@ -1,11 +1,9 @@
 """A type of one's own is known to every command: by ``--import``, or by one list."""
 
-import subprocess
-import sys
 from pathlib import Path
 
 import pytest
-from typing_commands import PATIENCE, hsp
+from typing_commands import PATIENCE, hsp, script
 
 PARTS = """
 import hsp_control as hsp
@@ -139,7 +137,7 @@ with hsp.Recorder(arm, "out/recorded.npz") as recorder:
         "two": PARTS,
     }.items():
         (tmp_path / f"{name}.py").write_text(head + run)
-        subprocess.run([sys.executable, f"{name}.py"], cwd=tmp_path, check=True)
+        script(f"{name}.py", tmp_path)
         for log in ("own", "experiment", "recorded"):
             said = hsp(f"view out/{log}.npz --no-browser", tmp_path)
             known = name == "one" or log == "own"

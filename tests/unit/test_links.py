@@ -5,6 +5,7 @@ by `make links`: this is for README, notebooks and what else stands outside of d
 """
 
 import json
+import os
 import re
 from pathlib import Path
 
@@ -13,8 +14,10 @@ from places import ROOT
 
 PATTERNS = (
     *("*.md", "*/*.md", "robots/*/*.md", "docs/**/*.md", "notebooks/*.ipynb"),
-    "hsp_control/companions/*/*.md",
+    "hsp_control/companions/**/*.md",
 )
+COMPANIONS = ROOT / "hsp_control" / "companions"
+PACKAGE = (ROOT / "hsp_control" / "__init__.py").read_text(encoding="utf-8")
 BUILT = ("_build", "generated")
 LINK = re.compile(r"\]\(([^)\s]+)\)|^\[[^\]]+\]: (\S+)|<img src=\"([^\"]+)\"", re.M)
 CODE = re.compile(r"^(```|~~~|::::?).*?^\1|`[^`\n]+`", re.M | re.S)
@@ -35,7 +38,17 @@ def missing(text: str, folder: Path) -> list[str]:
         path
         for path in paths
         if path and "/generated/" not in path and not (folder / path).exists()
+        if not taken_away(Path(os.path.normpath(folder / path)))
     )
+
+
+def taken_away(file: Path) -> bool:
+    """Return whether a file is of a companion that the package lists, but lacks."""
+    if not file.is_relative_to(COMPANIONS):
+        return False
+    name = file.relative_to(COMPANIONS).parts[0]
+    listed = f"from .companions import {name} as {name}\n"
+    return listed in PACKAGE and not (COMPANIONS / name).exists()
 
 
 @pytest.mark.parametrize(

@@ -74,7 +74,10 @@ def test_an_edit_is_of_the_text_that_it_was_made_for() -> None:
     [
         ("hsp_control/control/mixture.py", "tests/unit/control"),
         ("engine/fields/barrier.hpp", "tests/unit/null_space"),
-        ("hsp_control/companions/walking/walk.py", "tests/companions/walking"),
+        (
+            "hsp_control/companions/walking/walk.py",
+            "hsp_control/companions/walking/tests",
+        ),
         ("hsp_control/__init__.py", "tests/unit"),
     ],
 )

@@ -86,7 +86,7 @@ def test_the_source_distribution_has_what_tests_read() -> None:
         for file in (ROOT / "tests").rglob("*.py")
         for name in re.findall(r'\bROOT / "([^"/]+)', file.read_text(encoding="utf-8"))
     }
-    assert {"docs", "examples", "configs"} <= read
+    assert {"docs", "examples"} <= read
     assert read - {"out"} <= included()  # out is written
 
 

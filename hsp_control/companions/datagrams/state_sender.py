@@ -68,7 +68,7 @@ class Teller:
     """Sends the state of a loop to one address; `run_loop` calls it as ``on_period``.
 
     It needs no listener, and never waits: a datagram that cannot be sent is dropped,
-    and logged once. ``docs/companions/policies.md`` has the keys.
+    and logged once. ``hsp_control/companions/datagrams/policies.md`` has the keys.
     """
 
     def __init__(self, to: Any, rate: float, source: EffortSource) -> None:

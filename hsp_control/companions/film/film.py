@@ -13,7 +13,7 @@ from hsp_control.companions.film.chromium import headless_browser, open_page
 from hsp_control.companions.film.encoding import FORMATS, encoder, find_ffmpeg
 from hsp_control.companions.film.screenshots import frame_times, screenshots
 from hsp_control.companions.viewer.export_page import export_html
-from hsp_control.control.controller import Controller
+from hsp_control.control.interface import Controller
 from hsp_control.robot import Robot
 from hsp_control.simulation import Rollout
 

@@ -12,7 +12,7 @@ def _add_options(model: argparse.ArgumentParser) -> None:
         "address",
         metavar="ADDRESS",
         help="of the control box, with settings as behind franka:// "
-        "(docs/companions/franka.md)",
+        "(hsp_control/companions/franka/page.md)",
     )
     model.add_argument("urdf", type=Path, metavar="FILE", help="the URDF to write")
     like = model.add_argument(

@@ -116,12 +116,12 @@ _CAUSES: dict[str, str] = {
     "sending",
     "realtime capabilities": "boot a PREEMPT_RT kernel; ?realtime=ignore for a trial",
     "realtime scheduling": "allow it: rtprio 99 in /etc/security/limits.conf "
-    "(docs/companions/franka.md), or ?realtime=ignore for a trial",
+    "(hsp_control/companions/franka/page.md), or ?realtime=ignore for a trial",
     "thread priority": "allow it: rtprio 99 in /etc/security/limits.conf "
-    "(docs/companions/franka.md), or ?realtime=ignore for a trial",
+    "(hsp_control/companions/franka/page.md), or ?realtime=ignore for a trial",
     "incompatible library version": "libfranka and the robot's system software are "
     "incompatible: "
-    "docs/companions/franka.md names the versions",
+    "hsp_control/companions/franka/page.md names the versions",
     "safety function": "a safety function of Desk is active: end it there",
     "not possible in the current mode": "unlock the joints in Desk, and leave guiding",
     "closed connection": "the control box ended the connection",

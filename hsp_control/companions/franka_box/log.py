@@ -7,7 +7,7 @@ from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import LogError
 from hsp_control.companions.franka_box import ControlBox
 from hsp_control.config import Experiment
-from hsp_control.control.measurement import LogChannel
+from hsp_control.control.interface import LogChannel
 from hsp_control.live.live_log import DueRows
 from hsp_control.robot import RobotState
 from hsp_control.simulation import Rollout

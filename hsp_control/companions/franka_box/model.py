@@ -6,7 +6,7 @@ import pinocchio as pin
 from hsp_control.common.arrays import Array
 from hsp_control.companions.franka.layouts import JOINTS, PERIOD
 from hsp_control.companions.franka_box.arm import Arm
-from hsp_control.control.compensation.momentum_observer import MomentumObserver
+from hsp_control.control.interface import MomentumObserver
 from hsp_control.robot import RobotState
 
 OBSERVER = MomentumObserver(50.0, cancel=False)

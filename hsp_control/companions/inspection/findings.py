@@ -26,7 +26,7 @@ from hsp_control.companions.inspection.reading import (
     check_srdf,
     check_unread,
 )
-from hsp_control.control.compensation.automatic_observer import largest_cancelled
+from hsp_control.control.interface import largest_cancelled
 from hsp_control.geometry import Proximity, link_shapes, self_pairs
 from hsp_control.geometry.good_postures import PostureSearch, Rows
 from hsp_control.robot import Robot, RobotDescription

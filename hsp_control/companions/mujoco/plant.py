@@ -20,7 +20,7 @@ from hsp_control.companions.mujoco.mjcf import (
     geoms_of,
     write_mjcf,
 )
-from hsp_control.control.measurement import LogChannel
+from hsp_control.control.interface import LogChannel
 from hsp_control.declaration import within
 from hsp_control.declaration.quantities import Flag, Positive
 from hsp_control.robot import Robot

@@ -20,7 +20,7 @@ from hsp_control.companions.mujoco.coordinates import MujocoCoordinates
 from hsp_control.companions.mujoco.loading import compile_mjcf
 from hsp_control.companions.mujoco.plant import MujocoEngine, import_mujoco
 from hsp_control.companions.mujoco.scene import Motor, Names, joint_actuators, motor
-from hsp_control.control.measurement import LogChannel
+from hsp_control.control.interface import LogChannel
 from hsp_control.declaration import within
 from hsp_control.declaration.quantities import Flag
 from hsp_control.declaration.quantities import Names as NameList

@@ -23,9 +23,7 @@ from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import HspControlError, StreamError
 from hsp_control.companions.play.knobs import Knob, knobs_of
 from hsp_control.companions.plots.palette import FIELD
-from hsp_control.control.changes import Changes
-from hsp_control.control.controller import Controller
-from hsp_control.control.targets import DELAY, RAMP, new_stream
+from hsp_control.control.interface import DELAY, RAMP, Changes, Controller, new_stream
 from hsp_control.declaration.nested import Remembering, parts_within
 from hsp_control.geometry.scene import Obstacle
 from hsp_control.null_space.fields import TargetPosture

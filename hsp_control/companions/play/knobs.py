@@ -11,8 +11,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from hsp_control.control.changes import Changes
-from hsp_control.control.controller import Controller
+from hsp_control.control.interface import Changes, Controller
 from hsp_control.null_space.fields import NullSpaceField, Rest
 from hsp_control.null_space.fields.field import terms_of
 from hsp_control.null_space.fields.weight import Ramp

@@ -12,8 +12,7 @@ from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import HspControlError
 from hsp_control.companions.play.handles import Handles
 from hsp_control.config import Experiment
-from hsp_control.control.controller import Controller
-from hsp_control.control.targets import RAMP
+from hsp_control.control.interface import RAMP, Controller
 from hsp_control.live import OperatorRequests
 from hsp_control.robot import Robot
 from hsp_control.simulation.journal import JournalReader

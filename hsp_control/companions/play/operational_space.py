@@ -12,9 +12,11 @@ theorem bounds.
 import numpy as np
 
 from hsp_control.common.arrays import Array
-from hsp_control.control.active_stack import ActiveStack
-from hsp_control.control.compensation import CompensatedController
-from hsp_control.control.output import ControlOutput
+from hsp_control.control.interface import (
+    ActiveStack,
+    CompensatedController,
+    ControlOutput,
+)
 from hsp_control.robot import RobotState
 
 

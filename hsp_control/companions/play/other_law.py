@@ -12,8 +12,7 @@ from hsp_control.common.arrays import Array
 from hsp_control.companions.play.handles import Handles
 from hsp_control.companions.play.knobs import FieldSwitch
 from hsp_control.companions.play.operational_space import ComparedController
-from hsp_control.control.controller import Controller
-from hsp_control.control.measurement import NO_WRENCHES
+from hsp_control.control.interface import NO_WRENCHES, Controller
 from hsp_control.simulation.control_chain import ControlChain
 from hsp_control.simulation.loops import Instant, sampled_loop
 from hsp_control.simulation.plants import SampledPlant

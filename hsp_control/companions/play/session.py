@@ -17,9 +17,7 @@ from hsp_control.companions.play.operational_space import ComparedController
 from hsp_control.companions.play.other_law import OtherLaw, Playing, laws_beside
 from hsp_control.companions.viewer.commands import path_element
 from hsp_control.config import Experiment
-from hsp_control.control.changes import Changes
-from hsp_control.control.controller import Controller
-from hsp_control.control.measurement import LogChannel
+from hsp_control.control.interface import Changes, Controller, LogChannel
 from hsp_control.live.hardware import described
 from hsp_control.live.simulated_robot import sampled
 from hsp_control.robot import Robot

@@ -40,7 +40,7 @@ from hsp_control.config import Experiment, Scenario, load_experiment
 from hsp_control.config.document import Document
 from hsp_control.config.loaded_scenario import LoadedScenario, load_scenario
 from hsp_control.config.streams import without_sources
-from hsp_control.control.controller import Controller
+from hsp_control.control.interface import Controller
 from hsp_control.declaration.plain_data import plain_data
 from hsp_control.live import OperatorRequests
 

@@ -10,8 +10,7 @@ from pydantic import TypeAdapter
 from hsp_control.common.arrays import Array
 from hsp_control.companions.plots.log_series import held_period
 from hsp_control.config.logged_run import logged_controller
-from hsp_control.control.changes import Change
-from hsp_control.control.controller import Controller
+from hsp_control.control.interface import Change, Controller
 from hsp_control.law import MetricSample
 from hsp_control.null_space.fields import NullSpaceField
 from hsp_control.null_space.fields.field import terms_of

@@ -378,7 +378,7 @@ def draw_decay(axes: Axes, rollout: Rollout) -> None:
     """
     t, power = rollout.t, decay_power(rollout)
     V = 0.5 * rollout["null_space_norm"] ** 2
-    known = V > 0.0
+    known = (V > 0.0) & (np.diff(t, prepend=-np.inf) > 0.0)  # a time may be repeated
     fall = np.full(len(t), np.nan)
     if known.sum() > 1:
         fall[known] = -V[known] * np.gradient(np.log(V[known]), t[known])

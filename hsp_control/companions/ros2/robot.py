@@ -1,7 +1,7 @@
 """A simulated robot on ROS 2: ``python -m hsp_control.companions.ros2.robot``.
 
 It publishes its states and receives efforts like a robot with ros2_control; see
-docs/companions/ros2.md.
+page.md.
 """
 
 import argparse

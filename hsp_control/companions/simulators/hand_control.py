@@ -11,8 +11,7 @@ from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import NonFiniteError
 from hsp_control.companions.simulators.hand_settings import Source, read_settings
 from hsp_control.companions.simulators.held_goal import HeldPoint, HeldRotation
-from hsp_control.control.compensation import CompensatedController
-from hsp_control.control.controller import Controller
+from hsp_control.control.interface import CompensatedController, Controller
 from hsp_control.robot import Robot
 from hsp_control.tasks import FramePose, FramePosition, Gains, Task
 from hsp_control.tasks.frame_position import axis_indices

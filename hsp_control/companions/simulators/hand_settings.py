@@ -11,7 +11,7 @@ from hsp_control.config.document import Document
 from hsp_control.config.loaded_scenario import located_scene, validate
 from hsp_control.config.scenario import NullSpaceSettings
 from hsp_control.constraints.limits import Limits, LimitsOrNone
-from hsp_control.control.compensation import Compensation
+from hsp_control.control.interface import Compensation
 from hsp_control.declaration import Part
 from hsp_control.geometry.scene import Scene
 from hsp_control.null_space.fields import TargetPosture

@@ -31,8 +31,8 @@ try:
     from robosuite.controllers.parts.arm.osc import OperationalSpaceController
 except ImportError as error:
     raise ControllerError(
-        f"robosuite cannot be imported ({error}); docs/companions/simulators.md shows "
-        "how to install it"
+        f"robosuite cannot be imported ({error}); "
+        "hsp_control/companions/simulators/page.md shows how to install it"
     ) from error
 
 TYPE = "HSP_POSE"

@@ -26,7 +26,7 @@ from hsp_control.config import Experiment
 from hsp_control.config.document import Document
 from hsp_control.config.experiment import build
 from hsp_control.config.own_code import located_imports
-from hsp_control.control.first_state import StartWarning
+from hsp_control.control.interface import StartWarning
 from hsp_control.declaration import Part
 from hsp_control.declaration.imported import import_file, is_file_name
 from hsp_control.robot import Robot

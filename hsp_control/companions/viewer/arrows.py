@@ -23,7 +23,7 @@ from hsp_control.companions.viewer.commands import (
     translucent,
 )
 from hsp_control.companions.viewer.motion import Layer, RunMotion, Track
-from hsp_control.control.controller import Controller
+from hsp_control.control.interface import Controller
 from hsp_control.robot import Robot, RobotState
 
 _RADIUS = 0.007  # radius of an arrow's shaft, over the robot's size

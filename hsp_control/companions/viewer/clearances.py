@@ -28,7 +28,7 @@ from hsp_control.companions.viewer.obstacles import (
     surface_of,
 )
 from hsp_control.constraints.limits import MinimumDistance
-from hsp_control.control.controller import Controller
+from hsp_control.control.interface import Controller
 from hsp_control.geometry.links import LinkShape
 from hsp_control.geometry.scene import Obstacle
 from hsp_control.geometry.shapes import HalfSpace, Shape

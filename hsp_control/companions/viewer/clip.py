@@ -18,7 +18,7 @@ from hsp_control.companions.viewer.commands import (
     typed_array,
 )
 from hsp_control.companions.viewer.motion import Track
-from hsp_control.control.controller import Controller
+from hsp_control.control.interface import Controller
 from hsp_control.null_space.fields import Clearance, NullSpaceField, SelfClearance
 from hsp_control.simulation import Rollout
 from hsp_control.simulation.limit_excess import POSITION, VELOCITY

@@ -22,7 +22,7 @@ from hsp_control.companions.viewer.run_drawing import LAYERS, RunDrawing, all_la
 from hsp_control.companions.viewer.stage import in_sight
 from hsp_control.companions.viewer.targets import paths
 from hsp_control.companions.viewer.threejs import pose_at
-from hsp_control.control.controller import Controller
+from hsp_control.control.interface import Controller
 from hsp_control.robot import Robot
 from hsp_control.simulation import Rollout
 

@@ -19,7 +19,7 @@ from hsp_control.companions.viewer.page_plots import pack_panels
 from hsp_control.companions.viewer.replay import rebuild_run
 from hsp_control.companions.viewer.transport import SceneRecorder
 from hsp_control.companions.viewer.viewer import Viewer
-from hsp_control.control.controller import Controller
+from hsp_control.control.interface import Controller
 from hsp_control.robot import Robot
 from hsp_control.simulation import Rollout
 

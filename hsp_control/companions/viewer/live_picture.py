@@ -25,7 +25,7 @@ from hsp_control.companions.viewer.obstacles import logged_shapes
 from hsp_control.companions.viewer.run_drawing import RunDrawing, all_layers, line_color
 from hsp_control.companions.viewer.self_motion_preview import PreviewDrawing
 from hsp_control.companions.viewer.viewer import Viewer
-from hsp_control.control.controller import Controller
+from hsp_control.control.interface import Controller
 from hsp_control.null_space.fields import FieldSum, NullSpaceField, Rest
 from hsp_control.null_space.fields.field import terms_of
 from hsp_control.null_space.fields.weight import sample_weight

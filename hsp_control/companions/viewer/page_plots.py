@@ -16,7 +16,7 @@ from hsp_control.companions.viewer.commands import (
 )
 from hsp_control.companions.viewer.comparison import ComparedRun
 from hsp_control.companions.viewer.packing import CLOCK_STEP, ArrayTable, keyframe_rows
-from hsp_control.control.controller import Controller
+from hsp_control.control.interface import Controller
 from hsp_control.robot import Robot
 from hsp_control.simulation import Rollout, measures
 from hsp_control.simulation.log_writer import LogWriter, continuous_dofs

@@ -17,7 +17,7 @@ from hsp_control.config.loaded_scenario import load_robot, validate
 from hsp_control.config.logged_run import logged_document
 from hsp_control.config.recorded_scene import with_recorded_scene
 from hsp_control.config.scenario import Scenario
-from hsp_control.control.controller import Controller
+from hsp_control.control.interface import Controller
 from hsp_control.declaration.language import check_kind
 from hsp_control.robot import Robot
 from hsp_control.robot.description.access import ANYWHERE, Access, only_within

@@ -27,7 +27,7 @@ from hsp_control.companions.viewer.obstacles import (
 from hsp_control.companions.viewer.robot_drawing import RobotDrawing, robot_entry
 from hsp_control.companions.viewer.targets import desired_points, paths, target_markers
 from hsp_control.config.scenario import ShownItems
-from hsp_control.control.controller import Controller
+from hsp_control.control.interface import Controller
 from hsp_control.robot import Robot
 
 LAYERS = tuple(name for name in ShownItems().all_fields() if name != "grid")

@@ -25,7 +25,7 @@ from hsp_control.companions.viewer.commands import (
     set_transform,
 )
 from hsp_control.companions.viewer.ghosts import Ghosts
-from hsp_control.control.controller import Controller
+from hsp_control.control.interface import Controller
 from hsp_control.robot import Robot
 
 _STEP = 0.1  # length of a step, as a norm of joint angles [rad]

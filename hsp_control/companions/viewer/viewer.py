@@ -40,7 +40,7 @@ from hsp_control.companions.viewer.stage import (
 )
 from hsp_control.companions.viewer.transport import PageServer, SceneRecorder
 from hsp_control.config.scenario import ViewSettings
-from hsp_control.control.controller import Controller
+from hsp_control.control.interface import Controller
 from hsp_control.declaration.language import check_kind
 from hsp_control.geometry.scene import Scene
 from hsp_control.robot import Robot, RobotState

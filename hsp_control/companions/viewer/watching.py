@@ -17,8 +17,7 @@ from hsp_control.companions.viewer.transport import LOOPBACK, open_browser
 from hsp_control.config import Recorder
 from hsp_control.config.recorder import declaration_of
 from hsp_control.config.scenario import ViewSettings
-from hsp_control.control.changes import Change
-from hsp_control.control.controller import Controller
+from hsp_control.control.interface import Change, Controller
 from hsp_control.declaration.plain_data import plain_data
 from hsp_control.simulation.log_writer import LogWriter
 
@@ -161,7 +160,7 @@ class Follower:
     """Reads the newest state of a controller, and writes the row that a copy computes.
 
     The loop waits at most for the copying of a state, and for the interpreter's lock
-    while a row is written; see ``benchmarks/companions/watching.py``.
+    while a row is written; see ``hsp_control/companions/viewer/benchmark/watching.py``.
     """
 
     _begun: bool

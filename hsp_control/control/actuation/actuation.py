@@ -291,7 +291,13 @@ class Actuation:
             **delivered._asdict(),
         )
         solved = qp.solved_if(redistribute, nearest, self._rows)
-        return [keep, *support.calls(wanted.effort), decide, *solved, deliver]
+        return [
+            keep,
+            *support.calls(wanted.effort, self._law),
+            decide,
+            *solved,
+            deliver,
+        ]
 
     def calls_with_offset(
         self, a: Array, offset: Array, delivered: "DeliveredAlone"

@@ -95,7 +95,7 @@ class Support:
             self.upper[columns][2::3] = on * _MAX_FORCE * self.weight
             self.inverse_cost[columns] = on * full
         for planned, command in self._commanded:
-            command.write(state, planned.weight(state.t), law)
+            command.write(planned.weight(state.t), law)
 
     @cached_property
     def _write_maps(self) -> Callable[[], object]:
@@ -120,17 +120,18 @@ class Support:
             calls.append(call)
         return calls
 
-    def calls(self, wanted: Array) -> PartCalls:
+    def calls(self, wanted: Array, law: BoundLaw) -> PartCalls:
         """Return the calls of contacts that are active at all times.
 
         They do what `update` and `minimum_norm_forces` do.
 
         Args:
             wanted: The effort without contact forces, shape (nv,) [N·m or N].
+            law: The law whose effort it is.
         """
         assert not self._scheduled
         copy = PartCall(engine.Copy, x=wanted, out=self._wanted)
-        commands = [call for _, each in self._commanded for call in each.calls()]
+        commands = [call for _, each in self._commanded for call in each.calls(law)]
         return [*self.maps(), *commands, copy, self._solution()]
 
     def minimum_norm_forces(self, wanted: Array) -> Array:
@@ -210,7 +211,7 @@ class CommandedForces:
             out: f_ref of its points, shape (3 k,) [N], which is written.
         """
         assert contact.force is not None
-        self._contact = contact
+        self._contact, self._state, self._out = contact, state, out
         n = contact.force.dimension
         self._command = TrajectorySample.allocate(n)
         self._followed = contact.force.followed.calls(self._command)
@@ -222,7 +223,7 @@ class CommandedForces:
         only_normal = n == NORMAL and not contact.slides
         # commanded entries of the contact's forces, shape (3 k,)
         self.mask = np.tile([not only_normal, not only_normal, True], k)
-        self._weight, self._out = np.ones(1), out
+        self._weight = np.ones(1)
         self._command_call = PartCall(
             engine.CommandedForce,
             command=self._command.position,
@@ -232,45 +233,50 @@ class CommandedForces:
             normal=0 if n == NORMAL else 2,
             reference=out,
         )
-        self._write = engine.Plan(state.plan(self.calls()).steps())
+        self._write: engine.Plan | None = None
 
-    def calls(self) -> PartCalls:
-        """Return the calls that write f_ref of a contact that is active.
-
-        Not of one that slides, nor of moments: see `write`.
-        """
-        return [*self._followed, self._command_call]
-
-    def write(self, state: RobotState, weight: float, law: BoundLaw) -> None:
-        """Write f_ref."""
-        contact, out = self._contact, self._out
+    def calls(self, law: BoundLaw) -> PartCalls:
+        """Return the calls that write f_ref, after those of the law."""
+        calls: list[AnyCall] = [*self._followed]
         if self._varies:
-            arms = contact.arms_in_axes(state.frame(contact.frame))
-            self._shares[:] = shares(WRENCH, arms)
+            calls.append(self._sharing())
+        calls.append(self._command_call)
+        if isinstance(self._contact, SlidingContact) and self._contact.slides:
+            calls.append(self._friction(self._contact, law))
+        return calls
+
+    def write(self, weight: float, law: BoundLaw) -> None:
+        """Write f_ref of a contact that is active to a degree, in [0, 1]."""
+        if self._write is None:
+            self._write = engine.Plan(self._state.plan(self.calls(law)).steps())
         self._weight[:] = weight
-        self._write(state.t)
-        if isinstance(contact, SlidingContact) and contact.slides:
-            slip = _slip(contact, state, intended_velocity(state, law))
-            speed = float(np.hypot(slip[0], slip[1]))
-            if speed > 0.0:
-                share = np.tanh(speed / contact.smoothing) / speed
-                out[:2] = -contact.friction * share * out[2] * slip[:2]
+        self._write(self._state.t)
 
+    def _sharing(self) -> PartCall:
+        contact = self._contact
+        return PartCall(
+            engine.WrenchShares,
+            frame=self._state.frame(contact.frame),
+            points=np.array(contact.points),
+            shift=np.array(contact.shift),
+            axes=np.array(contact.axes),
+            out=self._shares,
+        )
 
-def _slip(contact: Contact, state: RobotState, v: Array) -> Array:
-    """Return the velocity of the first point in the contact's axes, (3,) [m/s]."""
-    frame = state.frame(contact.frame)
-    twist, arm = frame.jacobian @ v, contact.arms(frame)[0]
-    return np.asarray((twist[:3] + np.cross(twist[3:], arm)) @ contact.axes)
-
-
-def intended_velocity(state: RobotState, law: BoundLaw) -> Array:
-    """Return v + e_N + J# e', shape (nv,): the velocity once both errors are zero."""
-    # Measurement noise cancels in it, and a hand that sticks is pushed where it is to
-    # go.
-    problem = law.problem
-    L, J = problem.metric.L, problem.task.jacobian
-    whitened = np.linalg.solve(L, J.T)
-    motion = np.linalg.pinv(whitened.T, rcond=1e-6) @ problem.task.error_rate
-    raised = np.linalg.solve(L.T, motion)
-    return np.asarray(state.v + law.null_space_error + raised)
+    def _friction(self, contact: SlidingContact, law: BoundLaw) -> PartCall:
+        problem = law.problem
+        return PartCall(
+            engine.SlidingFriction,
+            frame=self._state.frame(contact.frame),
+            point=np.array(contact.points[0]),
+            shift=np.array(contact.shift),
+            axes=np.array(contact.axes),
+            v=self._state.v,
+            null_space_error=law.null_space_error,
+            L=problem.metric.L,
+            jacobian=problem.task.jacobian,
+            error_rate=problem.task.error_rate,
+            friction=contact.friction,
+            smoothing=contact.smoothing,
+            reference=self._out,
+        )

@@ -230,7 +230,8 @@ class FieldSum(NullSpaceField):
             calls += term.calls(state, metric, form, sample)
             weights = np.zeros(2)
             if isinstance(term.weight, SetWeight):
-                weights = term.weight.numbers
+                update_set, weights = term.weight.calls(state.time)
+                calls += update_set
             elif type(term.weight) is Ramp:
                 update = term.weight.call().given(time=state.time, weight=weights)
                 calls.append(update)

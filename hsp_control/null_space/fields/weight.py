@@ -8,10 +8,11 @@ import numpy as np
 from pydantic import InstanceOf
 
 from hsp_control import engine
+from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import FieldError
 from hsp_control.declaration import Part
 from hsp_control.declaration.quantities import NonNegative, Number, Positive
-from hsp_control.engine.plans import PartCall
+from hsp_control.engine.plans import PartCall, PartCalls
 from hsp_control.robot import RobotState
 from hsp_control.robot.differences import rate_along_flow
 
@@ -99,15 +100,29 @@ class StateWeight(Weight):
 
 
 class SetWeight(Weight):
-    """w and w' that are written elsewhere at run time."""
+    """w and w' that are written elsewhere at run time, perhaps times a ramp."""
 
     numbers: InstanceOf[np.ndarray]
     """w [-] and w' [1/s], shape (2,), read in each step."""
+    ramp: Ramp | None = None
+    """A factor of w [-]; by default none."""
+
+    def calls(self, time: Array) -> tuple[PartCalls, Array]:
+        """Return the calls that write w and w' at a time, and where they write them."""
+        if self.ramp is None:
+            return [], self.numbers
+        factor, weight = np.zeros(2), np.zeros(2)
+        follow = self.ramp.call().given(time=time, weight=factor)
+        given = {"first": self.numbers, "second": factor, "weight": weight}
+        return [follow, PartCall(engine.ProductWeight, **given)], weight
 
     def sample(self, state: RobotState) -> tuple[float, float]:
         """Return w and w'; see `Weight.sample`."""
-        value, rate = self.numbers.tolist()
-        return value, rate
+        a, a_dot = self.numbers.tolist()
+        if self.ramp is None:
+            return a, a_dot
+        b, b_dot = self.ramp.sample(state)
+        return a * b, a_dot * b + a * b_dot
 
 
 class Product(Weight):

@@ -19,7 +19,7 @@ from xml.parsers import expat
 
 from hsp_control.common.exceptions import AccessError
 from hsp_control.common.regular_file import check_ends
-from hsp_control.common.resources import bundled
+from hsp_control.common.resources import bundled, config_folders
 
 MAX_SIZE = 20_000_000
 """Maximum size of a URDF or SRDF [bytes]; example-robot-data has up to 0.3 MB."""
@@ -67,7 +67,7 @@ ANYWHERE = Access()
 
 def only_within(folders: Iterable[str | PathLike[str]]) -> Access:
     """Return access to these folders and to the bundled robots and configurations."""
-    allowed = [*map(Path, folders), bundled("robots"), bundled("configs")]
+    allowed = [*map(Path, folders), bundled("robots"), *config_folders()]
     return Access(tuple(folder.expanduser().resolve() for folder in allowed))
 
 

@@ -8,7 +8,10 @@ import pinocchio as pin
 
 from hsp_control.common.suggestions import listing
 
-_GRIPPER = re.compile("finger|thumb|jaw|gripper|knuckle|claw")
+_MOVING_PART = "finger|thumb|jaw|knuckle|claw|pincer"
+_GRIPPER = re.compile(f"{_MOVING_PART}|gripper")
+_PART = re.compile(_MOVING_PART)
+"""Names of links that a gripper's joint moves; a wrist moves what is called gripper."""
 _ARM = re.compile("wrist|roll|pitch|yaw|rotat|flex")
 """Names of joints that move a gripper, unless they also name an arm's joint."""
 _NO_HAND = re.compile(
@@ -35,12 +38,12 @@ def find_hand(model: pin.Model) -> Hand:
     """Return the hand, found from the kinematic tree and from names.
 
     It is a link on the last joint of the longest chain of joints. Joints at the end of
-    a chain that are called a jaw's, finger's or gripper's are no part of the arm. Where
-    the chain branches in its second half into three or more, or into two of similar
-    lengths, these are fingers, and it ends there. One much shorter branch does not end
-    it: it is a part of the arm's mechanism. Of the links on that joint one that is
-    called a TCP, a place to grasp, a tool or an end effector comes first, then the last
-    one, no finger or sensor if possible.
+    a chain that are called a jaw's, finger's or gripper's, or move a link that is, are
+    no part of the arm. Where the chain branches in its second half into three or more,
+    or into two of similar lengths, these are fingers, and it ends there. One much
+    shorter branch does not end it: it is a part of the arm's mechanism. Of the links on
+    that joint one that is called a TCP, a place to grasp, a tool or an end effector
+    comes first, then the last one, no finger or sensor if possible.
     """
     whole: list[list[int]] = [[]]
     for joint in range(1, model.njoints):
@@ -78,13 +81,22 @@ def _is(several: Sequence[str]) -> str:
 def _without_gripper(model: pin.Model, chain: Sequence[int]) -> list[int]:
     """Return a chain without the joints at its end that move a gripper's parts."""
     arm = [*chain]
-    while arm and _grips(model.names[arm[-1]].lower()):
+    while arm and _grips(model, arm[-1]):
         arm.pop()
     return arm or [*chain]
 
 
-def _grips(name: str) -> bool:
-    return bool(_GRIPPER.search(name)) and not _ARM.search(name)
+def _grips(model: pin.Model, joint: int) -> bool:
+    """Return whether a joint, or the link that it moves, has a gripper's name."""
+    name = model.names[joint].lower()
+    if _ARM.search(name):
+        return False
+    links = (
+        frame.name.lower()
+        for frame in model.frames
+        if frame.parentJoint == joint and frame.type == pin.FrameType.BODY
+    )
+    return bool(_GRIPPER.search(name) or _PART.search(next(links, "")))
 
 
 def _carries_fingers(chains: Sequence[Sequence[int]], joint: int) -> bool:

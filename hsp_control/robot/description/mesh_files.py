@@ -30,6 +30,13 @@ Strict reading allows no other formats.
 PICTURES = {".bmp", ".gif", ".jpeg", ".jpg", ".png", ".tga", ".tif", ".tiff", ".webp"}
 """Image files that a texture may name: others must not get into a page or a log."""
 
+_HEADING = 65536
+"""Length in which the heading of a mesh file ends [bytes]."""
+_COUNTS = {
+    ".ply": re.compile(rb"^\s*element[ \t]+\w+[ \t]+(\d+)", re.M),
+    ".off": re.compile(rb"\A\s*\w*OFF\s+(?:#.*\s+)*(\d+)[ \t]+(\d+)"),
+}
+"""The numbers of elements in a heading; each is a byte at least."""
 _PICTURE = re.compile(rb"<init_from[^>]*>([^<]*)<")
 _LIBRARY = re.compile(rb"^[ \t]*mtllib[ \t]+(.+)$", re.M)
 
@@ -45,6 +52,10 @@ def find_problem(file: Path) -> str:
         if file.suffix.lower() == ".dae":
             check_no_document_type(file.read_bytes())
             mesh_units(file)
+        with file.open("rb") as data:
+            declared = _declared(file.suffix.lower(), data.read(_HEADING))
+        if declared > size:  # Assimp reads as many, however short the file is
+            return f"its heading declares {declared} elements, in {size} bytes"
     except ValueError as error:
         return str(error)
     except XmlError as error:
@@ -52,6 +63,14 @@ def find_problem(file: Path) -> str:
     except OSError as error:
         return error.strerror or str(error)
     return ""
+
+
+def _declared(ending: str, heading: bytes) -> int:
+    """Return how many elements a mesh file's heading declares; 0 if it has no count."""
+    if ending not in _COUNTS:
+        return 0
+    counts = _COUNTS[ending].finditer(heading.partition(b"end_header")[0])
+    return sum(int(number[:20]) for found in counts for number in found.groups())
 
 
 def candidates(source: RobotSource, name: str) -> list[Path]:

@@ -10,7 +10,12 @@ from hsp_control.engine.plans import TIME, PartCall, PartCalls
 from hsp_control.trajectories.streams.chart import Chart, State
 from hsp_control.trajectories.streams.piece_calls import MotionBounds, coast
 from hsp_control.trajectories.streams.planner import Policy
-from hsp_control.trajectories.streams.waypoints import CONSIDERED, KEPT, MOST
+from hsp_control.trajectories.streams.waypoints import (
+    CONSIDERED,
+    KEPT,
+    MOST,
+    WINDOW,
+)
 
 
 class StreamAlone:
@@ -20,6 +25,8 @@ class StreamAlone:
         target: The next target to send, initially the start: linear coordinates, then
         perhaps a quaternion (x, y, z, w).
         velocity: The next velocity to send, linear, then angular.
+        rate: The velocity of the next target.
+        time: The time of the next target by the sender's clock, shape (1,) [s].
         call: The call that receives them, of the kind StreamAlone.
     """
 
@@ -37,12 +44,15 @@ class StreamAlone:
         self._state = State.allocate(n)
         value = chart.value(start)
         self.target, self.velocity = value.copy(), np.zeros(n)
-        integers = ("count", "commanded", "silent", "sent", "differs", "alone")
+        self.rate, self.time = np.zeros(n), np.zeros(1)
         most = _most_waypoints(policy, period)
+        seen = ceil(1.1 * WINDOW / period) + 2  # periods are not exactly equal
         self._memory: dict[str, Any] = {
             "piece": coast(0.0, np.inf, start),
             "times": np.zeros(most),
             "values": np.zeros((most, len(value))),
+            "rates": np.zeros((most, n)),
+            "given": np.zeros(most, dtype=bool),
             "velocity": np.zeros(n),
             "now": np.full(1, -np.inf),
             "begun": np.full(1, -np.inf),
@@ -50,7 +60,14 @@ class StreamAlone:
             "fades_at": np.full(1, np.inf),
             "sent_target": self.target,
             "sent_velocity": self.velocity,
-            **{name: np.zeros(1, dtype=np.int64) for name in integers},
+            "next_rate": self.rate,
+            "sent_rate": np.zeros(n),
+            "next_time": self.time,
+            "sent_time": np.zeros(1),
+            **{name: np.full(1, -np.inf) for name in _TIMES},
+            "seen_at": np.zeros(seen),
+            "seen_behind": np.zeros(seen),
+            **{name: np.zeros(1, dtype=np.int64) for name in _INTEGERS},
         }
         self._first = {name: array.copy() for name, array in self._memory.items()}
         self._arguments: dict[str, Any] = {
@@ -78,6 +95,12 @@ class StreamAlone:
         return [advance, *self._chart.calls(self._state, out)]
 
 
+_TIMES = "made", "superseded", "newest"
+_INTEGERS = (
+    *("count", "commanded", "silent", "sent", "differs", "alone", "targeted"),
+    *("next_moves", "sent_moves", "next_timed", "sent_timed"),
+    *("seen_first", "seen_count"),
+)
 _POLICIES = "latest", "interpolate", "extrapolate"
 
 

@@ -9,7 +9,8 @@ import numpy as np
 from hsp_control.common.arrays import Array
 from hsp_control.trajectories.streams.message import Message
 
-_WINDOW = 2.0  # the sender's clock is compared with the controller's over this time [s]
+WINDOW = 2.0
+"""Time over which the sender's clock is compared with the controller's [s]."""
 _NEW_CLOCK = 1.0  # jump back of a sender's time that indicates a restart [s]
 KEPT = 1.0
 """Time for which passed waypoints are kept, to estimate velocities [s]."""
@@ -40,7 +41,7 @@ class SenderClock:
             self._seen.clear()
             self._newest = t
         self._newest = max(self._newest, t)
-        while self._seen and self._seen[0][0] < now - _WINDOW:
+        while self._seen and self._seen[0][0] < now - WINDOW:
             self._seen.popleft()
         while self._seen and self._seen[-1][1] >= now - t:
             self._seen.pop()  # never the smallest again

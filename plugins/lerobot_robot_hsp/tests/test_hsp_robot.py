@@ -11,10 +11,11 @@ import av
 import numpy as np
 import pyarrow.parquet as parquet
 import pytest
-from conftest import Running, free_port
 from hsp_datagrams import LoopError
 from lerobot.robots import make_robot_from_config
 from lerobot_robot_hsp import HspCamera, HspCameraConfig, HspRobot, HspRobotConfig
+
+from conftest import Running, free_port
 
 POSE = ["ee.x", "ee.y", "ee.z", "ee.wx", "ee.wy", "ee.wz"]
 

@@ -55,6 +55,22 @@ def test_run_tells_a_program_what_it_did(
     assert told["tracking.tip.max"] == pytest.approx(error.max(), rel=1e-12)
 
 
+def test_an_exit_of_a_users_code_is_a_failure(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    own = tmp_path / "leaves.py"
+    own.write_text(
+        "import sys, hsp_control as hsp\n"
+        "class Leaves(hsp.Cost, type='leaves'):\n"
+        "    def value(self, state):\n"
+        "        return sys.exit(0) if state.t > 0.05 else 0.0 * state.q[0]\n"
+    )
+    fields = "null_space.fields=[{type: leaves}]"
+    arguments = ["--import", str(own), "--out", str(tmp_path), "--set", fields]
+    assert main(["run", MOVING, *arguments, *SHORT]) == 2
+    assert "SystemExit(0)" in capsys.readouterr().err
+
+
 def test_check_tells_a_program_what_a_configuration_is(
     capsys: pytest.CaptureFixture[str],
 ) -> None:

@@ -1,57 +1,21 @@
 """What steps call is bound when a change is made, and not in a step."""
 
 import pickle
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import Literal
 
 import numpy as np
 import pytest
+from each_change import BACK, CHANGES, PERIOD, ROBOT, controller, step
 
 import hsp_control as hsp
 from hsp_control import engine
-from hsp_control.common.arrays import Array
-from hsp_control.control.changes import Changes
 from hsp_control.engine import plans
 from hsp_control.robot import RobotState
 from hsp_control.trajectories import Schedule, trajectory
 
-H, AT, RAMP = 1e-3, 0.02, 0.005
-ROBOT = hsp.Robot.load("panda")
-REST = np.zeros(7)
-BALL = hsp.Obstacle("ball", hsp.shapes.Sphere(0.05), hsp.Hold([0.6, 0.3, 0.4]))
-
-CHANGES: dict[str, Callable[[Changes], object]] = {
-    "gains": lambda at: at.gains("hand", hsp.Gains(natural_frequency=20.0)),
-    "K_N": lambda at: at.null_space_gain(5.0),
-    "weight": lambda at: at.weight("posture", 0.5),
-    "field": lambda at: at.field(hsp.TargetPosture(REST, name="other")),
-    "exchange": lambda at: at.exchange("posture", hsp.TargetPosture(REST)),
-    "add": lambda at: at.add(hsp.FrameOrientation(priority=2, name="turned")),
-    "remove": lambda at: at.remove("hand"),
-    "replace": lambda at: at.remove("hand").add(hsp.FramePosition(name="new")),
-    "reference": lambda at: at.reference("hand", hsp.Circle(0.05, 1.0)),
-    "limits": lambda at: at.limits(hsp.Limits(effort={"scale": 0.5})),
-    "no limits": lambda at: at.limits(None),
-    "obstacle": lambda at: at.obstacle("ball", hsp.Hold([0.5, 0.3, 0.4])),
-    "payload": lambda at: at.payload("panda_hand", 1.0),
-    "tool": lambda at: at.tool("panda_tcp", [0.0, 0.0, 0.1], [0.0, 0.5, 0.0]),
-    "gravity": lambda at: at.gravity([0.0, 1.0, -9.7]),
-}
-
-
-def controller(*tasks: hsp.Task) -> hsp.Controller:
-    """Return one of a hand, a posture, and a ball that the arm keeps away from."""
-    hand = hsp.FramePosition(name="hand")
-    fields = hsp.TargetPosture("home", name="posture") + hsp.ObstacleClearance(["ball"])
-    return hsp.Controller(ROBOT, tasks or [hand], fields, scene=[BALL])
-
-
-def step(made: hsp.Controller, k: int) -> Array:
-    """Make the k-th step."""
-    tau = made.compute(k * H, ROBOT.home(), REST).tau
-    made.applied(tau, H)
-    return tau
+H, AT, RAMP = PERIOD, 0.02, 0.005
 
 
 @contextmanager
@@ -135,19 +99,9 @@ def test_what_is_over_is_forgotten(kind: str) -> None:
         step(made, 0)
         for k in range(1, 1500):
             if k % 40 == 1 and k < 40 * number:
-                begin = made.at(k * H).ramp(0.02)
-                CHANGES[kind](begin)
-                if kind == "remove":
-                    begin.add(hsp.FramePosition(name="hand"))
-                elif kind == "add":
-                    made.at((k + 30) * H).ramp(0.005).remove("turned")
-                elif kind == "replace":
-                    made.at((k + 30) * H).ramp(0.005).remove("new").add(
-                        hsp.FramePosition(name="hand")
-                    )
-                elif kind == "exchange":
-                    begin.exchange("target_posture", hsp.TargetPosture(REST))
-                    begin.field(hsp.TargetPosture(REST, name="posture"))
+                CHANGES[kind](made.at(k * H).ramp(0.02))
+                if kind in BACK:
+                    BACK[kind](made.at((k + 30) * H).ramp(0.005))
             step(made, k)
         for k in range(3000, 3003):
             step(made, k)

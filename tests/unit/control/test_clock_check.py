@@ -39,6 +39,7 @@ STEPS = H * np.arange(40)
         (STEPS, 2.0, "... advances by 0.002 s ... 2 s"),
         (-STEPS, H, "... runs back: t = -0.01 s ... -0.002 s"),
         (np.zeros(200), H, "... stands still at t = 0 s"),
+        (np.append(STEPS, STEPS), H, "... runs back: t = 0 s ... -0.078 s"),
     ],
 )
 def test_a_clock_of_something_else_is_said_once(

@@ -2,9 +2,10 @@
 
 import copy
 import pickle
+import re
 import sys
 from pathlib import Path
-from types import ModuleType
+from types import ModuleType, SimpleNamespace
 
 import numpy as np
 import pytest
@@ -61,9 +62,23 @@ def test_a_file_is_compiled_once_and_used(
         own_kinds.load(source)
 
 
-REFUSING = """
+OTHERS = """
 #include <hsp/kind.hpp>
 #include <stdexcept>
+
+struct Doubled {  // of another file
+  static constexpr const char* doc = "y = 3 x.";
+  hsp::In<'n'> x;
+  hsp::Out<'n'> y;
+  void operator()() { y = 3.0 * x; }
+};
+
+struct Copy {  // as one of the engine's is called
+  static constexpr const char* doc = "y = 3 x.";
+  hsp::In<'n'> x;
+  hsp::Out<'n'> y;
+  void operator()() { y = 3.0 * x; }
+};
 
 struct Memory {  // is refused, and counts how many of it there are
   static inline int alive = 0;
@@ -85,19 +100,26 @@ struct Alive {
   double operator()() { return Memory::alive; }
 };
 
-extern "C" auto hsp_kinds_1() { return hsp::kinds<Large, Alive>(); }
+extern "C" auto hsp_kinds_1() { return hsp::kinds<Doubled, Copy, Large, Alive>(); }
 """
 
 
+@pytest.fixture
+def others(source: Path) -> SimpleNamespace:
+    """Kinds of another file: compiled once for all tests."""
+    source.write_text(OTHERS)
+    return own_kinds.load(source)
+
+
 @pytest.mark.slow
-def test_a_call_that_cannot_be_prepared_leaves_nothing_behind(source: Path) -> None:
-    source.write_text(REFUSING)
-    kinds = own_kinds.load(source)
-    alive = kinds.Alive(x=np.zeros(1))
+def test_a_call_that_cannot_be_prepared_leaves_nothing_behind(
+    others: SimpleNamespace,
+) -> None:
+    alive = others.Alive(x=np.zeros(1))
     before = alive()  # the one of which its members were read has gone
     for _ in range(3):
         with pytest.raises(ValueError, match="too much memory"):
-            kinds.Large(x=np.zeros(1))
+            others.Large(x=np.zeros(1))
     assert alive() == before == 0.0
 
 
@@ -112,18 +134,21 @@ def test_a_library_beside_its_file_needs_no_compiler(
 
 @pytest.mark.slow
 def test_what_does_not_compile_says_what_the_compiler_says(source: Path) -> None:
-    source.write_text(SOURCE.replace("2.0 * x;", "2.0 * z;"))
-    with pytest.raises(
-        EngineError, match=r"does not compile:[\s\S]*z.* was not declared|undeclared"
-    ):
+    """What is wrong in the code, and that a kind needs a description."""
+    wrong = SOURCE.replace("2.0 * x;", "2.0 * z;").replace("doc =", "words =")
+    source.write_text(wrong)
+    with pytest.raises(EngineError, match="does not compile:") as raised:
         own_kinds.load(source)
+    said = str(raised.value)
+    assert re.search("z.* was not declared|undeclared", said)
+    assert "a kind needs a description: static" in said
 
 
 @pytest.mark.slow
 def test_files_with_one_name_for_a_kind_do_not_get_each_others(source: Path) -> None:
     """Also a file that was edited in the meantime."""
     first = own_kinds.load(source).Doubled
-    source.write_text(SOURCE.replace("2.0 * x", "3.0 * x"))
+    source.write_text(OTHERS)
     second = own_kinds.load(source).Doubled
     x, y = np.ones(1), np.zeros((2, 1))
     first(x=x, y=y[0])()
@@ -132,10 +157,9 @@ def test_files_with_one_name_for_a_kind_do_not_get_each_others(source: Path) -> 
 
 
 @pytest.mark.slow
-def test_copies_and_pickles_of_calls_have_the_own_kind(source: Path) -> None:
+def test_copies_and_pickles_of_calls_have_the_own_kind(others: SimpleNamespace) -> None:
     """Not the engine's, where that has one of the same name."""
-    source.write_text(SOURCE.replace("Doubled", "Copy"))
-    call = own_kinds.load(source).Copy(x=np.ones(1), y=np.zeros(1))
+    call = others.Copy(x=np.ones(1), y=np.zeros(1))
     for same in (
         copy.copy(call),
         copy.deepcopy(call),
@@ -143,37 +167,30 @@ def test_copies_and_pickles_of_calls_have_the_own_kind(source: Path) -> None:
     ):
         assert same.kind is call.kind
         same()
-        np.testing.assert_array_equal(same.values["y"], [2.0])
+        np.testing.assert_array_equal(same.values["y"], [3.0])
     assert pickle.loads(pickle.dumps(engine.Copy)) is engine.Copy
     library = own_kinds.library_of(call.kind)
-    with pytest.raises(EngineError, match="has no kind Doubled"):
-        own_kinds.of_library(library, "Doubled")
+    with pytest.raises(EngineError, match="has no kind Halved"):
+        own_kinds.of_library(library, "Halved")
     with pytest.raises(ValueError, match="Copy is no kind that `load` returned"):
         own_kinds.library_of(engine.Copy)
 
 
-@pytest.mark.slow
-def test_a_library_that_returns_nothing_is_named(source: Path) -> None:
-    source.write_text(
-        SOURCE.replace(
-            "auto hsp_kinds_1", "const hsp::Kind* const* hsp_kinds_1"
-        ).replace("hsp::kinds<Doubled>()", "nullptr")
-    )
-    with pytest.raises(EngineError, match="its function hsp_kinds_1 returns nothing"):
-        own_kinds.load(source)
-
-
-@pytest.mark.slow
-def test_a_kind_says_what_it_does(source: Path) -> None:
-    source.write_text(SOURCE.replace("doc =", "words ="))
-    with pytest.raises(EngineError, match="a kind needs a description: static"):
-        own_kinds.load(source)
-
-
-@pytest.mark.slow
-def test_a_library_without_kinds_is_named(source: Path) -> None:
-    source.write_text(SOURCE.replace("hsp_kinds_1", "hsp_kinds_0"))
-    with pytest.raises(EngineError, match="declares no kinds: it has no function"):
+@pytest.mark.parametrize(
+    ("code", "message"),
+    [
+        (
+            'extern "C" const void* const* hsp_kinds_1() { return nullptr; }',
+            "its function hsp_kinds_1 returns nothing",
+        ),
+        ("int hsp_kinds_0;", "declares no kinds: it has no function"),
+    ],
+)
+def test_a_library_without_kinds_is_named(
+    source: Path, code: str, message: str
+) -> None:
+    source.write_text(code)
+    with pytest.raises(EngineError, match=message):
         own_kinds.load(source)
 
 

@@ -38,13 +38,14 @@ int pthread_mutex_lock(pthread_mutex_t* mutex) {
 }
 int pthread_mutex_unlock(pthread_mutex_t* mutex) { return (void)mutex, 0; }
 
-/* Send an input what it was last, and a bit more or less. */
+/* Set or ramp an input from what it was last to a bit more or less. */
 static void send(hsp_controller* controller, const char* name, long k) {
   double values[16];
   const hsp_port* port = hsp_port_of(controller, name);
   if (!port || port->size > 16 || hsp_get(controller, name, values, port->size)) return;
   values[k % (port->size < 3 ? port->size : 3)] += k % 2 ? 0.3 : -0.3;
-  hsp_set(controller, name, values, port->size);
+  if (k % 4 < 2) hsp_set(controller, name, values, port->size);
+  else hsp_ramp(controller, name, values, port->size, 0.005); /* refused of a target */
 }
 
 int main(int argc, char** argv) {

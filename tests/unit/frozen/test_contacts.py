@@ -172,6 +172,60 @@ def test_a_commanded_force_along_a_plane(ramp: float, tmp_path: Path) -> None:
         assert opened.set(f"{foot}.force", wrong) == WRONG_VALUE
 
 
+def in_step(declared: hsp.Controller, folder: Path, new: dict[int, Any]) -> Opened:
+    """Change a commanded force of both by overlapping ramps; compare the bits."""
+    opened = Opened(hsp.freeze(declared, folder / "frozen.hsp"))
+    controller, robot = declared.preview(), declared.robot
+    name = next(each.name for each in declared.contacts if each.force is not None)
+    q, moving = declared.setup.start.state.q, slice(6 if robot.unactuated else 0, None)
+    for k in range(60):
+        v = np.zeros(robot.nv)
+        v[moving] = 0.02 * np.sin(0.3 * k + np.arange(robot.nv)[moving])
+        output = controller.compute(k * H, q, v)
+        controller.applied(output.tau, H)
+        assert opened.step(k * H, q, v) == output.status
+        np.testing.assert_array_equal(opened.tau, output.tau)
+        if k in new:
+            force = CommandedForce(value=new[k])
+            controller.at(k * H).ramp(0.015).force(name, force)
+            assert opened.ramp(f"{name}.force", new[k], 0.015) == OK
+    return opened
+
+
+def test_a_commanded_moment(tmp_path: Path) -> None:
+    """Of a sole, whose corners share it and each push."""
+    own = hsp.load_experiment("whole_body/talos_circle").controller
+    foot = own.contacts[0]
+    wrench = CommandedForce(value=[0.0, 0.0, 400.0, 0.0, 0.0, 0.0])
+    contacts = replace(foot, force=wrench), *own.contacts[1:]
+    start = own.setup.start.state.q
+    declared = hsp.Controller(own.robot, own.tasks, contacts=contacts, start=start)
+    x, y = 0.5 * foot.length, 0.5 * foot.width  # type: ignore[attr-defined]
+    tilted = [10.0, -5.0, 300.0, 2.0, -4.0, 1.0]
+    new = {4: [5.0, 3.0, 450.0, 2.0, -4.0, 1.0], 12: tilted, 40: [0.0] * 6}
+    opened = in_step(declared, tmp_path, new)
+    port = opened.ports[f"{foot.name}.force"]
+    assert (port.size, port.unit.decode()) == (6, "N, N·m")
+    for edge in ([0, 0, 100, 100 * y, 0, 0], [0, 0, 100, 0, -100 * x, 0]):
+        # where the foot would tilt
+        for share, status in ((0.98, OK), (1.02, WRONG_VALUE)):
+            moment = np.array(edge) * [1, 1, 1, share, share, 1]
+            assert opened.set(f"{foot.name}.force", moment) == status
+    assert "push" in opened.error
+
+
+def test_the_force_of_a_sliding_contact(tmp_path: Path) -> None:
+    """It slides with friction against the velocity that the tasks intend."""
+    own = hsp.load_experiment("forces/panda_wipe").controller
+    start = own.setup.start.state.q
+    wiper = replace(own.contacts[0], force=CommandedForce(value=5.0))
+    given: dict[str, Any] = {"contacts": (wiper,), "start": start}
+    declared = hsp.Controller(own.robot, own.tasks, own.field, **given)
+    opened = in_step(declared, tmp_path, {4: 20.0, 12: 7.0, 40: 15.0})
+    assert opened.set("wiper.force", -1.0) == WRONG_VALUE
+    assert opened.set("wiper.force", 0.0) == OK
+
+
 def test_what_nothing_carries_is_not_stopped(tmp_path: Path) -> None:
     controller = solo(contacts=(), base="driven")
     opened = Opened(hsp.freeze(controller, tmp_path / "frozen.hsp"))
@@ -205,12 +259,8 @@ def test_contacts_that_leave_the_base_free_are_refused(
         hsp.freeze(solo(**changes), tmp_path / "frozen.hsp")
 
 
-def test_a_contact_that_comes_or_is_pressed_is_refused(tmp_path: Path) -> None:
+def test_a_contact_that_comes_and_goes_is_refused(tmp_path: Path) -> None:
     own = hsp.load_experiment("walking/solo12_trot").controller
     controller = solo(contacts=own.contacts)
     with pytest.raises(FreezeError, match=r"^contacts\.front_left\.schedule: "):
         hsp.freeze(controller, tmp_path / "frozen.hsp")
-    wiper = hsp.load_experiment("forces/panda_wipe").controller
-    pressing = hsp.Controller(wiper.robot, wiper.tasks, contacts=wiper.contacts)
-    with pytest.raises(FreezeError, match=r"^contacts\.wiper\.force: "):
-        hsp.freeze(pressing, tmp_path / "frozen.hsp")

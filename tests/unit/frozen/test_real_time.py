@@ -2,14 +2,17 @@
 
 import subprocess
 import sys
+from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
-from typing import Literal, get_args
+from typing import Any, Literal, get_args
 
 import numpy as np
 import pytest
 from frozen_runs import compiled, random_states, simulated_states
 
 import hsp_control as hsp
+from hsp_control.constraints.contacts import CommandedForce
 from hsp_control.trajectories import StreamPose
 
 SEED = 61
@@ -37,7 +40,8 @@ def test_targets_are_planned_for_without_any(policy: Policy, tmp_path: Path) -> 
     hand = hsp.FramePose("panda_tcp", stream, name="hand")
     start = experiment.q0
     controller = hsp.Controller(experiment.robot, [hand], start=start)
-    check_quiet(experiment, controller, tmp_path, "hand.target", "hand.velocity")
+    inputs = "target_time", "target_velocity", "target", "velocity"
+    check_quiet(experiment, controller, tmp_path, *(f"hand.{x}" for x in inputs))
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="glibc's names, Linux' seccomp")
@@ -51,11 +55,36 @@ def test_a_spring_follows_without_any(tmp_path: Path) -> None:
     check_quiet(experiment, controller, tmp_path, *inputs)
 
 
+@pytest.mark.skipif(sys.platform != "linux", reason="glibc's names, Linux' seccomp")
+def test_tasks_come_and_go_without_any(tmp_path: Path) -> None:
+    experiment = hsp.load_experiment("panda_obstacle")
+    hand = hsp.FramePosition("panda_tcp", name="hand")
+    turn = hsp.FrameOrientation("panda_tcp", name="turn", priority=2)
+    start = experiment.q0
+    controller = hsp.Controller(experiment.robot, [hand, turn], start=start)
+    inputs = "hand.presence", "turn.presence", "gravity"
+    check_quiet(experiment, controller, tmp_path, *inputs, come_and_go=["hand", "turn"])
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="glibc's names, Linux' seccomp")
+def test_a_sliding_contact_presses_without_any(tmp_path: Path) -> None:
+    experiment = hsp.load_experiment("forces/panda_wipe")
+    own = experiment.controller
+    wiper = replace(own.contacts[0], force=CommandedForce(value=5.0))
+    given: dict[str, Any] = {"contacts": (wiper,), "start": experiment.q0}
+    controller = hsp.Controller(own.robot, own.tasks, own.field, **given)
+    check_quiet(experiment, controller, tmp_path, "wiper.force")
+
+
 def check_quiet(
-    experiment: hsp.Experiment, controller: hsp.Controller, tmp_path: Path, *sent: str
+    experiment: hsp.Experiment,
+    controller: hsp.Controller,
+    tmp_path: Path,
+    *sent: str,
+    come_and_go: Sequence[str] = (),
 ) -> None:
     program = compiled(Path(__file__).with_name("quiet.c"), tmp_path)
-    frozen = hsp.freeze(controller, tmp_path / "frozen.hsp")
+    frozen = hsp.freeze(controller, tmp_path / "frozen.hsp", presences=come_and_go)
     # where no limit is violated, and where some are, and contradict each other
     calm = simulated_states(experiment, 0.1)
     given = experiment.robot, experiment.q0, 100, SEED

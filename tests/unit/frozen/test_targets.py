@@ -57,8 +57,8 @@ class Pair:
         self.stream = self.controller.stream("hand")
         self.k = 0
 
-    def target(self, value: np.ndarray) -> None:
-        self.stream.send(value)
+    def target(self, value: np.ndarray, **given: Any) -> None:
+        self.stream.send(value, **given)
         assert self.opened.set("hand.target", value) == OK
 
     def velocity(self, value: np.ndarray) -> None:
@@ -101,6 +101,66 @@ def test_targets_and_velocities_whenever_they_come(kind: str, tmp_path: Path) ->
                 else:
                     pair.velocity(rng.normal(0.0, far, rates))
             pair.steps(int(rng.integers(1, 40)))
+
+
+class Sender:
+    """A program that sends by a clock of its own, which restarts at times."""
+
+    def __init__(self, rng: np.random.Generator) -> None:
+        self.rng, self.offset = rng, 1e3
+
+    def time(self, t: float) -> float:
+        """Return the time of a message that comes now, some of which are late."""
+        if self.rng.random() < 0.03:
+            self.offset -= 5.0
+        return t + self.offset - self.rng.exponential(0.01)
+
+
+@pytest.mark.smoke
+@pytest.mark.parametrize("kind", KINDS)
+def test_targets_with_velocities_and_times(kind: str, tmp_path: Path) -> None:
+    """Late ones, ones of a clock that restarts, and beside velocities in one period."""
+    rng, pair = np.random.default_rng(SEED), Pair(kind, tmp_path)
+    sender, rates = Sender(rng), pair.opened.ports["hand.velocity"].size
+
+    def target(far: float) -> None:
+        value, given = random_target(kind, rng, far), dict[str, Any]()
+        if rng.random() < 0.5:
+            given["velocity"] = rng.normal(0.0, 0.3 * far, rates)
+            assert pair.opened.set("hand.target_velocity", given["velocity"]) == OK
+        if rng.random() < 0.7:
+            given["t"] = sender.time(pair.k * H)
+            assert pair.opened.set("hand.target_time", given["t"]) == OK
+        pair.target(value, **given)
+
+    for far in (0.002, 0.05, 0.5):
+        for _ in range(40):
+            orders = ["", "t", "t", "t", "v", "tv", "vt", "vtv"]
+            for each in orders[rng.integers(len(orders))]:
+                if each == "t":
+                    target(far)
+                else:
+                    pair.velocity(rng.normal(0.0, far, rates))
+            pair.steps(int(rng.integers(1, 25)))
+    assert kind in ("position", "orientation") or pair.stream.counts()["late"] > 0
+
+
+def test_a_moving_target_is_passed_with_its_velocity(tmp_path: Path) -> None:
+    """By the times of the sender, although the messages come late."""
+    pair = Pair("extrapolate", tmp_path)
+    rng, speed = np.random.default_rng(SEED), 0.1
+    for k in range(0, 300, 10):
+        pair.steps(int(rng.integers(1, 5)))
+        moved = pin.SE3(
+            START.rotation, START.translation + np.array([1e-3 * k * speed, 0, 0])
+        )
+        rate, t = np.array([speed, 0.0, 0.0, 0.0, 0.0, 0.0]), 50.0 + 1e-3 * k
+        assert pair.opened.set("hand.target_time", t) == OK
+        assert pair.opened.set("hand.target_velocity", rate) == OK
+        pair.target(pin.SE3ToXYZQUAT(moved), velocity=rate, t=t)
+        pair.steps(k + 10 - pair.k)
+    errors = pair.steps(20)[:, 0]
+    np.testing.assert_allclose(np.diff(errors), speed * H, rtol=1e-6)
 
 
 def test_a_velocity_that_is_repeated_fades_when_it_is_not(tmp_path: Path) -> None:
@@ -178,6 +238,11 @@ def test_a_new_run_begins_anew(tmp_path: Path) -> None:
         ("hand.target", [0.5, 0.0, 0.5], 0.0, WRONG_SIZE),
         ("hand.velocity", [np.inf, 0.0, 0.0, 0.0, 0.0, 0.0], 0.0, WRONG_VALUE),
         ("hand.velocity", np.zeros(7), 0.0, WRONG_SIZE),
+        ("hand.target_velocity", [np.nan, 0.0, 0.0, 0.0, 0.0, 0.0], 0.0, WRONG_VALUE),
+        ("hand.target_velocity", np.zeros(6), 0.1, WRONG_VALUE),
+        ("hand.target_time", [np.inf], 0.0, WRONG_VALUE),
+        ("hand.target_time", [2e12], 0.0, WRONG_VALUE),
+        ("hand.target_time", [1.0, 2.0], 0.0, WRONG_SIZE),
         ("elbow.target", np.zeros(7), 0.0, WRONG_NAME),
     ],
 )

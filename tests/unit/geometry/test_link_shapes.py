@@ -17,6 +17,7 @@ from hsp_control.common.exceptions import ModelError, SceneError
 from hsp_control.geometry import link_shapes
 from hsp_control.geometry.shapes import Box, Mesh, Sphere
 from hsp_control.null_space.fields import ObstacleClearance, SelfClearance
+from hsp_control.robot.description.mesh_files import find_problem
 from hsp_control.trajectories import Hold
 
 
@@ -81,13 +82,39 @@ def test_a_mesh_of_the_robots_own_that_cannot_be_read(tmp_path: Path) -> None:
         link_shapes(robot)
     (tmp_path / "octa.stl").write_bytes(b"not a mesh at all")
     robot = odd_robot(tmp_path, collision(f'<mesh filename="{tmp_path}/octa.stl"/>'))
-    with pytest.raises(ModelError, match=r"odd\.urdf: a collision mesh: "):
+    with pytest.raises(
+        ModelError,
+        match=r"odd\.urdf: a collision mesh: .*octa\.stl: File is too small$",
+    ):
         link_shapes(robot)
     write_stl(tmp_path / "octa.stl", OCTAHEDRON, FACES)
     (capsule,) = link_shapes(robot)
     own = pin.SE3(turned(0.3, -0.2, 1.0), np.array([0.1, 0.02, -0.03]))
     points = np.array([own.act(p) for p in OCTAHEDRON])
     assert abs(outside(points, *ends(capsule))) < 1e-6  # its numbers are single
+
+
+@pytest.mark.parametrize(
+    ("ending", "heading"),
+    [
+        (
+            "ply",
+            "ply\nformat ascii 1.0\nelement vertex {}\nelement face 1\nend_header\n",
+        ),
+        ("off", "OFF\n# a comment\n{} 1 0\n"),
+    ],
+)
+def test_a_mesh_that_declares_more_than_it_has(
+    ending: str, heading: str, tmp_path: Path
+) -> None:
+    """Assimp reads so many elements, for hours and without an end."""
+    file = tmp_path / f"endless.{ending}"
+    file.write_text(heading.format(3))
+    assert not find_problem(file)
+    file.write_text(heading.format(99999999999))
+    robot = odd_robot(tmp_path, collision(f'<mesh filename="{file.name}"/>'))
+    with pytest.raises(ModelError, match=rf"{file.name}: .*\b100000000000\b"):
+        link_shapes(robot)
 
 
 FLAT = {

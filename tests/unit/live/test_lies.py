@@ -8,7 +8,7 @@ from zlib import crc32
 import numpy as np
 import pinocchio as pin
 import pytest
-from lies import LIES, THE_SIGN, Lie, Sensors
+from lies import LIES, THE_SIGN, Lie, Sensors, is_seen_at_rest
 from live_rigs import PERIOD, Rig, start, watched
 from loaded_robots import panda
 from places import THOROUGH, further
@@ -103,13 +103,24 @@ def honest_speeds(begin: int) -> Array:
     return np.array(robot.speeds)
 
 
-@pytest.mark.parametrize("begin", [AT_REST, IN_MOTION])
-@pytest.mark.parametrize("kind", LIES)
+ALIKE = {
+    *("velocity: -3", "velocity: +2", "velocity: a third more", "velocity: rpm"),
+    *("velocity: the next joint's", "velocity: every third", "position: -0.015"),
+}
+"""Lies beside which there is another one of the same kind and about the same size."""
+USUAL = {kind: lie for kind, lie in LIES.items() if THOROUGH or kind not in ALIKE}
+
+
+@pytest.mark.parametrize(
+    ("kind", "begin"),
+    [(kind, IN_MOTION) for kind in USUAL]
+    + [(kind, AT_REST) for kind, lie in USUAL.items() if is_seen_at_rest(lie)],
+)
 def test_no_lie_accelerates_a_joint(kind: str, begin: int) -> None:
     """About one joint, another one for each kind of lie, and about all.
 
-    Of the four ways in which each kind of lie can begin two, unless thorough: at rest
-    and in motion, the one about a joint and the other about all.
+    Unless thorough it is about a joint at rest and about all in motion, or the other
+    way round.
     """
     one = crc32(kind.encode()) % 7
     both = [one], ALL
@@ -156,7 +167,7 @@ def test_a_dead_sensor_leaves_it_to_the_robot() -> None:
 
 
 @pytest.mark.parametrize("kind", ["stands", "frozen"])
-@pytest.mark.parametrize("joint", [0, 2, 3])
+@pytest.mark.parametrize("joint", [0, 3, *further(2)])
 def test_a_sensor_that_is_dead_from_the_start_is_found(kind: str, joint: int) -> None:
     """Friction could hold the joint; but the others feel it move (12 rad/s before)."""
     robot = Liar(LIES[f"both: {kind}"], [joint], 2)
@@ -202,7 +213,7 @@ def test_a_lie_of_both_from_the_start_is_no_motion() -> None:
 
 
 @pytest.mark.parametrize("begin", [2, IN_MOTION])
-@pytest.mark.parametrize("joints", [[1], [3], [5], [4, 6], [0, 1, 5], ALL])
+@pytest.mark.parametrize("joints", [[1], [5], [4, 6], ALL, *further([3], [0, 1, 5])])
 def test_a_joint_with_the_wrong_sign_is_left_to_the_robot(
     joints: list[int], begin: int
 ) -> None:
@@ -281,8 +292,14 @@ class Noisy(Rig):
         return found._replace(q=q, v=self.delayed[0])
 
 
-@pytest.mark.parametrize("noise", [0.0, 0.05])
-@pytest.mark.parametrize(("delay", "frequency"), [(0.0, np.inf), (0.005, 20.0)])
+@pytest.mark.parametrize(
+    ("noise", "delay", "frequency"),
+    [
+        (0.0, 0.005, 20.0),
+        (0.05, 0.0, np.inf),
+        *further((0.0, 0.0, np.inf), (0.05, 0.005, 20.0)),
+    ],
+)
 @pytest.mark.parametrize("encoder", [1.5e-3, *further(0.0)])
 def test_what_real_sensors_do_is_no_lie(
     noise: float, delay: float, frequency: float, encoder: float
@@ -522,7 +539,7 @@ def test_a_joint_goes_the_other_way_than_it_is_driven() -> None:
 
 
 @pytest.mark.parametrize("frequency", [3.0, 10.0, 30.0])
-@pytest.mark.parametrize("damping", [0.4, 0.7, 1.0])
+@pytest.mark.parametrize("damping", [0.4, 1.0])
 def test_a_push_that_the_law_resists_is_no_wrong_sign(
     frequency: float, damping: float
 ) -> None:
@@ -641,15 +658,24 @@ def first(sensors: Sensors) -> Measurement:
     return sensors.first
 
 
-@pytest.mark.parametrize("joints", [[0], [1], [3], ALL])
-@pytest.mark.parametrize("kind", AGREEING)
+@pytest.mark.parametrize(
+    ("kind", "joints"),
+    [
+        *(("-1", [1]), ("-1", ALL), ("+1", [0]), ("+1", [3])),
+        *(("a tenth", [0]), ("a tenth", ALL)),
+        *(("-0.1 times", [3]), ("-0.1 times", ALL)),
+        *further(("-1", [0]), ("-1", [3]), ("+1", [1]), ("+1", ALL)),
+        *further(("a tenth", [3]), ("-0.1 times", [0])),
+    ],
+)
 def test_a_momentum_that_nothing_changes_is_measured_wrong(
     kind: str, joints: list[int]
 ) -> None:
-    """Efforts and contacts have not so much; before, only the stop found some."""
+    """Efforts and contacts have not so much; before, only the stop found some.
+
+    The shoulder is too slow for factors: 0.25 rad/s.
+    """
     usual = honest_speeds(IN_MOTION)[IN_MOTION - 1 : IN_MOTION + WATCHED].max(axis=0)
-    if kind in {"a tenth", "-0.1 times"} and joints == [1]:
-        joints = [3]  # the shoulder is slow then: 0.25 rad/s
     robot, report = run(IN_MOTION, AGREEING[kind], joints)
     assert report.ended == "fault"
     assert "it has hit something hard, or its sensors are wrong" in report.reason

@@ -98,7 +98,7 @@ def test_mass_matrix_rate_is_the_derivative_along_the_flow(case: str) -> None:
     robot, q, v, _ = draw(case, seed=6)
     state = robot.state(0.0, q, v)
     expected = slope(lambda s: state.ahead(s).mass_matrix, step_of(v))
-    # Rounding: 2e-16 of M over 0.01/Σ|v| s; for mimic joints both are differences.
+    # Rounding: 2e-16 of M over 0.01/Σ|v| s.
     atol = 1e-12 * np.abs(state.mass_matrix).max() * np.abs(v).sum()
     np.testing.assert_allclose(state.mass_matrix_rate, expected, rtol=0, atol=atol)
     assert np.abs(expected).max() > 1e3 * atol  # there is something to see
@@ -140,8 +140,7 @@ def test_mimic_fingers_carry_both_fingers_inertia() -> None:
         (frame.drift, same.drift),
     ]
     for actual, expected in pairs:
-        # 1e-11: the mass matrix' rate is by differences where joints mimic others.
-        np.testing.assert_allclose(actual, expected, rtol=0, atol=1e-11)
+        np.testing.assert_allclose(actual, expected, rtol=0, atol=1e-12)
 
 
 # --- a second engine -----------------------------------------------------------------

@@ -182,6 +182,19 @@ def test_a_damaged_row_is_said(
     assert set(read.t) < set(rollout.t)
 
 
+def test_a_damaged_end_is_said_and_an_unfinished_row_is_not(
+    run: tuple[Rollout, bytes], tmp_path: Path
+) -> None:
+    rollout, data = run
+    path = tmp_path / "a.journal"
+    for spoilt, damaged in ((data[:-1] + b"?", True), (data[:-1], False)):
+        path.write_bytes(spoilt)
+        read = Rollout.load(path)
+        assert read.status == "interrupted"
+        assert len(read) == len(rollout)
+        assert read.meta.get("damaged", 0) == damaged
+
+
 def test_a_heading_that_is_lost_takes_its_rows_and_no_others(tmp_path: Path) -> None:
     path = tmp_path / "a.journal"
     writer = JournalWriter(path)

@@ -1,4 +1,4 @@
-// The player's bar: buttons, the time line with its bands, and the keys of docs/companions/view.md.
+// The player's bar: buttons, the time line with its bands, and the keys of hsp_control/companions/viewer/page.md.
 // Each kind of event, such as an active limit, has a row of bands. A band under the pointer, or
 // with the focus, is named with its times; a click goes to its start. While the player's time is
 // inside a band, its caption stands above the bar.

@@ -1,0 +1,123 @@
+"""Changes of each kind while a controller runs: what is over leaves nothing.
+
+After twenty changes of a kind and after a hundred thousand, a controller has the same
+representation, the same calls in a step, a pickle of the same size, and the process the
+same number of Python's objects; and a copy makes the same step.
+"""
+
+import gc
+import pickle
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+import psutil
+from each_change import BACK, CHANGES, controller, step
+from rich.progress import Progress
+
+import hsp_control as hsp
+from campaigns.results import keep
+
+NUMBER, FEW = 100_000, 20
+RAMP = 2e-3
+EVERY = 3  # steps from one change to the next; each meets the ramp of the one before
+OVER = 2000  # steps after which all changes are forgotten
+PICKLE = 60  # digits of times and counts [bytes]
+OBJECTS = 200
+PROCESS = 8_000_000  # as in `soak` [bytes]
+
+
+@dataclass(frozen=True)
+class Kept:
+    """What there is once all changes are over."""
+
+    text: str
+    calls: int  # length of the step's plan in text
+    pickle: int  # [bytes]
+    objects: int
+    process: int  # resident set [bytes]
+    same: bool  # a pickle and a copy make the same step, to the last bit
+
+    def grew_from(self, few: "Kept") -> str:
+        """Return what has grown; empty: nothing has."""
+        grown = {
+            "repr": self.text != few.text,
+            "step": self.calls != few.calls,
+            "pickle": abs(self.pickle - few.pickle) > PICKLE,
+            "objects": self.objects - few.objects > OBJECTS,
+            "process": self.process - few.process > PROCESS,
+            "copy": not self.same,
+        }
+        return ", ".join(name for name, bad in grown.items() if bad)
+
+
+class Repeated:
+    """A controller that makes changes of one kind, again and again."""
+
+    def __init__(self, kind: str) -> None:
+        self.kind, self.k = kind, 0
+        pose = [hsp.FramePose(name="hand")] if kind == "twist" else []
+        self.made = controller(*pose)
+        self._step()
+
+    def _step(self) -> None:
+        step(self.made, self.k)
+        self.k += 1
+
+    def change(self, j: int) -> None:
+        """Make the j-th change, and some steps."""
+        made = self.made
+        if self.kind == "target":
+            made.set_target("hand", [0.5, 0.01 * (j % 7), 0.5])
+        elif self.kind == "twist":
+            made.set_velocity("hand", [0.0, 0.0, 0.01 * (j % 7), 0.1, 0.0, 0.0], "tool")
+        else:
+            back = BACK.get(self.kind)
+            make = back if back and j % 2 else CHANGES[self.kind]
+            make(made.at(self.k * 1e-3).ramp(RAMP))
+        for _ in range(EVERY):
+            self._step()
+
+    def kept(self) -> Kept:
+        """Return what there is when all is over."""
+        for _ in range(3):
+            self.k += OVER
+            self._step()
+        made = self.made
+        gc.collect()
+        objects, process = len(gc.get_objects()), psutil.Process().memory_info().rss
+        saved = pickle.dumps(made)
+        again, home = pickle.loads(saved), made.robot.home()
+        at = self.k * 1e-3, home, np.zeros(made.robot.nv)
+        same = again.compute(*at).tau.tobytes() == made.compute(*at).tau.tobytes()
+        return Kept(
+            repr(made), len(str(made.step_plan)), len(saved), objects, process, same
+        )
+
+
+KINDS = (*CHANGES, "target", "twist")
+
+
+def run(kind: str, number: int) -> Iterator[tuple[int, str]]:
+    """Make changes of a kind; yield how many there were, and at last what has grown."""
+    repeated = Repeated(kind)
+    for j in range(FEW):
+        repeated.change(j)
+    few = repeated.kept()
+    for j in range(FEW, 2 * (number // 2)):
+        repeated.change(j)
+        if j % 100 == 0:
+            yield j, ""
+    yield number, repeated.kept().grew_from(few)
+
+
+def campaign(progress: Progress, seed: int, share: float) -> bool:
+    """Make all changes of each kind."""
+    number, found = max(2 * FEW, round(share * NUMBER)), dict[str, str]()
+    for kind in KINDS:
+        bar = progress.add_task(f"changes {kind}", total=number)
+        for done, grew in run(kind, number):
+            progress.update(bar, completed=done)
+            found[kind] = grew
+        keep("changes", {"number": number, "wanted": NUMBER, "grew": found})
+    return not any(found.values())
