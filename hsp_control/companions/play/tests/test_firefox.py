@@ -5,7 +5,7 @@ from pathlib import Path
 
 import firefox
 import pytest
-from places import IF_THOROUGH
+from places import further
 from played import Played
 
 READY = "typeof play !== 'undefined' && play.ready && play.state.t > 0"
@@ -28,13 +28,15 @@ HAND = """(() => {
 SIZES = (1280, 800, 1.0), (1000, 640, 2.0), (390, 844, 2.0)
 
 
-@IF_THOROUGH
 @pytest.mark.slow
 @pytest.mark.process
 @pytest.mark.browser
 @pytest.mark.skipif(not firefox.is_installed(), reason="needs firefox-esr and Xvfb")
-def test_firefox_draws_a_play_in_windows_of_three_sizes(tmp_path: Path) -> None:
-    played = Played("planar3r", "--out", str(tmp_path), "--port", "7091")
+@pytest.mark.parametrize("robot", further("planar3r"))
+def test_firefox_draws_a_play_in_windows_of_three_sizes(
+    robot: str, tmp_path: Path
+) -> None:
+    played = Played(robot, "--out", str(tmp_path), "--port", "7091")
     profile = tmp_path / "profile"
     profile.mkdir()
 
