@@ -58,7 +58,7 @@ def _import_again(name: str, document: Document) -> None:
     """Import the code that a log lists, if it is unchanged since the run."""
     then = (document.recorded_code or {}).get(name)
     if document.access.strict:
-        why = "--strict does not run code"
+        why = "no code is run with --strict, and none to draw a figure"
     elif then is None or fingerprints([name]).get(name) != then:
         why = f"it is missing or was edited since the run; --import {name} imports it"
     else:

@@ -41,14 +41,14 @@ class Views {
   }
 
   // See these points, too, in Pinocchio's axes, and keep seeing them; not while the tool is followed.
-  // What is farther away than twice the scene's size stays outside.
+  // What is farther away than three times the scene's size stays outside.
   widen(points) {
     const {command, name} = this, known = command.points.map((point) => vector(point));
     if (!untouched() || name === "tool") return;
     const center = vector(command.target), apart = 0.03 * command.size;
     const added = points.map((point) => point.toArray()).filter((point) => {
       const place = vector(point);
-      return place.distanceTo(center) < 2 * command.size
+      return place.distanceTo(center) < 3 * command.size
         && known.every((other) => other.distanceTo(place) > apart);
     });
     if (!added.length) return;
