@@ -22,9 +22,7 @@ struct ProductWeight {
   In<2> first, second;  // a and a' [1/s], b and b'
   Out<2> weight;
 
-  void operator()() {
-    weight << first[0] * second[0], first[1] * second[0] + first[0] * second[1];
-  }
+  void operator()() { weight << first[0] * second[0], first[1] * second[0] + first[0] * second[1]; }
 };
 
 }  // namespace hsp
