@@ -112,7 +112,7 @@ def plants() -> dict[str, tuple[Plant | None, bool]]:
         "the model, pushed": (RigidBodyPlant(PANDA, pushes), False),
         "other bodies": (RigidBodyPlant(HEAVY), True),
         "a sensor": (ImperfectPlant(exact, [VelocityNoise(0.01)]), True),
-        "somebody's own": (Own(PANDA), True),
+        "somebody's own": (Own(PANDA, pushes), True),
     }
 
 
