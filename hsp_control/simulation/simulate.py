@@ -55,6 +55,8 @@ LOG_PERIOD = 0.01
 """Time between two rows by default [s]."""
 MAX_ROWS = 10_000_000
 """Most rows of a log; see also `log_columns.MAX_SIZE`."""
+_LONG = 0.5
+"""Control period from which on it is taken for milliseconds [s]."""
 MAX_STEPS = 1e9
 """Most control periods, or integrator steps, of a run: at 50 µs each, 14 hours."""
 
@@ -311,6 +313,12 @@ def _whole(total: float, part: float, total_name: str, part_name: str) -> int:
     if abs(ratio - round(ratio)) > 1e-6 * max(1.0, ratio) or round(ratio) < 1:
         if (total, total_name) == (LOG_PERIOD, "log_period"):  # nobody has written it
             with within(part_name):
+                if part >= _LONG:
+                    raise SimulationError(
+                        f"{part:g} s between two efforts; if these are milliseconds, "
+                        f"write {1e-3 * part:g}, else give log_period, too, for "
+                        f"example {part:g}"
+                    )
                 raise SimulationError(
                     f"a row is logged every {total:g} s by default, which is not a "
                     f"whole multiple of {part:g} s; give log_period, too, for "

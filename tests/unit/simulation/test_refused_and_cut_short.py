@@ -32,6 +32,8 @@ TIMES: list[tuple[dict[str, float], str]] = [
     ({"duration": 0.005}, "duration = 0.005 s ... log_period = 0.01 s"),
     ({"duration": 0.1, "control_period": 0.003},
      "control_period: ... 0.003 s ... log_period ... 0.009"),
+    ({"duration": 2.0, "control_period": 1},
+     "control_period: 1 s ... milliseconds, write 0.001 ... log_period ... 1"),
     ({"duration": 1e300, "log_period": 1e-300},
      "duration = 1e+300 s ... inf ... log_period = 1e-300 s"),
     ({"duration": 0.1, "control_period": -0.001}, "control_period is -0.001 s"),
