@@ -10,9 +10,8 @@ namespace hsp {
 // The decisions are those of `Mixture` in Python.
 struct ChooseSets {
   static constexpr const char* doc =
-      "Which sets of tasks a step resolves, and their shares: (1 - w₁), (w₁ - w₂), ... with w₁ ≥ "
-      "w₂ "
-      "≥ ... the presences between 0 and 1. Bit k of a set's index is whether task k is in it.";
+      "Which sets of tasks a step resolves, and their shares: (1 - w₁), (w₁ - w₂), ... with the "
+      "presences w₁ ≥ w₂ ≥ ... between 0 and 1. Bit k of a set's index: whether task k is in it.";
   In<'k'> presences;
   OutInts<'s'> on;
   Out<'s'> shares;

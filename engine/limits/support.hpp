@@ -123,8 +123,7 @@ struct CommandedForce {
 struct WrenchShares {
   static constexpr const char* doc =
       "The map from a force and a moment about the points' middle, in the axes of a contact, to "
-      "the "
-      "forces of least norm at the points that have this sum.";
+      "the forces of least norm at the points that have this sum.";
   FrameMotion<In> frame;
   In<'k', 3> points;  // in the frame's axes
   In<3> shift;        // of all of them, in world axes
