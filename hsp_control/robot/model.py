@@ -211,7 +211,7 @@ class RobotModel(Structure):
         ``dynamics``: those with a payload, for example.
 
         Raises:
-            ModelError: If M is singular.
+            ModelError: If M is singular, which only mimic joints can make it.
         """
         acceleration = np.empty(self.nv)
         given = {"q": _packed(q), "v": _packed(v), "effort": _packed(tau)}
@@ -219,7 +219,8 @@ class RobotModel(Structure):
             dynamics=dynamics or self._own, **given, acceleration=acceleration
         )
         call()
-        if all(np.isfinite(each).all() for each in given.values()):  # else NaN is right
+        # Of NaN it is NaN.
+        if self.mimics and all(np.isfinite(each).all() for each in given.values()):
             self._check_acceleration(acceleration)
         return acceleration
 

@@ -40,6 +40,7 @@ from places import ROOT
 from typing_commands import READY
 
 from hsp_control import load_experiment
+from hsp_control.common.resources import bundled_configs
 from hsp_control.declaration import Part, imported
 
 OUTPUT = {"text", "math", "bibtex"}
@@ -203,8 +204,7 @@ def _base(reason: str) -> dict[str, Any]:
     given = yaml.safe_load(reason)
     if isinstance(given, dict):
         return given
-    text = (ROOT / "configs" / f"{given}.yaml").read_text(encoding="utf-8")
-    return dict(yaml.safe_load(text))
+    return dict(yaml.safe_load(bundled_configs()[given].read_text(encoding="utf-8")))
 
 
 def _laid_over(base: dict[str, Any], over: dict[str, Any]) -> dict[str, Any]:
