@@ -108,7 +108,7 @@ bool Dynamics::forward_dynamics(const ConstVector& q, const ConstVector& v, cons
   }
   pin::cholesky::decompose(own.model, own.data);  // U D Uᵀ, as sparse as the tree
   pin::cholesky::solve(own.model, own.data, a);
-  return own.data.D.minCoeff() > 0.0;
+  return (own.data.D.array() > 0.0).all();  // of none, too
 }
 
 // With shares s_k of masses m_k at p_k, and m the whole mass, c = (Σ m_i c_i + Σ s_k m_k p_k)/m has
