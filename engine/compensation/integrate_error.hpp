@@ -1,6 +1,7 @@
 // Integral action of a task.
 #pragma once
 #include <hsp/kind.hpp>
+#include <hsp/linalg.hpp>
 
 namespace hsp {
 
@@ -22,7 +23,7 @@ struct IntegrateError {
     for (Index i = 0; i < e.size(); ++i)
       if (!(saturated && e[i] * integral[i] >= 0.0)) integral[i] += e[i] * period[0];
     offset.noalias() = Ki * integral;
-    const double largest = offset.size() ? offset.cwiseAbs().maxCoeff() : 0.0;
+    const double largest = greatest(offset.cwiseAbs());
     if (!(largest > limit)) return;
     integral *= limit / largest;
     offset *= limit / largest;

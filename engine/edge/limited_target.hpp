@@ -88,7 +88,7 @@ struct LimitedTarget {
     const auto above = (a + change - bounds.upper).array();
     const auto below = (bounds.lower - a - change).array();
     const auto motions = above.max(below) / permitted.acceleration.array();
-    double most = std::max({0.0, efforts.maxCoeff() - 1.0, motions.maxCoeff()});
+    double most = std::max({0.0, greatest(efforts) - 1.0, greatest(motions)});
     const double least = permitted.acceleration.minCoeff();
     for (Index r = 0; r < barred.lower.size(); ++r) {
       const auto row = barred.A.row(r).head(change.size());
@@ -100,8 +100,8 @@ struct LimitedTarget {
 
   // Demand relative to what the limits permit far from them; at least 1.
   double times_permitted() const {
-    const double efforts = (effort_demand.array().abs() / permitted.effort.array()).maxCoeff();
-    const double motions = (demand.array().abs() / permitted.acceleration.array()).maxCoeff();
+    const double efforts = greatest(effort_demand.array().abs() / permitted.effort.array());
+    const double motions = greatest(demand.array().abs() / permitted.acceleration.array());
     return std::max({1.0, efforts, motions});
   }
 };

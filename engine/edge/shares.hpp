@@ -39,7 +39,7 @@ double near_share(const J& jacobian, double edge, double least, B& rows, X& fact
 
 // The share of large errors, from 0 to 1; `stretched` is |e|/ℓ of each row.
 template <class S> double far_share(const S& stretched, double far) {
-  const double most = stretched.size() ? std::max(stretched.maxCoeff(), 0.0) : 0.0;
+  const double most = greatest(stretched);
   return smooth_share((most - far) / (1.0 - far));
 }
 

@@ -55,7 +55,7 @@ struct Evolve {
   template <class Values> bool permits(const Values& wanted) {
     if (!wanted.allFinite() || (wanted.array() < least).any() || (wanted.array() > most).any())
       return false;
-    const double rounding = 1e-9 * (1.0 + wanted.cwiseAbs().maxCoeff());
+    const double rounding = 1e-9 * (1.0 + greatest(wanted.cwiseAbs()));
     for (Index k = 0; k < cone.rows(); ++k)
       if (cone.row(k).dot(wanted) < -rounding) return false;
     if (definite == 0) return true;

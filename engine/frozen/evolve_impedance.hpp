@@ -57,21 +57,21 @@ struct EvolveImpedance {
     // Every direction that is stiff is damped: it would oscillate for ever.
     B = damping;
     orthogonalise_rows(B, V);  // V D = diag(λ) V
-    const double most = B.rowwise().norm().maxCoeff(), stiff = stiffness.cwiseAbs().maxCoeff();
+    const double most = greatest(B.rowwise().norm()), stiff = greatest(stiffness.cwiseAbs());
     for (Index k = 0; k < B.rows(); ++k) {
       if (B.row(k).norm() > rounding * most) continue;
       Z.col(0) = stiffness.lazyProduct(V.row(k).transpose());
-      if (Z.col(0).cwiseAbs().maxCoeff() > rounding * stiff) return false;
+      if (greatest(Z.col(0).cwiseAbs()) > rounding * stiff) return false;
     }
     return true;
   }
 
   // Symmetric, and with no eigenvalue below zero, but for rounding.
   template <class Given> bool is_semidefinite(const Given& given) {
-    const double size = given.cwiseAbs().maxCoeff();
+    const double size = greatest(given.cwiseAbs());
     if (size == 0.0) return true;
     if (!(size <= planned.most &&
-          (given - given.transpose()).cwiseAbs().maxCoeff() <= rounding * size))
+          greatest((given - given.transpose()).cwiseAbs()) <= rounding * size))
       return false;
     K = given;
     K.diagonal().array() += rounding * size;
@@ -91,7 +91,7 @@ struct EvolveImpedance {
     factor_stiffness(G, B, V);
     Z = C.transpose().lazyProduct(B);
     orthogonalise_rows(Z, V);
-    return Z.rowwise().squaredNorm().maxCoeff();
+    return greatest(Z.rowwise().squaredNorm());
   }
 };
 

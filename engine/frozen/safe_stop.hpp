@@ -2,6 +2,7 @@
 #pragma once
 #include <hsp/indices.hpp>
 #include <hsp/kind.hpp>
+#include <hsp/linalg.hpp>
 
 namespace hsp {
 
@@ -28,7 +29,7 @@ struct Brake {
 
   void check() const { check_indices("base", base, v.size()); }
   void operator()() {
-    const bool rests = v.cwiseAbs().maxCoeff() <= rest_speed;
+    const bool rests = greatest(v.cwiseAbs()) <= rest_speed;
     const bool begins = !holding[0] && (rests || damped_for[0] >= longest_damping);
     if (begins) {
       holding[0] = true;

@@ -42,6 +42,7 @@ struct MixParts {
   Ints<'k'> kept;
   Out<'m'> mean;
 
+  void check() const { check_at_least("parts", parts.rows(), 1); }
   bool operator()() {
     if ((kept.array() == 0).any()) return false;
     for (Index i = 0; i < mean.size(); ++i) {

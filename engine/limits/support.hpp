@@ -92,7 +92,7 @@ struct MinimumNormForces {
   void least_squares() {
     constexpr double negligible = 1e-10;  // relative to the largest eigenvalue: no support
     orthogonalise_rows(G, U);
-    const double largest = std::sqrt(G.rowwise().squaredNorm().maxCoeff());
+    const double largest = std::sqrt(greatest(G.rowwise().squaredNorm()));
     multipliers.setZero();
     for (Index r = 0; r < G.rows(); ++r) {
       const double eigenvalue = G.row(r).norm();
@@ -133,7 +133,10 @@ struct WrenchShares {
   Scratch<6, 'f'> total;
   Scratch<6, 6> turned;
 
-  void check() const { check_at_least("the rows of out", out.rows(), 3 * points.rows()); }
+  void check() const {
+    check_at_least("points", points.rows(), 1);
+    check_at_least("the rows of out", out.rows(), 3 * points.rows());
+  }
   void operator()() {
     constexpr double negligible = 1e-9;  // relative to the largest singular value
     for (Index k = 0; k < points.rows(); ++k)
@@ -146,7 +149,7 @@ struct WrenchShares {
       total.block<3, 3>(3, 3 * k) = skew(arm);
     }
     orthogonalise_rows(total, turned);
-    const double largest = std::sqrt(total.rowwise().squaredNorm().maxCoeff());
+    const double largest = std::sqrt(greatest(total.rowwise().squaredNorm()));
     out.setZero();
     for (Index r = 0; r < 6; ++r) {
       const double square = total.row(r).squaredNorm();
@@ -179,7 +182,7 @@ struct SlidingFriction {
     rows = jacobian;
     solve_rows(L, rows);
     orthogonalise_rows(rows, turned);
-    const double largest = std::sqrt(rows.rowwise().squaredNorm().maxCoeff());
+    const double largest = std::sqrt(greatest(rows.rowwise().squaredNorm()));
     intended.setZero();
     for (Index r = 0; r < rows.rows(); ++r) {
       const double square = rows.row(r).squaredNorm();

@@ -1,6 +1,7 @@
 #include "planner.hpp"
 
 #include <array>
+#include <hsp/linalg.hpp>
 #include <limits>
 #include <numbers>
 
@@ -176,7 +177,7 @@ bool Planner::keeps_box(const Matrix& ends, double duration) {
     auto points = points_.topRows(bezier[k].rows());
     points.noalias() = bezier[k].lazyProduct(ends);
     for (Index i = 0; i < size_; ++i)
-      if (points.col(i).cwiseAbs().maxCoeff() > (*bounds[k])[i] * scale) return false;
+      if (greatest(points.col(i).cwiseAbs()) > (*bounds[k])[i] * scale) return false;
   }
   return true;
 }
@@ -227,7 +228,7 @@ bool Planner::to_target(double t, const OwnState& state, const double* value, do
   if (time > t && smooth(t, state, goal_, piece)) return true;
   apart_ = (state.x - goal_.x).cwiseAbs().cwiseMax(state.rate.cwiseAbs());
   const bool there =
-      apart_.maxCoeff() < same_state && state.acceleration.cwiseAbs().maxCoeff() < same_state;
+      greatest(apart_) < same_state && greatest(state.acceleration.cwiseAbs()) < same_state;
   return there ? to_rest(t, state, delay, piece) : fastest(t, state, goal_, piece);
 }
 
@@ -255,8 +256,8 @@ Planned Planner::follow(double t, const OwnState& state, const Vector& velocity,
   if (turns() && !tool) there_.segment<3>(n_) = state.base.transpose() * wanted_.segment<3>(n_);
   apart_ = there_ - seen_.rate;
   const Planned in_axes = tool && n_ ? Planned::IN_TOOL_AXES : Planned::PIECE;
-  if (apart_.cwiseAbs().maxCoeff() < same_state &&
-      seen_.acceleration.cwiseAbs().maxCoeff() < same_state) {
+  if (greatest(apart_.cwiseAbs()) < same_state &&
+      greatest(seen_.acceleration.cwiseAbs()) < same_state) {
     const bool rests = !(wanted_.array() != 0.0).any();
     piece.begin(PieceForm::COAST, t, infinite, state.base);
     auto body = piece.body();
@@ -301,18 +302,14 @@ Planned Planner::follow(double t, const OwnState& state, const Vector& velocity,
 // A velocity in its own direction, but not beyond the bounds.
 void Planner::bound_velocity(const Vector& velocity, Vector& out) const {
   out = velocity;
-  if (n_) {
-    const double most =
-        (out.head(n_).cwiseAbs().array() / bounds_.speed.head(n_).array()).maxCoeff();
-    out.head(n_) /= std::max(1.0, most);
-  }
+  const auto ratios = out.head(n_).cwiseAbs().array() / bounds_.speed.head(n_).array();
+  out.head(n_) /= std::max(1.0, greatest(ratios));
   if (turns()) out.segment<3>(n_) /= std::max(1.0, out.segment<3>(n_).norm() / ball(bounds_.speed));
 }
 
 // The largest ratio of a change to a bound; of a rotation vector that of their lengths.
 double Planner::share(const Vector& change, const Vector& bound) const {
-  double most = 0.0;
-  if (n_) most = (change.head(n_).cwiseAbs().array() / bound.head(n_).array()).maxCoeff();
+  double most = greatest(change.head(n_).cwiseAbs().array() / bound.head(n_).array());
   if (turns()) most = std::max(most, change.segment<3>(n_).norm() / ball(bound));
   return most;
 }
@@ -362,7 +359,7 @@ bool Planner::steady(const Vector& wanted, bool tool, double T) {
     acceleration_.segment<3>(n_) = -(inverse * (jexp3_dot(y, turning) * turning));
     before_ = x_;
     x_ = moved_ + 0.5 * T * rate_ - T * T / 12.0 * acceleration_;
-    if ((x_ - before_).cwiseAbs().maxCoeff() < 1e-15) return true;
+    if (greatest((x_ - before_).cwiseAbs()) < 1e-15) return true;
   }
   return false;
 }

@@ -90,7 +90,7 @@ struct FollowImpedance {
     }
     s = S.lazyProduct(e);
     double length = 0.0;  // sᵀK⁺s, with K = C Cᵀ, the columns of C orthogonal
-    const double most = bounded.C.colwise().squaredNorm().maxCoeff();
+    const double most = greatest(bounded.C.colwise().squaredNorm());
     for (Index k = 0; k < s.size(); ++k) {
       const double stiffness = bounded.C.col(k).squaredNorm();
       if (stiffness <= rounding * most) continue;
@@ -113,7 +113,7 @@ struct FollowImpedance {
     orthogonalise_rows(Z, V);          // the norms of its rows are frequencies
     s = C.transpose().lazyProduct(e_dot);
     along = V.lazyProduct(s);
-    const double most = Z.rowwise().squaredNorm().maxCoeff();
+    const double most = greatest(Z.rowwise().squaredNorm());
     for (Index k = 0; k < along.size(); ++k) {
       const double square = Z.row(k).squaredNorm();
       if (square > rounding * most)

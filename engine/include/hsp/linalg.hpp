@@ -10,6 +10,9 @@
 
 namespace hsp {
 
+// The greatest of numbers that are not negative; of none 0, where Eigen would read memory.
+template <class Numbers> double greatest(const Numbers& x) { return x.size() ? x.maxCoeff() : 0.0; }
+
 // x ← L⁻¹ x and x ← L⁻ᵀ x for a lower triangular L.
 template <class L, class X> void solve_lower(const L& factor, X&& x) {
   factor.template triangularView<Eigen::Lower>().solveInPlace(x);
@@ -152,7 +155,7 @@ double smallest_singular_value(const X& factor, S& square, SymmetricSpectrum& sp
   if ((factor.diagonal().array() == 0.0).any()) return 0.0;  // a row became zero
   square.noalias() = factor.lazyProduct(factor.transpose());
   spectrum.compute(square, Eigen::EigenvaluesOnly);
-  return 1.0 / std::sqrt(spectrum.eigenvalues().maxCoeff());
+  return 1.0 / std::sqrt(greatest(spectrum.eigenvalues()));
 }
 
 // Overwrite Y (m, n) with U Y, whose rows are orthogonal; U (m, m) is orthogonal, and is not
