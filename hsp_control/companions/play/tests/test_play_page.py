@@ -62,15 +62,15 @@ PIXEL = """(point) => {
   const {x, y} = play.sight.update().project(new MeshCat.THREE.Vector3(...point));
   return [x, y];
 }"""
-# A point of a handle that no other one covers: [x, y]; handles reach 100 pixels out.
+# A pixel at which a press takes a handle, of no other target's: [x, y]; handles reach 100 pixels out.
 HANDLE = """([name, kind, axis]) => {
   const gizmo = [...play.gizmos.values()].find(({target}) => target.name === name);
   const middle = play.sight.update().project(gizmo.position);
   for (let y = middle.y - 100; y < middle.y + 100; y += 2) {
     for (let x = middle.x - 100; x < middle.x + 100; x += 2) {
-      const found = gizmo.find(play.sight, x, y, "mouse");
-      const {handle, gap} = found ?? {};
-      if (handle?.kind === kind && handle.axis === axis && gap < 1.5) return [x, y];
+      const {gizmo: taken, handle, gap} = play.hand.find(x, y, "mouse") ?? {};
+      if (taken === gizmo && handle.kind === kind && handle.axis === axis && gap < 1.5)
+        return [x, y];
     }
   }
   return null;
