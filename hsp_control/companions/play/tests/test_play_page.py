@@ -62,7 +62,7 @@ PIXEL = """(point) => {
   const {x, y} = play.sight.update().project(new MeshCat.THREE.Vector3(...point));
   return [x, y];
 }"""
-# A pixel at which a press takes a handle, of no other target's: [x, y]; handles reach 100 pixels out.
+# A pixel at which a press takes a handle and no other; handles reach 100 pixels out.
 HANDLE = """([name, kind, axis]) => {
   const gizmo = [...play.gizmos.values()].find(({target}) => target.name === name);
   const middle = play.sight.update().project(gizmo.position);

@@ -312,8 +312,13 @@ class Deadly(hsp.Cost, type="deadly"):
 @pytest.mark.process
 @pytest.mark.slow
 def test_a_run_that_kills_three_workers_is_a_row_and_tried_again_another_time(
-    tmp_path: Path, scheduler: str, monkeypatch: pytest.MonkeyPatch
+    tmp_path: Path,
+    scheduler: str,
+    monkeypatch: pytest.MonkeyPatch,
+    request: pytest.FixtureRequest,
 ) -> None:
+    members = hsp.NullSpaceField.family.members
+    request.addfinalizer(lambda: members.pop("deadly", None))
     script, out = tmp_path / "deadly.py", tmp_path / "crash.parquet"
     script.write_text(DEADLY)
     more = [*QUICK, "null_space.fields=[{type: deadly, strength: 1}]"]
