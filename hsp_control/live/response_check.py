@@ -26,7 +26,8 @@ class ResponseCheck:
     friction, its rotor and its contacts are unknown. A person may push it for a while.
     But if velocity and positions agree and a joint repeatedly moves against its effort,
     its sensor or its motor has the wrong sign. Feedback then accelerates it without
-    bound.
+    bound. That must be so in what varies, too: with a wrong mass an arm sinks while its
+    effort, which grows, is against it, and a constant acceleration explains that.
 
     Attributes:
         contrary: These joints, shape (nv,).
@@ -41,8 +42,9 @@ class ResponseCheck:
     def restart(self) -> None:
         """Forget all motion."""
         nv = self._judged.size
-        # the changes that are expected and measured, and squares: sum, each of them
-        self._changes, self._squares = np.zeros((2, nv)), np.zeros((3, nv))
+        # of a constant 1, of the expected and of the measured acceleration: the changes
+        # of velocity, and means of their products
+        self._changes, self._products = np.zeros((3, nv)), np.zeros((3, 3, nv))
         self._v: Array | None = None
         self._held = np.zeros(nv)
         self.contrary: Flags = self._none
@@ -59,14 +61,29 @@ class ResponseCheck:
         if self._v is None:
             self._v = v
         self._changes *= exp(-passed / _WASHOUT)
-        self._changes[0] += passed * expected
-        self._changes[1] += v - self._v
+        self._changes += np.stack(
+            [np.full(v.size, passed), passed * expected, v - self._v]
+        )
         self._v = v
-        of_efforts, measured = self._changes
-        now = np.stack([of_efforts + measured, of_efforts, measured]) ** 2
-        self._squares += (1.0 - exp(-passed / _MEMORY)) * (now - self._squares)
-        both, first, second = self._squares
-        contrary = both < _CONTRARY * np.minimum(first, second)
+        now = self._changes[:, None] * self._changes
+        self._products += (1.0 - exp(-passed / _MEMORY)) * (now - self._products)
+        constant, of_constant = self._products[0, 0], self._products[0, 1:]
+        whole = self._products[1:, 1:]
+        varying = whole - of_constant[:, None] * of_constant / constant
+        # What varies must be explained better by the opposite than by no relation.
+        contrary = _contrary(whole, _CONTRARY) & _contrary(varying, 1.0)
+        first, second = whole[0, 0], whole[1, 1]
         contrary &= (np.minimum(first, second) > self._least) & self._judged
         self._held = np.where(contrary, self._held + passed, 0.0)
         self.contrary = self._held >= _HELD
+
+
+def _contrary(products: Array, share: float) -> Flags:
+    """Return whether the mean of (e + m)² is less than a share of those of e² and m².
+
+    ``products`` are means of e e, e m, m e and m m, shape (2, 2, nv). With m = -e it is
+    0; with e and m unrelated it is the sum of both.
+    """
+    smaller = np.minimum(products[0, 0], products[1, 1])
+    less: Flags = products.sum(axis=(0, 1)) < share * smaller
+    return less

@@ -17,7 +17,7 @@ import pytest
 from places import ON_MUJOCO
 from wording import wording
 
-from hsp_control import Rollout, __version__
+from hsp_control import NullSpaceField, Rollout, __version__
 from hsp_control.cli import doctor, main, options
 from hsp_control.cli.interrupts import DeferredInterrupt
 
@@ -56,8 +56,12 @@ def test_run_tells_a_program_what_it_did(
 
 
 def test_an_exit_of_a_users_code_is_a_failure(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
+    request: pytest.FixtureRequest,
 ) -> None:
+    members = NullSpaceField.family.members
+    request.addfinalizer(lambda: members.pop("leaves", None))
     own = tmp_path / "leaves.py"
     own.write_text(
         "import sys, hsp_control as hsp\n"

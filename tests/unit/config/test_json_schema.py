@@ -1,6 +1,5 @@
 """The JSON schema: complete texts, units, defaults that fit, one definition a part."""
 
-import json
 import re
 from collections.abc import Iterator
 from typing import Any
@@ -9,7 +8,6 @@ import jsonschema
 import pytest
 from exported_schema import exported_schema, validator
 
-from hsp_control.cli import main
 from hsp_control.config.document import Document
 from hsp_control.config.loaded_scenario import validate
 from hsp_control.config.scenario import Scenario
@@ -145,10 +143,3 @@ def test_editor_and_program_agree_about_names(
     else:
         assert good
         assert scenario.changes[0].task.name == added.get("name", "hand")
-
-
-def test_the_command_prints_it(
-    capsys: pytest.CaptureFixture[str], schema: dict[str, Any]
-) -> None:
-    assert main(["schema"]) == 0
-    assert json.loads(capsys.readouterr().out) == schema

@@ -79,7 +79,7 @@ MISTAKES: list[tuple[Callable[[Any], Any], str, str, str]] = [
     (lambda r: compose(r).compute(r.home(), np.zeros(7)), "RobotState ... v is missing",
      "null_space=rest", "'rest' is text ... a mapping of"),
     (lambda r: run(r, duration=2.0, control_period=1.0),
-     "control_period: ... 0.01 s ... 1 s ... log_period ... 1",
+     "control_period: 1 s ... milliseconds ... 0.001 ... log_period ... 1",
      "simulation.control_period=1", "log_period ... 1"),
     (lambda _: hsp.load_experiment("panda"), "'panda' is a robot ... Robot.load(",
      "simulation.integrator=rk4", "'rk4' is text ... {type: rk4}"),
