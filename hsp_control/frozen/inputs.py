@@ -24,6 +24,7 @@ from hsp_control.control.change_model import MOST_GRAVITY
 from hsp_control.control.controller import Controller
 from hsp_control.control.followed_impedance import FollowedImpedance
 from hsp_control.declaration import within
+from hsp_control.declaration.language import spoken
 from hsp_control.declaration.nested import parts_within
 from hsp_control.declaration.quantities import LARGEST
 from hsp_control.engine import Call
@@ -225,7 +226,7 @@ def model_inputs(
     of_tasks = (getattr(task, "frame", None) for task in own.tasks)
     named = [each for each in of_tasks if isinstance(each, str)]
     for name in named if carrying is None else carrying:
-        with within("payloads"):
+        with within(spoken("--payload", "payloads")):
             frame = robot.model.frames[robot.frame_id(name)]
             if frame.parentJoint > 0:
                 places[name] = frame

@@ -19,6 +19,7 @@ from hsp_control.control.actuation.actuation import Actuation, DeliveredAlone
 from hsp_control.control.bound_step import BoundStep
 from hsp_control.control.controller import Controller
 from hsp_control.declaration import within
+from hsp_control.declaration.language import spoken
 from hsp_control.engine import Plan
 from hsp_control.engine.plans import AnyCall, PartCall, Step
 from hsp_control.tasks.compliant_task import impedance_of
@@ -146,7 +147,7 @@ class TaskSets:
 
 def _check(own: Controller, names: Sequence[str]) -> None:
     tasks = {task.name: task for task in own.tasks}
-    with within("presences"):
+    with within(spoken("--presence", "presences")):
         for k, name in enumerate(names):
             if name not in tasks:
                 raise FreezeError(

@@ -46,6 +46,28 @@ def test_what_cannot_be_frozen_is_refused_with_its_place(
     assert not list(tmp_path.iterdir())
 
 
+TWO = """\
+robot: {name: panda}
+tasks:
+  hand: {type: frame_position}
+  elbow: {type: frame_position, frame: panda_link4, axes: z}
+"""
+
+
+def test_a_task_that_comes_and_goes(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (tmp_path / "two.yaml").write_text(TWO)
+    command = ["freeze", str(tmp_path / "two.yaml"), "--out", str(tmp_path)]
+    assert main([*command, "--presence", "elbow"]) == 0
+    assert Opened(tmp_path / "two.hsp").get("elbow.presence", 1).tolist() == [1.0]
+    capsys.readouterr()
+    for option, known in (("--presence", "; did you mean 'elbow'?"), ("--payload", "")):
+        assert main([*command, option, "elbwo"]) == 2
+        said = " ".join(capsys.readouterr().err.split())
+        assert re.search(rf"two\.yaml:1: {option}: .*'elbwo'{re.escape(known)}", said)
+
+
 @pytest.mark.parametrize(
     ("option", "place"),
     [
