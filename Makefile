@@ -64,7 +64,7 @@ test: $(STAMP) $(ENGINE) ## run the tests, but for those of test-system
 test-system: $(STAMP) $(ENGINE) ## run those of browsers, notebooks, processes and whole walks
 	@$(BIN)/python -m pytest $(SPREAD) -m system $(ARGS)
 
-thorough: sanitize ## run the tests with more seeds, every configuration's page, some mutants
+thorough: assertions sanitize ## run the tests with more seeds, every configuration's page, some mutants
 	@HSP_THOROUGH=1 $(BIN)/python -m pytest $(SPREAD) $(ARGS)
 	@$(BIN)/python tools/mutants.py
 
