@@ -89,7 +89,7 @@ struct LimitedTarget {
     const auto below = (bounds.lower - a - change).array();
     const auto motions = above.max(below) / permitted.acceleration.array();
     double most = std::max({0.0, greatest(efforts) - 1.0, greatest(motions)});
-    const double least = permitted.acceleration.minCoeff();
+    const double least = a.size() ? permitted.acceleration.minCoeff() : 0.0;
     for (Index r = 0; r < barred.lower.size(); ++r) {
       const auto row = barred.A.row(r).head(change.size());
       const double missing = barred.lower[r] - row.dot(change.transpose());
