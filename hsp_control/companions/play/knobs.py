@@ -114,7 +114,7 @@ class FieldSwitch:
         self._on = on
 
     def weigh(self, name: str, at: Changes, weight: float) -> None:
-        """Change the weight of a term, or what it will be when the field is on."""
+        """Change the weight of a term, or its value for when the field is on."""
         if self._on:
             at.weight(name, weight)
         self.weights[name] = weight

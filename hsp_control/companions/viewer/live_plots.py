@@ -52,7 +52,7 @@ class LivePlot(NamedTuple):
     """One plot."""
 
     title: str
-    note: str  # what it shows
+    note: str  # description of the curves
     unit: str
     log: bool  # whether its scale is logarithmic
     curves: list[Curve]
