@@ -225,8 +225,8 @@ class Task(Part, ABC, family="tasks", error=TaskError):
     def call(self, state: RobotState) -> PartCall:
         """Return a kind of call with its arguments, without ``feedback`` and ``out``.
 
-        With these two, a `Feedback` and a `TaskSample`, it writes the values that `evaluate`
-        describes. Arguments are numbers, arrays and records of them, which may be
+        With these two, a `Feedback` and a `TaskSample`, it computes the same sample as
+        `evaluate`. Arguments are numbers, arrays and records of them, which may be
         memory of the state; and values that are updated before each call:
         ``state.frame(name)`` becomes a `FrameMotion`, a trajectory its sample.
 
