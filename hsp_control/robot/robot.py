@@ -262,7 +262,7 @@ class Robot(RobotModel):
 
     def __reduce__(self) -> tuple[Any, ...]:
         if self.mimics:
-            # A restored model would crash the process: Pinocchio's archives lack data of
+            # A restored model would crash the process: Pinocchio's archives lose
             # mimic joints (seen with 4.1).
             raise ModelError(
                 f"{self.name}: a robot with mimic joints cannot be pickled; "
