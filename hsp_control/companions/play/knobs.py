@@ -71,7 +71,7 @@ def _null_space(controller: Controller, period: float) -> Iterator[Knob]:
         return
     switch = FieldSwitch(field)
     if switch.whole:
-        note = "Off: self-motion has no desired velocity."
+        note = "Off: g = 0, self-motion is only damped."
         yield Knob("field", group, "Field", "", True, 0.0, 1.0, switch.turn, note)
     K = controller.null_space_gain
     gain = float(np.diag(K).mean())

@@ -415,13 +415,13 @@ def test_the_picture_follows_what_is_dragged(session: Session) -> None:
         "Task error", "Task error",
     ]  # fmt: skip
     effort = setup["plots"][2]
-    assert effort["note"] == "Of the motors; limits ±12, ±87."
+    assert effort["note"] == "Joint efforts; limits ±12, ±87."
     lines = [(each["value"], each["name"], each["curves"]) for each in effort["lines"]]
     assert lines == [
         (87.0, "limit of joint1 … joint4", [0, 1, 2, 3]),
-        (-87.0, "", [0, 1, 2, 3]),
+        (-87.0, "limit of joint1 … joint4", [0, 1, 2, 3]),
         (12.0, "limit of joint5 … joint7", [4, 5, 6]),
-        (-12.0, "", [4, 5, 6]),
+        (-12.0, "limit of joint5 … joint7", [4, 5, 6]),
     ]
     edges = {line["name"]: line["value"] for line in setup["plots"][1]["lines"]}
     assert edges == {"contact": 0.0}
