@@ -38,7 +38,7 @@ struct Payloads {
   InOut<'k'> masses;
   InOut<'k', 3> centers;
   InOut<'k', 9> inertias;
-  InOutInts<'k'> changes;  // their number: the first takes it up, the others put it down
+  InOutInts<'k'> changes;  // their number: the first adds it, the others remove it
   InOut<'k', 'm'> starts, ramps;
   Scratch<1> carries;                     // whether the dynamics have payloads
   static constexpr double largest = 1e6;  // of a mass, a center, an inertia

@@ -41,7 +41,7 @@ struct ForceMap {
 struct MinimumNormForces {
   static constexpr const char* doc =
       "f = r + E Aᵀ(A E Aᵀ)⁺(w - A r), of minimum Σ (f - r)²/e, and the remaining effort.";
-  // A are the base's rows of F, E = diag(e), w the base's rows of the wanted effort, and r the
+  // A are the base's rows of F, E = diag(e), w the base's rows of the desired effort, and r the
   // commanded forces. w lies in the range of A: directions without support are omitted. The effort
   // of the base, which has no motor, is zero.
   In<'n', 'f'> F;

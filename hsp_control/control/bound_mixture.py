@@ -14,9 +14,9 @@ from hsp_control.engine.plans import PartCall, Step, planned
 
 
 class BoundMixture:
-    """The law of each set of tasks, what it delivers within each set of limits, a mean.
+    """The law of each set of tasks within each set of limits, and the weighted mean.
 
-    All is one call, wherever each part delivers M a + N or what one QP finds. Elsewhere
+    It is one call, where each part is M a + N or the solution of one QP. Elsewhere
     `Mixture` makes the step, part by part.
 
     Attributes:
@@ -34,8 +34,8 @@ class BoundMixture:
         Args:
             effort: Where M a + N is written, shape (nv,) [N·m or N].
             stacks: The sets of tasks.
-            actuations: What delivers the law of each of them, within each set of
-                limits: those of the first one first. No contact carries.
+            actuations: The actuations of the law of each of them, within each set of
+                limits: those of the first one first. No contact is active.
         """
         self.stacks, self._first = tuple(stacks), actuations[0]
         nv, count = len(effort), len(actuations)
@@ -65,7 +65,7 @@ class BoundMixture:
         self._limited = self._mean._replace(status=LIMITED)
 
     def make(self, t: float, shares: Sequence[float]) -> Delivered | None:
-        """Return what is delivered at the state, at its time [s]; None: Python has to.
+        """Return the result at the state and its time [s]; None: use Python.
 
         Args:
             t: The time.
@@ -82,4 +82,4 @@ class BoundMixture:
 
 
 LIMITED_PART = 2
-"""What the engine writes of a part that a QP has limited (``KeepPart``)."""
+"""The engine's status of a part that a QP has limited (``KeepPart``)."""

@@ -37,15 +37,15 @@ class Controller(Commanded):
 
     Wherever the stacked Jacobian keeps its rank and no limit binds: every task's error
     obeys e'' + Kv e' + Kp e = 0, and V = ½ e_NᵀW e_N obeys V' = -e_NᵀW K_N e_N. The
-    same state gives the same effort, but for what is remembered of a run (`RunMemory`):
+    same state gives the same effort, but for the memory of a run (`RunMemory`):
     the last effort, used where the effort rate or the speed is limited (see `applied`),
     and how long changes of impedances wait.
 
     Time is zero at the first step of a run: a robot's clock may begin anywhere.
 
     The parts are values and do not change; `at` makes changes while the controller
-    runs. What they leave relative (a circle without a centre, ``target="start"``)
-    refers to ``start``, or else to the first state for which an effort is computed. A
+    runs. Relative values in them (a circle without a centre, ``target="start"``)
+    refer to ``start``, or else to the first state for which an effort is computed. A
     controller can be copied and pickled at any time; several threads may share it.
     """
 
@@ -63,8 +63,8 @@ class Controller(Commanded):
 
         Args:
             t: Time of a clock [s], which may begin anywhere: that of the first step is
-                time 0. Or a `RobotState` instead of all three, whose time counts from
-                there already; its values are copied.
+                time 0. Or a `RobotState` instead of all three, whose time starts
+                there; its values are copied.
             q: Configuration, shape (nq,).
             v: Velocity, shape (nv,) [rad/s or m/s].
             modifier: Changes the law's acceleration before the limits are applied;
@@ -74,14 +74,14 @@ class Controller(Commanded):
             ShapeError: If q or v has the wrong shape.
             NonFiniteError: If t, q or v contains NaN or inf, or a task or the field
                 does; a non-finite effort is never returned.
-            RateError: In the first step of a run, if a rate that somebody has written
+            RateError: In the first step of a run, if a user-defined rate
                 of the field or the metric is wrong, or the field depends on v.
             ConfigurationError: If a quaternion or a (cos, sin) pair is not of norm 1,
                 or an angle of the first state (also after `restart`; later ones are
                 not looked at) is farther from the middle of its joint's range than
                 twice that range: it would be in degrees.
-            ControllerError: If the state belongs to another robot, or what a step
-                calls, such as a field, calls its own controller.
+            ControllerError: If the state belongs to another robot, or a function
+                that a step calls, such as a field, calls its own controller.
         """
         with self._lock:
             now = self._in_force
@@ -90,7 +90,7 @@ class Controller(Commanded):
             moved = step is None or now.later is not None
             if moved:
                 self._observe(t, q, v)  # the state
-                self._advance()  # to what is in force at its time
+                self._advance()  # to the values in force at its time
                 step = now.step if whole else None
             if step is not None:  # all that follows is one call
                 delivered = (
@@ -99,7 +99,7 @@ class Controller(Commanded):
                 stack, damped = step.active, step.damped
             else:
                 mixture = now.mixture
-                # references, the law, and what it delivers within the limits
+                # references, the law, and its result within the limits
                 delivered = mixture.step(self._state.t, modifier)
                 stack, damped = self.active_stack, mixture.damped
                 stack.check(delivered.effort)
@@ -114,7 +114,7 @@ class Controller(Commanded):
         # of the last step, whose arrays the calls write
         memory.acceleration = memory.acceleration.copy()
         active, damped = now.mixture.active, now.mixture.damped
-        # What fails here fails in a step as well, which says so, or is not there yet.
+        # A failure here occurs in the step as well, which reports it, or not yet.
         with suppress(Exception):
             for _ in range(_REHEARSALS):
                 now.mixture.rehearse(self._state.t)
@@ -158,7 +158,7 @@ class Controller(Commanded):
             self._memory.count_from(0.0)
 
     def _begin(self) -> None:
-        """Look at the first state, and without a start place there what is relative."""
+        """Check the first state, and without a start place relative values there."""
         check_angles(self._declared.robot, self._state.q)
         self._memory.clock.begin(self._state.t)
         if self._declared.start is None:
@@ -167,11 +167,11 @@ class Controller(Commanded):
         warn_of_far_targets(self._state, self.planned_tasks)
         self.check_derivatives(self._state)
         self._memory.begun = True
-        self._in_force.write(self._state.t)  # what is bound is called once, here
+        self._in_force.write(self._state.t)  # bound calls are called once, here
         self._in_force.bind_ahead()
 
     def _advance(self) -> None:
-        """Go on to what is in force at the time of the state."""
+        """Write the values in force at the time of the state."""
         if not self._memory.begun:
             self._begin()
         self._in_force.advance(self._state.t)
@@ -180,7 +180,7 @@ class Controller(Commanded):
         """Store the effort that was sent to the robot.
 
         The limit on the effort's rate starts from it, and so does the margin of speed
-        limits, which covers what the robot does while the effort is held. Without
+        limits, which covers the motion while the effort is held. Without
         limits it has no effect. The first one, also after `restart`, is warned of
         (`StartWarning`) where a robot at rest would jump; see `first_state`.
 
@@ -235,7 +235,7 @@ class Controller(Commanded):
         """Store an acceleration that something else than the efforts causes.
 
         From now on limits on motion hold for the sum of it and the law's acceleration:
-        a robot that somebody pushes may be braked harder, and not driven on. An
+        a pushed robot may be braked harder, and not accelerated further. An
         observer estimates it; without one the limits hold for the model alone.
 
         Args:
@@ -254,7 +254,7 @@ class Controller(Commanded):
 
         Args:
             dynamics: Those of a robot with the same joints, instead of the last ones;
-                None: nobody follows.
+                None: none follow.
         """
         with self._lock:
             self._in_force.model.follow(dynamics)
@@ -272,7 +272,7 @@ class Controller(Commanded):
     def model_changes(
         self, dynamics: Dynamics | None
     ) -> Callable[[float], object] | None:
-        """Return what lets other dynamics follow changes of payload and gravity.
+        """Return a function that updates other dynamics with payload and gravity.
 
         A simulated robot in another process knows the changes that were declared, and
         follows them by itself; see `followed_by` for one in this process.
@@ -295,8 +295,8 @@ class Controller(Commanded):
         does one that was made after its last step, which no step has seen.
 
         Args:
-            origin: What the clock of `compute` reads at time 0, for references,
-                schedules and changes [s]; None: what it reads in the next step.
+            origin: The reading of `compute`'s clock at time 0, for references,
+                schedules and changes [s]; None: its reading in the next step.
 
         Raises:
             NonFiniteError: If the origin is NaN or inf.
@@ -312,7 +312,7 @@ class Controller(Commanded):
             now.step = None
             if origin is not None:
                 memory.count_from(origin)
-            now.mixture.active = None  # the next step places what is relative
+            now.mixture.active = None  # the next step places relative values
             remembers = any(each.task.remembers for each in self.setup.tasks)
             if changes or line.count or remembers:
                 self._compose(line.start, changes)
@@ -326,7 +326,7 @@ class Controller(Commanded):
         """Bind the law for some contacts and tasks now, instead of in a step.
 
         Schedules and changes are bound by themselves: in the first step, and when
-        they are made. A plan that switches contacts by events asks for each combination
+        they are made. A plan that switches contacts by events requests each combination
         that it will use.
 
         Args:
@@ -335,7 +335,7 @@ class Controller(Commanded):
             without: The names of the tasks that are not active.
 
         Returns:
-            How long it took [s].
+            Its duration [s].
         """
         begun = perf_counter()
         with self._lock:
@@ -348,7 +348,7 @@ class Controller(Commanded):
     def state(self) -> RobotState:
         """The state that the last effort was computed for; the next one overwrites it.
 
-        Its time counts from the first step. `update` moves it, and nothing else does:
+        Its time starts at the first step. Only `update` moves it:
         its t, q and v cannot be assigned or written. Given to `compute` it is not
         copied.
         """
@@ -360,7 +360,7 @@ class Controller(Commanded):
         now = self._in_force
         return now.step if now.later is None else None
 
-    # -- what explains it -------------------------------------------------------------
+    # -- its diagnosis ----------------------------------------------------------------
 
     @property
     def active_stack(self) -> ActiveStack:
@@ -391,7 +391,7 @@ class Controller(Commanded):
     def step_alone(self, q: ArrayLike | None = None) -> BoundStep | None:
         """Return a step at the beginning of a run, for who makes it without Python.
 
-        What is relative is placed there. The controller is used up: `without_python`
+        Relative values are placed there. The controller is consumed: `without_python`
         makes one for this.
 
         Args:
@@ -408,7 +408,7 @@ class Controller(Commanded):
         return self._settled_step
 
     def stack_alone(self, without: Collection[str]) -> tuple[ActiveStack, Actuation]:
-        """Return the stack without some tasks, and what delivers it, for `step_alone`.
+        """Return the stack without some tasks, and its actuation, for `step_alone`.
 
         Args:
             without: The names of the tasks.
@@ -438,7 +438,7 @@ class Controller(Commanded):
     def stack_at(self, state: RobotState) -> ActiveStack:
         """Return the contacts and tasks that are active at a state, resolved there.
 
-        The state's time counts from the first step. The controller does not move: its
+        The state's time starts at the first step. The controller does not move: its
         copy does.
         """
         ahead = self._ahead()
@@ -462,8 +462,8 @@ class Controller(Commanded):
         """Return v = J# x_d' + P g, shape (nv,): the robot once both errors have died.
 
         The law makes the robot this first-order flow (docs/law.md, Equations (7) and
-        (13) over a metric; Liégeois 1977). So it shows what a field will do, and a
-        start with this velocity has no transient. The time counts from the first step.
+        (13) over a metric; Liégeois 1977). So it shows the effect of a field, and a
+        start with this velocity has no transient. Time starts at the first step.
         The controller does not move: its copy does.
         """
         ahead = self._ahead()
@@ -484,8 +484,8 @@ class Controller(Commanded):
     def preview(self, changes: Sequence[Change] | None = None) -> "Controller":
         """Return a copy at the beginning of a run: to look ahead, or at a log.
 
-        It is of the same robot object, and counts times from 0. Messages that
-        it takes from streams remain for the controller.
+        It is of the same robot object, with times from 0. Messages that
+        it reads from streams remain for the controller.
 
         Args:
             changes: All changes of the run, such as those of a log; None: those that

@@ -47,7 +47,7 @@ class GainsInForce:
         self._followed: dict[int, FollowedImpedance] = {}
 
     def force_offset(self, contact: str) -> Array:
-        """Return what compensators add to a contact's commanded force, (1,) [N]."""
+        """Return the compensators' part of a contact's commanded force, (1,) [N]."""
         return self._memory.force_offset(contact)
 
     def plan(self, setup: Setup, t: float) -> None:
@@ -55,7 +55,7 @@ class GainsInForce:
         self.go_over_to(self.planned(setup), t)
 
     def planned(self, setup: Setup) -> "PlannedGains":
-        """Return what is to be followed for a setup, which may be later."""
+        """Return the gains of a setup, which may be followed later."""
         tasks = {each.key: each.task for each in setup.tasks}
         known = {id(task): self.feedback[key] for key, task in self._tasks.items()}
         feedback = {
@@ -74,7 +74,7 @@ class GainsInForce:
         """Follow it from now on; t is the present time [s].
 
         Returns:
-            What held the arrays of what was followed before.
+            The owner of the previous arrays.
         """
         before = self._tasks, self.feedback, self._followed
         self._setup, self._tasks, self.feedback, self._followed, self._changing = (
@@ -91,7 +91,7 @@ class GainsInForce:
     def _follower(
         self, planned: PlannedTask, in_force: FeedbackInForce
     ) -> FollowedImpedance:
-        """Return what lets a task's impedance follow what is planned."""
+        """Return the impedance in force of a task, which follows the planned one."""
         own = self._followed.get(planned.key)
         if own is not None and own.numbers is in_force.numbers:
             return own
@@ -110,7 +110,7 @@ class GainsInForce:
 
     def write(self, t: float) -> None:
         """Write the gains of a time [s]."""
-        for each in self._setup.tasks:  # what is constant is written once
+        for each in self._setup.tasks:  # constant gains are written once
             if not (each.gains.constant and each.key in self._written):
                 waits = self._waiting.get(each.key)
                 numbers = each.gains.at(t) if waits is None else waits.numbers
@@ -160,7 +160,7 @@ class GainsInForce:
 
 
 class PlannedGains(NamedTuple):
-    """What `GainsInForce` follows."""
+    """The gains of a setup, for `GainsInForce`."""
 
     setup: Setup
     tasks: dict[int, Task]  # by key
@@ -175,7 +175,7 @@ def changes_impedance(task: Task, numbers: Evolution[Array]) -> bool:
 
 
 def check_held(old: Setup, new: Setup, state: RobotState, period: float) -> None:
-    """Check what a change of the setup makes of gains, where the robot is now."""
+    """Check the gains after a change of the setup, at the present state."""
     before = {each.key: each.gains.target for each in old.tasks}
     for each in new.tasks:
         if not np.array_equal(each.gains.target, before.get(each.key, ())):

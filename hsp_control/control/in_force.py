@@ -25,7 +25,7 @@ class InForce:
     """The part of a time line in force now, and the step that is bound for it.
 
     Gains, limits, model and tools are arrays that the calls of a step read; `advance`
-    writes those of a time. What steps call is bound in `follow`, when a change is made,
+    writes those of a time. The calls of steps are bound in `follow`, after a change,
     also for the time when all changes are over.
     """
 
@@ -46,7 +46,7 @@ class InForce:
         self.tools = ToolsInForce(state)
         self.step = None
         self.later = None
-        self._over: tuple[object, ...] | None = None  # what is not followed any more
+        self._over: tuple[object, ...] | None = None  # no longer followed
 
     def begin(self, time_line: TimeLine) -> None:
         """Make all that computes, and follow a time line."""
@@ -58,7 +58,7 @@ class InForce:
         self.follow(time_line)
 
     def follow(self, time_line: TimeLine) -> None:
-        """Follow a time line from now on; what its steps call is bound."""
+        """Follow a time line from now on; the calls of its steps are bound."""
         self._memory.follow(time_line.streams())
         self._over = None
         self._plan(time_line)
@@ -81,7 +81,7 @@ class InForce:
             raise
 
     def bind_ahead(self) -> None:
-        """Bind what steps call until all changes are over, and then.
+        """Bind the calls of steps until all changes are over, and after that.
 
         Not before the first state: from it follow the motions that contacts leave free.
         """
@@ -102,7 +102,7 @@ class InForce:
         self.later = AfterChanges(at, over, following, step, gains, limits)
 
     def advance(self, t: float) -> None:
-        """Write what is in force at a time [s]."""
+        """Write the values in force at a time [s]."""
         memory, later = self._memory, self.later
         memory.now = max(memory.now, t)
         if later is None:
@@ -110,8 +110,8 @@ class InForce:
         if memory.now <= later.at:
             self.write(t)
             return
-        # All changes are over: go on without them. What the model and the tools have
-        # come to stays written; their calls are bound anew with the next change.
+        # All changes are over: go on without them. The final values of model and tools
+        # stay written; their calls are bound anew with the next change.
         self.model.write(t)
         self.tools.write(t)
         # To free it takes longer than a step: the next change does.
@@ -139,7 +139,7 @@ class InForce:
     def kept(self) -> TimeLine:
         """The time line without the changes that are over, for one more change.
 
-        An integrator that asks for earlier times than the last one does so within one
+        An integrator that evaluates earlier times than the last one does so within one
         of its steps, and changes are made between them.
         """
         return self.time_line.settled_at(self.latest)
@@ -163,7 +163,7 @@ class InForce:
 
 
 class AfterChanges(NamedTuple):
-    """What a controller goes on with once all changes are over."""
+    """The calls of a controller after all changes."""
 
     at: float  # from when on [s]
     time_line: TimeLine

@@ -1,4 +1,4 @@
-"""Steps while tasks and limits fade in and out: mixtures of what each set delivers."""
+"""Steps while tasks and limits fade in and out: weighted means of the results."""
 
 from collections.abc import (
     Callable,
@@ -50,7 +50,7 @@ class Mixture:
 
         (1 - w1) d{} + (w1 - w2) d{1} + (w2 - w3) d{1, 2} + ...
 
-    with d{...} what the law for what has weight 1 and what is in the braces delivers
+    with d{...} the result of the law for the parts of weight 1 and those in braces
     within the limits. It is continuous in the weights, whatever binds. It keeps the
     limits, because they are convex in the acceleration, the effort and the forces,
     which are affine in one another. The rows of the tasks in all sets are linear in the
@@ -82,7 +82,7 @@ class Mixture:
         self._follow(setup)
 
     def following(self, setup: Setup) -> "Mixture":
-        """Return the mixture of another setup; what stays the same is bound already."""
+        """Return the mixture of another setup; unchanged parts are bound already."""
         other = copy(self)
         field = setup.field
         if field != self.field:
@@ -125,7 +125,7 @@ class Mixture:
         self.damped = ""
 
     def step(self, t: float, modifier: AccelerationModifier | None) -> Delivered:
-        """Resolve the law at the state and its time [s], and return what is delivered.
+        """Resolve the law at the state and its time [s], and return the result.
 
         Without a modifier it is one call, if it was bound; see `prepare`.
         """
@@ -193,7 +193,7 @@ class Mixture:
         return sets
 
     def _deliver(self, modifier: AccelerationModifier | None) -> Delivered:
-        """Return what is delivered of the law that was resolved last."""
+        """Return the result for the law that was resolved last."""
         # While one set of limits follows another, it is the mixture of the steps within
         # each of them.
         sets = self._limits.sets
@@ -224,7 +224,7 @@ class Mixture:
     def bound_step(self, origin: Array) -> BoundStep | None:
         """Return a step as one call; None if it may change.
 
-        ``origin``: what the clock of its calls reads at time 0, shape (1,) [s].
+        ``origin``: the reading of its calls' clock at time 0, shape (1,) [s].
         """
         if not self.steady:
             return None
@@ -233,7 +233,7 @@ class Mixture:
         return BoundStep(self._state, stack, actuation, self._limits, origin)
 
     def stack_alone(self, without: Collection[str]) -> tuple[ActiveStack, Actuation]:
-        """Return the stack without some tasks, and what delivers it within the limits.
+        """Return the stack without some tasks, and its actuation within the limits.
 
         Neither contacts nor limits change.
         """
@@ -247,7 +247,7 @@ class Mixture:
         return next(each for each in self._limits.all if each.limits is last)
 
     def prepare(self, times: Iterable[float]) -> None:
-        """Bind what steps call at some times [s], now instead of in a step."""
+        """Bind the calls of steps at some times [s], now instead of in a step."""
         for t in times:
             stacks = tuple(stack for _, stack in self._sets(t))
             for stack in stacks:
@@ -281,13 +281,13 @@ class Mixture:
                 self._deliver(None)
 
     def bind(self, stack: ActiveStack) -> None:
-        """Bind what a step with a stack calls."""
+        """Bind the calls of a step with a stack."""
         stack.bind()
         for limits in self._limits.all:
             self.actuation(stack, limits)
 
     def actuation(self, stack: ActiveStack, limits: LimitSet) -> Actuation:
-        """Return what delivers the law of a stack within a set of limits."""
+        """Return the actuation of a stack within a set of limits."""
         found = self._actuations.get((stack, limits))
         if found is None:
             found = Actuation(self._state, stack.law, stack.support, limits)
@@ -331,7 +331,7 @@ class Mixture:
 
 
 _NOTHING = 0.0, None
-"""What comes after all that has a weight."""
+"""The end of the parts that have a weight."""
 
 
 def _weight(pair: tuple[float, object]) -> float:

@@ -25,8 +25,8 @@ def import_file(path: Path | str) -> None:
     """Run a Python file, whose functions and parts YAML can then name.
 
     ``{type: function_cost, function: elbow}`` names a function; a class such as ``class
-    Sway(hsp.Cost, type="sway")`` declares a type. The file may do anything that Python
-    can: import only what you trust.
+    Sway(hsp.Cost, type="sway")`` declares a type. The file may do anything in Python:
+    import only trusted files.
 
     Raises:
         ConfigError: If the file cannot be read, or raises an error.

@@ -23,7 +23,7 @@ from hsp_control.simulation.log_writer import LogWriter
 _CHANNELS = {
     "phase": ("-", "0 waiting; 1 running; 2 safe stop, damping; 3 safe stop, hold"),
     "sent": ("N·m or N", "sent to the robot: tau, or tau - g(q)"),
-    "applied": ("N·m or N", "what the robot applied of it before, if it reports it"),
+    "applied": ("N·m or N", "the last applied effort, if the robot reports it"),
     "measured": ("-", "1 if the state was measured, 0 if the model predicted it"),
     "age": ("s", "state age"),
     "response": ("s", "response time: from the state's arrival to its effort"),

@@ -170,7 +170,7 @@ def run_loop(
             with real_time_priority(priority), no_garbage_collection():
                 loop.run(on_period)
         except BaseException:
-            with suppress(BaseException):  # the first error is what matters
+            with suppress(BaseException):  # the first error is reported
                 hardware.close()
             if loop_log is not None:
                 loop_log.abandon()

@@ -133,7 +133,7 @@ def recorded_robot(record: Any, access: Access = ANYWHERE) -> Robot:
     looked up beside that file, or in the robot's package.
 
     Args:
-        record: What `robot_record` returned.
+        record: The result of `robot_record`.
         access: Which files may be read.
 
     Raises:

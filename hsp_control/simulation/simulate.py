@@ -127,7 +127,7 @@ def simulate(
         UnstableRateError: If the loop would be unstable at its control period, with
             the plant's delays; with values that would not.
         SimulationError: If durations, periods and plant do not fit, or the motion
-            diverged; its ``rollout`` then holds what was computed.
+            diverged; its ``rollout`` then has the computed rows.
         HspControlError: If q0 or v0 is not a valid state of the robot, or the plant
             does not fit it.
     """
@@ -311,7 +311,7 @@ def _whole(total: float, part: float, total_name: str, part_name: str) -> int:
             f"{part_name} = {part:g} s; at most {MAX_STEPS:.0e} times"
         )
     if abs(ratio - round(ratio)) > 1e-6 * max(1.0, ratio) or round(ratio) < 1:
-        if (total, total_name) == (LOG_PERIOD, "log_period"):  # nobody has written it
+        if (total, total_name) == (LOG_PERIOD, "log_period"):  # the default
             with within(part_name):
                 if part >= _LONG:
                     raise SimulationError(

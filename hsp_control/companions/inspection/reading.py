@@ -1,4 +1,4 @@
-"""How a robot's files are read where that is not obvious, and what is ignored."""
+"""How a robot's files are read where that is not obvious, and ignored elements."""
 
 from collections.abc import Iterator
 from xml.etree.ElementTree import Element
@@ -127,8 +127,8 @@ def check_mesh_axes(xml: Element, source: RobotSource) -> Iterator[Finding]:
             "note",
             "mesh",
             f"meshes of {listing(links)}",
-            f"their files say that {axis} points up: it is turned to the link's z, "
-            "which RViz does not do",
+            f"their files declare {axis} as the up axis: it is turned to the link's z, "
+            "unlike in RViz",
             "if the robot looks wrong, write <up_axis>Z_UP",
         )
 

@@ -206,7 +206,7 @@ class Follower:
                 self.failure, self._begin_anew = str(error), True
                 # A copy takes the lock for some ms: not at every failure.
                 self._ended.wait(_PATIENCE)
-            except Exception as error:  # a part of one's own may raise anything
+            except Exception as error:  # a user's part may raise anything
                 self.failure = f"{type(error).__name__}: {error}"
                 return
 

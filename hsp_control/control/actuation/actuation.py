@@ -101,7 +101,7 @@ class Actuation:
         compiled = not own or "barriers" in self._rows
         # Whether M a + N is the effort wherever it is within the bounds, and so is a.
         self.direct = compiled and not base.size and not support.size
-        # what is delivered there of the law's own acceleration
+        # the result there for the law's own acceleration
         self.own = Delivered(state.effort, law.acceleration, np.zeros(0), EXACT, 0.0)
         self.nearest = self.own
         # whether `nearest` is delivered, and its status stands, shape (1,)
@@ -121,7 +121,7 @@ class Actuation:
         if limits.limits is not None or support.size:
             holding = self._rows.get("holding")
             self._qp = self._limited_step(0 if holding is None else len(holding.least))
-            # what is delivered where it was solved at once
+            # the result where the QP was solved at once
             self.nearest = Delivered(*self._qp.result, LIMITED, 0.0)
 
     def _check(self) -> PartCall:
@@ -189,9 +189,9 @@ class Actuation:
 
         The last one returns whether it is exact and within the limits: then, where
         `direct`, it is delivered with the effort M a + N. Else the law's outcome and
-        `outcome` say what is not so. If a QP without forces and distances is all that
-        is needed where a bound is violated, it is solved at once; `is_nearest` says
-        whether `nearest` is all that there is to deliver.
+        `outcome` report the violations. If a QP without forces and distances
+        suffices where a bound is violated, it is solved at once; `is_nearest` says
+        whether `nearest` is the result.
         """
         law, wanted = self._law.acceleration, self._wanted
         begin = PartCall(engine.Copy, x=law, out=wanted.acceleration)
@@ -213,7 +213,7 @@ class Actuation:
         return self._state.plan(calls).steps()
 
     def keeping(self, acceleration: Array, effort: Array, kept: Indices) -> PartCall:
-        """Return the call that keeps what is delivered, after `calls`.
+        """Return the call that stores the result, after `calls`.
 
         Args:
             acceleration: Where it writes the acceleration, shape (nv,).
@@ -237,10 +237,10 @@ class Actuation:
     def calls_alone(self, delivered: "DeliveredAlone") -> PartCalls:
         """Return the calls that follow `calls` in a step without Python.
 
-        They do what `delivered` does.
+        They are equivalent to `delivered`.
 
         Args:
-            delivered: Where they write what is delivered.
+            delivered: Where they write the result.
         """
         if not self.direct:
             return self._calls_with_forces(delivered)
@@ -302,12 +302,12 @@ class Actuation:
     def calls_with_offset(
         self, a: Array, offset: Array, delivered: "DeliveredAlone"
     ) -> PartCalls:
-        """Return the calls that do what `deliver` does, where the effort is `direct`.
+        """Return the calls equivalent to `deliver`, where the effort is `direct`.
 
         Args:
             a: The acceleration, shape (nv,).
             offset: Effort besides M a + N, shape (nv,).
-            delivered: Where they write what is delivered.
+            delivered: Where they write the result.
         """
         wanted, bounds = self._wanted, self._limits.bounds
         begin = PartCall(engine.Copy, x=a, out=wanted.acceleration)
@@ -327,7 +327,7 @@ class Actuation:
     def _whole_step(
         self, before: PartCalls
     ) -> tuple[LimitedStep | None, list[AnyCall]]:
-        """Return a QP with room for all rows, and what solves it where it has to be."""
+        """Return a QP with room for all rows, and the calls that solve it if needed."""
         if self._qp is None:
             return None, []
         qp = self._limited_step(sum(len(each.least) for each in self._rows.values()))
@@ -340,7 +340,7 @@ class Actuation:
         effort: Array,
         delivered: "DeliveredAlone",
     ) -> PartCall:
-        """Return the call that decides what is delivered."""
+        """Return the call that selects the delivered effort."""
         nearest = self.own if qp is None else qp.result
         return PartCall(
             engine.Deliver,
@@ -371,14 +371,14 @@ class Actuation:
         return self.delivered(a, offset)
 
     def delivered(self, a: Array, offset: Array | None = None) -> Delivered:
-        """Return what is delivered, after `calls`; for the arguments see `deliver`."""
+        """Return the result, after `calls`; for the arguments see `deliver`."""
         delivered = self._within_limits(a, offset)
         if self.outcome.beyond.item():
             return delivered._replace(status=BEYOND)
         return delivered
 
     def _within_limits(self, a: Array, offset: Array | None) -> Delivered:
-        """Return what is delivered, whether or not a joint is beyond a limit."""
+        """Return the result, whether or not a joint is beyond a limit."""
         found = self.outcome
         if self._qp and self.direct and not self._qp_outcome.unsolved.item():
             status, relaxation = self._qp.found()
@@ -387,7 +387,7 @@ class Actuation:
             return Delivered(self._state.effort, a, self.own.forces, EXACT, 0.0)
         motion_ok = not (found.motion.item() or found.rows.item())
         effort_ok = not found.effort.item()
-        # A QP that was tried at once has overwritten what is wanted.
+        # A QP that was tried at once has overwritten the unlimited effort.
         wanted, support = self._wanted.effort, self._support
         self._wanted.acceleration[:], wanted[:] = a, self._state.effort
         if offset is not None:

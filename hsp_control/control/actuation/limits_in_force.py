@@ -61,11 +61,11 @@ class LimitSet:
 
 
 Measured = list[tuple[str, Callable[[], Array]]]
-"""What returns the distances of barriers in a step, by the barriers' names."""
+"""Functions that return the distances of barriers in a step, by their names."""
 
 
 class LimitsAt(NamedTuple):
-    """What `LimitsInForce` follows, and finds in force at a time."""
+    """The limits in force at a time."""
 
     all: list[tuple[LimitSet, Evolution[float]]]
     sets: list[tuple[LimitSet, float]]
@@ -73,7 +73,7 @@ class LimitsAt(NamedTuple):
 
 
 class LimitsInForce:
-    """The sets of limits in force, and what is remembered of the efforts sent.
+    """The sets of limits in force, and the memory of the efforts sent.
 
     Its only memory is of the last efforts, used where the effort's rate or the speed is
     limited.
@@ -96,7 +96,7 @@ class LimitsInForce:
         self.go_over_to(self.planned(planned, t))
 
     def planned(self, planned: PlannedLimits, t: float) -> "LimitsAt":
-        """Return what is in force at a time [s], which may be later."""
+        """Return the limits in force at a time [s], which may be later."""
         state, known = self._state, {id(each.limits): each for each in self.all}
         all_of_them = [
             (known.get(id(limits)) or LimitSet(limits, state, self.sent), share)
@@ -107,7 +107,7 @@ class LimitsInForce:
         return LimitsAt(all_of_them, sets, self._measured(sets))
 
     def go_over_to(self, planned: "LimitsAt") -> object:
-        """Follow it from now on; return what held what was followed before."""
+        """Use these limits from now on; return the owner of the previous arrays."""
         before = self._all, self.sets, self.measured
         if not self._rate:
             self.sent.forget_rate()
@@ -129,7 +129,7 @@ class LimitsInForce:
         return [each for each, share in self._all if share.at(t) > 0.0]
 
     def _measured(self, sets: Sequence[tuple[LimitSet, float]]) -> "Measured":
-        """Return what returns the distances of barriers, by their names.
+        """Return functions for the distances of barriers, by their names.
 
         The engine's steps write those of shapes; an own barrier is evaluated again.
         """
@@ -163,7 +163,7 @@ class LimitsInForce:
             self.sent.record_acceleration(acceleration, period)
 
     def applying(self, acceleration: Array) -> list[Callable[[float], Any]]:
-        """Return calls of the time that do what `applied` does of the effort M a + N.
+        """Return calls of the time equivalent to `applied` of the effort M a + N.
 
         The period is that of the last `applied`.
         """
@@ -176,7 +176,7 @@ class LimitsInForce:
         return self._state.plan(calls).steps()
 
     def applying_all(self, tau: Array, acceleration: Array, period: Array) -> PartCalls:
-        """Return the calls that do what `applied` does, of what these arrays hold.
+        """Return the calls equivalent to `applied`, with these arrays as arguments.
 
         Args:
             tau: Effort, shape (nv,) [N·m or N].
@@ -197,7 +197,7 @@ class LimitsInForce:
         return calls
 
     def update(self) -> None:
-        """Find what the last effort leaves for the next one."""
+        """Compute the bounds of the next effort from the last one."""
         for each, _ in self._all:
             if each.rate:
                 each.update()
@@ -241,7 +241,7 @@ def _numbers(limits: RobotLimits | None, nv: int) -> Array:
 
 
 def _distances(barrier: Barrier, state: RobotState) -> Callable[[], Array]:
-    """Return what returns the distances of a barrier at the step's state."""
+    """Return a function for the distances of a barrier at the step's state."""
     if isinstance(barrier, MinimumDistance):
         written = barrier.clearance.proximity(state).distances
         return lambda: written

@@ -81,7 +81,7 @@ class Support:
             self.inverse_cost[columns] = full
             if not planned.always:
                 self._scheduled.append((planned, columns, full))
-        # what `minimum_norm_forces` reads, and wrote last: the remaining effort, shape
+        # input and output of `minimum_norm_forces`: the remaining effort, shape
         # (nv,), and forces, shape (size,) [N]
         self._wanted, self.tau = np.zeros(nv), np.zeros(nv)
         self.forces = np.zeros(self.size)
@@ -123,7 +123,7 @@ class Support:
     def calls(self, wanted: Array, law: BoundLaw) -> PartCalls:
         """Return the calls of contacts that are active at all times.
 
-        They do what `update` and `minimum_norm_forces` do.
+        They are equivalent to `update` and `minimum_norm_forces`.
 
         Args:
             wanted: The effort without contact forces, shape (nv,) [N·m or N].
@@ -207,7 +207,7 @@ class CommandedForces:
         Args:
             contact: The contact, with k points.
             state: Where the robot is.
-            offset: What is added to its normal force, shape (1,) [N].
+            offset: An addition to its normal force, shape (1,) [N].
             out: f_ref of its points, shape (3 k,) [N], which is written.
         """
         assert contact.force is not None
