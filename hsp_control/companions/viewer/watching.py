@@ -19,6 +19,7 @@ from hsp_control.config.recorder import declaration_of
 from hsp_control.config.scenario import ViewSettings
 from hsp_control.control.interface import Change, Controller
 from hsp_control.declaration.plain_data import plain_data
+from hsp_control.live.hardware import described
 from hsp_control.simulation.log_writer import LogWriter
 
 START = 60.0  # time in which the page's process must report its address [s]
@@ -206,8 +207,8 @@ class Follower:
                 self.failure, self._begin_anew = str(error), True
                 # A copy takes the lock for some ms: not at every failure.
                 self._ended.wait(_PATIENCE)
-            except Exception as error:  # a part of one's own may raise anything
-                self.failure = f"{type(error).__name__}: {error}"
+            except BaseException as error:  # a part of one's own may raise anything
+                self.failure = described(error)
                 return
 
     def newest(self) -> tuple[float, Any, Any] | None:
