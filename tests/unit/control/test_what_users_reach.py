@@ -238,7 +238,7 @@ def controllers() -> list[hsp.Controller]:
 def test_a_modifier_that_returns_something_else(returned: Any, message: str) -> None:
     panda = hsp.Robot.load("panda")
     controller = hsp.Controller(panda, [hsp.FramePosition("panda_tcp")])
-    with pytest.raises(HspControlError, match=message):
+    with pytest.raises(hsp.HspControlError, match=message):
         controller.compute(
             0.0, panda.home(), np.zeros(NV), modifier=lambda *_: returned
         )
