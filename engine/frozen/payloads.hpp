@@ -45,6 +45,7 @@ struct Payloads {
 
   void check() const {
     check_indices("joints", joints, dynamics->joints(), 1);
+    check_at_least("joints", joints.size(), std::min<Index>(frames.size(), 1));
     dynamics->make_room(frames.size());
     if (changes.size() != frames.size() || starts.cols() < 1)
       throw std::invalid_argument("there is no room for a change");

@@ -153,8 +153,9 @@ struct WrenchShares {
     out.setZero();
     for (Index r = 0; r < 6; ++r) {
       const double square = total.row(r).squaredNorm();
-      if (std::sqrt(square) > negligible * largest)
-        out += (total.row(r).transpose() / square).lazyProduct(turned.row(r));
+      if (std::sqrt(square) <= negligible * largest) continue;
+      turned.row(r) /= square;
+      out += total.row(r).transpose().lazyProduct(turned.row(r));
     }
   }
 };

@@ -12,6 +12,7 @@ from copy import copy
 import numpy as np
 
 from hsp_control.common.arrays import Array
+from hsp_control.common.exceptions import ControllerError
 from hsp_control.control.active_stack import ActiveStack
 from hsp_control.control.actuation import Actuation, Delivered, Status
 from hsp_control.control.actuation.limits_in_force import LimitSet, LimitsInForce
@@ -32,6 +33,20 @@ AccelerationModifier = Callable[
 stack, a). It returns the acceleration to deliver, shape (nv,), and an additional effort
 besides M a + N, shape (nv,), or None. While tasks fade it is called for each set of
 them, weighted by the stack's `share`."""
+
+
+def _checked(found: object, robot: Robot) -> tuple[Array, Array | None]:
+    """Return what a modifier returned, if it is as `AccelerationModifier` says."""
+    if not isinstance(found, tuple) or len(found) != 2:
+        raise ControllerError(
+            f"modifier returned {type(found).__name__}; needs (acceleration, effort or "
+            "None)"
+        )
+    a, offset = found
+    own = robot.check_tangent(a, "the modifier's acceleration")
+    if offset is None:
+        return own, None
+    return own, robot.check_tangent(offset, "the modifier's effort")
 
 
 _Active = tuple[frozenset[int], frozenset[tuple[int, int]]]
@@ -205,7 +220,9 @@ class Mixture:
         for active in self._parts:
             a, offset = active.acceleration, None
             if modifier is not None:
-                a, offset = modifier(self._state.read_only, active, a)
+                # A copy: a function of the user may change it in place.
+                found = modifier(self._state.read_only, active, a.copy())
+                a, offset = _checked(found, self._state.robot)
             for limits, share in sets:
                 one = self.actuation(active, limits).deliver(a, offset)
                 if single:

@@ -103,7 +103,7 @@ class Rollout:
 
     @property
     def config(self) -> dict[str, Any] | None:
-        """The resolved configuration of the run; None if it was made in Python."""
+        """The resolved configuration of the run; None if a part of it is Python."""
         return self.meta.get("config")
 
     def measure(self, robot: Robot, function: Callable[[RobotState], Any]) -> Array:

@@ -46,7 +46,9 @@ def check_trajectories(parts: object, t: float) -> None:
             for first in (t + after for after in _AFTER):
                 try:
                     samples = [_values(each, first + k * INTERVAL) for k in range(5)]
-                except Exception:
+                except KeyboardInterrupt:
+                    raise
+                except BaseException:
                     break  # the step in which it occurs reports it
                 values = np.array([sample[value] for sample in samples])
                 declared.compare(values, samples[2][rate], first)
