@@ -78,11 +78,14 @@ struct DeliverWithForces {
   QPOutcome<Ints> qp;
   Ints<1> exact, redistribute;
   In<'n'> acceleration, effort;  // of the law
+  In<'f'> forces;                // of minimum norm [N]
   In<'n'> nearest_acceleration, nearest_effort;
+  In<'f'> nearest_forces;
   Ints<'b'> base;  // dofs without a motor
   In<'n'> lower, upper;
   std::int64_t redistributed, relaxed, beyond;
   Out<'n'> a, tau;
+  Out<'f'> f;
   OutInts<1> status, delivered;
   Scratch<'n'> found;
 
@@ -98,6 +101,8 @@ struct DeliverWithForces {
     delivered[0] = law.finite[0] && found.allFinite();
     if (!delivered[0]) return false;
     tau = found;
+    if (solved) f = nearest_forces;
+    else f = forces;
     const bool same = redistribute[0] && qp.status[0] == redistributed;
     if (solved && !same) a = nearest_acceleration;
     else a = acceleration;

@@ -2,33 +2,32 @@
 #pragma once
 #include <algorithm>
 #include <array>
+#include <cstdint>
 #include <hsp/indices.hpp>
 #include <hsp/kind.hpp>
 
 namespace hsp {
 
-// The decisions are those of `Mixture` in Python.
 struct ChooseSets {
   static constexpr const char* doc =
-      "Which sets of tasks a step resolves, and their shares: (1 - w₁), (w₁ - w₂), ... with the "
-      "presences w₁ ≥ w₂ ≥ ... between 0 and 1. Bit k of a set's index: whether task k is in it.";
+      "Which sets of parts a step resolves, and their shares: (1 - w₁), (w₁ - w₂), ... with the "
+      "presences w₁ ≥ w₂ ≥ ... between 0 and 1. Whether all of them are there; if not, none is on.";
   In<'k'> presences;
+  Ints<'s', 'k'> members;  // 1: the set has this part
   OutInts<'s'> on;
   Out<'s'> shares;
-  static constexpr Index most = 8;
+  static constexpr Index most = 64;
 
   void check() const {
-    if (presences.size() > most || on.size() != Index{1} << presences.size())
-      throw std::invalid_argument(
-          "on needs one entry for each set of the tasks, of which there "
-          "may be 8");
+    if (presences.size() > most) throw std::invalid_argument("there may be 64 parts");
   }
-  void operator()() {
+  bool operator()() {
     std::array<Index, most> coming;
-    Index count = 0, set = 0;
+    Index count = 0;
+    std::uint64_t set = 0;
     for (Index k = 0; k < presences.size(); ++k) {
       const double w = presences[k];
-      if (w >= 1.0) set |= Index{1} << k;
+      if (w >= 1.0) set |= bit(k);
       else if (w > 0.0) {  // after those of the same presence
         Index place = count++;
         for (; place > 0 && presences[coming[place - 1]] < w; --place)
@@ -38,14 +37,40 @@ struct ChooseSets {
     }
     on.setZero();
     shares.setZero();
+    bool all = true;
     double share = 1.0;
     for (Index i = 0; i <= count; ++i) {
       const double next = i < count ? presences[coming[i]] : 0.0;
-      on[set] = share != next;
-      shares[set] = share - next;
+      if (share != next) {
+        const Index s = place_of(set);
+        all = all && s < on.size();
+        if (s < on.size()) {
+          on[s] = 1;
+          shares[s] = share - next;
+        }
+      }
       share = next;
-      if (i < count) set |= Index{1} << coming[i];
+      if (i < count) set |= bit(coming[i]);
     }
+    if (!all) {
+      on.setZero();
+      shares.setZero();
+    }
+    return all;
+  }
+
+ private:
+  static std::uint64_t bit(Index k) { return std::uint64_t{1} << k; }
+
+  // Which of the sets has these parts; their number: none.
+  Index place_of(std::uint64_t set) const {
+    for (Index s = 0; s < on.size(); ++s) {
+      std::uint64_t own = 0;
+      for (Index k = 0; k < presences.size(); ++k)
+        if (members(s, k)) own |= bit(k);
+      if (own == set) return s;
+    }
+    return on.size();
   }
 };
 

@@ -35,21 +35,61 @@ struct KeepPart {
 
 struct MixParts {
   static constexpr const char* doc =
-      "The weighted mean of what parts deliver, which not even by rounding leaves their range: "
-      "whether each has kept something.";
-  In<'k'> shares;
-  In<'k', 'm'> parts;
-  Ints<'k'> kept;
+      "The weighted mean of what parts deliver, which not even by rounding leaves their range, "
+      "with "
+      "the worst status: whether each that has a share has kept something.";
+  In<'s'> shares;      // of each set of tasks
+  In<'l'> limits;      // of each set of limits
+  In<'k', 'm'> parts;  // of each set of tasks within each set of limits
+  Ints<'k'> kept, statuses;
+  std::int64_t limited;  // the status of a part that is the nearest within limits
   Out<'m'> mean;
+  OutInts<1> worst;
 
-  void check() const { check_at_least("parts", parts.rows(), 1); }
+  void check() const {
+    if (parts.rows() != shares.size() * limits.size())
+      throw std::invalid_argument("parts needs a row for each set of tasks and of limits");
+  }
   bool operator()() {
-    if ((kept.array() == 0).any()) return false;
-    for (Index i = 0; i < mean.size(); ++i) {
-      const double x = parts.col(i).dot(shares);
-      mean[i] = std::clamp(x, parts.col(i).minCoeff(), parts.col(i).maxCoeff());
+    worst[0] = 0;
+    bool any = false;
+    for (Index k = 0; k < parts.rows(); ++k) {
+      if (share(k) == 0.0) continue;
+      if (kept[k] == KeepPart::NEITHER) return false;
+      any = true;
+      const std::int64_t own = kept[k] == KeepPart::NEAREST ? limited : statuses[k];
+      worst[0] = std::max(worst[0], own);
     }
+    if (!any) return false;
+    for (Index i = 0; i < mean.size(); ++i) mean[i] = mixed(i);
     return true;
+  }
+
+ private:
+  double share(Index k) const { return shares[k / limits.size()] * limits[k % limits.size()]; }
+
+  double mixed(Index i) const {
+    double sum = 0.0, least = 0.0, most = 0.0;
+    bool first = true;
+    for (Index k = 0; k < parts.rows(); ++k) {
+      if (share(k) == 0.0) continue;
+      const double x = parts(k, i), own = share(k) * x;
+      sum = first ? own : sum + own;
+      least = first ? x : std::min(least, x);
+      most = first ? x : std::max(most, x);
+      first = false;
+    }
+    return std::clamp(sum, least, most);
+  }
+};
+
+struct HasShare {
+  static constexpr const char* doc = "Which of several have a share.";
+  In<'n'> shares;
+  OutInts<'n'> on;
+
+  void operator()() {
+    for (Index k = 0; k < on.size(); ++k) on[k] = shares[k] > 0.0;
   }
 };
 

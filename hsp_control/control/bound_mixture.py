@@ -1,85 +1,226 @@
 """A step of several sets of tasks or of limits that are mixed, as one call."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping, Sequence
+from itertools import chain
+from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from hsp_control import engine
-from hsp_control.common.arrays import Array
+from hsp_control.common.arrays import Array, Indices
 from hsp_control.control.active_stack import ActiveStack
 from hsp_control.control.actuation import Actuation, Delivered
-from hsp_control.control.actuation.limited_step import EXACT, LIMITED
-from hsp_control.engine import Plan
-from hsp_control.engine.plans import PartCall, Step, planned
+from hsp_control.control.actuation.actuation import Kept
+from hsp_control.control.actuation.limited_step import EXACT, LIMITED, STATUSES
+from hsp_control.control.actuation.limits_in_force import LimitsInForce
+from hsp_control.control.actuation.support import Support
+from hsp_control.control.planned import PlannedTask
+from hsp_control.engine import OnlyIf, Plan
+from hsp_control.engine.plans import TIME, PartCall, PartCalls, Step, planned
+from hsp_control.robot import RobotState
+
+Shares = Sequence[tuple[float, ActiveStack]]
+"""The share of each set of contacts and tasks that is active, and its stack."""
+
+
+class Choice(NamedTuple):
+    """Which sets of contacts and tasks a step resolves; see `Mixture`."""
+
+    # which tasks fade, and which of them each stack has
+    fading: Sequence[PlannedTask]
+    members: Mapping[ActiveStack, Sequence[bool]]
+    at: Callable[[float], Shares]  # the same, chosen in Python
+    native: (
+        bool  # whether the engine can: no contact fades, and no schedule is followed
+    )
 
 
 class BoundMixture:
     """The law of each set of tasks within each set of limits, and the weighted mean.
 
-    It is one call, where each part is M a + N or the solution of one QP. Elsewhere
-    `Mixture` makes the step, part by part.
-
-    Attributes:
-        stacks: The sets of tasks, in order of the mixture.
+    All is one call, wherever each part delivers M a + N or what one QP finds, also with
+    contacts: it evaluates what changes, chooses the sets that have a share, makes their
+    parts, and mixes them. Elsewhere `Mixture` makes the step, part by part.
     """
+
+    free = None  # the engine's loop makes no such steps
 
     def __init__(
         self,
-        effort: Array,
-        stacks: Sequence[ActiveStack],
-        actuations: Sequence[Actuation],
+        state: RobotState,
+        choice: Choice,
+        actuation: Callable[[ActiveStack, int], Actuation],
+        limits: LimitsInForce,
+        origin: Array,
+        evolving: Sequence[Step],
     ) -> None:
         """Bind the calls.
 
         Args:
-            effort: Where M a + N is written, shape (nv,) [N·m or N].
-            stacks: The sets of tasks.
-            actuations: The actuations of the law of each of them, within each set of
-                limits: those of the first one first. No contact is active.
+            state: The state that it moves.
+            choice: The sets of contacts and tasks.
+            actuation: Returns what delivers the law of a stack within a set of limits,
+                by its index.
+            limits: The sets of limits.
+            origin: What the clock of its calls reads at time 0, shape (1,) [s].
+            evolving: The calls that write what changes, at a time.
         """
-        self.stacks, self._first = tuple(stacks), actuations[0]
-        nv, count = len(effort), len(actuations)
-        self._shares, parts = np.zeros(count), np.zeros((count, 2 * nv))
-        self._kept, mean = np.zeros(count, dtype=np.int64), np.zeros(2 * nv)
-        self._single = count == 1
-        each = count // len(stacks)
-        steps: list[Step] = []
-        for k, actuation in enumerate(actuations):
-            if k % each == 0:
-                steps += stacks[k // each].calls
-            steps += actuation.calls()
-            keep = actuation.keeping(
-                parts[k, :nv], parts[k, nv:], self._kept[k : k + 1]
-            )
-            steps += planned([keep]).steps()
+        self.state, self._choice = state, choice
+        # in this order those with a share follow one another, each with one more part
+        self._stacks = sorted(choice.members, key=_size)
+        self._places = {each: k for k, each in enumerate(self._stacks)}
+        count, many = len(self._stacks), len(limits.all)
+        self._shares, self._on = np.zeros(count), np.zeros(count, dtype=np.int64)
+        self._whole = whole = _Placed([each.support for each in self._stacks])
+        nv = state.robot.nv
+        parts = np.zeros((count * many, 2 * nv + whole.size))
+        mean = np.zeros(parts.shape[1])
+        which, statuses = np.zeros((2, count * many), dtype=np.int64)
+        self._worst = np.zeros(1, dtype=np.int64)
+        within = np.ones(many, dtype=np.int64)  # which sets of limits are in force
+        begin: list[PartCall] = []
+        if many > 1:
+            begin.append(PartCall(engine.HasShare, shares=limits.shares, on=within))
+        steps = [*evolving, *planned([*begin, *self._choosing()]).steps()]
+        self.rehearsed: list[Plan] = []  # all parts, whether or not they have a share
+        self._actuations: list[list[Actuation]] = []
+        for s, stack in enumerate(self._stacks):
+            made = [*stack.calls]
+            self._actuations.append([])
+            for k in range(many):
+                one, own = slice(s * many + k, s * many + k + 1), actuation(stack, k)
+                self._actuations[s].append(own)
+                part, forces = parts[one.start], np.zeros(stack.support.size)
+                at = part[:nv], part[nv : 2 * nv], forces
+                kept = own.keeping(*at, Kept(which[one], statuses[one]))
+                places = whole.placing(stack.support, forces, part[2 * nv :])
+                calls = [*own.calls, *planned([kept, *places]).steps()]
+                if many > 1:
+                    plan = Plan(calls)
+                    calls = [OnlyIf(calls=plan, condition=within[k : k + 1])]
+                    self.rehearsed.append(plan)
+                made += calls
+            self.rehearsed.append(Plan(made))
+            condition = self._on[s : s + 1]
+            steps.append(OnlyIf(calls=self.rehearsed[-1], condition=condition))
         mix = PartCall(
             engine.MixParts,
             shares=self._shares,
+            limits=limits.shares,
             parts=parts,
-            kept=self._kept,
+            kept=which,
+            statuses=statuses,
+            limited=int(LIMITED),
             mean=mean,
+            worst=self._worst,
         )
-        self._make = Plan([*steps, *planned([mix]).steps()])
-        none = self._first.own.forces
-        self._mean = Delivered(mean[nv:], mean[:nv], none, EXACT, 0.0)
-        self._limited = self._mean._replace(status=LIMITED)
+        steps += planned([mix]).steps()
+        self.move = state.bind_move(steps, origin)
+        self._move = self.move.__call__
+        self.active, self.damped = self._stacks[-1], ""
+        self._limits = limits
+        self._mean = Delivered(mean[nv : 2 * nv], mean[:nv], mean[2 * nv :], EXACT, 0.0)
 
-    def make(self, t: float, shares: Sequence[float]) -> Delivered | None:
-        """Return the result at the state and its time [s]; None: use Python.
+    def _choosing(self) -> PartCalls:
+        """Return the calls that choose the sets, and write their shares."""
+        choice = self._choice
+        if not choice.native:
+            return [PartCall(self._choose, t=TIME)]
+        members = [choice.members[each] for each in self._stacks]
+        shape = len(self._stacks), len(choice.fading)
+        presences = np.zeros(len(choice.fading))
+        chosen = PartCall(
+            engine.ChooseSets,
+            presences=presences,
+            members=np.array(members, dtype=np.int64).reshape(shape),
+            on=self._on,
+            shares=self._shares,
+        )
+        present = [
+            each.presence.call(presences[k : k + 1])
+            for k, each in enumerate(choice.fading)
+        ]
+        return [*present, chosen]
 
-        Args:
-            t: The time.
-            shares: The share of each part, in the order of the actuations; their sum
-                is 1.
-        """
-        self._shares[:] = shares
-        if not self._make(t):
+    def _choose(self, t: float) -> None:
+        self._on[:], self._shares[:] = 0, 0.0
+        for share, stack in self._choice.at(t):
+            place = self._places.get(stack)
+            if place is None:  # Python has to make the step
+                self._on[:], self._shares[:] = 0, 0.0
+                return
+            self._on[place], self._shares[place] = 1, share
+
+    def make(self, t: float, q: ArrayLike, v: ArrayLike) -> Delivered | None:
+        """Move to a state; return what is delivered there; None: Python has to."""
+        mixed = self._move(t, q, v)
+        if mixed is None:  # refused: lists, for example, or what is not valid
+            mixed = self.state.advance(self.move, t, q, v)
+        if not mixed:
             return None
-        limited = LIMITED_PART in self._kept.tolist()
-        if self._single:
-            return self._first.nearest if limited else self._first.own
-        return self._limited if limited else self._mean
+        self.damped = ""
+        for share, stack in zip(self._shares.tolist(), self._stacks, strict=True):
+            if share:
+                self.active, stack.share = stack, share
+                self.damped = self.damped or stack.damped
+        delivered, status = self._mean, self._worst.item()
+        if delivered.forces.size:
+            columns = self._whole.columns(self.active.support)
+            delivered = delivered._replace(forces=delivered.forces[columns])
+        if status == 0:
+            return delivered
+        return delivered._replace(status=STATUSES[status], relaxation=self._relaxation)
+
+    @property
+    def _relaxation(self) -> float:
+        """The largest violation of a relaxed limit [rad/s² or m/s²]."""
+        shares = self._limits.shares.tolist()
+        return max(
+            own.relaxation
+            for on, made in zip(self._on.tolist(), self._actuations, strict=True)
+            for share, own in zip(shares, made, strict=True)
+            if on and share
+        )
+
+    def rehearse(self, t: float) -> None:
+        """Make the calls of all parts, whether or not they have a share."""
+        for each in self.rehearsed:
+            each(t)
 
 
-LIMITED_PART = 2
-"""The engine's status of a part that a QP has limited (``KeepPart``)."""
+class _Placed:
+    """The forces of the contacts of several stacks, one after another."""
+
+    def __init__(self, supports: Sequence[Support]) -> None:
+        """Give each contact its place."""
+        self._places: dict[int, slice] = {}  # by the contact's identity
+        self._columns: dict[Support, Indices] = {}
+        self.size = 0
+        for each in supports:
+            for contact, points in zip(each.contacts, each.points, strict=True):
+                if id(contact) not in self._places:
+                    end = self.size + 3 * (points.stop - points.start)
+                    self._places[id(contact)] = slice(self.size, end)
+                    self.size = end
+        for each in supports:
+            places = [self._places[id(contact)] for contact in each.contacts]
+            columns = [np.arange(place.start, place.stop) for place in places]
+            self._columns[each] = np.array([*chain(*columns)], dtype=np.int64)
+
+    def columns(self, own: Support) -> Indices:
+        """Return where the forces of some contacts are among those of all."""
+        return self._columns[own]
+
+    def placing(self, own: Support, forces: Array, out: Array) -> list[PartCall]:
+        """Return the calls that copy forces of some contacts to those of all."""
+        calls = []
+        for contact, points in zip(own.contacts, own.points, strict=True):
+            here = slice(3 * points.start, 3 * points.stop)
+            place = self._places[id(contact)]
+            calls.append(PartCall(engine.Copy, x=forces[here], out=out[place]))
+        return calls
+
+
+def _size(stack: ActiveStack) -> tuple[int, int]:
+    return len(stack.contacts), len(stack.stacked)

@@ -12,7 +12,7 @@ from hsp_control.control.actuation import Actuation, Delivered
 from hsp_control.control.actuation.actuation import LimitsOutcome
 from hsp_control.control.actuation.limited_step import BEYOND, RELAXED
 from hsp_control.control.actuation.limits_in_force import LimitsInForce
-from hsp_control.engine import Move, Plan
+from hsp_control.engine import Move
 from hsp_control.engine.plans import Step
 from hsp_control.law.outcome import LawOutcome
 from hsp_control.robot import RobotState
@@ -21,7 +21,8 @@ from hsp_control.robot import RobotState
 class BoundStep:
     """A step of the same tasks, contacts and limits, from the state on, as one call.
 
-    It reads gains, K_N, payloads and tools where they are in force: these may change.
+    It reads gains, K_N, payloads and tools where they are in force; while these change,
+    it begins with the calls that write them.
     """
 
     def __init__(
@@ -31,14 +32,14 @@ class BoundStep:
         actuation: Actuation,
         limits: LimitsInForce,
         origin: Array,
+        evolving: Sequence[Step] = (),
     ) -> None:
         self.active = active
         self.damped = ""  # tasks of the first level with a bounded inverse, by name
         # whether the effort is M a + N wherever no limit is violated
         self.direct = actuation.direct
-        calls = [*active.calls, *actuation.calls()]
+        calls = [*evolving, *active.calls, *actuation.calls]
         self.move = state.bind_move(calls, origin)
-        self._here = Plan(calls)  # the same, without the move of the state
         self._move = self.move.__call__  # bound once: half the time of a look-up
         self._own = actuation.own  # the result for the law's own acceleration
         self._nearest, self._is_nearest = actuation.nearest, actuation.is_nearest
@@ -59,12 +60,6 @@ class BoundStep:
         self.damped = ""
         return self._own if plain and self.direct else self._looked_at()
 
-    def make_here(self, t: float) -> Delivered:
-        """Return the result at the present state, at its time t [s]."""
-        plain = self._here(t)
-        self.damped = ""
-        return self._own if plain and self.direct else self._looked_at()
-
     def _looked_at(self) -> Delivered:
         """Return the result of a step in which the law's acceleration is limited."""
         if self._is_nearest.item():
@@ -76,6 +71,9 @@ class BoundStep:
             self.damped = active.damped
         if self.direct and not (limits.violated.item() or limits.beyond.item()):
             return self._own
+        carried = self.actuation.carried
+        if carried is not None and not carried.delivered.delivered.item():
+            active.raise_not_finite()
         delivered = self.actuation.delivered(active.acceleration)
         status = delivered.status
         if status is RELAXED or status is BEYOND:

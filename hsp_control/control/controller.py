@@ -13,6 +13,7 @@ from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import ControllerError, NonFiniteError
 from hsp_control.control.active_stack import ActiveStack
 from hsp_control.control.actuation import Actuation
+from hsp_control.control.bound_mixture import BoundMixture
 from hsp_control.control.bound_step import BoundStep, FreeStep
 from hsp_control.control.changes import Change
 from hsp_control.control.commanded import Commanded
@@ -84,47 +85,54 @@ class Controller(Commanded):
                 that a step calls, such as a field, calls its own controller.
         """
         with self._lock:
-            now = self._in_force
-            whole = modifier is None and q is not None and v is not None
-            step = now.step if whole else None
-            moved = step is None or now.later is not None
-            if moved:
-                self._observe(t, q, v)  # the state
-                self._advance()  # to the values in force at its time
-                step = now.step if whole else None
-            if step is not None:  # all that follows is one call
-                delivered = (
-                    step.make_here(self._state.t) if moved else step.make(t, q, v)  # type: ignore[arg-type]
-                )
-                stack, damped = step.active, step.damped
-            else:
-                mixture = now.mixture
-                # references, the law, and its result within the limits
-                delivered = mixture.step(self._state.t, modifier)
-                stack, damped = self.active_stack, mixture.damped
-                stack.check(delivered.effort)
-                now.bind_step()
-            self._memory.acceleration = delivered.acceleration
-            return ControlOutput(delivered, stack, damped, now.limits.measured)
+            return self._step(t, q, v, modifier)
+
+    def _step(
+        self,
+        t: float | RobotState,
+        q: ArrayLike | None,
+        v: ArrayLike | None,
+        modifier: AccelerationModifier | None,
+    ) -> ControlOutput:
+        now, delivered = self._in_force, None
+        step = now.step
+        if step is None or modifier is not None or q is None or v is None:
+            self._observe(t, q, v)  # the state
+            self._advance()  # to what is in force at its time
+        else:
+            delivered = step.make(t, q, v)  # type: ignore[arg-type]
+            stack, damped = step.active, step.damped
+            now.mixture.active = stack
+        if delivered is None:
+            mixture = now.mixture
+            # references, the law, and what it delivers within the limits
+            delivered = mixture.step(self._state.t, modifier)
+            stack, damped = self.active_stack, mixture.damped
+            stack.check(delivered.effort)
+            now.bind_step()
+        self._memory.acceleration = delivered.acceleration
+        output = ControlOutput(delivered, stack, damped, now.limits.measured)
+        if now.later is not None:
+            now.passed(self._state.t)
+        return output
 
     def _rehearse(self) -> None:
         # To make a change takes milliseconds, after which the processor's caches hold
         # nothing of a step, and the next one would cost many times as much.
-        memory, now = self._memory, self._in_force
-        # of the last step, whose arrays the calls write
-        memory.acceleration = memory.acceleration.copy()
+        memory, now, state = self._memory, self._in_force, self._state
+        origin, q, v = memory.origin.item(), state.q.copy(), state.v.copy()
         active, damped = now.mixture.active, now.mixture.damped
-        # A failure here occurs in the step as well, which reports it, or not yet.
-        with suppress(Exception):
+        # What fails here fails in a step as well, which says so, or is not there yet.
+        with memory.kept(), suppress(Exception):
             for _ in range(_REHEARSALS):
-                now.mixture.rehearse(self._state.t)
-                self._advance()
-                delivered = (
-                    now.mixture.step(self._state.t, None)
-                    if now.step is None
-                    else now.step.make_here(self._state.t)
-                )
-                ControlOutput(delivered, self.active_stack, "", now.limits.measured)
+                now.mixture.rehearse()
+                if isinstance(now.step, BoundMixture):
+                    now.step.rehearse(state.t)
+                tau = self._step(origin + state.t, q, v, None).tau
+                if memory.sent.period:
+                    self.applied(tau, memory.sent.period)
+        now.limits.update()  # from the last effort
+        now.gains.write_all(state.t)
         now.mixture.active, now.mixture.damped = active, damped
 
     def _observe(
@@ -358,7 +366,8 @@ class Controller(Commanded):
     def _settled_step(self) -> BoundStep | None:
         """The step while nothing changes, the same object; None while it does."""
         now = self._in_force
-        return now.step if now.later is None else None
+        step = now.step if now.later is None else None
+        return step if isinstance(step, BoundStep) else None
 
     # -- its diagnosis ----------------------------------------------------------------
 

@@ -6,7 +6,9 @@ from typing import Generic, TypeVar
 
 import numpy as np
 
+from hsp_control import engine
 from hsp_control.common.arrays import Array
+from hsp_control.engine.plans import TIME, PartCall, PartCalls
 from hsp_control.null_space.fields.weight import Weight
 from hsp_control.robot import RobotState
 from hsp_control.trajectories.schedule import smooth_step
@@ -108,6 +110,32 @@ class Evolution(Generic[Value]):
                 x = x + s * away
         return x, x_dot, x_ddot
 
+    def call(self, x: Array, rate: Array | None = None) -> PartCall:
+        """Return the call that writes x(t), and x'(t), at a time.
+
+        Args:
+            x: Where it writes the value, which has n numbers.
+            rate: Where it writes the rate, likewise; None: it is not kept.
+        """
+        steps = self.transitions
+        targets = [np.ravel(each.target) for each in steps]
+        times = [(each.start, each.ramp) for each in steps]
+        return PartCall(
+            engine.Evolve,
+            initial=np.array(self.initial, dtype=float).reshape(-1),
+            targets=np.array(targets, dtype=float).reshape(len(steps), x.size),
+            times=np.array(times, dtype=float).reshape(len(steps), 2),
+            count=np.array([len(steps)]),
+            least=-np.inf,
+            most=np.inf,
+            cone=np.zeros((0, x.size)),
+            definite=0,
+            x=x.reshape(-1),
+            rate=np.zeros(x.size) if rate is None else rate.reshape(-1),
+            ramp=np.zeros(1),
+            t=TIME,
+        )
+
     def settled(self, t: float) -> "Evolution[Value]":
         """Return the evolution for times from t on: complete transitions are folded."""
         done = [k for k, each in enumerate(self.transitions) if each.end <= t]
@@ -127,6 +155,12 @@ class EvolvingWeight(Weight):
     def constant(self) -> bool:
         """Whether w never changes."""
         return self.evolution.constant
+
+    def calls(self, time: Array) -> tuple[PartCalls, Array]:
+        """Return the calls that write w and w'; see `Weight.calls`."""
+        del time  # that of the plan
+        weight = np.zeros(2)
+        return [self.evolution.call(weight[:1], weight[1:])], weight
 
     def sample(self, state: RobotState) -> tuple[float, float]:
         """Return w and w'; see `Weight.sample`."""

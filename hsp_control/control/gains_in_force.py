@@ -11,6 +11,7 @@ for the period h, then has the transition
     x(h) = x + h x' + ½ h² x'',     x'(h) = x' + h x''.
 """
 
+from collections.abc import Mapping
 from typing import NamedTuple
 
 import numpy as np
@@ -24,6 +25,7 @@ from hsp_control.control.memory import RunMemory, Waiting
 from hsp_control.control.planned import PlannedTask
 from hsp_control.control.setup import Setup
 from hsp_control.declaration import within
+from hsp_control.engine.plans import TIME, PartCall, PartCalls
 from hsp_control.robot import RobotState
 from hsp_control.tasks import Task
 from hsp_control.tasks.compliant_task import impedance_of
@@ -37,6 +39,8 @@ _ROUNDING = 1e-7
 
 class GainsInForce:
     """Gains and impedances of the tasks, their offsets, and K_N, now."""
+
+    calls: PartCalls  # those that write what changes, at a time
 
     def __init__(self, nv: int, memory: RunMemory) -> None:
         self._memory, self._waiting = memory, memory.waiting
@@ -52,7 +56,8 @@ class GainsInForce:
 
     def plan(self, setup: Setup, t: float) -> None:
         """Follow a setup from now on; t is the present time [s]."""
-        self.go_over_to(self.planned(setup), t)
+        self.go_over_to(self.planned(setup))
+        self.write_all(t)
 
     def planned(self, setup: Setup) -> "PlannedGains":
         """Return the gains of a setup, which may be followed later."""
@@ -68,24 +73,19 @@ class GainsInForce:
             if impedance_of(each.task) is not None
         }
         changing = any(changes_impedance(each.task, each.gains) for each in setup.tasks)
-        return PlannedGains(setup, tasks, feedback, followed, changing)
+        calls = self._evolving(setup, feedback)
+        if changing:
+            calls.append(PartCall(self._write_impedances, t=TIME))
+        return PlannedGains(setup, tasks, feedback, followed, changing, calls)
 
-    def go_over_to(self, planned: "PlannedGains", t: float) -> object:
-        """Follow it from now on; t is the present time [s].
-
-        Returns:
-            The owner of the previous arrays.
-        """
+    def go_over_to(self, planned: "PlannedGains") -> object:
+        """Follow it from now on; return what was followed before."""
         before = self._tasks, self.feedback, self._followed
-        self._setup, self._tasks, self.feedback, self._followed, self._changing = (
-            planned
-        )
+        self._setup, self._tasks, self.feedback, self._followed, *_ = planned
+        self._changing, self.calls = planned.changing, planned.calls
         for kept in (self._waiting, self._memory.offsets):
             for key in kept.keys() - self._tasks.keys():
                 del kept[key]
-        self._written: set[int] = set()
-        self._gain_written = False
-        self.write(t)
         return before
 
     def _follower(
@@ -108,17 +108,33 @@ class GainsInForce:
         feedback = in_force.feedback._replace(offset=offsets[key])
         return in_force._replace(feedback=feedback)
 
-    def write(self, t: float) -> None:
-        """Write the gains of a time [s]."""
-        for each in self._setup.tasks:  # constant gains are written once
-            if not (each.gains.constant and each.key in self._written):
-                waits = self._waiting.get(each.key)
-                numbers = each.gains.at(t) if waits is None else waits.numbers
-                self.feedback[each.key].numbers[:] = numbers
-        self._written = set(self._tasks)
-        if not (self._gain_written and self._setup.gain.constant):
-            self.null_space[:] = self._setup.gain.at(t)
-            self._gain_written = True
+    def _evolving(
+        self, setup: Setup, feedback: Mapping[int, FeedbackInForce]
+    ) -> list[PartCall]:
+        """Return the calls of a setup that write what changes, but for impedances."""
+        calls = list[PartCall]()
+        for each in setup.tasks:
+            if impedance_of(each.task) is None and not each.gains.constant:
+                calls.append(each.gains.call(feedback[each.key].numbers))
+        if not setup.gain.constant:
+            calls.append(setup.gain.call(self.null_space))
+        return calls
+
+    def write_all(self, t: float) -> None:
+        """Write the gains of a time [s], also those that are constant."""
+        for each in self._setup.tasks:
+            self._write_task(each, t)
+        self.null_space[:] = self._setup.gain.at(t)
+
+    def _write_impedances(self, t: float) -> None:
+        for each in self._setup.tasks:
+            if changes_impedance(each.task, each.gains):
+                self._write_task(each, t)
+
+    def _write_task(self, planned: PlannedTask, t: float) -> None:
+        waits = self._waiting.get(planned.key)
+        numbers = planned.gains.at(t) if waits is None else waits.numbers
+        self.feedback[planned.key].numbers[:] = numbers
 
     @property
     def stiffening(self) -> bool:
@@ -167,6 +183,7 @@ class PlannedGains(NamedTuple):
     feedback: dict[int, FeedbackInForce]  # by key
     followed: dict[int, FollowedImpedance]  # by key, of those with an impedance
     changing: bool  # whether an impedance changes
+    calls: PartCalls  # those that write what changes, at a time
 
 
 def changes_impedance(task: Task, numbers: Evolution[Array]) -> bool:

@@ -5,6 +5,7 @@ from typing import NamedTuple
 import numpy as np
 
 from hsp_control.control.actuation.limits_in_force import LimitsAt, LimitsInForce
+from hsp_control.control.bound_mixture import BoundMixture
 from hsp_control.control.bound_step import BoundStep
 from hsp_control.control.changes import TimeLine
 from hsp_control.control.declared import DeclaredController
@@ -14,6 +15,8 @@ from hsp_control.control.mixture import Mixture
 from hsp_control.control.model_in_force import ModelInForce
 from hsp_control.control.setup import Setup
 from hsp_control.control.tools_in_force import ToolsInForce
+from hsp_control.engine import Plan
+from hsp_control.engine.plans import planned
 from hsp_control.robot import RobotState
 
 MEMORY = 1.0
@@ -24,17 +27,16 @@ earlier times than the last one."""
 class InForce:
     """The part of a time line in force now, and the step that is bound for it.
 
-    Gains, limits, model and tools are arrays that the calls of a step read; `advance`
-    writes those of a time. The calls of steps are bound in `follow`, after a change,
-    also for the time when all changes are over.
+    Gains, limits, model and tools are arrays that the calls of a step read, and while
+    they change it begins with those that write them. What steps call is bound in
+    `follow`, when a change is made, also for the time when all changes are over.
     """
 
     time_line: TimeLine
     setup: Setup  # that of the time line
     limits: LimitsInForce
     mixture: Mixture
-    # the step as one call, while the same tasks and contacts are active
-    step: BoundStep | None
+    step: BoundStep | BoundMixture | None  # as one call; None: Python makes it
     later: "AfterChanges | None"  # once all changes are over; None: nothing changes
 
     def __init__(
@@ -46,7 +48,8 @@ class InForce:
         self.tools = ToolsInForce(state)
         self.step = None
         self.later = None
-        self._over: tuple[object, ...] | None = None  # no longer followed
+        self._tried = False  # whether to bind the step was tried
+        self._over: tuple[object, ...] | None = None  # what is not followed any more
 
     def begin(self, time_line: TimeLine) -> None:
         """Make all that computes, and follow a time line."""
@@ -64,11 +67,14 @@ class InForce:
         self._plan(time_line)
         self.model.plan(self.setup.payloads, self.setup.gravity, self.latest)
         self.tools.plan(self.setup.tools, self.latest)
+        calls = *self.gains.calls, *self.limits.calls, *self.model.calls
+        self._evolving = [*planned(calls).steps(), *self.tools.steps]
+        self._write = Plan(self._evolving)
         self.mixture = self.mixture.following(self.setup)
-        self.later, step = None, None
+        self.later, self._tried, step = None, False, None
         if self._memory.begun:
             self.bind_ahead()
-            step = self.mixture.bound_step(self._memory.origin)
+            step = self._bound_step()
         self._go_on(step)
 
     def go_over_to(self, time_line: TimeLine) -> None:
@@ -85,7 +91,7 @@ class InForce:
 
         Not before the first state: from it follow the motions that contacts leave free.
         """
-        time_line, mixture = self.time_line, self.mixture
+        time_line, mixture, self._tried = self.time_line, self.mixture, False
         if time_line.open or not mixture.steady:
             mixture.prepare(self.setup.instants(self.latest))
         if not time_line.open:
@@ -95,45 +101,50 @@ class InForce:
         following = mixture.following(over.setup)
         following.active = None  # a stack of before the change, which goes now
         following.prepare([end])
-        step = following.bound_step(self._memory.origin)
+        step = following.bound_step(self._memory.origin, [])
         gains = self.gains.planned(over.setup)
         limits = self.limits.planned(over.setup.limits, end)
         at = end + MEMORY
         self.later = AfterChanges(at, over, following, step, gains, limits)
 
     def advance(self, t: float) -> None:
-        """Write the values in force at a time [s]."""
+        """Write what is in force at a time [s]."""
+        if self.later is not None:
+            self.write(t)
+            self.passed(t)
+        self._memory.now = max(self._memory.now, t)
+
+    def passed(self, t: float) -> None:
+        """Go on without the changes, if they are over at the time of a step [s]."""
         memory, later = self._memory, self.later
         memory.now = max(memory.now, t)
-        if later is None:
+        if later is None or memory.now <= later.at:
             return
-        if memory.now <= later.at:
-            self.write(t)
-            return
-        # All changes are over: go on without them. The final values of model and tools
-        # stay written; their calls are bound anew with the next change.
-        self.model.write(t)
-        self.tools.write(t)
-        # To free it takes longer than a step: the next change does.
+        # What is in force is written. The next change binds the calls of the model and
+        # the tools anew, and frees what is left here: to free it takes longer than a
+        # step.
         over = self.time_line, self.setup, self.mixture, self.step, later
         self.time_line, self.setup = later.time_line, later.time_line.setup
-        gains = self.gains.go_over_to(later.gains, t)
+        gains = self.gains.go_over_to(later.gains)
         self._over = *over, gains, self.limits.go_over_to(later.limits)
-        later.mixture.active = self.mixture.active
-        self.mixture, self.later = later.mixture, None
-        self._go_on(later.step)
+        active = self.mixture.active  # of the last step
+        self.mixture, self.step, self.later = later.mixture, later.step, None
+        self.mixture.active = active
 
     def write(self, t: float) -> None:
         """Write the gains, the limits, the model and the tools of a time [s]."""
-        self.gains.write(t)
-        self.limits.write(t)
-        self.model.write(t)
-        self.tools.write(t)
+        self._write(t)
+        self.tools.forget()
 
     def bind_step(self) -> None:
         """Bind the step as one call, after the first one, if there is none yet."""
-        if self.step is None:
-            self.step = self.mixture.bound_step(self._memory.origin)
+        if self.step is None and not self._tried:
+            self.step = self._bound_step()
+
+    def _bound_step(self) -> BoundStep | BoundMixture | None:
+        self._tried = True
+        steps = self._evolving if self.later else []
+        return self.mixture.bound_step(self._memory.origin, steps)
 
     @property
     def kept(self) -> TimeLine:
@@ -156,9 +167,9 @@ class InForce:
         self.gains.plan(setup, t)
         self.limits.plan(setup.limits, t)
 
-    def _go_on(self, step: BoundStep | None) -> None:
+    def _go_on(self, step: BoundStep | BoundMixture | None) -> None:
         self.step = step
-        if step is not None:
+        if isinstance(step, BoundStep):
             self.mixture.active = step.active
 
 
@@ -168,6 +179,6 @@ class AfterChanges(NamedTuple):
     at: float  # from when on [s]
     time_line: TimeLine
     mixture: Mixture
-    step: BoundStep | None
+    step: BoundStep | BoundMixture | None
     gains: PlannedGains
     limits: LimitsAt

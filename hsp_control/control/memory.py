@@ -1,6 +1,8 @@
 """A controller's memory of its run: one record, to which everything else is bound."""
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager
+from copy import copy, deepcopy
 from dataclasses import dataclass, field
 from typing import NamedTuple
 
@@ -66,6 +68,20 @@ class RunMemory:
         for offset in (*self.offsets.values(), *self.forces.values()):
             offset[:] = 0.0
         self.clock, self.runs = ClockCheck(), self.runs + 1
+
+    @contextmanager
+    def kept(self) -> Iterator[None]:
+        """Take back what steps and sent efforts change, at the time of the last one."""
+        sent, clock, waiting = deepcopy(self.sent), copy(self.clock), {**self.waiting}
+        # of the last step, whose arrays the calls write
+        last, now = self.acceleration.copy(), self.now
+        try:
+            yield
+        finally:
+            self.sent.become(sent)
+            self.clock, self.acceleration, self.now = clock, last, now
+            self.waiting.clear()
+            self.waiting.update(waiting)
 
     def follow(self, streams: Iterable[StreamRun]) -> None:
         """Remember the streams that are followed now, and forget those that are not.

@@ -17,12 +17,13 @@ from hsp_control.control.active_stack import ActiveStack
 from hsp_control.control.actuation import Actuation, Delivered, Status
 from hsp_control.control.actuation.limits_in_force import LimitSet, LimitsInForce
 from hsp_control.control.actuation.support import Support
-from hsp_control.control.bound_mixture import BoundMixture
+from hsp_control.control.bound_mixture import BoundMixture, Choice
 from hsp_control.control.bound_step import BoundStep
 from hsp_control.control.fitting import priority_of
 from hsp_control.control.gains_in_force import GainsInForce
 from hsp_control.control.planned import PlannedContact, PlannedTask
 from hsp_control.control.setup import Setup
+from hsp_control.engine.plans import Step
 from hsp_control.law.outcome import DAMPED, NOT_FINITE
 from hsp_control.robot import Robot, RobotState
 
@@ -52,8 +53,6 @@ def _checked(found: object, robot: Robot) -> tuple[Array, Array | None]:
 _Active = tuple[frozenset[int], frozenset[tuple[int, int]]]
 """The contacts and the tasks that are active, by identity: to compare their values
 would cost more than the step."""
-_Mixed = tuple[tuple[ActiveStack, ...], tuple[LimitSet, ...]]
-"""The stacks and the sets of limits that are mixed."""
 
 
 class Mixture:
@@ -92,7 +91,6 @@ class Mixture:
         self._gains, self._threshold = gains, threshold
         self._stacks: dict[_Active, ActiveStack] = {}
         self._actuations: dict[tuple[ActiveStack, LimitSet], Actuation] = {}
-        self._bound: dict[_Mixed, BoundMixture | None] = {}
         self.field, self.active = setup.field, None
         self._follow(setup)
 
@@ -121,13 +119,11 @@ class Mixture:
             for (stack, limits), each in self._actuations.items()
             if stack in alive and id(limits.limits) in sets
         }
-        self._bound = {
-            (stacks, mixed): each
-            for (stacks, mixed), each in self._bound.items()
-            if alive.issuperset(stacks) and sets.issuperset(id(x.limits) for x in mixed)
-        }
         self._active: dict[tuple[tuple[int, ...], Set[int]], ActiveStack] = {}
+        # the stacks that were bound ahead, and which of the fading tasks each has
+        self._prepared: dict[ActiveStack, list[bool]] = {}
         self._fading = [each for each in setup.tasks if not each.always]
+        self._moving = [each for each in setup.contacts if not each.always]
         self.levels = _levels(setup.tasks, self._state.robot)
         self._same_sets = setup.steady
         self.steady = setup.steady and setup.limits.end == -np.inf
@@ -142,22 +138,9 @@ class Mixture:
     def step(self, t: float, modifier: AccelerationModifier | None) -> Delivered:
         """Resolve the law at the state and its time [s], and return the result.
 
-        Without a modifier it is one call, if it was bound; see `prepare`.
+        Part by part: for a modifier, and what no `BoundMixture` can deliver.
         """
-        sets = self._sets(t)
-        if modifier is None and self._bound:
-            limits = self._limits.sets
-            key = tuple([each for _, each in sets]), tuple([each for each, _ in limits])
-            if bound := self._bound.get(key):
-                shares = [share * of for share, _ in sets for _, of in limits]
-                if found := bound.make(t, shares):
-                    self._parts, self.damped = [*key[0]], ""
-                    for share, active in sets:
-                        active.share = share
-                        self.damped = self.damped or active.damped
-                    self.active = active
-                    return found
-        self._resolve(t, sets)
+        self._resolve(t, self._sets(t))
         return self._deliver(modifier)
 
     def resolve(self, t: float) -> None:
@@ -181,7 +164,7 @@ class Mixture:
         if self._only:
             return self._only
         tasks = [(each.weight(t), each) for each in self._fading]
-        contacts = [(each.share(t), each) for each in self._setup.contacts]
+        contacts = [(each.share(t), each) for each in self._moving]
         edges = {
             id(each): each.edge(t)
             for share, each in contacts
@@ -192,7 +175,8 @@ class Mixture:
         sets, on, share = list[tuple[float, ActiveStack]](), set[int](), 1.0
         for following, each in (*coming, _NOTHING):
             if share != following:
-                standing = [c for w, c in contacts if w >= 1.0 or id(c) in on]
+                lift = {id(c) for w, c in contacts if w < 1.0 and id(c) not in on}
+                standing = [c for c in self._setup.contacts if id(c) not in lift]
                 lifted = [edge for key, edge in edges.items() if key not in on]
                 off = [
                     task.key
@@ -238,16 +222,33 @@ class Mixture:
             mean[:nv], mean[nv : 2 * nv], mean[2 * nv :], worst, relaxation
         )
 
-    def bound_step(self, origin: Array) -> BoundStep | None:
-        """Return a step as one call; None if it may change.
+    def bound_step(
+        self, origin: Array, evolving: Sequence[Step]
+    ) -> BoundStep | BoundMixture | None:
+        """Return the step as one call; None: Python has to make some of it.
 
-        ``origin``: the reading of its calls' clock at time 0, shape (1,) [s].
+        Args:
+            origin: What the clock of its calls reads at time 0, shape (1,) [s].
+            evolving: The calls that write what changes, at a time.
         """
-        if not self.steady:
-            return None
-        ((_, stack),) = self._sets(0.0)  # at any time
-        actuation = self.actuation(stack, self._steady_limits)
-        return BoundStep(self._state, stack, actuation, self._limits, origin)
+        state, limits = self._state, self._limits
+        if self.steady:
+            ((_, stack),) = self._sets(0.0)  # at any time
+            actuation = self.actuation(stack, self._steady_limits)
+            return BoundStep(state, stack, actuation, limits, origin, evolving)
+
+        def within(stack: ActiveStack, k: int) -> Actuation:
+            return self.actuation(stack, limits.all[k])
+
+        for stack in self._prepared:
+            for k in range(len(limits.all)):
+                each = within(stack, k)
+                if not each.direct and each.carried is None:
+                    return None
+        unscheduled = all(each.task.schedule is None for each in self._fading)
+        native = unscheduled and not self._moving
+        choice = Choice(self._fading, self._prepared, self._sets, native)
+        return BoundMixture(state, choice, within, limits, origin, evolving)
 
     def stack_alone(self, without: Collection[str]) -> tuple[ActiveStack, Actuation]:
         """Return the stack without some tasks, and its actuation within the limits.
@@ -266,36 +267,16 @@ class Mixture:
     def prepare(self, times: Iterable[float]) -> None:
         """Bind the calls of steps at some times [s], now instead of in a step."""
         for t in times:
-            stacks = tuple(stack for _, stack in self._sets(t))
-            for stack in stacks:
-                self.bind(stack)
-            if not self.steady:
-                limits = tuple(self._limits.sets_at(t))
-                self._bind_mixture(stacks, limits)
-                for k in range(
-                    1, len(stacks) - 1
-                ):  # where it has no share: see `_sets`
-                    self._bind_mixture(stacks[:k] + stacks[k + 1 :], limits)
+            for _, stack in self._sets(t):
+                if stack not in self._prepared:
+                    self.bind(stack)
+                    own = {each.planned.key for each in stack.stacked}
+                    self._prepared[stack] = [each.key in own for each in self._fading]
 
-    def _bind_mixture(
-        self, stacks: tuple[ActiveStack, ...], limits: tuple[LimitSet, ...]
-    ) -> None:
-        """Bind a step in which these are mixed, if it can be one call."""
-        if (stacks, limits) in self._bound:
-            return
-        actuations = [self.actuation(one, each) for one in stacks for each in limits]
-        bound = None
-        if all(each.direct for each in actuations):
-            bound = BoundMixture(self._state.effort, stacks, actuations)
-        self._bound[stacks, limits] = bound
-
-    def rehearse(self, t: float) -> None:
-        """Make the calls of every mixture that is bound, at the state's time t [s]."""
-        for (stacks, limits), bound in self._bound.items():
-            count = len(stacks) * len(limits)
-            if bound is None or bound.make(t, [1.0 / count] * count) is None:
-                self._resolve(t, [(1.0 / len(stacks), each) for each in stacks])
-                self._deliver(None)
+    def rehearse(self) -> None:
+        """Solve the QPs where the last step has left them; nothing of it is used."""
+        for each in self._actuations.values():
+            each.rehearse()
 
     def bind(self, stack: ActiveStack) -> None:
         """Bind the calls of a step with a stack."""

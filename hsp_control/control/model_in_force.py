@@ -14,7 +14,7 @@ from hsp_control import engine
 from hsp_control.common.arrays import Array
 from hsp_control.control.evolution import Evolution
 from hsp_control.engine import Dynamics
-from hsp_control.engine.plans import PartCall, planned
+from hsp_control.engine.plans import TIME, PartCall, PartCalls, planned
 from hsp_control.robot import Robot
 
 
@@ -76,6 +76,11 @@ class ModelInForce:
             self._shares[:, k] = each.share.with_rates(t)
         self._change[:] = self._gravity.at(t) - self._own
         self._write()
+
+    @property
+    def calls(self) -> PartCalls:
+        """The call that lets the model be that of a time, while it changes."""
+        return [] if self._constant else [PartCall(self.write, t=TIME)]
 
     def _bind(self) -> None:
         bodies, count = [each.body for each in self._payloads], len(self._payloads)

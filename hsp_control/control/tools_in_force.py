@@ -13,7 +13,7 @@ import pinocchio as pin
 
 from hsp_control import engine
 from hsp_control.engine import Plan
-from hsp_control.engine.plans import PartCall, planned
+from hsp_control.engine.plans import PartCall, Step, planned
 from hsp_control.robot import RobotState
 from hsp_control.robot.kinematics import LocalMotion
 from hsp_control.trajectories import PoseTrajectory
@@ -33,7 +33,8 @@ class ToolsInForce:
     def __init__(self, state: RobotState) -> None:
         self._state, self._model = state, state.robot.model
         self._tools: Sequence[PlannedTool] = ()
-        self._move = Plan()  # writes the motions of all tools at a time [s]
+        # those that write the motions of all tools at a time [s]
+        self.steps: list[Step] = []
 
     def plan(self, tools: Sequence[PlannedTool], t: float) -> None:
         """Follow other changes from now on; t is the present time [s]."""
@@ -44,18 +45,20 @@ class ToolsInForce:
                 self._state.move_frame(each.frame, LocalMotion.fixed(placement))
         if [*map(id, tools)] != [*map(id, self._tools)]:
             self._tools = tools
-            self._move = self._bound()
+            self.steps = self._bound()
         self.write(t)
 
     def write(self, t: float) -> None:
         """Let the frames be where they are at a time [s], and move as they do then."""
-        if not self._tools:
-            return
-        self._move(t)
+        Plan(self.steps)(t)
+        self.forget()
+
+    def forget(self) -> None:
+        """Let the frames be computed anew at the same state."""
         for each in self._tools:
             self._state.forget_frame(each.frame)
 
-    def _bound(self) -> Plan:
+    def _bound(self) -> list[Step]:
         calls = []
         for each in self._tools:
             own = _placement(self._model, each.frame)
@@ -67,7 +70,7 @@ class ToolsInForce:
                 out=self._state.local_motion(each.frame),
             )
             calls.append(call)
-        return Plan(planned(calls).steps())
+        return planned(calls).steps()
 
 
 def _placement(model: pin.Model, frame: str) -> pin.SE3:

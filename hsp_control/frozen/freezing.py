@@ -182,7 +182,7 @@ def _bare(
             _: ActiveStack, actuation: Actuation, part: DeliveredAlone
         ) -> list[Step]:
             alone = state.plan(actuation.calls_alone(part)).steps()
-            return [*actuation.calls(), *alone]
+            return [*actuation.calls, *alone]
 
         record = state.plan([recorded]).steps()
         following = [*sets.calls(delivered, delivering), *record]

@@ -101,11 +101,16 @@ class TaskSets:
         on, shares = np.zeros(count, dtype=np.int64), np.zeros(count)
         accelerations, efforts = np.zeros((2, count, nv))
         statuses, finite, levels = np.zeros((3, count), dtype=np.int64)
+        # Bit k of a set's index is whether it has task k.
+        members = np.arange(count)[:, None] >> np.arange(len(self.names)) & 1
         choose = PartCall(
-            engine.ChooseSets, presences=self.presences, on=on, shares=shares
+            engine.ChooseSets,
+            presences=self.presences,
+            members=members,
+            on=on,
+            shares=shares,
         )
         steps = state.plan([choose]).steps()
-        # Bit k of a set's index is whether it has task k.
         for s, left in enumerate(product((False, True), repeat=len(self.names))):
             has = dict(zip(self.names, reversed(left), strict=True))
             one = slice(s, s + 1)

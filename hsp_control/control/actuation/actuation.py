@@ -14,6 +14,7 @@ Contacts and floating bases, and Limits.
 """
 
 from collections.abc import Callable
+from functools import cached_property
 from typing import Any, NamedTuple, Self
 
 import numpy as np
@@ -25,6 +26,7 @@ from hsp_control.control.actuation.limited_step import (
     BEYOND,
     EXACT,
     LIMITED,
+    STATUSES,
     Barriers,
     LimitedStep,
     QPOutcome,
@@ -84,6 +86,50 @@ class DeliveredAlone(NamedTuple):
         return cls(np.zeros(nv), np.zeros(nv), *integers)
 
 
+class Kept(NamedTuple):
+    """Which part of a mixture was kept, shape (1,) each."""
+
+    which: Indices  # 0: none, Python has to look
+    status: Indices  # the `Status` where contacts carry
+
+
+class CarriedStep:
+    """What the calls of a step deliver where contacts carry.
+
+    Attributes:
+        qp: What is solved where it is not exact.
+        exact: Whether the law's acceleration is delivered with the forces of minimum
+            norm, shape (1,).
+        redistribute: Whether it needs others, shape (1,).
+        nearest: Whether it has to change, shape (1,).
+        delivered: What is delivered, and its status.
+        forces: The forces, shape (p,) [N].
+    """
+
+    def __init__(self, qp: LimitedStep) -> None:
+        """Allocate the arrays that the calls write."""
+        self.qp = qp
+        self.exact, self.redistribute, self.nearest = np.zeros((3, 1), dtype=np.int64)
+        self.delivered = DeliveredAlone.allocate(len(qp.result.effort))
+        self.forces = np.zeros_like(qp.result.forces)
+
+    def result(self, a: Array, outcome: QPOutcome) -> Delivered:
+        """Return what is delivered for the law's acceleration a, shape (nv,)."""
+        own, forces = self.delivered, self.forces
+        if (number := own.status.item()) == 0:
+            return Delivered(own.tau, a, forces, EXACT, 0.0)
+        status, relaxation = STATUSES[number], self.relaxation(outcome)
+        if status is not Status.REDISTRIBUTED:
+            a = own.a
+        return Delivered(own.tau, a, forces, status, relaxation)
+
+    def relaxation(self, outcome: QPOutcome) -> float:
+        """Return the largest violation of a relaxed limit [rad/s² or m/s²]."""
+        if self.exact.item():
+            return 0.0
+        return np.inf if outcome.unsolved.item() else self.qp.found()[1]
+
+
 class Actuation:
     """Computes efforts and contact forces for one law, within one set of limits."""
 
@@ -123,6 +169,12 @@ class Actuation:
             self._qp = self._limited_step(0 if holding is None else len(holding.least))
             # the result where the QP was solved at once
             self.nearest = Delivered(*self._qp.result, LIMITED, 0.0)
+        # what the calls deliver where contacts carry; None: Python has to
+        self.carried: CarriedStep | None = None
+        if support.size:
+            support.bind(law)
+            if self._qp is not None and compiled and "barriers" not in self._rows:
+                self.carried = CarriedStep(self._qp)
 
     def _check(self) -> PartCall:
         """Return the call that compares a and M a + N with their bounds."""
@@ -184,18 +236,24 @@ class Actuation:
             )
         return calls
 
+    @cached_property
     def calls(self) -> list[Callable[[float], Any]]:
-        """Return the calls of the time that deliver the law's own acceleration.
+        """The calls of the time that deliver the law's own acceleration.
 
         The last one returns whether it is exact and within the limits: then, where
         `direct`, it is delivered with the effort M a + N. Else the law's outcome and
-        `outcome` report the violations. If a QP without forces and distances
-        suffices where a bound is violated, it is solved at once; `is_nearest` says
-        whether `nearest` is the result.
+        `outcome` say what is not so. If a QP without forces and distances is all that
+        is needed where a bound is violated, it is solved at once; `is_nearest` says
+        whether `nearest` is all that there is to deliver. Where contacts carry,
+        the last one returns whether `carried` has an effort.
         """
         law, wanted = self._law.acceleration, self._wanted
         begin = PartCall(engine.Copy, x=law, out=wanted.acceleration)
         calls: PartCalls = [begin, *self._checks]
+        if (carried := self.carried) is not None:
+            found = self._finding_forces(carried)
+            last = self._delivering_forces(carried, carried.delivered, carried.forces)
+            return self._state.plan([*calls, *found, last]).steps()
         # Of distances there may be hundreds, and each row costs time, used or not.
         if self._qp is not None and self.direct and "barriers" not in self._rows:
             keep = PartCall(engine.Copy, x=self._state.effort, out=wanted.effort)
@@ -212,14 +270,20 @@ class Actuation:
         calls = [*calls, plain]
         return self._state.plan(calls).steps()
 
-    def keeping(self, acceleration: Array, effort: Array, kept: Indices) -> PartCall:
-        """Return the call that stores the result, after `calls`.
+    def keeping(
+        self, acceleration: Array, effort: Array, forces: Array, kept: "Kept"
+    ) -> PartCall:
+        """Return the call that keeps what is delivered, after `calls`.
 
         Args:
             acceleration: Where it writes the acceleration, shape (nv,).
             effort: Where it writes the effort, shape (nv,) [N·m or N].
-            kept: Where it writes which it is, shape (1,): 0 where Python has to look.
+            forces: Where it writes the forces of contacts, shape (p,) [N].
+            kept: Where it writes which it is.
         """
+        if self.carried is not None:
+            alone = DeliveredAlone(acceleration, effort, kept.status, kept.which)
+            return self._delivering_forces(self.carried, alone, forces)
         return PartCall(
             engine.KeepPart,
             law=self._law.outcome,
@@ -231,7 +295,7 @@ class Actuation:
             nearest_effort=self.nearest.effort,
             acceleration=acceleration,
             effort=effort,
-            kept=kept,
+            kept=kept.which,
         )
 
     def calls_alone(self, delivered: "DeliveredAlone") -> PartCalls:
@@ -251,10 +315,18 @@ class Actuation:
         own = self._law.acceleration, self._state.effort
         return [*calls, self._delivering(qp, *own, delivered)]
 
-    def _calls_with_forces(self, delivered: "DeliveredAlone") -> PartCalls:
-        """Return those of `calls_alone` where contacts carry, the same at all times."""
+    def _calls_with_forces(self, delivered: DeliveredAlone) -> PartCalls:
+        """Return those of `calls_alone` where contacts carry."""
+        carried, calls = self.carried, list[AnyCall]()
+        if carried is None:  # `calls` leaves it to Python
+            rows = sum(len(each.least) for each in self._rows.values())
+            carried = CarriedStep(self._limited_step(rows))
+            calls = self._finding_forces(carried)
+        return [*calls, self._delivering_forces(carried, delivered, carried.forces)]
+
+    def _finding_forces(self, carried: "CarriedStep") -> list[AnyCall]:
+        """Return the calls that find the forces of contacts, or the nearest step."""
         wanted, support, bounds = self._wanted, self._support, self._limits.bounds
-        exact, redistribute, nearest = np.zeros((3, 1), dtype=np.int64)
         keep = PartCall(engine.Copy, x=self._state.effort, out=wanted.effort)
         decide = PartCall(
             engine.ForcesWithin,
@@ -266,38 +338,40 @@ class Actuation:
             tau=self._tau,
             tau_lower=bounds.tau_lower,
             tau_upper=bounds.tau_upper,
-            exact=exact,
-            redistribute=redistribute,
-            nearest=nearest,
+            exact=carried.exact,
+            redistribute=carried.redistribute,
+            nearest=carried.nearest,
         )
-        qp = self._limited_step(sum(len(each.least) for each in self._rows.values()))
-        deliver = PartCall(
+        solved = carried.qp.solved_if(carried.redistribute, carried.nearest, self._rows)
+        return [keep, *support.calls(wanted.effort, self._law), decide, *solved]
+
+    def _delivering_forces(
+        self, carried: "CarriedStep", delivered: DeliveredAlone, forces: Array
+    ) -> PartCall:
+        """Return the call that decides what is delivered where contacts carry."""
+        bounds, result = self._limits.bounds, carried.qp.result
+        return PartCall(
             engine.DeliverWithForces,
             law=self._law.outcome,
             limits=self.outcome,
             qp=self._qp_outcome,
-            exact=exact,
-            redistribute=redistribute,
+            exact=carried.exact,
+            redistribute=carried.redistribute,
             acceleration=self._law.acceleration,
             effort=self._tau,
-            nearest_acceleration=qp.result.acceleration,
-            nearest_effort=qp.result.effort,
-            base=support.base,
+            forces=self._support.forces,
+            nearest_acceleration=result.acceleration,
+            nearest_effort=result.effort,
+            nearest_forces=result.forces,
+            base=self._support.base,
             lower=bounds.tau_lower,
             upper=bounds.tau_upper,
             redistributed=int(Status.REDISTRIBUTED),
             relaxed=int(Status.RELAXED),
             beyond=int(BEYOND),
+            f=forces,
             **delivered._asdict(),
         )
-        solved = qp.solved_if(redistribute, nearest, self._rows)
-        return [
-            keep,
-            *support.calls(wanted.effort, self._law),
-            decide,
-            *solved,
-            deliver,
-        ]
 
     def calls_with_offset(
         self, a: Array, offset: Array, delivered: "DeliveredAlone"
@@ -368,10 +442,22 @@ class Actuation:
         """
         self._wanted.acceleration[:] = a
         self._check_wanted(self._state.t)
-        return self.delivered(a, offset)
+        return self._delivered(a, offset)
 
-    def delivered(self, a: Array, offset: Array | None = None) -> Delivered:
-        """Return the result, after `calls`; for the arguments see `deliver`."""
+    def delivered(self, a: Array) -> Delivered:
+        """Return what is delivered of the law's acceleration a (nv,), after `calls`."""
+        if self.carried is None:
+            return self._delivered(a, None)
+        return self.carried.result(a, self._qp_outcome)
+
+    @property
+    def relaxation(self) -> float:
+        """The largest violation of a relaxed limit, where contacts carry."""
+        if self.carried is None:
+            return 0.0
+        return self.carried.relaxation(self._qp_outcome)
+
+    def _delivered(self, a: Array, offset: Array | None) -> Delivered:
         delivered = self._within_limits(a, offset)
         if self.outcome.beyond.item():
             return delivered._replace(status=BEYOND)
@@ -409,6 +495,11 @@ class Actuation:
             tau[support.base] = 0.0
             return Delivered(tau, a, forces, EXACT, 0.0)
         return self._nearest(a, motion_ok, barriers)
+
+    def rehearse(self) -> None:
+        """Solve the QP where the last step has left it; nothing of it is used."""
+        if self._qp is not None:
+            self._qp.solve(False, {})
 
     def _barriers(self) -> Barriers:
         """Return the rows A a ≥ lower for barriers and static efforts, by kind."""

@@ -65,11 +65,14 @@ Measured = list[tuple[str, Callable[[], Array]]]
 
 
 class LimitsAt(NamedTuple):
-    """The limits in force at a time."""
+    """What `LimitsInForce` follows."""
 
-    all: list[tuple[LimitSet, Evolution[float]]]
-    sets: list[tuple[LimitSet, float]]
-    measured: Measured
+    all: list[LimitSet]  # the sets that are in force, or will be
+    evolutions: list[Evolution[float]]  # the share of each
+    shares: Array  # the same now, shape (sets,)
+    calls: PartCalls  # those that write them, at a time
+    rate: bool  # whether the effort's rate is limited
+    bars: bool  # whether there are barriers
 
 
 class LimitsInForce:
@@ -77,7 +80,16 @@ class LimitsInForce:
 
     Its only memory is of the last efforts, used where the effort's rate or the speed is
     limited.
+
+    Attributes:
+        all: The sets that are in force, or will be.
+        shares: The share of each, in [0, 1], shape (sets,).
+        calls: Those that write the shares of a time.
     """
+
+    all: list[LimitSet]
+    shares: Array
+    calls: PartCalls
 
     def __init__(
         self, state: RobotState, planned: PlannedLimits, memory: SentMemory
@@ -85,10 +97,9 @@ class LimitsInForce:
         self._state = state
         self.sent = SentEffort(state, memory)
         self._rate = True  # the last effort in the memory limits the next one
-        self._all: list[tuple[LimitSet, Evolution[float]]] = []
-        # each set in force, and its share in (0, 1]
-        self.sets: list[tuple[LimitSet, float]] = []
-        self.measured: Measured = []
+        self.all = []
+        self._planned: LimitsAt | None = None
+        self._measured: dict[tuple[bool, ...], Measured] = {}
         self.plan(planned, -np.inf)
 
     def plan(self, planned: PlannedLimits, t: float) -> None:
@@ -98,52 +109,63 @@ class LimitsInForce:
     def planned(self, planned: PlannedLimits, t: float) -> "LimitsAt":
         """Return the limits in force at a time [s], which may be later."""
         state, known = self._state, {id(each.limits): each for each in self.all}
-        all_of_them = [
-            (known.get(id(limits)) or LimitSet(limits, state, self.sent), share)
-            for limits, share in planned.sets
+        sets = [
+            known.get(id(limits)) or LimitSet(limits, state, self.sent)
+            for limits, _ in planned.sets
         ]
-        now = [(each, share.at(t)) for each, share in all_of_them]
-        sets = [pair for pair in now if pair[1] > 0.0]
-        return LimitsAt(all_of_them, sets, self._measured(sets))
+        evolutions = [share for _, share in planned.sets]
+        shares = np.array([share.at(t) for share in evolutions])
+        calls = [
+            share.call(shares[k : k + 1])
+            for k, share in enumerate(evolutions)
+            if not share.constant
+        ]
+        rate = any(each.rate for each in sets)
+        bars = any(each.limits and each.limits.barriers for each in sets)
+        return LimitsAt(sets, evolutions, shares, calls, rate, bars)
 
     def go_over_to(self, planned: "LimitsAt") -> object:
-        """Use these limits from now on; return the owner of the previous arrays."""
-        before = self._all, self.sets, self.measured
+        """Follow it from now on; return what held what was followed before."""
+        before = self._planned, self._measured
         if not self._rate:
             self.sent.forget_rate()
-        self._all, self.sets, self.measured = planned
-        self._rate = any(each.rate for each, _ in self._all)
+        self._planned, self._measured = planned, {}
+        self.all, self._evolutions, self.shares, self.calls, self._rate, self._bars = (
+            planned
+        )
         return before
 
-    def write(self, t: float) -> None:
-        """Find the sets that are in force at a time [s]."""
-        if len(self._all) > 1:
-            shares = [(each, share.at(t)) for each, share in self._all]
-            before = [each for each, _ in self.sets]
-            self.sets = [pair for pair in shares if pair[1] > 0.0]
-            if [each for each, _ in self.sets] != before:
-                self.measured = self._measured(self.sets)
+    @property
+    def sets(self) -> list[tuple[LimitSet, float]]:
+        """The sets in force, and the share of each, in (0, 1]."""
+        pairs = zip(self.all, self.shares.tolist(), strict=True)
+        return [pair for pair in pairs if pair[1] > 0.0]
 
     def sets_at(self, t: float) -> list[LimitSet]:
         """Return the sets that are in force at a time [s]."""
-        return [each for each, share in self._all if share.at(t) > 0.0]
+        pairs = zip(self.all, self._evolutions, strict=True)
+        return [each for each, share in pairs if share.at(t) > 0.0]
 
-    def _measured(self, sets: Sequence[tuple[LimitSet, float]]) -> "Measured":
-        """Return functions for the distances of barriers, by their names.
+    @property
+    def measured(self) -> Measured:
+        """What returns the distances of the barriers in force, by their names.
 
         The engine's steps write those of shapes; an own barrier is evaluated again.
         """
-        limits, state = [each.limits for each, _ in sets], self._state
+        if not self._bars:
+            return []
+        on = tuple([share > 0.0 for share in self.shares.tolist()])
+        if on not in self._measured:
+            self._measured[on] = self._measuring([each for each, _ in self.sets])
+        return self._measured[on]
+
+    def _measuring(self, sets: Sequence[LimitSet]) -> Measured:
+        limits, state = [each.limits for each in sets], self._state
         barriers = [b for each in limits if each is not None for b in each.barriers]
         return [
             (name, _distances(each, state))
             for name, each in zip(barrier_names(barriers), barriers, strict=True)
         ]
-
-    @property
-    def all(self) -> list[LimitSet]:
-        """The sets that are in force, or will be."""
-        return [each for each, _ in self._all]
 
     @property
     def limits(self) -> RobotLimits | None:
@@ -197,8 +219,8 @@ class LimitsInForce:
         return calls
 
     def update(self) -> None:
-        """Compute the bounds of the next effort from the last one."""
-        for each, _ in self._all:
+        """Find what the last effort leaves for the next one."""
+        for each in self.all:
             if each.rate:
                 each.update()
 

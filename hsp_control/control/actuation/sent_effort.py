@@ -54,6 +54,13 @@ class SentMemory:
             each[:] = 0.0
         self.held.timing[0] = self.last[-1] = np.inf
 
+    def become(self, other: "SentMemory") -> None:
+        """Hold the numbers of another memory."""
+        self.period = other.period
+        given = other.last, *other.held
+        for each, number in zip((self.last, *self.held), given, strict=True):
+            each[:] = number
+
 
 class SentEffort:
     """The last effort, and the error of the acceleration while efforts are held.

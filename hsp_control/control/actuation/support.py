@@ -12,7 +12,7 @@ from hsp_control.constraints.contacts import Contact, SlidingContact
 from hsp_control.constraints.contacts.contact import NORMAL, WRENCH, shares
 from hsp_control.control.planned import PlannedContact
 from hsp_control.edge import BoundLaw
-from hsp_control.engine.plans import AnyCall, PartCall, PartCalls
+from hsp_control.engine.plans import TIME, AnyCall, PartCall, PartCalls
 from hsp_control.robot import Robot, RobotState
 from hsp_control.trajectories import TrajectorySample
 
@@ -81,26 +81,39 @@ class Support:
             self.inverse_cost[columns] = full
             if not planned.always:
                 self._scheduled.append((planned, columns, full))
-        # input and output of `minimum_norm_forces`: the remaining effort, shape
+        self._update: engine.Plan | None = None
+        # what `minimum_norm_forces` reads, and wrote last: the remaining effort, shape
         # (nv,), and forces, shape (size,) [N]
         self._wanted, self.tau = np.zeros(nv), np.zeros(nv)
         self.forces = np.zeros(self.size)
 
     def update(self, law: BoundLaw) -> None:
         """Compute the map, the positions, the bounds of schedules, and the commands."""
-        state = self._state
-        self._write_maps()
+        if self._update is None:
+            self._update = engine.Plan(self._state.plan(self._updating(law)).steps())
+        self._update(self._state.t)
+
+    def bind(self, law: BoundLaw) -> None:
+        """Bind all calls now, instead of in a step, and make them once."""
+        self.update(law)
+        self.minimum_norm_forces(self._wanted)
+        self.permits()
+
+    def _updating(self, law: BoundLaw) -> PartCalls:
+        """Return the calls that do what `update` does."""
+        commands = [call for _, each in self._commanded for call in each.calls(law)]
+        if not self._scheduled:
+            return [*self.maps(), *commands]
+        return [PartCall(self._follow_schedules, t=TIME), *self.maps(), *commands]
+
+    def _follow_schedules(self, t: float) -> None:
+        """Write how active contacts are at a time that come and go."""
         for planned, columns, full in self._scheduled:
-            on = max(planned.weight(state.t), 1e-6)
+            on = max(planned.weight(t), 1e-6)
             self.upper[columns][2::3] = on * _MAX_FORCE * self.weight
             self.inverse_cost[columns] = on * full
         for planned, command in self._commanded:
-            command.write(planned.weight(state.t), law)
-
-    @cached_property
-    def _write_maps(self) -> Callable[[], object]:
-        """The call that writes the map and the positions."""
-        return self._state.plan(self.maps()).call()
+            command.weight[:] = planned.weight(t)
 
     def maps(self) -> list[AnyCall]:
         """Return the calls that write the map and the positions."""
@@ -121,18 +134,14 @@ class Support:
         return calls
 
     def calls(self, wanted: Array, law: BoundLaw) -> PartCalls:
-        """Return the calls of contacts that are active at all times.
-
-        They are equivalent to `update` and `minimum_norm_forces`.
+        """Return the calls that do what `update` and `minimum_norm_forces` do.
 
         Args:
             wanted: The effort without contact forces, shape (nv,) [N·m or N].
             law: The law whose effort it is.
         """
-        assert not self._scheduled
         copy = PartCall(engine.Copy, x=wanted, out=self._wanted)
-        commands = [call for _, each in self._commanded for call in each.calls(law)]
-        return [*self.maps(), *commands, copy, self._solution()]
+        return [*self._updating(law), copy, self._solution()]
 
     def minimum_norm_forces(self, wanted: Array) -> Array:
         """Return the forces of minimum Σ (f - f_ref)²/e, and write `tau`."""
@@ -197,7 +206,12 @@ cheaper than a miss of the tasks."""
 
 
 class CommandedForces:
-    """Writes f_ref for the points of one contact, and how dear other forces are."""
+    """Writes f_ref for the points of one contact, and how dear other forces are.
+
+    Attributes:
+        mask: Commanded entries of the contact's forces, shape (3 k,).
+        weight: How active the contact is, in [0, 1], shape (1,).
+    """
 
     def __init__(
         self, contact: Contact, state: RobotState, offset: Array, out: Array
@@ -221,19 +235,17 @@ class CommandedForces:
         if not self._varies:
             self._shares[:] = shares(n, np.zeros((k, 3)))
         only_normal = n == NORMAL and not contact.slides
-        # commanded entries of the contact's forces, shape (3 k,)
         self.mask = np.tile([not only_normal, not only_normal, True], k)
-        self._weight = np.ones(1)
+        self.weight = np.ones(1)
         self._command_call = PartCall(
             engine.CommandedForce,
             command=self._command.position,
             offset=offset,
-            weight=self._weight,
+            weight=self.weight,
             shares=self._shares,
             normal=0 if n == NORMAL else 2,
             reference=out,
         )
-        self._write: engine.Plan | None = None
 
     def calls(self, law: BoundLaw) -> PartCalls:
         """Return the calls that write f_ref, after those of the law."""
@@ -244,13 +256,6 @@ class CommandedForces:
         if isinstance(self._contact, SlidingContact) and self._contact.slides:
             calls.append(self._friction(self._contact, law))
         return calls
-
-    def write(self, weight: float, law: BoundLaw) -> None:
-        """Write f_ref of a contact that is active to a degree, in [0, 1]."""
-        if self._write is None:
-            self._write = engine.Plan(self._state.plan(self.calls(law)).steps())
-        self._weight[:] = weight
-        self._write(self._state.t)
 
     def _sharing(self) -> PartCall:
         contact = self._contact

@@ -20,10 +20,10 @@ from hsp_control.geometry.scene import Start
 from hsp_control.law import FieldSample, MetricSample
 from hsp_control.null_space.fields.weight import (
     Ramp,
-    SetWeight,
     Weight,
     product,
     sample_weight,
+    weight_calls,
 )
 from hsp_control.robot import RobotState
 
@@ -228,21 +228,17 @@ class FieldSum(NullSpaceField):
         calls: list[AnyCall] = []
         for k, (term, sample) in enumerate(zip(self.terms, samples, strict=True)):
             calls += term.calls(state, metric, form, sample)
-            weights = np.zeros(2)
-            if isinstance(term.weight, SetWeight):
-                update_set, weights = term.weight.calls(state.time)
-                calls += update_set
-            elif type(term.weight) is Ramp:
-                update = term.weight.call().given(time=state.time, weight=weights)
-                calls.append(update)
-            elif isinstance(term.weight, Weight) and not term.weight.constant:
+            own = term.weight
+            evaluated = weight_calls(own, state.time)
+            weights = np.zeros(2) if evaluated is None else evaluated[1]
+            if evaluated is not None:
+                calls += evaluated[0]
+            elif isinstance(own, Weight) and not own.constant:
                 seen = state.read_only
-                update = PartCall(
-                    _update, weight=term.weight, state=seen, weights=weights
-                )
+                update = PartCall(_update, weight=own, state=seen, weights=weights)
                 calls.append(update)
             else:
-                weights[:] = sample_weight(term.weight, state)
+                weights[:] = sample_weight(own, state)
             add = PartCall(
                 engine.AddWeighted, first=k == 0, weight=weights, term=sample, sum=out
             )

@@ -12,7 +12,7 @@ from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import FieldError
 from hsp_control.declaration import Part
 from hsp_control.declaration.quantities import NonNegative, Number, Positive
-from hsp_control.engine.plans import PartCall, PartCalls
+from hsp_control.engine.plans import PartCall, PartCalls, implemented_by
 from hsp_control.robot import RobotState
 from hsp_control.robot.differences import rate_along_flow
 
@@ -33,6 +33,17 @@ class Weight(Part, ABC, error=FieldError):
     def sample(self, state: RobotState) -> tuple[float, float]:
         """Return w [-] and its total rate w' = ∂w/∂q·v + ∂w/∂t [1/s]."""
 
+    def calls(self, time: Array) -> tuple[PartCalls, Array] | None:
+        """Return the engine's calls that write w and w', and where they write them.
+
+        The array has shape (2,); None: `sample` is called in each step.
+
+        Args:
+            time: The present time, shape (1,) [s].
+        """
+        del time
+        return None
+
 
 class ConstantWeight(Weight):
     """w = value, w' = 0."""
@@ -44,6 +55,11 @@ class ConstantWeight(Weight):
     def constant(self) -> bool:
         """True."""
         return True
+
+    def calls(self, time: Array) -> tuple[PartCalls, Array]:
+        """Return none, and w and 0; see `Weight.calls`."""
+        del time
+        return [], np.array([self.value, 0.0])
 
     def sample(self, state: RobotState) -> tuple[float, float]:
         """Return w and 0; see `Weight.sample`."""
@@ -66,15 +82,19 @@ class Ramp(Weight):
     duration: Positive
     """Duration of the ramp [s]."""
 
-    def call(self) -> PartCall:
-        """Return the call that writes w and its rate at a time, shape (2,)."""
-        return PartCall(
+    def calls(self, time: Array) -> tuple[PartCalls, Array]:
+        """Return the call that writes w and w'; see `Weight.calls`."""
+        weight = np.zeros(2)
+        call = PartCall(
             engine.RampWeight,
             initial=self.initial,
             final=self.final,
             start=self.start,
             duration=self.duration,
+            time=time,
+            weight=weight,
         )
+        return [call], weight
 
     def sample(self, state: RobotState) -> tuple[float, float]:
         """Return w and w'; see `Weight.sample`."""
@@ -111,10 +131,7 @@ class SetWeight(Weight):
         """Return the calls that write w and w' at a time, and where they write them."""
         if self.ramp is None:
             return [], self.numbers
-        factor, weight = np.zeros(2), np.zeros(2)
-        follow = self.ramp.call().given(time=time, weight=factor)
-        given = {"first": self.numbers, "second": factor, "weight": weight}
-        return [follow, PartCall(engine.ProductWeight, **given)], weight
+        return _product(([], self.numbers), self.ramp.calls(time))
 
     def sample(self, state: RobotState) -> tuple[float, float]:
         """Return w and w'; see `Weight.sample`."""
@@ -138,10 +155,32 @@ class Product(Weight):
         """Whether neither factor changes."""
         return self.first.constant and self.second.constant
 
+    def calls(self, time: Array) -> tuple[PartCalls, Array] | None:
+        """Return those of both and of the product; see `Weight.calls`."""
+        first, second = weight_calls(self.first, time), weight_calls(self.second, time)
+        return None if first is None or second is None else _product(first, second)
+
     def sample(self, state: RobotState) -> tuple[float, float]:
         """Return w and w'; see `Weight.sample`."""
         (a, a_dot), (b, b_dot) = self.first.sample(state), self.second.sample(state)
         return a * b, a_dot * b + a * b_dot
+
+
+def _product(
+    first: tuple[PartCalls, Array], second: tuple[PartCalls, Array]
+) -> tuple[PartCalls, Array]:
+    """Return the calls of two weights and of their product."""
+    (calls, a), (others, b), weight = first, second, np.zeros(2)
+    times = PartCall(engine.ProductWeight, first=a, second=b, weight=weight)
+    return [*calls, *others, times], weight
+
+
+def weight_calls(weight: Weight | float, time: Array) -> tuple[PartCalls, Array] | None:
+    """Return what `Weight.calls` does; None: it is a number, or is in Python."""
+    if not isinstance(weight, Weight):
+        return None
+    native = implemented_by(weight, "calls", "sample") == "calls"
+    return weight.calls(time) if native else None
 
 
 def sample_weight(weight: Weight | float, state: RobotState) -> tuple[float, float]:
