@@ -34,8 +34,8 @@ _REHEARSALS = 3
 
 
 _LARGE = 4096
-"""Memory [bytes] for which malloc sorts what has been freed; else the next output, whose
-record is larger than its small pieces, would have to."""
+"""Memory [bytes] for which malloc sorts what has been freed: else the next output,
+which is larger than most pieces, would have to."""
 
 
 class Controller(Commanded):
