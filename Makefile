@@ -138,8 +138,13 @@ release: wheel ## a wheel for any Linux, the sources with their tests; check wha
 wheel-test: wheel ## build the wheel, install it elsewhere, use it from there
 	@dir=$$(mktemp -d); trap 'rm -rf "$$dir"' EXIT; mkdir "$$dir/cwd"; \
 	echo "Installing the wheel into a fresh environment ..."; \
-	$(call new-venv,$(BIN)/python,"$$dir/venv"); \
-	"$$dir/venv/bin/python" -m pip install --quiet dist/*.whl; \
+	if command -v uv > /dev/null; then \
+	  uv venv --quiet --python $(BIN)/python "$$dir/venv"; \
+	  uv pip install --quiet --python "$$dir/venv/bin/python" dist/*.whl; \
+	else \
+	  $(call new-venv,$(BIN)/python,"$$dir/venv"); \
+	  "$$dir/venv/bin/python" -m pip install --quiet dist/*.whl; \
+	fi; \
 	cd "$$dir/cwd"; export PATH="$$dir/venv/bin:$$PATH"; unset PYTHONPATH; \
 	hsp robots; \
 	hsp check paper/4_moving_obstacle; \

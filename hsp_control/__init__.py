@@ -20,7 +20,7 @@ from typing import TYPE_CHECKING, Any
 
 from hsp_control.common.version import __version__ as __version__
 
-if TYPE_CHECKING:  # what a type checker reads; the names are looked up below
+if TYPE_CHECKING:  # for type checkers; the names are looked up below
     from . import config as config
     from . import live as live
     from . import robot as robot
@@ -162,7 +162,7 @@ def __getattr__(name: str) -> Any:
 
 
 def _room(name: str) -> ModuleType:
-    """Import a room without collecting garbage: what imports make is none."""
+    """Import a room without collecting garbage: imports create none."""
     collecting = gc.isenabled()
     gc.disable()
     try:
@@ -175,7 +175,7 @@ def _room(name: str) -> ModuleType:
 def _hint(name: str) -> str:
     """Return where a name is that a namespace has, for the message."""
     if name.startswith("_") or (Path(__file__).parent / name).is_dir():
-        return ""  # a room: who imports it from here is asked about it first
+        return ""  # a room: its import from here looks it up here first
     for namespace, room in _NAMESPACES.items():
         value = getattr(import_module(f"{__name__}.{room}"), name, None)
         if getattr(value, "__module__", "").startswith(f"{__name__}.{room}"):

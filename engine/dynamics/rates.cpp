@@ -1,5 +1,5 @@
-// What follows from the joints' Jacobians and the bodies' inertias: the mass matrix of models with
-// followers, the rates of the mass matrix and of the momentum, and the forward dynamics.
+// Terms computed from the joints' Jacobians and the bodies' inertias: the mass matrix of models
+// with followers, the rates of the mass matrix and of the momentum, and the forward dynamics.
 //
 // Let Y be the inertia of all bodies beyond a joint, at the world's origin, and s_k a column of the
 // joint's Jacobian. Its momentum is h_k = Y s_k, with the rate h_k' = Y' s_k + Y s_k', and

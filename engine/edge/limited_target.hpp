@@ -6,7 +6,7 @@
 //
 // into the motion of the tasks and the self-motion. Two things change, each in proportion to the
 // excess of a beyond a limit, so that the step is a continuous function of the state. With E the
-// excess, relative to what the limit permits, 1/(1 + E) is the part of the command that is within
+// excess, relative to the permitted value, 1/(1 + E) is the part of the command that is within
 // it.
 //
 // *The tasks are damped.* An arm at its workspace boundary, or moving fast towards it, commands
@@ -15,7 +15,7 @@
 // and reaches it at E_t = `large`.
 //
 // *The field's command is bounded.* That is φ_N + P K_N P v, the self-motion without its damping. A
-// field's command is unbounded, r times what the limits permit far from them; it is scaled by
+// field's command is unbounded, r times the permitted one far from limits; it is scaled by
 // 1/(1 + E), but not below 1/r. The damping is not scaled, or the null space would oscillate.
 //
 // Both begin slowly: a step that is reduced by more than its excess reverses its command where it
@@ -98,7 +98,7 @@ struct LimitedTarget {
     return most;
   }
 
-  // Demand relative to what the limits permit far from them; at least 1.
+  // Demand relative to the permitted one far from limits; at least 1.
   double times_permitted() const {
     const double efforts = greatest(effort_demand.array().abs() / permitted.effort.array());
     const double motions = greatest(demand.array().abs() / permitted.acceleration.array());

@@ -49,7 +49,7 @@ struct Resolve {
       B.prepare(size);
       turned.prepare(size);
       square.prepare(size);
-      // Once, for its memory. Eigen's constructor of a size leaves what it has found undefined.
+      // Once, for its memory. Eigen's constructor of a size leaves the values undefined.
       if (const Index m = size('m'); m > 0)
         spectrum.compute(Eigen::MatrixXd::Identity(m, m), Eigen::EigenvaluesOnly);
     }

@@ -29,7 +29,8 @@ struct PointDistance {
     const double square = r.squaredNorm();
     if (square < nearest * nearest) {
       // The law reports that the field is not finite.
-      total[0] = gradient[0] = std::numeric_limits<double>::infinity();
+      total[0] = std::numeric_limits<double>::infinity();
+      gradient.setConstant(total[0]);
       return total[0];
     }
     const auto J = frame.jacobian.topRows<3>(), J_dot = frame.jacobian_dot.topRows<3>();

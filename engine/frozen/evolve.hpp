@@ -17,9 +17,9 @@ struct Evolve {
       "x_(k-1)(t)).";
   InOut<'n'> initial;       // x before all transitions that are kept
   InOut<'k', 'n'> targets;  // in order of time
-  InOut<'k', 2> times;      // when each begins, and how long it takes [s]
+  InOut<'k', 2> times;      // start and duration of each [s]
   InOutInts<1> count;       // how many there are
-  double least, most;       // bounds of what may be commanded
+  double least, most;       // bounds of commands
   In<'h', 'n'> cone;        // rows a with a·x ≥ 0, but for rounding
   std::int64_t definite;    // size of x as a matrix that has to be positive definite; 0: it is none
   Out<'n'> x, rate;         // x' of the ramps [1/s]

@@ -15,7 +15,7 @@ struct EvolveImpedance {
   In<1> period;    // [s]
   Ints<1> waits;
   InOut<'r', 'm'> numbers;  // in force
-  Scratch<'n'> wanted;      // what is checked, and then planned
+  Scratch<'n'> wanted;      // checked, and then planned
   Scratch<'m', 'm'> K, C, B, V, Z;
 
   void check() const {
@@ -48,7 +48,7 @@ struct EvolveImpedance {
     return ImpedanceNumbers{wanted.data(), numbers.cols()}.parts();
   }
 
-  // What `Impedance` checks in Python.
+  // The checks of `Impedance` in Python.
   bool is_impedance() {
     const auto [stiffness, damping, ratio, inverse_force] = own();
     if (!is_semidefinite(stiffness) || !is_semidefinite(damping)) return false;
@@ -78,7 +78,7 @@ struct EvolveImpedance {
     return cholesky(K, K);
   }
 
-  // What keeps a scalar error stable where the robot is: ω² h² < 4, 2 ζ ω h < 2, λ(G D) h < 2.
+  // Conditions of a stable scalar error at the robot's state: ω² h² < 4, 2 ζ ω h < 2, λ(G D) h < 2.
   bool is_stable() {
     const auto [stiffness, damping, ratio, inverse_force] = own();
     const double h = period[0], square = largest(stiffness), rate = largest(damping);

@@ -191,7 +191,7 @@ Argument FrozenPlan::read_array(Bytes& bytes, const Field& field) {
   if (offset > initial_.size() || size > initial_.size() - offset ||
       (field.entry != 'b' && offset % 8))
     throw std::runtime_error("an array is beyond the memory");
-  // What one call has checked as an index another one must not overwrite by a real number.
+  // A call must not overwrite an index that another one has checked by a real number.
   for (std::uint64_t at = offset; at < offset + size; ++at) {
     if (entries_[at] != '\0' && entries_[at] != field.entry)
       throw std::runtime_error("arrays of different types overlap");

@@ -17,7 +17,7 @@
 
 namespace hsp::frozen {
 
-// What of a message an input of a stream is.
+// The part of a message that an input of a stream sets.
 enum class SentTo : char { TARGET = 't', VELOCITY = 'v', RATE = 'r', TIME = 'c' };
 
 // An array of the plan that has a name outside of it.

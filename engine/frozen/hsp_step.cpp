@@ -170,7 +170,7 @@ hsp_status refused(hsp_controller& of, const char* reason) {
 
 constexpr const char* null_state = "q, v or tau is a null pointer";
 
-// What a port accepts.
+// The values that a port accepts.
 const char* accepted(const Port& port) {
   if (port.payloads)
     return "a payload needs a mass of 0 or more, and the inertia of a body, in finite numbers; "

@@ -1,4 +1,4 @@
-// What acts on the joints besides their efforts: a safe stop goes on with what it was before.
+// The external effort on the joints: a safe stop uses its value before the stop.
 #pragma once
 #include <algorithm>
 #include <cstdlib>

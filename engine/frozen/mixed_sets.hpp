@@ -1,4 +1,4 @@
-// A step whose tasks come and go: what each set of those that are present delivers, and their mean.
+// A step whose tasks come and go: the results of the active sets, and their mean.
 #pragma once
 #include <algorithm>
 #include <array>

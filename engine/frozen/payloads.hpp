@@ -38,13 +38,14 @@ struct Payloads {
   InOut<'k'> masses;
   InOut<'k', 3> centers;
   InOut<'k', 9> inertias;
-  InOutInts<'k'> changes;  // their number: the first takes it up, the others put it down
+  InOutInts<'k'> changes;  // their number: the first adds it, the others remove it
   InOut<'k', 'm'> starts, ramps;
   Scratch<1> carries;                     // whether the dynamics have payloads
   static constexpr double largest = 1e6;  // of a mass, a center, an inertia
 
   void check() const {
     check_indices("joints", joints, dynamics->joints(), 1);
+    check_at_least("joints", joints.size(), std::min<Index>(frames.size(), 1));
     dynamics->make_room(frames.size());
     if (changes.size() != frames.size() || starts.cols() < 1)
       throw std::invalid_argument("there is no room for a change");

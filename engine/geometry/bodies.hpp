@@ -50,14 +50,20 @@ struct Bodies {
   auto own_dofs(Index i) const { return dofs.segment(kinds(i, 2), kinds(i, 3) - kinds(i, 2)); }
 };
 
-// Pairs are a link, a body, and the index of their distance; a link's core is a segment.
+// Pairs are a link, a body, and the index of their distance; a link's core is a segment, only
+// obstacles are solids.
 template <class Pairs> void check_pairs(const Pairs& pairs, const Bodies& bodies, Index distances) {
   check_indices("pairs", pairs.template leftCols<2>(), bodies.kinds.rows());
   check_indices("the places of pairs", pairs.col(2), distances);
-  for (Index k = 0; k < pairs.rows(); ++k)
+  for (Index k = 0; k < pairs.rows(); ++k) {
     if (!bodies.is_link(pairs(k, 0)))
       throw std::invalid_argument("pairs begin with links; body " + std::to_string(pairs(k, 0)) +
                                   " is an obstacle");
+    for (const Index i : {pairs(k, 0), pairs(k, 1)})
+      if (bodies.is_link(i) && bodies.kind(i) != SEGMENT)
+        throw std::invalid_argument("links are segments; body " + std::to_string(i) +
+                                    " is a solid");
+  }
 }
 
 struct Placement {

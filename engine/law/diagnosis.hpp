@@ -55,7 +55,7 @@ struct SingularValues {
   Out<'s'> values;
 
   void operator()() {
-    // Its columns are nearer to orthogonal than the rows of what it is a factor of.
+    // Its columns are nearer to orthogonal than the rows of the matrix that it factorises.
     Matrix none;
     orthogonalise_rows(T, none);
     values = T.rowwise().norm();

@@ -15,7 +15,7 @@
 // `edge/damped_levels.hpp`, which goes through the levels.
 //
 // If the stack has full rank, this equals the law of `law.hpp` up to rounding. That law is then
-// used, because it takes a tenth of the time. The smallest singular value of the stack is a lower
+// used, because it needs a tenth of the time. The smallest singular value of the stack is a lower
 // bound for those of all levels (Schur complements interlace), so both give the same result where
 // one replaces the other. docs/law.md, Priorities.
 #pragma once

@@ -35,6 +35,7 @@ struct DistancesAt {
   In<'d'> measured;  // written by the move
   Out<'d'> distances;
 
+  void check() const { move->check_moved_by(q, v); }
   void operator()() {
     if (move->to(time[0] + later, q, v)) distances = measured;
     else distances.setConstant(std::numeric_limits<double>::quiet_NaN());

@@ -1,4 +1,4 @@
-// A step in which several sets of tasks, or of limits, are mixed: what each of them delivers.
+// A step in which several sets of tasks, or of limits, are mixed: the results of all.
 #pragma once
 #include <algorithm>
 

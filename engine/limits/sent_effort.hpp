@@ -2,6 +2,7 @@
 #pragma once
 #include <algorithm>
 #include <cmath>
+#include <hsp/indices.hpp>
 #include <limits>
 
 #include "records.hpp"
@@ -15,6 +16,7 @@ struct EffortWindow {
   In<'n'> effort, rate;
   Out<'n'> lower, upper;
 
+  void check() const { check_at_least("last", last.size(), effort.size() + 1); }
   void operator()() {
     const Index n = effort.size();
     const auto tau = last.head(n).array();

@@ -41,7 +41,7 @@ struct ForceMap {
 struct MinimumNormForces {
   static constexpr const char* doc =
       "f = r + E Aᵀ(A E Aᵀ)⁺(w - A r), of minimum Σ (f - r)²/e, and the remaining effort.";
-  // A are the base's rows of F, E = diag(e), w the base's rows of the wanted effort, and r the
+  // A are the base's rows of F, E = diag(e), w the base's rows of the desired effort, and r the
   // commanded forces. w lies in the range of A: directions without support are omitted. The effort
   // of the base, which has no motor, is zero.
   In<'n', 'f'> F;
@@ -153,8 +153,9 @@ struct WrenchShares {
     out.setZero();
     for (Index r = 0; r < 6; ++r) {
       const double square = total.row(r).squaredNorm();
-      if (std::sqrt(square) > negligible * largest)
-        out += (total.row(r).transpose() / square).lazyProduct(turned.row(r));
+      if (std::sqrt(square) <= negligible * largest) continue;
+      turned.row(r) /= square;
+      out += total.row(r).transpose().lazyProduct(turned.row(r));
     }
   }
 };

@@ -28,6 +28,7 @@ struct Periods {
   LimitsOutcome<Ints> limits;
   Timing timing;
 
+  void check() const { step->check_moved_by(q, v); }
   std::int64_t operator()() {
     const std::int64_t last = timing.last[0];
     double t = beginning(timing.first[0]);

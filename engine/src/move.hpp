@@ -24,6 +24,11 @@ struct Move {
       check_index("the sizes of unit_blocks", unit_blocks(k, 1), q.size() - unit_blocks(k, 0) + 1);
     }
   }
+  // Throws unless arrays that will be passed to `to` have its sizes.
+  template <class Q, class V> void check_moved_by(const Q& q_in, const V& v_in) const {
+    if (q_in.size() != q.size() || v_in.size() != v.size())
+      throw std::invalid_argument("q and v have other sizes than the state that they move");
+  }
   double operator()(double t) { return calls->run(t); }
 
   // Copy q, v and the time since the origin, and make the calls; nothing, if not all are finite or

@@ -50,7 +50,7 @@ std::vector<Plan::Row> PlanObject::rows(nb::tuple given) {
       found.push_back({reinterpret_cast<double (*)(void*, double)>(row.first),
                        reinterpret_cast<void*>(row.second)});
     } else {
-      throw nb::type_error(("a plan makes calls, and what has the `row` of one; number " +
+      throw nb::type_error(("a plan contains calls and objects with a `row` of calls; number " +
                             std::to_string(found.size()) + " is " + text_of(nb::repr(each)))
                                .c_str());
     }

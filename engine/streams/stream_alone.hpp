@@ -32,7 +32,7 @@ struct StreamAlone {
   InOutInts<1> differs;   // whether a velocity differs from the one sent before it
   InOutInts<1> alone;     // whether a velocity was sent, which ends all waypoints
   InOutInts<1> targeted;  // whether a target was
-  // What is known of the next target, and of the one that was sent.
+  // Data of the next target, and of the one that was sent.
   InOut<'n'> next_rate, sent_rate;
   InOut<1> next_time, sent_time;  // by the sender's clock [s]
   InOutInts<1> next_moves, sent_moves, next_timed, sent_timed;
@@ -277,7 +277,7 @@ struct StreamAlone {
     if (next(t, planner, state, present)) return;
     count[0] = commanded[0] = 0;  // too far away for a motion
     fades_at[0] = infinite;
-    // Where it cannot even rest, what follows is not finite, and the step is refused.
+    // Where it cannot even rest, the result is not finite, and the step is refused.
     if (!planner.to_rest(t, state, delay, present)) lose(t, present);
   }
 

@@ -4,8 +4,8 @@
 //
 //   E' = fᵀx' - e'ᵀ(D + D_ζ) e' + ∂U/∂t.
 //
-// The numbers in force follow those that were planned only as fast as ∂U/∂t is no more than what
-// the damping takes out. Where they are behind they catch up in half of the change's ramp, so that
+// The values in force follow the planned ones only as fast as ∂U/∂t is no more than the power of
+// the damping. Where they are behind they catch up in half of the change's ramp, so that
 // no effort jumps.
 #pragma once
 #include <algorithm>
@@ -43,7 +43,7 @@ struct FollowImpedance {
   Ints<'g'> ends;              // where each part of the error ends
   In<'m', 'm'> G;              // Λ⁻¹ in the coordinates of e
   In<'m'> e, e_dot;
-  In<1> period, ramp;  // [s]; how long the change takes
+  In<1> period, ramp;  // [s]; duration of the change
   InOutInts<1> waits;
   Scratch<'r', 'm'> step, ahead;
   Scratch<'m', 'm'> C, B, V, Z, S;
@@ -78,7 +78,7 @@ struct FollowImpedance {
   }
 
  private:
-  // Of a mode or a spring: what is smaller, relative to the largest, is rounding.
+  // Of a mode or a spring: smaller values, relative to the largest, are rounding.
   static constexpr double rounding = 1e-12;
 
   // U(e) = sᵀe - ½ sᵀK⁺s: ½ eᵀK e, and linear where s is at its bound.

@@ -10,8 +10,8 @@ namespace hsp {
 //
 //   J = R_rᵀ K,    J' = R_rᵀ(K' - w_r × K)    since (R_rᵀ)' = -R_rᵀ[w_r]×.
 //
-// What J v lacks, where the frames move in their joints, is R_rᵀ y, with the rate R_rᵀ(y' - w_r ×
-// y): y = y_f - y_r, whose linear part also loses (angular part of y_r) × d.
+// The rest of the velocity besides J v, where the frames move in their joints, is R_rᵀ y, with the
+// rate R_rᵀ(y' - w_r × y): y = y_f - y_r, whose linear part also loses (angular part of y_r) × d.
 struct RelativeKinematics {
   static constexpr const char* doc = "The motion of a frame relative to another, in its axes.";
   FrameMotion<In> frame, reference;

@@ -1,5 +1,6 @@
 // Orientations that move: relative to others, from waypoint to waypoint, at a constant rate.
 #pragma once
+#include <hsp/indices.hpp>
 #include <hsp/rotations.hpp>
 
 #include "smooth_step.hpp"
@@ -32,6 +33,7 @@ struct OrientationPath {
   In<'m', 3> turns;         // a_i in world axes, to the next waypoint; the last is not used
   OrientationSample<Out> out;
 
+  void check() const { check_at_least("times", times.size(), 2); }
   void operator()(double t) {
     const Index last = times.size() - 1;
     Index i = 0;

@@ -47,7 +47,7 @@ struct PiecewisePolynomial {
   // It rests exactly at the first waypoint before, and at the last one after.
   void operator()(double t) {
     const Index last = times.size() - 1;
-    if (t <= times[0] || t >= times[last]) {
+    if (!(times[0] < t && t < times[last])) {  // also if a knot is not finite
       out.position = waypoints.row(t <= times[0] ? 0 : last).transpose();
       out.velocity.setZero();
       out.acceleration.setZero();

@@ -140,7 +140,7 @@ def live(options: argparse.Namespace) -> int:
             named = fault is None or fault in report.reason
             print(f"hsp: {report.reason if named else fault}", file=sys.stderr)
             return 2
-        # Or a simulated one, in a process of its own
+        # Or a simulated one, in a separate process
         with RobotProcess(
             experiment,
             faults=faults,

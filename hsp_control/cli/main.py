@@ -12,7 +12,7 @@ from hsp_control.cli.streams import lost_text, make_usable
 from hsp_control.common.exceptions import HspControlError
 
 _OWN_FILES = {"check", "doctor", "freeze", "live"}
-"""Commands with a file of their own; `commands` has the others."""
+"""Commands with their own file; `commands` has the others."""
 _PACKAGES = {"libgomp.so.1": "libgomp1 (Debian, Ubuntu) or libgomp (Fedora)"}
 """The system package of a library that the wheels of our dependencies expect."""
 FAILURE = 2
@@ -51,7 +51,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
         return status
     except HspControlError as error:
         print(f"hsp: {consoles.message_of(error)}", file=sys.stderr)
-    except ImportError as error:  # Pinocchio's wheel links what slim systems lack
+    except (
+        ImportError
+    ) as error:  # Pinocchio's wheel links libraries that slim systems lack
         library, _, reason = str(error).partition(": ")
         if "shared object file" not in reason:
             raise
@@ -66,7 +68,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except KeyboardInterrupt:
         print("hsp: stopped by the user", file=sys.stderr)
         return INTERRUPTED
-    except SystemExit as error:  # of somebody's own code; its status may be 0
+    except SystemExit as error:  # of user code; its status may be 0
         print(f"hsp: ended early by SystemExit({error.code!r})", file=sys.stderr)
     return FAILURE
 

@@ -101,7 +101,7 @@ def command_line() -> argparse.ArgumentParser:
     which.add_argument("--json", action="store_true", help="print JSON")
 
     _add(commands, added, 1)
-    doctor = _command(commands, "doctor", "report what this machine lacks")
+    doctor = _command(commands, "doctor", "check this machine and installation")
     doctor.add_argument("--json", action="store_true", help="print JSON")
     _command(commands, "schema", "print the JSON Schema of a configuration")
     return parser
@@ -196,7 +196,7 @@ def add_freeze(freeze: argparse.ArgumentParser) -> None:
     where = freeze.add_mutually_exclusive_group()
     for name, what in (
         ("--cmake-dir", "the folder that CMake's find_package(hsp_step) needs"),
-        ("--flags", "what cc needs for hsp_step.h and its library"),
+        ("--flags", "the flags of cc for hsp_step.h and its library"),
     ):
         where.add_argument(name, action="store_true", help=f"print {what}, and end")
 

@@ -10,7 +10,7 @@ _PACKAGE = Path(__file__).parents[1]
 
 
 def entry_points(group: str) -> dict[str, EntryPoint]:
-    """Return what is added to ``hsp_control.<group>``, by name.
+    """Return the additions to ``hsp_control.<group>``, by name.
 
     Companions whose folder was deleted add nothing, although the package's metadata
     still name them.
@@ -39,8 +39,8 @@ def _is_there(entry: EntryPoint) -> bool:
 def own_names(module: str) -> Callable[[], list[str]]:
     """Return a public module's ``__dir__``: its classes and functions, no imports.
 
-    ``__dir__ = own_names(__name__)``. What a package imports from its modules is its
-    own; in a file, what it defines, or what ``__all__`` lists.
+    ``__dir__ = own_names(__name__)``. A package owns its imports from its modules;
+    a file owns its definitions, or those that ``__all__`` lists.
     """
 
     def own(value: object, package: bool) -> bool:

@@ -7,7 +7,7 @@ _ENDLESS = "a device or a pipe, which may never end"
 
 
 def why_no_file(path: Path) -> str:
-    """Return why what is at a path cannot be read as a file, in words."""
+    """Return why a path cannot be read as a file, in words."""
     return _ENDLESS if _is_endless(path) else "no such file"
 
 
@@ -16,7 +16,7 @@ def _is_endless(path: Path) -> bool:
 
 
 def check_ends(path: Path) -> None:
-    """Check that what is at a path, if anything is, ends when it is read.
+    """Check that the file at a path, if it exists, is finite.
 
     Raises:
         OSError: If it is a device or a pipe; reading one may never return.

@@ -16,7 +16,7 @@ class Silence:
 
         Args:
             now: The time of this look [s].
-            heard: Whether a sign arrived since the last look.
+            heard: Whether a message arrived since the last look.
         """
         self._lasts = 0.0 if heard else self._lasts + min(now - self._looked, _LOOK)
         self._looked = now

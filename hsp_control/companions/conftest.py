@@ -1,4 +1,4 @@
-"""What tests of companions' pages share."""
+"""Fixtures of the tests of companions' pages."""
 
 from collections.abc import Iterator
 from typing import Any

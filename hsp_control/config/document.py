@@ -76,7 +76,7 @@ class Document:
     """The plain data of a YAML text, with a location for every key path.
 
     A key path is a tuple: ``("tasks", 0, "frame")`` for ``tasks.0.frame``. All errors
-    have the form ``file:line: key.path: what is wrong``.
+    have the form ``file:line: key.path: the error``.
     """
 
     def __init__(

@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import replace
-from functools import cached_property, partial
+from functools import cached_property
 from itertools import count
 from os import PathLike
 from pathlib import Path
@@ -17,12 +17,10 @@ from hsp_control.common.exceptions import (
     ConfigError,
     ImmutableError,
     ModelError,
-    SceneError,
 )
 from hsp_control.common.keywords import suggesting
 from hsp_control.config.document import Document, read_document
 from hsp_control.config.loaded_scenario import LoadedScenario, load_scenario
-from hsp_control.config.own_code import own_modules
 from hsp_control.config.scenario import Scenario, ViewSettings
 from hsp_control.constraints.contacts import Contact
 from hsp_control.constraints.limits import Limits
@@ -32,17 +30,18 @@ from hsp_control.control.controller import Controller
 from hsp_control.control.estimator import Estimator, begun
 from hsp_control.control.fitting import Base
 from hsp_control.control.motion_plan import MotionPlan
-from hsp_control.declaration.nested import keyed, parts_within, with_parts_replaced
+from hsp_control.declaration.nested import parts_within
+from hsp_control.declaration.own_modules import own_modules
 from hsp_control.declaration.plain_data import plain_data
 from hsp_control.geometry.scene import Obstacle, Scene
 from hsp_control.live.settings import LiveSettings
 from hsp_control.null_space.fields import NullSpaceField
-from hsp_control.null_space.fields.field import terms_of
 from hsp_control.null_space.metrics import Metric
 from hsp_control.robot import Robot
 from hsp_control.robot.description.robot_description import RobotDescription
 from hsp_control.robot.integrators import Integrator
 from hsp_control.simulation import Rollout, simulate
+from hsp_control.simulation.declared_run import controller_data
 from hsp_control.simulation.initial_state import InitialState
 from hsp_control.simulation.log_writer import LogWriter
 from hsp_control.simulation.model_errors import ModelErrors, model_errors
@@ -151,6 +150,7 @@ class Experiment:
             "live": live,
             "view": view,
         }
+        robot = _described(robot)
         data = {
             "title": title,
             "description": description,
@@ -404,6 +404,19 @@ def build(document: Document) -> Experiment:
     return Experiment.of(load_scenario(document))
 
 
+def _described(robot: str | Robot | RobotDescription) -> RobotDescription:
+    if isinstance(robot, str):
+        return RobotDescription(robot)
+    if not isinstance(robot, Robot):
+        return robot
+    if robot.description is None:
+        raise ModelError(
+            f"{robot.name} was not loaded by Robot.load, so that no configuration can "
+            "name it; give a name, a path or a RobotDescription"
+        )
+    return robot.description
+
+
 def _plant(document: Document, scenario: Scenario, robot: Robot) -> Plant:
     """Return the plant, with the required control period and steps."""
     settings = scenario.simulation
@@ -426,57 +439,6 @@ def _integrator(scenario: Scenario) -> Integrator:
     settings = scenario.simulation
     own = default_integrator(scenario.plant, settings.control_period)
     return settings.integrator or own
-
-
-def controller_data(
-    robot: str | Robot | RobotDescription,
-    tasks: Sequence[Task],
-    field: NullSpaceField | None,
-    gain: ArrayLike,
-    metric: Metric | None,
-    threshold: float,
-    limits: Limits | None,
-    contacts: Sequence[Contact],
-    base: Base | None,
-    scene: Scene | Iterable[Obstacle],
-    changes: Sequence[Change] = (),
-) -> dict[str, Any]:
-    """Return the configuration of a controller; see `Experiment`.
-
-    The parts' own obstacles are in its scene, and the parts refer to their names.
-    """
-    if isinstance(robot, Robot):
-        if robot.description is None:
-            raise ModelError(
-                f"{robot.name} was not loaded by Robot.load, so that no configuration "
-                "can name it; give a name, a path or a RobotDescription"
-            )
-        robot = robot.description
-    scene = scene if isinstance(scene, Scene) else Scene(scene)
-    known = dict(scene)
-
-    def name_of(obstacle: Obstacle) -> str:
-        if known.setdefault(obstacle.name, obstacle) != obstacle:
-            raise SceneError(f"two obstacles have the name {obstacle.name!r}")
-        return obstacle.name
-
-    named = partial(with_parts_replaced, kind=Obstacle, change=name_of)
-    null_space = {
-        "gain": gain,
-        "metric": metric,
-        "fields": named(() if field is None else tuple(terms_of(field))),
-        "singularity_threshold": threshold,
-    }
-    return {
-        "robot": RobotDescription(robot) if isinstance(robot, str) else robot,
-        "tasks": keyed(tasks),
-        "null_space": null_space,
-        "limits": named(limits),
-        "contacts": keyed(contacts),
-        "base": base,
-        "changes": named(tuple(changes)),
-        "scene": scene if len(known) == len(scene) else Scene(known.values()),
-    }
 
 
 def _check_compensation(

@@ -24,7 +24,7 @@ from hsp_control.geometry.shapes import Mesh
 from hsp_control.robot import Robot
 from hsp_control.robot.description.access import Access
 from hsp_control.robot.description.mesh_files import check_references
-from hsp_control.robot.recorded import recorded_robot
+from hsp_control.robot.recorded import name_a_changed_scene, recorded_robot
 
 Value = TypeVar("Value", bound=Part)
 
@@ -86,7 +86,10 @@ def load_robot(document: Document, scenario: Scenario) -> Robot:
             return recorded_robot(document.recorded_robot, document.access)
     keys = [key for key in ("name", "description") if getattr(scenario.robot, key)]
     with document.at("robot", *keys):
-        return Robot.load(scenario.robot, access=document.access)
+        robot = Robot.load(scenario.robot, access=document.access)
+    if document.recorded_robot is not None:
+        name_a_changed_scene(robot, document.recorded_robot)
+    return robot
 
 
 def located_scene(scene: Scene, folder: Path, access: Access) -> Scene:

@@ -2,17 +2,13 @@
 
 import logging
 import sys
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from os import PathLike, fspath
 from pathlib import Path
-from typing import Any
 
-from hsp_control.common.entry_points import entry_points
 from hsp_control.common.exceptions import AccessError
 from hsp_control.config.document import Document
-from hsp_control.declaration import Part
 from hsp_control.declaration.imported import fingerprints, import_code, is_file_name
-from hsp_control.declaration.nested import parts_within
 
 _log = logging.getLogger(__name__)
 _KEY = "imports"
@@ -70,35 +66,6 @@ def _import_again(name: str, document: Document) -> None:
 def located_imports(imports: Sequence[str], folder: Path) -> tuple[str, ...]:
     """Return the list with absolute paths."""
     return tuple(_absolute(name, folder) for name in imports)
-
-
-def own_modules(scenario: Any) -> Iterator[str]:
-    """Yield modules that declare types of a scenario, and that can be imported.
-
-    Modules of this package and of installed ones with entry points are found without a
-    list, and a script would run once more: these are left out.
-    """
-    for part in _parts(scenario):
-        name = type(part).__module__
-        if name.startswith("hsp_control.") or name == "__main__":
-            continue
-        family, yaml_type = part.family, part.yaml_type
-        if family is not None and yaml_type in entry_points(family.name):
-            continue
-        module = sys.modules.get(name)
-        file = getattr(module, "__file__", None)
-        if file is None:
-            continue
-        spec = getattr(module, "__spec__", None)
-        installed = "." in name or (spec is not None and spec.name != Path(file).stem)
-        yield name if installed else str(Path(file).resolve())
-
-
-def _parts(value: Any) -> Iterator[Part]:
-    """Yield a part and all parts inside it."""
-    for part in parts_within(value, Part):
-        yield part
-        yield from _parts(part.all_fields())
 
 
 def _absolute(name: str, folder: Path) -> str:

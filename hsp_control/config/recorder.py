@@ -4,24 +4,21 @@ from math import inf
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from types import TracebackType
-from typing import Any, Self
+from typing import Self
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from hsp_control.common.exceptions import HspControlError, LogError
+from hsp_control.common.exceptions import LogError
 from hsp_control.common.keywords import suggesting
-from hsp_control.config.document import Document
-from hsp_control.config.experiment import controller_data
-from hsp_control.config.loaded_scenario import load_scenario
-from hsp_control.config.own_code import own_modules
 from hsp_control.control.controller import Controller
 from hsp_control.control.output import ControlOutput
 from hsp_control.declaration.language import check_kind
-from hsp_control.declaration.plain_data import plain_data
 from hsp_control.live.hardware import described
 from hsp_control.simulation import Rollout
+from hsp_control.simulation.declared_run import declared_controller
 from hsp_control.simulation.log_writer import LogWriter
+from hsp_control.simulation.simulate import SimulationSettings
 
 
 class Recorder:
@@ -35,8 +32,8 @@ class Recorder:
                 recorder.record(output)
         hsp.plots.diagnostics_figure(recorder.rollout)
 
-    `hsp run` repeats it in simulation, if the robot was loaded by `Robot.load`, the
-    parts are data and not Python functions, and t begins at 0.
+    `hsp run` repeats it in simulation, if the parts are data and not Python functions,
+    and t begins at 0.
 
     Attributes:
         path: The log's file; None: after closing, the log is only in memory.
@@ -68,7 +65,9 @@ class Recorder:
         where = Path(self._folder.name) / "log" if self._folder else Path(str(path))
         self._journal = where.with_suffix(".journal")
         self._controller, self._period = controller, log_period
-        self._config, self._lost = declaration_of(controller)
+        self._config, self._lost = declared_controller(
+            controller, simulation=SimulationSettings()
+        )
         self._begun = self._last = self._due = -inf
         self._held = 0.0  # time between the first two outputs [s]
         meta = {"name": where.stem, "config": self._config, "config_lost": self._lost}
@@ -182,19 +181,3 @@ class Recorder:
             self._journal.unlink(missing_ok=True)
             if self._folder is not None:
                 self._folder.cleanup()
-
-
-def declaration_of(controller: Controller) -> tuple[dict[str, Any] | None, str]:
-    """Return the configuration of a controller as data; or None, and why."""
-    own = controller._declared
-    try:
-        data = controller_data(
-            *(own.robot, own.tasks, own.field, own.gain, own.metric, own.threshold),
-            *(own.limits, own.contacts, own.base, own.scene),
-        )
-        scenario = load_scenario(Document(data, {}, "recorded")).scenario
-        config: dict[str, Any] = plain_data(scenario, defaults=True)
-        config["imports"] = list(dict.fromkeys(own_modules(scenario)))
-    except HspControlError as error:
-        return None, str(error)
-    return config, ""

@@ -142,7 +142,7 @@ class ViewSettings(Part, error=ViewerError):
     light: Positive = 1.0
     """Brightness of the light [-]; 1 is a bright room."""
     show: ShownItems = ShownItems()
-    """What is shown at first."""
+    """The layers shown at first."""
 
 
 class Scenario(Part, error=ConfigError):

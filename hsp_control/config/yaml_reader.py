@@ -1,6 +1,6 @@
 """Read a YAML text as plain data, and record the place of each key in the text.
 
-Nothing in a text is ever executed. What PyYAML accepts silently (a key given twice, a
+Nothing in a text is ever executed. Errors that PyYAML accepts (a key given twice, a
 key that is not text, a tag, aliases that grow without bound) is an error here.
 
 PyYAML reads YAML 1.1, where ``1e-3`` is text, ``on`` is true, ``010`` is eight and

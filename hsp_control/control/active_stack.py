@@ -146,7 +146,7 @@ class ActiveStack:
             follows = each.key in below or len(in_force.feedback.largest)
             draws = spring and below  # from those below it
             if (follows or draws) and not balances:
-                # at rest: what damps is not lost, at any speed
+                # at rest, so that damping is kept at any speed
                 stretched = self.law.problem.stretched[here]
                 call = PartCall(
                     engine.DemandAtRest,
@@ -189,7 +189,7 @@ class ActiveStack:
         """Bind the calls of `resolve` now, and run them once.
 
         A part, or a user's function, may make something at its first use. A stream's
-        messages belong to a time, and what raises does so in the step that meets it.
+        messages belong to a time, and an exception is raised in the step that meets it.
         """
         if "_plan" in self.__dict__:
             return
@@ -231,7 +231,7 @@ class ActiveStack:
         return self._field.value(self._state.read_only)
 
     def diagnose(self) -> tuple[float, float, bytes]:
-        """Return ‖e_N‖_W, the tasks' manipulability, and what `singular_values` takes.
+        """Return ‖e_N‖_W, the manipulability, and the input of `singular_values`.
 
         They are those of the last `resolve`.
         """

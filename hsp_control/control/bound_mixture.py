@@ -44,7 +44,7 @@ MOST_CHOSEN = 64
 
 
 class BoundMixture:
-    """The law of each set of tasks, what it delivers within each set of limits, a mean.
+    """The law of each set of tasks within each set of limits, and the weighted mean.
 
     All is one call, wherever each part delivers M a + N or what one QP finds, also with
     contacts: it evaluates what changes, chooses the sets that have a share, makes their

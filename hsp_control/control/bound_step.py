@@ -41,27 +41,27 @@ class BoundStep:
         calls = [*evolving, *active.calls, *actuation.calls]
         self.move = state.bind_move(calls, origin)
         self._move = self.move.__call__  # bound once: half the time of a look-up
-        self._own = actuation.own  # what is delivered of the law's own acceleration
+        self._own = actuation.own  # the result for the law's own acceleration
         self._nearest, self._is_nearest = actuation.nearest, actuation.is_nearest
         self.state, self.actuation, self.limits = state, actuation, limits
         self._law_outcome = active.law.outcome
         self._limits_outcome = actuation.outcome
 
     def make(self, t: float, q: ArrayLike, v: ArrayLike) -> Delivered:
-        """Move to a state; return what is delivered there.
+        """Move to a state; return the result there.
 
         The move makes all calls of a step, up to the law's own effort M a + N and the
         check of the limits; the last one, `IsPlain`, returns whether that is the result
         as it is. Else the QP may have been solved at once; if not, it is looked at why.
         """
         plain = self._move(t, q, v)
-        if plain is None:  # refused: lists, for example, or what is not valid
+        if plain is None:  # rejected: lists, for example, or invalid values
             plain = self.state.advance(self.move, t, q, v)
         self.damped = ""
         return self._own if plain and self.direct else self._looked_at()
 
     def _looked_at(self) -> Delivered:
-        """Return what is delivered of a step that is not simply the law's own."""
+        """Return the result of a step in which the law's acceleration is limited."""
         if self._is_nearest.item():
             return self._nearest
         active, law, limits = self.active, self._law_outcome, self._limits_outcome
@@ -82,7 +82,7 @@ class BoundStep:
 
     @cached_property
     def free(self) -> "FreeStep | None":
-        """What the engine's loop calls instead; None if more is needed than that."""
+        """The same for the engine's loop; None if a step needs Python."""
         if self.active.streamed or not self.direct:
             return None
         sending = self.limits.applying(self.active.acceleration)
@@ -91,9 +91,9 @@ class BoundStep:
 
 
 class FreeStep(NamedTuple):
-    """What `compute` and `applied` of a controller do where no limit is violated."""
+    """`compute` and `applied` of a controller where no limit is violated."""
 
-    # writes the effort, the acceleration and what became of the law and the limits
+    # writes the effort, the acceleration and the outcomes of the law and the limits
     move: Move
     law: LawOutcome
     limits: LimitsOutcome

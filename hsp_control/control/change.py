@@ -43,8 +43,8 @@ class Change(Part, ABC, family="changes", error=ControllerError):
     """A change that begins at a time and takes a while; efforts stay continuous.
 
     Changes apply in the order of their times, whatever the order in which they are
-    made. Each continues from what is then in force, so that several may overlap. A
-    subclass implements `apply`, and `Controller.change` makes it. What has a ramp is an
+    made. Each continues from the values then in force, so that several may overlap. A
+    subclass implements `apply`, and `Controller.change` makes it. With a ramp it is an
     `Evolution` of the `Setup`: ``gain``, ``gravity``, and each task's ``gains`` and
     ``presence``; ``setup.gain.then(self.at, self.ramp, target)`` is the next one. All
     else that is replaced acts at once; for a reference apply a `ChangeReference`.
@@ -231,7 +231,7 @@ class AddTask(Change, type="add_task"):
     """A task is added; it fades in."""
 
     task: Task
-    """The task; what is relative in it starts from where the robot is when the change
+    """The task; relative values in it refer to the robot's pose when the change
     is made."""
 
     def placed(self, start: Start, setup: Setup) -> Self:
@@ -330,8 +330,8 @@ class ChangeReference(Change, type="reference"):
         Trajectory | OrientationTrajectory | PoseTrajectory,
         AnyOf(PoseTrajectory, Trajectory, OrientationTrajectory),
     ]
-    """The new trajectory, in the task's unit; what is relative in it starts from where
-    the robot is when the change is made."""
+    """The new trajectory, in the task's unit; relative values in it refer to
+    the robot's pose when the change is made."""
 
     def understood(self, setup: Setup) -> Self:
         """Return the change with a stream of the task's kind: YAML has one word."""

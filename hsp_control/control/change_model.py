@@ -1,4 +1,4 @@
-"""The changes of a robot's model: of what it carries, its tools, and gravity."""
+"""The changes of a robot's model: its payloads, its tools, and gravity."""
 
 from dataclasses import replace
 from typing import Self
@@ -24,14 +24,14 @@ from hsp_control.trajectories.pose import HoldPose
 MOST_GRAVITY = 300.0
 """Largest gravity, ten times that of Jupiter: more is in other units [m/s²]."""
 _ROUNDING = 1e-9
-"""Of moments of inertia, relative: what somebody typed has rounding errors."""
+"""Of moments of inertia, relative: typed values have rounding errors."""
 
 
 class ChangePayload(Change, type="payload"):
     """A frame takes up a payload, or puts it down; the law is that of the model.
 
-    It replaces what the frame carried before. Simulated rigid bodies carry it, too,
-    besides what is wrong with their own masses.
+    It replaces the frame's previous payload. Simulated rigid bodies carry it, too,
+    besides the errors of their own masses.
     """
 
     frame: str
@@ -114,7 +114,7 @@ class ChangeTool(Change, type="tool"):
 
     All tasks and fields of the frame follow it: their errors obey their equations while
     it moves, and the hand moves so that the new tip goes where the old one was to be.
-    What is fixed to the link, such as its capsules and its payload, stays.
+    Capsules, the payload and all else fixed to the link stay.
     """
 
     frame: str

@@ -67,7 +67,7 @@ __all__ = [
 
 
 class Changes:
-    """Makes changes that begin at one time: what `Controller.at` returns.
+    """Makes changes that begin at one time: the result of `Controller.at`.
 
     Each method makes one change and returns the object, so that calls can be chained::
 
@@ -180,7 +180,7 @@ class Changes:
 
 @dataclass(frozen=True)
 class TimeLine:
-    """What is in force at each time."""
+    """The setup in force at each time."""
 
     start: Start  # where the parts were placed
     declared: tuple[Change, ...]  # those of every run, as they were given
@@ -192,7 +192,7 @@ class TimeLine:
     @classmethod
     def of(cls, setup: Setup, made: Sequence[Change]) -> "TimeLine":
         """Place changes in a setup."""
-        # In order of time: a change may refer to what an earlier one has made.
+        # In order of time: a change may refer to the result of an earlier one.
         given, later, placed = [*made], setup, []
         for k in sorted(range(len(made)), key=lambda k: made[k].at):
             with within("changes", k):
@@ -235,7 +235,7 @@ class TimeLine:
         return replace(self, made=made, count=count, open=tuple(opened))
 
     def settled_at(self, t: float) -> "TimeLine":
-        """Return the time line for times from t [s] on, without what is over then."""
+        """Return the time line for times from t [s] on, without completed changes."""
         done = list(takewhile(lambda each: each.end <= t, self.open))
         over = len(done) == len(self.open)
         settled = (self.setup if over else _applied(done, self.settled)).settled(t)

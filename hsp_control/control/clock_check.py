@@ -18,7 +18,7 @@ class ClockWarning(UserWarning):
 
 
 class ClockCheck:
-    """Warns once of what is wrong with the times of the steps of a run."""
+    """Warns once of inconsistent times of the steps of a run."""
 
     def __init__(self) -> None:
         self._last: float | None = None
@@ -42,7 +42,7 @@ class ClockCheck:
                 f"a change at t = {at:.10g} s begins in {(at - now) / 86400.0:.0f} "
                 "days: times count from the first step; for now it is "
                 "at(controller.state.t)",
-                of=7,  # whoever calls a method of `Controller.at`
+                of=7,  # the caller of a method of `Controller.at`
             )
 
     def look(self, t: float, period: float, stamp: int) -> None:

@@ -28,12 +28,12 @@ class Commanded(Composition):
     """A composition that is changed, and given targets, while it runs."""
 
     def at(self, t: float) -> Changes:
-        """Return what makes changes that begin at a time [s].
+        """Return an object that makes changes which begin at a time [s].
 
         ``controller.at(2.0).ramp(0.5).gains("hand", hsp.Gains(natural_frequency=20))``.
         Changes apply in the order of their times, whatever the order of the calls; each
-        continues from what is then in force, so that several may overlap, and efforts
-        stay continuous. A time that has passed means now, with the whole ramp.
+        continues from the values then in force, so that several may overlap, and tau
+        stays continuous. A time that has passed means now, with the whole ramp.
         """
         return Changes(self.change, t)
 
@@ -43,7 +43,7 @@ class Commanded(Composition):
         ``controller.set_target("hand", pose)``, at any time and as often as needed. A
         stream takes over from the task's trajectory, with a crossfade, and goes there
         as fast as it may: at 0.5 m/s and 3 m/s², 1.5 rad/s and 8 rad/s². A task that
-        was given a stream, with bounds of its own, goes on with that.
+        was given a stream, with its own bounds, continues with that.
         ``controller.at(t).reference(task, trajectory)`` ends it.
 
         Args:
@@ -68,7 +68,7 @@ class Commanded(Composition):
         return self._sent(task, value=value)
 
     def stream(self, of: str | Streamed) -> StreamHandle:
-        """Return what commands a stream: ``controller.stream("hand").send(pose)``.
+        """Return the handle of a stream: ``controller.stream("hand").send(pose)``.
 
         Args:
             of: The name of a task: the stream is the one that it follows once all
@@ -159,7 +159,7 @@ class Commanded(Composition):
             ControllerError: If it names something that does not exist at its time.
             UnstableRateError: If gains that follow make the running loop unstable at
                 its period, without delays, where the robot is now.
-            RateError: If a rate that somebody has written of a new part is wrong.
+            RateError: If a user-defined rate of a new part is wrong.
             HspControlError: If its parts do not fit the robot.
         """
         with self._lock:

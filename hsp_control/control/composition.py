@@ -1,4 +1,4 @@
-"""What a controller is composed of, and what of it is active at a time."""
+"""The parts of a controller, and those that are active at a time."""
 
 from collections.abc import Iterable, Sequence
 from typing import Any
@@ -33,9 +33,9 @@ from hsp_control.trajectories.streams.run import StreamRun
 
 
 class Composition:
-    """What a controller is made of, and what of it is active at a time."""
+    """The parts of a controller, and those that are active at a time."""
 
-    # whether a program writes what changes; see `Controller.without_python`
+    # whether a program writes the changing values; see `Controller.without_python`
     _without_python = False
 
     @suggesting
@@ -74,8 +74,8 @@ class Composition:
             limits: Limits on efforts and motion, by default those of the robot's
                 URDF; None: no limits.
             contacts: The contacts that may support a robot with a free-flyer root.
-            base: What moves the free-flyer root besides contacts. ``flying``: nothing;
-                ``driven``: something outside, for example a simulator.
+            base: Actuation of the free-flyer root besides contacts. ``flying``: none;
+                ``driven``: external, for example a simulator.
             scene: The obstacles that fields and limits name.
             start: The configuration that relative parts refer to, shape (nq,); None:
                 that of the first `compute`.
@@ -119,7 +119,7 @@ class Composition:
         return Start(self._state.snapshot(), self.setup.start.scene)
 
     def check_derivatives(self, state: RobotState) -> None:
-        """Check the derivatives that somebody has written of the parts, at a state.
+        """Check the user-defined derivatives of the parts, at a state.
 
         The first step of a run does; see `hsp_control.control.declared_rates`.
 
@@ -130,7 +130,7 @@ class Composition:
         places = len(terms_of(self._declared.field))
         check_rates(self.setup, None, state, places)
 
-    # -- what it is made of -----------------------------------------------------------
+    # -- its parts --------------------------------------------------------------------
 
     @property
     def robot(self) -> Robot:
@@ -139,7 +139,7 @@ class Composition:
 
     @property
     def setup(self) -> Setup:
-        """All parts, placed, and when they count: what a step is bound for."""
+        """All parts, placed, with the times at which they are active."""
         return self._in_force.setup
 
     @property
@@ -200,7 +200,7 @@ class Composition:
 
     @property
     def base(self) -> Base | None:
-        """What else than contacts acts on a floating base."""
+        """The actuation of a floating base besides contacts."""
         return self._declared.base
 
     @property
@@ -280,7 +280,7 @@ class Composition:
         return self.setup.contact(contact).weight(t)
 
     def _force_offset(self, contact: str) -> Array:
-        """Return what compensators add to a contact's commanded force, (1,) [N]."""
+        """Return the compensators' part of a contact's commanded force, (1,) [N]."""
         return self._memory.force_offset(self.setup.contact(contact).contact.name)
 
     def __repr__(self) -> str:
@@ -333,4 +333,4 @@ _INSTEAD = {
     "active_stack": "call compute",
     "task_rows": "call compute",
 }
-"""What to do instead of assigning an attribute."""
+"""The alternative to the assignment of an attribute."""

@@ -43,15 +43,15 @@ class Controller(Commanded):
 
     Wherever the stacked Jacobian keeps its rank and no limit binds: every task's error
     obeys e'' + Kv e' + Kp e = 0, and V = ½ e_NᵀW e_N obeys V' = -e_NᵀW K_N e_N. The
-    same state gives the same effort, but for what is remembered of a run (`RunMemory`):
+    same state gives the same effort, but for the memory of a run (`RunMemory`):
     the last effort, used where the effort rate or the speed is limited (see `applied`),
     and how long changes of impedances wait.
 
     Time is zero at the first step of a run: a robot's clock may begin anywhere.
 
     The parts are values and do not change; `at` makes changes while the controller
-    runs. What they leave relative (a circle without a centre, ``target="start"``)
-    refers to ``start``, or else to the first state for which an effort is computed. A
+    runs. Relative values in them (a circle without a centre, ``target="start"``)
+    refer to ``start``, or else to the first state for which an effort is computed. A
     controller can be copied and pickled at any time; several threads may share it.
     """
 
@@ -69,8 +69,8 @@ class Controller(Commanded):
 
         Args:
             t: Time of a clock [s], which may begin anywhere: that of the first step is
-                time 0. Or a `RobotState` instead of all three, whose time counts from
-                there already; its values are copied.
+                time 0. Or a `RobotState` instead of all three, whose time starts
+                there; its values are copied.
             q: Configuration, shape (nq,).
             v: Velocity, shape (nv,) [rad/s or m/s].
             modifier: Changes the law's acceleration before the limits are applied;
@@ -80,14 +80,14 @@ class Controller(Commanded):
             ShapeError: If q or v has the wrong shape.
             NonFiniteError: If t, q or v contains NaN or inf, or a task or the field
                 does; a non-finite effort is never returned.
-            RateError: In the first step of a run, if a rate that somebody has written
+            RateError: In the first step of a run, if a user-defined rate
                 of the field or the metric is wrong, or the field depends on v.
             ConfigurationError: If a quaternion or a (cos, sin) pair is not of norm 1,
                 or an angle of the first state (also after `restart`; later ones are
                 not looked at) is farther from the middle of its joint's range than
                 twice that range: it would be in degrees.
-            ControllerError: If the state belongs to another robot, or what a step
-                calls, such as a field, calls its own controller.
+            ControllerError: If the state belongs to another robot, or a function
+                that a step calls, such as a field, calls its own controller.
         """
         with self._lock:
             return self._step(t, q, v, modifier)
@@ -175,7 +175,7 @@ class Controller(Commanded):
             self._memory.count_from(0.0)
 
     def _begin(self) -> None:
-        """Look at the first state, and without a start place there what is relative."""
+        """Check the first state, and without a start place relative values there."""
         check_angles(self._declared.robot, self._state.q)
         self._memory.clock.begin(self._state.t)
         if self._declared.start is None:
@@ -184,11 +184,11 @@ class Controller(Commanded):
         warn_of_far_targets(self._state, self.planned_tasks)
         self.check_derivatives(self._state)
         self._memory.begun = True
-        self._in_force.write(self._state.t)  # what is bound is called once, here
+        self._in_force.write(self._state.t)  # bound calls are called once, here
         self._in_force.bind_ahead()
 
     def _advance(self) -> None:
-        """Go on to what is in force at the time of the state."""
+        """Write the values in force at the time of the state."""
         if not self._memory.begun:
             self._begin()
         self._in_force.advance(self._state.t)
@@ -197,7 +197,7 @@ class Controller(Commanded):
         """Store the effort that was sent to the robot.
 
         The limit on the effort's rate starts from it, and so does the margin of speed
-        limits, which covers what the robot does while the effort is held. Without
+        limits, which covers the motion while the effort is held. Without
         limits it has no effect. The first one, also after `restart`, is warned of
         (`StartWarning`) where a robot at rest would jump; see `first_state`.
 
@@ -252,7 +252,7 @@ class Controller(Commanded):
         """Store an acceleration that something else than the efforts causes.
 
         From now on limits on motion hold for the sum of it and the law's acceleration:
-        a robot that somebody pushes may be braked harder, and not driven on. An
+        a pushed robot may be braked harder, and not accelerated further. An
         observer estimates it; without one the limits hold for the model alone.
 
         Args:
@@ -271,7 +271,7 @@ class Controller(Commanded):
 
         Args:
             dynamics: Those of a robot with the same joints, instead of the last ones;
-                None: nobody follows.
+                None: none follow.
         """
         with self._lock:
             self._in_force.model.follow(dynamics)
@@ -289,7 +289,7 @@ class Controller(Commanded):
     def model_changes(
         self, dynamics: Dynamics | None
     ) -> Callable[[float], object] | None:
-        """Return what lets other dynamics follow changes of payload and gravity.
+        """Return a function that updates other dynamics with payload and gravity.
 
         A simulated robot in another process knows the changes that were declared, and
         follows them by itself; see `followed_by` for one in this process.
@@ -312,8 +312,8 @@ class Controller(Commanded):
         does one that was made after its last step, which no step has seen.
 
         Args:
-            origin: What the clock of `compute` reads at time 0, for references,
-                schedules and changes [s]; None: what it reads in the next step.
+            origin: The reading of `compute`'s clock at time 0, for references,
+                schedules and changes [s]; None: its reading in the next step.
 
         Raises:
             NonFiniteError: If the origin is NaN or inf.
@@ -329,7 +329,7 @@ class Controller(Commanded):
             now.step = None
             if origin is not None:
                 memory.count_from(origin)
-            now.mixture.active = None  # the next step places what is relative
+            now.mixture.active = None  # the next step places relative values
             remembers = any(each.task.remembers for each in self.setup.tasks)
             if changes or line.count or remembers:
                 self._compose(line.start, changes)
@@ -343,7 +343,7 @@ class Controller(Commanded):
         """Bind the law for some contacts and tasks now, instead of in a step.
 
         Schedules and changes are bound by themselves: in the first step, and when
-        they are made. A plan that switches contacts by events asks for each combination
+        they are made. A plan that switches contacts by events requests each combination
         that it will use.
 
         Args:
@@ -352,7 +352,7 @@ class Controller(Commanded):
             without: The names of the tasks that are not active.
 
         Returns:
-            How long it took [s].
+            Its duration [s].
         """
         begun = perf_counter()
         with self._lock:
@@ -365,7 +365,7 @@ class Controller(Commanded):
     def state(self) -> RobotState:
         """The state that the last effort was computed for; the next one overwrites it.
 
-        Its time counts from the first step. `update` moves it, and nothing else does:
+        Its time starts at the first step. Only `update` moves it:
         its t, q and v cannot be assigned or written. Given to `compute` it is not
         copied.
         """
@@ -378,7 +378,7 @@ class Controller(Commanded):
         step = now.step if now.later is None else None
         return step if isinstance(step, BoundStep) else None
 
-    # -- what explains it -------------------------------------------------------------
+    # -- its diagnosis ----------------------------------------------------------------
 
     @property
     def active_stack(self) -> ActiveStack:
@@ -409,7 +409,7 @@ class Controller(Commanded):
     def step_alone(self, q: ArrayLike | None = None) -> BoundStep | None:
         """Return a step at the beginning of a run, for who makes it without Python.
 
-        What is relative is placed there. The controller is used up: `without_python`
+        Relative values are placed there. The controller is consumed: `without_python`
         makes one for this.
 
         Args:
@@ -426,7 +426,7 @@ class Controller(Commanded):
         return self._settled_step
 
     def stack_alone(self, without: Collection[str]) -> tuple[ActiveStack, Actuation]:
-        """Return the stack without some tasks, and what delivers it, for `step_alone`.
+        """Return the stack without some tasks, and its actuation, for `step_alone`.
 
         Args:
             without: The names of the tasks.
@@ -456,7 +456,7 @@ class Controller(Commanded):
     def stack_at(self, state: RobotState) -> ActiveStack:
         """Return the contacts and tasks that are active at a state, resolved there.
 
-        The state's time counts from the first step. The controller does not move: its
+        The state's time starts at the first step. The controller does not move: its
         copy does.
         """
         ahead = self._ahead()
@@ -480,8 +480,8 @@ class Controller(Commanded):
         """Return v = J# x_d' + P g, shape (nv,): the robot once both errors have died.
 
         The law makes the robot this first-order flow (docs/law.md, Equations (7) and
-        (13) over a metric; Liégeois 1977). So it shows what a field will do, and a
-        start with this velocity has no transient. The time counts from the first step.
+        (13) over a metric; Liégeois 1977). So it shows the effect of a field, and a
+        start with this velocity has no transient. Time starts at the first step.
         The controller does not move: its copy does.
         """
         ahead = self._ahead()
@@ -502,8 +502,8 @@ class Controller(Commanded):
     def preview(self, changes: Sequence[Change] | None = None) -> "Controller":
         """Return a copy at the beginning of a run: to look ahead, or at a log.
 
-        It is of the same robot object, and counts times from 0. Messages that
-        it takes from streams remain for the controller.
+        It is of the same robot object, with times from 0. Messages that
+        it reads from streams remain for the controller.
 
         Args:
             changes: All changes of the run, such as those of a log; None: those that

@@ -1,4 +1,4 @@
-"""What a controller is made of before anything relative in it is placed."""
+"""The parts of a controller before relative values in them are placed."""
 
 from collections.abc import Iterable, Sequence
 from pathlib import Path
@@ -40,7 +40,7 @@ from hsp_control.trajectories.streams.streamed import Streamed
 
 
 class DeclaredController:
-    """What a controller is made of before anything relative in it is placed."""
+    """The parts of a controller before relative values in them are placed."""
 
     def __init__(
         self,
@@ -56,7 +56,7 @@ class DeclaredController:
         scene: Scene | Iterable[Obstacle],
         start: ArrayLike | None,
     ) -> None:
-        """Check each part by itself; see `Controller` for what they mean."""
+        """Check each part by itself; `Controller` documents the arguments."""
         if isinstance(robot, str | Path):
             raise ControllerError(f"robot is {robot!r}; needs Robot.load({robot!r})")
         if isinstance(robot, pin.Model):

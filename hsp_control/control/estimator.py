@@ -1,4 +1,4 @@
-"""The base class of estimators: what is not measured, from what is."""
+"""The base class of estimators of quantities that are not measured."""
 
 from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
@@ -16,11 +16,11 @@ from hsp_control.declaration.by_type import ByType
 
 
 class Estimator(Part, ABC, family="estimators", error=EstimationError):
-    """What completes or replaces a part of each measurement.
+    """Completes or replaces a part of each measurement.
 
-    It stands between the sensors, and the plan and the controller. A subclass declares
-    its parameters as fields (see `Part`) and implements `begin`; what remembers
-    something is what that returns. Several run in the order of their stages.
+    It acts between the sensors, and the plan and the controller. A subclass declares
+    its parameters as fields (see `Part`) and implements `begin`; the memory of a
+    run belongs to its result. Several run in the order of their stages.
 
     Attributes:
         stage: The place in the chain: `BaseEstimator` 10, `ContactForces` 20.
@@ -32,33 +32,33 @@ class Estimator(Part, ABC, family="estimators", error=EstimationError):
     def begin(
         self, controller: Controller, inertial: Inertial | None
     ) -> "RunningEstimator":
-        """Return what estimates, for one run.
+        """Return the estimator of one run.
 
         Args:
-            controller: The controller, whose contacts carry the robot.
-            inertial: A reading of the robot's inertial measurement unit, which says
-                where that is; None: there is no unit.
+            controller: The controller, whose contacts support the robot.
+            inertial: A reading of the robot's inertial measurement unit, which
+                gives its placement; None: there is no unit.
 
         Raises:
-            EstimationError: If it does not fit the robot, or what it needs is missing.
+            EstimationError: If it does not fit the robot, or an input is missing.
             FrameNotFoundError: If the robot has no such frame.
         """
 
 
 class RunningEstimator(ABC):
-    """What an `Estimator` became for one run."""
+    """An `Estimator` in one run."""
 
     @abstractmethod
     def update(self, measured: Measurement) -> Measurement:
-        """Return the measurement with what is estimated; once a period, in order.
+        """Return the measurement with the estimates; once a period, in order.
 
         Raises:
-            EstimationError: If what it needs was not measured.
+            EstimationError: If an input was not measured.
         """
 
     @abstractmethod
     def log_channels(self, q: Array, v: Array) -> Mapping[str, LogChannel]:
-        """Return what to log of the last update, by name: ``estimate.<...>``.
+        """Return the logged values of the last update, by name: ``estimate.<...>``.
 
         Args:
             q: The true configuration at that time, shape (nq,), for errors.
@@ -69,7 +69,7 @@ class RunningEstimator(ABC):
 def begun(
     estimators: Sequence[Estimator], controller: Controller, inertial: Inertial | None
 ) -> list[RunningEstimator]:
-    """Return what runs, in order; see `Estimator.begin`."""
+    """Return the running estimators, in order; see `Estimator.begin`."""
     running = []
     for each in estimators:
         with within("estimators", each.yaml_type or type(each).__name__):

@@ -96,10 +96,10 @@ def warn_of_jump(
 ) -> None:
     """Warn if the first effort is far from the one that held the robot until then.
 
-    A robot at rest is held against gravity, so from there the effort jumps. What made a
-    start in motion is not known, and it is not looked at: that of the paper's runs lies
+    A robot at rest is held against gravity, so there the effort jumps. That before a
+    start in motion is unknown, and it is not checked: that of the paper's runs lies
     on the trajectory, with its velocity. Nor is a floating base, which contacts hold,
-    nor a joint without an effort limit. ``dynamics``: with what the robot carries.
+    nor a joint without an effort limit. ``dynamics``: with the payloads.
     """
     if robot.unactuated or (np.abs(v) > REST).any():
         return

@@ -20,7 +20,7 @@ from hsp_control.tasks import Task
 from hsp_control.tasks.gains import as_matrix
 
 Base = Literal["flying", "driven"]
-"""What else than contacts acts on a free-flyer root: nothing, or an outside device."""
+"""The actuation of a free-flyer root besides contacts: none, or external."""
 
 
 def check_parts(what: str, parts: object, kind: type[Part]) -> None:
@@ -61,7 +61,7 @@ def check_tasks(tasks: Sequence[Task], robot: Robot) -> None:
 
 def priority_of(task: Task, robot: Robot) -> int:
     """Return the priority of a placed task, 1 the highest."""
-    # Without one of its own it is 1; on a floating base 1 for what keeps the balance,
+    # If it declares none it is 1; on a floating base 1 for tasks that keep the balance,
     # and 2 for all else, so that no hand that reaches too far makes the robot fall.
     if task.priority is not None:
         return task.priority

@@ -4,9 +4,9 @@ With E = ½ e'ᵀΛe' + U(e), U the energy of the spring, and an external force 
 
     E' = fᵀx' - e'ᵀ(D + D_ζ) e' + ∂U/∂t.
 
-A spring that becomes stiffer while it is stretched stores energy that nobody gave. So
-the numbers in force follow those that were planned only as fast as ∂U/∂t is no more
-than what the damping takes out: E' <= fᵀx', to first order in the period. Where they
+A spring that becomes stiffer while it is stretched stores additional energy. So
+the values in force follow the planned ones only as fast as ∂U/∂t is at most
+the power of the damping: E' <= fᵀx', to first order in the period. Where they
 are behind, they catch up in half of the change's ramp, so that no effort jumps.
 """
 

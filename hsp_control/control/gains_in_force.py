@@ -51,7 +51,7 @@ class GainsInForce:
         self._followed: dict[int, FollowedImpedance] = {}
 
     def force_offset(self, contact: str) -> Array:
-        """Return what compensators add to a contact's commanded force, (1,) [N]."""
+        """Return the compensators' part of a contact's commanded force, (1,) [N]."""
         return self._memory.force_offset(contact)
 
     def plan(self, setup: Setup, t: float) -> None:
@@ -60,7 +60,7 @@ class GainsInForce:
         self.write_all(t)
 
     def planned(self, setup: Setup) -> "PlannedGains":
-        """Return what is to be followed for a setup, which may be later."""
+        """Return the gains of a setup, which may be followed later."""
         tasks = {each.key: each.task for each in setup.tasks}
         known = {id(task): self.feedback[key] for key, task in self._tasks.items()}
         feedback = {
@@ -91,7 +91,7 @@ class GainsInForce:
     def _follower(
         self, planned: PlannedTask, in_force: FeedbackInForce
     ) -> FollowedImpedance:
-        """Return what lets a task's impedance follow what is planned."""
+        """Return the impedance in force of a task, which follows the planned one."""
         own = self._followed.get(planned.key)
         if own is not None and own.numbers is in_force.numbers:
             return own
@@ -176,7 +176,7 @@ class GainsInForce:
 
 
 class PlannedGains(NamedTuple):
-    """What `GainsInForce` follows."""
+    """The gains of a setup, for `GainsInForce`."""
 
     setup: Setup
     tasks: dict[int, Task]  # by key
@@ -192,7 +192,7 @@ def changes_impedance(task: Task, numbers: Evolution[Array]) -> bool:
 
 
 def check_held(old: Setup, new: Setup, state: RobotState, period: float) -> None:
-    """Check what a change of the setup makes of gains, where the robot is now."""
+    """Check the gains after a change of the setup, at the present state."""
     before = {each.key: each.gains.target for each in old.tasks}
     for each in new.tasks:
         if not np.array_equal(each.gains.target, before.get(each.key, ())):

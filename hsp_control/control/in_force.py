@@ -61,7 +61,7 @@ class InForce:
         self.follow(time_line)
 
     def follow(self, time_line: TimeLine) -> None:
-        """Follow a time line from now on; what its steps call is bound."""
+        """Follow a time line from now on; the calls of its steps are bound."""
         self._memory.follow(time_line.streams())
         self._over = None
         self._plan(time_line)
@@ -87,7 +87,7 @@ class InForce:
             raise
 
     def bind_ahead(self) -> None:
-        """Bind what steps call until all changes are over, and then.
+        """Bind the calls of steps until all changes are over, and after that.
 
         Not before the first state: from it follow the motions that contacts leave free.
         """
@@ -150,7 +150,7 @@ class InForce:
     def kept(self) -> TimeLine:
         """The time line without the changes that are over, for one more change.
 
-        An integrator that asks for earlier times than the last one does so within one
+        An integrator that evaluates earlier times than the last one does so within one
         of its steps, and changes are made between them.
         """
         return self.time_line.settled_at(self.latest)
@@ -174,7 +174,7 @@ class InForce:
 
 
 class AfterChanges(NamedTuple):
-    """What a controller goes on with once all changes are over."""
+    """The calls of a controller after all changes."""
 
     at: float  # from when on [s]
     time_line: TimeLine

@@ -1,10 +1,10 @@
-"""What companions may know of this room.
+"""The interface of `control` for companions.
 
-They import from nowhere else here, and so a contract keeps it: what is not named below
-may move. A `MotionPlan` gives a controller its tasks and contacts step by step, an
+They import from no other module here, by a contract: names that are not listed below
+may change. A `MotionPlan` gives a controller its tasks and contacts step by step, an
 `Estimator` the state that it computes with; both read a `Measurement`, write
-`LogChannel` columns, and may ask a `FallDetector` or a `RunningObserver`. Pages steer a
-`Controller` by `Changes` and streams, and draw what it computes.
+`LogChannel` columns, and may use a `FallDetector` or a `RunningObserver`. Pages steer a
+`Controller` by `Changes` and streams, and draw its output.
 """
 
 from .active_stack import ActiveStack as ActiveStack

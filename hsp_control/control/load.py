@@ -1,4 +1,4 @@
-"""What acts on the joints besides their efforts, as it was before a safe stop."""
+"""The external effort on the joints before a safe stop."""
 
 from math import ceil
 
@@ -15,7 +15,7 @@ _HEAD_START = 0.05
 """Time T₀ that is counted besides that since the first state [s]: 1/k, so that an error
 of a velocity in the first period moves a braked joint no faster than the error."""
 _BEFORE = 0.2
-"""How old the estimate is that is used [s]: what is wrong is found within this time,
+"""Age of the estimate that is used [s]: a fault is detected within this time,
 or is small."""
 _CONTACT = 0.3
 """Largest load of a joint, relative to its effort limit: as much as a contact [-]."""
@@ -28,7 +28,7 @@ class LoadEstimate:
 
     With d the load, M v' = tau - N + d, so d' = K (M v' - (tau - N) - d). It is
     estimated while the robot runs and its measurements are consistent, and not in the
-    stop, in which what is measured may be wrong.
+    stop, in which measurements may be wrong.
 
     At first, t after the first state, the gain is 1/(t + T₀) instead of K, until that
     is smaller. Then the estimate is the mean ∫ (M v' - (tau - N)) dt / (t + T₀), and a

@@ -1,4 +1,4 @@
-"""What is measured of a robot at one time, and what a run's parts report to the log."""
+"""The measurement of a robot at one time, and the log channels of a run's parts."""
 
 from collections.abc import Mapping
 from types import MappingProxyType
@@ -11,7 +11,7 @@ NO_WRENCHES: Mapping[str, Array] = MappingProxyType({})
 
 
 class Inertial(NamedTuple):
-    """What an inertial measurement unit reports: means over the period that ends.
+    """The reading of an inertial measurement unit: means over the period that ends.
 
     Both are in the axes that the frame had when the period began, so that an
     orientation R and a velocity v go on as R exp(ω h) and v + (R f + g) h, exactly.
@@ -44,13 +44,13 @@ class Measurement(NamedTuple):
         halted: Whether the robot has stopped by itself and ignores efforts.
         applied: Effort the robot had when it measured, in the terms of
             `Hardware.write` (libfranka's ``tau_J_d``), shape (nv,), where the hardware
-            knows it; None: what was sent last is used.
+            knows it; None: the effort sent last is used.
         fault: Why the robot must be stopped safely, if hardware knows a reason.
-        wrenches: What the world exerts on the robot at each contact, by the name of
+        wrenches: The wrench of the world on the robot at each contact, by the name of
             its frame: force and moment about the frame's origin, world axes, shape (6,)
             [N, N·m]; of the period that ends now. Frames without one are missing.
         estimated: The frames whose wrench was not measured, but estimated.
-        inertial: What an inertial measurement unit reports; None: there is none.
+        inertial: The reading of an inertial measurement unit; None: there is none.
     """
 
     sequence: int

@@ -26,27 +26,27 @@ class Waiting(NamedTuple):
 class RunMemory:
     """The whole memory of a controller's run.
 
-    A controller is what is declared, its time line, the state of its robot, and this.
-    What computes reads and writes these arrays, and remembers nothing by itself. A copy
+    A controller is its declaration, its time line, the state of its robot, and this.
+    Calls read and write these arrays, and have no other memory. A copy
     and a pickle are of the four; a restart clears this one.
     """
 
-    # what the last step delivered, shape (nv,) [rad/s² or m/s²]
+    # of the last step, shape (nv,) [rad/s² or m/s²]
     acceleration: Array
-    sent: SentMemory  # the efforts sent, and what holding them did
-    # what the clock reads at time 0, shape (1,) [s], and whether that is known
+    sent: SentMemory  # the efforts sent, and the effect of holding them
+    # reading of the clock at time 0, shape (1,) [s], and whether that is known
     origin: Array = field(default_factory=lambda: np.zeros(1))
     counts: bool = False
     begun: bool = False  # whether there was a step
     now: float = -np.inf  # latest time of a step [s]
     # changes as they were given that no step has seen, and the time of the last one
     unseen: tuple[float, tuple[Change, ...]] = (-np.inf, ())
-    # of tasks, by key: an impedance that waits, and what compensators add
+    # of tasks, by key: an impedance that waits, and the compensators' addition
     waiting: dict[int, Waiting] = field(default_factory=dict)
     offsets: dict[int, Array] = field(default_factory=dict)
-    # what compensators add to commanded normal forces, by contact, shape (1,) [N]
+    # compensators' part of commanded normal forces, by contact, shape (1,) [N]
     forces: dict[str, Array] = field(default_factory=dict)
-    streams: tuple[StreamRun, ...] = ()  # of what is followed, or will be
+    streams: tuple[StreamRun, ...] = ()  # of present and later references
     clock: ClockCheck = field(default_factory=ClockCheck)
     runs: int = 0  # how many times it was cleared
 
@@ -58,7 +58,7 @@ class RunMemory:
     def clear(self) -> None:
         """Begin another run; the arrays stay where they are.
 
-        So do the streams, until those of the new run take what was sent to them.
+        So do the streams, until those of the new run take over their pending messages.
         """
         self.acceleration = np.zeros_like(self.acceleration)
         self.sent.clear()
@@ -86,8 +86,8 @@ class RunMemory:
     def follow(self, streams: Iterable[StreamRun]) -> None:
         """Remember the streams that are followed now, and forget those that are not.
 
-        One that is new takes what was sent to the one before it, of the same
-        declaration, and nobody took.
+        A new one takes over the messages of the previous one, of the same
+        declaration, that were not read.
         """
         before, now = list(self.streams), list(streams)
         known = {id(each) for each in before}
@@ -104,7 +104,7 @@ class RunMemory:
         self.origin[0], self.counts = origin, True
 
     def force_offset(self, contact: str) -> Array:
-        """Return what is added to a contact's commanded force; the array stays."""
+        """Return the addition to a contact's commanded force; the array stays."""
         return self.forces.setdefault(contact, np.zeros(1))
 
     def made(self, now: float, change: Change) -> None:

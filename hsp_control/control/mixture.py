@@ -1,4 +1,4 @@
-"""Steps while tasks and limits fade in and out: mixtures of what each set delivers."""
+"""Steps while tasks and limits fade in and out: weighted means of the results."""
 
 from collections.abc import (
     Callable,
@@ -12,6 +12,7 @@ from copy import copy
 import numpy as np
 
 from hsp_control.common.arrays import Array
+from hsp_control.common.exceptions import ControllerError
 from hsp_control.control.active_stack import ActiveStack
 from hsp_control.control.actuation import Actuation, Delivered, Status
 from hsp_control.control.actuation.limits_in_force import LimitSet, LimitsInForce
@@ -35,6 +36,20 @@ besides M a + N, shape (nv,), or None. While tasks fade it is called for each se
 them, weighted by the stack's `share`."""
 
 
+def _checked(found: object, robot: Robot) -> tuple[Array, Array | None]:
+    """Return what a modifier returned, if it is as `AccelerationModifier` says."""
+    if not isinstance(found, tuple) or len(found) != 2:
+        raise ControllerError(
+            f"modifier returned {type(found).__name__}; needs (acceleration, effort or "
+            "None)"
+        )
+    a, offset = found
+    own = robot.check_tangent(a, "the modifier's acceleration")
+    if offset is None:
+        return own, None
+    return own, robot.check_tangent(offset, "the modifier's effort")
+
+
 _Active = tuple[frozenset[int], frozenset[tuple[int, int]]]
 """The contacts and the tasks that are active, by identity: to compare their values
 would cost more than the step."""
@@ -49,7 +64,7 @@ class Mixture:
 
         (1 - w1) d{} + (w1 - w2) d{1} + (w2 - w3) d{1, 2} + ...
 
-    with d{...} what the law for what has weight 1 and what is in the braces delivers
+    with d{...} the result of the law for the parts of weight 1 and those in braces
     within the limits. It is continuous in the weights, whatever binds. It keeps the
     limits, because they are convex in the acceleration, the effort and the forces,
     which are affine in one another. The rows of the tasks in all sets are linear in the
@@ -80,7 +95,7 @@ class Mixture:
         self._follow(setup)
 
     def following(self, setup: Setup) -> "Mixture":
-        """Return the mixture of another setup; what stays the same is bound already."""
+        """Return the mixture of another setup; unchanged parts are bound already."""
         other = copy(self)
         field = setup.field
         if field != self.field:
@@ -121,7 +136,7 @@ class Mixture:
         self.damped = ""
 
     def step(self, t: float, modifier: AccelerationModifier | None) -> Delivered:
-        """Resolve the law at the state and its time [s], and return what is delivered.
+        """Resolve the law at the state and its time [s], and return the result.
 
         Part by part: for a modifier, and what no `BoundMixture` can deliver.
         """
@@ -177,7 +192,7 @@ class Mixture:
         return sets
 
     def _deliver(self, modifier: AccelerationModifier | None) -> Delivered:
-        """Return what is delivered of the law that was resolved last."""
+        """Return the result for the law that was resolved last."""
         # While one set of limits follows another, it is the mixture of the steps within
         # each of them.
         sets = self._limits.sets
@@ -189,7 +204,9 @@ class Mixture:
         for active in self._parts:
             a, offset = active.acceleration, None
             if modifier is not None:
-                a, offset = modifier(self._state.read_only, active, a)
+                # A copy: a function of the user may change it in place.
+                found = modifier(self._state.read_only, active, a.copy())
+                a, offset = _checked(found, self._state.robot)
             for limits, share in sets:
                 one = self.actuation(active, limits).deliver(a, offset)
                 if single:
@@ -233,7 +250,7 @@ class Mixture:
         return BoundMixture(state, choice, within, limits, origin, evolving)
 
     def stack_alone(self, without: Collection[str]) -> tuple[ActiveStack, Actuation]:
-        """Return the stack without some tasks, and what delivers it within the limits.
+        """Return the stack without some tasks, and its actuation within the limits.
 
         Neither contacts nor limits change.
         """
@@ -247,7 +264,7 @@ class Mixture:
         return next(each for each in self._limits.all if each.limits is last)
 
     def prepare(self, times: Iterable[float]) -> None:
-        """Bind what steps call at some times [s], now instead of in a step."""
+        """Bind the calls of steps at some times [s], now instead of in a step."""
         for t in times:
             for _, stack in self._sets(t):
                 if stack not in self._prepared:
@@ -265,13 +282,13 @@ class Mixture:
             each.rehearse()
 
     def bind(self, stack: ActiveStack) -> None:
-        """Bind what a step with a stack calls."""
+        """Bind the calls of a step with a stack."""
         stack.bind()
         for limits in self._limits.all:
             self.actuation(stack, limits)
 
     def actuation(self, stack: ActiveStack, limits: LimitSet) -> Actuation:
-        """Return what delivers the law of a stack within a set of limits."""
+        """Return the actuation of a stack within a set of limits."""
         found = self._actuations.get((stack, limits))
         if found is None:
             found = Actuation(self._state, stack.law, stack.support, limits)
@@ -315,7 +332,7 @@ class Mixture:
 
 
 _NOTHING = 0.0, None
-"""What comes after all that has a weight."""
+"""The end of the parts that have a weight."""
 
 
 def _weight(pair: tuple[float, object]) -> float:

@@ -1,4 +1,4 @@
-"""The model in force: what a robot carries, and gravity, as changes make them.
+"""The model in force: payloads, and gravity, as changes make them.
 
 The inertia of a payload adds to that of the body that carries it, in part while it is
 taken up or put down: M, N, their rates and the law are those of the model of the time.
@@ -37,7 +37,7 @@ class PlannedPayload:
 
 
 class ModelInForce:
-    """What is carried now, and gravity, in a state's dynamics and what follows them."""
+    """Present payloads and gravity in a state's dynamics, and in those that follow."""
 
     def __init__(self, robot: Robot, dynamics: Sequence[Dynamics]) -> None:
         self._payloads: Sequence[PlannedPayload] = ()

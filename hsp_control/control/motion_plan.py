@@ -31,7 +31,7 @@ class PlanParts(NamedTuple):
 
 
 class MotionPlan(Part, ABC, family="plans", error=PlanError):
-    """What a robot is to do, decided once a control period from what is measured.
+    """A motion of the robot, planned once a control period from the measurements.
 
     A plan writes references of tasks and switches contacts; it owns no part of the law.
     It adds the tasks that it needs. A task that already has the name of one of these
@@ -39,7 +39,7 @@ class MotionPlan(Part, ABC, family="plans", error=PlanError):
     schedule become the plan's.
 
     A subclass declares its parameters as fields (see `Part`) and implements `parts` and
-    `begin`. What remembers something during a run is what `begin` returns.
+    `begin`. The memory of a run belongs to the result of `begin`.
     """
 
     @abstractmethod
@@ -60,7 +60,7 @@ class MotionPlan(Part, ABC, family="plans", error=PlanError):
     def limits(self, limits: Limits | None) -> Limits | None:
         """Return the limits of a controller that follows this plan.
 
-        What is given stays; a plan may choose what is not. By default it chooses
+        Given arguments stay; a plan may choose the others. By default it chooses
         nothing.
 
         Args:
@@ -70,7 +70,7 @@ class MotionPlan(Part, ABC, family="plans", error=PlanError):
 
     @abstractmethod
     def begin(self, controller: Controller) -> "RunningPlan":
-        """Return what runs, for a controller that is made of `parts`.
+        """Return the running plan of a controller that is made of `parts`.
 
         Raises:
             PlanError: If the controller has other parts, or the robot cannot follow.
@@ -78,7 +78,7 @@ class MotionPlan(Part, ABC, family="plans", error=PlanError):
 
 
 class RunningPlan(ABC):
-    """What a plan became for one run of one controller.
+    """A plan in one run of one controller.
 
     Attributes:
         plan: The plan, with the streams of this run.
@@ -124,7 +124,7 @@ class RunningPlan(ABC):
 
     @abstractmethod
     def log_channels(self) -> Mapping[str, LogChannel]:
-        """Return what to log of the last update, by name: ``plan.<...>``."""
+        """Return the logged values of the last update, by name: ``plan.<...>``."""
 
 
 __dir__ = own_names(__name__)

@@ -1,4 +1,4 @@
-"""What a controller returns: an effort, and everything that explains it."""
+"""The output of a controller: an effort, and its diagnosis."""
 
 from collections.abc import Callable, Sequence
 from typing import NamedTuple
@@ -17,11 +17,11 @@ from hsp_control.law.problem import StepRecord
 class ControlOutput:
     """The effort at one state, and everything that explains it.
 
-    It belongs to the caller: the controller does not write into it again. What explains
-    the effort may be read-only.
+    It belongs to the caller: the controller does not write into it again. The diagnosis
+    may be read-only.
 
     Attributes:
-        tau: Effort M a + N minus what the contact forces supply, shape (nv,)
+        tau: Effort M a + N minus that of the contact forces, shape (nv,)
             [N·m or N].
         damped: The tasks of the highest level that is so near a singularity that its
             inverse is bounded, and the law not exact: their names, or ``contacts``.
@@ -29,7 +29,7 @@ class ControlOutput:
         forces: Forces at the points of the active contacts, in the axes of each
             contact (two tangents, normal), shape (3 points,) [N]; see
             `ActiveStack.support`.
-        status: What the limits left of the law's acceleration.
+        status: How the limits changed the law's acceleration.
         relaxation: The largest violation of a limit, where limits contradict each
             other [rad/s² or m/s²].
     """
@@ -66,7 +66,7 @@ class ControlOutput:
         damped: str,
         measured: Sequence[tuple[str, Callable[[], Array]]],
     ) -> None:
-        """Copy what a step wrote: its effort, its memory, the distances it measured."""
+        """Copy the results of a step: its effort, its memory, measured distances."""
         tau, a, forces, self.status, self.relaxation = delivered
         self.tau, self._memory, self._views = tau.copy(), stack.memory.tobytes(), None
         self._acceleration = None if a is stack.acceleration else a.tobytes()
@@ -80,7 +80,7 @@ class ControlOutput:
     def distances(self) -> dict[str, float]:
         """The smallest distance that each barrier measured [m], by its name.
 
-        Of a barrier of one's own: its smallest value, in its unit. The names are those
+        Of a user-defined barrier: its smallest value, in its unit. The names are those
         of the log's columns ``distance.NAME`` and ``barrier.NAME``: the types, such as
         ``obstacle_distance``; of one type they are numbered. The distance of shapes
         that overlap is negative.
@@ -186,7 +186,7 @@ class Diagnostics(NamedTuple):
         field_value: The field's cost f, or its norm.
         null_space_norm: ‖e_N‖_W, which decays like exp(-K_N t) for a scalar gain.
         manipulability: det(J W⁻¹ Jᵀ) of the tasks' stacked Jacobian.
-        triangle: What `singular_values` computes them from.
+        triangle: The input of `singular_values`.
     """
 
     field_value: float

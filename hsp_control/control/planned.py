@@ -53,8 +53,8 @@ class PlannedTask:
     def weight_beyond(self, t: float, edges: Sequence[float]) -> float:
         """Return its weight at time t where some contacts are lifted.
 
-        A task without a ramp that begins where a contact ends moves what the contact
-        kept at rest. So it is active before, in proportion as the contact is not; so is
+        A task without a ramp that begins where a contact ends moves the link that the
+        contact held. So it is active before, with the complementary weight; so is
         one that ends where a contact begins.
         """
         now, schedule = self.weight(t), self.task.schedule
@@ -98,7 +98,7 @@ class PlannedTerm:
         return None if isinstance(own, Weight) else Evolution(float(own))
 
     def with_weight(self, weight: Evolution[float]) -> "PlannedTerm":
-        """Return the term with another weight of its own."""
+        """Return the term with another weight."""
         own = weight.initial if weight.constant else EvolvingWeight(weight)
         return replace(self, field=replace(self.field, weight=own))
 
@@ -178,8 +178,8 @@ class PlannedContact:
 class PlannedLimits:
     """The limits of a controller: sets that follow one another.
 
-    While one follows another, both count, and what each delivers is mixed; see
-    `Mixture.step`. So a limit can go to infinity, or come from there.
+    While one follows another, both are active, and their results are mixed; see
+    `Mixture.step`. So a limit can be removed or added smoothly.
     """
 
     # each set of limits, None for none, in order of time; and its share, in [0, 1]. The

@@ -1,4 +1,4 @@
-"""The safe stop as calls: what a live loop does, and a program without Python."""
+"""The safe stop as calls, for a live loop and for a program without Python."""
 
 from collections.abc import Sequence
 from typing import NamedTuple
@@ -22,7 +22,7 @@ class StopGains(NamedTuple):
     damping: float = 20.0
     """k of the braking effort -k M(q) v [1/s]."""
     natural_frequency: float = 10.0
-    """Natural frequency of what then holds it [rad/s]."""
+    """Natural frequency of the hold that follows [rad/s]."""
     rest_speed: float = 0.01
     """Joint speed below which holding begins [rad/s or m/s]."""
     longest_damping: float = 0.5
@@ -40,7 +40,7 @@ Steeper ones, such as a wall, may only be pushed: the joints that are held do it
 
 
 class BoundStop:
-    """The calls of a safe stop at a state, and what they remember.
+    """The calls of a safe stop at a state, and their memory.
 
     Damping: tau = g(q) - d - s k M(q) v, with the load d that acted on the joints
     before the stop (`LoadEstimate`; 0 where a robot floats, whose feet push it, too).
@@ -66,8 +66,8 @@ class BoundStop:
         state: Where the robot is.
         feet: The contacts that can carry it; see `STEEPEST`.
         limits: Limits of the efforts, shape (nv,).
-        load: What acted on the joints besides their efforts before.
-        damped_for: How long it has damped, shape (1,) [s].
+        load: The external effort on the joints before the stop.
+        damped_for: Duration of the damping so far, shape (1,) [s].
         holding: Whether it holds, shape (1,).
         held_q: Where it holds, q₀, shape (nq,).
         tau: The effort, shape (nv,) [N·m or N].
@@ -83,9 +83,9 @@ class BoundStop:
         """Begin with damping, on all feet.
 
         Args:
-            state: Where the robot is.
-            contacts: What a robot with a floating base stands on.
-            gains: How it brakes.
+            state: The state of the robot.
+            contacts: The contacts of a robot with a floating base.
+            gains: The gains of damping and hold.
             period: Time between two evaluations, shape (1,) [s].
         """
         robot, nv = state.robot, state.robot.nv
@@ -136,7 +136,7 @@ class BoundStop:
                 end=state.q,
                 displacement=away,
             ),
-            PartCall(  # with what the state's robot carries
+            PartCall(  # with the state's payloads
                 engine.InverseDynamics,
                 dynamics=state.dynamics,
                 q=state.q,

@@ -14,11 +14,11 @@ class StreamHandle:
     """A stream of a controller, in whichever run it is; see `Controller.stream`.
 
     `send` and `send_chunk` may be called from any thread, before the first step, too.
-    What is counted and recorded is that of the present run.
+    Counters and the record are those of the present run.
     """
 
     def __init__(self, find: Callable[[], StreamRun]) -> None:
-        """Set what returns the stream at present: each run has one of its own."""
+        """Set the function that returns the stream of the present run."""
         self._find = find
 
     def send(
@@ -49,7 +49,7 @@ class StreamHandle:
 
     @property
     def record(self) -> tuple[Mapping[str, Any], ...]:
-        """What the run has taken, and when; see `Streamed.messages`."""
+        """The messages that the run has read, and when; see `Streamed.messages`."""
         return self._find().record
 
     @property

@@ -1,4 +1,4 @@
-"""Targets that one sets: a stream takes over from what a task follows."""
+"""Targets of a program: a stream takes over from the reference of a task."""
 
 from collections.abc import Callable
 from typing import Any
@@ -58,7 +58,7 @@ def new_stream(followed: object) -> Streamed:
 def followed_stream(task: Task) -> StreamRun | None:
     """Return the stream that a task follows after all changes; None: it follows none.
 
-    What reads a source or a recording is none: nobody can send to it.
+    One that reads a source or a recording cannot be sent to.
     """
     followed: object = settled(task.followed, np.inf)
     if isinstance(followed, FollowedStream) and not followed.run.stream.listens_to:

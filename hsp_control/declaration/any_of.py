@@ -1,4 +1,4 @@
-"""A part of one of some families, whose ``type:`` says which it is."""
+"""A part of one of some families, selected by its ``type:``."""
 
 from dataclasses import fields, is_dataclass
 from typing import Any, cast
@@ -128,7 +128,7 @@ def _is_known(reference: Any, handler: GetJsonSchemaHandler) -> bool:
 
 
 def _check_complete(type_name: str, member: type[Declared]) -> None:
-    """Check that a class implements what its family requires."""
+    """Check that a class implements the methods that its family requires."""
     missing = sorted(getattr(member, "__abstractmethods__", ()))
     if missing:
         raise ConfigError(

@@ -1,6 +1,6 @@
 """Parts by type: mappings in YAML, whose keys are the types of a family.
 
-``sensors: {delay: 2, position_noise: {std: 0.001}}`` is what Python writes as
+``sensors: {delay: 2, position_noise: {std: 0.001}}`` is in Python
 ``sensors=[SensorDelay(2), PositionNoise(std=0.001)]``.
 """
 

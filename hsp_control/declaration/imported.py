@@ -25,8 +25,8 @@ def import_file(path: Path | str) -> None:
     """Run a Python file, whose functions and parts YAML can then name.
 
     ``{type: function_cost, function: elbow}`` names a function; a class such as ``class
-    Sway(hsp.Cost, type="sway")`` declares a type. The file may do anything that Python
-    can: import only what you trust.
+    Sway(hsp.Cost, type="sway")`` declares a type. The file may do anything in Python:
+    import only trusted files.
 
     Raises:
         ConfigError: If the file cannot be read, or raises an error.
@@ -43,7 +43,9 @@ def import_file(path: Path | str) -> None:
     module = sys.modules[path.stem] = module_from_spec(spec)
     try:
         spec.loader.exec_module(module)
-    except Exception as error:
+    except KeyboardInterrupt:
+        raise
+    except BaseException as error:  # also sys.exit(), which would end a run silently
         del sys.modules[path.stem]
         raise ConfigError(f"{path}: {type(error).__name__}: {error}") from error
     _take_functions(module)
@@ -61,7 +63,9 @@ def import_code(name: str) -> None:
     if not is_file_name(name):
         try:
             _take_functions(import_module(name))
-        except Exception as error:
+        except KeyboardInterrupt:
+            raise
+        except BaseException as error:
             hint = f" (for a file, write {name}.py)" if isinstance(
                 error, ModuleNotFoundError
             ) else ""  # fmt: skip

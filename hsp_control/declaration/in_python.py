@@ -61,7 +61,7 @@ def _bases(annotation: Any, metadata: Sequence[Any] = ()) -> list[type[Declared]
 
 
 def plain_signature(cls: Any) -> Signature:
-    """Return a class's signature, without what only pydantic reads in annotations."""
+    """Return a class's signature, without pydantic's metadata in annotations."""
     return Signature([_parameter(each) for each in _in_order(cls)])
 
 

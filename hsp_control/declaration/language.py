@@ -42,7 +42,7 @@ _OF_FUNCTIONS = {
     "orientations": "CallableOrientation",
     "trajectories": "CallableTrajectory",
 }
-"""What is made of a Python function, by the family."""
+"""The part that is made of a Python function, by the family."""
 
 _IN_YAML: ContextVar[bool] = ContextVar("_IN_YAML", default=False)
 
@@ -137,7 +137,7 @@ def _told(value: object) -> str:
 
 
 def _call(kind: type[Any]) -> str:
-    """Return a class; of a part that has no others beside it, what it is made of."""
+    """Return a class; of a part that is alone in its family, its constructor."""
     name = _with_article(kind.__name__)
     if not issubclass(kind, Declared) or kind.family is not None:
         return name

@@ -212,7 +212,7 @@ _LONG_LIST = 40
 def explained(finding: Mistake, key: str = "key") -> str:
     """Return the message for a finding, without its location.
 
-    What is missing or unknown is called ``key``.
+    A missing or unknown name is called ``key``.
     """
     value, expected = finding.value, finding.expected
     match finding.kind:
@@ -387,7 +387,7 @@ def _list(option: Any, bounds: tuple[int, int | None], *, many: bool) -> str:
 
 
 def argument_error(cls: type[Declared], error: ValidationError) -> HspControlError:
-    """Return the part's own error for what pydantic found wrong with its arguments."""
+    """Return the part's own error for pydantic's errors of its arguments."""
     fields = dataclasses.fields(cls)  # type: ignore[arg-type]
     names = [field.name for field in fields if not field.kw_only]
     pending = []

@@ -118,12 +118,12 @@ Axes = Annotated[str, AfterValidator(_distinct_axes)]
 
 
 class ArrayField:
-    """The validation of a field that holds an array, or what a list makes."""
+    """The validation of a field that holds an array, or the result of a list."""
 
     def __init__(
         self, items: Any, convert: Callable[[Any], object], none: str | None = None
     ) -> None:
-        # what pydantic checks first, such as nested lists of numbers
+        # checked by pydantic first, such as nested lists of numbers
         self.items = items
         self.convert = convert  # makes the array of them, and may check more
         self.none = none  # the form of None in plain data

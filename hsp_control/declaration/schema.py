@@ -1,4 +1,4 @@
-"""What a part or a pydantic model accepts, read from its annotations."""
+"""The values that a part or a pydantic model accepts, from its annotations."""
 
 from collections.abc import Collection, Iterable, Iterator, Mapping
 from types import UnionType
@@ -17,7 +17,7 @@ class _Discriminator(NamedTuple):
 
 
 _BY_TYPE = _Discriminator("type")
-"""The key that says which member of a family a part is."""
+"""The key that selects the member of a family."""
 
 
 class ValueTypes(NamedTuple):
@@ -82,7 +82,7 @@ def shape(annotation: Any, *metadata: Any) -> ValueTypes:
 
 def field_shape(field: FieldInfo) -> ValueTypes:
     """Return the shape of a model's field."""
-    for each in field.metadata:  # what pydantic took out of ``Annotated``
+    for each in field.metadata:  # pydantic moves it out of ``Annotated``
         if isinstance(each, ArrayField | AnyOf | ByType):
             return shape(Annotated[Any, each])
     return shape(field.annotation, field)

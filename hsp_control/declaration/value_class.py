@@ -83,7 +83,7 @@ class ValueClass(ABCMeta):
             cls.family.register(type, cls)
         return cls
 
-    # What a part's own constructor is comes anew when its schema is built.
+    # A part's own constructor is replaced when its schema is built.
     if not TYPE_CHECKING:
 
         def __call__(cls, *args: Any, **kwargs: Any) -> Any:

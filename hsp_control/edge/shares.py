@@ -11,7 +11,7 @@ largest of three shares, each of them 0 in the interior of the workspace:
 
     near    σ ≥ σ_x: 0;  σ ≤ σ_x/2: 1.    σ_x is a tenth of the robot's size
     far     |e| ≤ 0.85 ℓ: 0;  |e| ≥ ℓ: 1.      ℓ is the largest error that is fed back
-    limits  a_t is within all limits: 0;  it is three times what they permit: 1
+    limits  a_t is within all limits: 0;  it is three times the permitted one: 1
 
 with σ the smallest singular value of the stack J, whatever the metric. The first two
 are here, the last is in `limited_target.py`, where limits are known. All are

@@ -41,7 +41,7 @@ from hsp_control.edge.shares import FAR, NEAR
 
 STIFFNESS = 200.0
 """L times the robot's size [1/s²]. A stretched elbow is then pulled to its singular
-posture by a spring of at most 2 L |∂s/∂q| ≤ 100 1/s² of its own inertia, 10 rad/s: slow
+posture by a spring of at most 2 L |∂s/∂q| ≤ 100 1/s² times its inertia, 10 rad/s: slow
 relative to periods of up to 10 ms and to the motors' efforts, and damped by a
 null-space gain of 10 1/s."""
 WHOLE = 3

@@ -7,8 +7,8 @@ read, and the calls that write it. `planned` combines them into a plan:
 
     PartCall the call to make, with arguments that may have to be supplied
     Step       a bound call: it has its arrays, and is called with the time
-    StepPlan   the steps of part calls, in order: first what follows the time alone, so
-               that a state may be evaluated after it, then what reads the state
+    StepPlan   the steps of part calls, in order: first those of the time alone, so
+               that a state may be evaluated after it, then those that read the state
     Plan       steps as one call of the engine
 """
 

@@ -1,4 +1,4 @@
-"""The safe stop of a frozen controller: what `hsp live` does, for ``hsp_stop``."""
+"""The safe stop of a frozen controller: that of `hsp live`, for ``hsp_stop``."""
 
 from collections.abc import Sequence
 from typing import NamedTuple
@@ -26,9 +26,9 @@ class Stopping(NamedTuple):
     move: Move
     """It, as one move."""
     before: Sequence[Step]
-    """What a step does for it at its end: it estimates the load."""
+    """Its calls at the end of a step: they estimate the load."""
     outputs: list[Port]
-    """What can be read of it."""
+    """Its outputs."""
 
 
 def stopping(
@@ -49,7 +49,7 @@ def stopping(
         bound: Its step.
         gains: How it brakes.
         period: How long each effort is held, shape (1,) [s].
-        origin: What the clock reads at time 0, shape (1,) [s].
+        origin: The clock's reading at time 0, shape (1,) [s].
         first: The calls that bring the model up to a time.
         acts: The effort that a step delivers, shape (nv,).
     """
@@ -67,8 +67,8 @@ def stopping(
     calls = Plan([*first, *values["calls"].calls])
     effort = Port("stop.tau", "N·m or N", "the effort that brakes, or holds", stop.tau)
     held = Port("stop.holding", "-", "whether it holds", stop.holding)
-    rate = Port("stop.damping", "1/s", "how it brakes", np.array([gains.damping]))
-    besides, unit = "what acts besides the efforts, as it was before", "N·m or N"
+    rate = Port("stop.damping", "1/s", "damping of the stop", np.array([gains.damping]))
+    besides, unit = "external effort on the joints before the stop", "N·m or N"
     load = Port("stop.load", unit, besides, stop.load.load)
     move = engine.Move(**values | {"calls": calls})
     before = state.plan(stop.calls_before(acts)).steps()

@@ -1,4 +1,4 @@
-"""A step with compensators, as one move: what `CompensatedController.effort` does.
+"""A step with compensators, as one move, like `CompensatedController.effort`.
 
     measured t, q, v → velocity filter → state → observer → law → start-up ramp
                      → offset of the effort → limits → effort → integral action
@@ -30,7 +30,7 @@ class CompensatedStep:
     """The step of a controller with the compensators of one run.
 
     Attributes:
-        stages: What each of them does.
+        stages: The calls of each.
     """
 
     def __init__(
@@ -131,7 +131,7 @@ class CompensatedStep:
     def _deliver(
         self, active: ActiveStack, actuation: Actuation, part: DeliveredAlone
     ) -> list[Step]:
-        """Return the calls that deliver what a stack resolves, with the stages."""
+        """Return the calls that deliver the law of a stack, with the stages."""
         shared = self._shared
         calls = [
             _copy(active.law.acceleration, shared.a),

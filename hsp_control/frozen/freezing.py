@@ -61,9 +61,9 @@ def freeze(
     Args:
         controller: The controller.
         path: The file to write, such as ``panda.hsp``.
-        compensation: Compensators for what the model lacks; None: there are none.
+        compensation: Compensators of model errors; None: there are none.
         period: How long each effort is held [s].
-        start: The configuration at which what is relative is placed, shape (nq,); by
+        start: The configuration to which relative values refer, shape (nq,); by
             default the controller's start, or else where its run began.
         payloads: Frames that may carry something, which is an input of each; None:
             those of the tasks.

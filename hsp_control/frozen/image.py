@@ -1,11 +1,11 @@
-"""What is saved of a plan: its memory, its calls, the robots that they share.
+"""The saved form of a plan: its memory, its calls, the robots that they share.
 
-A plan is calls on arrays of NumPy. Arrays that overlap are one block, so that what one
-call writes another one reads, and each block keeps its alignment to the processor's
+A plan is calls on arrays of NumPy. Arrays that overlap are one block, so that one
+call reads the output of another, and each block keeps its alignment to the processor's
 vectors: the order of a sum, and so its last bit, may depend on it. The kinds of calls
 are named, and their arguments by their members' names; nothing here is of one kind.
 
-``engine/frozen/frozen_plan.cpp`` reads what `Image.content` returns:
+``engine/frozen/frozen_plan.cpp`` reads the result of `Image.content`:
 
     magic, CRC-32 of the rest, the engine's build, memory, objects, the move, the stop,
     ports
@@ -33,10 +33,10 @@ of it."""
 
 
 RAMPED, PAYLOAD, SPRING = b"i", b"p", b"s"
-"""What is set: a value that may ramp, what is carried, or some numbers of an
+"""Kinds of inputs: a value that may ramp, a payload, or some numbers of an
 impedance."""
 TARGET, VELOCITY, RATE, TIME = b"t", b"v", b"r", b"c"
-"""What is sent to a stream: a target, or a velocity; velocity and time of the next
+"""Kinds of messages to a stream: a target, or a velocity; velocity and time of the next
 target."""
 
 
@@ -176,7 +176,7 @@ class _Memory:
         return self._places[start] + int(begin) - start
 
     def content(self) -> bytes:
-        """Return what the memory holds now."""
+        """Return the present contents of the memory."""
         memory = bytearray(self._size)
         for array in self._arrays.values():
             place = self.place(array)

@@ -1,7 +1,7 @@
 """The inputs of a frozen controller while it runs: gains, K_N, and targets.
 
-Gains are as on a controller's time line: they crossfade to a new value, and go on from
-what is then in force; see `Evolution`, and ``engine/frozen/evolve.hpp``. An impedance
+Gains are as on a controller's time line: they crossfade to a new value, from
+the present one; see `Evolution`, and ``engine/frozen/evolve.hpp``. An impedance
 does so, too, and waits where it would add energy; see `FollowedImpedance`.
 """
 
@@ -70,7 +70,7 @@ def inputs_of(
         own: The controller.
         bound: Its step.
         held: How long its efforts are held, shape (1,) [s].
-        says: What it says of its tasks.
+        says: Its reports of tasks.
     """
     period = float(held[0])
     for task in own.tasks:

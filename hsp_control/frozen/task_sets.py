@@ -29,7 +29,7 @@ MOST = 4
 
 
 Delivering = Callable[[ActiveStack, Actuation, DeliveredAlone], list[Step]]
-"""Returns the calls that deliver what a stack resolves, and where they write it."""
+"""Returns the calls that deliver the law of a stack into the given arrays."""
 
 
 class TaskErrors(NamedTuple):
@@ -40,7 +40,7 @@ class TaskErrors(NamedTuple):
 
 
 class Reported(NamedTuple):
-    """What a step says of its tasks."""
+    """The reports of a step on its tasks."""
 
     errors: Mapping[str, TaskErrors]
     """By the tasks' names."""
@@ -64,11 +64,11 @@ class TaskSets:
     Attributes:
         names: The tasks that come and go.
         presences: How far each of them is present, in [0, 1], shape (k,).
-        reported: What a step says of all tasks.
+        reported: The reports of a step on all tasks.
     """
 
     def __init__(self, own: Controller, bound: BoundStep, names: Sequence[str]) -> None:
-        """Bind what all sets share.
+        """Bind the common calls of all sets.
 
         Args:
             own: The controller.
@@ -93,8 +93,8 @@ class TaskSets:
         """Return the calls of a step after those of the state.
 
         Args:
-            delivered: Where they write what is delivered.
-            deliver: What delivers the law of one set.
+            delivered: The arrays of the result.
+            deliver: Returns the calls for the law of one set.
         """
         state, nv = self._bound.state, len(delivered.a)
         count = 1 << len(self.names)
@@ -136,7 +136,7 @@ class TaskSets:
         return [*steps, *state.plan([mix]).steps()]
 
     def _report(self, active: ActiveStack, level: Indices) -> list[Step]:
-        """Return the calls that keep what a set says of its tasks."""
+        """Return the calls that store the reports of a set on its tasks."""
         calls = list[AnyCall]()
         for name, here in active.task_rows.items():
             there = self.reported.errors[name]

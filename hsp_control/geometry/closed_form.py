@@ -139,7 +139,7 @@ class ClosedFormDistances:
         """Return Σ b'(d_k) ∇d_k and its rate, (nv,), after `measure` at this state.
 
         ``slopes`` and ``curvatures`` are b' and b'' of all distances. The next call
-        overwrites what is returned.
+        overwrites the result.
         """
         sums = self._sums
         run = state.cached(

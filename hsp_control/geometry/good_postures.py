@@ -109,7 +109,7 @@ class PostureSearch:
     def overlap(self, q: Array) -> tuple[float, str]:
         """Return how deep [m] links and obstacles overlap, and the pair ``a to b``.
 
-        Capsules are larger than the links; so what overlaps as capsules is measured
+        Capsules are larger than the links; so overlapping pairs of them are measured
         again with the convex hulls of the links.
         """
         rough = self._proximity

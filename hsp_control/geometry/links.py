@@ -250,7 +250,7 @@ def _between_joints(robot: Robot, part: RobotPart) -> list[LinkShape]:
     shapes = []
     for child in joints:
         parent, end = model.parents[child], model.jointPlacements[child].translation
-        # The parts share the world, so each uses a name of its own for it.
+        # The parts share the world, so each uses its own name for it.
         name = model.names[parent] if parent else f"{part.prefix}universe"
         start = np.zeros(3) if parent else part.placement.translation
         placement, length = _placement_along(start, end)

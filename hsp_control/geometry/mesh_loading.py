@@ -30,7 +30,7 @@ def load_mesh(file: Path, scale: Array) -> Any:
 
 
 def why_unread(error: Exception) -> str:
-    """Return the reason in an error of Coal's reader, which says much besides."""
+    """Return the reason in a longer message of Coal's reader."""
     text = str(error).strip() or type(error).__name__
     lines = text.rpartition("message: ")[2].splitlines()
     return ": ".join(line for line in lines if not line.startswith("Hint: "))

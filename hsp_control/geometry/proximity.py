@@ -178,7 +178,7 @@ class Proximity:
         Args:
             state: The state.
             near: Whether a pair has a row, shape (k,).
-            least: What each row needs, shape (k,).
+            least: Lower bound of each row, shape (k,).
             rows: The rows to which they are added: their number, A and least.
         """
         if self.closed_form is not None and self.coal is None:

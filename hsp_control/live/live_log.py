@@ -23,7 +23,7 @@ from hsp_control.simulation.log_writer import LogWriter
 _CHANNELS = {
     "phase": ("-", "0 waiting; 1 running; 2 safe stop, damping; 3 safe stop, hold"),
     "sent": ("N·m or N", "sent to the robot: tau, or tau - g(q)"),
-    "applied": ("N·m or N", "what the robot applied of it before, if it reports it"),
+    "applied": ("N·m or N", "the last applied effort, if the robot reports it"),
     "measured": ("-", "1 if the state was measured, 0 if the model predicted it"),
     "age": ("s", "state age"),
     "response": ("s", "response time: from the state's arrival to its effort"),
@@ -76,6 +76,7 @@ class LoopLog:
         # whether the controller has raised; it is not called again
         self.controller_failed = False
         self._log: LogWriter | None = None
+        self._config, self._ran = meta.get("config"), 0.0
         if self.path is not None:
             self._log = LogWriter(controller, scene, 0, path=self.path, meta=meta)
 
@@ -107,6 +108,8 @@ class LoopLog:
             self._failed = True
             raise
         self._due.written(state.t, phase)
+        if phase == Phase.RUNNING:
+            self._ran = state.t
 
     def warm_up(self, reader: StateReader, limiter: EffortLimiter) -> None:
         """Make a row without writing it, so that later rows compile nothing."""
@@ -135,7 +138,16 @@ class LoopLog:
             "response": deadlines.response,
             "gap": deadlines.interval,
         }
-        self._log.end(report.status, report.reason, live=summary)
+        self._log.end(report.status, report.reason, live=summary, **self._whole())
+
+    def _whole(self) -> dict[str, Any]:
+        """Return a configuration without a duration, with the one until the stop."""
+        if self._config is None or self._config["simulation"]["duration"] is not None:
+            return {}
+        settings = self._config["simulation"]
+        rows = max(round(self._ran / settings["log_period"]), 1)
+        settings |= {"duration": rows * settings["log_period"]}
+        return {"config": self._config}
 
     def abandon(self) -> None:
         """Close the journal of a run that did not begin; another run may write it."""

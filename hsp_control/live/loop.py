@@ -36,6 +36,7 @@ from hsp_control.live.simulated_robot import InProcessRobot
 from hsp_control.live.state_reader import StateReader
 from hsp_control.robot import RobotState
 from hsp_control.simulation.control_chain import ControlChain, EffortSource
+from hsp_control.simulation.declared_run import declared_run
 from hsp_control.simulation.plants import is_exact
 
 _WARM_UP = 20
@@ -149,7 +150,22 @@ def run_loop(
             end = np.inf if duration is None else start_time + duration - 0.5 * period
             warn_of_slow_efforts(robot, first.q, limits)
             shown = scene or controller.scene
-            loop_log = LoopLog(log, log_period, chain, shown, dict(meta or {}))
+            meta = dict(meta or {})
+            if log is not None and "config" not in meta:
+                meta |= declared_run(
+                    controller,
+                    first.q,
+                    first.v,
+                    start_time,
+                    plan=plan,
+                    estimators=estimators,
+                    simulation={
+                        "duration": duration,
+                        "log_period": log_period,
+                        "control_period": period,
+                    },
+                )
+            loop_log = LoopLog(log, log_period, chain, shown, meta)
             loop_log.warm_up(reader, limiter)
             chain.begin(first.inertial, robot.state(start_time, first.q, first.v))
             controller.compute(start_time, first.q, first.v)  # begins
@@ -170,7 +186,7 @@ def run_loop(
             with real_time_priority(priority), no_garbage_collection():
                 loop.run(on_period)
         except BaseException:
-            with suppress(BaseException):  # the first error is what matters
+            with suppress(BaseException):  # the first error is reported
                 hardware.close()
             if loop_log is not None:
                 loop_log.abandon()

@@ -20,13 +20,13 @@ _LEAST = 0.1
 
 
 class ResponseCheck:
-    """Compares changes of the measured velocity with what the efforts would cause.
+    """Compares changes of the measured velocity with those expected of the efforts.
 
     A joint may follow its effort by less than the model expects, or not at all: its
     friction, its rotor and its contacts are unknown. A person may push it for a while.
     But if velocity and positions agree and a joint repeatedly moves against its effort,
     its sensor or its motor has the wrong sign. Feedback then accelerates it without
-    bound. That must be so in what varies, too: with a wrong mass an arm sinks while its
+    bound. The varying part must agree: with a wrong mass an arm sinks while its
     effort, which grows, is against it, and a constant acceleration explains that.
 
     Attributes:
@@ -70,7 +70,7 @@ class ResponseCheck:
         constant, of_constant = self._products[0, 0], self._products[0, 1:]
         whole = self._products[1:, 1:]
         varying = whole - of_constant[:, None] * of_constant / constant
-        # What varies must be explained better by the opposite than by no relation.
+        # The opposite sign must explain the varying part better than no relation.
         contrary = _contrary(whole, _CONTRARY) & _contrary(varying, 1.0)
         first, second = whole[0, 0], whole[1, 1]
         contrary &= (np.minimum(first, second) > self._least) & self._judged

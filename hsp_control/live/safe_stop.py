@@ -123,7 +123,7 @@ class SafeStop:
 
     @property
     def load(self) -> Array:
-        """What acted on the joints besides their efforts before the stop, (nv,)."""
+        """The external effort on the joints before the stop, (nv,)."""
         robot = self._robot
         return np.zeros(robot.nv) if self._bound is None else self._bound.load.load
 

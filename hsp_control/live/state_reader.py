@@ -452,7 +452,7 @@ class StateReader:
         # the new, valid measurement of this period, or None
         self.measurement: Measurement | None = None
         self.fault: str | None = None  # why the robot must be stopped, or None
-        self.error: BaseException | None = None  # what the hardware raised, or None
+        self.error: BaseException | None = None  # raised by the hardware, or None
         self.connection_lost = False  # whether no state can arrive any more
         # arrival of this period's state, by the loop's clock [s]
         self.arrival = self._last_arrival = self._due = clock()

@@ -123,7 +123,7 @@ class StillSensors:
             return "the other joints show that it moves; its sensor is dead"
         return (
             f"its effort is {self.beyond[i]:.3g} {_EFFORT[self._robot.units[i]]} "
-            "beyond what holds it; its sensor is dead, or it is blocked"
+            "beyond the holding effort; its sensor is dead, or it is blocked"
         )
 
 

@@ -190,7 +190,7 @@ class TrustedMotion:
     def stop(self, load: Array) -> None:
         """Begin braking: a joint that accelerates now has a wrong sensor or motor.
 
-        ``load`` is what acts on the joints besides their efforts, shape (nv,).
+        ``load`` is the external effort on the joints, shape (nv,).
         """
         self.stopping = True
         self._load = load.copy()

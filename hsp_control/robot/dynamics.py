@@ -34,7 +34,7 @@ class JointNumbers(NamedTuple):
     placement: tuple[float, ...]  # in the parent: R, row by row, and the origin [m]
     axis: tuple[float, ...]
     pitch: float  # of a screw [m/rad]
-    leader: int  # what it follows: q = ratio q_leader + offset; 0: none
+    leader: int  # the joint that it follows: q = ratio q_leader + offset; 0: none
     ratio: float
     offset: float
     parts: tuple["JointNumbers", ...]  # of a composite joint
@@ -70,7 +70,7 @@ def model_numbers(model: pin.Model) -> ModelNumbers:
 
 
 def dynamics_of(model: pin.Model) -> Dynamics:
-    """Return the dynamics of a model, with memory of their own."""
+    """Return the dynamics of a model, with their own memory."""
     return Dynamics(*model_numbers(model))
 
 

@@ -154,7 +154,7 @@ class Rk4(FixedStep, type="rk4"):
     """The classical fourth-order Runge-Kutta step, with a new chart in each step."""
 
     def begin(self, robot: Robot, bind_dynamics: Bind) -> "Steps":
-        """Return what integrates; see `Integrator.begin`."""
+        """Return the running integrator; see `Integrator.begin`."""
         return _Rk4Stages(robot, bind_dynamics, self.step)
 
 
@@ -162,7 +162,7 @@ class SemiImplicitEuler(FixedStep, type="semi_implicit_euler"):
     """The semi-implicit Euler step, of first order: v ← v + h v', q ← q ⊕ h v."""
 
     def begin(self, robot: Robot, bind_dynamics: Bind) -> "Steps":
-        """Return what integrates; see `Integrator.begin`."""
+        """Return the running integrator; see `Integrator.begin`."""
         return _EulerStep(robot, bind_dynamics, self.step)
 
 
@@ -266,7 +266,7 @@ class _Rk4Stages(Steps):
         return parts
 
     def _place(self, stage: int | None) -> None:
-        """Compute what the chart of a robot that is not linear needs."""
+        """Compute the chart of a robot whose coordinates are not a vector space."""
         self.q[:] = self.robot.integrate(self._base, self._delta)
         if stage is not None and not self.robot.flat:
             self._D[stage] = self._chart.velocity(self._delta, self.v)
@@ -285,7 +285,7 @@ class Dop853(Integrator, type="dop853"):
     """Absolute tolerance of a step [rad, m, rad/s or m/s]."""
 
     def begin(self, robot: Robot, bind_dynamics: Bind) -> Advance:
-        """Return what integrates; see `Integrator.begin`."""
+        """Return the running integrator; see `Integrator.begin`."""
         return partial(self._advance, robot, _of_new_arrays(robot, bind_dynamics))
 
     def _advance(

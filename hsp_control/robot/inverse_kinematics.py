@@ -62,7 +62,7 @@ def reach(
     the null space of J it moves towards the preferred configuration. A joint at a limit
     that would go beyond it is fixed in a step. The result depends on the arguments
     only. ``preferred``, ``lower`` and ``upper`` are displacements from neutral, (nv,).
-    Frames that are ``held`` meanwhile, such as feet, have targets of their own.
+    Frames that are ``held`` meanwhile, such as feet, have their own targets.
     """
     neutral, state, rest = robot.neutral(), RobotState(robot), np.zeros(robot.nv)
     x = np.clip(robot.difference(neutral, q), lower, upper)

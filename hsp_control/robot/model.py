@@ -122,9 +122,9 @@ class RobotModel(Structure):
     def spring_force(self) -> tuple[float, float]:
         """The largest force and moment of springs by default [N, N·m]; inf for none.
 
-        The force is what the strongest motor holds at half of `size`, the moment half
+        The force is that of the strongest motor at half of `size`, the moment half
         of that motor's effort. Of prismatic joints the force is used directly. Without
-        a maximum effort it is what moves the robot's mass as gains of 100 1/s² do at
+        a maximum effort it accelerates the robot's mass as gains of 100 1/s² do at
         0.3 of its size.
         """
         effort, lever = self._largest_effort(), 0.5 * self.size
@@ -169,7 +169,7 @@ class RobotModel(Structure):
     # -- dynamics ---------------------------------------------------------------------
 
     def dynamics(self) -> Dynamics:
-        """Return the dynamics with memory of their own, as an argument of calls.
+        """Return the dynamics with their own memory, as an argument of calls.
 
         They are those of the model as it is now: change its masses before states,
         controllers and plants are made of it.
@@ -227,7 +227,7 @@ class RobotModel(Structure):
     def bind_forward_dynamics(
         self, q: Array, v: Array, tau: Array, dynamics: Dynamics | None = None
     ) -> Term:
-        """Return `forward_dynamics` of what these arrays hold at its computation."""
+        """Return `forward_dynamics` of the present contents of these arrays."""
         acceleration = np.zeros(self.nv)
         call = PartCall(
             engine.ForwardDynamics,

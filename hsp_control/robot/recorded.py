@@ -133,7 +133,7 @@ def recorded_robot(record: Any, access: Access = ANYWHERE) -> Robot:
     looked up beside that file, or in the robot's package.
 
     Args:
-        record: What `robot_record` returned.
+        record: The result of `robot_record`.
         access: Which files may be read.
 
     Raises:
@@ -152,6 +152,15 @@ def recorded_robot(record: Any, access: Access = ANYWHERE) -> Robot:
         raise
     except (LookupError, TypeError, ValueError, AttributeError) as error:
         raise ModelError(f"the robot in the log is damaged: {error!r}") from None
+
+
+def name_a_changed_scene(robot: Robot, record: Mapping[str, Any]) -> None:
+    """Warn that the robot in a scene's file is not the one of a log."""
+    if "model" in record and record["model"] != plain_data(model_data(robot.model)):
+        _log.warning(
+            "%s has changed since the log was made: the robot is that of the file",
+            robot.source.urdf,
+        )
 
 
 def _of_model(record: Mapping[str, Any]) -> Robot:

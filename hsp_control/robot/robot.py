@@ -262,8 +262,8 @@ class Robot(RobotModel):
 
     def __reduce__(self) -> tuple[Any, ...]:
         if self.mimics:
-            # A restored model would crash the process: Pinocchio's archives omit what
-            # mimic joints refer to (seen with 4.1).
+            # A restored model would crash the process: Pinocchio's archives lose
+            # mimic joints (seen with 4.1).
             raise ModelError(
                 f"{self.name}: a robot with mimic joints cannot be pickled; "
                 "load it in each process, or with mimic=False"

@@ -171,9 +171,9 @@ class RobotState:
         return self
 
     def advance(self, move: Move, t: float, q: ArrayLike, v: ArrayLike) -> float:
-        """`update`, with the calls of `bind_move`; return what the last one returns."""
+        """`update`, with the calls of `bind_move`; return the last one's result."""
         value = move(t, q, v)
-        if value is None:  # refused: lists, for example, or what is not valid
+        if value is None:  # rejected: lists, for example, or invalid values
             if not isinstance(t, float | int | np.number) or not np.isfinite(t):
                 raise NonFiniteError(
                     f"time t is {t!r}; needs a finite number of seconds"
@@ -193,7 +193,7 @@ class RobotState:
         """Return how `advance` moves this state, with calls of the time that follow.
 
         Args:
-            calls: What is called after it, with the time of the state.
+            calls: The calls after it, with the time of the state.
             origin: The clock of `advance` at time 0, shape (1,) [s]; None: it is the
                 time of the state.
         """
@@ -323,7 +323,7 @@ class RobotState:
         return int(self.stamp_array[0])
 
     def cached(self, part: object, what: str, make: Callable[[], Made]) -> Made:
-        """Return what ``make`` returned for a part and this state; it is called once.
+        """Return the result of ``make`` for a part and this state; it is called once.
 
         ``what`` distinguishes the memories of a class and its subclasses.
 
@@ -341,7 +341,7 @@ class RobotState:
         return made
 
     def run(self, calls: PartCalls) -> Any:
-        """Make calls now, once; return what the last one returns."""
+        """Make calls now, once; return the result of the last one."""
         return self.plan(calls).run(self.t)
 
     def plan(self, calls: PartCalls) -> StepPlan:
@@ -351,7 +351,7 @@ class RobotState:
     def prepared(
         self, part: object, what: str, make: Callable[[], tuple[Made, PartCalls]]
     ) -> tuple[Made, Callable[[], Any]]:
-        """Return what `cached` does, and a call that makes ``make``'s calls now."""
+        """Return the result of `cached`, and a call that makes ``make``'s calls now."""
 
         def plan() -> tuple[Made, StepPlan]:
             memory, calls = make()
@@ -501,7 +501,7 @@ _FIXED = {
     "robot", "q", "v", "time", "stamp_array", "dynamics", "world", "inertia",
     "inertia_rate", "effects", "effort",
 }  # fmt: skip
-"""What native calls read or write: assigning others would change nothing for them."""
+"""Arrays of native calls: assigning others would have no effect on the calls."""
 
 
 def _fits(data: pin.Data, world: WorldKinematics) -> bool:

@@ -56,7 +56,7 @@ class Structure:
         mimics: Whether some joints mimic others.
         unactuated: Indices in v that have no motor: those of a free-flyer root.
         dof_indices: Index in q of each degree of freedom's coordinate, shape (nv,); -1
-            if it has none of its own (roots, continuous joints).
+            if it has none (roots, continuous joints).
     """
 
     def __init__(

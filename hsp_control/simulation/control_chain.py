@@ -13,7 +13,7 @@ from hsp_control.robot import RobotState
 
 
 class EffortSource(Protocol):
-    """Computes the efforts of a loop: a `CompensatedController` or what wraps one.
+    """Computes the efforts of a loop: a `CompensatedController` or a wrapper of one.
 
     One that has an attribute ``feels_contacts`` which is true gets the wrenches of
     `Measurement` as a fifth argument of `effort`.
@@ -66,7 +66,7 @@ class ControlChain(Generic[Source_co]):
         plan: MotionPlan | None = None,
         estimators: Sequence[Estimator] = (),
     ) -> None:
-        self.compensated = compensated  # what computes the efforts
+        self.compensated = compensated  # computes the efforts
         self._plan, self._estimators = plan, tuple(estimators)
         self._feels = bool(getattr(compensated, "feels_contacts", False))
         # whether more is needed of a measurement than q and v
@@ -84,7 +84,7 @@ class ControlChain(Generic[Source_co]):
     def begin(self, inertial: Inertial | None, state: RobotState | None = None) -> None:
         """Begin a run: the memory of an earlier one is cleared.
 
-        ``inertial``, a reading of the inertial measurement unit, says where that is. A
+        ``inertial``, a reading of the inertial measurement unit, gives its placement. A
         plan starts at ``state``; without one it starts with the first effort.
         """
         controller = self.compensated.controller

@@ -219,7 +219,7 @@ def missed_forces(
     controller, rest = controller.preview(), np.zeros(controller.robot.nv)
     least: dict[str, tuple[float, str]] = {}  # share of a command and its warning
     for t in map(float, np.linspace(0.0, duration, _LOOKS)):
-        controller.compute(t, q0, rest)  # what is commanded then
+        controller.compute(t, q0, rest)  # the commands at that time
         support = controller.active_stack.support
         pressed = _pressed(support)
         share = _share(controller, support, t) if pressed else 1.0

@@ -26,7 +26,7 @@ def heavy_plant(plant: PlantPart, robot: Robot, q: Array) -> Iterator[str]:
     """
     if robot.unactuated:
         return
-    # one field after the other, so that each is checked for what it adds
+    # one field after the other, so that each is checked for its own effect
     so_far = replace(plant, inertias=Inertias(), payload=None, motor_inertia=0.0)
     before = so_far.simulated(robot, ANYWHERE)
     for field in ("inertias", "payload", "motor_inertia"):

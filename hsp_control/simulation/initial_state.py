@@ -43,7 +43,7 @@ class StartPose(Part, error=ConfigurationError):
     (x, y, z, w) [-], or a matrix [-]; any by default."""
 
     def target(self, robot: Robot) -> Target:
-        """Return what inverse kinematics tries to reach.
+        """Return the target of the inverse kinematics.
 
         Raises:
             FrameNotFoundError: If there is no such frame.
@@ -228,7 +228,7 @@ def posture_search(
 
 
 def _tracked_rows(tasks: Iterable[Task], robot: Robot) -> list[Rows]:
-    """Return what those tasks of the highest priority track that track frames."""
+    """Return the rows of the frame tasks of the highest priority."""
     tasks = list(tasks)
     first = min((task.priority or 1 for task in tasks), default=1)
     found = []

@@ -60,7 +60,7 @@ class JournalWriter:
     """Writes a journal; no other writer can, until it is closed or deleted."""
 
     def __init__(self, path: Path, resumed: "JournalReader | None" = None) -> None:
-        """Begin a journal, or go on after what a reader of it has read.
+        """Begin a journal, or continue after the rows that a reader has read.
 
         Else an existing file is overwritten, unless another process writes it.
         """
@@ -231,7 +231,7 @@ class JournalReader:
     def ends_damaged(self) -> bool:
         """Return whether all bytes of the frame after the last one are there.
 
-        Of a file that nobody writes any more it is damaged, and not merely unfinished.
+        In a file that is no longer written it is damaged, not merely unfinished.
         """
         data = self.path.read_bytes()[self._at :]
         if len(data) < _FRAME.size:

@@ -50,7 +50,7 @@ class LimitExcess:
     def recording(
         self, limits: RobotLimits | None, q: Array, v: Array
     ) -> list[PartCall]:
-        """Return `record` of what these arrays then hold, as calls."""
+        """Return `record` of the contents of these arrays, as calls."""
         if limits is None:
             return []
         return [PartCall(engine.LimitExcess, **self._arguments(limits, q, v))]
@@ -69,7 +69,7 @@ class LimitExcess:
         }
 
     def collect(self, limits: RobotLimits | None) -> dict[str, LogChannel]:
-        """Return what to log, and begin anew; nothing without limits."""
+        """Return the logged values, and begin anew; nothing without limits."""
         if limits is None:
             return {}
         found = {

@@ -42,8 +42,8 @@ class LogColumns:
     """The columns of a log, each declared once: the present row, and the rows before.
 
     Attributes:
-        row: Where the numbers of the present row are written, by column; what is not
-            written is NaN.
+        row: The arrays of the present row, by column; values that are not
+            written are NaN.
         numbers: The same numbers side by side, shape (n,); another array once columns
             were added.
         descriptions: The unit and the meaning of each column, as JSON data.
@@ -82,7 +82,7 @@ class LogColumns:
             self._shapes[name], self._laid_out = (length,), False
 
     def lay_out(self) -> None:
-        """Make the columns that were added; what the row has already is kept."""
+        """Make the columns that were added; present values of the row are kept."""
         if self._laid_out:
             return
         old, size = self.row, width(self._shapes)
@@ -195,7 +195,7 @@ class TaskColumns:
         column(f"{prefix}.actual", (width,), unit, "actual value")
 
     def write(self, state: RobotState) -> None:
-        """Write references, tracked values, and what streams have received."""
+        """Write references, tracked values, and the counters of streams."""
         row = self._columns.row
         for name, task in self.logged.items():
             reference, actual = task.measure(state.read_only)

@@ -72,7 +72,7 @@ class LogWriter:
             scene: Obstacles to log.
             rows: How many rows are kept in memory; 0: none, and then any number of
                 them can be written.
-            plan: What the robot follows.
+            plan: The plan of the run.
             path: The journal to write; `Rollout.load` reads it also after a crash.
             meta: JSON data to add to the log's.
 
@@ -88,7 +88,7 @@ class LogWriter:
         # the latest run of each stream that there was, by its declaration's identity
         self._streams: dict[int, StreamRun] = {}
         self._law: StepRecord | None = None  # of the present row
-        self._active: ActiveStack | None = None  # what `_sources` are of
+        self._active: ActiveStack | None = None  # the stack of `_sources`
         self._sources: list[tuple[str, Array]] = []  # the law's arrays for columns
         robot, column = controller.robot, columns.add
         nv, units = robot.nv, dict.fromkeys(robot.units)

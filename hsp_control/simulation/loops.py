@@ -33,7 +33,7 @@ class Instant(NamedTuple):
     tau: Array  # the commanded effort, computed from the measured state, shape (nv,)
     log_channels: Mapping[
         str, LogChannel
-    ]  # what the controller and the plan log, by name
+    ]  # log channels of the controller and the plan, by name
 
 
 def continuous_loop(

@@ -237,7 +237,7 @@ def measures(rollout: Log) -> dict[str, Measure]:
     """Return the metrics of a run, by the names of a sweep's columns.
 
     For a run that ended early they are computed until its end; ``simulated_time`` is
-    the time until then. A task that was never active, or what a log does not have, is
+    the time until then. A task that was never active, or a missing column, gives
     NaN.
     """
     if not len(rollout):

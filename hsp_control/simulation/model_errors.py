@@ -74,9 +74,9 @@ class ModelErrors(NamedTuple):
 
     moved: tuple[Moved, ...]  # of the tasks
     joints: tuple[str, ...]  # the degrees of freedom
-    delay: float  # longest delay without a growing mode, besides what is known [s]
-    lag: float  # longest lag of the drives without one, besides what is known [s]
-    growing: int  # how many of `tried` robots of other masses have a growing mode
+    delay: float  # longest delay without a growing mode, besides known delays [s]
+    lag: float  # longest lag of the drives without one, besides known lags [s]
+    growing: int  # number of the `tried` robots of other masses with a growing mode
     tried: int
     growth: float  # the fastest rate at which one grows; 0: none grows [1/s]
     # largest inertia that each rotor may have beyond the model [kg·m²]; inf: any that

@@ -103,7 +103,7 @@ class Rollout:
 
     @property
     def config(self) -> dict[str, Any] | None:
-        """The resolved configuration of the run; None if it was made in Python."""
+        """The resolved configuration of the run; None if a part of it is Python."""
         return self.meta.get("config")
 
     def measure(self, robot: Robot, function: Callable[[RobotState], Any]) -> Array:
@@ -146,7 +146,7 @@ class Rollout:
             with part.open("wb") as file:
                 np.savez_compressed(file, allow_pickle=False, **arrays)
             part.replace(path)
-        except (OSError, ValueError) as error:  # a name may contain what none can
+        except (OSError, ValueError) as error:  # a name may contain invalid characters
             _remove(part)
             reason = getattr(error, "strerror", None) or str(error)
             raise LogError(f"{path}: cannot write the log: {reason}") from error
@@ -286,7 +286,7 @@ def complete_columns(columns: Mapping[str, Array], continuous: Sequence[int]) ->
     """Complete columns that were written row by row, in place.
 
     Continuous joints pass ±π without a jump. A task that was added during the run gets
-    its first reference and position before, because what is drawn must be finite.
+    its first reference and position before, because drawn values must be finite.
     """
     positions, dofs = columns["joint_positions"], list(continuous)
     positions[:, dofs] = np.unwrap(positions[:, dofs], axis=0)

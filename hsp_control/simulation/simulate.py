@@ -33,6 +33,7 @@ from hsp_control.declaration.quantities import Flag, Positive
 from hsp_control.geometry.scene import Scene
 from hsp_control.robot.integrators import Dop853, Integrator, Rk4
 from hsp_control.simulation.control_chain import ControlChain
+from hsp_control.simulation.declared_run import declared_run
 from hsp_control.simulation.heavy_plant import heavy_plant
 from hsp_control.simulation.log_writer import LogWriter
 from hsp_control.simulation.loops import continuous_loop, sampled_loop
@@ -127,12 +128,13 @@ def simulate(
         UnstableRateError: If the loop would be unstable at its control period, with
             the plant's delays; with values that would not.
         SimulationError: If durations, periods and plant do not fit, or the motion
-            diverged; its ``rollout`` then holds what was computed.
+            diverged; its ``rollout`` then has the computed rows.
         HspControlError: If q0 or v0 is not a valid state of the robot, or the plant
             does not fit it.
     """
     check_kind("controller is", controller, Controller, SimulationError)
     robot = controller.robot
+    own_integrator, given = integrator, plant
     integrator = integrator or default_integrator(plant, control_period)
     check_kind("integrator is", integrator, Integrator, SimulationError)
     if compensation is not None:
@@ -154,7 +156,7 @@ def simulate(
     times = [start_time + row * log_period for row in range(rows)]
     if isinstance(plant, ContinuousPlant) and periods:
         plant = IntegratedPlant(plant, integrator)
-    compensation = compensation or Compensation()
+    compensation = own_compensation = compensation or Compensation()
     if compensation.names and not periods:
         names = ", ".join(compensation.names)
         raise _no_period(f"compensation ({names}) is computed once a period: it needs")
@@ -206,6 +208,29 @@ def simulate(
         raise _no_period(f"{name} holds the effort during a period: it needs")
     # The log, and the run
     description = {**plant.describe(), **differing_bodies(plant, robot)}
+    meta = dict(meta or {})
+    if isinstance(given, Plant) and not exact:
+        name = type(given).__name__
+        lost = f"its plant is a {name} that was built in Python; give a PlantPart"
+        meta = {"config": None, "config_lost": lost} | meta
+    if "config" not in meta:
+        meta |= declared_run(
+            controller,
+            q,
+            v,
+            start_time,
+            plan=plan,
+            estimators=estimators,
+            simulation={
+                "duration": duration,
+                "log_period": log_period,
+                "control_period": control_period,
+                "check_rate": check_rate,
+                "integrator": own_integrator,
+            },
+            plant=given if isinstance(given, PlantPart) else RigidBody(),
+            compensation=own_compensation,
+        )
     writer = LogWriter(
         controller,
         scene or controller.scene,
@@ -215,7 +240,7 @@ def simulate(
         meta={
             "plant": description,
             "momentum_observer": observed,
-            **(meta or {}),
+            **meta,
         },
     )
 
@@ -311,7 +336,7 @@ def _whole(total: float, part: float, total_name: str, part_name: str) -> int:
             f"{part_name} = {part:g} s; at most {MAX_STEPS:.0e} times"
         )
     if abs(ratio - round(ratio)) > 1e-6 * max(1.0, ratio) or round(ratio) < 1:
-        if (total, total_name) == (LOG_PERIOD, "log_period"):  # nobody has written it
+        if (total, total_name) == (LOG_PERIOD, "log_period"):  # the default
             with within(part_name):
                 if part >= _LONG:
                     raise SimulationError(

@@ -130,7 +130,7 @@ class FunctionTask(TrackingTask, type="function_task"):
     # --- results of functions --------------------------------------------------------
 
     def _numbers(self, value: object, what: str, *shape: int) -> Array:
-        """Return what a function has returned as an array of finite numbers."""
+        """Return the result of a function as an array of finite numbers."""
         try:
             array = np.asarray(value, dtype=float)
         except (TypeError, ValueError):

@@ -140,14 +140,14 @@ class Task(Part, ABC, family="tasks", error=TaskError):
         return in_force.feedback
 
     def fed_back(self, feedback: Feedback, error: Array, error_rate: Array) -> Array:
-        """Return what the error equation feeds back: it is e'' = -fed_back.
+        """Return the feedback of the error equation e'' = -fed_back.
 
         By default Kv e' + Kp s(e) + offset; of a task of first order K e + offset, and
         the equation is e' = -fed_back. A task of your own with another feedback, which
-        need not be linear, overrides this, and adds what it returns to a_x in
+        need not be linear, overrides this, and adds the result to a_x in
         `evaluate`; the first step checks that its equation follows. Near e = 0 it
-        should be that of the gains, which are what the check of the control period
-        looks at.
+        should be that of the gains, which the check of the control period
+        uses.
 
         Args:
             feedback: The gains and the offset.
@@ -225,8 +225,8 @@ class Task(Part, ABC, family="tasks", error=TaskError):
     def call(self, state: RobotState) -> PartCall:
         """Return a kind of call with its arguments, without ``feedback`` and ``out``.
 
-        With these two, a `Feedback` and a `TaskSample`, it writes what `evaluate`
-        describes. Arguments are numbers, arrays and records of them, which may be
+        With these two, a `Feedback` and a `TaskSample`, it computes the same sample as
+        `evaluate`. Arguments are numbers, arrays and records of them, which may be
         memory of the state; and values that are updated before each call:
         ``state.frame(name)`` becomes a `FrameMotion`, a trajectory its sample.
 

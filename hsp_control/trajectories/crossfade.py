@@ -256,7 +256,7 @@ def _check_overlapping(part: Crossfade | CrossfadeOrientation) -> None:
     if count > MOST_OVERLAPPING:
         raise TrajectoryError(
             f"{count} changes of one reference overlap; at most {MOST_OVERLAPPING}. "
-            "What changes this often is a stream, such as set_target(task, target)"
+            "For frequent changes use a stream, such as set_target(task, target)"
         )
 
 

@@ -150,8 +150,8 @@ class Trajectory(Part, ABC, family="trajectories", error=TrajectoryError):
     def call(self) -> PartCall:
         """Return a kind of call with its arguments, without ``out``.
 
-        With it, a `TrajectorySample`, it writes what `sample` returns at a time t; a
-        function takes t first.
+        With it, a `TrajectorySample`, it writes the result of `sample` at a time t; a
+        function has t as its first parameter.
         """
         raise TypeError(f"{type(self).__name__} implements neither call nor sample")
 

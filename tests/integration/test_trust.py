@@ -244,6 +244,7 @@ NONSENSE = [
     ('xyz="0 0 0.4"', 'xyz="0 0"', r'xyz="0 0" must be 3 numbers'),
     ('radius="0.1"', 'radius="-0.1"', 'radius="-0.1" must not be negative'),
     ('filename="good.stl"', 'filename=" "', "the filename is missing"),
+    ('scale="1 1 1"', 'scale="1 0 1"', 'scale="1 0 1": a factor must not be zero'),
 ]
 
 

@@ -50,14 +50,14 @@ hsp.run_loop(
     log="out/loop.journal",
 )
 """
-REPEATED = "mine", "mine-live", "mine-robot", "mine-play", "recorded"
+REPEATED = (
+    *("mine", "mine-live", "mine-robot", "mine-play", "recorded"),
+    *("simulated", "from_pinocchio", "loop"),
+)
 """Logs with a configuration that is data: `hsp run` repeats them."""
 OTHERS = {  # by what `hsp run` says of it
-    "simulated": "was made from Python and contains no configuration",
     "function": "was made from Python and contains no configuration",
     "task": "was made from Python and contains no configuration",
-    "from_pinocchio": "was made from Python and contains no configuration",
-    "loop": "was made from Python and contains no configuration",
 }
 
 TAKERS = "export {log} --html out/{name}.html", "plot {log}"

@@ -182,7 +182,7 @@ class _Pictures:
         self.drawn(0, **_SIZE)
 
     def drawn(self, camera: int, width: int, height: int) -> tuple[float, Array]:
-        """Return the time [s], and what a camera sees, shape (height, width, 3)."""
+        """Return the time [s], and a camera's picture, shape (height, width, 3)."""
         mujoco, data = self._mujoco, self._data
         if (width, height) not in self._renderers:
             if len(self._renderers) == _SIZES:

@@ -117,7 +117,7 @@ def packed(state: Any) -> bytes:
 
 
 def described(state: Any) -> dict[str, Any]:
-    """Return what a state logs once: mode, errors, the load on the flange."""
+    """Return the values of a state that are logged once: mode, errors, flange load."""
     errors = state.current_errors
     names = [name for name in dir(errors) if not name.startswith("_")]
     return {

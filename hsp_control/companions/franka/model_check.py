@@ -55,7 +55,7 @@ class ModelDifference:
             raise HardwareError(
                 f"{self}; allowed are {GRAVITY:g} N·m and {least:g} to {most:g}. The "
                 f"robot carries {total_mass:.3g} kg beyond its flange (end effector "
-                "in Desk, and load). Set what is there, or take the robot's own "
+                "in Desk, and load). Set the true values, or use the robot's own "
                 "model: hsp franka-model ADDRESS my_robot.urdf"
             )
 

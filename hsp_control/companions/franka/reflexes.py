@@ -167,7 +167,7 @@ def about(names: list[str]) -> str:
 
 def table() -> str:
     """Return the errors as a Markdown table, for the manual."""
-    lines = ["| the robot reports | what happened | what to do |", "|---|---|---|"]
+    lines = ["| the robot reports | cause | remedy |", "|---|---|---|"]
     rows: dict[tuple[str, str], list[str]] = {}
     for name, about_it in REFLEXES.items():
         rows.setdefault(about_it, []).append(f"`{name}`")

@@ -95,7 +95,7 @@ class Motion:
             self.generator.extrapolate()
 
     def execute(self, command: np.void) -> Iterator[Violation]:
-        """Follow a command, and yield what it violates."""
+        """Follow a command, and yield the violated limits."""
         self._window.append(True)
         self.lost = 0
         first, self.commands = not self.commands, self.commands + 1

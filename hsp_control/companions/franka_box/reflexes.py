@@ -223,7 +223,7 @@ class LinkDistances:
     """The distances between the links of an arm that can collide.
 
     Attributes:
-        unwatched: What is not monitored, and why, a line each.
+        unwatched: Properties that are not monitored, and why, a line each.
     """
 
     def __init__(self, state: RobotState) -> None:

@@ -24,6 +24,7 @@ from hsp_control.companions.inspection.reading import (
     check_planar_axes,
     check_soft_limits,
     check_srdf,
+    check_transmissions,
     check_unread,
 )
 from hsp_control.control.interface import largest_cancelled
@@ -353,6 +354,7 @@ def inspect(description: RobotDescription, access: Access = ANYWHERE) -> Inspect
             findings += [*check_inertias(xml), *check_limits(xml), *check_angles(xml)]
             findings += [*check_soft_limits(xml), *check_followers(xml)]
             findings += [*check_planar_axes(xml), *check_unread(xml)]
+            findings += check_transmissions(xml)
             findings += [*check_meshes(xml, source), *check_mesh_axes(xml, source)]
             findings += check_srdf(xml, source)
         errors = [f for f in findings if f.severity == "error"]

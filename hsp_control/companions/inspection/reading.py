@@ -1,4 +1,4 @@
-"""How a robot's files are read where that is not obvious, and what is ignored."""
+"""How a robot's files are read where that is not obvious, and ignored elements."""
 
 from collections.abc import Iterator
 from xml.etree.ElementTree import Element
@@ -43,6 +43,34 @@ def check_unread(xml: Element) -> Iterator[Finding]:
         if tag in _UNREAD:
             message += f": {_UNREAD[tag]}"
         yield Finding("note", "not read", f"<{tag}>", message)
+
+
+def check_transmissions(xml: Element) -> Iterator[Finding]:
+    """Yield transmissions of joints that do not exist, and joints with several."""
+    joints = [joint.get("name", "") for joint in xml.findall("joint")]
+    by_joint: dict[str, list[str]] = {}
+    for transmission in xml.findall("transmission"):
+        name = transmission.get("name", "")
+        for joint in transmission.findall("joint"):
+            by_joint.setdefault(joint.get("name", ""), []).append(name)
+    for joint, names in by_joint.items():
+        about = f"transmission {listing(map(repr, names))}"
+        if joint not in joints:
+            yield Finding(
+                "warning",
+                "transmission",
+                about,
+                f"its joint {joint!r} does not exist{did_you_mean(joint, joints)}",
+                "correct the name: its rotor counts for no joint",
+            )
+        elif len(names) > 1:
+            yield Finding(
+                "warning",
+                "transmission",
+                about,
+                f"all are of joint {joint!r}: the last one's rotor counts",
+                "keep one of them",
+            )
 
 
 def check_followers(xml: Element) -> Iterator[Finding]:
@@ -127,8 +155,8 @@ def check_mesh_axes(xml: Element, source: RobotSource) -> Iterator[Finding]:
             "note",
             "mesh",
             f"meshes of {listing(links)}",
-            f"their files say that {axis} points up: it is turned to the link's z, "
-            "which RViz does not do",
+            f"their files declare {axis} as the up axis: it is turned to the link's z, "
+            "unlike in RViz",
             "if the robot looks wrong, write <up_axis>Z_UP",
         )
 
@@ -151,6 +179,16 @@ def check_srdf(xml: Element, source: RobotSource) -> Iterator[Finding]:
         for end in ("link1", "link2"):
             if (name := pair.get(end, "")) not in links:
                 unknown[name] = None
+    every = srdf.iter("disable_default_collisions")
+    whole = [each.get("link", "") for each in every]
+    if whole:
+        yield Finding(
+            "note",
+            "srdf",
+            source.srdf.name,
+            f"<disable_default_collisions> of {listing(map(repr, whole))} is not read",
+            "list the pairs of links with <disable_collisions>",
+        )
     if unknown:
         first, *others = unknown
         named = f"{first!r}{did_you_mean(first, links)}"

@@ -11,7 +11,7 @@ planar   x, y, cos, sin; v and ω in the     two slides along the parent's axes 
          child                              hinge
 free     position and x y z w in the joint; in the world, w x y z; v in the world, ω
          v and ω in the child               in the child
-mimic    none of its own                    a joint of its own, tied to its leader
+mimic    none                               a joint, coupled to its leader
 ======== ================================== =====================================
 
 MuJoCo may also number joints and degrees of freedom in another order.

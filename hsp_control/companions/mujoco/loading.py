@@ -1,4 +1,4 @@
-"""A robot from an MJCF or a compiled MuJoCo model, and a report of what it lacks.
+"""A robot from an MJCF or a compiled MuJoCo model, and a report of omitted features.
 
 A robot is rigid bodies, joints, armatures, symmetric limits and joint friction.
 Everything else that acts on its bodies is reported here, so that nothing is silently
@@ -185,7 +185,7 @@ def load_selection(
 
 @cache
 def _warn(robot: str, sentence: str) -> None:
-    """Log what a robot lacks, once: simulators build the same robot at every reset."""
+    """Log an omitted feature, once: simulators build the same robot at every reset."""
     _log.warning("%s, as MuJoCo has it, but without: %s", robot, sentence)
 
 

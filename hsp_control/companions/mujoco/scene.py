@@ -56,7 +56,7 @@ def is_scalar(model: Any, joint: int) -> bool:
 class Names:
     """The names of the bodies, joints, sites and actuators of a model, by number.
 
-    What has no name is called by its kind and its number in the model: ``joint_3``. The
+    Unnamed objects are called by kind and number in the model: ``joint_3``. The
     first body is ``world``. A site that is called like a body is called
     ``site:<name>``, so that both are frames.
     """
@@ -141,9 +141,9 @@ def motor(model: Any, actuator: int) -> Motor | None:
 def effort_range(model: Any, joint: int) -> tuple[float, float]:
     """Return the lowest and the highest effort on a joint [N·m or N].
 
-    It is the sum of what its actuators give, within the range of the joint's own total
-    (``actuatorfrcrange``). An actuator that is no motor gives what its ``forcerange``
-    allows. Without any actuator there is no limit.
+    It is the sum of its actuators' limits, within the range of the joint's own total
+    (``actuatorfrcrange``). An actuator that is no motor has its ``forcerange``.
+    Without any actuator there is no limit.
     """
     ranges = [_range(model, each) for each in joint_actuators(model).get(joint, ())]
     low, high = np.sum(ranges, axis=0) if ranges else (-np.inf, np.inf)

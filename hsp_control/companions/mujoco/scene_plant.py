@@ -102,7 +102,7 @@ class MujocoScenePlant(MujocoEngine):
             data: Its state, where a run begins.
             contacts: Names of the bodies whose contact forces are logged.
             disable_servos: Whether servos on the robot's joints are switched off: they
-                get a group of their own in ``model``, which is disabled. Without it
+                get their own group in ``model``, which is disabled. Without it
                 they are an error, since they would work against the controller.
             pushes: External wrenches on the robot.
         """

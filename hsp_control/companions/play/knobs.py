@@ -71,7 +71,7 @@ def _null_space(controller: Controller, period: float) -> Iterator[Knob]:
         return
     switch = FieldSwitch(field)
     if switch.whole:
-        note = "Off: self-motion has no desired velocity."
+        note = "Off: g = 0, self-motion is only damped."
         yield Knob("field", group, "Field", "", True, 0.0, 1.0, switch.turn, note)
     K = controller.null_space_gain
     gain = float(np.diag(K).mean())
@@ -114,7 +114,7 @@ class FieldSwitch:
         self._on = on
 
     def weigh(self, name: str, at: Changes, weight: float) -> None:
-        """Change the weight of a term, or what it will be when the field is on."""
+        """Change the weight of a term, or its value for when the field is on."""
         if self._on:
             at.weight(name, weight)
         self.weights[name] = weight

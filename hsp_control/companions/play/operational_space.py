@@ -12,28 +12,8 @@ theorem bounds.
 import numpy as np
 
 from hsp_control.common.arrays import Array
-from hsp_control.control.interface import (
-    ActiveStack,
-    CompensatedController,
-    ControlOutput,
-)
+from hsp_control.control.interface import ActiveStack
 from hsp_control.robot import RobotState
-
-
-class ComparedController(CompensatedController):
-    """A controller that can follow the operational-space law instead."""
-
-    operational = False
-
-    def _law(self, t: float, q: Array, v: Array) -> ControlOutput:
-        if not self.operational:
-            return super()._law(t, q, v)
-        return self.controller.compute(t, q, v, modifier=self._compared)
-
-    def _compared(
-        self, state: RobotState, active: ActiveStack, a: Array
-    ) -> tuple[Array, Array | None]:
-        return self._modify(state, active, operational_space(state, active))
 
 
 def operational_space(state: RobotState, active: ActiveStack) -> Array:
@@ -42,6 +22,6 @@ def operational_space(state: RobotState, active: ActiveStack) -> Array:
     problem = active.law.problem
     W_inv_Jt = np.linalg.solve(problem.metric.W, J.T)
     inverse = W_inv_Jt @ np.linalg.pinv(J @ W_inv_Jt, rcond=1e-9)
-    wanted = active.rows.acceleration - J_dot @ state.v
+    desired = active.rows.acceleration - J_dot @ state.v
     towards = problem.gain @ (problem.field.g - state.v)
-    return np.asarray(towards + inverse @ (wanted - J @ towards))
+    return np.asarray(towards + inverse @ (desired - J @ towards))

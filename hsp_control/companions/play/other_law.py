@@ -9,16 +9,20 @@ from copy import deepcopy
 from typing import Any, NamedTuple
 
 from hsp_control.common.arrays import Array
+from hsp_control.companions.play.compared import ComparedController
 from hsp_control.companions.play.handles import Handles
 from hsp_control.companions.play.knobs import FieldSwitch
-from hsp_control.companions.play.operational_space import ComparedController
+from hsp_control.companions.play.operational_space import operational_space
+from hsp_control.companions.play.plain_impedance import PlainImpedance
 from hsp_control.control.interface import NO_WRENCHES, Controller
 from hsp_control.simulation.control_chain import ControlChain
 from hsp_control.simulation.loops import Instant, sampled_loop
 from hsp_control.simulation.plants import SampledPlant
+from hsp_control.tasks.compliant_task import impedance_of
 
 WITHOUT_FIELD = "no field"
 OPERATIONAL = "operational-space law"
+PLAIN = "plain impedance (JᵀK)"
 EXACT = "exact law"
 
 
@@ -27,7 +31,15 @@ def laws_beside(controller: Controller, *, operational: bool) -> list[str]:
     if not controller.field.controls:
         return []
     without = [WITHOUT_FIELD] if FieldSwitch(controller.field).whole else []
-    return [*without, EXACT if operational else OPERATIONAL]
+    plain = [PLAIN] if _has_gains_only(controller) else []
+    return [*without, EXACT if operational else OPERATIONAL, *plain]
+
+
+def _has_gains_only(controller: Controller) -> bool:
+    """Return whether the base is fixed, without contacts, and no task is a spring."""
+    springs = any(impedance_of(task) is not None for task in controller.tasks)
+    on_contacts = controller.contacts or controller.robot.unactuated
+    return bool(controller.tasks) and not (springs or on_contacts)
 
 
 class Playing(NamedTuple):
@@ -75,7 +87,9 @@ class OtherLaw:
             switch = FieldSwitch(self.controller.field)
             switch.turn(self.controller.at(times[0]), on=False)
         else:
-            compensated.operational = law == OPERATIONAL
+            compensated.compared = {
+                EXACT: None, OPERATIONAL: operational_space, PLAIN: PlainImpedance()
+            }[law]  # fmt: skip
         self._loop: Iterator[Instant] = sampled_loop(
             ControlChain(compensated), self.plant, periods, times,
             state.q.copy(), state.v.copy(),

@@ -12,7 +12,7 @@ from typing import Any
 
 from hsp_control.cli.consoles import out
 from hsp_control.cli.loading import own_code
-from hsp_control.common.exceptions import HspControlError
+from hsp_control.common.exceptions import HspControlError, ViewerError
 from hsp_control.companions.play.one_page import OnePage
 from hsp_control.companions.play.playable import playable_document
 from hsp_control.companions.play.session import Session
@@ -27,6 +27,7 @@ from hsp_control.companions.viewer.transport import PageServer
 from hsp_control.config import Experiment
 from hsp_control.config.loaded_scenario import load_scenario
 from hsp_control.config.own_code import add_imports
+from hsp_control.live.hardware import described
 
 BEHIND = 0.1
 """A session that is later than this [s] does not catch up: it is slower than real time.
@@ -88,10 +89,19 @@ def play(
         if now - drawn >= FRAME:
             if one_page is not None and (told := one_page.done()):
                 session.handles.say(told)
-            picture.draw(running=running and not session.over, rate=rate)
+            _draw(picture, running=running and not session.over, rate=rate)
             drawn = now
         wait = due if running and not session.over else drawn + FRAME
         sleep(max(min(wait - monotonic(), FRAME), 0.0))
+
+
+def _draw(picture: Picture, *, running: bool, rate: float) -> None:
+    try:
+        picture.draw(running=running, rate=rate)
+    except (HspControlError, KeyboardInterrupt, SystemExit):
+        raise
+    except BaseException as error:  # a user's field or weight may raise anything
+        raise ViewerError(f"cannot draw the play: {described(error)}") from error
 
 
 def play_command(options: argparse.Namespace) -> int:
@@ -138,10 +148,12 @@ def play_command(options: argparse.Namespace) -> int:
             lambda: session.rollout().save(log), log.with_suffix(".html")
         )
         stack.callback(one_page.close)
-        with suppress(KeyboardInterrupt):
-            out.print("Ctrl-C ends it and saves the log.")
-            play(session, picture, server.messages, save, one_page=one_page)
-        out.print(f"Log: {session.rollout().save(log)}")
+        try:
+            with suppress(KeyboardInterrupt):
+                out.print("Ctrl-C ends it and saves the log.")
+                play(session, picture, server.messages, save, one_page=one_page)
+        finally:  # also if the page's server fails, or the picture
+            out.print(f"Log: {session.rollout().save(log)}")
         if session.over:  # and it was not reset
             print(f"hsp: {session.over.partition('; reset')[0]}", file=sys.stderr)
     return 2 if session.over else 0

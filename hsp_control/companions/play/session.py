@@ -11,9 +11,10 @@ import pinocchio as pin
 
 from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import SimulationError
+from hsp_control.companions.play.compared import ComparedController
 from hsp_control.companions.play.handles import Handles
 from hsp_control.companions.play.knobs import Knob
-from hsp_control.companions.play.operational_space import ComparedController
+from hsp_control.companions.play.operational_space import operational_space
 from hsp_control.companions.play.other_law import OtherLaw, Playing, laws_beside
 from hsp_control.companions.viewer.commands import path_element
 from hsp_control.config import Experiment
@@ -151,7 +152,7 @@ class Session:
         """The laws with which it can be compared; none if it has a plan."""
         if self.experiment.scenario.plan is not None:
             return []
-        operational = self.compensated.operational
+        operational = self.compensated.compared is operational_space
         return laws_beside(self.controller, operational=operational)
 
     def compare_with(self, law: str | None) -> None:
@@ -207,7 +208,7 @@ class Session:
 
     def _compare(self, _at: Changes, operational: bool) -> None:
         """Follow another law; it is part neither of the controller nor of its log."""
-        self.compensated.operational = operational
+        self.compensated.compared = operational_space if operational else None
         self.other = None  # its law may be the same now
         if operational:
             self._unrepeatable = "the operational-space law was tried"

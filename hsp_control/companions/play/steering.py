@@ -200,7 +200,7 @@ _RATE_WINDOW = 1.0  # time over which the loop's rate is measured [s]
 def main() -> int:
     """Show the loop until it has ended; return 0, or 2 after one error message.
 
-    This is the page's process. It draws what the loop writes into its journal, and
+    This is the page's process. It draws the rows of the loop's journal, and
     forwards the page's commands. It reads lines of JSON from its standard input. The
     first has its settings; then it writes the page's address. With ``prepare`` it draws
     the robot and the scene, ``status`` sets the status line, and with ``begin`` it

@@ -27,7 +27,7 @@ def _add_options(plot: argparse.ArgumentParser) -> None:
         "--names",
         default="",
         metavar="NAME,...",
-        help="what the logs are called, in their order; $K_N$ is mathematics",
+        help="names of the logs, in their order; $K_N$ is mathematics",
     )
     plot.add_argument(
         "--format",

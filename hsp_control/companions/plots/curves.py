@@ -110,7 +110,7 @@ def draw_lines(
     units: Sequence[str] | None = None,
     limits: tuple[Array, Array] | None = None,
 ) -> str:
-    """Draw one line per column, named in the legend; return the units of what is drawn.
+    """Draw one line per column, named in the legend; return the units of the lines.
 
     If the named lines differ in their units, names show them; lines without a name are
     drawn only if they share a unit with named ones. A lower or upper limit of a named

@@ -37,7 +37,7 @@ class Watched:
 
         Args:
             address: ``NAME?rate=HZ&domain=N``.
-            effort_source: What computes the efforts.
+            effort_source: The source of the efforts.
 
         Raises:
             HardwareError: If the address is invalid, or Cyclone DDS cannot start.

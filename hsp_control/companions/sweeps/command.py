@@ -14,7 +14,7 @@ def _add_options(sweep: argparse.ArgumentParser) -> None:
         action="append",
         default=[],
         metavar="KEY=VALUES",
-        help="what is varied: a,b,c or LOW:HIGH:COUNT or log:LOW:HIGH:COUNT, or (with "
+        help="varied values: a,b,c or LOW:HIGH:COUNT or log:LOW:HIGH:COUNT, or (with "
         "--samples) uniform:LOW:HIGH, loguniform:LOW:HIGH, normal:MEAN:DEVIATION, "
         "integers:LOW:HIGH; may be repeated",
     )
@@ -32,11 +32,11 @@ def _add_options(sweep: argparse.ArgumentParser) -> None:
         "--out",
         type=Path,
         metavar="FOLDER",
-        help="for Parquet files; what is in them already is not computed again; "
+        help="for Parquet files; runs that they contain are not repeated; "
         "default: out/NAME-sweep.parquet",
     )
     sweep.add_argument(
-        "--fresh", action="store_true", help="remove what the folder has already"
+        "--fresh", action="store_true", help="remove the folder's present contents"
     )
     sweep.add_argument(
         "--time-limit",
@@ -54,7 +54,7 @@ def _add_options(sweep: argparse.ArgumentParser) -> None:
         "default: workers on this computer",
     )
     sweep.add_argument(
-        "--plot", action="store_true", help="draw what was found, beside the folder"
+        "--plot", action="store_true", help="draw the results, beside the folder"
     )
 
 

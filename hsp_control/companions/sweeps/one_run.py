@@ -10,7 +10,7 @@ from hsp_control.simulation import Rollout
 from hsp_control.simulation.measures import Measure, measures
 
 CRASHED, TIMED_OUT = "crashed", "timed out"
-"""Status if the workers died, and if the run took too long. Neither is a result: such
+"""Status if the workers died, and if the run lasted too long. Neither is a result: such
 runs are repeated when the sweep resumes."""
 
 
@@ -21,7 +21,7 @@ class Row(NamedTuple):
         run: Its number in the plan.
         status: ``completed``; ``diverged``: the metrics are those until then;
             ``refused``: the configuration is wrong; ``failed``: an unexpected error;
-            ``crashed``: the workers died; ``timed out``: the run took too long.
+            ``crashed``: the workers died; ``timed out``: the run lasted too long.
         message: The reason, if the status is not ``completed``.
         metrics: The metrics by name.
         wall_time: Computation time [s]; the only entry that depends on the machine and
@@ -31,7 +31,7 @@ class Row(NamedTuple):
     run: int
     status: str
     message: str = ""
-    metrics: dict[str, Measure] = {}  # noqa: RUF012 - nobody changes it
+    metrics: dict[str, Measure] = {}  # noqa: RUF012 - it is never changed
     wall_time: float = 0.0
 
 
@@ -71,14 +71,14 @@ def computed(
     except SweepError:
         raise
     except _TooLongError:
-        status, message = TIMED_OUT, f"took longer than {time_limit:g} s"
+        status, message = TIMED_OUT, f"lasted longer than {time_limit:g} s"
     except BaseException as error:
         status, message = "failed", _described(error)
     return Row(run, status, message, found, perf_counter() - start)
 
 
 class _TooLongError(BaseException):
-    """A run took too long; not an `Exception`, so that no other handler catches it."""
+    """A run lasted too long; not an `Exception`, so that no handler catches it."""
 
 
 def _outcome(

@@ -1,4 +1,4 @@
-"""What a clearance field measures: links' shapes, distances, zones of influence."""
+"""The geometry of a clearance field: links' shapes, distances, zones of influence."""
 
 from collections.abc import Callable, Iterator
 from functools import partial
@@ -187,7 +187,7 @@ def _distances(controller: Controller, root: str) -> Iterator[_Distance]:
     for clearance in _clearances(controller):
         found = _pairs_by_obstacle(clearance, controller.state)
         for name, pairs in found.items():
-            if name in drawn:  # a barrier keeps what the field already shows
+            if name in drawn:  # the field already shows it
                 continue
             path = f"{root}/{path_element(f'{clearance.name} {name}')}"
             closest = partial(_between_pairs, clearance, pairs)

@@ -75,7 +75,7 @@ class ExportFormat(NamedTuple):
     """Formats of ``hsp export`` for one run: an entry point of ``hsp_control.exports``.
 
     Attributes:
-        what: What such a file is called in a message, as in "a film".
+        what: The name of such a file in a message, as in "a film".
         files: A description of each file ending; the endings are the names of options.
         add_options: Adds the other options to the parser of `hsp export`.
         write: Writes a file and returns its path, given the run, the path, the options

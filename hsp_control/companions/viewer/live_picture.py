@@ -133,7 +133,7 @@ class Shown(Protocol):
 
 
 class Picture:
-    """Draws what is played on the pages of a viewer."""
+    """Draws a play on the pages of a viewer."""
 
     def __init__(self, session: Shown, viewer: Viewer) -> None:
         """Draw the present instant, with all handles."""

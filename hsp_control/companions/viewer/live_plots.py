@@ -52,7 +52,7 @@ class LivePlot(NamedTuple):
     """One plot."""
 
     title: str
-    note: str  # what it shows
+    note: str  # description of the curves
     unit: str
     log: bool  # whether its scale is logarithmic
     curves: list[Curve]
@@ -94,7 +94,7 @@ def live_plots(rows: Mapping[str, Array], meta: Mapping[str, Any]) -> list[LiveP
 def _null_space(log: Rollout) -> Iterator[LivePlot]:
     if not log.meta["controls_null_space"]:
         return
-    note = "Free joints' velocity minus the field's; decays at K_N while not damped."
+    note = "Projected field minus joint velocity; decays at K_N unless damped."
     norm = Curve("‖e_N‖", "null_space_norm")
     yield LivePlot("Null-space error ‖e_N‖", note, rate_unit(log), True, [norm])
 
@@ -127,14 +127,14 @@ def _joints(
     limits = np.array(given, dtype=float)  # NaN where there is none
     known = np.isfinite(limits) & (limits > 0.0)
     unit = ", ".join(dict.fromkeys(units))
-    what = "Of the motors" if column == "tau" else "Of the joints"
+    what = "Joint efforts" if column == "tau" else "Joint speeds"
     if len(names) > _JOINTS:
         if not known.any():
             norm = [Curve(f"‖{title[-1]}‖", column, slice(0, len(names)))]
-            return LivePlot(title, f"{what}: the norm.", unit, False, norm)
+            return LivePlot(title, f"{what}, their norm.", unit, False, norm)
         over = np.where(known, limits, np.inf)
         share = [Curve("largest", column, slice(0, len(names)), over)]
-        note = f"{what}: the largest, in % of its limit."
+        note = f"{what}: the largest relative to its limit."
         full = [Line(100.0, "limit", (0,))]
         return LivePlot(title, note, "%", False, share, full, reaches=True)
     curves = [Curve(name, column, slice(k, k + 1)) for k, name in enumerate(names)]
@@ -145,7 +145,7 @@ def _joints(
     for limit, own in places.items():
         whose = "" if len(places) == 1 else f" of {_span([names[k] for k in own])}"
         lines.append(Line(limit, f"limit{whose}", tuple(own)))
-        lines.append(Line(-limit, "", tuple(own)))
+        lines.append(Line(-limit, f"limit{whose}", tuple(own)))
     values = ", ".join(f"±{limit:.4g}" for limit in sorted(places))
     note = f"{what}; limits {values}." if places else f"{what}."
     return LivePlot(title, note, unit, False, curves, lines)
@@ -162,7 +162,9 @@ def _forces(log: Rollout) -> Iterator[LivePlot]:
     if PULL_COLUMN in log.columns:
         curves.append(Curve("your pull", PULL_COLUMN))
     if curves:
-        yield LivePlot("Forces", "On the robot, their size.", "N", False, curves)
+        yield LivePlot(
+            "Forces", "External forces, their magnitude.", "N", False, curves
+        )
 
 
 def _errors(log: Rollout) -> Iterator[LivePlot]:

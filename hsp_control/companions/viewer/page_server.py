@@ -136,7 +136,7 @@ class Hub:
             page.command(PLAY, "drive", type="play_drive", mine=mine, taken=taken)
 
     def fail(self, error: BaseException) -> None:
-        """End the server: what a page held could not be released."""
+        """End the server: an object of a page could not be released."""
         self.failure = self.failure or error
         self.end.set()
 

@@ -152,7 +152,7 @@ def paths(
 def growing_paths(
     preview: RunMotion, root: str
 ) -> tuple[Layer, Callable[[RunMotion], Iterator[PageCommand]]]:
-    """Draw paths of a run that is being computed; return also what extends them.
+    """Draw paths of a run that is being computed; return also their extension.
 
     The desired paths are those of a preview. Each extension begins at the last point.
     """

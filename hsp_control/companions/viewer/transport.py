@@ -202,7 +202,7 @@ class PageServer(SceneRecorder):
 def page_key(host: str, *, fresh: bool = False) -> str:
     """Return the key that a page's address must contain.
 
-    On this computer it is the user's, in a file that nobody else can read, so that an
+    On this computer it is the user's, in a file that no other user can read, so that an
     open page finds the next start. In a network, or if it is to be ``fresh``, it is new
     at each start.
     """

@@ -54,7 +54,7 @@ _log = logging.getLogger(__name__)
 class Viewer:
     """Shows a robot in a browser; pages may be opened, closed and reopened at any time.
 
-    In a notebook, a viewer in the last line of a cell puts what it shows into the
+    In a notebook, a viewer in the last line of a cell puts its scene into the
     notebook, where it stays; `url` is the live page. See also `show`.
 
     Attributes:

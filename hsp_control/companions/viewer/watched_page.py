@@ -62,7 +62,7 @@ class Watched:
         self.robot, self.controller = run.robot, run.controller
         self.title = self.robot.name
         if self.controller is None:
-            self.handles.message = "a type of one's own: its distances are plots only"
+            self.handles.message = "a user-defined type: its distances are plotted only"
         self._move()
 
     @property

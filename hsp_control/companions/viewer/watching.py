@@ -15,11 +15,13 @@ from weakref import finalize
 from hsp_control.common.exceptions import HspControlError, ViewerError
 from hsp_control.companions.viewer.transport import LOOPBACK, open_browser
 from hsp_control.config import Recorder
-from hsp_control.config.recorder import declaration_of
 from hsp_control.config.scenario import ViewSettings
 from hsp_control.control.interface import Change, Controller
 from hsp_control.declaration.plain_data import plain_data
+from hsp_control.live.hardware import described
+from hsp_control.simulation.declared_run import declared_controller
 from hsp_control.simulation.log_writer import LogWriter
+from hsp_control.simulation.simulate import SimulationSettings
 
 START = 60.0  # time in which the page's process must report its address [s]
 RATE = 30.0  # rate at which states are copied from a controller [1/s]
@@ -206,8 +208,8 @@ class Follower:
                 self.failure, self._begin_anew = str(error), True
                 # A copy takes the lock for some ms: not at every failure.
                 self._ended.wait(_PATIENCE)
-            except Exception as error:  # a part of one's own may raise anything
-                self.failure = f"{type(error).__name__}: {error}"
+            except BaseException as error:  # a user's part may raise anything
+                self.failure = described(error)
                 return
 
     def newest(self) -> tuple[float, Any, Any] | None:
@@ -266,7 +268,7 @@ class Follower:
         self._begin_anew = False
 
     def _new_journal(self) -> Path:
-        config, lost = declaration_of(self._copy)
+        config, lost = declared_controller(self._copy, simulation=SimulationSettings())
         self._files += 1
         path = Path(self._folder.name) / f"{self._files}.journal"
         meta = {"name": "watched", "config": config, "config_lost": lost}

@@ -82,7 +82,7 @@ class RunningCrawl(RunningQuadruped):
         return [[foot] for foot in self._feet]
 
     def _phase(self) -> tuple[float, str]:
-        """Return what to log of the phase; see `RunningQuadruped`."""
+        """Return the logged phase; see `RunningQuadruped`."""
         phase = {"standing": 0.0, "four": 1.0, "three": 2.0}[self._mode]
         if self._mode == "three":
             phase += self._swings % 4

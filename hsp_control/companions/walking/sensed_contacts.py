@@ -71,7 +71,7 @@ class SensedContact(Part, error=PlanError):
     def __post_init__(self) -> None:
         """Check that a condition is given, and that the intervals are in order."""
         if self.force is None and self.height is None:
-            raise PlanError("give force or height: what shows that it is active")
+            raise PlanError("give force or height, by which it is detected")
         if self.release is not None and self.force is None:
             raise PlanError("release is a force; give force, too")
         if self.release is not None and self.release >= (self.force or 0.0):

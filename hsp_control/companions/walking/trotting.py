@@ -67,7 +67,7 @@ class RunningTrot(RunningQuadruped):
         return [aloft for pair in self._pairs for aloft in (pair, pair[:1], pair[1:])]
 
     def _phase(self) -> tuple[float, str]:
-        """Return what to log of the phase; see `RunningQuadruped`."""
+        """Return the logged phase; see `RunningQuadruped`."""
         phase = {"standing": 0.0, "ready": 1.0, "four": 1.0, "two": 2.0}[self._mode]
         if self._mode == "two" and self._swings % 2:
             phase = 3.0

@@ -111,7 +111,7 @@ class SlidingContact(Contact, type="sliding"):
             with within("force"):
                 raise ContactError(
                     "it has 6 coordinates; a sliding contact needs 1 (it slides) or "
-                    "3 (it moves what it presses on)"
+                    "3 (it moves the body that it presses)"
                 )
 
     @property

@@ -147,7 +147,7 @@ class Actuation:
         compiled = not own or "barriers" in self._rows
         # Whether M a + N is the effort wherever it is within the bounds, and so is a.
         self.direct = compiled and not base.size and not support.size
-        # what is delivered there of the law's own acceleration
+        # the result there for the law's own acceleration
         self.own = Delivered(state.effort, law.acceleration, np.zeros(0), EXACT, 0.0)
         self.nearest = self.own
         # whether `nearest` is delivered, and its status stands, shape (1,)
@@ -167,7 +167,7 @@ class Actuation:
         if limits.limits is not None or support.size:
             holding = self._rows.get("holding")
             self._qp = self._limited_step(0 if holding is None else len(holding.least))
-            # what is delivered where it was solved at once
+            # the result where the QP was solved at once
             self.nearest = Delivered(*self._qp.result, LIMITED, 0.0)
         # what the calls deliver where contacts carry; None: Python has to
         self.carried: CarriedStep | None = None
@@ -301,10 +301,10 @@ class Actuation:
     def calls_alone(self, delivered: "DeliveredAlone") -> PartCalls:
         """Return the calls that follow `calls` in a step without Python.
 
-        They do what `delivered` does.
+        They are equivalent to `delivered`.
 
         Args:
-            delivered: Where they write what is delivered.
+            delivered: Where they write the result.
         """
         if not self.direct:
             return self._calls_with_forces(delivered)
@@ -376,12 +376,12 @@ class Actuation:
     def calls_with_offset(
         self, a: Array, offset: Array, delivered: "DeliveredAlone"
     ) -> PartCalls:
-        """Return the calls that do what `deliver` does, where the effort is `direct`.
+        """Return the calls equivalent to `deliver`, where the effort is `direct`.
 
         Args:
             a: The acceleration, shape (nv,).
             offset: Effort besides M a + N, shape (nv,).
-            delivered: Where they write what is delivered.
+            delivered: Where they write the result.
         """
         wanted, bounds = self._wanted, self._limits.bounds
         begin = PartCall(engine.Copy, x=a, out=wanted.acceleration)
@@ -401,7 +401,7 @@ class Actuation:
     def _whole_step(
         self, before: PartCalls
     ) -> tuple[LimitedStep | None, list[AnyCall]]:
-        """Return a QP with room for all rows, and what solves it where it has to be."""
+        """Return a QP with room for all rows, and the calls that solve it if needed."""
         if self._qp is None:
             return None, []
         qp = self._limited_step(sum(len(each.least) for each in self._rows.values()))
@@ -414,7 +414,7 @@ class Actuation:
         effort: Array,
         delivered: "DeliveredAlone",
     ) -> PartCall:
-        """Return the call that decides what is delivered."""
+        """Return the call that selects the delivered effort."""
         nearest = self.own if qp is None else qp.result
         return PartCall(
             engine.Deliver,
@@ -464,7 +464,7 @@ class Actuation:
         return delivered
 
     def _within_limits(self, a: Array, offset: Array | None) -> Delivered:
-        """Return what is delivered, whether or not a joint is beyond a limit."""
+        """Return the result, whether or not a joint is beyond a limit."""
         found = self.outcome
         if self._qp and self.direct and not self._qp_outcome.unsolved.item():
             status, relaxation = self._qp.found()
@@ -473,7 +473,7 @@ class Actuation:
             return Delivered(self._state.effort, a, self.own.forces, EXACT, 0.0)
         motion_ok = not (found.motion.item() or found.rows.item())
         effort_ok = not found.effort.item()
-        # A QP that was tried at once has overwritten what is wanted.
+        # A QP that was tried at once has overwritten the unlimited effort.
         wanted, support = self._wanted.effort, self._support
         self._wanted.acceleration[:], wanted[:] = a, self._state.effort
         if offset is not None:

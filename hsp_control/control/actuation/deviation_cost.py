@@ -1,7 +1,7 @@
 """Cost of deviations from the law's acceleration, level by level.
 
 The cost of a deviation δ is ½ δᵀH δ with H = Σ ρ_k (Lᵀδ·n_k)², over directions n_k that
-are orthonormal in whitened coordinates Lᵀδ. Which they are, and what each costs, is in
+are orthonormal in whitened coordinates Lᵀδ. The directions and their costs are in
 the engine, see ``engine/qp/deviation_cost.hpp``.
 """
 
@@ -33,12 +33,12 @@ class Levels(NamedTuple):
     size: float  # robot's size [m]
     first: int  # first level that may deviate: 1 below contacts, else 0
     least: float  # least cost of a level relative to the one above it
-    held: Array  # what is below each level costs at least, see `held_levels`, (levels,)
+    held: Array  # minimum costs below each level, see `held_levels`, (levels,)
     # singular value of each level below which a direction belongs to it in part, shape
     # (levels,)
     thresholds: Array
     factors: Factors  # law's pseudo-inverse of the stack
-    projectors: Projectors  # what its levels left, where it went level by level
+    projectors: Projectors  # of its levels, where it was resolved level by level
     edge_level: Indices  # see `BoundLaw`, shape (1,)
     alone: bool  # see `BoundLaw`
 

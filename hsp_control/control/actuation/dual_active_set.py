@@ -1,4 +1,4 @@
-"""A dual active-set solver for small, dense, strictly convex QPs: what it works on.
+"""A dual active-set solver for small, dense, strictly convex QPs: its memory.
 
 Minimise ½ ‖y‖² over x = x0 + J y, where H⁻¹ = J Jᵀ, subject to
 
@@ -36,12 +36,12 @@ Neither was seen with hard constraints."""
 class QP(NamedTuple):
     """A QP with k rows lower ≤ A x ≤ upper; bounds on x count as k, k + 1, ...
 
-    The cost couples the first n₁ unknowns; of the others, each has a cost of its own:
+    The cost couples the first n₁ unknowns; that of the others is diagonal:
     J is block-diagonal.
     """
 
-    # Jᵀ of the first unknowns, J Jᵀ = H⁻¹, shape (nz, n₁), nz ≤ n₁. What its rows do
-    # not span does not move.
+    # Jᵀ of the first unknowns, J Jᵀ = H⁻¹, shape (nz, n₁), nz ≤ n₁. Directions that
+    # its rows do not span are not used.
     JT: Array
     own: Array  # J of the others, 1/√cost of each, shape (n - n₁,)
     A: Array  # shape (k, n)
@@ -58,7 +58,7 @@ class Workspace(NamedTuple):
     """The active constraints; m is the largest number of them."""
 
     # for each constraint 1 if its lower bound is active, -1 if the upper, else 0, shape
-    # (k + n,). A warm start begins with what it contains.
+    # (k + n,). A warm start begins with its contents.
     held: Indices
     counts: Indices  # number of active constraints and of iterations, shape (2,)
     active: Indices  # active constraints, shape (m,)

@@ -116,7 +116,7 @@ class Places(NamedTuple):
 
 
 class Result(NamedTuple):
-    """What is delivered: effort and acceleration, shape (nv,), forces, shape (p,)."""
+    """The solution: effort and acceleration, shape (nv,), forces, shape (p,)."""
 
     effort: Array
     acceleration: Array
@@ -145,7 +145,7 @@ def _at_the_edge(
     permitted: Permitted,
     barred: Barred,
 ) -> tuple[PartCalls, Array]:
-    """Return what writes what a step comes near to, and what yielding costs there."""
+    """Return the calls that write the desired step and the costs of deviations."""
     taken, (self_motions, brakings) = law.self_motions(state.v)
     parted, (by_levels, factors) = law.by_levels(state.v)
     holding, held = held_levels(
@@ -163,7 +163,7 @@ def _at_the_edge(
 
 
 class LimitedStep:
-    """The QP of one set of contacts and one stack of tasks, and what relaxes it."""
+    """The QP of one set of contacts and one stack of tasks, and its relaxation."""
 
     def __init__(
         self,
@@ -218,7 +218,7 @@ class LimitedStep:
         memories = [Workspace.of(width, k) for _ in range(3)]
         soft_memory = Workspace.of(width, k, soft=True)
 
-        # What they read and write; the result is that of the last step
+        # Inputs and outputs; the result is that of the last step
         self.result = Result(zeros(n), zeros(n), zeros(p))
         self.relaxation = zeros(1)  # the largest violation, if it is relaxed
         self._wanted = wanted
@@ -277,7 +277,7 @@ class LimitedStep:
             )
 
         rows: list[AnyCall] = [*state.inertia.calls, law.damped_beside(state.v)]
-        # What yielding costs at least; with a floating base priorities are strict.
+        # Minimum costs of deviations; with a floating base priorities are strict.
         self.held = zeros(len(law.ends))
         if permitted is not None:
             kept = slice(barriers, contacts)
@@ -324,8 +324,8 @@ class LimitedStep:
             upper=relaxed.upper,
             relaxation=self.relaxation,
         )
-        # If rounding leaves no room within the relaxed limits, the result is what
-        # violates them least: nobody asks what became of the last QP. There is so
+        # If rounding leaves no room within the relaxed limits, the result
+        # violates them least: the status of the last QP is not used. There is so
         # little room that sets of active constraints are equally good but for the last
         # bits: it begins with none, lest these depend on steps before.
         last = optimum(
@@ -361,7 +361,7 @@ class LimitedStep:
     def solved_if(
         self, redistribute: Indices, nearest: Indices, rows: Mapping[str, BarrierRows]
     ) -> PartCalls:
-        """Return the calls that do what `solve` does, where one of these is not 0.
+        """Return the calls equivalent to `solve`, where one of these is not 0.
 
         Args:
             redistribute: Whether other forces may do, shape (1,).

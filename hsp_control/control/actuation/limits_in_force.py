@@ -61,7 +61,7 @@ class LimitSet:
 
 
 Measured = list[tuple[str, Callable[[], Array]]]
-"""What returns the distances of barriers in a step, by the barriers' names."""
+"""Functions that return the distances of barriers in a step, by their names."""
 
 
 class LimitsAt(NamedTuple):
@@ -76,7 +76,7 @@ class LimitsAt(NamedTuple):
 
 
 class LimitsInForce:
-    """The sets of limits in force, and what is remembered of the efforts sent.
+    """The sets of limits in force, and the memory of the efforts sent.
 
     Its only memory is of the last efforts, used where the effort's rate or the speed is
     limited.
@@ -107,7 +107,7 @@ class LimitsInForce:
         self.go_over_to(self.planned(planned, t))
 
     def planned(self, planned: PlannedLimits, t: float) -> "LimitsAt":
-        """Return what is in force at a time [s], which may be later."""
+        """Return the limits in force at a time [s], which may be later."""
         state, known = self._state, {id(each.limits): each for each in self.all}
         sets = [
             known.get(id(limits)) or LimitSet(limits, state, self.sent)
@@ -185,7 +185,7 @@ class LimitsInForce:
             self.sent.record_acceleration(acceleration, period)
 
     def applying(self, acceleration: Array) -> list[Callable[[float], Any]]:
-        """Return calls of the time that do what `applied` does of the effort M a + N.
+        """Return calls of the time equivalent to `applied` of the effort M a + N.
 
         The period is that of the last `applied`.
         """
@@ -198,7 +198,7 @@ class LimitsInForce:
         return self._state.plan(calls).steps()
 
     def applying_all(self, tau: Array, acceleration: Array, period: Array) -> PartCalls:
-        """Return the calls that do what `applied` does, of what these arrays hold.
+        """Return the calls equivalent to `applied`, with these arrays as arguments.
 
         Args:
             tau: Effort, shape (nv,) [N·m or N].
@@ -263,7 +263,7 @@ def _numbers(limits: RobotLimits | None, nv: int) -> Array:
 
 
 def _distances(barrier: Barrier, state: RobotState) -> Callable[[], Array]:
-    """Return what returns the distances of a barrier at the step's state."""
+    """Return a function for the distances of a barrier at the step's state."""
     if isinstance(barrier, MinimumDistance):
         written = barrier.clearance.proximity(state).distances
         return lambda: written

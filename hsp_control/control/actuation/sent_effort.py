@@ -23,8 +23,8 @@ class Held(NamedTuple):
     quick: Array  # mean error of the last 30 ms
     least: Array  # the lowest that mean was of late, 0 or less
     most: Array  # the highest, 0 or more
-    lasting: Array  # what that mean and that of the last hundredth of a second share
-    # what the mean error and that of the last hundredth of a second have in common: a
+    lasting: Array  # common part of it and the mean of the last hundredth of a second
+    # common part of the mean error and that of the last hundredth of a second: a
     # force that has ended is not included
     steady: Array
     disturbance: Array  # acceleration that something else than the effort causes
@@ -69,10 +69,10 @@ class SentEffort:
     held the robot moves on, and the acceleration changes. The barriers of `Limits` look
     at the beginning of each period, so that a speed limit is exceeded by the error over
     the barrier's bandwidth, unless the margin grows by as much. The error is
-    observed: it is the difference between the speed at the end of a period and what was
-    expected. So it includes whatever else the model lacks. A position limit is exceeded
+    observed: it is the difference between the speed at the end of a period and the
+    expected one. So it includes all model errors. A position limit is exceeded
     by a mean error over the bandwidth's square. An error of 20 rad/s², as a light wrist
-    has it with a load that nobody declared, would be 0.2 rad; the mean follows it in
+    has it with an undeclared load, would be 0.2 rad; the mean follows it in
     30 ms, and its worst is kept for 0.1 s, because the next one may be as large.
     """
 
@@ -94,7 +94,7 @@ class SentEffort:
         self._expect()
 
     def expecting(self, acceleration: Array) -> PartCall:
-        """Return `record_acceleration` of what an array then holds.
+        """Return `record_acceleration` of the contents of an array.
 
         The period is that of the last one.
         """

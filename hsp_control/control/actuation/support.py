@@ -241,7 +241,7 @@ class CommandedForces:
         Args:
             contact: The contact, with k points.
             state: Where the robot is.
-            offset: What is added to its normal force, shape (1,) [N].
+            offset: An addition to its normal force, shape (1,) [N].
             out: f_ref of its points, shape (3 k,) [N], which is written.
         """
         assert contact.force is not None

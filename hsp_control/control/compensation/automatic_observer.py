@@ -56,7 +56,7 @@ def automatic_observer(
     Args:
         controller: The controller.
         period: The control period [s]; None: efforts are not held.
-        exact: Whether what moves is the controller's model and nothing else.
+        exact: Whether the plant is the controller's model.
     """
     if period is None:
         return Choice(None, "efforts are not held for a period")
@@ -83,10 +83,10 @@ def begin_automatic(controller: Controller) -> "AutomaticObserver | None":
 
 
 class AutomaticObserver(RunningObserver):
-    """The observer that nobody declared, in one run.
+    """The observer that is on by default, in one run.
 
-    A task that comes while it runs may have an impedance: then what is cancelled fades
-    at the observer's own rate, and comes back when that task has gone.
+    A task that is added may have an impedance: then the cancelled effort fades
+    at the observer's rate, and returns when that task is removed.
     """
 
     def __init__(self, controller: Controller) -> None:

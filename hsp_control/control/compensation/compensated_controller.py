@@ -7,7 +7,7 @@ The friction feed-forward and the observer's estimate r are an offset of the eff
 the model, M a + N + friction - r; the controller's limits hold for the sum. The two do
 not cancel each other: the observer gets the effort sent minus the feed-forward, because
 friction consumes that part. For the same reason it gets the contact forces that the
-controller expects, so that r is what else acts.
+controller expects, so that r contains all other forces.
 """
 
 from collections.abc import Mapping
@@ -31,8 +31,8 @@ class CompensatedController:
 
     Without compensators (`Compensation(momentum_observer=None)`) it returns the
     controller's effort, bit for bit. A run is one `restart`, then one `effort` per
-    period, in order of time. What the compensators remember during a run is the
-    this object's own.
+    period, in order of time. The compensators' memory of a run is
+    that of this object.
 
     Attributes:
         controller: The controller.
@@ -99,7 +99,7 @@ class CompensatedController:
             q: Measured configuration, shape (nq,).
             v: Measured velocity, shape (nv,).
             period: Time until the next effort [s].
-            wrenches: What sensors in the contacts measure; see `Measurement`.
+            wrenches: Readings of sensors in the contacts; see `Measurement`.
 
         Returns:
             The effort, shape (nv,) [N·m or N], overwritten by the next call.
@@ -171,7 +171,7 @@ class CompensatedController:
         return found
 
     def _expected(self, output: ControlOutput) -> Array:
-        """Return what the contact forces that the law expects do, shape (nv,)."""
+        """Return the effort of the contact forces that the law expects, shape (nv,)."""
         support = self.controller.active_stack.support
         if not support.size:
             return self._run.none

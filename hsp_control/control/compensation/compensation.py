@@ -41,7 +41,7 @@ class Compensation(Part, error=CompensationError):
     """Compensators for the differences between the robot and its model.
 
     Each is off unless it is given, but for the momentum observer, which is on where it
-    makes sense; None turns it off. They have no memory: what runs is made by a
+    makes sense; None turns it off. They have no memory: the stages are made by a
     `CompensatedController`, so one set serves many controllers, runs and threads.
     """
 
@@ -84,7 +84,7 @@ class Compensation(Part, error=CompensationError):
         Args:
             controller: The controller.
             period: The control period [s]; None: efforts are not held.
-            exact: Whether what moves is the controller's model and nothing else.
+            exact: Whether the plant is the controller's model.
         """
         if self.momentum_observer != "auto":
             return self
@@ -116,7 +116,7 @@ class Compensation(Part, error=CompensationError):
         return f"on, {rate}" if own.cancel else f"only estimates, {rate}"
 
     def begin(self, controller: Controller) -> list[Stage]:
-        """Return what runs on a robot, in the order of the `CompensatedController`."""
+        """Return the stages of a run, in the order of the `CompensatedController`."""
         running = [
             begin(getattr(self, name), controller)
             for name, begin in STAGES.items()
@@ -191,4 +191,4 @@ STAGES: dict[str, Callable[[Any, Controller], Stage | None]] = {
     "force_feedback": RunningForceFeedback,
     "integral_action": RunningIntegral,
 }
-"""What each compensator becomes in a run of a controller, in the order of the chain."""
+"""The stage of each compensator in a run, in the order of the chain."""

@@ -33,9 +33,9 @@ class ForceFeedback(Part, error=CompensationError):
 
         λ = λ_d + K_i ∫ (λ_d - λ_m) dt
 
-    A rigid contact answers with λ_m = λ - (what the model lacks), so the error decays
+    A rigid contact answers with λ_m = λ - (the model's error), so the error decays
     like exp(-K_i t). The integral rests while the contact is not fully active, and
-    while limits leave no room for what it would add.
+    while limits leave no room for its addition.
     """
 
     gain: Positive = 5.0
@@ -45,8 +45,8 @@ class ForceFeedback(Part, error=CompensationError):
     bound: Positive = 50.0
     """Largest magnitude of the integral's share of the command [N]."""
     force: Literal["measured", "estimated"] = "measured"
-    """What is fed back [-]: what sensors in the contacts measure, or what the momentum
-    observer estimates (for robots with a fixed base)."""
+    """The fed back force [-]: that of sensors in the contacts, or that of the momentum
+    observer (for robots with a fixed base)."""
     contacts: Names | None = None
     """Names of the contacts; all with a commanded force by default."""
 
@@ -82,7 +82,7 @@ class RunningForceFeedback(Stage):
             if contact.force is not None
             and (declared.contacts is None or contact.name in declared.contacts)
         ]
-        self.integrals = dict.fromkeys(names, 0.0)  # what is added to each command [N]
+        self.integrals = dict.fromkeys(names, 0.0)  # addition to each command [N]
         self.actual = dict.fromkeys(
             names, np.nan
         )  # λ_m by contact, at the last step [N]
@@ -111,7 +111,7 @@ class RunningForceFeedback(Stage):
             self.actual[contact.name] = actual if pressed else np.nan
 
     def _estimate(self, state: RobotState, disturbance: Array, forces: Array) -> None:
-        """Estimate forces from r, what acts besides those that were expected."""
+        """Estimate forces from r, the effort of those that were not expected."""
         unexpected = np.linalg.solve(state.mass_matrix, disturbance)
         support = self._controller.active_stack.support
         for contact in self._fed:
@@ -162,9 +162,9 @@ class RunningForceFeedback(Stage):
             self.integrals[name] = self._controller._force_offset(name)[0] = integral
 
     def log_channels(self, run: Run) -> Mapping[str, LogChannel]:
-        """Return what is measured, and what it adds; see `Stage.log_channels`."""
+        """Return measured forces and additions; see `Stage.log_channels`."""
         found, how = dict[str, LogChannel](), self._declared.force
-        added = "what force feedback adds to the commanded normal force"
+        added = "addition of the force feedback to the commanded normal force"
         for name, actual in self.actual.items():
             meaning = f"normal force, {how}"
             found[f"contact.{name}.{how}"] = LogChannel(actual, "N", meaning)

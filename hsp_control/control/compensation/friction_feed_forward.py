@@ -80,7 +80,7 @@ class RunningFriction(Stage):
         run.effort = run.effort + own
 
     def log_channels(self, run: Run) -> Mapping[str, LogChannel]:
-        """Return what was added; see `Stage.log_channels`."""
+        """Return the added effort; see `Stage.log_channels`."""
         sent = LogChannel(run.friction_sent, "N·m or N", "feed-forward of friction")
         return {"friction.feed_forward": sent}
 

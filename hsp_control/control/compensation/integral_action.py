@@ -75,7 +75,7 @@ class IntegralAction(Part, error=CompensationError):
             if impedance_of(task) is not None:
                 raise CompensationError(
                     f"task {task.name!r} has an impedance: integral action would press "
-                    "against what it yields to; list the other tasks in tasks"
+                    "against the external force; list the other tasks in tasks"
                 )
             if task.name in self.ki:
                 with within("ki", task.name):
@@ -143,7 +143,7 @@ class RunningIntegral(Stage):
         status: Indices,
         starting: Indices,
     ) -> PartCall:
-        """Return what integrates the error of a task."""
+        """Return the call that integrates the error of a task."""
         return PartCall(
             engine.IntegrateError,
             e=e,

@@ -54,7 +54,7 @@ class ElasticJoint:
 
 
 _NOTHING = 1e-12
-"""What couples two rows by less than this part of the gains is rounding."""
+"""A coupling of two rows below this part of the gains is rounding."""
 
 
 @dataclass(frozen=True)
@@ -84,7 +84,7 @@ class LinearLoop:
     joint: ElasticJoint | None = None
     # time constant of drives of first order, which follow u [s]; 0: they are u
     lag: float = 0.0
-    # what else accelerates a rigid robot beside x = 0: x'' = share u + slope x, shape
+    # further acceleration of a rigid robot near x = 0: x'' = share u + slope x, shape
     # (m, m) [1/s²]; weight that the model does not explain
     slope: Array | None = None
 
@@ -261,7 +261,7 @@ NO_GAINS = (np.zeros((0, 0)),) * 3
 class LoadedLoop(NamedTuple):
     """The loop of a whole robot, for any part of its difference from the model.
 
-    A robot with the mass matrix M̃ performs M̃⁻¹ M u where the law asks for the
+    A robot with the mass matrix M̃ performs M̃⁻¹ M u where the law commands the
     acceleration u. That couples the tasks and the null space, which the law decouples
     for its model. In coordinates y = T δq with T = Vᵀ Lᵀ, orthonormal in the metric
     W = L Lᵀ, and J L⁻ᵀ = U [S 0] Vᵀ, all are one linear loop:
@@ -285,7 +285,7 @@ class LoadedLoop(NamedTuple):
     slope: Array
 
     def largest_part(self, wanted: float) -> float:
-        """Return this part, or less: what is lighter must keep a tenth of its mass."""
+        """Return this part, or less: a lighter robot must keep a tenth of its mass."""
         lightest = float(np.linalg.eigvals(self.difference).real.min())
         return wanted if lightest >= 0.0 else min(wanted, -0.9 / lightest)
 

@@ -169,7 +169,7 @@ class RunningObserver(Stage):
             run.controller.disturbed(self._bound.besides)
 
     def _unexplained(self, state: RobotState, besides: Array) -> PartCall:
-        """Return what writes the acceleration of what is not cancelled."""
+        """Return the call for the acceleration of the part that is not cancelled."""
         return PartCall(
             engine.Unexplained,
             M=state.inertia,
@@ -179,7 +179,7 @@ class RunningObserver(Stage):
         )
 
     def alone(self, shared: Alone) -> AloneCalls:
-        """Return what it does; see `Stage.alone`."""
+        """Return its calls; see `Stage.alone`."""
         state = shared.state
         observe = [
             self._calls(state, shared.acted, shared.period),

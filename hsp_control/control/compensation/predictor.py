@@ -50,7 +50,7 @@ class RunningPredictor(Stage):
         self._tau = np.zeros(robot.nv)
 
     def __getstate__(self) -> dict[str, Any]:
-        """Return what a copy needs: its integrator begins anew, with its own memory."""
+        """Return a copy's state: its integrator begins anew, with its own memory."""
         state = vars(self) | {"_period": 0.0, "_tau": self._tau.copy()}
         state.pop("_advance", None)
         return state

@@ -123,7 +123,7 @@ def check_rate(
 
 
 class _Chain(NamedTuple):
-    """What is between the law and the robot."""
+    """The delays and compensators between the law and the robot."""
 
     effort_delay: int
     sensor_delay: int
@@ -182,7 +182,7 @@ def _findings_of(
             speed = _of_impedance(of, frequency, damped)
     late = delays.effort_delay + delays.sensor_delay > 0
     delayed = late and delays.compensation.predictor is None
-    if since > -np.inf:  # a change makes them; the message says when, and of what
+    if since > -np.inf:  # a change makes them; the message names it and its time
         path = ("changes",)
     found = [_finding(path, loop, speed, RULE_DELAYED if delayed else RULE, "")]
     if Ki.any():
@@ -191,7 +191,7 @@ def _findings_of(
 
 
 class _Speed(NamedTuple):
-    """How fast a loop is to be, and what makes it slower."""
+    """The bandwidth of a loop, and the way to reduce it."""
 
     what: str  # setting that decides
     rate: float  # its rate [1/s]
@@ -338,7 +338,7 @@ def _finding(
 ) -> RateFinding | None:
     gain, h, late = speed.rate, loop.period, loop.effort_delay + loop.sensor_delay
     if late > _LONG and (borne := _borne(loop)) is not None:
-        # What a loop tolerates is a product of rate and delay.
+        # The tolerance of a loop is a product of rate and delay.
         share = borne / late
         slower = f" or {speed.at_most(share * gain)}" if share else ""
         return RateFinding(

@@ -1,4 +1,4 @@
-"""A stage of the chain of compensators, and what the stages of a run share."""
+"""A stage of the chain of compensators, and the data shared by the stages of a run."""
 
 from collections import deque
 from collections.abc import Mapping
@@ -16,7 +16,7 @@ from hsp_control.robot import RobotState
 
 
 class Run:
-    """What the stages of one run share; they read it and write it, one by one."""
+    """Data shared by the stages of one run, which read and write them in order."""
 
     # time and state for which the law is to be evaluated, at first as they are measured
     t: float
@@ -48,7 +48,7 @@ class Run:
 
 
 class Alone(NamedTuple):
-    """What the stages of a run share where no Python looks at a step, as arrays."""
+    """Data shared by the stages of a run in a step without Python, as arrays."""
 
     state: RobotState  # at which the law is evaluated
     v: Array  # the velocity, at first as it was measured
@@ -59,11 +59,11 @@ class Alone(NamedTuple):
     disturbance: Array  # acceleration that something else causes, (nv,)
     starting: Indices  # whether the law is not yet fully active, shape (1,)
     damped: Indices  # the first level with a bounded inverse, or 0, shape (1,)
-    status: Indices  # the `Status` of what was delivered, shape (1,)
+    status: Indices  # the `Status` of the delivered effort, shape (1,)
 
 
 class AloneCalls(NamedTuple):
-    """What a stage does where no Python looks at a step."""
+    """The calls of a stage in a step without Python."""
 
     measure: PartCalls = ()  # change the velocity, before the state moves
     observe: PartCalls = ()  # at the state, before the law
@@ -72,7 +72,7 @@ class AloneCalls(NamedTuple):
 
 
 class Stage:
-    """What a compensator does in one run; what it does not override stays as it is."""
+    """A compensator in one run; by default a method changes nothing."""
 
     def measure(self, run: Run) -> None:
         """Change the time and the state for which the law is evaluated."""
@@ -88,5 +88,5 @@ class Stage:
         return None
 
     def log_channels(self, run: Run) -> Mapping[str, LogChannel]:
-        """Return what to log, by name."""
+        """Return the logged values, by name."""
         return {}

@@ -40,7 +40,7 @@ class RunningRamp(Stage):
         self._bound: tuple[Array, Callable[[], object]] | None = None
 
     def act(self, run: Run, state: RobotState, active: ActiveStack) -> None:
-        """Blend the law's acceleration with what holds still; see `Stage.act`."""
+        """Blend the law's acceleration with the holding one; see `Stage.act`."""
         if not _is_plain(state.robot):
             self._act_on_manifold(run, state)
             return

@@ -1,8 +1,8 @@
 """Derivatives of user code are compared with a difference, once.
 
 The law needs them: with a wrong one e_N does not decay, or the error does not obey its
-equation, and nothing else shows it. So where a run begins, and where a change brings
-something new, what the package did not write is looked at, on a state of its own.
+equation, and no output shows it. So where a run begins, and where a change adds
+parts, the user's own code is checked, on a separate state.
 """
 
 from hsp_control.control.declared_rates.fields import check_field, check_metric
@@ -16,14 +16,14 @@ from hsp_control.robot import RobotState
 def check_rates(
     setup: Setup, known: Setup | None, state: RobotState, places: int = 0
 ) -> None:
-    """Check what somebody has written of the parts of a setup.
+    """Check the user-defined rates of the parts of a setup.
 
     Args:
         setup: The parts, as functions of time.
         known: A setup whose parts were checked before; None: all are checked.
         state: Where they are compared.
-        places: How many terms of the field have a place in the declaration, the first
-            ones; what a change brings has none.
+        places: The number of terms of the field in the declaration, the first
+            ones; those of a change follow.
 
     Raises:
         RateError: If a rate or a gradient is wrong, a value depends on v, or an error

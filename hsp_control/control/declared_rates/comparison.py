@@ -31,13 +31,13 @@ ValueAndRate = Callable[[RobotState], tuple[Array, Array]]
 
 
 class Declared(NamedTuple):
-    """A rate that somebody has declared, and how messages name it."""
+    """A user-defined rate, and its names in messages."""
 
-    part: str  # whose it is
-    by: str  # what declares the rate
-    value: str  # what the value is called
-    rate: str  # what the rate is called
-    entry: Callable[[int], str]  # of which an entry of either is
+    part: str  # its owner
+    by: str  # method or argument that declares the rate
+    value: str  # name of the value
+    rate: str  # name of the rate
+    entry: Callable[[int], str]  # name of an entry's row or joint
     remedy: str = "correct it"
 
     def compare(self, values: Array, rate: Array, t: float) -> None:
@@ -69,7 +69,7 @@ class Declared(NamedTuple):
         factor = float(rate @ slope) / size**2 if size > 0.0 else 0.0
         times = ""
         if factor and np.linalg.norm(rate - factor * slope) <= allowed:
-            times = f", so that it is {factor:.4g} times what it should be"
+            times = f", so that it is {factor:.4g} times the true rate"
         without = ""
         if self.by.endswith("_function"):
             without = f", or leave {self.by} out: the package then takes differences"
@@ -91,12 +91,12 @@ def independent_of_v(
     """Return whether a value is a function of q and t, not random, for example.
 
     Args:
-        part: Whose it is.
-        value: What it is called.
-        entry: Of what an entry of it is.
-        at: The value, and a rate that does not matter, at a state.
-        state: Where it is compared.
-        instead: A sentence that says what damps instead.
+        part: The owner.
+        value: Its name.
+        entry: The name of an entry's row or joint.
+        at: The value, and an ignored rate, at a state.
+        state: The state of the comparison.
+        instead: A sentence that names the damping parameter.
 
     Raises:
         RateError: If it depends on v: its rate would need v'.
@@ -150,7 +150,7 @@ def velocities(state: RobotState) -> Array:
 
 
 def declared_by(part: object, ways: tuple[str, ...]) -> str:
-    """Return the name of the method by which somebody's class declares a rate."""
+    """Return the name of the method by which a user's class declares a rate."""
     name = type(part).__name__
     for kind in type(part).__mro__:
         for way in ways:

@@ -1,4 +1,4 @@
-"""What somebody has written of a field, its weight or a metric, beside a difference.
+"""User-defined rates of a field, its weight or a metric, against differences.
 
 V' = -e_NᵀW K_N e_N needs the g' of this g; a wrong one shows nowhere, but e_N does not
 decay. So g' of a field, ∇f and (∇f)' of a cost, w' of a weight, and W' of a metric are
@@ -56,7 +56,7 @@ class _OfField(NamedTuple):
         """Check both at a state."""
         own = self.declared
         instead = spoken("null_space.gain", "null_space_gain")
-        instead = f"What damps self-motion is {instead}"
+        instead = f"Self-motion is damped by {instead}"
         words = own.part, own.value, own.entry
         if independent_of_v(*words, self.at, state, instead) and own.by:
             samples = along_the_flow(self.at, state, timed=self.timed)
@@ -64,7 +64,7 @@ class _OfField(NamedTuple):
 
 
 def check_field(field: NullSpaceField, state: RobotState) -> None:
-    """Check what a placed field, and its weight, declare at a state.
+    """Check the rates of a placed field, and of its weight, at a state.
 
     Raises:
         RateError: If a value depends on v, or a rate or gradient is not that of the
@@ -75,7 +75,7 @@ def check_field(field: NullSpaceField, state: RobotState) -> None:
 
 
 def check_metric(metric: Metric, state: RobotState) -> None:
-    """Check what a placed metric declares at a state; see `check_field`."""
+    """Check the rates of a placed metric at a state; see `check_field`."""
     if is_own(type(metric)) or metric.form != VARYING:
         return
 
@@ -93,7 +93,7 @@ def check_metric(metric: Metric, state: RobotState) -> None:
 
 
 def _of_field(field: NullSpaceField, robot: Robot) -> Iterator[_OfField]:
-    """Yield what somebody has declared of a field."""
+    """Yield the user-defined rates of a field."""
     given = isinstance(field, FunctionCost | FunctionField)
     if given or not is_own(type(field)):
         yield _rate_of(field, robot)
@@ -143,7 +143,7 @@ def _gradient_of(cost: Cost, by: str) -> _OfField:
 
 
 def _gradient_by(cost: Cost) -> str:
-    """Return what declares ∇f; empty: the package takes it by differences."""
+    """Return the source of ∇f; empty: computed by differences."""
     if isinstance(cost, FunctionCost):
         return "" if cost.gradient_function is None else "gradient_function"
     return (

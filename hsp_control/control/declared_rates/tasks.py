@@ -1,4 +1,4 @@
-"""What somebody has written of a task, beside a difference.
+"""User-defined rates of a task, against differences.
 
 The error equation follows from J a + J'v = a_x only if e' is the rate of e, and J, J'
 and a_x are those of e'. So three things are looked at where the package did not write
@@ -31,11 +31,11 @@ _WRITTEN_BY = ("call", "calls", "evaluate")
 _FUNCTIONS = "rate_function", "jacobian_rate_function", "jacobian_function"
 _SOLVED = 1e-6
 """Part of a_x - J'v that may be left of it [-]: more is a singular posture."""
-_DAMPED = "What damps a task is Kv of its gains"
+_DAMPED = "A task is damped by Kv of its gains"
 
 
 def check_task(task: Task, state: RobotState) -> None:
-    """Check what a placed task declares at a state.
+    """Check the rates of a placed task at a state.
 
     Raises:
         RateError: If e or J depends on v, a rate is not that of its value, or the error
@@ -105,7 +105,7 @@ def _check_equation(task: Task, by: str, state: RobotState) -> None:
     """Check that the error equation follows from J a + J'v = a_x."""
     v, _ = velocities(state)
     there, robot = RobotState(state.robot), state.robot
-    # of the whole error: a task may shorten it in coordinates of its own
+    # of the whole error: a task may shorten it in other coordinates
     feedback = task.feedback_at(state)
     largest = feedback.largest * [1.0, 1.0, np.inf]
     feedback = feedback._replace(largest=largest)
@@ -143,7 +143,7 @@ def _named(task: Task) -> str:
 
 
 def _of_row(task: Task) -> Callable[[int], str]:
-    """Return what says which row of a task an entry is of."""
+    """Return a function that names the row of an entry of a task."""
     names = [
         each.name if each.size == 1 else f"{each.name} {i}"
         for each in task.error_parts

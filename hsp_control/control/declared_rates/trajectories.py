@@ -1,4 +1,4 @@
-"""What somebody has written of a trajectory, beside a difference in time.
+"""User-defined rates of a trajectory, against differences in time.
 
 A reference enters the error equation with its x' and x'': a wrong one drives the error
 away as a disturbance does, and nothing else shows it.
@@ -34,7 +34,7 @@ _WRITTEN_BY = "call", "calls", "sample"
 
 
 def check_trajectories(parts: object, t: float) -> None:
-    """Check what somebody has declared of the trajectories in parts, from t [s] on.
+    """Check the user-defined rates of the trajectories in parts, from t [s] on.
 
     Raises:
         RateError: If x', x'', ω or ω' is not the rate of its value.
@@ -46,8 +46,10 @@ def check_trajectories(parts: object, t: float) -> None:
             for first in (t + after for after in _AFTER):
                 try:
                     samples = [_values(each, first + k * INTERVAL) for k in range(5)]
-                except Exception:
-                    break  # the step that meets it says what it is
+                except KeyboardInterrupt:
+                    raise
+                except BaseException:
+                    break  # the step in which it occurs reports it
                 values = np.array([sample[value] for sample in samples])
                 declared.compare(values, samples[2][rate], first)
 
@@ -61,7 +63,7 @@ def _within(parts: object) -> Iterator[AnyReference]:
 
 
 def _declared(each: AnyReference) -> Iterator[tuple[str, str, str]]:
-    """Yield what declares a rate of a reference, its value, and the rate, by name."""
+    """Yield the source of a rate of a reference, its value, and the rate, by name."""
     if isinstance(each, CallableTrajectory):
         if each.velocity is not None:
             yield "velocity", "x", "x'"

@@ -60,7 +60,7 @@ class Metric(Part, ABC, family="metrics", error=MetricError):
     def call(self, state: RobotState) -> PartCall:
         """Return a kind of call with its arguments, without ``out``.
 
-        With it, a `MetricSample`, it writes what `evaluate` describes; see `Task.call`
+        With it, a `MetricSample`, it writes the result of `evaluate`; see `Task.call`
         for its arguments.
         """
         raise TypeError(f"{type(self).__name__} implements neither call nor evaluate")

@@ -124,7 +124,7 @@ class _TopElementError(Exception):
 
 
 def _check_limits(data: bytes, *, only_prolog: bool = False) -> None:
-    """Count what Expat sees; malformed XML is left to the parser that follows."""
+    """Count elements; malformed XML is left to the parser that follows."""
     parser = expat.ParserCreate()
     elements = depth = 0
 

@@ -11,7 +11,7 @@ from hsp_control.common.suggestions import listing
 _MOVING_PART = "finger|thumb|jaw|knuckle|claw|pincer"
 _GRIPPER = re.compile(f"{_MOVING_PART}|gripper")
 _PART = re.compile(_MOVING_PART)
-"""Names of links that a gripper's joint moves; a wrist moves what is called gripper."""
+"""Names of links that a gripper's joint moves; a wrist may move a gripper, too."""
 _ARM = re.compile("wrist|roll|pitch|yaw|rotat|flex")
 """Names of joints that move a gripper, unless they also name an arm's joint."""
 _NO_HAND = re.compile(
@@ -63,7 +63,7 @@ def find_hand(model: pin.Model) -> Hand:
         why += f": {listing(gripper)} after it {_is(gripper)} a gripper's"
     there = [frame for frame in model.frames if frame.parentJoint == end]
     links = [frame.name for frame in there if frame.type == pin.FrameType.BODY]
-    if not links:  # a model of one's own may have no links
+    if not links:  # a user's model may have no links
         links = [frame.name for frame in (there or model.frames)]
     hands = [link for link in links if not _NO_HAND.search(link.lower())] or links
     for what, name in _HANDS:

@@ -402,7 +402,7 @@ def combine(parts: Sequence[tuple[RobotPart, pin.Model]]) -> pin.Model:
 
 
 _LINK = "\t"
-"""What the name of a link's frame ends in while robots are put together."""
+"""Suffix of the name of a link's frame while robots are combined."""
 
 
 def placement(position: ArrayLike, rotation: ArrayLike) -> pin.SE3:

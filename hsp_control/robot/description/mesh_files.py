@@ -89,7 +89,7 @@ def places(source: RobotSource, name: str) -> list[Path]:
 
 
 def find_file(source: RobotSource, name: str) -> Path | None:
-    """Return what a file name in a URDF means; None if there is nothing."""
+    """Return the file of a name in a URDF; None if there is none."""
     known = candidates(source, name)
     file = next(filter(is_file, known), None)
     return file or next(filter(_is_there, known), None)

@@ -79,7 +79,7 @@ def _of_collada(data: bytes) -> MeshUnits:
 
     parser.StartElementHandler, parser.EndElementHandler = start, end
     parser.CharacterDataHandler = text
-    with suppress(expat.ExpatError, _EndError):  # what is malformed is left to others
+    with suppress(expat.ExpatError, _EndError):  # malformed files are left to others
         parser.Parse(data, True)
     try:
         length = float(unit)

@@ -262,7 +262,7 @@ def _set(joint: Element, tag: str, name: str, value: float) -> None:
     """Set an attribute of a joint's element, which gets those that are required."""
     if (element := joint.find(tag)) is None:
         if tag == "limit" and joint.get("type") == "prismatic":
-            return  # it has to have limits, and the parser says so
+            return  # its limits are required, and the parser reports that
         element = SubElement(joint, tag)
     for needed in _NEEDED[tag]:
         element.set(needed, element.get(needed, "0"))

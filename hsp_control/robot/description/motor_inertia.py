@@ -100,7 +100,7 @@ def rotors_of_urdf(robot: Element) -> dict[str, float]:
     """Return I k² of each joint whose ``<transmission>`` gives it [kg·m² or kg].
 
     Raises:
-        ModelError: If a number is none, or negative.
+        ModelError: If a number is none, or negative, or a rotor's reduction is 0.
     """
     found: dict[str, float] = {}
     for transmission in robot.findall("transmission"):
@@ -112,6 +112,11 @@ def rotors_of_urdf(robot: Element) -> dict[str, float]:
         rotor = _number(own, _ROTOR, joints[0])
         reduction = _number(own, _REDUCTION, joints[0])
         if rotor is not None:
+            if reduction == 0.0:
+                raise ModelError(
+                    f"transmission of {joints[0]!r}: its reduction is 0, and its rotor "
+                    "would not turn; it is the rotor's speed over the joint's"
+                )
             gear = 1.0 if reduction is None else reduction
             found[joints[0]] = rotor * gear * gear
     return found

@@ -32,7 +32,7 @@ FORMATS = CHECKED | {".ply", ".off", ".gltf", ".glb"}
 MOST = 5_000_000
 """Most bytes of a robot's meshes in a log, packed.
 
-It is what nearly all arms need. Runs of a sweep have a log each, so a log should not
+It suffices for nearly all arms. Runs of a sweep have a log each, so a log should not
 become much larger than its columns.
 """
 UNPACKED = 20 * MOST
@@ -126,7 +126,7 @@ class _Packed(NamedTuple):
     """A mesh file that names only files beside it, packed."""
 
     content: str
-    beside: dict[str, str]  # these files, by names that say what is in them
+    beside: dict[str, str]  # these files, by names of their contents
     unpacked: int  # bytes of all of them as they are
 
 
@@ -183,7 +183,7 @@ def _of_gltf(content: bytes, renamed: _Renamed) -> bytes:
             name = buffer.get("uri", "")
             if name and not name.startswith("data:"):
                 buffer["uri"] = renamed(name, {".bin"})
-    except (ValueError, AttributeError, TypeError):  # what reads the mesh reports it
+    except (ValueError, AttributeError, TypeError):  # the reader of the mesh reports it
         return content
     return json.dumps(scene, separators=(",", ":")).encode()
 

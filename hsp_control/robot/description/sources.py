@@ -50,7 +50,7 @@ class BodyShape:
     """A shape that is fixed to a body, visual or for collisions."""
 
     body: str  # name of the body's frame
-    kind: ShapeKind  # what it is
+    kind: ShapeKind  # its kind
     # the lengths of a box, the radius and the length (of a cylinder, of a capsule
     # without its ends), the radius of a sphere, the semi-axes of an ellipsoid [m]; of a
     # mesh: nothing
@@ -61,7 +61,7 @@ class BodyShape:
     seen: bool  # whether it is drawn
     collides: bool  # whether distances and collisions include it
     # of a mesh: its vertices [m], shape (k, 3), and triangles of their indices, shape
-    # (n, 3). What collides is its convex hull
+    # (n, 3). Collisions are those of its convex hull
     mesh: tuple[Array, Indices] | None = None
 
 
@@ -97,7 +97,7 @@ class RobotSource:
     shapes: tuple[BodyShape, ...] | None = field(default=None, repr=False)
     # pairs of bodies that never collide, besides those of the SRDF
     excluded: frozenset[frozenset[str]] = frozenset()
-    # what the model that it comes from has and the robot lacks, in words
+    # features of the original model that the robot lacks, in words
     omitted: tuple[str, ...] = ()
     # the URDF that xacro makes of the file; None if the file is the URDF
     expanded: str | None = None
@@ -133,7 +133,7 @@ def find_robot(
             "loaded from a URDF"
         )
     if text and is_folder(Path(text)):
-        return _from_path(Path(text), access, xacro_args)  # which says what is in it
+        return _from_path(Path(text), access, xacro_args)  # which reports its contents
     known = [*bundled, *sorted(set(others) - set(bundled)), *_described_names()]
     hint = (
         "list all with: hsp robots"
@@ -170,7 +170,7 @@ def find_description(
             f"(it has {listing(known)})"
         )
     try:
-        with redirect_stdout(sys.stderr):  # it says there what it clones
+        with redirect_stdout(sys.stderr):  # it prints there which repository it clones
             own = vars(import_module(f"{PACKAGE}.{name}"))
     except Exception as error:  # of git, or of a repository that has moved
         reason = " ".join(str(error).split()) or type(error).__name__

@@ -153,7 +153,7 @@ def _no_tree(robot: Element) -> Iterator[tuple[str, str]]:
         ends = [joint.find("parent"), joint.find("child")]
         parent, child = (None if end is None else end.get("link") for end in ends)
         if parent not in links or child not in links:
-            return  # the parser says so
+            return  # the parser reports it
         name = joint.get("name", "")
         if child in above:
             joints = f"the joints {above[child][0]!r} and {name!r}"
@@ -205,7 +205,7 @@ def _elements(robot: Element) -> Iterator[tuple[str, Element]]:
 
 
 def _find_problem(element: Element) -> str:
-    """Return what is wrong with an element, or an empty string."""
+    """Return the error of an element, or an empty string."""
     tag = element.tag
     largest = math.inf if tag == "limit" else MAX_NUMBER  # large limits mean none
     for name, count in _NUMBERS.get(tag, {}).items():
@@ -223,13 +223,15 @@ def _find_problem(element: Element) -> str:
         text = element.get(name, "")
         if any(length < 0.0 for length in _parsed(text)):
             return f'{name}="{_short(text)}" must not be negative'
+    if tag == "mesh" and not all(_parsed(text := element.get("scale", "1"))):
+        return f'scale="{_short(text)}": a factor must not be zero'
     if tag == "mesh" and not (element.get("filename") or "").strip():
         return "the filename is missing"
     return ""
 
 
 def _repeated(element: Element) -> str:
-    """Return what an element contains more than once, or an empty string."""
+    """Return the error of a repeated child of an element, or an empty string."""
     single = _SINGLE.get(element.tag, ())
     found = Counter(child.tag for child in element if child.tag in single)
     if element.tag == "geometry" and found.total() > 1:
@@ -241,7 +243,7 @@ def _repeated(element: Element) -> str:
 
 
 def _check_numbers(text: str, count: int, largest: float) -> str:
-    """Return what is wrong with an attribute of some numbers, or an empty string."""
+    """Return the error of an attribute of some numbers, or an empty string."""
     needed = f"must be {count} numbers" if count > 1 else "must be a number"
     if not text.isascii():  # Python reads the digits of all scripts, parsers do not
         return f"{needed} in the digits 0 to 9"

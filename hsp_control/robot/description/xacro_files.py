@@ -48,7 +48,7 @@ _MACRO = re.compile(rb"<xacro:\w")
 
 
 def is_xacro(file: Path) -> bool:
-    """Return whether a file must be expanded: by its name, or by what it contains."""
+    """Return whether a file must be expanded: by its name, or by its contents."""
     if file.suffix.lower() == ".xacro":
         return True
     try:

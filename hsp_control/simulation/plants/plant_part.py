@@ -43,7 +43,7 @@ class PlantPart(Part, ABC, family="plants", error=SimulationError):
     """The declaration of a plant in Python and YAML; `build` returns the plant.
 
     A subclass declares the parameters of its engine as fields (see `Part`) and
-    implements `engine`. The fields below and what they do are common to all plants. A
+    implements `engine`. The fields below are common to all plants. A
     package names its class as an entry point of the group ``hsp_control.plants``.
 
     Sensors and drives are applied in the order of their stages, whatever the order in
@@ -89,7 +89,7 @@ class PlantPart(Part, ABC, family="plants", error=SimulationError):
 
     @property
     def push_off(self) -> float:
-        """Acceleration with which its surfaces push off what slides, by its speed.
+        """Normal acceleration of a sliding body per sliding speed.
 
         A contact pressed with less is lost [1/s]; 0: nothing is pushed off.
         """
@@ -192,7 +192,7 @@ class _OrItsName(AnyOf):
     """The type of a field that holds a plant, or in YAML its type alone."""
 
     def validate(self, value: Any) -> Any:
-        """Return a plant: the value itself, or what a mapping or a name declares."""
+        """Return a plant: the value itself, or that of a mapping or a name."""
         return super().validate({"type": value} if isinstance(value, str) else value)
 
     def _json_schema(self, schema: CoreSchema, handler: GetJsonSchemaHandler) -> Any:

@@ -81,7 +81,7 @@ class DifferencedVelocity(Sensor, type="differenced_velocity"):
 
 
 class Encoder(Sensor, type="encoder_resolution"):
-    """Joint positions rounded to counts; a root is exact."""
+    """Joint positions rounded to the encoder's resolution; a root is exact."""
 
     stage: ClassVar[float] = 30.0
     strength: ClassVar[str] = "resolution"
@@ -205,7 +205,7 @@ class Imu(Sensor, type="imu"):
     def begin(
         self, robot: Robot, q: Array, v: Array, random: np.random.Generator
     ) -> Sensing:
-        """Return what measures; see `Sensor.begin`."""
+        """Return the running sensor; see `Sensor.begin`."""
         with within("frame"):
             frame = robot.frame_id(self.frame)
         return RunningImu(self, robot, frame, random)
@@ -226,7 +226,7 @@ class RunningImu:
         self.accelerometer_bias: Array = imu.accelerometer_bias * (
             random.standard_normal(3)
         )
-        # what it reported last
+        # its last reading
         self.reading = Inertial(imu.frame, np.zeros(3), np.zeros(3))
         self._last: tuple[float, Array, Array] | None = None
 

@@ -39,7 +39,7 @@ class State:
         return cls(np.zeros(n), np.zeros(n), np.zeros(n), np.eye(3))
 
     def rotation_vector(self, linear: int) -> TrajectorySample:
-        """Return views of what follows the linear coordinates: y, y' and y''."""
+        """Return views of y, y' and y'', which follow the linear coordinates."""
         return TrajectorySample(
             self.x[linear:], self.rate[linear:], self.acceleration[linear:]
         )

@@ -115,7 +115,7 @@ class Inbox:
         """Make each reader raise: the listening thread has ended with an error."""
         try:
             text = str(error)
-        except Exception:  # of a user's own type
+        except BaseException:  # of a user's own type
             text = ""
         name = type(error).__name__
         self.failure = f"{name}: {text}" if text else name

@@ -1,4 +1,4 @@
-"""What the engine computes of the pieces of a stream: bound once, before it runs."""
+"""The engine's calls for the pieces of a stream, bound once, before it runs."""
 
 from typing import Any, NamedTuple
 
@@ -58,7 +58,7 @@ def _room(n: int) -> Array:
 class PieceCalls:
     """Evaluates pieces, and plans the next one from the state that was evaluated last.
 
-    Copies and pickles have their own arrays: what is in them belongs to one call.
+    Copies and pickles have their own arrays: their contents belong to one call.
 
     Attributes:
         chart: The coordinates.

@@ -213,7 +213,7 @@ class StreamRun:
 
     @property
     def state(self) -> State:
-        """The state that `bring` writes, always the same arrays: what plans is made."""
+        """The state that `bring` writes, always the same arrays."""
         return self._planned.state
 
     def keep(self, since: float, until: float) -> None:

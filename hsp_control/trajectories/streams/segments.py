@@ -76,7 +76,7 @@ class Piece(Segment):
     """A piece planned by the engine, as numbers."""
 
     def __init__(self, numbers: Array) -> None:
-        """Keep what the engine wrote."""
+        """Keep the engine's numbers."""
         super().__init__(float(numbers[1]), float(numbers[2]))
         self.numbers = numbers
 

@@ -165,6 +165,6 @@ class Streamed(Part, error=TrajectoryError):
         """Return the error of a stream without a controller."""
         return StreamError(
             f"this {type(self).__name__} is declared, and moves where a controller "
-            "follows it: controller.stream('hand') has what is sent; without a "
+            "follows it: controller.stream('hand') has its messages; without a "
             "controller, stream.anchored(start).run has"
         )

@@ -42,7 +42,7 @@ class VelocityCommand(NamedTuple):
 def velocity_piece(
     t: float, command: VelocityCommand, calls: PieceCalls
 ) -> Segment | None:
-    """Return what reaches a velocity from where ``calls.state`` is at a time [s].
+    """Return the segment that reaches a velocity from ``calls.state`` at a time [s].
 
     None: no motion within the bounds is found. See `PieceCalls.follow`.
     """
@@ -61,7 +61,7 @@ class ToolMotion(Segment):
     """A piece in which x' = R u: u and a rotation vector are those of another piece."""
 
     def __init__(self, inner: Piece, calls: PieceCalls) -> None:
-        """Begin in ``calls.state``; ``inner`` moves what u is the rate of."""
+        """Begin in ``calls.state``; ``inner`` moves the integral of u."""
         super().__init__(inner.start, inner.end)
         self._inner, self._begin = inner, calls.state.x[:3].copy()
 

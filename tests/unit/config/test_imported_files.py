@@ -78,6 +78,7 @@ def test_yaml_names_what_a_file_has(
     [
         ("none_of_a_test.py", None, "^none_of_a_test.py: no such file; needs a .py"),
         ("bad_of_a_test.py", "1 / 0", "^bad_of_a_test.py: ZeroDivisionError: division"),
+        ("exit_of_a_test.py", "raise SystemExit(0)", "^exit_of.*: SystemExit: 0$"),
         ("json.py", "x = 1", "another module 'json' already; rename the file$"),
     ],
 )

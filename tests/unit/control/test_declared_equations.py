@@ -1,5 +1,6 @@
 """A task or a trajectory of a user's own that is wrong is named at the first step."""
 
+from asyncio import CancelledError
 from collections.abc import Callable
 from dataclasses import replace
 from typing import Any, ClassVar, Self
@@ -279,6 +280,12 @@ def wave_accelerations(t: float) -> Array:
     return np.array([-np.sin(t), -4.0 * np.cos(2.0 * t)])
 
 
+def waves_that_end(t: float) -> Array:
+    if t > 0.25:  # what it raises then is raised then, and no `Exception`
+        raise CancelledError
+    return waves(t)
+
+
 def turned(t: float) -> Array:
     return wave_rates(t) * [1.0, -1.0]
 
@@ -312,6 +319,7 @@ FINE: dict[str, Any] = {
         waves, 2, velocity=wave_rates, acceleration=wave_accelerations
     ),
     "acceleration": CallableTrajectory(waves, 2, acceleration=wave_accelerations),
+    "one that ends": CallableTrajectory(waves_that_end, 2, velocity=wave_rates),
     "a function": CallableTrajectory(waves, 2),
 }
 

@@ -238,7 +238,7 @@ def test_a_wrong_rate_is_named(way: str, how: str) -> None:
         else "correct it"
     )
     if how == "of the other sign":
-        assert "so that it is -1 times what it should be" in message
+        assert "so that it is -1 times the true rate" in message
 
 
 def test_a_wrong_gradient_is_named() -> None:
@@ -469,7 +469,7 @@ def test_a_configuration_is_told_the_line(
 
 def test_it_speaks_the_language_of_the_user() -> None:
     field = FunctionField(lambda s: -s.v)
-    with pytest.raises(RateError, match=r"What damps self-motion is null_space_gain$"):
+    with pytest.raises(RateError, match=r"Self-motion is damped by null_space_gain$"):
         first_step(field)
     with in_yaml(), pytest.raises(RateError, match=r"is null_space\.gain$"):
         first_step(field)

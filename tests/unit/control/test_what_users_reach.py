@@ -228,6 +228,22 @@ def controllers() -> list[hsp.Controller]:
     ]
 
 
+@pytest.mark.parametrize(("returned", "message"), [
+    (None, "modifier returned NoneType; needs"),
+    (np.zeros(NV), "modifier returned ndarray; needs"),
+    ((np.zeros(3), None), r"the modifier's acceleration has shape \(3,\); panda needs"),
+    ((np.zeros(NV), 1.0), r"the modifier's effort has shape \(\); panda needs"),
+    ((np.full(NV, np.nan), None), r"the modifier's acceleration\[0\] is nan"),
+])  # fmt: skip
+def test_a_modifier_that_returns_something_else(returned: Any, message: str) -> None:
+    panda = hsp.Robot.load("panda")
+    controller = hsp.Controller(panda, [hsp.FramePosition("panda_tcp")])
+    with pytest.raises(hsp.HspControlError, match=message):
+        controller.compute(
+            0.0, panda.home(), np.zeros(NV), modifier=lambda *_: returned
+        )
+
+
 def test_no_hook_can_change_the_controllers_robot() -> None:
     """Whatever it writes is refused, or its own; and the efforts are the same."""
 

@@ -73,6 +73,12 @@ def test_a_urdf_says_it_in_its_transmissions(
     assert armature(hsp.Robot.load(path, motor_inertia=0.3)) == [0.3, 0.3]
 
 
+def test_a_rotor_that_would_not_turn_is_refused(tmp_path: Path) -> None:
+    path = arm(tmp_path, PLAIN.replace("-50", "0"))
+    with pytest.raises(ModelError, match="transmission of 'b': its reduction is 0"):
+        hsp.Robot.load(path)
+
+
 @pytest.mark.parametrize("name", ["panda", "iiwa14", "planar3r"])
 def test_it_is_the_diagonal_of_m_in_every_algorithm(name: str) -> None:
     rng = np.random.default_rng(0)

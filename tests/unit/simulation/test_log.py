@@ -128,7 +128,6 @@ def test_round_trip(planar_run: Rollout, tmp_path: Path) -> None:
     loaded = Rollout.load(str(path))
     assert same(loaded, planar_run)
     assert all(loaded[n].dtype == planar_run[n].dtype for n in loaded.columns)
-    assert loaded.config is None
     assert repr(loaded) == "Rollout(planar3r: tip; 51 rows, 0 to 0.5 s, completed)"
 
 

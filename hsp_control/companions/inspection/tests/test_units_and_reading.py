@@ -163,6 +163,20 @@ def test_soft_limits_and_planes_are_named(look: Look) -> None:
     assert "planar without <axis>: its plane is x-y" in found.message
 
 
+def test_transmissions_are_looked_at(look: Look) -> None:
+    gear = '<transmission name="{}"><joint name="{}"/></transmission></robot>'
+    for transmissions, message in (
+        ([("one", "shouldr")], "'shouldr' does not exist; did you mean 'shoulder'?"),
+        ([("one", "shoulder"), ("two", "shoulder")], "the last one's rotor counts"),
+        ([("one", "shoulder"), ("two", "elbow")], ""),
+    ):
+        text = ARM
+        for each in transmissions:
+            text = text.replace("</robot>", gear.format(*each))
+        found = look(text).get("transmission", [])
+        assert [message in each.message for each in found] == [True] * bool(message)
+
+
 def test_meshes_that_are_turned_are_named(look: Look, tmp_path: Path) -> None:
     tetrahedron(tmp_path / "y.dae", "0.01", "Y_UP")
     tetrahedron(tmp_path / "z.dae", "0.01", "Z_UP")
@@ -185,6 +199,9 @@ def test_an_srdf_is_looked_at(look: Look, tmp_path: Path) -> None:
         "it disables collisions of links that do not exist: 'lowr'"
     )
     assert "lower" in found.message
+    srdf.write_text('<robot><disable_default_collisions link="upper"/></robot>')
+    (found,) = look(ARM)["srdf"]
+    assert "<disable_default_collisions> of 'upper' is not read" in found.message
     srdf.write_text("<robot>")
     (found,) = look(ARM)["srdf"]
     assert (found.severity, "malformed XML" in found.message) == ("error", True)

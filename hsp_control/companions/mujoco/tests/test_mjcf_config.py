@@ -50,7 +50,9 @@ def write(folder: Path, old: str, new: str) -> Path:
     return path
 
 
-def test_a_configuration_runs_in_its_scene(folder: Path) -> None:
+def test_a_configuration_runs_in_its_scene(
+    folder: Path, caplog: pytest.LogCaptureFixture
+) -> None:
     experiment = load_experiment(folder / "run.yaml")
     plant = experiment.plant
     assert isinstance(plant, MujocoScenePlant)
@@ -64,6 +66,10 @@ def test_a_configuration_runs_in_its_scene(folder: Path) -> None:
     rollout.save(path)
     again = load_experiment(path).run()
     np.testing.assert_array_equal(again.q, rollout.q)
+    assert "has changed" not in caplog.text
+    (folder / "cell.xml").write_text(CELL.replace('mass="1"', 'mass="1.5"'))
+    load_experiment(path)
+    assert f"{folder / 'cell.xml'} has changed since the log was made" in caplog.text
 
 
 def test_the_plant_may_be_another_mjcf_or_no_mjcf(folder: Path) -> None:

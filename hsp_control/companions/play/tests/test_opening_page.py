@@ -2,6 +2,7 @@
 
 import sys
 from argparse import Namespace
+from asyncio import CancelledError
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -17,6 +18,7 @@ from hsp_control.companions.play.playable import playable
 from hsp_control.companions.play.steering import PageProcess, SteeringPage
 from hsp_control.companions.viewer import SceneRecorder, Viewer, transport
 from hsp_control.companions.viewer.commands import unpack
+from hsp_control.companions.viewer.live_picture import Picture
 from hsp_control.companions.viewer.pages import OpeningPage, draw_before
 from hsp_control.config.document import read_document
 from hsp_control.config.loaded_scenario import load_scenario
@@ -126,3 +128,21 @@ def test_a_play_that_failed_and_was_not_reset_says_so_with_its_status(
     assert capsys.readouterr().err.endswith("hsp: the arm is too fast\n")
     monkeypatch.setattr(PLAYED, lambda *_, **__: None)
     assert main(["play", *arguments]) == 0
+
+
+@pytest.mark.parametrize("error", [ViewerError("no page"), CancelledError()])
+def test_a_play_that_cannot_be_drawn_is_saved(
+    error: BaseException,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    def fail(*_: Any, **__: Any) -> None:
+        raise error
+
+    monkeypatch.setattr(Picture, "draw", fail)
+    arguments = ["planar3r", "--out", str(tmp_path), "--no-browser"]
+    assert main(["play", *arguments]) == 2
+    assert len(list(tmp_path.glob("*-play.npz"))) == 1
+    wanted = "hsp: cannot draw the play: CancelledError\n", "hsp: no page\n"
+    assert capsys.readouterr().err.endswith(wanted)

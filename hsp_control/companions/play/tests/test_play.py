@@ -15,7 +15,8 @@ from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import ConfigError
 from hsp_control.companions.play import Session, play
 from hsp_control.companions.play.knobs import _scaled, knobs_of
-from hsp_control.companions.play.other_law import OtherLaw
+from hsp_control.companions.play.other_law import PLAIN, OtherLaw
+from hsp_control.companions.play.plain_impedance import PlainImpedance, feedback_of
 from hsp_control.companions.play.playable import playable
 from hsp_control.companions.viewer import Viewer
 from hsp_control.companions.viewer.live_picture import Picture
@@ -324,7 +325,7 @@ def test_another_law_goes_beside_it(law: str) -> None:
         session.receive({"do": "move", "target": "hand", "pose": wanted.tolist()})
         go(session, 0.1)
     session, alone = both
-    assert session.laws == ["no field", "operational-space law"]
+    assert session.laws == ["no field", "operational-space law", PLAIN]
     session.receive({"do": "compare", "law": law})
     other = session.other
     assert other is not None
@@ -350,6 +351,28 @@ def test_another_law_goes_beside_it(law: str) -> None:
     session.receive({"do": "compare", "law": law})
     session.reset()
     assert session.other is None
+
+
+def test_a_plain_impedance_goes_beside_it() -> None:
+    """Equal where it begins; then its stiffness is constant, and its hand lags."""
+    session = Session(playable("panda_obstacle", "null_space.fields.0.weight=0"))
+    go(session, 2.0)  # on the circle
+    state, active = session.controller.state, session.controller.active_stack
+    feedback = feedback_of(state, active)
+    np.testing.assert_allclose(
+        active.rows.jacobian @ PlainImpedance()(state, active), feedback, rtol=1e-6
+    )
+    session.receive({"do": "compare", "law": PLAIN})
+    other = session.other
+    assert other is not None
+    go(session, 1.0)
+    feed_forward = active.rows.acceleration[:3] - feedback_of(state, active)[:3]
+    left = other.controller.active_stack.rows.error[:3]
+    # Kp⁻¹ x_d'', but for the inertia, which is not that of the start any more
+    np.testing.assert_allclose(left, feed_forward / 10.0**2, atol=6e-4)
+    assert np.linalg.norm(left) > 1e-3
+    with_spring = Session(playable("panda", "tasks.hand.impedance={stiffness: 300}"))
+    assert with_spring.laws == ["no field", "operational-space law"]
 
 
 def test_what_fails_beside_a_play_ends_alone(
@@ -392,13 +415,13 @@ def test_the_picture_follows_what_is_dragged(session: Session) -> None:
         "Task error", "Task error",
     ]  # fmt: skip
     effort = setup["plots"][2]
-    assert effort["note"] == "Of the motors; limits ±12, ±87."
+    assert effort["note"] == "Joint efforts; limits ±12, ±87."
     lines = [(each["value"], each["name"], each["curves"]) for each in effort["lines"]]
     assert lines == [
         (87.0, "limit of joint1 … joint4", [0, 1, 2, 3]),
-        (-87.0, "", [0, 1, 2, 3]),
+        (-87.0, "limit of joint1 … joint4", [0, 1, 2, 3]),
         (12.0, "limit of joint5 … joint7", [4, 5, 6]),
-        (-12.0, "", [4, 5, 6]),
+        (-12.0, "limit of joint5 … joint7", [4, 5, 6]),
     ]
     edges = {line["name"]: line["value"] for line in setup["plots"][1]["lines"]}
     assert edges == {"contact": 0.0}

@@ -270,7 +270,9 @@ def test_a_plot_draws_the_limits_of_its_curves(page: Any) -> None:
     )
     plot = page.locator(".play-plots .plot").nth(1)
     edges = plot.locator(".edge")
-    assert edges.all_inner_texts() == ["limit of q2"]  # 87 is beyond the axis
+    assert edges.all_inner_texts() == ["limit of q2"]  # the first is far from 87
+    near = plot.locator("output.near").all_inner_texts()
+    assert near == ["1.100"]
     plot.locator("button").nth(0).click()
     assert edges.all_inner_texts() == ["limit of q1"]
     plot.locator("button").nth(1).click()

@@ -96,15 +96,19 @@ def log_channels(number: int, run: Rollout) -> dict[str, float]:
         "largest ‖e_N‖": run["null_space_norm"].max(),
         "‖e_N‖ at the end": run["null_space_norm"][-1],
         "smallest det(J Jᵀ)": det.min(),
-        "at": run.t[det.argmin()],
+        "time of the smallest": run.t[det.argmin()],
         "largest effort": np.abs(run.tau).max(),
         "largest drift of an angle from one turn to the next": drift(run),
     }
     if number == 2:
-        found["starts 1e-9 rad apart, farthest apart"] = farthest_apart()
+        found["largest distance of two runs whose starts differ by 1e-9 rad"] = (
+            farthest_apart()
+        )
     if number == 5:
-        found["nearest joint to the disk's centre"] = joint_distance(run)
-        found["nearest link to the disk's centre"] = link_distance(run)
+        found["smallest distance of a joint from the disk's centre"] = joint_distance(
+            run
+        )
+        found["smallest distance of a link from the disk's centre"] = link_distance(run)
         bare = joint_distance(without_the_disk().run())
         found["the same without 1/d₂² + 1/d₃²"] = bare
     return {name: float(value) for name, value in found.items()}
@@ -115,7 +119,7 @@ def table(number: int) -> dict[str, str]:
     page = (DOCS / "paper.md").read_text(encoding="utf-8")
     (section,) = re.findall(rf"^## Figure {number}:(.*?)(?=^## |\Z)", page, re.M | re.S)
     rows = re.findall(r"^\| (.+?) \| (.+?) \|$", section, re.M)
-    return {label: value for label, value in rows if label != "the run"}
+    return {label: value for label, value in rows if label != "quantity"}
 
 
 def agrees(printed: str, measured: float) -> bool:

@@ -450,7 +450,7 @@ def test_a_run_that_takes_too_long_is_a_row_and_tried_again_another_time(
             scheduler=scheduler, time_limit=0.3, on_progress=note,
         )  # fmt: skip
         assert found["status"].tolist() == ["timed out", "timed out"]
-        assert found["message"].tolist() == 2 * ["took longer than 0.3 s"]
+        assert found["message"].tolist() == 2 * ["lasted longer than 0.3 s"]
     assert done == [0, 1, 2, 0, 1, 2]
 
 

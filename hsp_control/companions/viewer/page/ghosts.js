@@ -34,7 +34,7 @@ class Ghosts {
     this.groups.clear();
   }
 
-  // The label of ghosts stands above the first one's highest joint.
+  // The label of ghosts stands above the first one's highest joint, or below the title.
   label(name, text, color) {
     const known = this.labels.get(name) ?? make("div", {className: "play-label ghost"});
     if (!this.labels.has(name)) part(".play-overlay").append(known);
@@ -50,7 +50,10 @@ class Ghosts {
       if (label.hidden || !ghost) continue;
       const points = ghost.children.map(({position}) => sight.project(position.clone()));
       const top = points.reduce((one, other) => (one.y < other.y ? one : other));
-      PlayOverlay.put(label, top.x, top.y - 40);
+      const {right, bottom} = part("#caption h1").getBoundingClientRect();
+      const {offsetWidth: width, offsetHeight: height} = label;
+      const hides = top.x - width / 2 < right && top.y - 40 - height < bottom;
+      PlayOverlay.put(label, top.x, hides ? bottom + height + 6 : top.y - 40);
     }
   }
 }

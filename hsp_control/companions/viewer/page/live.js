@@ -72,6 +72,9 @@ class LivePlots {
 }
 
 class LivePlot extends Plot {
+  static NEAR = 0.8;  // of a limit: its line is drawn among several curves
+  static REACHED = 0.95;  // of a limit: a value is marked
+
   constructor(plots, definition) {
     super("h3", definition, definition.series);
     const {log, lines = [], reaches = false} = definition;
@@ -114,16 +117,23 @@ class LivePlot extends Plot {
     return this.lines.filter(({curves}) => this.alone === null || curves.includes(this.alone));
   }
 
+  // Whether a curve is near a line: all limits of many joints would hide the curves.
+  isNear({value, curves}) {
+    return this.reaches || this.alone !== null || curves.some((k) =>
+      this.columns[k].some((own) => own !== null && own / value > LivePlot.NEAR));
+  }
+
   // Limits and contacts within the axis, with their names at the left.
   drawLines({over, scales: {y: {min, max}}, valToPos}) {
-    const inside = this.ownLines.filter(({value}) => value >= min && value <= max);
+    const inside = this.ownLines.filter((line) =>
+      line.value >= min && line.value <= max && this.isNear(line));
     const named = [];  // where names stand: none covers another one
     this.marks.replaceChildren(...inside.map(({value, name}) => {
       const top = Math.round(valToPos(value, "y"));
-      const free = named.every((other) => Math.abs(other - top) >= 12);
-      if (free && name) named.push(top);
+      const free = name && named.every((other) => Math.abs(other - top) >= 14);
+      if (free) named.push(top);
       return make("i", {className: top < 16 ? "edge below" : "edge", style: `top: ${top}px`},
-                  free ? name : "");
+                  ...free ? [make("span", {}, name)] : []);
     }));
     over.prepend(this.marks);
   }
@@ -160,7 +170,10 @@ class LivePlot extends Plot {
     const hovered = left >= 0 && idx !== null, row = hovered ? idx : times.length - 1;
     this.moment.textContent = hovered ? `t = ${times[row].toFixed(2)} s` : "";
     this.outputs.forEach((output, k) => {
-      output.textContent = Plot.number(this.columns[k][row] ?? null, this.log);
+      const value = this.columns[k][row] ?? null;
+      output.textContent = Plot.number(value, this.log);
+      output.classList.toggle("near", !this.reaches && value !== null && this.lines.some((line) =>
+        line.curves.includes(k) && value / line.value > LivePlot.REACHED));
     });
   }
 }

@@ -58,7 +58,7 @@ class PlayBar {
 
   showDrive(mine, taken) {
     this.watching.hidden = mine;
-    part("span", this.watching).textContent = taken ? "another page" : "nobody";
+    part("span", this.watching).textContent = taken ? "another page" : "no page";
     for (const button of this.acting) button.disabled = !mine;
   }
 }

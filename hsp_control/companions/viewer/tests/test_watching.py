@@ -1,6 +1,7 @@
 """A loop of one's own that is watched: what is taken of it, and what its page shows."""
 
 import subprocess
+from asyncio import CancelledError
 from pathlib import Path
 from typing import Any
 
@@ -154,11 +155,11 @@ def test_a_loop_with_a_function_of_its_own_is_shown_by_its_columns(
 
 
 def test_what_fails_is_said_and_does_not_reach_the_loop() -> None:
-    fails = False
+    fails: BaseException | None = None
 
     def cost(state: hsp.RobotState) -> float:
-        if fails:
-            raise FieldError("no sensor")
+        if fails is not None:
+            raise fails
         return float(state.q @ state.q)
 
     loop = Loop(controller_of(hsp.FunctionCost(cost)))
@@ -166,14 +167,18 @@ def test_what_fails_is_said_and_does_not_reach_the_loop() -> None:
         loop.step(3)
         follower = page._follower
         assert follower is not None
-        fails = True
+        fails = FieldError("no sensor")
         with pytest.raises(FieldError):
             loop.step()
         _until(lambda: page.failure)
         assert "no sensor" in page.failure
-        fails = False
+        fails = None
         loop.step(3)
         _until(lambda: not page.failure)
+        fails = CancelledError()  # no `Exception`: the thread ends, and says why
+        with pytest.raises(CancelledError):
+            loop.step()
+        _until(lambda: page.failure == "CancelledError")
     assert not follower.journal.exists()
 
 

@@ -139,7 +139,7 @@ class InvariantFilter:
         return Phi
 
     def _noise(self, transition: Array, h: float) -> Array:
-        """Return what a period adds to P: white noise enters where a bias does."""
+        """Return the growth of P in a period: white noise enters where a bias does."""
         n = self._densities
         gyro = transition[:, GYROSCOPE].copy()
         accelerometer = transition[:, ACCELEROMETER].copy()

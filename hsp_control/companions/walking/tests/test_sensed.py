@@ -83,7 +83,7 @@ def test_with_height_and_force_both_must_be_felt(height, force, bears):
 
 
 @pytest.mark.parametrize(("rule", "message"), [
-    ("{}", "give force or height: what shows that it is active"),
+    ("{}", "give force or height, by which it is detected"),
     ("{height: 0.1, release: 2}", "release is a force; give force, too"),
     ("{force: 2, release: 2}", "release is 2 N; must be below force = 2 N"),
     ("{force: 2, wanted: [[2, 1]]}", "the interval from 2 to 1 s is empty"),
