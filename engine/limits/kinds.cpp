@@ -17,6 +17,6 @@ const Kind* const* limit_kinds() {
                Observe, IsPlain, CheckLimits, ForceMap, MinimumNormForces, CommandedForce,
                WrenchShares, SlidingFriction, WithinCones, Displace, DistancesAt, NearPairs,
                ApproachedPairs, DistanceRows, HoldingRows, Clear, CheckRows, PlaceRows, KeepPart,
-               MixParts, HasShare>();
+               MixParts, HasShare, FadingContact, FadingForces>();
 }
 }  // namespace hsp

@@ -83,6 +83,37 @@ struct MixParts {
   }
 };
 
+struct FadingContact {
+  static constexpr const char* doc =
+      "How much a contact that comes or goes is kept at rest, 1 - (1 - x)³ with x its weight over "
+      "that from which it is kept: C² in time, as the weight.";
+  In<1> weight;
+  double held;
+  Out<1> share;
+
+  void operator()() {
+    const double x = std::min(weight[0] / held, 1.0);
+    share[0] = x * (3.0 - x * (3.0 - x));
+  }
+};
+
+struct FadingForces {
+  static constexpr const char* doc =
+      "Bounds on the normal forces of a contact that comes or goes, and how dear its forces are.";
+  In<1> weight;        // of the contact
+  In<'p'> full;        // e where it is fully active: the cost is Σ f²/e
+  double most, robot;  // largest normal force in weights of the robot, and this [N]
+  Out<'p'> upper, inverse_cost;
+  Out<1> command;  // weight of its commanded force
+
+  void operator()() {
+    const double on = std::max(weight[0], 1e-6);
+    for (Index i = 2; i < upper.size(); i += 3) upper[i] = on * most * robot;
+    for (Index i = 0; i < full.size(); ++i) inverse_cost[i] = on * full[i];
+    command[0] = weight[0];
+  }
+};
+
 struct HasShare {
   static constexpr const char* doc = "Which of several have a share.";
   In<'n'> shares;

@@ -15,9 +15,9 @@ from hsp_control.control.actuation.actuation import Kept
 from hsp_control.control.actuation.limited_step import EXACT, LIMITED, STATUSES
 from hsp_control.control.actuation.limits_in_force import LimitsInForce
 from hsp_control.control.actuation.support import Support
-from hsp_control.control.planned import PlannedTask
+from hsp_control.control.planned import PlannedContact, PlannedTask
 from hsp_control.engine import OnlyIf, Plan
-from hsp_control.engine.plans import TIME, PartCall, PartCalls, Step, planned
+from hsp_control.engine.plans import TIME, AnyCall, PartCall, PartCalls, Step, planned
 from hsp_control.robot import RobotState
 
 Shares = Sequence[tuple[float, ActiveStack]]
@@ -27,13 +27,20 @@ Shares = Sequence[tuple[float, ActiveStack]]
 class Choice(NamedTuple):
     """Which sets of contacts and tasks a step resolves; see `Mixture`."""
 
-    # which tasks fade, and which of them each stack has
-    fading: Sequence[PlannedTask]
+    # which tasks and contacts fade, and which of them each stack has
+    fading: Sequence[PlannedTask | PlannedContact]
     members: Mapping[ActiveStack, Sequence[bool]]
     at: Callable[[float], Shares]  # the same, chosen in Python
-    native: (
-        bool  # whether the engine can: no contact fades, and no schedule is followed
-    )
+
+    @property
+    def native(self) -> bool:
+        """Whether the engine can choose: no part follows a schedule."""
+        few = len(self.fading) <= MOST_CHOSEN
+        return few and all(each.unscheduled for each in self.fading)
+
+
+MOST_CHOSEN = 64
+"""Parts that may fade at once where the engine chooses (``ChooseSets``)."""
 
 
 class BoundMixture:
@@ -137,11 +144,10 @@ class BoundMixture:
             on=self._on,
             shares=self._shares,
         )
-        present = [
-            each.presence.call(presences[k : k + 1])
-            for k, each in enumerate(choice.fading)
-        ]
-        return [*present, chosen]
+        calls = list[AnyCall]()
+        for k, each in enumerate(choice.fading):
+            calls += each.share_calls(presences[k : k + 1])
+        return [*calls, chosen]
 
     def _choose(self, t: float) -> None:
         self._on[:], self._shares[:] = 0, 0.0

@@ -140,6 +140,9 @@ class Commanded(Composition):
             self.at(self._state.t).ramp(RAMP).reference(task, reference)
         stream = self.stream(task)
         stream.send(**message)
+        with self._lock:
+            if self._memory.begun:
+                self._rehearse()
         return stream
 
     def _followed(self, task: str) -> Task:

@@ -33,6 +33,11 @@ _REHEARSALS = 3
 """The first fills the processor's caches, the others train its predictions."""
 
 
+_LARGE = 4096
+"""Memory [bytes] for which malloc sorts what has been freed: else the next output,
+which is larger than most pieces, would have to."""
+
+
 class Controller(Commanded):
     """Computes tau = M a + N with the law of Hsu, Hauser and Sastry over a metric.
 
@@ -128,11 +133,15 @@ class Controller(Commanded):
                 now.mixture.rehearse()
                 if isinstance(now.step, BoundMixture):
                     now.step.rehearse(state.t)
+                for stream in memory.streams:
+                    if not stream.stream.listens_to:
+                        stream.rehearse()
                 tau = self._step(origin + state.t, q, v, None).tau
                 if memory.sent.period:
                     self.applied(tau, memory.sent.period)
         now.limits.update()  # from the last effort
         now.gains.write_all(state.t)
+        bytes(_LARGE)
         now.mixture.active, now.mixture.damped = active, damped
 
     def _observe(

@@ -120,7 +120,7 @@ class Mixture:
             if stack in alive and id(limits.limits) in sets
         }
         self._active: dict[tuple[tuple[int, ...], Set[int]], ActiveStack] = {}
-        # the stacks that were bound ahead, and which of the fading tasks each has
+        # the stacks that were bound ahead, and which of the fading parts each has
         self._prepared: dict[ActiveStack, list[bool]] = {}
         self._fading = [each for each in setup.tasks if not each.always]
         self._moving = [each for each in setup.contacts if not each.always]
@@ -245,9 +245,8 @@ class Mixture:
                 each = within(stack, k)
                 if not each.direct and each.carried is None:
                     return None
-        unscheduled = all(each.task.schedule is None for each in self._fading)
-        native = unscheduled and not self._moving
-        choice = Choice(self._fading, self._prepared, self._sets, native)
+        fading: list[PlannedTask | PlannedContact] = [*self._fading, *self._moving]
+        choice = Choice(fading, self._prepared, self._sets)
         return BoundMixture(state, choice, within, limits, origin, evolving)
 
     def stack_alone(self, without: Collection[str]) -> tuple[ActiveStack, Actuation]:
@@ -270,8 +269,12 @@ class Mixture:
             for _, stack in self._sets(t):
                 if stack not in self._prepared:
                     self.bind(stack)
-                    own = {each.planned.key for each in stack.stacked}
-                    self._prepared[stack] = [each.key in own for each in self._fading]
+                    tasks = {each.planned.key for each in stack.stacked}
+                    there = {id(each) for each in stack.contacts}
+                    self._prepared[stack] = [
+                        *(each.key in tasks for each in self._fading),
+                        *(id(each.contact) in there for each in self._moving),
+                    ]
 
     def rehearse(self) -> None:
         """Solve the QPs where the last step has left them; nothing of it is used."""

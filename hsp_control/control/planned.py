@@ -4,6 +4,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any, TypeVar
 
+import numpy as np
+
+from hsp_control import engine
 from hsp_control.common.arrays import Array
 from hsp_control.constraints.contacts import Contact
 from hsp_control.constraints.limits import RobotLimits
@@ -13,6 +16,7 @@ from hsp_control.control.evolution import (
     Evolution,
     EvolvingWeight,
 )
+from hsp_control.engine.plans import PartCall, PartCalls
 from hsp_control.null_space.fields import NullSpaceField
 from hsp_control.null_space.fields.field import terms_of
 from hsp_control.null_space.fields.weight import ConstantWeight, Weight, product
@@ -30,6 +34,15 @@ class PlannedTask:
     # numbers of its feedback: Kp and Kv, shape (2, m, m) [1/s², 1/s], or those of an
     # impedance; see `Task.in_force`
     gains: Evolution[Array]
+
+    @property
+    def unscheduled(self) -> bool:
+        """Whether it comes and goes by changes alone."""
+        return self.task.schedule is None
+
+    def share_calls(self, share: Array) -> PartCalls:
+        """Return the call that writes `weight`, shape (1,), where it is unscheduled."""
+        return [self.presence.call(share)]
 
     def weight(self, t: float) -> float:
         """Return the weight of the task at time t [s], in [0, 1]."""
@@ -127,6 +140,17 @@ class PlannedContact:
     def always(self) -> bool:
         """Whether the contact is active at all times."""
         return self.contact.always and self.presence == PRESENT
+
+    @property
+    def unscheduled(self) -> bool:
+        """Whether it comes and goes by changes alone."""
+        return self.contact.schedule is None
+
+    def share_calls(self, share: Array) -> PartCalls:
+        """Return the calls that write `share`, shape (1,), where it is unscheduled."""
+        weight = np.zeros(1)
+        given = {"weight": weight, "held": HELD, "share": share}
+        return [self.presence.call(weight), PartCall(engine.FadingContact, **given)]
 
     def active(self, t: float) -> bool:
         """Return whether the contact is kept at rest at time t [s]."""

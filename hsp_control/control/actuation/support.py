@@ -101,19 +101,39 @@ class Support:
 
     def _updating(self, law: BoundLaw) -> PartCalls:
         """Return the calls that do what `update` does."""
-        commands = [call for _, each in self._commanded for call in each.calls(law)]
-        if not self._scheduled:
-            return [*self.maps(), *commands]
-        return [PartCall(self._follow_schedules, t=TIME), *self.maps(), *commands]
+        calls = list[AnyCall]()
+        if any(not planned.unscheduled for planned, *_ in self._scheduled):
+            calls.append(PartCall(self._follow_schedules, t=TIME))
+        commands = {id(planned): each.weight for planned, each in self._commanded}
+        for planned, columns, full in self._scheduled:
+            if planned.unscheduled:
+                on = np.zeros(1)
+                fading = PartCall(
+                    engine.FadingForces,
+                    weight=on,
+                    full=full,
+                    most=_MAX_FORCE,
+                    robot=self.weight,
+                    upper=self.upper[columns],
+                    inverse_cost=self.inverse_cost[columns],
+                    command=commands.get(id(planned), np.zeros(1)),
+                )
+                calls += [planned.presence.call(on), fading]
+        calls += self.maps()
+        for _, each in self._commanded:
+            calls += each.calls(law)
+        return calls
 
     def _follow_schedules(self, t: float) -> None:
-        """Write how active contacts are at a time that come and go."""
+        """Write how active contacts with a schedule are at a time."""
         for planned, columns, full in self._scheduled:
-            on = max(planned.weight(t), 1e-6)
-            self.upper[columns][2::3] = on * _MAX_FORCE * self.weight
-            self.inverse_cost[columns] = on * full
+            if not planned.unscheduled:
+                on = max(planned.weight(t), 1e-6)
+                self.upper[columns][2::3] = on * _MAX_FORCE * self.weight
+                self.inverse_cost[columns] = on * full
         for planned, command in self._commanded:
-            command.weight[:] = planned.weight(t)
+            if not planned.unscheduled:
+                command.weight[:] = planned.weight(t)
 
     def maps(self) -> list[AnyCall]:
         """Return the calls that write the map and the positions."""

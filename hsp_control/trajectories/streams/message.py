@@ -75,7 +75,7 @@ class Message(NamedTuple):
 
     def taken_at(self, t: float) -> "Message":
         """Return it as it is taken at a time [s], unless it has one."""
-        return self if self.at > -inf else Message(*self[:-1], t)
+        return self if self.at > -inf else Message._make((*self[:-1], t))
 
     def to_dict(self) -> dict[str, Any]:
         """Return its data for `message_of`, and the time ``at`` of taking it."""

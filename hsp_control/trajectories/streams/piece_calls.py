@@ -97,6 +97,8 @@ class PieceCalls:
             given=self._known,
             piece=self._next,
         )
+        # the last count, rests and more, and whether any velocity was known
+        self._written = 1, False, False, False
         self._velocity, self._tool = np.zeros(n), np.zeros(1, dtype=bool)
         self._follow = engine.VelocityPiece(
             **here,
@@ -139,13 +141,16 @@ class PieceCalls:
         else:
             self._times[:count] = waypoints.times[first:end]
             self._values[:count] = waypoints.values[first:end]
-        for k in range(count):
-            velocity = waypoints.velocities[first + k]
-            self._known[k] = known = velocity is not None
-            if known:
-                self._velocities[k] = velocity
-        self._count[0], self._rests[0] = count, rests
-        self._more[0] = end < len(waypoints.times)
+        rates = waypoints.velocities[first:end]
+        given = any(each is not None for each in rates)
+        written = count, rests, end < len(waypoints.times), given
+        if given or written != self._written:  # else half the time
+            for k, velocity in enumerate(rates):
+                self._known[k] = velocity is not None
+                if velocity is not None:
+                    self._velocities[k] = velocity
+            self._count[0], self._rests[0], self._more[0], _ = written
+            self._written = written
         return self._next.copy() if self._through(t) else None
 
     def follow(

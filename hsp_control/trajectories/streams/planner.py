@@ -30,7 +30,7 @@ from hsp_control.trajectories.streams.velocities import (
 )
 from hsp_control.trajectories.streams.waypoints import KEPT, Waypoints
 
-_SOON = 1e-3  # [s]
+SOON = 1e-3  # when a rehearsed step would be [s]
 _AT_ONCE = 256  # maximum number of simultaneous messages; the oldest others are ignored
 
 
@@ -121,22 +121,32 @@ class Planner:
 
     def copy(self) -> "Planner":
         """Return a copy that continues independently."""
+        return self._with(copy(self._calls))
+
+    def _with(self, calls: PieceCalls) -> "Planner":
         other = copy(self)
-        other._calls = copy(self._calls)
+        other._calls = calls
         other._kept = self._kept.copy()
         other._segments, other._starts = self._segments.copy(), self._starts.copy()
         other.waypoints = self.waypoints.copy()
         return other
 
-    def rehearse(self) -> None:
-        """Plan a move once on a copy, so that no step is the first one that does."""
-        other = self.copy()
-        other._calls = self._calls
-        self._segments[0].write(0.0, self._calls)
-        value = self._calls.chart.value_near(self.state)
-        other.advance(0.0, [])
-        other.advance(_SOON, [Message(None, np.zeros(1), value[None], None, at=_SOON)])
-        other.bring(2.0 * _SOON)
+    def rehearse(self, messages: Sequence[Message] = ()) -> None:
+        """Plan a move and move nothing, so that no step is the first one that does.
+
+        Args:
+            messages: Those that the next step takes; by default one to stay here.
+        """
+        other = self._with(self._calls)
+        self._segments[-1].write(max(self.now, 0.0), self._calls)
+        if not self.begun:
+            other.advance(0.0, [])
+        t = other.now + SOON
+        if not messages:
+            value = self._calls.chart.value_near(self.state)
+            messages = [Message(None, np.zeros(1), value[None], None, at=t)]
+        other.advance(t, messages)
+        other.bring(t)
 
     def advance(self, t: float, messages: Sequence[Message]) -> None:
         """Plan up to a time [s]: first without, then with the new messages."""
@@ -151,6 +161,9 @@ class Planner:
             self.taken += surplus
             self.waypoints.late += surplus
             self._step(max(at, self.now), together[surplus:])
+        if messages and self.now == t < min(self._segments[-1].end, self._fades_at):
+            self._due = -inf  # the next step looks what else there is to do
+            return
         self._step(t, [])
         if self.age > self._policy.stop_after:
             raise StreamError(

@@ -14,7 +14,7 @@ from hsp_control.trajectories.streams.alone import StreamAlone
 from hsp_control.trajectories.streams.chart import Chart, State
 from hsp_control.trajectories.streams.inbox import Inbox, Reader
 from hsp_control.trajectories.streams.message import Space
-from hsp_control.trajectories.streams.planner import Planner
+from hsp_control.trajectories.streams.planner import SOON, Planner
 from hsp_control.trajectories.streams.sources import (
     is_address,
     listening_inbox,
@@ -219,6 +219,12 @@ class StreamRun:
     def keep(self, since: float, until: float) -> None:
         """Keep the reference from a time on until a later one [s]."""
         self._planned.keep(since, until)
+
+    def rehearse(self) -> None:
+        """Take the messages that wait, and plan with them; nothing of it stays."""
+        planner = self._planned
+        reader = self.reader.copy()
+        planner.rehearse(reader.take(planner.now + SOON) if planner.begun else [])
 
     @property
     def _planned(self) -> Planner:

@@ -115,6 +115,8 @@ class Waypoints:
 
     def near(self, t: float, window: float) -> tuple[int, int]:
         """Return which waypoints matter at a time: from the first to before the end."""
+        if len(self.times) == 1:
+            return 0, 1
         ahead = self.ahead(t)
         first = min(bisect_left(self.times, t - window), max(ahead - 3, 0))
         end = min(ahead + CONSIDERED, len(self.times))
