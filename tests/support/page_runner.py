@@ -8,7 +8,7 @@ file. What cannot run so has a comment before it in the page, which no reader se
     <!-- slow: a minute -->                only `make test-system` runs it
     <!-- Ctrl-C: serves a page -->         it runs until it has said something
     <!-- part of: {robot: {name: panda}} -->    YAML that is no whole configuration
-    <!-- part of: forces/talos_wall -->         such YAML, laid over a bundled one
+    <!-- part of: forces/talos_wall KEY=VALUE -->    such YAML, laid over a bundled one
     <!-- lines of: engine/... -->          text that stands so in a file of the checkout
     <!-- background: a robot -->           it goes on until the page ends
     <!-- fails: unstable gains -->         its status is 2, as the page says
@@ -217,11 +217,12 @@ def _laid_over(base: dict[str, Any], over: dict[str, Any]) -> dict[str, Any]:
 
 def _check_yaml(block: Block, where: str) -> None:
     """Run a configuration for a moment; a part of one together with its rest."""
-    data = yaml.safe_load(block.text)
+    data, overrides = yaml.safe_load(block.text), [_SHORT]
     if block.kind == "part of":
-        data = _laid_over(_base(block.reason), data)
+        base, *more = [block.reason] if block.reason[0] == "{" else block.reason.split()
+        data, overrides = _laid_over(_base(base), data), [*more, _SHORT]
     try:
-        status = load_experiment(data, _SHORT).run().status
+        status = load_experiment(data, *overrides).run().status
     except Exception as error:
         error.add_note(where)
         raise

@@ -63,12 +63,18 @@ class Play {
     legend.keepClosed = true;  // the whole scene can be dragged
     legend.setOpen(false);
     this.panel.setOpen(!this.panel.narrow.matches);
-    // A page whose address has "full" draws everything all the same: for pictures.
-    if (isSoftware() && !new URLSearchParams(location.search).has("full")) {
-      drawLightly();
+    if (this.lighten()) {
       this.bar.notify("No graphics card is used: shadows and reflections are off.");
     }
     refit();  // there is no legend to make room for
+  }
+
+  // Draw lightly without a graphics card; return whether it does. A page whose address has "full"
+  // draws everything all the same: for pictures.
+  lighten() {
+    this.light ??= isSoftware() && !new URLSearchParams(location.search).has("full");
+    if (this.light && !drawsLightly) drawLightly();
+    return this.light;
   }
 
   // The picture has room for what the bar covers of it.
@@ -279,7 +285,10 @@ Object.assign(commandHandlers, {
   play_joints(command) { if (play.ready && play.panel.open) play.bars.show(command); },
   play_force(command) { play.force = command.visible ? command : null; },
   play_samples({times, values}) { if (play.ready) play.plots.add(times, values); },
-  play_drive(command) { play.setDrive(command); },
+  play_drive(command) {
+    play.lighten();  // before the scene comes: its first picture would take the longest
+    play.setDrive(command);
+  },
   lost() {
     play.setDrive({mine: false, taken: false});
     play.showState({running: false, message: ""});
