@@ -24,11 +24,13 @@ _LONGEST_GAP = 0.02
 
 
 class LoadEstimate:
-    """A slow momentum observer, which a safe stop freezes.
+    """A slow momentum observer, with which a safe stop goes on.
 
     With d the load, M v' = tau - N + d, so d' = K (M v' - (tau - N) - d). It is
-    estimated while the robot runs and its measurements are consistent, and not in the
-    stop, in which what is measured may be wrong.
+    estimated while measurements are consistent, in a live loop also in the stop: early
+    in a run most of it is learnt there. (M v' is little there, so that the estimate
+    hardly depends on its own use, whatever M is.) From the first contradiction on it is
+    frozen, since what is measured may be wrong.
 
     At first, t after the first state, the gain is 1/(t + T₀) instead of K, until that
     is smaller. Then the estimate is the mean ∫ (M v' - (tau - N)) dt / (t + T₀), and a

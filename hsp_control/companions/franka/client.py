@@ -208,7 +208,9 @@ class GripperClient:
         if "values" in message:
             values = message["values"]
             if not isinstance(values, list) or not values:
-                raise ValueError(f"values is {str(values)[:40]}; needs [[OPENING], ...]")
+                raise ValueError(
+                    f"values is {str(values)[:40]}; needs [[OPENING], ...]"
+                )
             value = values[-1]
         if value is None:
             return wanted
