@@ -325,8 +325,9 @@ class LiveRun:
         self.send(before)
         if self.consistent and reader.measurement is not None:
             self.safe_stop.observe(reader.state, limiter.applied)
-            if stops:
-                reader.stop(self.safe_stop.load)
+        if stops:
+            self.safe_stop.trust(measurements=self.consistent)
+            reader.stop(self.safe_stop.load)
         response = reader.effort_sent(limiter.applied)
         self.report_applied_effort()
         self.log_row(response)
@@ -413,6 +414,7 @@ class LiveRun:
         self.phase = Phase.DAMPING
         self.ended, self.reason, self.error = ended, reason, error
         self.safe_stop.begin()
+        self.safe_stop.trust(measurements=self.consistent)
         self.reader.stop(self.safe_stop.load)
 
     def fail(self, error: BaseException) -> None:
