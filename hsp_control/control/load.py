@@ -24,11 +24,13 @@ _LONGEST_GAP = 0.02
 
 
 class LoadEstimate:
-    """A slow momentum observer, which a safe stop freezes.
+    """A slow momentum observer, with which a safe stop goes on.
 
     With d the load, M v' = tau - N + d, so d' = K (M v' - (tau - N) - d). It is
-    estimated while the robot runs and its measurements are consistent, and not in the
-    stop, in which measurements may be wrong.
+    estimated while measurements are consistent, in a live loop also in the stop, which
+    then uses the newest estimate. (M v' is small there, so that the estimate hardly
+    depends on its own use, whatever M is.) From the first contradiction on, the one of
+    0.2 s before is frozen.
 
     At first, t after the first state, the gain is 1/(t + T₀) instead of K, until that
     is smaller. Then the estimate is the mean ∫ (M v' - (tau - N)) dt / (t + T₀), and a
@@ -42,7 +44,8 @@ class LoadEstimate:
 
     Attributes:
         bound: Largest load, shape (nv,) [N·m or N].
-        load: The estimate of 0.2 s ago, shape (nv,) [N·m or N].
+        load: The estimate that is used, that of 0.2 s ago unless `use` chooses,
+            shape (nv,) [N·m or N].
     """
 
     def __init__(self, nv: int, period: float) -> None:
@@ -59,6 +62,12 @@ class LoadEstimate:
         Where no limit is known, no load is estimated.
         """
         self.bound[:] = np.where(np.isfinite(limits), _CONTACT * limits, 0.0)
+
+    def use(self, *, newest: bool) -> None:
+        """Set `load` to the newest estimate, or to the one of 0.2 s ago."""
+        oldest = self._past[self._count.item() % len(self._past)]
+        chosen = self._estimate if newest else oldest
+        self.load[:] = np.clip(chosen, -self.bound, self.bound)
 
     def forget(self) -> None:
         """Begin anew."""

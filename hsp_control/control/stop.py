@@ -42,11 +42,11 @@ Steeper ones, such as a wall, may only be pushed: the joints that are held do it
 class BoundStop:
     """The calls of a safe stop at a state, and their memory.
 
-    Damping: tau = g(q) - d - s k M(q) v, with the load d that acted on the joints
-    before the stop (`LoadEstimate`; 0 where a robot floats, whose feet push it, too).
-    Where d is right, the kinetic energy obeys T' = -s k vᵀM v. This is negative for any
-    true inertia of the robot, because the model's M is positive definite. (Coriolis
-    terms do no work; compensating them with a wrong model would.)
+    Damping: tau = g(q) - d - s k M(q) v, with the load d that acts on the joints
+    besides their efforts (`LoadEstimate`; 0 where a robot floats, whose feet push it,
+    too). Where d is right, the kinetic energy obeys T' = -s k vᵀM v. This is negative
+    for any true inertia of the robot, because the model's M is positive definite.
+    (Coriolis terms do no work; compensating them with a wrong model would.)
     With an exact model T falls like exp(-2 k t) for heavy and light joints alike, so
     that one gain k is enough. s, in [0, 1], scales the whole vector into the effort
     limits: damping that is clipped joint by joint can accelerate the robot.
@@ -66,7 +66,7 @@ class BoundStop:
         state: Where the robot is.
         feet: The contacts that can carry it; see `STEEPEST`.
         limits: Limits of the efforts, shape (nv,).
-        load: The external effort on the joints before the stop.
+        load: The external effort on the joints, shape (nv,).
         damped_for: Duration of the damping so far, shape (1,) [s].
         holding: Whether it holds, shape (1,).
         held_q: Where it holds, q₀, shape (nq,).

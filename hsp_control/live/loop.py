@@ -260,6 +260,7 @@ class LiveRun:
     done: bool = False
     abandoned: bool = False
     later: str = ""  # the first fault in the safe stop, "" without one
+    consistent: bool = True  # whether nothing that was measured has been wrong
 
     def run(self, on_period: Callable[[float], object] | None) -> None:
         """Run period after period until the safe stop is complete."""
@@ -301,6 +302,7 @@ class LiveRun:
         reader, limiter = self.reader, self.limiter
         reader.read(limiter.applied, self.chain.compensated.controller.limits)
         if reader.fault is not None:
+            self.consistent = False
             self.stop("fault", reader.fault, reader.error)
         elif self.requests.reason is not None:
             self.end_regularly("operator", self.requests.reason)
@@ -321,8 +323,11 @@ class LiveRun:
         if tau is not None and not limiter.apply(tau, reader.state.q, inertia):
             self.stop("fault", f"the effort is not finite: {tau.tolist()}")
         self.send(before)
-        if self.phase == Phase.RUNNING and reader.measurement is not None:
+        if self.consistent and reader.measurement is not None:
             self.safe_stop.observe(reader.state, limiter.applied)
+        if stops:
+            self.safe_stop.trust(measurements=self.consistent)
+            reader.stop(self.safe_stop.load)
         response = reader.effort_sent(limiter.applied)
         self.report_applied_effort()
         self.log_row(response)
@@ -409,6 +414,7 @@ class LiveRun:
         self.phase = Phase.DAMPING
         self.ended, self.reason, self.error = ended, reason, error
         self.safe_stop.begin()
+        self.safe_stop.trust(measurements=self.consistent)
         self.reader.stop(self.safe_stop.load)
 
     def fail(self, error: BaseException) -> None:
@@ -427,6 +433,7 @@ class LiveRun:
         if has is not None:
             wrong = self.limiter.contradiction(has, halted=measurement.halted)
             if wrong is not None:
+                self.consistent = False
                 self.stop("fault", wrong)
                 has = None
         if self.limiter.robot_has(has):

@@ -123,7 +123,7 @@ class SafeStop:
 
     @property
     def load(self) -> Array:
-        """The external effort on the joints before the stop, (nv,)."""
+        """The external effort on the joints that is compensated, shape (nv,)."""
         robot = self._robot
         return np.zeros(robot.nv) if self._bound is None else self._bound.load.load
 
@@ -134,7 +134,7 @@ class SafeStop:
         self.begin()
 
     def observe(self, state: RobotState, acts: Array) -> None:
-        """Learn from a period before the stop.
+        """Learn from a period, also of the stop while measurements are consistent.
 
         Args:
             state: The robot's state.
@@ -143,6 +143,11 @@ class SafeStop:
         self._bound_to(state).load.permit(self._effort_limits)
         self._acts[:] = acts
         self._learn()
+
+    def trust(self, *, measurements: bool) -> None:
+        """Use the newest load; or, if a measurement is wrong, that of before it."""
+        if self._bound is not None:
+            self._bound.load.use(newest=measurements)
 
     def effort(self, state: RobotState) -> Array:
         """Return the effort of this period at the state, shape (nv,); once a period."""

@@ -7,6 +7,7 @@ from live_rigs import PERIOD, panda, start
 
 import hsp_control as hsp
 from hsp_control.common.arrays import Array
+from hsp_control.live import InProcessRobot, SimulatedRobot
 from hsp_control.live.safe_stop import SafeStop
 from hsp_control.live.settings import StopSettings
 
@@ -124,3 +125,26 @@ def test_an_arm_with_an_unknown_load_does_not_sink(observed: bool) -> None:
         fastest = max(fastest, float(np.abs(v).max()))
     assert (fastest < 0.02) == observed, fastest
     assert (fastest > 0.1) != observed, fastest
+
+
+def test_a_stop_early_in_a_run_still_learns_the_load() -> None:
+    """Masses that are 20 % off, link by link; frozen, the load's rest moved the arm."""
+    robot = hsp.Robot.load("ur5")
+    model, rng = robot.model.copy(), np.random.default_rng(2)
+    for k in range(1, model.njoints):
+        body, share = model.inertias[k], rng.choice([0.8, 1.2])
+        model.inertias[k] = pin.Inertia(
+            share * body.mass, body.lever, share * body.inertia
+        )
+    plant = hsp.plants.RigidBodyPlant(hsp.Robot.from_pinocchio(model))
+    moving = hsp.plants.IntegratedPlant(plant, hsp.integrators.Rk4(PERIOD))
+    simulated = SimulatedRobot(moving, robot.home(), np.zeros(robot.nv), PERIOD)
+    circle = hsp.Circle(radius=0.05, angular_rate=2.0)
+    hand = hsp.FramePosition(robot.end_effector, circle, blend=0.2)
+    report = hsp.run_loop(
+        hsp.Controller(robot, [hand], hsp.JointCentering(), null_space_gain=8.0),
+        InProcessRobot(simulated),
+        duration=0.3,
+        clock=lambda: simulated.t,
+    )
+    assert (report.ended, report.at_rest) == ("completed", True), report.reason
