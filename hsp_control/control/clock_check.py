@@ -1,6 +1,6 @@
 """Looks whether a clock can be that of the loop: origin, unit and direction."""
 
-import warnings
+from hsp_control.common.warned import warn
 
 _FEW = 5
 """Steps in a row before a clock is called wrong: one may be late, or made twice. One
@@ -41,8 +41,7 @@ class ClockCheck:
             self._tell(
                 f"a change at t = {at:.10g} s begins in {(at - now) / 86400.0:.0f} "
                 "days: times count from the first step; for now it is "
-                "at(controller.state.t)",
-                of=7,  # the caller of a method of `Controller.at`
+                "at(controller.state.t)"
             )
 
     def look(self, t: float, period: float, stamp: int) -> None:
@@ -76,10 +75,9 @@ class ClockCheck:
         if self._count >= enough:
             self._tell(_MESSAGES[kind].format(t=t, passed=passed, period=held))
 
-    def _tell(self, message: str, of: int = 4) -> None:
-        """Warn of the line of a caller, so many calls away."""
+    def _tell(self, message: str) -> None:
         self._told = True
-        warnings.warn(message, ClockWarning, stacklevel=of)
+        warn(message, ClockWarning)
 
 
 _UNIT = (

@@ -1,12 +1,12 @@
 """Checks at the start of a run, not in its steps."""
 
-import warnings
 from collections.abc import Iterable
 
 import numpy as np
 
 from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import ConfigurationError
+from hsp_control.common.warned import warn
 from hsp_control.constraints.limits import RobotLimits, in_degrees
 from hsp_control.declaration.language import spoken
 from hsp_control.declaration.nested import parts_within
@@ -61,16 +61,11 @@ def warn_of_far_targets(state: RobotState, tasks: Iterable[Task]) -> None:
                 target = task.followed.sample(t).position.position
             else:
                 target = task.trajectory.sample(t).position
-            warn_of_far_target(state, task, target, of=6)  # who calls `compute`
+            warn_of_far_target(state, task, target)
 
 
-def warn_of_far_target(
-    state: RobotState, task: Task, target: Array, *, of: int = 3
-) -> None:
-    """Warn if a target, shape (3,) or of the tracked axes [m], is far out of reach.
-
-    The warning names the line of a caller, ``of`` calls away.
-    """
+def warn_of_far_target(state: RobotState, task: Task, target: Array) -> None:
+    """Warn if a target, shape (3,) or of the tracked axes [m], is far out of reach."""
     robot = state.robot
     if robot.unactuated or not isinstance(task, FramePose | FramePosition):
         return
@@ -83,11 +78,10 @@ def warn_of_far_target(
         return
     in_mm = away > MILLIMETRES * reach
     why = "millimetres? Lengths are in m" if in_mm else "it goes as near as it can"
-    warnings.warn(
+    warn(
         f"the target of task {task.name!r} is {away:.4g} m away from "
         f"{task.frame_name!r}, but the robot reaches {reach:.2g} m: {why}",
         StartWarning,
-        stacklevel=of,
     )
 
 
@@ -111,14 +105,13 @@ def warn_of_jump(
     if not share[j] > JUMP:
         return
     unit = "N·m" if robot.units[j] == "rad" else "N"
-    warnings.warn(
+    warn(
         f"the first effort of joint {robot.dof_names[j]!r} is {tau[j]:.3g} {unit}, but "
         f"gravity requires {gravity[j]:.3g} {unit}: a jump of {100.0 * share[j]:.0f} % "
         f"of its limit of {limit[j]:.3g} {unit}; let tasks begin gently with "
         f"{spoken('blend: 1.0', 'blend=1.0')}, or start on the trajectory with its "
         "velocity",
         StartWarning,
-        stacklevel=3,
     )
 
 
@@ -146,4 +139,4 @@ def warn_of_slow_efforts(robot: Robot, q: Array, limits: RobotLimits | None) -> 
                 "limits.effort_rate, or less limits.velocity"
             )
     if found:
-        warnings.warn(found, StartWarning, stacklevel=3)
+        warn(found, StartWarning)

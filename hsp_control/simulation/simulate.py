@@ -1,6 +1,5 @@
 """Simulates the closed loop of a controller and a plant."""
 
-import warnings
 from collections.abc import Callable, Sequence
 from contextlib import suppress
 from pathlib import Path
@@ -16,6 +15,7 @@ from hsp_control.common.exceptions import (
     StreamError,
 )
 from hsp_control.common.keywords import suggesting
+from hsp_control.common.warned import warn
 from hsp_control.control.change_model import ChangeGravity, ChangePayload
 from hsp_control.control.compensation import CompensatedController, Compensation
 from hsp_control.control.compensation import check_rate as check_loop
@@ -145,7 +145,7 @@ def simulate(
         plant = RigidBodyPlant(robot)
     elif isinstance(plant, PlantPart):
         for message in heavy_plant(plant, robot, robot.check_configuration(q0)):
-            warnings.warn(message, StartWarning, stacklevel=2)
+            warn(message, StartWarning)
         with within("plant"):
             plant = plant.build(robot, integrator)
     # Rows, periods, and where it begins
@@ -172,7 +172,7 @@ def simulate(
             f"{type(plant).__name__} does not follow changes of payload and gravity; "
             "change them in the plant itself"
         )
-        warnings.warn(message, StartWarning, stacklevel=2)
+        warn(message, StartWarning)
     # The loop
     exact = is_exact(plant, robot)
     period = log_period / periods if periods else None
@@ -196,7 +196,7 @@ def simulate(
             )
             for each in high:
                 warning = f"{'.'.join(each.path)}: {each.message}"
-                warnings.warn(warning, StartWarning, stacklevel=2)
+                warn(warning, StartWarning)
         chain = ControlChain(
             CompensatedController(controller, compensation), plan, estimators
         )
@@ -273,7 +273,7 @@ def simulate(
             writer.end(status, message)
     rollout = writer.rollout(status, message)
     if damped := damped_words(rollout):
-        warnings.warn(damped, RunWarning, stacklevel=2)
+        warn(damped, RunWarning)
     return rollout
 
 

@@ -204,7 +204,12 @@ class GripperClient:
         """Return the opening that a message commands, if any."""
         if not isinstance(message, dict):
             raise ValueError("it needs a mapping with value: [OPENING]")
-        value = message["values"][-1] if "values" in message else message.get("value")
+        value = message.get("value")
+        if "values" in message:
+            values = message["values"]
+            if not isinstance(values, list) or not values:
+                raise ValueError(f"values: {str(values)[:40]}; needs [[OPENING], ...]")
+            value = values[-1]
         if value is None:
             return wanted
         if sender != self.sender and monotonic() - self.last_time < _SILENCE:

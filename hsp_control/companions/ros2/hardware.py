@@ -1,12 +1,12 @@
 """A robot whose states and commands are topics of ROS 2."""
 
-import warnings
 from itertools import pairwise
 from statistics import median
 from time import monotonic
 
 from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import HardwareError
+from hsp_control.common.warned import warn
 from hsp_control.companions.ros2.address import checked_name, parse
 from hsp_control.companions.ros2.joints import Joints
 from hsp_control.companions.ros2.messages import (
@@ -182,11 +182,10 @@ class Ros2Hardware:
                 if found is not None:
                     stamps.append(received.message.header.stamp.nanoseconds)
         if self._joints.others:
-            warnings.warn(
+            warn(
                 f"{self.states}: joints that the robot does not have are ignored: "
                 f"{', '.join(self._joints.others)}",
                 RuntimeWarning,
-                stacklevel=3,
             )
         there = 1e-9 * median(b - a for a, b in pairwise(stamps))
         if abs(there - self.period) > _TOLERANCE * self.period:

@@ -223,8 +223,9 @@ def _find_problem(element: Element) -> str:
         text = element.get(name, "")
         if any(length < 0.0 for length in _parsed(text)):
             return f'{name}="{_short(text)}" must not be negative'
-    if tag == "mesh" and not all(_parsed(text := element.get("scale", "1"))):
-        return f'scale="{_short(text)}": a factor must not be zero'
+    scale = element.get("scale", "1")
+    if tag == "mesh" and not all(_parsed(scale)):
+        return f'scale="{_short(scale)}": a factor must not be zero'
     if tag == "mesh" and not (element.get("filename") or "").strip():
         return "the filename is missing"
     return ""

@@ -50,7 +50,7 @@ def test_too_many_that_overlap_are_refused(
     made = controller()
     for k in range(8):
         MOVES[kind](made.at(0.0).ramp(1.0 + k), k)
-    words = "9 changes of one reference overlap; at most 8.* is a stream, such as"
+    words = "9 changes of one reference overlap; at most 8.* use a stream, such as"
     with pytest.raises(hsp.errors.TrajectoryError, match=words):
         MOVES[kind](made.at(0.0).ramp(100.0), 0)
     assert len(made.changes) == 8
