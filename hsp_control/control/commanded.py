@@ -23,6 +23,10 @@ from hsp_control.trajectories.streams.run import StreamRun
 from hsp_control.trajectories.streams.streamed import Streamed
 from hsp_control.trajectories.streams.velocities import Axes
 
+_REHEARSALS = 3
+"""Of a change: the first fills the processor's caches, the others train its
+predictions."""
+
 
 class Commanded(Composition):
     """A composition that is changed, and given targets, while it runs."""
@@ -128,7 +132,7 @@ class Commanded(Composition):
         return self._sent(task, velocity=velocity, axes=axes)
 
     @abstractmethod
-    def _rehearse(self) -> None:
+    def _rehearse(self, times: int) -> None:
         """Make the next step's calls once, where the robot is, and move nothing."""
 
     def _sent(self, task: str, **message: Any) -> StreamHandle:
@@ -142,7 +146,7 @@ class Commanded(Composition):
         stream.send(**message)
         with self._lock:
             if self._memory.begun:
-                self._rehearse()
+                self._rehearse(1)
         return stream
 
     def _followed(self, task: str) -> Task:
@@ -165,7 +169,7 @@ class Commanded(Composition):
         with self._lock:
             self._change(change)
             if self._memory.begun:  # when all that the change used is freed
-                self._rehearse()
+                self._rehearse(_REHEARSALS)
 
     def _change(self, change: Change) -> None:
         here, now, given = None, self._in_force.latest, change

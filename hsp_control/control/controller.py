@@ -29,10 +29,6 @@ from hsp_control.engine import Dynamics, Plan
 from hsp_control.law import TaskSample
 from hsp_control.robot import RobotState
 
-_REHEARSALS = 3
-"""The first fills the processor's caches, the others train its predictions."""
-
-
 _LARGE = 4096
 """Memory [bytes] for which malloc sorts what has been freed: else the next output,
 which is larger than most pieces, would have to."""
@@ -121,7 +117,7 @@ class Controller(Commanded):
             now.passed(self._state.t)
         return output
 
-    def _rehearse(self) -> None:
+    def _rehearse(self, times: int) -> None:
         # To make a change takes milliseconds, after which the processor's caches hold
         # nothing of a step, and the next one would cost many times as much.
         memory, now, state = self._memory, self._in_force, self._state
@@ -129,7 +125,7 @@ class Controller(Commanded):
         active, damped = now.mixture.active, now.mixture.damped
         # What fails here fails in a step as well, which says so, or is not there yet.
         with memory.kept(), suppress(Exception):
-            for _ in range(_REHEARSALS):
+            for _ in range(times):
                 now.mixture.rehearse()
                 if isinstance(now.step, BoundMixture):
                     now.step.rehearse(state.t)

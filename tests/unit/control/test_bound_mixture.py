@@ -74,3 +74,42 @@ def test_it_delivers_what_its_parts_do(kind: str, speed: float | None) -> None:
         for each in (whole, parts):
             each.applied(out.tau, H)
     assert speed is None or Status.LIMITED in statuses
+
+
+@pytest.mark.parametrize("scheduled", [False, True])
+def test_it_delivers_what_its_parts_do_on_feet(scheduled: bool) -> None:
+    """One is lifted, by a change or a schedule, and another pushes less meanwhile."""
+    pytest.importorskip("example_robot_data")
+    robot = hsp.Robot.load("solo12")
+    feet = [name for name in robot.frame_names if name.endswith("_FOOT")]
+    lifted = hsp.trajectories.Schedule([(None, BEGIN + RAMP)], ramp=RAMP)
+    push = hsp.contacts.CommandedForce(3.0)
+
+    def standing() -> hsp.Controller:
+        first = hsp.contacts.PointContact(
+            feet[0], schedule=lifted if scheduled else None
+        )
+        pushing = hsp.contacts.PointContact(feet[1], force=push)
+        others = [hsp.contacts.PointContact(foot) for foot in feet[2:]]
+        trunk = hsp.FramePose("base_link", name="trunk")
+        made = hsp.Controller(robot, [trunk], contacts=[first, pushing, *others])
+        q, v = robot.home(), np.zeros(robot.nv)
+        made.applied(made.compute(0.0, q, v).tau, H)
+        if not scheduled:
+            made.at(BEGIN).ramp(RAMP).contact(feet[0], active=False)
+        made.at(BEGIN).ramp(RAMP).force(feet[1], hsp.contacts.CommandedForce(2.0))
+        return made
+
+    whole, parts = standing(), standing()
+    q, v = robot.home(), 0.01 * np.ones(robot.nv)
+    points = set()
+    for k in range(1, 45):
+        out = whole.compute(k * H, q, v)
+        apart = parts.compute(k * H, q, v, modifier=lambda _, __, a: (a, None))
+        np.testing.assert_allclose(out.tau, apart.tau, rtol=0, atol=1e-9)
+        np.testing.assert_allclose(out.forces, apart.forces, rtol=0, atol=1e-8)
+        assert (out.status, out.damped) == (apart.status, apart.damped)
+        points.add(len(out.forces))
+        for each in (whole, parts):
+            each.applied(out.tau, H)
+    assert points == {9, 12}
