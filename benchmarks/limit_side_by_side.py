@@ -189,7 +189,8 @@ def close_loop(experiment: Experiment, compute: Compute) -> Run:
         if not np.abs(v).max() < 100.0:
             end = f"diverged at {t:.2f} s"
             break
-    return Run(*(np.array(column) for column in zip(*rows, strict=True)), end)
+    columns = [np.array(column) for column in zip(*rows, strict=True)]
+    return Run(*columns, end=end)
 
 
 def runs_of(

@@ -188,7 +188,7 @@ def laws(
         except ImportError as error:
             missing[name] = str(error)
             continue
-        found[name] = lambda peer=peer: peer.make(case, case.robot.model.copy())  # type: ignore[misc]
+        found[name] = lambda peer=peer: peer.make(case, case.robot.model.copy())
     return found
 
 
@@ -199,7 +199,7 @@ def borne_delay(case: Case, make: Callable[[], Compute]) -> int:
         plant = wrong_arm(case, "exact", 0, delay)
         own = plant.measure
         # Seen 1 mm beside, at first: something to settle.
-        plant.measure = lambda t, q, v, own=own: own(t, q + 1e-3 * (t == 0.0), v)  # type: ignore
+        plant.measure = lambda t, q, v, own=own: own(t, q + 1e-3 * (t == 0.0), v)
         if not measured(case, plant, make()).rests:
             break
         longest = delay

@@ -161,8 +161,9 @@ def parts_table(case: Standing, states: list[State]) -> str:
     controller.compute(*states[0])
     state = controller.state
     active = controller.active_stack
-    ((limits, _),) = controller._limits.sets
-    actuation = controller._mixture.actuation(active, limits)
+    now = controller._in_force
+    ((limits, _),) = now.limits.sets
+    actuation = now.mixture.actuation(active, limits)
     support = active.support
     times: dict[str, list[int]] = {}
 

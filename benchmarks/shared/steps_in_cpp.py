@@ -42,7 +42,7 @@ class StepsInCpp:
             RuntimeError: If the last effort differs from that of `compute`.
         """
         expected = controller.compute(*states[-1]).tau
-        bound = controller._bound
+        bound = controller._settled_step
         assert bound is not None, "something changes at present"
         t, q, v = (np.array(each, dtype=float) for each in zip(*states, strict=True))
         self._begin, self._end = np.zeros((2, 1), dtype=np.int64)
@@ -57,7 +57,7 @@ class StepsInCpp:
             elapsed=self._elapsed,
         )
         self.elapsed(0, len(t))
-        own = bound._actuation.delivered(bound.active.acceleration).effort
+        own = bound.actuation.delivered(bound.active.acceleration).effort
         if not np.array_equal(own, expected):
             raise RuntimeError(f"in C++ the effort is {own}, from Python {expected}")
 
