@@ -23,9 +23,7 @@ hand = hsp.FramePose("panda_tcp")
 turning = hsp.trajectories.Stops(
     [[0.0], [0.8], [-0.8], [0.0]], times=[0.5, 2.0, 4.0, 5.5], origin="start"
 )
-elbow = hsp.tasks.FunctionTask(
-    elbow_angle, turning, unit="rad", priority=2, name="elbow"
-)
+elbow = hsp.FunctionTask(elbow_angle, turning, unit="rad", priority=2, name="elbow")
 controller = hsp.Controller(robot, [hand, elbow])
 run = hsp.simulate(controller, robot.home(), duration=6.0, control_period=0.005)
 print(run, run.save("out/elbow.npz"))

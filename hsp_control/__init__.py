@@ -83,6 +83,7 @@ if TYPE_CHECKING:  # for type checkers; the names are looked up below
     from .tasks import FrameOrientation as FrameOrientation
     from .tasks import FramePose as FramePose
     from .tasks import FramePosition as FramePosition
+    from .tasks import FunctionTask as FunctionTask
     from .tasks import Gains as Gains
     from .tasks import Impedance as Impedance
     from .tasks import JointPosture as JointPosture
@@ -100,8 +101,8 @@ _NAMES = {
     "geometry": "Obstacle Sphere",
     "trajectories": "Circle Hold Line Stream StreamOrientation StreamPose",
     "tasks": (
-        "CenterOfMass FrameOrientation FramePose FramePosition Gains Impedance "
-        "JointPosture Pointing Task"
+        "CenterOfMass FrameOrientation FramePose FramePosition FunctionTask Gains "
+        "Impedance JointPosture Pointing Task"
     ),
     "null_space.fields": (
         "Cost FunctionCost JointCentering Manipulability NullSpaceField "

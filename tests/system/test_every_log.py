@@ -25,7 +25,7 @@ def law(field):
 
 
 own = hsp.FunctionCost(lambda state: state.q[3] ** 2, weight=0.01)
-task = hsp.tasks.FunctionTask(lambda state: state.q[0], name="first")
+task = hsp.FunctionTask(lambda state: state.q[0], name="first")
 both = hsp.Controller(robot, [hand, task])
 run = {"duration": 0.05, "control_period": 0.001}
 hsp.simulate(law(hsp.JointCentering()), robot.home(), **run).save("out/simulated.npz")
@@ -92,10 +92,10 @@ def test_a_log_is_taken(name: str, folder: Path) -> None:
 
 
 def test_a_walk_s_log_is_taken(folder: Path) -> None:
-    hsp("run walking/solo12_trot --set simulation.duration=0.3", folder)
+    in_this_process("run walking/solo12_trot --set simulation.duration=0.3", folder)
     (log,) = (path.relative_to(folder) for path in folder.glob("out/solo12_trot*.npz"))
     for command in (*TAKERS, VIEW, "run {log}"):
-        hsp(command.format(log=log, name="walk"), folder)
+        in_this_process(command.format(log=log, name="walk"), folder)
 
 
 def test_a_sweep_s_file_is_drawn(folder: Path) -> None:
