@@ -51,8 +51,8 @@ def check_transmissions(xml: Element) -> Iterator[Finding]:
     by_joint: dict[str, list[str]] = {}
     for transmission in xml.findall("transmission"):
         name = transmission.get("name", "")
-        for joint in transmission.findall("joint"):
-            by_joint.setdefault(joint.get("name", ""), []).append(name)
+        for element in transmission.findall("joint"):
+            by_joint.setdefault(element.get("name", ""), []).append(name)
     for joint, names in by_joint.items():
         about = f"transmission {listing(map(repr, names))}"
         if joint not in joints:
