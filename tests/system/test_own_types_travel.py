@@ -3,6 +3,7 @@
 from pathlib import Path
 
 import pytest
+from places import further
 from typing_commands import PATIENCE, hsp, script
 
 PARTS = """
@@ -52,7 +53,15 @@ WITH_LOG = {
 WITHOUT_CONTROLLER = "no controller, only the log's columns are drawn"
 
 
-@pytest.fixture(scope="module", params=["parts.py", "--import"])
+CASES = [
+    *(("parts.py", what) for what in WITH_LOG),
+    *(("--import", what) for what in ("run", "of its robot")),
+    *further(*(("--import", what) for what in WITH_LOG)),
+]
+"""A log names the modules of its types, however these were found."""
+
+
+@pytest.fixture(scope="module")
 def folder(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory):
     """Return a folder with logs, whose types a list names, or an option."""
     folder = tmp_path_factory.mktemp("own")
@@ -66,7 +75,7 @@ def folder(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFact
     return folder
 
 
-@pytest.mark.parametrize("what", WITH_LOG)
+@pytest.mark.parametrize(("folder", "what"), CASES, indirect=["folder"])
 def test_a_log_is_read_with_its_own_types(folder: Path, what: str) -> None:
     assert WITHOUT_CONTROLLER not in hsp(WITH_LOG[what], folder)
 
