@@ -379,9 +379,9 @@ class ContactColumns:
             prefix = f"contact.{contact.name}"
             row[f"{prefix}.force"][:] = 0.0
             row[f"{prefix}.weight"][...] = controller.contact_weight(contact.name, t)
-            if contact not in support.contacts:
+            points = support.points_of(contact.name)
+            if points is None:
                 continue
-            points = support.points[support.contacts.index(contact)]
             local = output.forces.reshape(-1, 3)[points]
             row[f"{prefix}.force"][:] = world[points].sum(axis=0)
             if contact.force is not None:

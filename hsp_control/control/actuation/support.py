@@ -87,6 +87,16 @@ class Support:
         self._wanted, self.tau = np.zeros(nv), np.zeros(nv)
         self.forces = np.zeros(self.size)
 
+    def points_of(self, contact: str) -> slice | None:
+        """Return the rows of the points of a contact; None: it is not active.
+
+        By its name: the controller's own, whose changes are over, may be another value.
+        """
+        for each, points in zip(self.contacts, self.points, strict=True):
+            if each.name == contact:
+                return points
+        return None
+
     def update(self, law: BoundLaw) -> None:
         """Compute the map, the positions, the bounds of schedules, and the commands."""
         if self._update is None:

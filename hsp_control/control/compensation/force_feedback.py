@@ -115,10 +115,10 @@ class RunningForceFeedback(Stage):
         unexpected = np.linalg.solve(state.mass_matrix, disturbance)
         support = self._controller.active_stack.support
         for contact in self._fed:
-            if contact not in support.contacts:
+            points = support.points_of(contact.name)
+            if points is None:
                 self.actual[contact.name] = 0.0
                 continue
-            points = support.points[support.contacts.index(contact)]
             columns = slice(3 * points.start, 3 * points.stop)
             F = support.map[:, columns].reshape(len(disturbance), -1, 3).sum(axis=1)
             F = F / (points.stop - points.start)
@@ -138,15 +138,16 @@ class RunningForceFeedback(Stage):
         gain, bound = self._declared.gain, self._declared.bound
         for contact in self._fed:
             actual, name = self.actual[contact.name], contact.name
+            points = support.points_of(name)
             if (
-                not np.isfinite(actual)
+                points is None
+                or not np.isfinite(actual)
                 or self._controller.contact_weight(name, t) < 1.0
             ):
                 continue
             assert contact.force is not None
             command = contact.force.followed.sample(t).position
             wanted = command[0 if contact.force.dimension == NORMAL else 2]
-            points = support.points[support.contacts.index(contact)]
             planned, commanded = (
                 float(each.reshape(-1, 3)[points, 2].sum())
                 for each in (forces, support.reference)

@@ -162,7 +162,8 @@ class Planner:
             self.waypoints.late += surplus
             self._step(max(at, self.now), together[surplus:])
         if messages and self.now == t < min(self._segments[-1].end, self._fades_at):
-            self._due = -inf  # the next step looks what else there is to do
+            self._forget(t)
+            self._due = -inf  # the rest is left to the next step: none is due before
             return
         self._step(t, [])
         if self.age > self._policy.stop_after:

@@ -184,7 +184,7 @@ def test_meshes_that_are_turned_are_named(look: Look, tmp_path: Path) -> None:
     text = ARM.replace(INERTIA, INERTIA + shape.format("y.dae"), 1)
     (found,) = look(text)["mesh"]
     assert found.element == "meshes of upper"
-    assert "y points up: it is turned to the link's z" in found.message
+    assert "y as the up axis: it is turned to the link's z" in found.message
     assert "mesh" not in look(text.replace("y.dae", "z.dae"))
 
 

@@ -1,4 +1,4 @@
-"""A loop of one's own that is watched: what is taken of it, and what its page shows."""
+"""A user's own loop that is watched: what is taken of it, and what its page shows."""
 
 import subprocess
 from asyncio import CancelledError
@@ -147,7 +147,7 @@ def test_a_loop_with_a_function_of_its_own_is_shown_by_its_columns(
     own = hsp.FunctionCost(lambda state: float(state.q @ state.q))
     watched = Watched(recorded(tmp_path, controller_of(own)))
     assert watched.controller is None
-    assert "of one's own" in watched.handles.message
+    assert "user-defined" in watched.handles.message
     setup, paths = drawn(watched)
     assert "Clearance" in [plot["title"] for plot in setup["plots"]]
     assert any(path.startswith("/targets") for path in paths)
