@@ -43,9 +43,7 @@ def import_file(path: Path | str) -> None:
     module = sys.modules[path.stem] = module_from_spec(spec)
     try:
         spec.loader.exec_module(module)
-    except KeyboardInterrupt:
-        raise
-    except BaseException as error:  # also sys.exit(), which would end a run silently
+    except (Exception, SystemExit) as error:  # sys.exit() would end a run silently
         del sys.modules[path.stem]
         raise ConfigError(f"{path}: {type(error).__name__}: {error}") from error
     _take_functions(module)
@@ -63,9 +61,7 @@ def import_code(name: str) -> None:
     if not is_file_name(name):
         try:
             _take_functions(import_module(name))
-        except KeyboardInterrupt:
-            raise
-        except BaseException as error:
+        except (Exception, SystemExit) as error:
             hint = f" (for a file, write {name}.py)" if isinstance(
                 error, ModuleNotFoundError
             ) else ""  # fmt: skip
