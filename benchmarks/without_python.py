@@ -6,7 +6,7 @@ A step is `compute` and `applied`; a turn is 100,000 of them along the first ten
 of the run, ten turns are a million. The efforts are the same to the last bit. ``pose``
 is the Panda of `side_by_side.py`; in .venv-peers TSID in C++ computes its steps, too,
 with its references made before. ``--fifo`` gives all real-time priority. Writes
-benchmarks/results/without_python.md.
+benchmarks/results/without_python.md: its tables of an idle machine, or of a busy one.
 """
 
 import argparse
@@ -34,6 +34,8 @@ from hsp_control.live.real_time import no_garbage_collection, real_time_priority
 STEPS, REPEATS, H = 10_000, 10, 0.001
 PAUSE = 0.02
 """Between passes [s]: Linux stops a real-time process that takes 95 % of a second."""
+IDLE = 0.5
+"""Load of a machine on which nothing else runs."""
 Rows = NDArray[np.float64]
 Turn = Callable[[], Rows]
 """Makes the steps of a turn, and returns the time of each [us]."""
@@ -158,6 +160,8 @@ def main() -> None:
                 table += f"| {name} | {where} | {p50:.1f} | {p999:.1f} | {most:.0f} |\n"
     print(table)
     section = "fifo" if options.fifo else "usual"
+    if load < IDLE:
+        section = f"idle {section}"
     replace_section(RESULTS / "without_python.md", section, table)
 
 
