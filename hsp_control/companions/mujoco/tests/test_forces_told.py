@@ -3,8 +3,10 @@
 import re
 from pathlib import Path
 
+import numpy as np
 import pytest
 
+import hsp_control as hsp
 from hsp_control.cli.main import main
 
 
@@ -19,11 +21,16 @@ def test_a_wipe_that_loses_contact_is_told_before_and_after_it(
 ) -> None:
     fast = ["--set", "tasks.path.trajectory.angular_rate=3"]
     short = ["--set", "simulation.duration=2", "--out", str(tmp_path)]
+    short += ["--set", "simulation.log_period=0.001"]
     assert main(["run", *forced("panda_wipe", "wiper", 5), *fast, *short]) == 0
     told = capsys.readouterr()
     assert "it slides at 0.34 m/s, and the plant's surface pushes it off b" in told.err
     assert re.search(r"force wiper .* N at the end, missed by [2-9]\.", told.out)
     assert re.search(r"\n +\d+ rows: contact lost", told.out)
+    (log,) = tmp_path.glob("*.npz")
+    planned = hsp.Rollout.load(log)["contact.wiper.force"]
+    # also in the step in which the change of the force is over
+    assert np.linalg.norm(planned[1:], axis=1).min() > 0.0
 
 
 @pytest.mark.parametrize(
