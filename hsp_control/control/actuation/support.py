@@ -112,38 +112,28 @@ class Support:
     def _updating(self, law: BoundLaw) -> PartCalls:
         """Return the calls that do what `update` does."""
         calls = list[AnyCall]()
-        if any(not planned.unscheduled for planned, *_ in self._scheduled):
-            calls.append(PartCall(self._follow_schedules, t=TIME))
         commands = {id(planned): each.weight for planned, each in self._commanded}
         for planned, columns, full in self._scheduled:
+            on = np.zeros(1)
             if planned.unscheduled:
-                on = np.zeros(1)
-                fading = PartCall(
-                    engine.FadingForces,
-                    weight=on,
-                    full=full,
-                    most=_MAX_FORCE,
-                    robot=self.weight,
-                    upper=self.upper[columns],
-                    inverse_cost=self.inverse_cost[columns],
-                    command=commands.get(id(planned), np.zeros(1)),
-                )
-                calls += [planned.presence.call(on), fading]
+                calls.append(planned.presence.call(on))
+            else:
+                calls.append(PartCall(_write_weight, t=TIME, contact=planned, out=on))
+            fading = PartCall(
+                engine.FadingForces,
+                weight=on,
+                full=full,
+                most=_MAX_FORCE,
+                robot=self.weight,
+                upper=self.upper[columns],
+                inverse_cost=self.inverse_cost[columns],
+                command=commands.get(id(planned), np.zeros(1)),
+            )
+            calls.append(fading)
         calls += self.maps()
         for _, each in self._commanded:
             calls += each.calls(law)
         return calls
-
-    def _follow_schedules(self, t: float) -> None:
-        """Write how active contacts with a schedule are at a time."""
-        for planned, columns, full in self._scheduled:
-            if not planned.unscheduled:
-                on = max(planned.weight(t), 1e-6)
-                self.upper[columns][2::3] = on * _MAX_FORCE * self.weight
-                self.inverse_cost[columns] = on * full
-        for planned, command in self._commanded:
-            if not planned.unscheduled:
-                command.weight[:] = planned.weight(t)
 
     def maps(self) -> list[AnyCall]:
         """Return the calls that write the map and the positions."""
@@ -233,6 +223,10 @@ COMMANDED_INVERSE_COST = 1e-6
 one. Feet that carry 1 kN then leave a commanded force 1 mN from its command. In a
 limited step it makes a miss of the command dearer than motion of the null space, and
 cheaper than a miss of the tasks."""
+
+
+def _write_weight(t: float, contact: PlannedContact, out: Array) -> None:
+    out[:] = contact.weight(t)
 
 
 class CommandedForces:
