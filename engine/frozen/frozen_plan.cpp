@@ -84,14 +84,14 @@ std::unique_ptr<Dynamics> read_dynamics(Bytes& bytes) {
   return std::make_unique<Dynamics>(joints, gravity, armature);
 }
 
-Index size_of(const StreamAlone& stream, SentTo part) {
+Index size_of(const Stream& stream, SentTo part) {
   switch (part) {
     case SentTo::TARGET:
-      return stream.sent_target.size();
+      return stream.sent.target.size();
     case SentTo::TIME:
       return 1;
     default:
-      return stream.sent_velocity.size();
+      return stream.sent.velocity.size();
   }
 }
 
@@ -215,7 +215,7 @@ void FrozenPlan::read_port(Bytes& bytes) {
   port.data = array.data;
   if (role == 'i') port.input = &input<Evolve>(bytes);
   else if (role == 't' || role == 'v' || role == 'r' || role == 'c') {
-    port.stream = &input<StreamAlone>(bytes);
+    port.stream = &input<Stream>(bytes);
     port.part = static_cast<SentTo>(role);
   } else if (role == 'p') {
     port.payloads = &input<Payloads>(bytes);

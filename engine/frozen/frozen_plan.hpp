@@ -9,7 +9,7 @@
 #include "../src/call.hpp"
 #include "../src/move.hpp"
 #include "../src/plan.hpp"
-#include "../streams/stream_alone.hpp"
+#include "../streams/stream.hpp"
 #include "bytes.hpp"
 #include "evolve.hpp"
 #include "evolve_impedance.hpp"
@@ -28,7 +28,7 @@ struct Port {
   void* data;
   // The receivers of a set value; all are null for an output.
   Evolve* input = nullptr;
-  StreamAlone* stream = nullptr;
+  Stream* stream = nullptr;
   SentTo part = SentTo::TARGET;  // of a message to a stream
   Payloads* payloads = nullptr;
   Index frame = 0;  // of a payload

@@ -191,7 +191,7 @@ const char* accepted(const Port& port) {
 }
 
 // Send a part of a message to a stream; return whether it is valid.
-template <class Values> bool sent(hsp::StreamAlone& stream, SentTo part, const Values& wanted) {
+template <class Values> bool sent(hsp::Stream& stream, SentTo part, const Values& wanted) {
   switch (part) {
     case SentTo::TARGET:
       return stream.send_target(wanted);

@@ -1,8 +1,6 @@
 #include "../src/rooms.hpp"
-#include "stream_alone.hpp"
+#include "stream.hpp"
 
 namespace hsp {
-const Kind* const* stream_kinds() {
-  return kinds<PieceState, WaypointPiece, VelocityPiece, StreamAlone>();
-}
+const Kind* const* stream_kinds() { return kinds<PieceState, Stream>(); }
 }  // namespace hsp

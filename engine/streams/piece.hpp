@@ -33,11 +33,18 @@ struct OwnState {
   }
 };
 
-enum class PieceForm { COAST, QUINTIC, FASTEST };
+// The same state in the chart in which its rotation vector is zero; the first `linear` coordinates
+// are outside of it.
+void rebase(OwnState& state, Index linear);
+
+enum class PieceForm { COAST, QUINTIC, FASTEST, TOOL_COAST, TOOL_QUINTIC };
 
 // COAST: x, x' at the start. QUINTIC: coefficients of u^k, u = (t - start)/duration. FASTEST: the
 // origin and the velocity of a frame, and in it phases of constant jerk, of each coordinate: when
 // it begins, x, x', x'' there, x'''.
+//
+// TOOL_COAST, TOOL_QUINTIC: of a pose, the same in the body's axes: the rates of the first three
+// numbers are u in place of x', x' = R u, and x is the integral of that from x at the start on.
 class Piece {
  public:
   static constexpr Index head = 13, phases = 10, rows = 2 + 5 * phases;
@@ -46,6 +53,7 @@ class Piece {
   Piece(double* numbers, Index n) : numbers_(numbers), n_(n) {}
 
   bool is(PieceForm form) const { return numbers_[0] == static_cast<double>(form); }
+  void set(PieceForm form) { numbers_[0] = static_cast<double>(form); }
   double& start() { return numbers_[1]; }
   double& end() { return numbers_[2]; }  // the next piece may begin earlier
   double& duration() { return numbers_[3]; }
@@ -55,7 +63,7 @@ class Piece {
   Eigen::Map<Matrix> body() { return {numbers_ + head, rows, n_}; }
 
   void begin(PieceForm form, double start, double end, const Matrix3& base) {
-    numbers_[0] = static_cast<double>(form);
+    set(form);
     numbers_[1] = start;
     numbers_[2] = end;
     numbers_[3] = end - start;
@@ -66,6 +74,9 @@ class Piece {
   void state(double t, OwnState& out);
 
  private:
+  void to_world_axes(double elapsed, OwnState& out);
+  Vector3 moved(double elapsed, const OwnState& now);
+
   double* numbers_;
   Index n_;
 };

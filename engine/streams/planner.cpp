@@ -59,52 +59,7 @@ std::array<Matrix, 3> derivatives() {
 
 const std::array<Matrix, 3> bezier = derivatives();
 
-struct Sample {
-  Vector &position, &velocity, &acceleration;
-};
-
-// R, ω and ω' of a state, in world axes.
-struct Turned {
-  Matrix3 rotation;
-  Vector3 angular_velocity, angular_acceleration;
-};
-
-Turned turned(const OwnState& state, Index n) {
-  struct {
-    Vector3 position, velocity, acceleration;
-  } y{state.x.segment<3>(n), state.rate.segment<3>(n), state.acceleration.segment<3>(n)};
-  const Turned at_rest{state.base, Vector3::Zero(), Vector3::Zero()};
-  Turned found;
-  turn_from(at_rest, y, found);
-  return found;
-}
-
 }  // namespace
-
-void Piece::state(double t, OwnState& out) {
-  const double elapsed = t - start();
-  const auto rows = body();
-  out.base = base();
-  if (is(PieceForm::COAST)) {
-    out.rate = rows.row(1).transpose();
-    out.x = rows.row(0).transpose() + elapsed * out.rate;
-    out.acceleration.setZero();
-  } else if (is(PieceForm::QUINTIC)) {
-    Sample sample{out.x, out.rate, out.acceleration};
-    polynomial(elapsed / duration(), duration(), rows.topRows<6>(), sample);
-  } else {
-    for (Index i = 0; i < n_; ++i) {
-      Index k = phases - 1;
-      while (k > 0 && !(rows(2 + 5 * k, i) <= elapsed)) --k;
-      const Index row = 2 + 5 * k;
-      const double s = std::max(elapsed - rows(row, i), 0.0), x = rows(row + 1, i),
-                   v = rows(row + 2, i), a = rows(row + 3, i), j = rows(row + 4, i);
-      out.x[i] = x + s * (v + s * (0.5 * a + s * j / 6.0)) + (rows(0, i) + elapsed * rows(1, i));
-      out.rate[i] = v + s * (a + 0.5 * s * j) + rows(1, i);
-      out.acceleration[i] = a + s * j;
-    }
-  }
-}
 
 void Planner::resize(Index n) {
   size_ = n;
@@ -117,15 +72,6 @@ void Planner::resize(Index n) {
        {&goal_.x, &goal_.rate, &goal_.acceleration, &bounds_.speed, &bounds_.acceleration,
         &bounds_.jerk, &wanted_, &there_, &apart_, &moved_, &x_, &rate_, &acceleration_, &before_})
     each->setZero(n);
-}
-
-void rebase(OwnState& state, Index linear) {
-  if (linear == state.x.size()) return;
-  const Turned now = turned(state, linear);
-  state.x.segment<3>(linear).setZero();
-  state.rate.segment<3>(linear) = now.rotation.transpose() * now.angular_velocity;
-  state.acceleration.segment<3>(linear) = now.rotation.transpose() * now.angular_acceleration;
-  state.base = now.rotation;
 }
 
 void Planner::local(const double* value, const Matrix3& base, Vector& x) const {
@@ -234,15 +180,15 @@ bool Planner::to_target(double t, const OwnState& state, const double* value, do
 
 bool Planner::to_rest(double t, const OwnState& state, double delay, Piece& piece) {
   goal_.rate.setZero();
-  return follow(t, state, goal_.rate, false, delay, piece) != Planned::NONE;
+  return follow(t, state, goal_.rate, false, delay, piece);
 }
 
 // A velocity changes along a cubic, so that all its components keep their ratio from one steady
 // velocity to another: a hand never leaves its straight line or its screw. If no cubic keeps the
 // bounds, an accelerating motion is first brought to a steady velocity; finally, in world axes,
 // Ruckig plans the motion.
-Planned Planner::follow(double t, const OwnState& state, const Vector& velocity, bool tool,
-                        double delay, Piece& piece) {
+bool Planner::follow(double t, const OwnState& state, const Vector& velocity, bool tool,
+                     double delay, Piece& piece) {
   bound_velocity(velocity, wanted_);
   seen_ = state;
   if (tool && n_) {  // u and u' in place of x' and x'': x'' = R (u' + ω × u)
@@ -255,16 +201,16 @@ Planned Planner::follow(double t, const OwnState& state, const Vector& velocity,
   there_ = wanted_;
   if (turns() && !tool) there_.segment<3>(n_) = state.base.transpose() * wanted_.segment<3>(n_);
   apart_ = there_ - seen_.rate;
-  const Planned in_axes = tool && n_ ? Planned::IN_TOOL_AXES : Planned::PIECE;
   if (greatest(apart_.cwiseAbs()) < same_state &&
       greatest(seen_.acceleration.cwiseAbs()) < same_state) {
     const bool rests = !(wanted_.array() != 0.0).any();
-    piece.begin(PieceForm::COAST, t, infinite, state.base);
+    const bool turns_on = tool && n_ && !rests;
+    piece.begin(turns_on ? PieceForm::TOOL_COAST : PieceForm::COAST, t, infinite, state.base);
     auto body = piece.body();
     body.row(0) = state.x.transpose();
     if (rests) body.row(1).setZero();
     else body.row(1) = seen_.rate.transpose();
-    return rests ? Planned::PIECE : in_axes;
+    return true;
   }
   double T = shortest(apart_, delay);
   bool kept = false;
@@ -281,7 +227,8 @@ Planned Planner::follow(double t, const OwnState& state, const Vector& velocity,
   }
   if (kept || tool) {
     quintic(t, T, state.base, piece);
-    return in_axes;
+    if (tool && n_) piece.set(PieceForm::TOOL_QUINTIC);
+    return true;
   }
   task_.x = state.x;
   task_.rate = state.rate;
@@ -293,10 +240,10 @@ Planned Planner::follow(double t, const OwnState& state, const Vector& velocity,
   task_.together = size_;
   task_.minimum = 0.0;
   const double duration = fastest_.solve(task_, bounds_, piece);
-  if (duration < 0.0) return Planned::NONE;
+  if (duration < 0.0) return false;
   piece.begin(PieceForm::FASTEST, t, t + std::max(duration, shortest_motion), state.base);
   piece.body().topRows<2>().setZero();
-  return Planned::PIECE;
+  return true;
 }
 
 // A velocity in its own direction, but not beyond the bounds.

@@ -19,14 +19,6 @@ struct OwnGoal {
   Vector x, rate, acceleration;
 };
 
-// The result of planning: a piece in the axes of its chart; or one whose linear coordinates are u
-// in place of x', x' = R u, in the axes of the body; or none, if none was found.
-enum class Planned { NONE, PIECE, IN_TOOL_AXES };
-
-// The same state in the chart in which its rotation vector is zero; the first `linear` coordinates
-// are outside of it.
-void rebase(OwnState& state, Index linear);
-
 class Planner {
  public:
   void resize(Index n);
@@ -51,9 +43,10 @@ class Planner {
   bool smooth(double t, const OwnState& state, const OwnGoal& goal, Piece& piece);
   // The fastest motion to a goal, which continues to move at its velocity.
   bool fastest(double t, const OwnState& state, const OwnGoal& goal, Piece& piece);
-  // To a velocity, linear, then angular, and on with it; in `delay` [s] if the bounds permit.
-  Planned follow(double t, const OwnState& state, const Vector& velocity, bool tool, double delay,
-                 Piece& piece);
+  // To a velocity, linear, then angular, in world axes or the body's, and on with it; in `delay`
+  // [s] if the bounds permit.
+  bool follow(double t, const OwnState& state, const Vector& velocity, bool tool, double delay,
+              Piece& piece);
   // To rest at a value, at a time or later.
   bool to_target(double t, const OwnState& state, const double* value, double time, double delay,
                  Piece& piece);

@@ -19,9 +19,9 @@ from hsp_control.control.targets import RAMP, followed_stream, new_stream, targe
 from hsp_control.tasks import Task
 from hsp_control.trajectories.crossfade import settled
 from hsp_control.trajectories.streams.followed import FollowedStream
+from hsp_control.trajectories.streams.message import Axes
 from hsp_control.trajectories.streams.run import StreamRun
 from hsp_control.trajectories.streams.streamed import Streamed
-from hsp_control.trajectories.streams.velocities import Axes
 
 _REHEARSALS = 3
 """Of a change: the first fills the processor's caches, the others train its

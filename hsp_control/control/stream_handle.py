@@ -6,8 +6,8 @@ from typing import Any
 import pinocchio as pin
 from numpy.typing import ArrayLike
 
+from hsp_control.trajectories.streams.message import Axes
 from hsp_control.trajectories.streams.run import StreamRun
-from hsp_control.trajectories.streams.velocities import Axes
 
 
 class StreamHandle:

@@ -125,7 +125,7 @@ def _image(
     assert bound is not None  # it is steady
     streams = streams_of(own)
     for stream in streams.values():
-        stream.forget()  # the step that has bound all
+        stream.restart()  # after the step that has bound all
     held, delivered = np.array([period]), DeliveredAlone.allocate(robot.nv)
     sending = bound.limits.applying_all(delivered.tau, delivered.a, held)
     sets = TaskSets(own, bound, presences) if presences else None

@@ -47,7 +47,7 @@ class Port(NamedTuple):
     unit: str
     meaning: str
     array: Any  # float64 or int64, contiguous
-    # the call that receives the input, of the kind Evolve, StreamAlone, Payloads or
+    # the call that receives the input, of the kind Evolve, Stream, Payloads or
     # EvolveImpedance; None: an output
     input: Call | None = None
     role: bytes = RAMPED

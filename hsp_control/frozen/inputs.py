@@ -44,8 +44,8 @@ from hsp_control.tasks import Task
 from hsp_control.tasks.compliant_task import impedance_of
 from hsp_control.tasks.impedance import Impedance
 from hsp_control.trajectories.hold import SetPoint
-from hsp_control.trajectories.streams.alone import StreamAlone
 from hsp_control.trajectories.streams.followed import FollowedStream
+from hsp_control.trajectories.streams.planner import Planner
 
 _MOST = 8
 """How many ramps of one input may be under way."""
@@ -256,7 +256,7 @@ def model_inputs(
         yield Input(port, (payloads,) if k == 0 else ())
 
 
-def streams_of(own: Controller) -> dict[str, StreamAlone]:
+def streams_of(own: Controller) -> dict[str, Planner]:
     """Return the streams of a controller without Python, by the tasks' names."""
     found = {}
     for task in own.tasks:
@@ -266,7 +266,7 @@ def streams_of(own: Controller) -> dict[str, StreamAlone]:
     return found
 
 
-def targets_of(own: Controller, streams: Mapping[str, StreamAlone]) -> Iterator[Port]:
+def targets_of(own: Controller, streams: Mapping[str, Planner]) -> Iterator[Port]:
     """Yield the targets and velocities that a program sends.
 
     They are sent when the next step is made; a target may have a velocity, and a time
@@ -276,20 +276,21 @@ def targets_of(own: Controller, streams: Mapping[str, StreamAlone]) -> Iterator[
         if task.name not in streams:
             continue
         stream = streams[task.name]
-        turns = len(stream.target) > len(stream.velocity)
+        sent, turns = stream.sent, stream.chart.rotational
+        axes = "the body's" if stream.policy.axes == "tool" else "world"
         unit = "m or the task's, and a quaternion x, y, z, w" if turns else "the task's"
         meaning = "where the reference goes"
         at = f"{task.name}.target"
-        yield Port(at, unit, meaning, stream.target, stream.call, TARGET)
-        meaning = "how it moves until it fades: linear, then angular, in world axes"
+        yield Port(at, unit, meaning, sent["target"], stream.call, TARGET)
+        meaning = f"how it moves until it fades: linear, then angular, in {axes} axes"
         at = f"{task.name}.velocity"
-        yield Port(at, "1/s", meaning, stream.velocity, stream.call, VELOCITY)
+        yield Port(at, "1/s", meaning, sent["velocity"], stream.call, VELOCITY)
         meaning = "how the next target moves: linear, then angular, in world axes"
         at = f"{task.name}.target_velocity"
-        yield Port(at, "1/s", meaning, stream.rate, stream.call, RATE)
+        yield Port(at, "1/s", meaning, sent["rate"], stream.call, RATE)
         meaning = "when the next target is, by any clock of the sender"
         at = f"{task.name}.target_time"
-        yield Port(at, "s", meaning, stream.time, stream.call, TIME)
+        yield Port(at, "s", meaning, sent["time"], stream.call, TIME)
 
 
 def _matrix(name: str, unit: str, meaning: str, own: Array, most: float) -> Input:

@@ -99,9 +99,6 @@ def check_streams(own: Controller) -> None:
             reasons = {
                 "source": stream.source is None or "the program sets targets instead",
                 "messages": stream.messages is None or "a recording is read in Python",
-                "axes": stream.axes == "world" or "velocities are in world axes",
-                "stop_after": stream.stop_after is None
-                or "the program stops the robot; hold_after brings it to rest",
             }
             for name, reason in reasons.items():
                 if reason is not True:

@@ -165,14 +165,13 @@ def simulate(
     if estimators and not periods:
         raise _no_period("estimators estimate once a period: they need")
     controller.followed_by(plant.dynamics)
-    if plant.dynamics is None and any(
-        isinstance(each, ChangePayload | ChangeGravity) for each in controller.changes
-    ):
-        message = (
-            f"{type(plant).__name__} does not follow changes of payload and gravity; "
-            "change them in the plant itself"
-        )
-        warn(message, StartWarning)
+    for k, change in enumerate(controller.changes if plant.dynamics is None else ()):
+        if isinstance(change, ChangePayload | ChangeGravity):
+            message = (
+                f"changes[{k}]: {type(plant).__name__} does not follow changes of "
+                "payload and gravity; change them in the plant itself"
+            )
+            warn(message, StartWarning)
     # The loop
     exact = is_exact(plant, robot)
     period = log_period / periods if periods else None

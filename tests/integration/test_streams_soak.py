@@ -55,7 +55,7 @@ def test_targets_are_forgotten(policy: Any, monkeypatch: pytest.MonkeyPatch) -> 
                 words.append(repr(controller))
                 followed: Any = controller.tasks[0].followed
                 planner = followed.run._planner
-                memory += [len(planner._segments), len(planner.waypoints.times)]
+                memory += [len(planner._past), planner._room.waypoints]
     finally:
         tracemalloc.stop()
     assert len(set(words)) == 1

@@ -3,7 +3,7 @@
 import logging
 import re
 from collections import deque
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from itertools import starmap
 from math import inf
 from threading import Lock
@@ -175,12 +175,19 @@ class Inbox:
         self._waiting = deque(saved["waiting"], maxlen=most)
 
 
+class Taken(NamedTuple):
+    """A message in a record."""
+
+    message: Message
+    at: float  # when it was taken [s]
+
+
 class Reader:
     """Takes messages for one run, and records them; it begins with the untaken ones.
 
     Attributes:
         inbox: The queue.
-        record: The messages that were taken, with the times ``at`` of taking them.
+        record: The messages that were taken.
         lost: The number of messages that were not recorded.
     """
 
@@ -189,12 +196,12 @@ class Reader:
         self.inbox, self._aside = inbox, aside
         self._number = inbox.taken
         self._missed: list[Received] = []
-        self.record: list[Message] = []
+        self.record: list[Taken] = []
         self.lost = self._recorded = 0
         self.logged = False  # whether a log needs the whole record
 
-    def take(self, t: float) -> list[Message]:
-        """Return the untaken messages at a time [s], with their times ``at``.
+    def take(self, t: float) -> Sequence[Message]:
+        """Return the untaken messages at a time [s].
 
         Raises:
             StreamError: If the listener has ended.
@@ -203,15 +210,15 @@ class Reader:
         if inbox.failure:
             raise StreamError(f"{inbox.source}: its thread has ended: {inbox.failure}")
         if inbox.count == self._number and not self._missed:
-            return []
+            return ()
         received = inbox.after(self._number, take=not self._aside, until=t)
         if self._missed:
             received, self._missed = self._missed + received, []
         if received:
             self._number = received[-1].number
-        taken = [each.message.taken_at(t) for each in received]
+        taken = [each.message for each in received]
         for each in taken:
-            self._add(each)
+            self._add(each, t)
         return taken
 
     def copy(self) -> "Reader":
@@ -220,11 +227,11 @@ class Reader:
         other._number, other._missed = self._number, self._missed.copy()
         return other
 
-    def _add(self, message: Message) -> None:
-        """Record a message, as long as there is room."""
+    def _add(self, message: Message, t: float) -> None:
+        """Record a message that is taken at a time [s], as long as there is room."""
         most = MOST if self.logged else min(BRIEF, MOST)
         if self._recorded + message.size <= most:
-            self.record.append(message)
+            self.record.append(Taken(message, message.at if message.at > -inf else t))
             self._recorded += message.size
         else:
             self.lost += 1

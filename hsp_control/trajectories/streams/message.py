@@ -21,6 +21,10 @@ _UNIT = 1e-3
 """Deviation of a quaternion's norm from 1 that may be a sender's rounding."""
 
 
+Axes = Literal["world", "tool"]
+"""The axes in which a velocity is commanded: the world's, or the moving body's."""
+
+
 class Space(NamedTuple):
     """The kind of a stream's values: linear coordinates, then perhaps a quaternion."""
 
@@ -63,7 +67,7 @@ class Message(NamedTuple):
     # Their velocities, (k, rates), in world axes; None: unknown.
     velocities: Array | None
     chunk: bool = False  # whether they replace all later ones
-    axes: Literal["world", "tool"] | None = None  # axes of a velocity alone, if given
+    axes: Axes | None = None  # of a velocity alone, if given
     at: float = -inf  # time of taking it, by the controller's clock [s]; -inf: at once
 
     @property
@@ -73,13 +77,9 @@ class Message(NamedTuple):
         size += 0 if self.values is None else self.values.size
         return size + (0 if self.velocities is None else self.velocities.size)
 
-    def taken_at(self, t: float) -> "Message":
-        """Return it as it is taken at a time [s], unless it has one."""
-        return self if self.at > -inf else Message._make((*self[:-1], t))
-
-    def to_dict(self) -> dict[str, Any]:
-        """Return its data for `message_of`, and the time ``at`` of taking it."""
-        data: dict[str, Any] = {} if self.at == -inf else {"at": self.at}
+    def to_dict(self, at: float) -> dict[str, Any]:
+        """Return its data for `message_of`, and the time ``at`` of taking it [s]."""
+        data: dict[str, Any] = {"at": at}
         if self.t is not None:
             data["t"] = self.t
         for one, several in (("value", "values"), ("velocity", "velocities")):
@@ -145,7 +145,7 @@ def _check_alternatives(given: Mapping[str, Any]) -> None:
         raise StreamError("times need values, one for each")
 
 
-def _axes(given: Mapping[str, Any], space: Space) -> Literal["world", "tool"] | None:
+def _axes(given: Mapping[str, Any], space: Space) -> Axes | None:
     """Return the axes of a velocity; None: those of its stream."""
     axes: Any = given.get("axes")
     if axes not in (None, "world", "tool"):

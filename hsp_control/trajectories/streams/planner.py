@@ -1,37 +1,38 @@
-"""The reference of a stream: messages become waypoints, and a motion, piece by piece.
+"""The reference of a stream in a run, which the engine plans from messages.
 
-Whenever a message arrives, the rest of the reference is planned again from its present
+Whenever messages are taken, the rest of the reference is planned again from its present
 state (x, x', x''). A piece, once begun, never changes; so the reference is a C²
-function of time for any messages and any sampling.
+function of time for any messages and any sampling. All of it is one call of the engine
+(``engine/streams/stream.hpp``), in Python as in a frozen controller; its memory is
+arrays, and Python keeps the pieces of the last second.
 """
 
 from bisect import bisect_right
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from copy import copy
-from math import inf
-from typing import NamedTuple
+from math import ceil, inf
+from typing import Any, NamedTuple
 
 import numpy as np
 
+from hsp_control import engine
+from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import StreamError
+from hsp_control.engine.plans import TIME, PartCall, PartCalls
+from hsp_control.trajectories.streams.bounds import MotionBounds
 from hsp_control.trajectories.streams.chart import Chart, State
-from hsp_control.trajectories.streams.message import Message
-from hsp_control.trajectories.streams.piece_calls import (
-    MotionBounds,
-    PassingTimes,
-    PieceCalls,
-    coast,
-)
-from hsp_control.trajectories.streams.segments import Piece, Segment
-from hsp_control.trajectories.streams.velocities import (
-    Axes,
-    VelocityCommand,
-    velocity_piece,
-)
-from hsp_control.trajectories.streams.waypoints import KEPT, Waypoints
+from hsp_control.trajectories.streams.message import Axes, Message
 
 SOON = 1e-3  # when a rehearsed step would be [s]
+KEPT = 1.0
+"""How long the reference is known after a time [s]."""
+MOST = 4096  # maximum number of stored waypoints
 _AT_ONCE = 256  # maximum number of simultaneous messages; the oldest others are ignored
+_CONSIDERED = 256  # waypoints before and after a time: see `KnownWaypoints`
+_CLOCK = 2.0  # over which the sender's clock is compared with the controller's [s]
+_HEAD, _ROWS = 13, 52
+"""Numbers of a piece: of all of it, and of each coordinate; see
+``engine/streams/piece.hpp``."""
 
 
 class Policy(NamedTuple):
@@ -47,18 +48,40 @@ class Policy(NamedTuple):
     axes: Axes
 
 
-def _together(messages: Sequence[Message]) -> list[tuple[float, list[Message]]]:
-    """Return messages by the time when they are taken, in their order."""
-    found: list[tuple[float, list[Message]]] = []
-    for each in messages:
-        if not found or found[-1][0] != each.at:
-            found.append((each.at, []))
-        found[-1][1].append(each)
-    return found
+class Room(NamedTuple):
+    """Maximum numbers of the elements that a planner's memory contains."""
+
+    messages: int = 4  # rows of the queue: messages, and waypoints of a chunk
+    waypoints: int = 16
+    pieces: int = 8  # those that may begin in one step, and stay known
+    arrivals: int = 512  # of messages, by which the sender's clock is known
+
+    @classmethod
+    def without_python(cls, policy: Policy, period: float) -> "Room":
+        """Return what suffices for a message each period [s], which no call extends."""
+        arrivals = ceil(1.1 * _CLOCK / period) + 2  # periods are not exactly equal
+        most = 1
+        if policy.name != "latest":
+            passed = max(min(policy.smoothing, KEPT) / period, 3.0)
+            found = min(passed, _CONSIDERED) + policy.delay / period
+            most = min(ceil(1.1 * found) + 2, MOST)
+        return cls(messages=8, waypoints=most, pieces=1, arrivals=arrivals)
 
 
 class Planner:
-    """Plans the reference of one run."""
+    """Plans the reference of one run.
+
+    A copy continues independently.
+
+    Attributes:
+        chart: The coordinates.
+        policy: The conversion of messages to goals.
+        state: The reference at a time, in its chart: always the same arrays.
+        sent: What a program without Python sends next: ``target``, initially the start
+        (linear coordinates, then perhaps a quaternion (x, y, z, w)), ``velocity``
+        (linear, then angular), and the next target's ``rate`` and ``time`` [s].
+        call: The engine's call, of the kind Stream.
+    """
 
     def __init__(
         self,
@@ -66,29 +89,172 @@ class Planner:
         bounds: MotionBounds,
         policy: Policy,
         start: State,
+        room: Room = Room(),  # noqa: B008 (a value)
     ) -> None:
         """Begin at rest."""
-        self._policy = policy
-        how = PassingTimes(policy.delay, policy.smoothing, policy.extrapolation)
-        self._calls = PieceCalls(chart, bounds, how)
-        self._still = VelocityCommand(np.zeros(chart.size), "world")
-        self._begin = self.now = self._oldest = -inf
-        self._heard = -inf
-        self._silent = False
-        # the commanded velocity, until it fades, unless it is repeated
-        self._command: VelocityCommand | None = None
-        self._fades_at = inf
-        self._segments: list[Segment] = [Piece(coast(0.0, inf, start))]
-        self._starts = [-inf]
-        self.taken = self.refused = 0
-        self.waypoints = Waypoints()
+        self.chart, self.policy, self._bounds = chart, policy, bounds
+        self.state = State.allocate(chart.size)
+        self._begin, self._room = start, room
+        self._memory = _memory(room, chart)
+        self.restart()
+        self._past: list[Array] = []  # earlier pieces, as numbers
+        self._starts: list[float] = []  # and when they begin [s]
+        self._oldest = self._start = -inf  # of what is known, and of the present piece
+        self._number = 0  # of the present piece
         self._kept: dict[float, float] = {}
-        self._due = -inf  # before this time nothing happens without messages
+        self.now = -inf
+        self._bind()
 
-    @property
-    def state(self) -> State:
-        """The state that `bring` writes: always the same arrays."""
-        return self._calls.state
+    def _bind(self) -> None:
+        """Make the calls of the present memory."""
+        policy, memory = self.policy, self._memory
+        self._arguments: dict[str, Any] = {
+            "linear": self.chart.linear,
+            "policy": _POLICIES.index(policy.name),
+            "delay": policy.delay,
+            "smoothing": policy.smoothing,
+            "extrapolation": policy.extrapolation,
+            "dead_man": policy.dead_man,
+            "hold_after": policy.hold_after,
+            "stop_after": policy.stop_after,
+            "tool": policy.axes == "tool",
+            "bounds": self._bounds,
+            "out": vars(self.state),
+            **_nested(memory),
+        }
+        self.sent = {name: memory[f"sent.{name}"] for name in _SENT}
+        self.call = engine.Stream(**self._arguments)
+        self._earlier = np.zeros(memory["pieces"].shape[1])
+        self._evaluate = engine.PieceState(piece=self._earlier, out=vars(self.state))
+        self._queued, self._known = memory["queue.count"], memory["waypoints.count"]
+        self._heard, self._begun = memory["heard"], memory["begun"]
+        self._piece, self._pieces = memory["piece"], memory["pieces"]
+
+    # -- the reference ----------------------------------------------------------------
+
+    def bring(self, t: float) -> None:
+        """Bring `state` to a time that was planned [s].
+
+        Raises:
+            StreamError: If the time is long past.
+        """
+        if t < self._start:
+            if t < self._oldest:
+                raise StreamError(
+                    f"the reference at t = {t:g} s is not known any more: the run is "
+                    f"at {self.now:g} s; begin another one with controller.restart()"
+                )
+            k = max(bisect_right(self._starts, t) - 1, 0)
+            self._earlier[:] = self._past[k]
+            self._evaluate(t)
+        else:
+            self.call(t)
+
+    def advance(self, t: float, messages: Sequence[Message]) -> None:
+        """Bring `state` to a later time [s], with the messages taken by then.
+
+        Raises:
+            StreamError: If there was no message for too long, or there is no motion.
+        """
+        if len(messages) > _AT_ONCE:
+            messages = self._newest(messages)
+        if messages:
+            self._make_room(messages)
+            for message in messages:
+                self._put(message)
+        moves = self.call(t)
+        self.now = float(t)
+        if self._piece.item() != self._number:
+            self._remember()
+        if self._starts:
+            self._forget(t)
+        if not moves:
+            if self._memory["lost"].item():
+                raise StreamError("no motion within the bounds was found")
+            raise StreamError(
+                f"no message for {self.age:.3g} s; stop_after is "
+                f"{self.policy.stop_after:g}"
+            )
+
+    def keep(self, since: float, until: float) -> None:
+        """Keep the reference from a time on until a later one [s]."""
+        self._kept[since] = max(until, self._kept.get(since, -inf))
+
+    def _remember(self) -> None:
+        """Keep the pieces that are followed by others now."""
+        number, last, room = self._number, self._piece.item(), len(self._pieces)
+        if last - number >= room:  # those between are not known any more
+            number = last - room + 1
+            self._past.clear()
+            self._starts.clear()
+            self._oldest = self._pieces[number % room, 1].item()
+        for k in range(number, last):
+            self._past.append(self._pieces[k % room].copy())
+            self._starts.append(self._past[-1][1].item())
+        self._start, self._number = self._pieces[last % room, 1].item(), last
+
+    def _forget(self, t: float) -> None:
+        """Drop pieces that are long past."""
+        oldest = t - KEPT
+        if (self._starts[1] if len(self._starts) > 1 else self._start) > oldest:
+            return
+        for since, until in [*self._kept.items()]:
+            if until < oldest:
+                del self._kept[since]
+            else:
+                oldest = min(oldest, since)
+        gone = bisect_right([*self._starts[1:], self._start], oldest)
+        del self._past[:gone], self._starts[:gone]
+        self._oldest = self._starts[0] if self._starts else self._start
+
+    # -- messages ---------------------------------------------------------------------
+
+    def _put(self, message: Message) -> None:
+        """Add a message to the queue."""
+        memory, first = self._memory, self._queued.item()
+        rows = slice(first, first + message.times.size)
+        kind, t = _kind(message, self.policy.axes), message.t
+        what, times = memory["queue.what"], memory["queue.times"]
+        what[rows] = kind, message.velocities is not None, t is not None
+        if kind == _CHUNK:
+            what[first + 1 : rows.stop, 0] = _GOES_ON
+        times[rows] = 0.0 if t is None else t, 0.0, message.at
+        if message.chunk:
+            times[rows, 1] = message.times
+        if message.values is not None:
+            memory["queue.values"][rows] = message.values
+        if message.velocities is not None:
+            memory["queue.rates"][rows] = message.velocities
+        self._queued[0] = rows.stop
+
+    def _newest(self, messages: Sequence[Message]) -> Sequence[Message]:
+        """Return messages without those of a time when there are too many."""
+        found = list[Message]()
+        for k, each in enumerate(messages):
+            if k + _AT_ONCE < len(messages) and messages[k + _AT_ONCE].at == each.at:
+                self._memory["taken"] += 1
+                self._memory["late"] += 1
+            else:
+                found.append(each)
+        return found
+
+    def _make_room(self, messages: Sequence[Message]) -> None:
+        """Make sure that messages can be taken."""
+        rows = self._queued.item() + sum(each.times.size for each in messages)
+        waypoints = min(self._known.item() + rows, MOST)
+        room, before = self._room, self._memory
+        if rows <= room.messages and waypoints <= room.waypoints:
+            return
+        self._room = room._replace(
+            messages=max(room.messages, 2 * rows),
+            waypoints=max(room.waypoints, min(2 * waypoints, MOST)),
+        )
+        self._memory = _memory(self._room, self.chart)
+        for name, array in before.items():
+            self._memory[name][tuple(slice(n) for n in array.shape)] = array
+        self._bind()
+
+    # -- statistics -------------------------------------------------------------------
 
     @property
     def begun(self) -> bool:
@@ -98,38 +264,35 @@ class Planner:
     @property
     def age(self) -> float:
         """Time since the last message, or since the run began [s]."""
-        return self.now - max(self._heard, self._begin) if self.begun else 0.0
+        if not self.begun:
+            return 0.0
+        return self.now - float(max(self._heard.item(), self._begun.item()))
 
-    def bring(self, t: float) -> None:
-        """Bring `state` to the reference at a time that was planned [s]; see `Chart`.
+    def count(self, of: str) -> int:
+        """Return how many messages were ``taken``, ``late`` or ``refused``."""
+        return int(self._memory[of].item())
 
-        Raises:
-            StreamError: If the time is long past.
-        """
-        if t < self._oldest:
-            raise StreamError(
-                f"the reference at t = {t:g} s is not known any more: the run is at "
-                f"{self.now:g} s; begin another one with controller.restart()"
-            )
-        k = -1 if t >= self._starts[-1] else max(bisect_right(self._starts, t) - 1, 0)
-        self._segments[k].write(t, self._calls)
-
-    def keep(self, since: float, until: float) -> None:
-        """Keep the reference from a time on until a later one [s]."""
-        self._kept[since] = max(until, self._kept.get(since, -inf))
-        self._due = -inf
+    # -- copies -----------------------------------------------------------------------
 
     def copy(self) -> "Planner":
         """Return a copy that continues independently."""
-        return self._with(copy(self._calls))
-
-    def _with(self, calls: PieceCalls) -> "Planner":
         other = copy(self)
-        other._calls = calls
+        other.state = State(**{k: v.copy() for k, v in vars(self.state).items()})
+        other._memory = _copied(self._memory)
         other._kept = self._kept.copy()
-        other._segments, other._starts = self._segments.copy(), self._starts.copy()
-        other.waypoints = self.waypoints.copy()
+        other._past, other._starts = self._past.copy(), self._starts.copy()
+        other._bind()
         return other
+
+    def __getstate__(self) -> dict[str, Any]:
+        """Return all but the calls and their arguments."""
+        calls = "call", "_evaluate", "_arguments", "sent"
+        return {name: own for name, own in vars(self).items() if name not in calls}
+
+    def __setstate__(self, saved: dict[str, Any]) -> None:
+        """Bind the calls."""
+        vars(self).update(saved)
+        self._bind()
 
     def rehearse(self, messages: Sequence[Message] = ()) -> None:
         """Plan a move and move nothing, so that no step is the first one that does.
@@ -137,140 +300,118 @@ class Planner:
         Args:
             messages: Those that the next step takes; by default one to stay here.
         """
-        other = self._with(self._calls)
-        self._segments[-1].write(max(self.now, 0.0), self._calls)
+        kept = vars(self).copy()
+        memory, past, starts = _copied(self._memory), self._past[:], self._starts[:]
+        kept["_kept"] = self._kept.copy()
         if not self.begun:
-            other.advance(0.0, [])
-        t = other.now + SOON
+            self.advance(0.0, [])
         if not messages:
-            value = self._calls.chart.value_near(self.state)
-            messages = [Message(None, np.zeros(1), value[None], None, at=t)]
-        other.advance(t, messages)
-        other.bring(t)
+            self.call(self.now)
+            value = self.chart.value_near(self.state)
+            messages = [Message(None, np.zeros(1), value[None], None)]
+        t = self.now + SOON
+        self.advance(t, messages)
+        vars(self).update(kept)
+        self._past, self._starts = past, starts
+        for name, array in memory.items():
+            self._memory[name][...] = array
 
-    def advance(self, t: float, messages: Sequence[Message]) -> None:
-        """Plan up to a time [s]: first without, then with the new messages."""
-        if not self.begun:
-            self.now = self._begin = t
-            return
-        if not messages and t < self._due:
-            self.now = t
-            return
-        for at, together in _together(messages):
-            surplus = max(len(together) - _AT_ONCE, 0)
-            self.taken += surplus
-            self.waypoints.late += surplus
-            self._step(max(at, self.now), together[surplus:])
-        if messages and self.now == t < min(self._segments[-1].end, self._fades_at):
-            self._forget(t)
-            self._due = -inf  # the rest is left to the next step: none is due before
-            return
-        self._step(t, [])
-        if self.age > self._policy.stop_after:
-            raise StreamError(
-                f"no message for {self.age:.3g} s; stop_after is "
-                f"{self._policy.stop_after:g}"
-            )
-        self._forget(t)
-        self._due = self._next_event()
+    # -- without Python ---------------------------------------------------------------
 
-    def _next_event(self) -> float:
-        """Return the time until which neither a piece begins nor anything is forgotten.
+    def calls(self, out: Any) -> PartCalls:
+        """Return the calls that take a program's messages, and write a sample."""
+        advance = PartCall(engine.Stream, t=TIME, **self._arguments)
+        return [advance, *self.chart.calls(self.state, out)]
 
-        That is, without messages [s].
-        """
-        policy, heard = self._policy, max(self._heard, self._begin)
-        if self._kept:
-            return -inf
-        due = min(self._segments[-1].end, self._fades_at, heard + policy.stop_after)
-        if not self._silent:
-            due = min(due, heard + policy.hold_after)
-        for times in (self._starts[1:2], self.waypoints.times[:1]):
-            due = min([due, *(time + KEPT for time in times)])
-        return due
+    def restart(self) -> None:
+        """Begin another run, at the start."""
+        for name, array in _memory(self._room, self.chart).items():
+            self._memory[name][...] = array
+        self._memory["sent.target"][:] = self.chart.value(self._begin)
+        self._memory["pieces"][0] = _rest(self._begin)
 
-    def _step(self, t: float, messages: Sequence[Message]) -> None:
-        """Plan up to a time at which messages arrive."""
-        self.now = t
-        while (due := min(self._segments[-1].end, self._fades_at)) <= t:
-            if due == self._fades_at and self._command is not None:
-                still = np.zeros_like(self._command.velocity)
-                self._command = self._command._replace(velocity=still)
-                self._fades_at = inf
-            self._plan(due)
-        changed = False
-        for message in messages:
-            changed = self._accept(message, t) or changed
-        silent = self._falls_silent()
-        if changed or silent:
-            self._plan(t)
 
-    def _accept(self, message: Message, t: float) -> bool:
-        """Store a message; return whether it changes the future reference."""
-        policy = self._policy
-        self.taken += 1
-        self._heard = t
-        only_newest = policy.name == "latest"
-        if not self.waypoints.add(message, t, policy.delay, only_newest):
-            return False
-        before, self._command, self._fades_at = self._command, None, inf
-        if message.values is None:
-            assert message.velocities is not None
-            axes = message.axes or policy.axes
-            self._command = VelocityCommand(message.velocities[0], axes)
-            self._fades_at = t + policy.dead_man
-            return self._silent or not self._command.same(before)
-        return True
+_SENT = "target", "velocity", "rate", "time"
+_POLICIES = "latest", "interpolate", "extrapolate"
+_TARGET, _VELOCITY, _TOOL_VELOCITY, _CHUNK, _GOES_ON = range(5)
 
-    def _falls_silent(self) -> bool:
-        """Return whether the reference must come to rest now, for lack of messages."""
-        was, self._silent = self._silent, self.age > self._policy.hold_after
-        return self._silent and not was
 
-    def _plan(self, t: float) -> None:
-        """Begin another piece at a time."""
-        self._segments[-1].write(t, self._calls)
-        following = self._next(t)
-        if following is None:  # too far away for a motion
-            self.refused += 1
-            self._command, self._fades_at = None, inf
-            self.waypoints.clear()
-            following = self._to_rest(t)
-            if following is None:
-                raise StreamError("no motion within the bounds was found")
-        if self._segments[-1].start == t:  # replaced before anything could see it
-            del self._segments[-1], self._starts[-1]
-        self._segments.append(following)
-        self._starts.append(t)
+def _kind(message: Message, axes: Axes) -> int:
+    """Return what a message is; see ``engine/streams/message_queue.hpp``."""
+    if message.values is not None:
+        return _CHUNK if message.chunk else _TARGET
+    return _TOOL_VELOCITY if (message.axes or axes) == "tool" else _VELOCITY
 
-    def _next(self, t: float) -> Segment | None:
-        policy, waypoints = self._policy, self.waypoints
-        if self._silent:
-            return self._to_rest(t)
-        if self._command is not None:
-            return velocity_piece(t, self._command, self._calls)
-        if not waypoints.times:
-            return self._to_rest(t)
-        rests = policy.name != "extrapolate" and waypoints.velocities[-1] is None
-        numbers = self._calls.through(t, waypoints, rests)
-        return None if numbers is None else Piece(numbers)
 
-    def _to_rest(self, t: float) -> Segment | None:
-        """Return a piece that brakes, or stays."""
-        return velocity_piece(t, self._still, self._calls)
+def _rest(state: State) -> Array:
+    """Return the numbers of a piece that stays in a state."""
+    numbers = np.zeros(_HEAD + _ROWS * len(state.x))
+    numbers[2] = inf  # a velocity of 0 from t = 0 on
+    numbers[4:_HEAD] = state.base.ravel()
+    numbers[_HEAD:][: len(state.x)] = state.x
+    return numbers
 
-    def _forget(self, t: float) -> None:
-        """Drop pieces and waypoints that are long past."""
-        self.waypoints.forget(t)
-        oldest = t - KEPT
-        if not self._kept and (len(self._starts) == 1 or self._starts[1] > oldest):
-            return
-        for since, until in [*self._kept.items()]:
-            if until < oldest:
-                del self._kept[since]
-            else:
-                oldest = min(oldest, since)
-        gone = bisect_right(self._starts, oldest) - 1
-        if gone > 0:
-            del self._segments[:gone], self._starts[:gone]
-            self._oldest = self._starts[0]
+
+def _memory(room: Room, chart: Chart) -> dict[str, Any]:
+    """Return the arrays of a run that has not begun, by the names of the engine."""
+    n, width = chart.size, chart.linear + 4 * chart.rotational
+    q, k, s = room.messages, room.waypoints, room.arrivals
+    never = np.full(1, -inf)
+
+    def count() -> Any:
+        return np.zeros(1, dtype=np.int64)
+
+    return {
+        "queue.count": count(),
+        "queue.what": np.zeros((q, 3), dtype=np.int64),
+        "queue.times": np.zeros((q, 3)),
+        "queue.values": np.zeros((q, width)),
+        "queue.rates": np.zeros((q, n)),
+        "waypoints.count": count(),
+        "waypoints.times": np.zeros(k),
+        "waypoints.values": np.zeros((k, width)),
+        "waypoints.rates": np.zeros((k, n)),
+        "waypoints.given": np.zeros(k, dtype=bool),
+        "waypoints.made": never.copy(),
+        "waypoints.superseded": never.copy(),
+        "waypoints.clock.newest": never.copy(),
+        "waypoints.clock.seen_at": np.zeros(s),
+        "waypoints.clock.seen_behind": np.zeros(s),
+        "waypoints.clock.first": count(),
+        "waypoints.clock.count": count(),
+        "pieces": np.zeros((room.pieces, _HEAD + _ROWS * n)),
+        "velocity": np.zeros(n),
+        "now": never.copy(),
+        "begun": never.copy(),
+        "heard": never.copy(),
+        "fades_at": np.full(1, inf),
+        **{name: count() for name in _INTEGERS},
+        "sent.target": np.zeros(width),
+        "sent.velocity": np.zeros(n),
+        "sent.rate": np.zeros(n),
+        "sent.time": np.zeros(1),
+        "sent.moves": count(),
+        "sent.timed": count(),
+    }
+
+
+_INTEGERS = (
+    *("piece", "commanded", "in_tool", "silent", "lost"),
+    *("taken", "late", "refused"),
+)
+
+
+def _copied(memory: Mapping[str, Any]) -> dict[str, Any]:
+    return {name: array.copy() for name, array in memory.items()}
+
+
+def _nested(memory: Mapping[str, Any]) -> dict[str, Any]:
+    """Return arrays by name as arguments, of which some are in groups."""
+    found: dict[str, Any] = {}
+    for name, array in memory.items():
+        *groups, last = name.split(".")
+        place = found
+        for each in groups:
+            place = place.setdefault(each, {})
+        place[last] = array
+    return found

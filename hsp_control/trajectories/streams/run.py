@@ -10,11 +10,10 @@ import pinocchio as pin
 from numpy.typing import ArrayLike
 
 from hsp_control.common.exceptions import StreamError
-from hsp_control.trajectories.streams.alone import StreamAlone
 from hsp_control.trajectories.streams.chart import Chart, State
 from hsp_control.trajectories.streams.inbox import Inbox, Reader
-from hsp_control.trajectories.streams.message import Space
-from hsp_control.trajectories.streams.planner import SOON, Planner
+from hsp_control.trajectories.streams.message import Axes, Space
+from hsp_control.trajectories.streams.planner import SOON, Planner, Room
 from hsp_control.trajectories.streams.sources import (
     is_address,
     listening_inbox,
@@ -22,7 +21,6 @@ from hsp_control.trajectories.streams.sources import (
     recorded,
 )
 from hsp_control.trajectories.streams.streamed import Streamed
-from hsp_control.trajectories.streams.velocities import Axes
 
 
 class StreamRun:
@@ -49,7 +47,6 @@ class StreamRun:
         self._period_alone: float | None = None  # of a run without Python
         self._reader: Reader | None = None
         self._planner: Planner | None = None
-        self._alone: StreamAlone | None = None
 
     # -- messages ---------------------------------------------------------------------
 
@@ -158,9 +155,9 @@ class StreamRun:
         planner = self._planned
         return {
             "age": planner.age,
-            "taken": planner.taken,
-            "late": planner.waypoints.late,
-            "rejected": self.inbox.rejected + planner.refused,
+            "taken": planner.count("taken"),
+            "late": planner.count("late"),
+            "rejected": self.inbox.rejected + planner.count("refused"),
         }
 
     @property
@@ -181,7 +178,7 @@ class StreamRun:
         Without a log, only the first messages.
         """
         taken = self._reader.record if self._reader is not None else []
-        return tuple(each.to_dict() for each in taken)
+        return tuple(message.to_dict(at) for message, at in taken)
 
     @property
     def unrecorded(self) -> int:
@@ -205,11 +202,10 @@ class StreamRun:
         """
         planner = self._planned
         if t > planner.now:
-            reader = (
-                self.reader
-            )  # a source that cannot be opened raises in the first step
-            planner.advance(t, reader.take(t) if planner.begun else [])
-        planner.bring(t)
+            reader = self.reader  # a source that cannot be opened raises in step one
+            planner.advance(t, reader.take(t) if planner.begun else ())
+        else:
+            planner.bring(t)
 
     @property
     def state(self) -> State:
@@ -230,28 +226,26 @@ class StreamRun:
     def _planned(self) -> Planner:
         if self._planner is None:
             bounds, how = self.stream.bounds(), self.stream.how
-            self._planner = Planner(self.chart, bounds, how, self._start)
+            period = self._period_alone
+            room = Room() if period is None else Room.without_python(how, period)
+            self._planner = Planner(self.chart, bounds, how, self._start, room)
             self._planner.rehearse()
         return self._planner
 
     # -- without Python ---------------------------------------------------------------
 
     def leave_python(self, period: float) -> None:
-        """Receive only messages of a program, from the next run on; see `StreamAlone`.
+        """Receive only messages of a program, from the start on.
 
         Args:
             period: Minimum time between two messages [s].
         """
-        self._period_alone = period
+        self._period_alone, self._planner = period, None
 
     @property
-    def alone(self) -> StreamAlone | None:
-        """Its computation without Python; None: it receives messages in Python."""
-        period = self._period_alone
-        if period is not None and self._alone is None:
-            bounds, how = self.stream.bounds(), self.stream.how
-            self._alone = StreamAlone(self.chart, bounds, how, self._start, period)
-        return self._alone
+    def alone(self) -> Planner | None:
+        """What plans without Python; None: it receives messages in Python."""
+        return None if self._period_alone is None else self._planned
 
     def __repr__(self) -> str:
         return f"StreamRun of {self.declared!r}"
@@ -260,7 +254,6 @@ class StreamRun:
         """Return a copy that continues independently."""
         memo[id(self)] = other = copy(self)
         other._aside = True
-        other._alone = None
         if self._reader is not None:
             other._reader = self._reader.copy()
         if self._planner is not None:

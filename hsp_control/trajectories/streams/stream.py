@@ -18,18 +18,20 @@ from hsp_control.declaration.quantities import (
 from hsp_control.declaration.rotation import Rotation, matrix_of
 from hsp_control.trajectories.orientation import OrientationTrajectory
 from hsp_control.trajectories.pose import PoseTrajectory
+from hsp_control.trajectories.streams.bounds import (
+    MotionBounds,
+    angular_bounds,
+    linear_bounds,
+)
 from hsp_control.trajectories.streams.chart import Chart, State
 from hsp_control.trajectories.streams.followed import (
     FollowedOrientation,
     FollowedPoint,
     FollowedPose,
 )
-from hsp_control.trajectories.streams.message import ORIENTATION, POSE, Space
-from hsp_control.trajectories.streams.piece_calls import MotionBounds
+from hsp_control.trajectories.streams.message import ORIENTATION, POSE, Axes, Space
 from hsp_control.trajectories.streams.run import StreamRun
-from hsp_control.trajectories.streams.segments import angular_bounds, linear_bounds
 from hsp_control.trajectories.streams.streamed import Streamed
-from hsp_control.trajectories.streams.velocities import Axes
 from hsp_control.trajectories.trajectory import Trajectory
 
 

@@ -11,9 +11,9 @@ from pydantic import AfterValidator
 from hsp_control.common.exceptions import StreamError, TrajectoryError
 from hsp_control.declaration.part import Part
 from hsp_control.declaration.quantities import NonNegative, Positive
+from hsp_control.trajectories.streams.bounds import MotionBounds
 from hsp_control.trajectories.streams.chart import State
-from hsp_control.trajectories.streams.message import Space, message_of
-from hsp_control.trajectories.streams.piece_calls import MotionBounds
+from hsp_control.trajectories.streams.message import Axes, Space, message_of
 from hsp_control.trajectories.streams.planner import Policy
 from hsp_control.trajectories.streams.sources import (
     is_address,
@@ -21,7 +21,6 @@ from hsp_control.trajectories.streams.sources import (
     read_recording,
     recorded,
 )
-from hsp_control.trajectories.streams.velocities import Axes
 
 
 class Streamed(Part, error=TrajectoryError):
@@ -39,13 +38,13 @@ class Streamed(Part, error=TrajectoryError):
     fastest motion.
 
     * ``interpolate``: the reference passes through all waypoints, with velocities and
-    * accelerations estimated from them. If no more follow, it brakes and comes to rest
-    * at the last one, as at a single target.
+      accelerations estimated from them. If no more follow, it brakes and comes to rest
+      at the last one, as at a single target.
     * ``latest``: only the newest message is followed; the reference comes to rest at
       its last waypoint. For single targets that replace each other, such as those of a
       dragged hand.
     * ``extrapolate``: it continues from the last one at the velocity estimated from the
-    * waypoints, for a time, and then comes to rest.
+      waypoints, for a time, and then comes to rest.
 
     A velocity alone, as of a joystick, is reached within the bounds and kept; the
     position is its integral. Without another message for ``dead_man``, it fades to

@@ -177,7 +177,7 @@ def test_a_stream_whose_times_are_wrong_ends(times: float, tmp_path: Path) -> No
     content, v = bytearray(file.read_bytes()), np.zeros(7)
     layout = Layout(bytes(content))
     for name in ("fades_at", "now"):
-        at = layout.array("StreamAlone", name)
+        at = layout.array("Stream", name)
         content[at : at + 8] = np.float64(times).tobytes()
     file.write_bytes(summed(bytes(content)))
     opened = Opened(file)

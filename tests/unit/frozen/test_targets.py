@@ -6,7 +6,15 @@ from typing import Any
 import numpy as np
 import pinocchio as pin
 import pytest
-from frozen_library import LIB, OK, WRONG_NAME, WRONG_SIZE, WRONG_VALUE, Opened
+from frozen_library import (
+    LIB,
+    NOT_FINITE,
+    OK,
+    WRONG_NAME,
+    WRONG_SIZE,
+    WRONG_VALUE,
+    Opened,
+)
 
 import hsp_control as hsp
 from hsp_control.common.exceptions import FreezeError
@@ -28,6 +36,9 @@ def tasks(kind: str) -> list[hsp.Task]:
     if kind == "falls silent":
         how = {**HOW, "hold_after": 0.02}
         return [hsp.FramePose("panda_tcp", StreamPose(**how), name="hand")]
+    if kind == "tool axes":
+        how = {**HOW, "axes": "tool", "extrapolation": 0.02}
+        return [hsp.FramePose("panda_tcp", StreamPose(**how), name="hand")]
     if kind in WAYPOINTS:
         how = {**HOW, **WAYPOINTS[kind]}
         return [hsp.FramePose("panda_tcp", StreamPose(**how), name="hand")]
@@ -44,7 +55,7 @@ WAYPOINTS: dict[str, dict[str, Any]] = {
     "extrapolate": {"policy": "extrapolate", "extrapolation": 0.05},
     "extrapolate and rest": {"policy": "extrapolate", "hold_after": 0.07},
 }
-KINDS = "pose", "falls silent", "position", "orientation", *WAYPOINTS
+KINDS = "pose", "falls silent", "position", "orientation", "tool axes", *WAYPOINTS
 
 
 class Pair:
@@ -135,7 +146,7 @@ def test_targets_with_velocities_and_times(kind: str, tmp_path: Path) -> None:
 
     for far in (0.002, 0.05, 0.5):
         for _ in range(40):
-            orders = ["", "t", "t", "t", "v", "tv", "vt", "vtv"]
+            orders = ["", "t", "t", "t", "v", "tv", "vt", "vtv", "tt", "ttvtt"]
             for each in orders[rng.integers(len(orders))]:
                 if each == "t":
                     target(far)
@@ -272,8 +283,6 @@ def test_a_target_that_no_motion_reaches(tmp_path: Path) -> None:
     [
         (StreamPose(source="udp://127.0.0.1:9", **HOW), "source"),
         (StreamPose(messages=[], **HOW), "messages"),
-        (StreamPose(stop_after=1.0, **HOW), "stop_after"),
-        (StreamPose(axes="tool", **HOW), "axes"),
     ],
 )
 def test_what_a_program_cannot_feed_is_refused(
@@ -283,6 +292,33 @@ def test_what_a_program_cannot_feed_is_refused(
     controller = hsp.Controller(ROBOT, [hand], start=Q)
     with pytest.raises(FreezeError, match=rf"^tasks\.hand\.trajectory\.{key}: "):
         hsp.freeze(controller, tmp_path / "frozen.hsp")
+
+
+def test_no_message_for_too_long_is_an_error_until_the_next_one(tmp_path: Path) -> None:
+    stream = StreamPose(stop_after=0.05, **HOW)
+    hand = hsp.FramePose("panda_tcp", stream, name="hand")
+    controller = hsp.Controller(ROBOT, [hand], start=Q)
+    opened = Opened(hsp.freeze(controller, tmp_path / "frozen.hsp"))
+    for k in range(51):
+        assert opened.step(k * H, Q, np.zeros(7)) == OK
+    last = opened.tau.copy()
+    assert opened.step(51 * H, Q, np.zeros(7)) == NOT_FINITE
+    np.testing.assert_array_equal(opened.tau, last)
+    assert opened.set("hand.target", pin.SE3ToXYZQUAT(START)) == OK
+    assert opened.step(52 * H, Q, np.zeros(7)) == OK
+
+
+def test_of_many_messages_in_a_period_the_last_eight_are_followed(
+    tmp_path: Path,
+) -> None:
+    pair, rng = Pair("interpolate", tmp_path), np.random.default_rng(SEED)
+    pair.steps(2)
+    for _ in range(5):
+        first = random_target("pose", rng, 0.3)
+        assert pair.opened.set("hand.target", first) == OK
+    for _ in range(8):
+        pair.target(random_target("pose", rng, 0.3))
+    pair.steps(50)
 
 
 def test_a_stream_is_not_taken_from_who_has_it(tmp_path: Path) -> None:

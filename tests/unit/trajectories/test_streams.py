@@ -24,8 +24,8 @@ from hsp_control.trajectories.streams.followed import (
     FollowedOrientation,
     FollowedPose,
 )
+from hsp_control.trajectories.streams.planner import Planner, Room
 from hsp_control.trajectories.streams.sources import read_recording
-from hsp_control.trajectories.streams.waypoints import SenderClock
 
 H = 5e-4
 """Time between samples [s]."""
@@ -269,13 +269,74 @@ def test_silence_holds_and_then_stops_with_the_time() -> None:
 
 
 def test_the_sender_s_clock_is_found_and_may_start_again() -> None:
-    clock = SenderClock()
-    arrivals = [(100.0 + 0.05 * k, 0.05 * k + delay) for k, delay in
-                enumerate([0.03, 0.01, 0.02, 0.04])]  # fmt: skip
-    found = [clock.to_controller(t, now) for t, now in arrivals]
-    assert found[1:] == pytest.approx([0.06, 0.11, 0.16])  # the fastest took 0.01 s
-    assert clock.restarts_at(5.0)
-    assert clock.to_controller(5.0, 1.0) == pytest.approx(1.0)
+    """Waypoints are passed when they were meant to be, after the delay."""
+    bounds = {"speed": 1e3, "acceleration": 1e4, "jerk": 1e6}
+    stream = Stream([0.0], delay=2.0, **bounds).anchored(None)
+    # The fastest message takes 0.01 s; the first arrives before that is known.
+    for k, late in enumerate([0.03, 0.01, 0.02, 0.04]):
+        stream.sample(0.05 * k + late - H)
+        stream.run.send([float(k)], t=100.0 + 0.05 * k)
+        stream.sample(0.05 * k + late)
+    for k in (1, 2, 3):
+        stream.sample(t := 2.01 + 0.05 * k)
+        assert stream.sample(t).position[0] == pytest.approx(k, abs=1e-9)
+    stream.run.send([7.0], t=5.0)
+    stream.sample(3.0)
+    assert stream.sample(5.0).position[0] == pytest.approx(7.0, abs=1e-9)
+    assert stream.sample(4.99).position[0] != pytest.approx(7.0, abs=1e-9)
+
+
+@pytest.mark.parametrize("policy", POLICIES)
+def test_room_is_made_for_all_waypoints(policy: str) -> None:
+    """Those of large chunks and of many messages, beside a stream that has it."""
+    rng = np.random.default_rng(59)
+    streams = [Stream([0.0, 0.0], policy=policy, delay=1.0).anchored(None)]
+    streams.append(copy.deepcopy(streams[0]))
+    large = Room(messages=2000, waypoints=4000)
+    planner = streams[1].run._planned
+    streams[1].run._planner = Planner(
+        planner.chart,
+        streams[1].run.stream.bounds(),
+        planner.policy,
+        planner.state,
+        large,
+    )
+    for k in range(1500):
+        if k % 300 == 100:
+            rows, t = int(rng.integers(1, 400)), float(rng.uniform(0.0, 0.1))
+            values = rng.normal(0.0, 0.1, (rows, 2))
+            for each in streams:
+                each.run.send_chunk(values, 0.01 * (1 + np.arange(rows)), t=t)
+        elif k > 700:
+            value = rng.normal(0.0, 0.1, 2)
+            for each in streams:
+                each.run.send(value)
+        one, other = (each.sample(k * 1e-3) for each in streams)
+        np.testing.assert_array_equal(one, other)
+    assert streams[0].run.counts() == streams[1].run.counts()
+
+
+def test_earlier_times_are_known_while_a_step_begins_many_pieces() -> None:
+    """Of more pieces than a step can keep, the last are, and the others are named."""
+    stream = Stream([0.0]).anchored(None)
+    stream.sample(0.0)
+    times = 0.02 * (1 + np.arange(25))
+    stream.run.send_chunk(1e-3 * np.sin(times)[:, None], times)
+    stream.sample(0.01)
+    fine = copy.deepcopy(stream)
+    before = [fine.sample(t) for t in np.arange(0.02, 0.6, 0.01)]
+    stream.sample(0.6)
+    known = 0
+    for t, expected in zip(np.arange(0.02, 0.6, 0.01), before, strict=True):
+        try:
+            found = stream.sample(t)
+        except StreamError as error:
+            assert "is not known any more" in str(error)  # noqa: PT017
+            assert not known
+        else:
+            known += 1
+            np.testing.assert_allclose(found, expected, rtol=0.0, atol=1e-12)
+    assert 10 < known < 50
 
 
 def test_a_new_run_begins_anew_and_hears_only_what_is_new() -> None:

@@ -1,19 +1,24 @@
-"""Pieces of a streamed reference: quintics within the bounds, otherwise Ruckig's.
+"""Bounds on the motion of a stream, in the coordinates of its chart."""
 
-A piece is a C² function of time, given in local coordinates (`Chart`); each begins in
-the final state of the piece before it. The engine plans them
-(``engine/streams/planner.cpp``): the same without Python.
-"""
-
-from abc import ABC, abstractmethod
 from math import pi, sqrt
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import TrajectoryError
-from hsp_control.trajectories.streams.piece_calls import MotionBounds, PieceCalls
+
+PLANNED = 0.95
+"""Share of an angular speed up to which motions are planned; see `angular_bounds`."""
+
+
+class MotionBounds(NamedTuple):
+    """Largest magnitude of the first three derivatives, for each coordinate."""
+
+    speed: Array  # (n,) [1/s]
+    acceleration: Array  # (n,) [1/s²]
+    jerk: Array  # (n,) [1/s³]
 
 
 def linear_bounds(
@@ -54,32 +59,3 @@ def angular_bounds(speed: float, acceleration: float, jerk: float) -> MotionBoun
         )
     planned = PLANNED * speed, curved, turned
     return MotionBounds(*(np.full(3, each / sqrt(3.0)) for each in planned))
-
-
-PLANNED = 0.95
-"""Share of an angular speed up to which motions are planned; see `angular_bounds`."""
-
-
-class Segment(ABC):
-    """A piece of the reference, from ``start`` to ``end`` [s]."""
-
-    def __init__(self, start: float, end: float) -> None:
-        """Set when it begins and ends."""
-        self.start, self.end = start, end
-
-    @abstractmethod
-    def write(self, t: float, calls: PieceCalls) -> None:
-        """Write the state at time t [s], between start and end, to ``calls.state``."""
-
-
-class Piece(Segment):
-    """A piece planned by the engine, as numbers."""
-
-    def __init__(self, numbers: Array) -> None:
-        """Keep the engine's numbers."""
-        super().__init__(float(numbers[1]), float(numbers[2]))
-        self.numbers = numbers
-
-    def write(self, t: float, calls: PieceCalls) -> None:
-        """Write the state at time t [s]; see `Segment.write`."""
-        calls.evaluate(self.numbers, t)
