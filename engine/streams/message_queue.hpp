@@ -6,9 +6,16 @@
 
 namespace hsp {
 
-// What a row is: a target; a velocity alone, in world axes or in the body's; a waypoint of a chunk,
-// which begins with the first one.
-enum class MessageKind : std::int64_t { TARGET, VELOCITY, TOOL_VELOCITY, CHUNK, CHUNK_GOES_ON };
+// What a row is: a target; a velocity alone, in the stream's axes, in the world's or in the body's;
+// a waypoint of a chunk, the first one or a later one.
+enum class MessageKind : std::int64_t {
+  TARGET,
+  VELOCITY,
+  WORLD_VELOCITY,
+  TOOL_VELOCITY,
+  CHUNK,
+  CHUNK_GOES_ON
+};
 
 struct MessageQueue {
   InOutInts<1> count;
@@ -25,7 +32,7 @@ struct MessageQueue {
   double after(Index k) const { return times(k, 1); }     // of a waypoint, after that [s]
   double taken_at(Index k) const { return times(k, 2); }  // [s]; -∞: when the next step is
   bool is_velocity(Index k) const {
-    return kind(k) == MessageKind::VELOCITY || kind(k) == MessageKind::TOOL_VELOCITY;
+    return MessageKind::VELOCITY <= kind(k) && kind(k) <= MessageKind::TOOL_VELOCITY;
   }
   // The row after the message that begins at one.
   Index end_of(Index k) const {

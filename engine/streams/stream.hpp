@@ -28,7 +28,7 @@ struct Stream {
   double linear;  // number of coordinates before a rotation
   double policy;  // `Policy`
   double delay, smoothing, extrapolation, dead_man, hold_after, stop_after;  // [s]
-  double tool;  // whether velocities that a program sends are in the body's axes
+  double tool;  // whether velocities alone are in the body's axes
   MotionBounds<In> bounds;
   MessageQueue queue;
   KnownWaypoints waypoints;
@@ -118,8 +118,8 @@ struct Stream {
   template <class Values> bool send_velocity(const Values& wanted) {
     if (!(wanted.cwiseAbs().array() <= largest).all()) return false;
     sent.velocity = wanted;
-    const auto kind = tool ? MessageKind::TOOL_VELOCITY : MessageKind::VELOCITY;
-    queue.rates.row(queue.add(kind, true, false, 0.0)) = sent.velocity.transpose();
+    const Index row = queue.add(MessageKind::VELOCITY, true, false, 0.0);
+    queue.rates.row(row) = sent.velocity.transpose();
     return true;
   }
 
@@ -180,7 +180,8 @@ struct Stream {
     commanded[0] = queue.is_velocity(k);
     fades_at[0] = infinite;
     if (!commanded[0]) return true;
-    const bool of_tool = queue.kind(k) == MessageKind::TOOL_VELOCITY;
+    const bool of_tool = queue.kind(k) == MessageKind::TOOL_VELOCITY ||
+                         (queue.kind(k) == MessageKind::VELOCITY && tool);
     const bool same =
         was && (in_tool[0] != 0) == of_tool && velocity == queue.rates.row(k).transpose();
     velocity = queue.rates.row(k).transpose();

@@ -143,12 +143,12 @@ class Inbox:
             take: Whether later readers no longer receive them.
             until: Only those whose time has come [s].
         """
-        found = []
+        found, bounded = [], until < inf
         with self._lock:
             waiting = self._waiting
             known = number - self.count + len(waiting)  # dropped ones have no number
             for k in range(max(known, 0), len(waiting)):
-                if waiting[k].message.at > until:
+                if bounded and waiting[k].message.at > until:
                     break
                 found.append(waiting[k])
             if take and found:
@@ -179,7 +179,7 @@ class Taken(NamedTuple):
     """A message in a record."""
 
     message: Message
-    at: float  # when it was taken [s]
+    t: float  # when the step was that took it [s]
 
 
 class Reader:
@@ -231,7 +231,7 @@ class Reader:
         """Record a message that is taken at a time [s], as long as there is room."""
         most = MOST if self.logged else min(BRIEF, MOST)
         if self._recorded + message.size <= most:
-            self.record.append(Taken(message, message.at if message.at > -inf else t))
+            self.record.append(Taken(message, t))
             self._recorded += message.size
         else:
             self.lost += 1

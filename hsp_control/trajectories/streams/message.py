@@ -3,12 +3,12 @@
 import json
 from collections.abc import Mapping
 from math import inf
-from typing import Any, Literal, NamedTuple, NoReturn
+from typing import Any, Literal, NamedTuple, NoReturn, Self
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from hsp_control.common.arrays import Array
+from hsp_control.common.arrays import Array, Indices
 from hsp_control.common.exceptions import StreamError
 
 MOST_WAYPOINTS = 1000  # maximum number of waypoints of one message
@@ -23,6 +23,14 @@ _UNIT = 1e-3
 
 Axes = Literal["world", "tool"]
 """The axes in which a velocity is commanded: the world's, or the moving body's."""
+
+
+KINDS = (
+    *("target", "velocity", "world velocity", "tool velocity"),
+    *("chunk", "chunk goes on"),
+)
+"""What a row is: a target, a velocity alone, in the stream's axes or in those it says,
+or a waypoint of a chunk, the first one or a later one."""
 
 
 class Space(NamedTuple):
@@ -57,41 +65,73 @@ ORIENTATION = Space(0, True)
 
 
 class Message(NamedTuple):
-    """Waypoints, or a velocity alone."""
+    """Waypoints, or a velocity alone, as rows of the engine's queue.
 
-    t: float | None  # its time by the sender's clock [s]; None: unknown, now
-    times: Array  # times of the waypoints after ``t``, increasing, (k,) [s]
+    See ``engine/streams/message_queue.hpp``.
+    """
+
+    # (k, 3): `KINDS`, whether there are velocities, whether there is a time
+    what: Indices
+    # (k, 3): its time by the sender's clock, that of the waypoint after it, and that of
+    # taking it by the controller's clock; -inf: at once [s]
+    times: Array
     # The waypoints, (k, width), quaternions of norm 1; None: the message is a velocity
     # alone.
     values: Array | None
     # Their velocities, (k, rates), in world axes; None: unknown.
     velocities: Array | None
-    chunk: bool = False  # whether they replace all later ones
-    axes: Axes | None = None  # of a velocity alone, if given
-    at: float = -inf  # time of taking it, by the controller's clock [s]; -inf: at once
+    size: int  # its number of numbers
+
+    @classmethod
+    def of(
+        cls,
+        t: float | None,
+        values: Array | None,
+        velocities: Array | None,
+        *,
+        times: Array | None = None,
+        axes: Axes | None = None,
+    ) -> Self:
+        """Return a message; ``times``: of a chunk, after ``t`` [s]."""
+        kind = "velocity" if axes is None else f"{axes} velocity"
+        if values is not None:
+            kind = "target" if times is None else "chunk"
+        arrays = [each for each in (values, velocities) if each is not None]
+        what = np.empty((len(arrays[0]), 3), dtype=np.int64)
+        what[:] = KINDS.index(kind), velocities is not None, t is not None
+        rows = np.empty((len(what), 3))
+        rows[:] = 0.0 if t is None else t, 0.0, -inf
+        if times is not None:
+            what[1:, 0], rows[:, 1] = KINDS.index("chunk goes on"), times
+        size = len(what) + sum(each.size for each in arrays)
+        return cls(what, rows, values, velocities, size)
 
     @property
-    def size(self) -> int:
-        """Its number of numbers."""
-        size = self.times.size
-        size += 0 if self.values is None else self.values.size
-        return size + (0 if self.velocities is None else self.velocities.size)
+    def at(self) -> float:
+        """When it is taken, by the controller's clock; -inf: at once [s]."""
+        return float(self.times[0, 2])
 
-    def to_dict(self, at: float) -> dict[str, Any]:
-        """Return its data for `message_of`, and the time ``at`` of taking it [s]."""
-        data: dict[str, Any] = {"at": at}
-        if self.t is not None:
-            data["t"] = self.t
+    def to_dict(self, t: float) -> dict[str, Any]:
+        """Return its data for `message_of`, and the time ``at`` of taking it.
+
+        Args:
+            t: When the step was that took it [s].
+        """
+        data: dict[str, Any] = {"at": t if self.at == -inf else self.at}
+        kind, _, timed = self.what[0].tolist()
+        if timed:
+            data["t"] = self.times[0, 0].item()
+        chunk = KINDS[kind] == "chunk"
         for one, several in (("value", "values"), ("velocity", "velocities")):
             array = getattr(self, several)
-            if array is not None and self.chunk:
+            if array is not None and chunk:
                 data[several] = array.tolist()
             elif array is not None:
                 data[one] = array[0].tolist()
-        if self.chunk:
-            data["times"] = self.times.tolist()
-        if self.axes is not None:
-            data["axes"] = self.axes
+        if chunk:
+            data["times"] = self.times[:, 1].tolist()
+        if " velocity" in KINDS[kind]:
+            data["axes"] = KINDS[kind].split()[0]
         return data
 
 
@@ -112,8 +152,7 @@ def message_of(data: Any, space: Space) -> Message:
     if values is None:
         if velocities is None or len(velocities) != 1:
             raise StreamError("a message needs a value, values or one velocity")
-        axes = _axes(given, space)
-        return Message(t, np.zeros(1), None, velocities, axes=axes)
+        return Message.of(t, None, velocities, axes=_axes(given, space))
     if "axes" in given:
         raise StreamError("axes are only for a velocity without a value; remove axes")
     if velocities is not None and len(velocities) != len(values):
@@ -122,9 +161,7 @@ def message_of(data: Any, space: Space) -> Message:
         )
     if space.rotational:
         _normalise(values)
-    return Message(
-        t, _times(given, len(values)), values, velocities, chunk="times" in given
-    )
+    return Message.of(t, values, velocities, times=_times(given, len(values)))
 
 
 def parsed(text: str | bytes) -> Any:
@@ -187,10 +224,10 @@ def _rows(
     return rows
 
 
-def _times(given: Mapping[str, Any], count: int) -> Array:
-    """Return the times of the waypoints after ``t``, shape (count,)."""
+def _times(given: Mapping[str, Any], count: int) -> Array | None:
+    """Return the times of the waypoints after ``t``, shape (count,), of a chunk."""
     if "times" not in given:
-        return np.zeros(1)
+        return None
     times = _numbers(given["times"], "times", 1)
     if len(times) != count:
         raise StreamError(f"there are {len(times)} times for {count} values")

@@ -127,6 +127,8 @@ class Planner:
         self._earlier = np.zeros(memory["pieces"].shape[1])
         self._evaluate = engine.PieceState(piece=self._earlier, out=vars(self.state))
         self._queued, self._known = memory["queue.count"], memory["waypoints.count"]
+        self._what, self._times = memory["queue.what"], memory["queue.times"]
+        self._values, self._rates = memory["queue.values"], memory["queue.rates"]
         self._heard, self._begun = memory["heard"], memory["begun"]
         self._piece, self._pieces = memory["piece"], memory["pieces"]
 
@@ -138,6 +140,8 @@ class Planner:
         Raises:
             StreamError: If the time is long past.
         """
+        if self._piece.item() != self._number:
+            self._remember()
         if t < self._start:
             if t < self._oldest:
                 raise StreamError(
@@ -164,10 +168,13 @@ class Planner:
                 self._put(message)
         moves = self.call(t)
         self.now = float(t)
-        if self._piece.item() != self._number:
-            self._remember()
-        if self._starts:
-            self._forget(t)
+        begun = self._piece.item() - self._number
+        # A step with messages does most: the next one will do, unless it has some, too.
+        if not messages or begun > self._room.pieces // 2:
+            if begun:
+                self._remember()
+            if self._starts:
+                self._forget(t)
         if not moves:
             if self._memory["lost"].item():
                 raise StreamError("no motion within the bounds was found")
@@ -211,20 +218,13 @@ class Planner:
 
     def _put(self, message: Message) -> None:
         """Add a message to the queue."""
-        memory, first = self._memory, self._queued.item()
-        rows = slice(first, first + message.times.size)
-        kind, t = _kind(message, self.policy.axes), message.t
-        what, times = memory["queue.what"], memory["queue.times"]
-        what[rows] = kind, message.velocities is not None, t is not None
-        if kind == _CHUNK:
-            what[first + 1 : rows.stop, 0] = _GOES_ON
-        times[rows] = 0.0 if t is None else t, 0.0, message.at
-        if message.chunk:
-            times[rows, 1] = message.times
+        first = self._queued.item()
+        rows = slice(first, first + len(message.what))
+        self._what[rows], self._times[rows] = message.what, message.times
         if message.values is not None:
-            memory["queue.values"][rows] = message.values
+            self._values[rows] = message.values
         if message.velocities is not None:
-            memory["queue.rates"][rows] = message.velocities
+            self._rates[rows] = message.velocities
         self._queued[0] = rows.stop
 
     def _newest(self, messages: Sequence[Message]) -> Sequence[Message]:
@@ -240,7 +240,7 @@ class Planner:
 
     def _make_room(self, messages: Sequence[Message]) -> None:
         """Make sure that messages can be taken."""
-        rows = self._queued.item() + sum(each.times.size for each in messages)
+        rows = self._queued.item() + sum(len(each.what) for each in messages)
         waypoints = min(self._known.item() + rows, MOST)
         room, before = self._room, self._memory
         if rows <= room.messages and waypoints <= room.waypoints:
@@ -308,9 +308,10 @@ class Planner:
         if not messages:
             self.call(self.now)
             value = self.chart.value_near(self.state)
-            messages = [Message(None, np.zeros(1), value[None], None)]
+            messages = [Message.of(None, value[None], None)]
         t = self.now + SOON
         self.advance(t, messages)
+        self.advance(t + SOON, ())  # the step after it keeps what was before
         vars(self).update(kept)
         self._past, self._starts = past, starts
         for name, array in memory.items():
@@ -333,14 +334,6 @@ class Planner:
 
 _SENT = "target", "velocity", "rate", "time"
 _POLICIES = "latest", "interpolate", "extrapolate"
-_TARGET, _VELOCITY, _TOOL_VELOCITY, _CHUNK, _GOES_ON = range(5)
-
-
-def _kind(message: Message, axes: Axes) -> int:
-    """Return what a message is; see ``engine/streams/message_queue.hpp``."""
-    if message.values is not None:
-        return _CHUNK if message.chunk else _TARGET
-    return _TOOL_VELOCITY if (message.axes or axes) == "tool" else _VELOCITY
 
 
 def _rest(state: State) -> Array:

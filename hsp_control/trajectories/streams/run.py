@@ -178,7 +178,7 @@ class StreamRun:
         Without a log, only the first messages.
         """
         taken = self._reader.record if self._reader is not None else []
-        return tuple(message.to_dict(at) for message, at in taken)
+        return tuple(message.to_dict(t) for message, t in taken)
 
     @property
     def unrecorded(self) -> int:

@@ -95,7 +95,8 @@ def recorded(data: Sequence[Mapping[str, Any]], space: Space) -> list[Message]:
             if messages and at < messages[-1].at:
                 raise StreamError(f"at is {at:g}, earlier than {messages[-1].at:g}")
             rest = {key: value for key, value in each.items() if key != "at"}
-            messages.append(message_of(rest, space)._replace(at=at))
+            messages.append(message_of(rest, space))
+            messages[-1].times[:, 2] = at
         except StreamError as error:
             raise StreamError(f"message {k} of the recording: {error}") from None
     return messages
