@@ -293,14 +293,9 @@ def test_room_is_made_for_all_waypoints(policy: str) -> None:
     streams = [Stream([0.0, 0.0], policy=policy, delay=1.0).anchored(None)]
     streams.append(copy.deepcopy(streams[0]))
     large = Room(messages=2000, waypoints=4000)
-    planner = streams[1].run._planned
-    streams[1].run._planner = Planner(
-        planner.chart,
-        streams[1].run.stream.bounds(),
-        planner.policy,
-        planner.state,
-        large,
-    )
+    run = streams[1].run
+    given = run.chart, run.stream.bounds(), run.stream.how, run.stream.begin()
+    run._planner = Planner(*given, large)
     for k in range(1500):
         if k % 300 == 100:
             rows, t = int(rng.integers(1, 400)), float(rng.uniform(0.0, 0.1))
