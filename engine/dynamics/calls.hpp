@@ -57,6 +57,12 @@ struct ChangeGravity {
   void operator()() { dynamics->change_gravity(change); }
 };
 
+inline void check_joints(Index given, const Dynamics& dynamics) {
+  if (given != dynamics.joints())
+    throw std::invalid_argument("the robot has " + std::to_string(dynamics.joints()) +
+                                " joints, the world included");
+}
+
 struct Weights {
   static constexpr const char* doc =
       "The mass at each joint [kg], payloads included, its centre [m], and gravity.";
@@ -65,13 +71,27 @@ struct Weights {
   Out<'j', 3> center;
   Out<3> gravity;
 
-  void check() const {
-    if (mass.size() != dynamics->joints())
-      throw std::invalid_argument("the robot has " + std::to_string(dynamics->joints()) +
-                                  " joints, the world included");
-  }
+  void check() const { check_joints(mass.size(), *dynamics.object); }
   void operator()() {
     dynamics->body_masses(mass, center);
+    gravity = dynamics->gravity();
+  }
+};
+
+struct Bodies {
+  static constexpr const char* doc =
+      "The body at each joint, payloads included: mass [kg], centre [m] and the inertia about it "
+      "[kg·m²], in the joint's axes; and gravity.";
+  Shared<Dynamics> dynamics;
+  Out<'j'> mass;
+  Out<'j', 3> center;
+  Out<'j', 9> inertia;
+  Out<3> gravity;
+
+  void check() const { check_joints(mass.size(), *dynamics.object); }
+  void operator()() {
+    dynamics->body_masses(mass, center);
+    dynamics->body_inertias(inertia);
     gravity = dynamics->gravity();
   }
 };

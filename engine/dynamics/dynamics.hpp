@@ -15,6 +15,7 @@ namespace hsp {
 using ConstVector = Eigen::Map<const Vector>;
 using Jacobian = Eigen::Map<Eigen::Matrix<double, 6, Eigen::Dynamic>>;
 using Square = Eigen::Map<Matrix>;
+using Inertias = Eigen::Map<Eigen::Matrix<double, Eigen::Dynamic, 9, Eigen::RowMajor>>;
 using Centers = Eigen::Map<Eigen::Matrix<double, Eigen::Dynamic, 3, Eigen::RowMajor>>;
 using Placements = Eigen::Map<Eigen::Matrix<double, Eigen::Dynamic, 12, Eigen::RowMajor>>;
 
@@ -74,6 +75,8 @@ class Dynamics {
   Vector3 gravity() const;
   double mass() const;  // of all bodies [kg]
   void body_masses(Eigen::Map<Vector> mass, Centers center) const;
+  // About the centres, row by row, in the joints' axes.
+  void body_inertias(Inertias inertia) const;
 
   // end ⊖ start: the displacement from one configuration to another.
   void difference(const ConstVector& start, const ConstVector& end,

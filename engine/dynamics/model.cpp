@@ -146,6 +146,13 @@ void Dynamics::body_masses(Eigen::Map<Vector> mass, Centers center) const {
   }
 }
 
+void Dynamics::body_inertias(Inertias inertia) const {
+  const auto& bodies = pinocchio_->model.inertias;
+  for (Index i = 0; i < inertia.rows(); ++i)
+    Eigen::Map<Eigen::Matrix<double, 3, 3, Eigen::RowMajor>>(inertia.row(i).data()) =
+        bodies[i].inertia().matrix();
+}
+
 const char* pinocchio_version() { return PINOCCHIO_VERSION; }
 
 Dynamics::~Dynamics() = default;

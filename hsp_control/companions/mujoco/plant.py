@@ -12,6 +12,7 @@ from hsp_control import engine
 from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import ModelError, SimulationError
 from hsp_control.companions.mujoco import scene
+from hsp_control.companions.mujoco.carried import CarriedInMujoco
 from hsp_control.companions.mujoco.coordinates import MujocoCoordinates, joints_of
 from hsp_control.companions.mujoco.mjcf import (
     ContactShapes,
@@ -23,6 +24,7 @@ from hsp_control.companions.mujoco.mjcf import (
 from hsp_control.control.interface import LogChannel
 from hsp_control.declaration import within
 from hsp_control.declaration.quantities import Flag, Positive
+from hsp_control.engine import Dynamics
 from hsp_control.robot import Robot
 from hsp_control.robot.integrators import Integrator, number_of_steps
 from hsp_control.simulation.plants.plant import (
@@ -249,8 +251,14 @@ class MujocoPlant(MujocoEngine):
         self._owners = {
             model.geom(name).id: frame for name, frame in frame_of_geom.items()
         }
+        self._carried = CarriedInMujoco(robot, model, joints)
         self._data = robot.model.createData()
         self._origins = {c.frame: robot.frame_id(c.frame) for c in self.contacts}
+
+    @property
+    def dynamics(self) -> Dynamics:
+        """Those whose bodies, payloads and gravity MuJoCo has; see `Plant.dynamics`."""
+        return self._carried.dynamics
 
     def reset(self, t: float, q: Array, v: Array) -> None:
         """Set the state; see `SampledPlant.reset`."""
@@ -260,6 +268,7 @@ class MujocoPlant(MujocoEngine):
 
     def advance(self, t: float, end: float, tau: Array) -> tuple[Array, Array]:
         """Step MuJoCo from t to ``end``; see `SampledPlant.advance`."""
+        self._carried.write()
         return self._step(t, end, tau, self.declared.timestep)
 
     def log_channels(
@@ -268,6 +277,7 @@ class MujocoPlant(MujocoEngine):
         """Return each contact's force and moment at a true state under an effort."""
         if not self.contacts:
             return {}
+        self._carried.write()
         self._drive(self.data, t, q, self._roots.remove_effort(t, tau))
         self._mujoco.mj_forward(self.model, self.data)
         return contact_channels(self._wrenches(q)) | self._places()

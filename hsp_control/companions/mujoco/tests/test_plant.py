@@ -11,6 +11,7 @@ import pytest
 from robot_texts import ARM
 from wording import wording
 
+import hsp_control as hsp
 from hsp_control import Robot
 from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import (
@@ -350,3 +351,31 @@ def test_a_motion_that_diverges_is_an_error(
     ):
         plant.advance(0.0, 0.01, np.full(7, 1e14))
     assert not list(tmp_path.iterdir())
+
+
+def test_mujoco_carries_what_a_time_line_puts_into_the_hand() -> None:
+    """Mass matrix and gravity of the present share, and a hand that does not sag."""
+    robot = load("panda")
+    q, rest = robot.home(), np.zeros(7)
+    made = hsp.Controller(robot, [hsp.FramePose("panda_tcp")], start=q)
+    made.at(0.1).ramp(0.2).payload(
+        "panda_tcp", 2.0, center=[0.02, 0.0, 0.05], inertia=[0.01, 0.02, 0.015]
+    )
+    made.at(0.15).ramp(0.1).gravity([0.0, 1.0, -9.0])
+    plant = MujocoPlant(robot, Mujoco())
+    made.followed_by(plant.dynamics)
+    plant.reset(0.0, q, rest)
+    for t in (0.0, 0.21, 0.4):  # before, in both ramps, after
+        made.compute(t, q, rest)
+        plant.advance(t, t + 1e-9, rest)
+        expected = robot.mass_matrix(q, made.state.dynamics)
+        found = mass_matrix(plant.model, plant.data)
+        np.testing.assert_allclose(found, expected, rtol=0.0, atol=1e-9)
+    np.testing.assert_allclose(plant.model.opt.gravity, [0.0, 1.0, -9.0])
+    made.restart()
+    none = hsp.compensation.Compensation(momentum_observer=None)
+    given: dict[str, Any] = {"duration": 0.6, "control_period": 1e-3}
+    run = hsp.simulate(made, q, plant=Mujoco(), compensation=none, **given)
+    there = [robot.state(0.0, each, rest).position("panda_tcp") for each in run.q]
+    # With the bodies of before the hand is 20 mm below.
+    np.testing.assert_allclose(there, [there[0]] * len(there), rtol=0.0, atol=1e-9)
