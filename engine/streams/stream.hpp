@@ -134,7 +134,7 @@ struct Stream {
   void advance(double t) {
     for (Index k = 0; k < queue.size();) {
       const double at = queue.taken_at(k);
-      Index end = k;
+      Index end = queue.end_of(k);
       while (end < queue.size() && queue.taken_at(end) == at) end = queue.end_of(end);
       step(at == -infinite ? t : std::max(at, now[0]), k, end);
       k = end;

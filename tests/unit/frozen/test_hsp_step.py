@@ -186,6 +186,24 @@ def test_a_stream_whose_times_are_wrong_ends(times: float, tmp_path: Path) -> No
     assert "not finite" in opened.error
 
 
+@pytest.mark.timeout(60)
+def test_a_message_that_is_taken_at_no_time_ends(tmp_path: Path) -> None:
+    robot = hsp.Robot.load("panda")
+    hand = hsp.FramePosition("panda_tcp", hsp.Stream())
+    declared = hsp.Controller(robot, [hand], start=robot.home())
+    file = hsp.freeze(declared, tmp_path / "stream.hsp")
+    content, v = bytearray(file.read_bytes()), np.zeros(7)
+    layout = Layout(bytes(content))
+    at = layout.array("Stream", "queue.count")
+    content[at : at + 8] = np.int64(3).tobytes()
+    at = layout.array("Stream", "queue.times", rank=2)
+    content[at : at + 72] = np.full(9, np.nan).tobytes()
+    file.write_bytes(summed(bytes(content)))
+    opened = Opened(file)
+    for k in range(3):
+        opened.step(0.001 * k, robot.home(), v)
+
+
 # -- steps --------------------------------------------------------------------------
 
 
