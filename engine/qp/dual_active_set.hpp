@@ -216,7 +216,7 @@ class DualActiveSet {
       if (set.held[i] == 0) continue;
       ++marked;
       const double square = project(i);
-      if (square > negligible(i)) extend(i, square);
+      if (is_independent(i, square)) extend(i, square);
       else set.held[i] = 0;
     }
     if (marked > 0) settle();
@@ -305,11 +305,11 @@ class DualActiveSet {
   // constraint holds. An active one whose multiplier vanishes first is released.
   bool enter(Violation entering) {
     const Index i = entering.constraint;
-    const double side = static_cast<double>(set.held[i]), rounding = negligible(i);
+    const double side = static_cast<double>(set.held[i]);
     double square = project(i), multiplier = 0.0;
     while (true) {
       ++iterations();
-      const bool independent = square > rounding;
+      const bool independent = is_independent(i, square);
       auto rate = memory.rate.head(count());  // Lᵀ rate = Q b
       rate = memory.components.head(count());
       solve_lower_transposed(L(), rate);
@@ -461,6 +461,13 @@ class DualActiveSet {
   double norm(Index i) const {
     const double square = i < qp.A.rows() ? a(i).squaredNorm() : 1.0;
     return square != 0.0 ? std::sqrt(square) : 1.0;
+  }
+
+  // Whether constraint i is not in the span of the active ones, by the square of its remainder:
+  // where they span all that y can move in, what remains is rounding, however large it is.
+  bool is_independent(Index i, double square) const {
+    const Index slacks = memory.width - x.size();
+    return set.counts[0] < moving + qp.own.size() + slacks && square > negligible(i);
   }
 
   // The square of a remainder of Jᵀ a that is rounding.
