@@ -1,5 +1,8 @@
 """The QP solver: proofs of optima, two other solvers, warm starts, softness, codes."""
 
+from pathlib import Path
+from typing import Any
+
 import numpy as np
 import pytest
 from hypothesis import given
@@ -22,6 +25,7 @@ from hsp_control.common.arrays import Array
 from hsp_control.control.actuation.dual_active_set import (
     EXHAUSTED,
     INFEASIBLE,
+    QP,
     SOLVED,
     Workspace,
 )
@@ -214,3 +218,22 @@ def test_sizes_that_do_not_fit_are_refused() -> None:
     problem = packed(case)._replace(own=np.ones(1))
     with pytest.raises(ValueError, match="a QP: the sizes do not fit together"):
         engine.Minimise(problem=problem, iterations=10, warm=False, x=x, work=work)
+
+
+def test_active_constraints_span_no_more_than_there_is() -> None:
+    """Where they span everything, what remains of another one is rounding.
+
+    Efforts of a Talos that contradict each other; once they were one too many for the
+    solver's memory.
+    """
+    with np.load(Path(__file__).parent / "data/full_active_set.npz") as arrays:
+        given: Any = {name: arrays[name] for name in arrays.files}
+    problem = QP(**given | {"equalities": int(given["equalities"])})
+    n, k = len(problem.JT) + len(problem.own), len(problem.A)
+    work = Workspace.of(n, k)
+    x = np.zeros(n)
+    engine.Minimise(problem=problem, iterations=10, warm=False, x=x, work=work)()
+    active = work.active[: work.counts[0]]
+    assert len(active) == n
+    assert len({*active.tolist()}) == n
+    assert np.isfinite(x).all()
