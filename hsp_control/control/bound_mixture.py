@@ -11,7 +11,7 @@ from hsp_control import engine
 from hsp_control.common.arrays import Array, Indices
 from hsp_control.control.active_stack import ActiveStack
 from hsp_control.control.actuation import Actuation, Delivered
-from hsp_control.control.actuation.actuation import Kept
+from hsp_control.control.actuation.delivered import Kept
 from hsp_control.control.actuation.limited_step import EXACT, LIMITED, STATUSES
 from hsp_control.control.actuation.limits_in_force import LimitsInForce
 from hsp_control.control.actuation.support import Support

@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike
 from hsp_control.common.arrays import Array
 from hsp_control.control.active_stack import ActiveStack
 from hsp_control.control.actuation import Actuation, Delivered
-from hsp_control.control.actuation.actuation import LimitsOutcome
+from hsp_control.control.actuation.limit_checks import LimitsOutcome
 from hsp_control.control.actuation.limited_step import BEYOND, RELAXED
 from hsp_control.control.actuation.limits_in_force import LimitsInForce
 from hsp_control.engine import Move

@@ -14,7 +14,8 @@ from hsp_control import engine
 from hsp_control.common.arrays import Array, Indices
 from hsp_control.common.exceptions import FreezeError
 from hsp_control.control.active_stack import ActiveStack
-from hsp_control.control.actuation.actuation import Actuation, DeliveredAlone
+from hsp_control.control.actuation.actuation import Actuation
+from hsp_control.control.actuation.delivered import DeliveredAlone
 from hsp_control.control.bound_step import BoundStep
 from hsp_control.control.compensation.compensation import STAGES, Compensation
 from hsp_control.control.compensation.stage import Alone, AloneCalls

@@ -15,7 +15,8 @@ from hsp_control.common.arrays import Array, Indices
 from hsp_control.common.exceptions import FreezeError
 from hsp_control.common.suggestions import did_you_mean
 from hsp_control.control.active_stack import ActiveStack
-from hsp_control.control.actuation.actuation import Actuation, DeliveredAlone
+from hsp_control.control.actuation.actuation import Actuation
+from hsp_control.control.actuation.delivered import DeliveredAlone
 from hsp_control.control.bound_step import BoundStep
 from hsp_control.control.controller import Controller
 from hsp_control.declaration import within

@@ -15,18 +15,23 @@ Contacts and floating bases, and Limits.
 
 from collections.abc import Callable
 from functools import cached_property
-from typing import Any, NamedTuple, Self
+from typing import Any
 
 import numpy as np
 
 from hsp_control import engine
 from hsp_control.common.arrays import Array, Indices
-from hsp_control.constraints.limits.barriers import BarrierRows
+from hsp_control.control.actuation.delivered import (
+    CarriedStep,
+    Delivered,
+    DeliveredAlone,
+    Kept,
+)
+from hsp_control.control.actuation.limit_checks import LimitChecks
 from hsp_control.control.actuation.limited_step import (
     BEYOND,
     EXACT,
     LIMITED,
-    STATUSES,
     Barriers,
     LimitedStep,
     QPOutcome,
@@ -41,95 +46,6 @@ from hsp_control.engine.plans import AnyCall, PartCall, PartCalls
 from hsp_control.robot import RobotState
 
 
-class LimitsOutcome(NamedTuple):
-    """Results of a check of the limits: the engine writes 0 or 1, shape (1,) each."""
-
-    motion: Indices
-    """Whether a bound on the accelerations is violated."""
-    effort: Indices
-    """Whether a bound on the efforts is violated."""
-    rows: Indices
-    """Whether a row of a barrier or of static efforts is violated."""
-    violated: Indices
-    """Whether one of them is."""
-    beyond: Indices
-    """Whether a joint is beyond its range, or faster than its limit; see `Status`."""
-
-    @classmethod
-    def allocate(cls) -> Self:
-        """Return that of a check that found nothing."""
-        return cls(*np.zeros((5, 1), dtype=np.int64))
-
-
-class Delivered(NamedTuple):
-    """The delivered part of a law within the limits; the next step overwrites it."""
-
-    effort: Array  # shape (nv,) [N·m or N], zero where there is no motor
-    acceleration: Array  # shape (nv,) [rad/s² or m/s²]
-    forces: Array  # contact forces in the axes of each contact, shape (size,) [N]
-    status: Status
-    relaxation: float  # largest violation of a relaxed limit [rad/s² or m/s²]
-
-
-class DeliveredAlone(NamedTuple):
-    """The delivered part of a step without Python: see `Actuation.calls_alone`."""
-
-    a: Array  # acceleration, shape (nv,)
-    tau: Array  # effort, shape (nv,) [N·m or N]
-    status: Indices  # the `Status`, shape (1,)
-    delivered: Indices  # whether there is a finite effort, shape (1,)
-
-    @classmethod
-    def allocate(cls, nv: int) -> Self:
-        """Return that of no step."""
-        integers = np.zeros((2, 1), dtype=np.int64)
-        return cls(np.zeros(nv), np.zeros(nv), *integers)
-
-
-class Kept(NamedTuple):
-    """Which part of a mixture was kept, shape (1,) each."""
-
-    which: Indices  # 0: none, Python has to look
-    status: Indices  # the `Status` where contacts carry
-
-
-class CarriedStep:
-    """What the calls of a step deliver where contacts carry.
-
-    Attributes:
-        qp: What is solved where it is not exact.
-        exact: Whether the law's acceleration is delivered with the forces of minimum
-            norm, shape (1,).
-        redistribute: Whether it needs others, shape (1,).
-        nearest: Whether it has to change, shape (1,).
-        delivered: What is delivered, and its status.
-        forces: The forces, shape (p,) [N].
-    """
-
-    def __init__(self, qp: LimitedStep) -> None:
-        """Allocate the arrays that the calls write."""
-        self.qp = qp
-        self.exact, self.redistribute, self.nearest = np.zeros((3, 1), dtype=np.int64)
-        self.delivered = DeliveredAlone.allocate(len(qp.result.effort))
-        self.forces = np.zeros_like(qp.result.forces)
-
-    def result(self, a: Array, outcome: QPOutcome) -> Delivered:
-        """Return what is delivered for the law's acceleration a, shape (nv,)."""
-        own, forces = self.delivered, self.forces
-        if (number := own.status.item()) == 0:
-            return Delivered(own.tau, a, forces, EXACT, 0.0)
-        status, relaxation = STATUSES[number], self.relaxation(outcome)
-        if status is not Status.REDISTRIBUTED:
-            a = own.a
-        return Delivered(own.tau, a, forces, status, relaxation)
-
-    def relaxation(self, outcome: QPOutcome) -> float:
-        """Return the largest violation of a relaxed limit [rad/s² or m/s²]."""
-        if self.exact.item():
-            return 0.0
-        return np.inf if outcome.unsolved.item() else self.qp.found()[1]
-
-
 class Actuation:
     """Computes efforts and contact forces for one law, within one set of limits."""
 
@@ -141,25 +57,24 @@ class Actuation:
         self._state, self._law = state, law
         self._support, self._limits = support, limits
         base = support.base
-        # the rows that the engine writes, by kind; Python writes those of own barriers
-        self._rows = self._engine_rows()
-        own = limits.limits is not None and bool(limits.limits.barriers)
-        compiled = not own or "barriers" in self._rows
+        self._wanted = wanted = Wanted(state.mass_matrix, np.zeros(nv), np.zeros(nv))
+        self._qp_outcome = QPOutcome.allocate()
+        self._limit_checks = checks = LimitChecks(
+            state, limits, wanted.acceleration, self._qp_outcome
+        )
+        self.outcome, self._rows = checks.outcome, checks.rows
         # Whether M a + N is the effort wherever it is within the bounds, and so is a.
-        self.direct = compiled and not base.size and not support.size
+        self.direct = checks.compiled and not base.size and not support.size
         # the result there for the law's own acceleration
         self.own = Delivered(state.effort, law.acceleration, np.zeros(0), EXACT, 0.0)
         self.nearest = self.own
         # whether `nearest` is delivered, and its status stands, shape (1,)
         self.is_nearest: Indices = np.zeros(1, dtype=np.int64)
-        self._wanted = wanted = Wanted(state.mass_matrix, np.zeros(nv), np.zeros(nv))
-        self.outcome = LimitsOutcome.allocate()
-        self._qp_outcome = QPOutcome.allocate()
-        checks: list[AnyCall] = [state.rnea(wanted.acceleration)]
-        if limits.limits is not None:
-            checks += [self._check(), *self._row_checks()]
-        self._checks: PartCalls = checks
-        self._check_wanted = engine.Plan(state.plan(checks).steps())
+        self._checks: PartCalls = [
+            state.rnea(wanted.acceleration),
+            *checks.calls(support.supporting_dofs),
+        ]
+        self._check_wanted = engine.Plan(state.plan(self._checks).steps())
         self._tau = support.tau if support.size else wanted.effort
         self._effort_within = self._within_bounds(wanted.effort)
         self._tau_within = self._within_bounds(self._tau)
@@ -173,27 +88,8 @@ class Actuation:
         self.carried: CarriedStep | None = None
         if support.size:
             support.bind(law)
-            if self._qp is not None and compiled and "barriers" not in self._rows:
-                self.carried = CarriedStep(self._qp)
-
-    def _check(self) -> PartCall:
-        """Return the call that compares a and M a + N with their bounds."""
-        state, limits = self._state, self._limits
-        return PartCall(
-            engine.CheckLimits,
-            time=state.time,
-            q=state.q,
-            v=state.v,
-            a=self._wanted.acceleration,
-            tau=state.effort,
-            where=state.robot.dof_indices,
-            limits=limits.motion,
-            ends=limits.ends,
-            held=limits.sent.held,
-            bounds=limits.bounds,
-            outcome=self.outcome,
-            unsolved=self._qp_outcome.unsolved,
-        )
+            at_once = checks.compiled and "barriers" not in self._rows
+            self.carried = CarriedStep(self._qp) if self._qp and at_once else None
 
     def _within_bounds(self, effort: Array) -> Callable[[], float]:
         """Return the call that checks whether an effort is within its bounds."""
@@ -202,39 +98,6 @@ class Actuation:
             engine.Within, x=effort, lower=bounds.tau_lower, upper=bounds.tau_upper
         )
         return self._state.plan([call]).call()
-
-    def _engine_rows(self) -> dict[str, BarrierRows]:
-        """Return room for the rows that the engine writes, by kind."""
-        limits, state = self._limits.limits, self._state
-        if limits is None:
-            return {}
-        found, nv = {}, state.robot.nv
-        rooms = [each.room(state) for each in limits.barriers]
-        if rooms and all(rooms):  # else Python has to compute some
-            found["barriers"] = BarrierRows.allocate(sum(rooms), nv)
-        if limits.static_effort is not None:
-            found["holding"] = BarrierRows.allocate(limits.static_effort.room(), nv)
-        return found
-
-    def _row_checks(self) -> PartCalls:
-        """Return the calls that write these rows, and compare a with them."""
-        limits, state, a = self._limits.limits, self._state, self._wanted.acceleration
-        calls: list[AnyCall] = []
-        if limits is None or not self._rows:
-            return calls
-        for kind, rows in self._rows.items():
-            calls.append(PartCall(engine.Clear, number=rows.number))
-            if kind == "barriers":
-                for each in limits.barriers:
-                    calls += each.row_calls(state, limits.bandwidth, a, rows)
-            elif limits.static_effort is not None:
-                excluded = self._support.supporting_dofs
-                given = state, limits.bandwidth, excluded, rows
-                calls += limits.static_effort.row_calls(*given)
-            calls.append(
-                PartCall(engine.CheckRows, rows=rows, a=a, outcome=self.outcome)
-            )
-        return calls
 
     @cached_property
     def calls(self) -> list[Callable[[float], Any]]:
@@ -271,7 +134,7 @@ class Actuation:
         return self._state.plan(calls).steps()
 
     def keeping(
-        self, acceleration: Array, effort: Array, forces: Array, kept: "Kept"
+        self, acceleration: Array, effort: Array, forces: Array, kept: Kept
     ) -> PartCall:
         """Return the call that keeps what is delivered, after `calls`.
 
@@ -298,7 +161,7 @@ class Actuation:
             kept=kept.which,
         )
 
-    def calls_alone(self, delivered: "DeliveredAlone") -> PartCalls:
+    def calls_alone(self, delivered: DeliveredAlone) -> PartCalls:
         """Return the calls that follow `calls` in a step without Python.
 
         They are equivalent to `delivered`.
@@ -319,12 +182,12 @@ class Actuation:
         """Return those of `calls_alone` where contacts carry."""
         carried, calls = self.carried, list[AnyCall]()
         if carried is None:  # `calls` leaves it to Python
-            rows = sum(len(each.least) for each in self._rows.values())
+            rows = self._limit_checks.count
             carried = CarriedStep(self._limited_step(rows))
             calls = self._finding_forces(carried)
         return [*calls, self._delivering_forces(carried, delivered, carried.forces)]
 
-    def _finding_forces(self, carried: "CarriedStep") -> list[AnyCall]:
+    def _finding_forces(self, carried: CarriedStep) -> list[AnyCall]:
         """Return the calls that find the forces of contacts, or the nearest step."""
         wanted, support, bounds = self._wanted, self._support, self._limits.bounds
         keep = PartCall(engine.Copy, x=self._state.effort, out=wanted.effort)
@@ -346,7 +209,7 @@ class Actuation:
         return [keep, *support.calls(wanted.effort, self._law), decide, *solved]
 
     def _delivering_forces(
-        self, carried: "CarriedStep", delivered: DeliveredAlone, forces: Array
+        self, carried: CarriedStep, delivered: DeliveredAlone, forces: Array
     ) -> PartCall:
         """Return the call that decides what is delivered where contacts carry."""
         bounds, result = self._limits.bounds, carried.qp.result
@@ -374,7 +237,7 @@ class Actuation:
         )
 
     def calls_with_offset(
-        self, a: Array, offset: Array, delivered: "DeliveredAlone"
+        self, a: Array, offset: Array, delivered: DeliveredAlone
     ) -> PartCalls:
         """Return the calls equivalent to `deliver`, where the effort is `direct`.
 
@@ -404,7 +267,7 @@ class Actuation:
         """Return a QP with room for all rows, and the calls that solve it if needed."""
         if self._qp is None:
             return None, []
-        qp = self._limited_step(sum(len(each.least) for each in self._rows.values()))
+        qp = self._limited_step(self._limit_checks.count)
         return qp, [qp.nearest_if(self.outcome.violated, before, self._rows)]
 
     def _delivering(
@@ -412,7 +275,7 @@ class Actuation:
         qp: LimitedStep | None,
         a: Array,
         effort: Array,
-        delivered: "DeliveredAlone",
+        delivered: DeliveredAlone,
     ) -> PartCall:
         """Return the call that selects the delivered effort."""
         nearest = self.own if qp is None else qp.result
@@ -480,14 +343,14 @@ class Actuation:
             wanted += offset
             effort_ok = bool(self._effort_within())
         elif self.direct:
-            return self._nearest(a, False, self._barriers())
+            return self._nearest(a, False, self._limit_checks.barriers())
         forces, tau = self.own.forces, self._tau
         if self.direct and motion_ok and effort_ok:
             return Delivered(tau, a, forces, EXACT, 0.0)
         if support.size:
             support.update(self._law)
             forces = support.minimum_norm_forces(wanted)
-        barriers = self._barriers()
+        barriers = self._limit_checks.barriers()
         for A, least in barriers.values():
             motion_ok = motion_ok and bool((A @ a >= least).all())
         forces_ok = not support.size or support.permits()
@@ -500,22 +363,6 @@ class Actuation:
         """Solve the QP where the last step has left it; nothing of it is used."""
         if self._qp is not None:
             self._qp.solve(False, {})
-
-    def _barriers(self) -> Barriers:
-        """Return the rows A a ≥ lower for barriers and static efforts, by kind."""
-        limits, state = self._limits.limits, self._state
-        found: dict[str, tuple[Array, Array]] = {}
-        if limits is None:
-            return found
-        found |= {kind: rows.used for kind, rows in self._rows.items()}
-        if limits.barriers and "barriers" not in self._rows:
-            wanted = self._wanted.acceleration
-            parts = [
-                each.rows(state, limits.bandwidth, wanted) for each in limits.barriers
-            ]
-            A, lower = (np.concatenate(each) for each in zip(*parts, strict=True))
-            found["barriers"] = A, lower
-        return found
 
     def _nearest(self, a: Array, redistribute: bool, barriers: Barriers) -> Delivered:
         """Return the nearest to the law's command within the limits."""
