@@ -6,6 +6,7 @@ import numpy as np
 import pinocchio as pin
 import pytest
 from loaded_robots import load
+from places import further
 from task_cases import FRAMES
 
 import hsp_control as hsp
@@ -105,7 +106,7 @@ def test_a_centre_of_mass_out_of_reach_rests() -> None:
     assert rests(robot, q0, hsp.CenterOfMass(hsp.Hold(here + 0.5 * rng.normal(size=3))))
 
 
-@pytest.mark.parametrize("name", ["panda", "ur5"])
+@pytest.mark.parametrize("name", ["panda", *further("ur5")])
 def test_a_height_out_of_reach_rests(name: str) -> None:
     """All joints draw the hand up, against the inertia of the whole arm."""
     robot = load(name)

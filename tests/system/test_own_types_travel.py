@@ -3,7 +3,7 @@
 from pathlib import Path
 
 import pytest
-from places import further
+from places import THOROUGH, further
 from typing_commands import PATIENCE, hsp, script
 
 PARTS = """
@@ -50,6 +50,11 @@ WITH_LOG = {
     "of its robot": "export out/mine-robot.npz --html out/robot.html",
     "of a play": "run out/mine-play.npz",
 }
+USUAL = {
+    "parts.py": ["run", "check", "live", "play"],
+    "--import": ["run", "live", "sweep"],
+}
+"""With a list, and with the option: each command unless thorough once, or twice."""
 WITHOUT_CONTROLLER = "no controller, only the log's columns are drawn"
 
 
@@ -70,8 +75,9 @@ def folder(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFact
     imports = f"imports: [{request.param}]\n" if listed else ""
     (folder / "mine.yaml").write_text(CONFIG + imports)
     option = "" if listed else " --import parts.py"
-    for line in WITH_CONFIGURATION.values():
-        hsp(line + option, folder)
+    for name, line in WITH_CONFIGURATION.items():
+        if THOROUGH or name in USUAL[request.param]:
+            hsp(line + option, folder)
     return folder
 
 
@@ -151,9 +157,9 @@ with hsp.Recorder(arm, "out/recorded.npz") as recorder:
             said = hsp(f"view out/{log}.npz --no-browser", tmp_path)
             known = WITHOUT_CONTROLLER not in said
             assert known == (name == "one"), (name, log)
-        # A log with a controller, and one without; test_every_log.py has the others.
-        hsp("export out/experiment.npz --html out/experiment.html", tmp_path)
-        hsp("plot out/own.npz", tmp_path)
+        if name == "two" or THOROUGH:  # test_every_log.py has the others
+            hsp("export out/experiment.npz --html out/experiment.html", tmp_path)
+            hsp("plot out/own.npz", tmp_path)
         if name == "one":
             hsp("run experiment.yaml --set simulation.duration=0.05", tmp_path)
             hsp("run out/recorded.npz", tmp_path)

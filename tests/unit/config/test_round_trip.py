@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 import yaml
 from exported_schema import validator
+from places import covering
 from wording import wording
 
 from hsp_control import (
@@ -88,8 +89,7 @@ def scenarios() -> dict[str, Scenario]:
 SCENARIOS = scenarios()
 
 
-@pytest.mark.parametrize("defaults", [False, True])
-@pytest.mark.parametrize("name", SCENARIOS)
+@pytest.mark.parametrize(("name", "defaults"), covering(SCENARIOS, [False, True]))
 def test_a_configuration_equals_what_it_becomes_as_data(
     name: str, defaults: bool
 ) -> None:

@@ -9,7 +9,7 @@ import pytest
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 from loaded_robots import panda
-from places import THOROUGH
+from places import THOROUGH, covering
 from runs import held
 from static_rows import static_rows
 
@@ -61,9 +61,10 @@ def inverse_cost(law: BoundLaw, held: Array) -> Array:
     return JT.T @ JT
 
 
-@pytest.mark.parametrize("levels", [1, 3])
-@pytest.mark.parametrize("threshold", [1e-3, 0.2, 0.5, 0.999, 1.0, 5.0])
-@pytest.mark.parametrize("metric", METRICS)
+@pytest.mark.parametrize(
+    ("threshold", "metric", "levels"),
+    covering([1e-3, 0.2, 0.5, 0.999, 1.0, 5.0], METRICS, [1, 3], times=2),
+)
 @given(seeds)
 @settings(max_examples=30 if THOROUGH else 3)
 def test_levels_share_directions_as_the_law_does(

@@ -8,6 +8,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from loaded_robots import panda
+from places import THOROUGH
 from runs import held
 
 import hsp_control as hsp
@@ -181,7 +182,7 @@ def test_the_margin_of_the_speed_covers_an_error_up_to_half_the_speed() -> None:
 
 
 @given(seeds)
-@settings(max_examples=50)
+@settings(max_examples=50 if THOROUGH else 20)
 def test_without_an_active_limit_the_qp_gives_the_law(seed: int) -> None:
     """Wide limits: the step is the law's, to the last bit, over random states."""
     robot, rng = panda(), np.random.default_rng(seed)
@@ -234,7 +235,7 @@ def limit_rich(seed: int) -> tuple[hsp.Controller, RobotLimits, Array]:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("seed", range(6))
+@pytest.mark.parametrize("seed", range(6 if THOROUGH else 3))
 def test_no_limit_is_violated(seed: int) -> None:
     """Limit-rich rollouts; benchmarks/limit_rollouts.py runs a thousand of them."""
     controller, limits, q0 = limit_rich(seed)
