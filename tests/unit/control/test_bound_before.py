@@ -8,7 +8,7 @@ from typing import Literal
 import numpy as np
 import pytest
 from each_change import BACK, CHANGES, PERIOD, ROBOT, controller, step
-from places import THOROUGH
+from places import THOROUGH, covering
 
 import hsp_control as hsp
 from hsp_control import engine
@@ -42,8 +42,7 @@ class _Refused(dict[str, object]):
         raise AssertionError(f"a call of {name} is bound in a step")
 
 
-@pytest.mark.parametrize("kind", CHANGES)
-@pytest.mark.parametrize("begun", [True, False])
+@pytest.mark.parametrize(("kind", "begun"), covering(CHANGES, [True, False]))
 def test_no_step_around_a_change_binds(
     kind: str, begun: bool, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -95,7 +95,7 @@ class Pushed(RigidBodyPlant):
 def test_an_unknown_effort_moves_the_hand_as_far_as_is_told(joint: int) -> None:
     """A hundredth of what is told for 1 N·m, where the arm is linear."""
     small = 0.01
-    for compensation in (ALONE, Compensation()):
+    for compensation in (*further(ALONE), Compensation()):
         found, made, q = borne("panda", compensation)
         plant = Pushed(made.robot)
         plant.push = small * np.eye(7)[joint]
