@@ -75,7 +75,7 @@ CALLS ?= tests/unit/engine tests/unit/law tests/unit/edge tests/unit/tasks tests
 assertions: $(STAMP) $(ENGINE) ## those of the engine, with Eigen's assertions and no allocation
 	@HSP_ENGINE=$$($(BIN)/python hatch_build.py Debug) \
 	  $(BIN)/python -m pytest $(SPREAD) $(CALLS) $(ARGS)
-	@HSP_ENGINE=$$($(BIN)/python hatch_build.py Debug) \
+	@HSP_THOROUGH=1 HSP_ENGINE=$$($(BIN)/python hatch_build.py Debug) \
 	  $(BIN)/python -m pytest tests/unit/engine/test_misuse.py -m process
 
 sanitize: $(STAMP) $(ENGINE) ## those of the engine, under AddressSanitizer and UBSan (needs g++)

@@ -3,7 +3,7 @@
 from pathlib import Path
 
 import pytest
-from places import THOROUGH
+from places import THOROUGH, further
 from typing_commands import PATIENCE, hsp, in_this_process, script
 
 CONFIG = """
@@ -107,6 +107,7 @@ def test_a_walk_s_log_is_taken(folder: Path) -> None:
         in_this_process(command.format(log=log, name="walk"), folder)
 
 
-def test_a_sweep_s_file_is_drawn(folder: Path) -> None:
-    hsp("sweep mine.yaml --over null_space.gain=5,8 --workers 1", folder)
+@pytest.mark.parametrize("workers", further(1))  # as in test_sweep_command.py
+def test_a_sweep_s_file_is_drawn(workers: int, folder: Path) -> None:
+    hsp(f"sweep mine.yaml --over null_space.gain=5,8 --workers {workers}", folder)
     hsp("plot out/mine-sweep.parquet", folder)
