@@ -13,6 +13,7 @@ import numpy as np
 import pinocchio as pin
 import pytest
 from places import THOROUGH
+from states import moved
 
 import hsp_control as hsp
 from hsp_control.common.arrays import Array
@@ -68,7 +69,7 @@ def unmoved(state: hsp.RobotState) -> Array:
 
 def smallest(robot: hsp.Robot, frame: str, q: Array, rows: int) -> float:
     """Return the smallest singular value of J over the robot's size."""
-    J = robot.state(0.0, q, np.zeros(robot.nv)).frame(frame).jacobian[:rows]
+    J = moved(robot, 0.0, q).frame(frame).jacobian[:rows]
     return float(np.linalg.svd(J, compute_uv=False)[-1]) / robot.size
 
 

@@ -10,6 +10,7 @@ from hypothesis import strategies as st
 from loaded_robots import panda
 from places import THOROUGH
 from runs import held
+from states import at_home
 
 import hsp_control as hsp
 from hsp_control import engine
@@ -18,8 +19,6 @@ from hsp_control.constraints.limits import ObstacleDistance, RobotLimits, SelfDi
 from hsp_control.control.actuation import Status
 from hsp_control.control.actuation.sent_effort import SentEffort, SentMemory
 from hsp_control.control.compensation import Compensation, MomentumObserver
-from hsp_control.geometry import Scene
-from hsp_control.geometry.scene import Start
 from hsp_control.simulation.plants import (
     EffortDelay,
     Friction,
@@ -48,10 +47,6 @@ def hand(frequency: float = 10.0, **circle: Any) -> hsp.FramePosition:
 def of(robot: hsp.Robot, **options: Any) -> RobotLimits:
     """Return limits as numbers of a robot."""
     return hsp.Limits(**options).placed(at_home(robot))
-
-
-def at_home(robot: hsp.Robot, *scene: hsp.Obstacle) -> Start:
-    return Start(robot.state(0.0, robot.home(), np.zeros(robot.nv)), Scene(scene))
 
 
 def bounds(

@@ -8,7 +8,7 @@ from zlib import crc32
 import numpy as np
 import pinocchio as pin
 import pytest
-from lies import LIES, THE_SIGN, Lie, Sensors, is_seen_at_rest
+from lies import LIES, THE_SIGN, Lie, Sensors, begun, is_seen_at_rest
 from live_rigs import PERIOD, Rig, start, watched
 from loaded_robots import panda
 from places import THOROUGH, covering, further
@@ -669,19 +669,14 @@ AGREEING: dict[str, Lie] = {
     for name, change in {
         "-1": lambda s: (s.q[-1] - s.since, s.v[-1] - 1.0),
         "+1": lambda s: (s.q[-1] + s.since, s.v[-1] + 1.0),
-        "a tenth": lambda s: (first(s).q + 0.1 * (s.q[-1] - first(s).q), 0.1 * s.v[-1]),
+        "a tenth": lambda s: (begun(s).q + 0.1 * (s.q[-1] - begun(s).q), 0.1 * s.v[-1]),
         "-0.1 times": lambda s: (
-            first(s).q - 0.1 * (s.q[-1] - first(s).q),
+            begun(s).q - 0.1 * (s.q[-1] - begun(s).q),
             -0.1 * s.v[-1],
         ),
     }.items()
 }
 """Lies in which velocity and positions agree; the heavy joints reveal them."""
-
-
-def first(sensors: Sensors) -> Measurement:
-    assert sensors.first is not None
-    return sensors.first
 
 
 @pytest.mark.parametrize(
