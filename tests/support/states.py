@@ -1,4 +1,4 @@
-"""States for differences: one of each robot, moved to where it is wanted. And starts."""
+"""States for differences, one of each robot, moved to where it is wanted; at home."""
 
 from functools import lru_cache
 
