@@ -155,7 +155,7 @@ def test_a_wrong_velocity_is_named_and_braked_with_the_slope(kind: str) -> None:
     assert robot.robot.reason == "the loop has ended"
 
 
-@pytest.mark.parametrize("kind", ["stuck", "drifting", "mirrored"])
+@pytest.mark.parametrize("kind", ["drifting", "mirrored", *further("stuck")])
 def test_a_wrong_position_is_braked_with_the_velocity(kind: str) -> None:
     what = "both" if kind == "mirrored" else "position"
     _, report = run(IN_MOTION, LIES[f"{what}: {kind}"], [3])
@@ -244,7 +244,7 @@ def test_a_joint_with_the_wrong_sign_is_left_to_the_robot(
     assert np.abs(robot.robot.v).max() < 0.5  # 0.3 s of damping may be too short
 
 
-@pytest.mark.parametrize("begin", [60, 120, 180])
+@pytest.mark.parametrize("begin", [120, *further(60, 180)])
 def test_a_fault_while_the_arm_accelerates_does_not_throw_its_wrist(begin: int) -> None:
     """Efforts change by their rate: heavy joints lag, and drag the light ones along."""
     robot, report = run(begin, LIES["effort: none"], [4])
@@ -302,9 +302,8 @@ class Noisy(Rig):
 @pytest.mark.parametrize(
     ("noise", "delay", "frequency"),
     [
-        (0.0, 0.005, 20.0),
-        (0.05, 0.0, np.inf),
-        *further((0.0, 0.0, np.inf), (0.05, 0.005, 20.0)),
+        (0.05, 0.005, 20.0),
+        *further((0.0, 0.0, np.inf), (0.05, 0.0, np.inf), (0.0, 0.005, 20.0)),
     ],
 )
 @pytest.mark.parametrize("encoder", [1.5e-3, *further(0.0)])
@@ -631,7 +630,7 @@ def test_noise_in_motion_says_nothing_of_rest() -> None:
     assert not found.dead.any()
 
 
-@pytest.mark.parametrize("share", [0.8, 1.2])
+@pytest.mark.parametrize("share", [1.2, *further(0.8)])
 def test_wrong_masses_are_no_lie(share: float) -> None:
     """With noise, delay, filter and lost states."""
     robot = Noisy(0.05, 0.005, 20.0, 0.1, 0.0, seed=3)
@@ -657,7 +656,7 @@ def test_an_unknown_load_is_no_lie() -> None:
     loaded = hsp.Robot.from_pinocchio(model)
     plant = IntegratedPlant(RigidBodyPlant(loaded), SemiImplicitEuler(PERIOD))
     robot = Rig(SimulatedRobot(plant, start(), np.zeros(7), PERIOD, settings=PATIENT))
-    report = run_loop(moving(), robot, duration=2.0, settings=SETTINGS)
+    report = run_loop(moving(), robot, duration=1.2, settings=SETTINGS)
     assert report.ended == "completed", report.reason  # its stop does not sink
     assert report.at_rest
 
