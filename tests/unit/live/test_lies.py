@@ -656,7 +656,7 @@ def test_an_unknown_load_is_no_lie() -> None:
     loaded = hsp.Robot.from_pinocchio(model)
     plant = IntegratedPlant(RigidBodyPlant(loaded), SemiImplicitEuler(PERIOD))
     robot = Rig(SimulatedRobot(plant, start(), np.zeros(7), PERIOD, settings=PATIENT))
-    report = run_loop(moving(), robot, duration=1.2, settings=SETTINGS)
+    report = run_loop(moving(), robot, duration=2.0, settings=SETTINGS)
     assert report.ended == "completed", report.reason  # its stop does not sink
     assert report.at_rest
 
