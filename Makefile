@@ -61,8 +61,9 @@ SPREAD := -n $(WORKERS) --dist worksteal
 test: $(STAMP) $(ENGINE) ## run the tests, but for those of test-system
 	@$(BIN)/python -m pytest $(SPREAD) -m "not system" $(ARGS)
 
+# They wait for clocks and for processes: one more of them keeps the cores busy.
 test-system: $(STAMP) $(ENGINE) ## run those of browsers, notebooks, processes and whole walks
-	@$(BIN)/python -m pytest $(SPREAD) -m system $(ARGS)
+	@$(BIN)/python -m pytest $(SPREAD) -n $$(($(WORKERS) + 1)) -m system $(ARGS)
 
 thorough: assertions sanitize ## run the tests with more seeds, every configuration's page, some mutants
 	@HSP_THOROUGH=1 $(BIN)/python -m pytest $(SPREAD) $(ARGS)
@@ -75,7 +76,7 @@ CALLS ?= tests/unit/engine tests/unit/law tests/unit/edge tests/unit/tasks tests
 assertions: $(STAMP) $(ENGINE) ## those of the engine, with Eigen's assertions and no allocation
 	@HSP_ENGINE=$$($(BIN)/python hatch_build.py Debug) \
 	  $(BIN)/python -m pytest $(SPREAD) $(CALLS) $(ARGS)
-	@HSP_ENGINE=$$($(BIN)/python hatch_build.py Debug) \
+	@HSP_THOROUGH=1 HSP_ENGINE=$$($(BIN)/python hatch_build.py Debug) \
 	  $(BIN)/python -m pytest tests/unit/engine/test_misuse.py -m process
 
 sanitize: $(STAMP) $(ENGINE) ## those of the engine, under AddressSanitizer and UBSan (needs g++)

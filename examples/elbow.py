@@ -14,7 +14,7 @@ def elbow_angle(state):
     )
     axis = (wrist - shoulder) / np.linalg.norm(wrist - shoulder)
     up = np.array([0.0, 0.0, 1.0]) - axis[2] * axis
-    aside = np.cross(axis, up)
+    aside = np.array([axis[1], -axis[0], 0.0])  # axis × z
     away = elbow - shoulder
     return np.arctan2(away @ aside, away @ up)
 

@@ -1,7 +1,7 @@
 """Convex hulls and capsules that enclose points, meshes and ellipsoids."""
 
 from collections.abc import Callable
-from functools import partial
+from functools import lru_cache, partial
 from typing import Any
 
 import numpy as np
@@ -37,10 +37,18 @@ def enclosing_capsule(points: Array) -> tuple[Array, Array, float]:
 
     The direction and the offset of its axis minimise the volume, by a local search from
     each of the three principal axes. For a given axis the segment is the shortest; the
-    ends of a sphere are equal.
+    ends of a sphere are equal. It is remembered: a robot is often loaded again.
     """
+    ends, radius = _enclosing(np.asarray(points, dtype=float).tobytes())
+    return *np.array(ends), radius
+
+
+@lru_cache(maxsize=512)  # of 40 robots; a kilobyte to 40 a shape
+def _enclosing(data: bytes) -> tuple[tuple[Array, Array], float]:
+    """Return the ends of a capsule and its radius [m]; of points (k, 3), row by row."""
     from scipy.optimize import minimize  # here: SciPy takes long to import
 
+    points = np.frombuffer(data).reshape(-1, 3)
     center = points.mean(axis=0)
     spread = points - center
     axes = np.linalg.svd(spread.T @ spread)[
@@ -60,7 +68,7 @@ def enclosing_capsule(points: Array) -> tuple[Array, Array, float]:
         candidates.append((float(found.fun), k, axis(found.x)))
     _, _, (anchor, direction) = min(candidates, key=lambda candidate: candidate[:2])
     low, high, radius = _segment(points, anchor, direction)
-    return anchor + low * direction, anchor + high * direction, radius
+    return (anchor + low * direction, anchor + high * direction), radius
 
 
 def _axis(center: Array, frame: Array, scale: float, x: Array) -> tuple[Array, Array]:
@@ -81,8 +89,10 @@ def _segment(
     points: Array, anchor: Array, direction: Array
 ) -> tuple[float, float, float]:
     """Return (low, high, radius) of the shortest capsule that contains the points."""
-    along = (points - anchor) @ direction
-    across = np.linalg.norm(points - anchor - np.outer(along, direction), axis=1)
+    away = points - anchor
+    along = away @ direction
+    away -= along[:, None] * direction
+    across = np.sqrt(np.add.reduce(away * away, axis=1))
     radius = float(across.max())
     cap = np.sqrt(np.maximum(radius**2 - across**2, 0.0))
     low, high = float((along + cap).min()), float((along - cap).max())

@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 import pytest
 from loaded_robots import panda
+from places import further
 from scipy.integrate import simpson
 
 import hsp_control as hsp
@@ -88,7 +89,9 @@ def test_an_unknown_force_at_the_hand_does_not_reach_the_null_space(name: str) -
 # --- the spring ----------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("metric", [IdentityMetric(), MassMatrixMetric()], ids=repr)
+@pytest.mark.parametrize(
+    "metric", [IdentityMetric(), *further(MassMatrixMetric())], ids=repr
+)
 def test_under_a_constant_force_the_hand_rests_where_the_spring_holds_it(
     metric: Metric,
 ) -> None:
@@ -117,7 +120,9 @@ def inertia(q: Array, rows: int) -> Array:
     return np.linalg.inv(J @ np.linalg.solve(state.mass_matrix, J.T))
 
 
-@pytest.mark.parametrize("metric", [IdentityMetric(), MassMatrixMetric()], ids=repr)
+@pytest.mark.parametrize(
+    "metric", [MassMatrixMetric(), *further(IdentityMetric())], ids=repr
+)
 def test_the_energy_is_what_came_in_less_what_was_damped(metric: Metric) -> None:
     """E' = fᵀv - e'ᵀDe' + ½ eᵀK'e, E = ½ e'ᵀΛe' + ½ eᵀKe: passive at the hand.
 
@@ -150,7 +155,7 @@ def test_the_energy_is_what_came_in_less_what_was_damped(metric: Metric) -> None
 
 
 @pytest.mark.parametrize(
-    "damping", [{"damping": 40.0}, {"damping_ratio": 0.7}], ids=repr
+    "damping", [{"damping_ratio": 0.7}, *further({"damping": 40.0})], ids=repr
 )
 def test_a_stiffness_that_changes_adds_no_energy(damping: dict[str, float]) -> None:
     """Held away by a force, the hand waits; let go, it becomes stiffer as it moves.

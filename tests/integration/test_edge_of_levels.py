@@ -6,6 +6,7 @@ import numpy as np
 import pinocchio as pin
 import pytest
 from loaded_robots import load
+from places import further
 from task_cases import FRAMES
 
 import hsp_control as hsp
@@ -30,7 +31,7 @@ def rests_at(name: str, q0: Array, away: Array, *below: hsp.Task) -> float:
     return float(np.linalg.norm(left))
 
 
-@pytest.mark.parametrize("name", ["panda", "ur5"])
+@pytest.mark.parametrize("name", ["ur5", *further("panda")])
 def test_the_hand_is_as_near_as_it_can_be_whatever_is_asked_below(name: str) -> None:
     """A position half a metre too far, above an orientation, above a posture."""
     robot, q0 = load(name), load(name).home()
@@ -105,7 +106,7 @@ def test_a_centre_of_mass_out_of_reach_rests() -> None:
     assert rests(robot, q0, hsp.CenterOfMass(hsp.Hold(here + 0.5 * rng.normal(size=3))))
 
 
-@pytest.mark.parametrize("name", ["panda", "ur5"])
+@pytest.mark.parametrize("name", ["panda", *further("ur5")])
 def test_a_height_out_of_reach_rests(name: str) -> None:
     """All joints draw the hand up, against the inertia of the whole arm."""
     robot = load(name)

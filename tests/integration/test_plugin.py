@@ -6,7 +6,7 @@ import sys
 from pathlib import Path
 
 import pytest
-from places import ROOT
+from places import ROOT, further
 from typing_commands import READY
 
 EXAMPLE = ROOT / "examples" / "plugin"
@@ -60,7 +60,7 @@ def test_it_runs_plots_and_exports(installed: Path, tmp_path: Path) -> None:
     hsp(installed, f"run {DEMO} --out . --set simulation.duration=0.3", tmp_path)
     log = "demo-simulation.duration=0.3.npz"
     for line in (
-        f"plot {log}",
+        *further(f"plot {log}"),
         f"export {log} --html demo.html",
         f"run {log} --out again",
     ):

@@ -4,6 +4,7 @@ from functools import partial
 
 import numpy as np
 import pytest
+from places import covering
 
 import hsp_control as hsp
 from hsp_control.common.arrays import Array
@@ -43,8 +44,7 @@ FIELDS = {
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("field", FIELDS)
-@pytest.mark.parametrize("name", ARMS)
+@pytest.mark.parametrize(("name", "field"), covering(ARMS, FIELDS, times=2))
 def test_a_field_that_pushes_into_limits_leaves_the_task(name: str, field: str) -> None:
     """The hand stays where it is, while joints are driven into their limits."""
     robot, (kind, size) = hsp.Robot.load(name), FIELDS[field]

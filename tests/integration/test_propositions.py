@@ -12,6 +12,7 @@ import numpy as np
 import pinocchio as pin
 import pytest
 from loaded_robots import load
+from places import covering
 from scipy.optimize import minimize
 
 from hsp_control import (
@@ -336,13 +337,13 @@ class Run:
         return np.diag(rng.uniform(5.0, 9.0, nv)) + 0.3 * rng.normal(size=(nv, nv))
 
 
-RUNS = [
-    Run(robot, metric, gain)
-    for robot in FRAMES
+KINDS = [
+    (metric, gain)
     for metric in METRICS
     for gain in ("scalar", "matrix")
     if (metric, gain) != ("mass matrix", "matrix")  # refused
 ]
+RUNS = [Run(robot, *kind) for robot, kind in covering(FRAMES, KINDS)]
 every_run = pytest.mark.parametrize("run", RUNS, ids=str)
 
 
@@ -492,9 +493,7 @@ HELD: dict[str, Held] = {
         pull, centering_and_posture,
         lambda q: pin.log6(hand(home("panda")).actInv(hand(q))).vector, 2.0, 4.0),
 }  # fmt: skip
-HELD_RUNS = [
-    (which, metric) for which in HELD for metric in ("identity", "mass matrix")
-]
+HELD_RUNS = covering(HELD, ["mass matrix", "identity"])
 
 
 @cache

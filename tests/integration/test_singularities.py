@@ -9,7 +9,7 @@ of 1/s, so ‖J#‖ ≤ 1.0887/ε. With κ = 1.0887/ε and x = g - v, for the id
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from functools import cache
+from functools import cache, lru_cache
 from typing import Any
 
 import numpy as np
@@ -150,14 +150,16 @@ def driven(
     span = np.array(swing)
     there_and_back = 4.0  # [s]
 
-    def hand(t: float) -> Any:
+    @lru_cache(maxsize=256)
+    def hand(t: float) -> tuple[Array, Array]:
         u = np.clip(t / there_and_back, 0.0, 1.0)
         angle = 2.0 * np.pi * u**4 * (35.0 - 84.0 * u + 70.0 * u**2 - 20.0 * u**3)
-        return state.update(0.0, singular + span * np.cos(angle), still).frame(frame)
+        there = state.update(0.0, singular + span * np.cos(angle), still).frame(frame)
+        return there.position.copy(), there.rotation.copy()
 
     path = ComposedPose(
-        CallableTrajectory(lambda t: hand(t).position.copy(), 3),
-        CallableOrientation(lambda t: hand(t).rotation.copy()),
+        CallableTrajectory(lambda t: hand(t)[0], 3),
+        CallableOrientation(lambda t: hand(t)[1]),
     )
     task = FramePose(frame, path, gains=Gains(natural_frequency=FREQUENCY))
     return Passage(robot, task, singular + span, 5.0, DEFAULT, effort=80.0, step=0.0025)
@@ -181,10 +183,8 @@ PASSAGES: dict[str, Callable[[], Passage]] = {
         [0.1, -0.1, 0.1, 0.1, -0.3, 0.6, 0.1],
     ),
 }
-every_passage = pytest.mark.parametrize(
-    "which",
-    PASSAGES if THOROUGH else [name for name in PASSAGES if name != "iiwa14 wrist"],
-)
+USUAL = ["planar arm stretched", "panda out of reach", "panda elbow"]
+every_passage = pytest.mark.parametrize("which", PASSAGES if THOROUGH else USUAL)
 
 
 @cache
@@ -257,7 +257,7 @@ def test_effort_is_bounded_in_the_singularity(which: str) -> None:
 
 # --- random starts -------------------------------------------------------------------
 
-STARTS = 1250 if THOROUGH else 200
+STARTS = 1250 if THOROUGH else 100
 ROBOTS = {
     "planar3r": "xy", "panda": "pose", "iiwa14": "pose", "ur5": "xyz", "kinova": "xyz",
     "xarm7": "pose", "talos_arm": "pose", "tiago_no_hand": "pose",

@@ -1,5 +1,6 @@
 """A controller amid a stream: copies, pickles and previews go on, to the last bit."""
 
+import os
 import pickle
 import subprocess
 import sys
@@ -11,6 +12,7 @@ from typing import Any
 import numpy as np
 import pinocchio as pin
 import pytest
+from places import covering
 
 import hsp_control as hsp
 from hsp_control.tasks import RelativePose
@@ -92,20 +94,29 @@ def amid(kind: str, policy: str) -> hsp.Controller:
     return controller
 
 
+CASES = covering(KINDS, POLICIES)
+every_case = pytest.mark.parametrize(("kind", "policy"), CASES)
+
+
 @pytest.fixture(scope="module")
 def elsewhere(tmp_path_factory: pytest.TempPathFactory) -> dict[str, list[bytes]]:
     """Return the efforts of pickles that go on in another process, by case."""
     file = tmp_path_factory.mktemp("amid") / "controllers.pkl"
-    cases = {f"{k} {p}": pickle.dumps(amid(k, p)) for k in KINDS for p in POLICIES}
+    cases = {f"{k} {p}": pickle.dumps(amid(k, p)) for k, p in CASES}
     file.write_bytes(pickle.dumps(cases))
     command = [sys.executable, __file__, str(file)]
-    done = subprocess.run(command, check=True, stdout=subprocess.PIPE)
+    path = os.pathsep.join(filter(None, sys.path))  # of this file's own imports
+    done = subprocess.run(
+        command,
+        check=True,
+        stdout=subprocess.PIPE,
+        env={**os.environ, "PYTHONPATH": path},
+    )
     found: dict[str, list[bytes]] = pickle.loads(done.stdout)
     return found
 
 
-@pytest.mark.parametrize("policy", POLICIES)
-@pytest.mark.parametrize("kind", KINDS)
+@every_case
 def test_a_pickle_goes_on_elsewhere_to_the_last_bit(
     elsewhere: dict[str, list[bytes]], kind: str, policy: str
 ) -> None:
@@ -114,8 +125,7 @@ def test_a_pickle_goes_on_elsewhere_to_the_last_bit(
     assert len(set(expected)) > 50  # it was moving
 
 
-@pytest.mark.parametrize("policy", POLICIES)
-@pytest.mark.parametrize("kind", KINDS)
+@every_case
 def test_copies_go_on_and_what_looks_ahead_moves_nothing(
     kind: str, policy: str
 ) -> None:

@@ -52,7 +52,7 @@ def test_talos_on_two_feet() -> None:
 def test_talos_with_a_weak_arm() -> None:
     """At its torque limit, the hand gives way and comes back; all else goes on."""
     name, shorter = "talos_weak_arm", "simulation.duration=3.4"
-    rollout = run(name, shorter, "simulation.log_period=0.001")
+    rollout = run(name, shorter, "simulation.log_period=0.005")
     assert rollout.meta["status"] == "completed"
     limits = load_experiment(f"whole_body/{name}").controller.limits
     assert limits is not None
@@ -60,7 +60,7 @@ def test_talos_with_a_weak_arm() -> None:
     names = rollout.meta["robot"]["dofs"]
     elbow = names.index("arm_right_4_joint")
     assert used.max() <= 1.0 + 1e-9
-    assert (used[:, elbow] > 0.999).sum() > 50  # it is met, for a while
+    assert (used[:, elbow] > 0.999).sum() > 10  # it is met, for a while
     assert rollout["status"].max() == Status.LIMITED
     assert (rollout["status"] == Status.LIMITED).mean() > 0.3
     mass = np.linalg.norm(rollout["task.center_of_mass.error"], axis=1)

@@ -242,10 +242,8 @@ MEMBERS: dict[str, Member] = {
         rate_accuracy=2e-11,
     ),
 }
-every_field = pytest.mark.parametrize(
-    ("name", "which"),
-    [(name, which) for which, m in MEMBERS.items() for name in m.robots],
-)
+FIELD_CASES = [(name, which) for which, m in MEMBERS.items() for name in m.robots]
+every_field = pytest.mark.parametrize(("name", "which"), FIELD_CASES)
 
 
 def metrics(

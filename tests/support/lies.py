@@ -77,7 +77,8 @@ def _both(change: Callable[[Sensors], Values]) -> Lie:
     return lambda s, m: m._replace(**dict(zip("qv", change(s), strict=True)))
 
 
-def _begun(sensors: Sensors) -> Measurement:
+def begun(sensors: Sensors) -> Measurement:
+    """Return the measurement at which a lie began."""
     assert sensors.first is not None
     return sensors.first
 
@@ -113,7 +114,7 @@ VELOCITY: dict[str, Lie] = {
     "a third more": _v(lambda s, v: 1.33 * v),
     "-3 times": _v(lambda s, v: -3.0 * v),
     "none": _v(lambda s, v: 0.0 * v),
-    "stuck": _v(lambda s, v: _begun(s).v),
+    "stuck": _v(lambda s, v: begun(s).v),
     "stuck at 1": _v(lambda s, v: np.ones_like(v)),
     "another joint's": _v(lambda s, v: np.roll(v, 1)),
     "the next joint's": _v(lambda s, v: np.roll(v, -1)),
@@ -139,7 +140,7 @@ POSITION: dict[str, Lie] = {
     "+0.1": _q(lambda s, q: q + 0.1),
     "+0.015": _q(lambda s, q: q + 0.015),
     "-0.015": _q(lambda s, q: q - 0.015),
-    "stuck": _q(lambda s, q: _begun(s).q),
+    "stuck": _q(lambda s, q: begun(s).q),
     "the sign": _q(lambda s, q: -q),
     "a tenth more": _q(lambda s, q: 1.1 * q),
     "one hundredth more": _q(lambda s, q: 1.01 * q),
@@ -152,13 +153,13 @@ POSITION: dict[str, Lie] = {
     "coarse": _q(lambda s, q: np.round(q / 0.02) * 0.02),
 }
 BOTH: dict[str, Lie] = {
-    "stands": _both(lambda s: (_begun(s).q, 0.0 * _begun(s).v)),
-    "frozen": _both(lambda s: (_begun(s).q, _begun(s).v)),
+    "stands": _both(lambda s: (begun(s).q, 0.0 * begun(s).v)),
+    "frozen": _both(lambda s: (begun(s).q, begun(s).v)),
     "+1 and +0.1": _both(lambda s: (s.q[-1] + 0.1, s.v[-1] + 1.0)),
     "other joints'": _both(lambda s: (np.roll(s.q[-1], 1), np.roll(s.v[-1], 1))),
     "contrary": _both(lambda s: (s.q[-1] + 0.5 * s.since, s.v[-1] - 0.5)),
-    "stuck, with +1": _both(lambda s: (_begun(s).q, s.v[-1] + 1.0)),
-    "mirrored": _both(lambda s: (2.0 * _begun(s).q - s.q[-1], s.v[-1])),
+    "stuck, with +1": _both(lambda s: (begun(s).q, s.v[-1] + 1.0)),
+    "mirrored": _both(lambda s: (2.0 * begun(s).q - s.q[-1], s.v[-1])),
 }
 EFFORT: dict[str, Lie] = {
     "+60": _applied(lambda s, tau: tau + 60.0),
@@ -174,8 +175,8 @@ TIME: dict[str, Lie] = {
     "+0.01": _t(lambda s, t: t + 0.01),
     "twice as fast": _t(lambda s, t: t + s.since),
     "half as fast": _t(lambda s, t: t - 0.5 * s.since),
-    "stands": _t(lambda s, t: _begun(s).t),
-    "backwards": _t(lambda s, t: 2.0 * _begun(s).t - t),
+    "stands": _t(lambda s, t: begun(s).t),
+    "backwards": _t(lambda s, t: 2.0 * begun(s).t - t),
     "jitter": _t(lambda s, t: t + s.rng.uniform(-0.005, 0.005)),
     "in milliseconds": _t(lambda s, t: 1000.0 * t),
 }
@@ -205,5 +206,5 @@ def is_seen_at_rest(lie: Lie) -> bool:
     return False
 
 
-THE_SIGN: Lie = _both(lambda s: (2.0 * _begun(s).q - s.q[-1], -s.v[-1]))
+THE_SIGN: Lie = _both(lambda s: (2.0 * begun(s).q - s.q[-1], -s.v[-1]))
 """Position and velocity agree with each other, and nothing with the efforts."""

@@ -1,4 +1,4 @@
-"""States for differences: one of each robot, moved to where it is wanted."""
+"""States for differences, one of each robot, moved to where it is wanted; at home."""
 
 from functools import lru_cache
 
@@ -6,6 +6,7 @@ import numpy as np
 
 import hsp_control as hsp
 from hsp_control.common.arrays import Array
+from hsp_control.geometry.scene import Scene, Start
 from hsp_control.robot.state import RobotState
 
 
@@ -18,6 +19,12 @@ def moved(robot: hsp.Robot, t: float, q: Array, v: Array | None = None) -> Robot
     state = _state(robot)
     state.update(t, q, np.zeros(robot.nv) if v is None else v)
     return state
+
+
+def at_home(robot: hsp.Robot, *scene: hsp.Obstacle) -> Start:
+    """Return a start at rest at home, in a scene: what parts are placed with."""
+    state = robot.state(0.0, robot.home(), np.zeros(robot.nv))
+    return Start(state, Scene(scene))
 
 
 @lru_cache(maxsize=32)

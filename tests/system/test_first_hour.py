@@ -15,6 +15,7 @@ from hsp_control.common.resources import bundled_robots
 pytestmark = pytest.mark.process
 
 Capture = pytest.CaptureFixture[str]
+SHORT = "--set simulation.duration=0.5"
 
 
 def page(name: str, language: str) -> list[str]:
@@ -53,8 +54,8 @@ def _in_a_folder_with_the_readme_s_yaml(
 
 def test_a_gain_is_changed_and_the_runs_are_compared(capsys: Capture) -> None:
     changed = command("README.md", "hsp run mine.yaml --set")
-    slow = kept(hsp("hsp run mine.yaml", capsys), "slow.npz")
-    quick = kept(hsp(changed, capsys), "quick.npz")
+    slow = kept(hsp(f"hsp run mine.yaml {SHORT}", capsys), "slow.npz")
+    quick = kept(hsp(f"{changed} {SHORT}", capsys), "quick.npz")
     at = slow.t == 0.1
     for run, gain in ((slow, 8.0), (quick, 20.0)):
         decay = run["null_space_norm"] / run["null_space_norm"][0]
@@ -93,7 +94,7 @@ def test_a_cost_of_one_s_own_from_python_and_from_yaml(capsys: Capture) -> None:
     text = Path("mine.yaml").read_text()
     text = text.replace("{type: joint_centering, weight: 2}", declared)
     Path("mine.yaml").write_text(text)
-    run = kept(hsp(line, capsys), "elbow.npz")
+    run = kept(hsp(f"{line} {SHORT}", capsys), "elbow.npz")
     start = space["robot"].state(0.0, run.q[0], run.v[0])
     value = 20.0 * space["elbow_at_its_height"](start)
     np.testing.assert_allclose(run["field.value"][0], value, rtol=1e-12)

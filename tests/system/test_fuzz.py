@@ -52,7 +52,7 @@ def test_frozen_controllers(config: str, compensators: tuple[str, ...]) -> None:
 
 
 @pytest.mark.parametrize(
-    ("kind", "cases"), [("yaml", 30 if THOROUGH else 12), ("urdf", 5)]
+    ("kind", "cases"), [("yaml", 30 if THOROUGH else 5), ("urdf", 5)]
 )
 def test_mutated_files(kind: str, cases: int) -> None:
     count = count_cases(KINDS[kind], SEED, cases)
@@ -108,7 +108,7 @@ def test_a_disk_that_fills(run: Rollout, log: Path) -> None:
 
 
 def test_ctrl_c_at_any_moment(log: Path) -> None:
-    sample(3, lambda r, f: faults.interrupted(r, f, log, 6.0))
+    sample(3 if THOROUGH else 2, lambda r, f: faults.interrupted(r, f, log, 6.0))
 
 
 def test_a_run_that_cannot_be_saved_is_saved_elsewhere(

@@ -15,6 +15,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from places import further
 
 import hsp_control as hsp
 from hsp_control import Rollout
@@ -214,7 +215,9 @@ def test_a_robot_that_cannot_start_says_so(tmp_path: Path) -> None:
     robot.close()
 
 
-@pytest.mark.parametrize("raised", [KeyboardInterrupt, SystemExit, MemoryError])
+@pytest.mark.parametrize(
+    "raised", [KeyboardInterrupt, *further(SystemExit, MemoryError)]
+)
 def test_a_start_that_is_cut_short_leaves_no_process(
     raised: type[BaseException], monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -1,9 +1,11 @@
 """A type of one's own is known to every command: by ``--import``, or by one list."""
 
+from collections.abc import Callable
+from functools import cache
 from pathlib import Path
 
 import pytest
-from places import further
+from places import THOROUGH, further
 from typing_commands import PATIENCE, hsp, script
 
 PARTS = """
@@ -50,6 +52,11 @@ WITH_LOG = {
     "of its robot": "export out/mine-robot.npz --html out/robot.html",
     "of a play": "run out/mine-play.npz",
 }
+USUAL = {
+    "parts.py": ["run", "check", "live", "play"],
+    "--import": ["run", "live", "sweep"],
+}
+"""With a list, and with the option: each command unless thorough once, or twice."""
 WITHOUT_CONTROLLER = "no controller, only the log's columns are drawn"
 
 
@@ -62,22 +69,33 @@ CASES = [
 
 
 @pytest.fixture(scope="module")
-def folder(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory):
-    """Return a folder with logs, whose types a list names, or an option."""
-    folder = tmp_path_factory.mktemp("own")
-    (folder / "parts.py").write_text(PARTS)
-    listed = request.param != "--import"
-    imports = f"imports: [{request.param}]\n" if listed else ""
-    (folder / "mine.yaml").write_text(CONFIG + imports)
-    option = "" if listed else " --import parts.py"
-    for line in WITH_CONFIGURATION.values():
-        hsp(line + option, folder)
+def folders(tmp_path_factory: pytest.TempPathFactory) -> Callable[[str], Path]:
+    """Make folders with logs, one for each way in which the types are named.
+
+    Not a fixture with parameters: pytest makes one anew for each row of a table.
+    """
+
+    @cache
+    def folder(how: str) -> Path:
+        made = tmp_path_factory.mktemp("own")
+        (made / "parts.py").write_text(PARTS)
+        listed = how != "--import"
+        imports = f"imports: [{how}]\n" if listed else ""
+        (made / "mine.yaml").write_text(CONFIG + imports)
+        option = "" if listed else " --import parts.py"
+        for name, line in WITH_CONFIGURATION.items():
+            if THOROUGH or name in USUAL[how]:
+                hsp(line + option, made)
+        return made
+
     return folder
 
 
-@pytest.mark.parametrize(("folder", "what"), CASES, indirect=["folder"])
-def test_a_log_is_read_with_its_own_types(folder: Path, what: str) -> None:
-    assert WITHOUT_CONTROLLER not in hsp(WITH_LOG[what], folder)
+@pytest.mark.parametrize(("how", "what"), CASES)
+def test_a_log_is_read_with_its_own_types(
+    folders: Callable[[str], Path], how: str, what: str
+) -> None:
+    assert WITHOUT_CONTROLLER not in hsp(WITH_LOG[what], folders(how))
 
 
 def test_a_module_of_a_package_is_found_on_the_path(
@@ -151,9 +169,9 @@ with hsp.Recorder(arm, "out/recorded.npz") as recorder:
             said = hsp(f"view out/{log}.npz --no-browser", tmp_path)
             known = WITHOUT_CONTROLLER not in said
             assert known == (name == "one"), (name, log)
-        # A log with a controller, and one without; test_every_log.py has the others.
-        hsp("export out/experiment.npz --html out/experiment.html", tmp_path)
-        hsp("plot out/own.npz", tmp_path)
+        if name == "two" or THOROUGH:  # test_every_log.py has the others
+            hsp("export out/experiment.npz --html out/experiment.html", tmp_path)
+            hsp("plot out/own.npz", tmp_path)
         if name == "one":
             hsp("run experiment.yaml --set simulation.duration=0.05", tmp_path)
             hsp("run out/recorded.npz", tmp_path)

@@ -6,6 +6,7 @@ import sys
 from pathlib import Path
 
 import pytest
+from places import covering
 
 from hsp_control.common.exceptions import (
     ConfigError,
@@ -30,8 +31,10 @@ sys.exit(7 if descriptor > 2 and sys.stdin.read() == "" else 3)
 """
 
 
-@pytest.mark.parametrize("closed", [(), (1,), (2,), (1, 2), (0, 1, 2)])
-@pytest.mark.parametrize("encoding", ["ascii", "utf-8", "latin-1"])
+@pytest.mark.parametrize(
+    ("closed", "encoding"),
+    covering([(), (1,), (2,), (1, 2), (0, 1, 2)], ["ascii", "utf-8", "latin-1"]),
+)
 @pytest.mark.process
 @pytest.mark.smoke
 def test_any_text_can_be_written(closed: tuple[int, ...], encoding: str) -> None:

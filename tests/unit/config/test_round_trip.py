@@ -2,6 +2,7 @@
 
 import json
 from dataclasses import fields
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -9,6 +10,7 @@ import numpy as np
 import pytest
 import yaml
 from exported_schema import validator
+from places import covering
 from wording import wording
 
 from hsp_control import (
@@ -75,25 +77,23 @@ EVERYTHING: dict[str, Any] = {
 }  # fmt: skip
 
 
-def scenarios() -> dict[str, Scenario]:
-    """Return the bundled configurations, and one with a little of everything."""
-    found = {
-        name: validate(Document.read(file), Scenario)
-        for name, file in bundled_configs().items()
-    }
-    everything = validate(Document(EVERYTHING, {}, "everything"), Scenario)
-    return {**found, "everything": everything}
+NAMES = [*bundled_configs(), "everything"]
 
 
-SCENARIOS = scenarios()
+@cache
+def scenario_of(name: str) -> Scenario:
+    """Return a bundled configuration, or the one with a little of everything."""
+    bundled = bundled_configs()
+    if name in bundled:
+        return validate(Document.read(bundled[name]), Scenario)
+    return validate(Document(EVERYTHING, {}, name), Scenario)
 
 
-@pytest.mark.parametrize("defaults", [False, True])
-@pytest.mark.parametrize("name", SCENARIOS)
+@pytest.mark.parametrize(("name", "defaults"), covering(NAMES, [False, True]))
 def test_a_configuration_equals_what_it_becomes_as_data(
     name: str, defaults: bool
 ) -> None:
-    scenario = SCENARIOS[name]
+    scenario = scenario_of(name)
     data = plain_data(scenario, defaults=defaults)
     assert validate(Document(data, {}, name), Scenario) == scenario
     # JSON and YAML change nothing either.
@@ -104,7 +104,7 @@ def test_a_configuration_equals_what_it_becomes_as_data(
 
 
 def test_with_defaults_no_key_is_missing() -> None:
-    data = plain_data(SCENARIOS["everything"], defaults=True)
+    data = plain_data(scenario_of("everything"), defaults=True)
     assert set(data) == {field.name for field in fields(Scenario)}
     assert data["scene"]["obstacles"]["ball"]["center"]["origin"] == "world"
     assert data["tasks"]["hand"]["blend"] is None

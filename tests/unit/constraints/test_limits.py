@@ -3,7 +3,6 @@
 ``tests/unit/control/test_limits.py`` has what the controller does with them.
 """
 
-from collections.abc import Sequence
 from functools import cache
 from itertools import pairwise
 from typing import Any
@@ -12,6 +11,7 @@ import numpy as np
 import pytest
 from loaded_robots import panda
 from places import further
+from states import at_home
 
 from hsp_control import Hold, Limits, Obstacle, Robot, Sphere
 from hsp_control.common.arrays import Array
@@ -32,7 +32,6 @@ from hsp_control.constraints.limits import (
     Scaled,
     SelfDistance,
 )
-from hsp_control.geometry.scene import Scene, Start
 from hsp_control.geometry.shapes import Box, PointCloud
 from hsp_control.trajectories import Lissajous
 
@@ -49,12 +48,8 @@ def talos() -> Robot:
     return Robot.load("talos")
 
 
-def at_home(robot: Robot, scene: Sequence[Obstacle] = ()) -> Start:
-    return Start(robot.state(0.0, robot.home(), np.zeros(robot.nv)), Scene(scene))
-
-
 def of(robot: Robot, *scene: Obstacle, **options: Any) -> RobotLimits:
-    return Limits(**options).placed(at_home(robot, scene))
+    return Limits(**options).placed(at_home(robot, *scene))
 
 
 # --- numbers -------------------------------------------------------------------------
@@ -246,7 +241,7 @@ DISTANCES: dict[str, MinimumDistance] = {
 def test_distance_rows_are_its_second_derivative(kind: str) -> None:
     """∇d·a + drift = d'' along q ⊕ (s v + ½ s² a) at t + s, by differences."""
     robot = panda()
-    limit = DISTANCES[kind].placed(at_home(robot, [ball(), table()]))
+    limit = DISTANCES[kind].placed(at_home(robot, ball(), table()))
     rng = np.random.default_rng(2)
     v, a = 0.3 * rng.standard_normal(7), rng.standard_normal(7)
     q = robot.integrate(robot.home(), 0.3 * rng.standard_normal(7))  # nothing parallel
@@ -281,8 +276,8 @@ def test_the_rows_are_those_of_single_pairs(name: str) -> None:
     robot, rng = Robot.load(name), np.random.default_rng(4)
     points = rng.uniform(-0.05, 0.05, (20, 3))
     cloud = Obstacle("cloud", PointCloud(points, 0.01), Hold([0.4, 0.3, 0.4]))
-    start = at_home(robot, [Obstacle("ball", Sphere(0.08), Hold([0.4, -0.3, 0.4]))])
-    seen = at_home(robot, [cloud])
+    start = at_home(robot, Obstacle("ball", Sphere(0.08), Hold([0.4, -0.3, 0.4])))
+    seen = at_home(robot, cloud)
     q = robot.integrate(robot.home(), 0.1 * rng.standard_normal(robot.nv))
     state = robot.state(0.4, q, 0.3 * rng.standard_normal(robot.nv))
     wanted = 1e4 * rng.standard_normal(robot.nv)  # so that also far pairs count
@@ -305,7 +300,7 @@ def test_the_rows_are_those_of_single_pairs(name: str) -> None:
 def test_a_row_turns_no_corner_in_one_step() -> None:
     """A capsule's side ends: d'' jumps by 3.3 m/s², and efforts have to follow."""
     robot, rng = panda(), np.random.default_rng(6)
-    limit = ObstacleDistance().placed(at_home(robot, [ball(), table()]))
+    limit = ObstacleDistance().placed(at_home(robot, ball(), table()))
     v = rng.standard_normal(7)
     q = robot.integrate(robot.home(), 0.2 * rng.standard_normal(7))
     way = [robot.integrate(q, s * v) for s in np.arange(-0.15, 0.15, 1e-3)]

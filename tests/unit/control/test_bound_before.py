@@ -8,6 +8,7 @@ from typing import Literal
 import numpy as np
 import pytest
 from each_change import BACK, CHANGES, PERIOD, ROBOT, controller, step
+from places import THOROUGH, covering
 
 import hsp_control as hsp
 from hsp_control import engine
@@ -41,8 +42,7 @@ class _Refused(dict[str, object]):
         raise AssertionError(f"a call of {name} is bound in a step")
 
 
-@pytest.mark.parametrize("kind", CHANGES)
-@pytest.mark.parametrize("begun", [True, False])
+@pytest.mark.parametrize(("kind", "begun"), covering(CHANGES, [True, False]))
 def test_no_step_around_a_change_binds(
     kind: str, begun: bool, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -97,7 +97,7 @@ def test_what_is_over_is_forgotten(kind: str) -> None:
         # as many steps for any number: they are counted, in the clock's check as well
         made = controller()
         step(made, 0)
-        for k in range(1, 1500):
+        for k in range(1, 1500 if THOROUGH else 500):
             if k % 40 == 1 and k < 40 * number:
                 CHANGES[kind](made.at(k * H).ramp(0.02))
                 if kind in BACK:
@@ -110,7 +110,7 @@ def test_what_is_over_is_forgotten(kind: str) -> None:
         plan = str(made.step_plan)
         return len(pickle.dumps(made)), repr(made), len(plan)
 
-    few, many = kept(2), kept(30)
+    few, many = kept(2), kept(30 if THOROUGH else 10)
     assert many[1:] == few[1:]
     assert abs(many[0] - few[0]) < 50  # digits of counts and times
 

@@ -4,6 +4,7 @@ from collections.abc import Callable
 
 import numpy as np
 import pytest
+from places import covering
 
 import hsp_control as hsp
 from hsp_control.control.actuation import Actuation, Status
@@ -56,8 +57,7 @@ def test_no_part_is_delivered_by_python(
         made.applied(made.compute(*moves(k)).tau, H)
 
 
-@pytest.mark.parametrize("speed", [None, 0.31])
-@pytest.mark.parametrize("kind", CHANGES)
+@pytest.mark.parametrize(("kind", "speed"), covering(CHANGES, [0.31, None]))
 def test_it_delivers_what_its_parts_do(kind: str, speed: float | None) -> None:
     """As with a modifier, which is called part by part, and here adds nothing."""
     whole, parts = controller(kind, speed), controller(kind, speed)

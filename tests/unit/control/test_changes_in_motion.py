@@ -12,6 +12,7 @@ import pytest
 from hypothesis import assume, given
 from hypothesis import strategies as st
 from loaded_robots import panda
+from places import covering
 from runs import check_null_space
 from scipy.integrate import quad, solve_ivp
 
@@ -142,9 +143,9 @@ CHANGES: dict[str, Callable[[hsp.Controller], Any]] = {
 }
 
 
-@pytest.mark.parametrize("what", CHANGES)
 @pytest.mark.parametrize(
-    "metric", [hsp.metrics.IdentityMetric(), hsp.metrics.MassMatrixMetric()]
+    ("what", "metric"),
+    covering(CHANGES, [hsp.metrics.MassMatrixMetric(), hsp.metrics.IdentityMetric()]),
 )
 def test_proposition_2_holds_all_the_way(what: str, metric: hsp.metrics.Metric) -> None:
     """‖e_N‖_W decays like exp(-K_N t) before, through and after the change."""

@@ -22,7 +22,7 @@ from hsp_control.trajectories import HoldOrientation, Schedule
 ROBOTS = ["panda", *further("planar3r", "ur5", "iiwa14", "xarm7")]
 
 many = settings(
-    max_examples=40 if THOROUGH else 3, deadline=None, derandomize=not THOROUGH
+    max_examples=40 if THOROUGH else 2, deadline=None, derandomize=not THOROUGH
 )
 seeds = st.integers(0, 2**32 - 1)
 

@@ -9,6 +9,7 @@ import pytest
 from compensation_cases import ALL, EVERYTHING, PANDA, Q0, H, circle, controller
 from compensators import ALONE, only
 from numpy.testing import assert_allclose, assert_array_equal
+from places import covering, further
 from scipy.linalg import expm
 from task_cases import placed
 
@@ -99,8 +100,9 @@ def test_compensators_need_a_control_period() -> None:
 # ------------------------------------------------------------------ momentum observer
 
 
-@pytest.mark.parametrize("name", ["panda", "iiwa14", "planar3r"])
-@pytest.mark.parametrize("rate", [20.0, 200.0])
+@pytest.mark.parametrize(
+    ("name", "rate"), covering(["panda", "iiwa14", "planar3r"], [20.0, 200.0])
+)
 def test_the_observer_is_a_low_pass_on_what_pushes(name: str, rate: float) -> None:
     """r = d (1 - exp(-K_O t)) for a constant d, while the robot falls about.
 
@@ -323,7 +325,9 @@ def test_half_of_the_power_passes_at_the_cut_off(order: int) -> None:
     assert t[-1] - late[-1] == pytest.approx(declared.delay, abs=0.51 * H)
 
 
-@pytest.mark.parametrize(("efforts", "sensors"), [(1, 0), (2, 0), (0, 1), (1, 2)])
+@pytest.mark.parametrize(
+    ("efforts", "sensors"), [(2, 0), (1, 2), *further((1, 0), (0, 1))]
+)
 def test_the_predictor_knows_where_the_robot_will_be(
     efforts: int, sensors: int
 ) -> None:

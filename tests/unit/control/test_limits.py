@@ -8,7 +8,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from loaded_robots import panda
+from places import THOROUGH
 from runs import held
+from states import at_home
 
 import hsp_control as hsp
 from hsp_control import engine
@@ -17,8 +19,6 @@ from hsp_control.constraints.limits import ObstacleDistance, RobotLimits, SelfDi
 from hsp_control.control.actuation import Status
 from hsp_control.control.actuation.sent_effort import SentEffort, SentMemory
 from hsp_control.control.compensation import Compensation, MomentumObserver
-from hsp_control.geometry import Scene
-from hsp_control.geometry.scene import Start
 from hsp_control.simulation.plants import (
     EffortDelay,
     Friction,
@@ -47,10 +47,6 @@ def hand(frequency: float = 10.0, **circle: Any) -> hsp.FramePosition:
 def of(robot: hsp.Robot, **options: Any) -> RobotLimits:
     """Return limits as numbers of a robot."""
     return hsp.Limits(**options).placed(at_home(robot))
-
-
-def at_home(robot: hsp.Robot, *scene: hsp.Obstacle) -> Start:
-    return Start(robot.state(0.0, robot.home(), np.zeros(robot.nv)), Scene(scene))
 
 
 def bounds(
@@ -181,7 +177,7 @@ def test_the_margin_of_the_speed_covers_an_error_up_to_half_the_speed() -> None:
 
 
 @given(seeds)
-@settings(max_examples=50)
+@settings(max_examples=50 if THOROUGH else 20)
 def test_without_an_active_limit_the_qp_gives_the_law(seed: int) -> None:
     """Wide limits: the step is the law's, to the last bit, over random states."""
     robot, rng = panda(), np.random.default_rng(seed)
@@ -234,7 +230,7 @@ def limit_rich(seed: int) -> tuple[hsp.Controller, RobotLimits, Array]:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("seed", range(6))
+@pytest.mark.parametrize("seed", range(6 if THOROUGH else 3))
 def test_no_limit_is_violated(seed: int) -> None:
     """Limit-rich rollouts; benchmarks/limit_rollouts.py runs a thousand of them."""
     controller, limits, q0 = limit_rich(seed)

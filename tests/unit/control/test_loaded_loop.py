@@ -85,9 +85,7 @@ CASES: dict[str, tuple[dict[str, Any], int]] = {
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(
-    "case", CASES if THOROUGH else ["integral action", "measured two periods late"]
-)
+@pytest.mark.parametrize("case", CASES if THOROUGH else ["measured two periods late"])
 def test_the_robot_grows_and_decays_at_the_rate_of_the_linear_loop(case: str) -> None:
     """On both sides of the boundary, with the load that the linear loop tells.
 

@@ -11,6 +11,7 @@ import pinocchio as pin
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from places import THOROUGH
 from robot_cases import load
 
 import hsp_control as hsp
@@ -19,7 +20,7 @@ from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import GainError
 from hsp_control.control.fitting import checked_gain
 
-COUNT = 2500
+COUNT = 2500 if THOROUGH else 1000
 """Gains for each of four robots."""
 ROBOTS = ("planar3r", "panda", "ur5", "talos_arm_free_flyer")
 seeds = st.integers(0, 2**32 - 1)

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 import pinocchio as pin
 import pytest
+from places import further
 
 import hsp_control as hsp
 from hsp_control.cli.live_experiment import simulated_robot
@@ -120,12 +121,10 @@ def test_efforts_have_no_jump() -> None:
 @pytest.mark.parametrize(
     "plant",
     [
-        plants.RigidBody(),
         plants.RigidBody(friction=plants.Friction(viscous=0.1)),
-        plants.RigidBody(sensors=[plants.SensorDelay(1)]),
         plants.RigidBody(pushes=[plants.Push("panda_link4", (0.0, 1.0, 0.0))]),
+        *further(plants.RigidBody(), plants.RigidBody(sensors=[plants.SensorDelay(1)])),
     ],
-    ids=["bodies", "friction", "sensors", "pushes"],
 )
 def test_simulated_bodies_carry_it(plant: Any) -> None:
     """At 1 kHz; a robot that did not would miss by 0.1 m without an observer."""

@@ -5,6 +5,7 @@ from pathlib import Path
 
 import pytest
 from frozen_runs import EXAMPLE, compiled
+from places import further
 
 import hsp_control as hsp
 
@@ -37,7 +38,7 @@ def test_libfranka_s_callback_brakes_and_ends(frozen: Path, tmp_path: Path) -> N
     assert "t, q or v is not finite" in done.stderr
 
 
-@pytest.mark.parametrize("release", ["HUMBLE", "LATER"])
+@pytest.mark.parametrize("release", ["LATER", *further("HUMBLE")])
 def test_a_controller_of_ros2_control_brakes(
     release: str, frozen: Path, tmp_path: Path
 ) -> None:

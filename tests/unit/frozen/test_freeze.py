@@ -12,6 +12,7 @@ from frozen_runs import (
     replayed,
     simulated_states,
 )
+from places import THOROUGH
 
 import hsp_control as hsp
 from hsp_control.common.exceptions import EngineError, FreezeError
@@ -232,9 +233,9 @@ def test_every_bundled_configuration(replay: Path, tmp_path: Path) -> None:
         except FreezeError as error:
             refused[name] = error.path
             continue
-        given = controller.robot, experiment.q0, 200, SEED
+        given = controller.robot, experiment.q0, 200 if THOROUGH else 50, SEED
         for states in (
-            simulated_states(experiment, 0.2),
+            simulated_states(experiment, 0.2 if THOROUGH else 0.05),
             random_states(*given, away=0.4, speed=0.5),
         ):
             np.testing.assert_array_equal(

@@ -15,6 +15,7 @@ from frozen_library import (
     WRONG_VALUE,
     Opened,
 )
+from places import THOROUGH, covering
 
 import hsp_control as hsp
 from hsp_control.common.exceptions import FreezeError
@@ -145,7 +146,7 @@ def test_targets_with_velocities_and_times(kind: str, tmp_path: Path) -> None:
         pair.target(value, **given)
 
     for far in (0.002, 0.05, 0.5):
-        for _ in range(40):
+        for _ in range(40 if THOROUGH else 15):
             orders = ["", "t", "t", "t", "v", "tv", "vt", "vtv", "tt", "ttvtt"]
             for each in orders[rng.integers(len(orders))]:
                 if each == "t":
@@ -185,8 +186,7 @@ def test_a_velocity_that_is_repeated_fades_when_it_is_not(tmp_path: Path) -> Non
     assert errors[-1, 0] > 0.015  # 0.1 m/s for 0.2 s, and on for what fades
 
 
-@pytest.mark.parametrize("kind", WAYPOINTS)
-@pytest.mark.parametrize("every", [1, 4, 16])
+@pytest.mark.parametrize(("kind", "every"), covering(WAYPOINTS, [1, 4, 16]))
 def test_a_hand_that_moves_is_followed_through_its_waypoints(
     kind: str, every: int, tmp_path: Path
 ) -> None:

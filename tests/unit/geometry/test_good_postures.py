@@ -3,6 +3,7 @@
 import numpy as np
 import pinocchio as pin
 import pytest
+from places import further
 
 from hsp_control import Robot
 from hsp_control.common.exceptions import ConfigurationError, FrameNotFoundError
@@ -100,7 +101,7 @@ def two_arms(name: str, apart: float) -> Robot:
     return Robot.combine({"left": (arm, places[0]), "right": (arm, places[1])})
 
 
-@pytest.mark.parametrize("apart", [0.2, 0.6])
+@pytest.mark.parametrize("apart", [0.2, *further(0.6)])
 def test_two_equal_arms_side_by_side_begin_well(apart: float) -> None:
     """One posture in six is clear of a UR10's own links: none of 50 for both."""
     robot = two_arms("ur10", apart)

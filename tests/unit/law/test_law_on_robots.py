@@ -15,6 +15,7 @@ from law_cases import load
 from law_numbers import positive
 from numpy.testing import assert_allclose
 from oracles import slope
+from places import covering
 from task_cases import placed
 
 import hsp_control as hsp
@@ -255,9 +256,9 @@ def test_coordinates_metric_is_equation_13_in_those_coordinates(name: str) -> No
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("name", CASES)
-@pytest.mark.parametrize("kind", METRICS)
-@pytest.mark.parametrize("gain", ["scalar", "matrix"])
+@pytest.mark.parametrize(
+    ("name", "kind", "gain"), covering(CASES, METRICS, ["scalar", "matrix"], times=2)
+)
 def test_lyapunov_function_decays_as_proved(name: str, kind: str, gain: str) -> None:
     """d/dt ½e_NᵀWe_N = -e_NᵀW K_N e_N, by differences of V along the closed loop.
 

@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 from live_rigs import PERIOD, Rig, always, law, missing, nan_velocity, start, watched
 from loaded_robots import panda
+from places import further
 
 import hsp_control as hsp
 from hsp_control import (
@@ -280,7 +281,7 @@ def test_a_robot_that_is_silent_or_unfit_is_not_started() -> None:
     assert rig.closed
 
 
-@pytest.mark.parametrize("at_first", [None, Limits()])
+@pytest.mark.parametrize("at_first", [None, *further(Limits())])
 def test_the_monitor_follows_limits_that_change(at_first: Limits | None) -> None:
     q = start()
     wide = PositionRange(q - 0.3, q + 0.3)

@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from live_rigs import PERIOD, Array, Rig, gravity, law, start, watched
 from loaded_robots import panda
-from places import THOROUGH
+from places import THOROUGH, covering
 from wording import wording
 
 from hsp_control import Gains, Robot
@@ -131,8 +131,9 @@ class Lossy(Rig):
             self.sent.append(np.array(effort))
 
 
-@pytest.mark.parametrize("compensates", [False, True])
-@pytest.mark.parametrize("says", [True, False])
+@pytest.mark.parametrize(
+    ("compensates", "says"), covering([False, True], [True, False])
+)
 def test_lost_efforts_do_not_add_up_where_the_robot_says_what_it_has(
     says: bool, compensates: bool
 ) -> None:
@@ -164,7 +165,7 @@ def test_lost_efforts_do_not_add_up_where_the_robot_says_what_it_has(
 
 
 @pytest.mark.slow
-@settings(max_examples=40 if THOROUGH else 8)
+@settings(max_examples=40 if THOROUGH else 4)
 @given(seed=st.integers(0, 2**32 - 1), loss=st.sampled_from([0.1, 0.3]))
 def test_a_robot_never_rejects_an_effort_over_a_bad_line(
     seed: int, loss: float

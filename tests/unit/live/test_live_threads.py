@@ -8,6 +8,7 @@ import pytest
 from live_rigs import PERIOD, Rig, start, watched
 from loaded_robots import panda
 from odd_errors import NamelessError, OddError
+from places import further
 
 import hsp_control as hsp
 from hsp_control.live import LoopReport, run_loop
@@ -51,7 +52,10 @@ def streamed(kind: FailingKind, monkeypatch: pytest.MonkeyPatch) -> hsp.Controll
 
 @pytest.mark.parametrize(
     "error",
-    [CancelledError("x"), GeneratorExit(), OddError("panic"), NamelessError()],
+    [
+        NamelessError(),
+        *further(CancelledError("x"), GeneratorExit(), OddError("panic")),
+    ],
     ids=lambda error: type(error).__name__,
 )
 def test_what_a_streams_thread_raises_ends_in_the_safe_stop(

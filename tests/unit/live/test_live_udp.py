@@ -10,6 +10,7 @@ from hypothesis import strategies as st
 from live_rigs import PERIOD, start, watched
 from loaded_robots import panda
 from odd_errors import OddError
+from places import covering
 
 from hsp_control.common.exceptions import HardwareError, LiveError
 from hsp_control.live import (
@@ -304,8 +305,12 @@ def test_a_robot_that_is_held_up_says_for_how_long(
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("raised", [OddError, MemoryError, SystemExit, GeneratorExit])
-@pytest.mark.parametrize("what", ["row", "receive", "send"])
+@pytest.mark.parametrize(
+    ("raised", "what"),
+    covering(
+        [OddError, MemoryError, SystemExit, GeneratorExit], ["row", "receive", "send"]
+    ),
+)
 def test_whatever_is_raised_around_a_served_robot_stops_it(
     what: str, raised: type[BaseException], monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -15,6 +15,7 @@ from clearance_cases import AIR, agree, barrier_at, flowing, turned
 from loaded_robots import load
 from odd_robots import FACES, OCTAHEDRON, write_stl
 from oracles import gradient
+from places import covering
 from states import moved
 
 from hsp_control import Controller, Cost, FramePosition, Gains, Obstacle, simulate
@@ -57,8 +58,7 @@ OBSTACLES: dict[str, Callable[[Path], Obstacle]] = {
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("kind", OBSTACLES)
-@pytest.mark.parametrize("name", ["panda", "iiwa14"])
+@pytest.mark.parametrize(("kind", "name"), covering(OBSTACLES, ["panda", "iiwa14"]))
 def test_gradient_and_rate_for_every_shape(
     name: str, kind: str, tmp_path: Path
 ) -> None:

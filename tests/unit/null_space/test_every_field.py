@@ -2,8 +2,9 @@
 
 import numpy as np
 import pytest
-from field_cases import MEMBERS, draw, evaluate, every_field, metrics
+from field_cases import FIELD_CASES, MEMBERS, draw, evaluate, every_field, metrics
 from field_oracles import TIME, derivative, load, plain
+from places import covering
 
 from hsp_control.common.arrays import Array
 from hsp_control.robot import differences
@@ -27,14 +28,17 @@ def test_value(name: str, which: str) -> None:
     assert value == pytest.approx(expected, rel=1e-13, abs=1e-13)
 
 
-@pytest.mark.parametrize("metric_name", ["identity", "constant", "mass matrix"])
-@every_field
-def test_field_and_its_rate(name: str, which: str, metric_name: str) -> None:
+@pytest.mark.parametrize(
+    ("case", "metric_name"),
+    covering(FIELD_CASES, ["identity", "constant", "mass matrix"]),
+)
+def test_field_and_its_rate(case: tuple[str, str], metric_name: str) -> None:
     """g = -W⁻¹∇f (or the vector itself), and g' its total derivative along the flow.
 
     The gradient is good to 1e-13 of f by differences of eighth order here, to 1e-12
     (`differences.gradient`) there; W⁻¹ of a mass matrix lifts either by 1e2.
     """
+    name, which = case
     member = MEMBERS[which]
     robot = load(name)
     field = member.build(name)

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 import pinocchio as pin
 import pytest
+from places import covering
 from refused_robots import NO_HAND_MASS, NO_LEADER, REFUSED
 from robot_texts import ARM, assert_same_placements, link, placements
 
@@ -35,8 +36,9 @@ def example(name: str) -> Robot:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("name", sorted(example_robots()))
-@pytest.mark.parametrize("mimic", [True, False])
+@pytest.mark.parametrize(
+    ("name", "mimic"), covering(sorted(example_robots()), [True, False])
+)
 def test_every_example_robot_loads_or_says_why_not(name: str, mimic: bool) -> None:
     """Nothing but ModelError, and of exactly the robots that are known for it."""
     reason = REFUSED.get(name)

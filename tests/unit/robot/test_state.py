@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from places import THOROUGH
 from robot_cases import ROBOTS, assert_equal_terms, draw, everything, load
 from wording import wording
 
@@ -56,7 +57,8 @@ def test_order_of_questions_does_not_matter(case: str) -> None:
         for what, question in questions.items()
     }
     # One call may leave a Jacobian that another recomputes: equal up to rounding only.
-    for order in itertools.permutations(questions):
+    orders = list(itertools.permutations(questions))
+    for order in orders if THOROUGH else orders[::7]:  # all begin one, in each place
         state = robot.state(0.0, q, v)
         first = {what: questions[what](state) for what in order}
         for what in order:

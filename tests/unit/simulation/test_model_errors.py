@@ -63,22 +63,22 @@ def test_a_delay_that_is_told_is_borne_and_a_longer_one_is_not(name: str) -> Non
         assert (growth(made, q, plant, 2.0) > 1.0) is grows, late
 
 
-@pytest.mark.parametrize(("name", "rotors"), [("panda", 0.05), ("panda", 0.02)])
-def test_rotors_that_the_drives_hide_cost_delay(name: str, rotors: float) -> None:
+@pytest.mark.parametrize("rotors", [0.05, *further(0.02)])
+def test_rotors_that_the_drives_hide_cost_delay(rotors: float) -> None:
     """Too much of a rotor is too strong a law: of a bare arm it bears less delay."""
-    made, q = holding(WrongArm(name, 0, motor_inertia=rotors))
+    made, q = holding(WrongArm("panda", 0, motor_inertia=rotors))
     found = model_errors(made, q, H, Compensation())
     assert found is not None
     assert found.hidden is not None
     assert found.hidden < 0.5 * found.delay
     assert "rotors hidden" in lines(found)
-    bare = hsp.Robot.load(name, motor_inertia=0.0)
+    bare = hsp.Robot.load("panda", motor_inertia=0.0)
     periods = round(found.hidden / H)
     for late, grows in ((periods, False), (periods + 3, True)):
         engine = IntegratedPlant(RigidBodyPlant(bare), Rk4(H))
         plant = ImperfectPlant(engine, [], [EffortDelay(late)])
         assert (growth(made, q, plant, 2.0) > 1.0) is grows, late
-    plain, *_ = borne(name, Compensation())
+    plain, *_ = borne("panda", Compensation())
     assert plain.hidden is None
 
 
@@ -95,7 +95,7 @@ class Pushed(RigidBodyPlant):
 def test_an_unknown_effort_moves_the_hand_as_far_as_is_told(joint: int) -> None:
     """A hundredth of what is told for 1 N·m, where the arm is linear."""
     small = 0.01
-    for compensation in (ALONE, Compensation()):
+    for compensation in (*further(ALONE), Compensation()):
         found, made, q = borne("panda", compensation)
         plant = Pushed(made.robot)
         plant.push = small * np.eye(7)[joint]

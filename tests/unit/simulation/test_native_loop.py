@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 from closed_loops import load, panda_controller
+from places import further
 
 from hsp_control import (
     FramePosition,
@@ -269,10 +270,8 @@ CHANGES: dict[str, Callable[[Changes], object]] = {
 }
 
 
-@pytest.mark.parametrize("change", CHANGES.values(), ids=CHANGES.keys())
-def test_a_change_is_made_where_it_begins(
-    change: Callable[[Changes], object], counted: Counted
-) -> None:
+@pytest.mark.parametrize("what", ["task", "limits", *further("gain", "field")])
+def test_a_change_is_made_where_it_begins(what: str, counted: Counted) -> None:
     """What changes is made in Python; a second after its end the loop goes on.
 
     It goes on with what is in force then.
@@ -284,7 +283,7 @@ def test_a_change_is_made_where_it_begins(
 
         def on_row(recorder: Any) -> None:
             if recorder.count == 11:  # at 0.1 s
-                change(controller.at(0.1234).ramp(0.05))
+                CHANGES[what](controller.at(0.1234).ramp(0.05))
 
         return simulate(
             controller,

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from places import further
 
 import hsp_control as hsp
 from hsp_control.simulation.demand_check import not_followed
@@ -37,7 +38,7 @@ def said(speed: float, rows: str) -> list[TooFast]:
     return [each for each in not_followed(*asked) if isinstance(each, TooFast)]
 
 
-@pytest.mark.parametrize("rows", ["pose", "position"])
+@pytest.mark.parametrize("rows", ["pose", *further("position")])
 def test_what_is_too_fast_is_said_with_place_joint_and_speed(rows: str) -> None:
     (found,) = said(4.0, rows)
     assert found.share > 1.01

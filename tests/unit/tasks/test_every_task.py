@@ -8,8 +8,10 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from loaded_robots import load
+from places import covering
 from states import moved
 from task_cases import (
+    CASES,
     GAINS,
     SECOND,
     TIME,
@@ -80,20 +82,22 @@ def shortened(task: Task, e: Array, largest: float) -> Array:
 
 
 @pytest.mark.parametrize(
-    ("part", "gains", "largest"),
-    [(0.0, "matrix", "none"), (0.03, "per row", "none"), (1 / 3, "matrix", "none"),
-     (1.0, "scalar", "none"), (1.0, "matrix", "none"), (1.0, "matrix", 0.4)],
+    ("case", "kind"),
+    covering(
+        CASES,
+        [(0.0, "matrix", "none"), (0.03, "per row", "none"), (1 / 3, "matrix", "none"),
+         (1.0, "scalar", "none"), (1.0, "matrix", "none"), (1.0, "matrix", 0.4)],
+    ),
+    ids=str,
 )  # fmt: skip
-@every_task
-def test_the_law_of_the_error(
-    case: Case, part: float, gains: str, largest: Any
-) -> None:
+def test_the_law_of_the_error(case: Case, kind: tuple[float, str, Any]) -> None:
     """With J a + J'v = a_x the reported error obeys e'' + Kv e' + Kp s(e) = 0.
 
     At errors up to 3 rad or m (2.5 rad for pointing), in motion, with any motion in
     the null space. What is left, 5e-10 of e, is the rounding of second differences
     (1e-16/h² with h = 0.5 to 10 ms) and 1e-11 of what Kp e alone amounts to.
     """
+    part, gains, largest = kind
     seed = 11
     motion = place(case, seed)
     robot, rng = motion.robot, np.random.default_rng(seed)

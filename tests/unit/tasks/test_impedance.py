@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 import pinocchio as pin
 import pytest
-from places import THOROUGH
+from places import THOROUGH, covering
 from states import moved
 from task_cases import (
     GAINS,
@@ -125,8 +125,11 @@ def inverse_inertias(task: Any, motion: Motion) -> Callable[[float], Array]:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("kind", ["ratio", "matrices", "led", "led, damped", "bounded"])
-@every_case
+@pytest.mark.parametrize(
+    ("case", "kind"),
+    covering(CASES, ["ratio", "matrices", "led", "led, damped", "bounded"], times=2),
+    ids=str,
+)
 def test_the_equation_holds_whatever_the_force_and_the_metric(
     case: Case, kind: str
 ) -> None:

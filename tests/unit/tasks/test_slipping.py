@@ -5,6 +5,7 @@ from typing import Any
 import numpy as np
 import pytest
 from loaded_robots import panda
+from places import further
 from spring_energy import spring_energy
 from task_cases import placed
 
@@ -120,7 +121,7 @@ def test_the_default_of_a_robot() -> None:
         )
 
 
-@pytest.mark.parametrize("force", [5.0, 20.0])
+@pytest.mark.parametrize("force", [20.0, *further(5.0)])
 def test_its_energy_falls(force: float) -> None:
     """E = ½ e'ᵀΛe' + U(e) falls by what is damped; within it nothing is different."""
     robot = panda()

@@ -12,6 +12,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from oracles import slope
+from places import THOROUGH
 from scipy.integrate import quad
 from trajectory_cases import CORNER, IDENTITY, POINTS, R1, R2, R3, SPIN, TIMES
 from wording import wording
@@ -44,7 +45,7 @@ from hsp_control.trajectories import (
     UniformLine,
 )
 
-quick = settings(max_examples=25, deadline=None, derandomize=True)
+quick = settings(max_examples=25 if THOROUGH else 10)
 seeds = st.integers(0, 10**6)
 
 

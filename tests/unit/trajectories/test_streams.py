@@ -11,6 +11,7 @@ import pinocchio as pin
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from places import THOROUGH
 
 from hsp_control.common.exceptions import StreamError, TrajectoryError
 from hsp_control.trajectories import (
@@ -103,7 +104,7 @@ def hostile(rng: np.random.Generator, stream: Any, n: int) -> Callable[[float], 
     return feed
 
 
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=25 if THOROUGH else 8)
 @given(st.integers(0, 2**32 - 1), st.sampled_from(POLICIES), st.floats(0.0, 0.3))
 def test_points_keep_their_bounds_whatever_is_sent(
     seed: int, policy: Any, delay: float
@@ -122,7 +123,7 @@ def test_points_keep_their_bounds_whatever_is_sent(
     assert_derivatives(x, rate, acceleration, 80.0)
 
 
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=25 if THOROUGH else 8)
 @given(st.integers(0, 2**32 - 1), st.sampled_from(POLICIES), st.floats(0.0, 0.3))
 def test_poses_keep_their_bounds_whatever_is_sent(
     seed: int, policy: Any, delay: float

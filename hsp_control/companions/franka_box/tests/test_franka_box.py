@@ -13,6 +13,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from franka_boxes import LONGEST, PATIENCE, PRELUDE, addresses, home, served
+from places import covering
 
 from hsp_control import Rollout
 
@@ -99,8 +100,10 @@ print(json.dumps(told))
 
 
 @pytest.mark.process
-@pytest.mark.parametrize("controller", ["JointImpedance", "CartesianImpedance"])
-@pytest.mark.parametrize("kind", ["position", "velocity"])
+@pytest.mark.parametrize(
+    ("controller", "kind"),
+    covering(["JointImpedance", "CartesianImpedance"], ["position", "velocity"]),
+)
 def test_motion_generators_are_tracked(kind: str, controller: str) -> None:
     with served() as rig:
         error, moved, mode = rig.run(

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 import pinocchio as pin
 import pytest
+from places import further
 from robot_texts import ARM
 from wording import wording
 
@@ -178,7 +179,7 @@ def dampers(springs: Array) -> Friction:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("name", ["talos", "g1", "solo12", "go2"])
+@pytest.mark.parametrize("name", ["talos", "solo12", *further("g1", "go2")])
 def test_a_legged_robot_stands_on_its_own_feet(name: str) -> None:
     """On the collision geometry of its feet: less than 2 cm and 2°, and it rests.
 

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 from clips import Recorder, told
+from places import further
 from wording import wording
 
 import hsp_control as hsp
@@ -314,7 +315,7 @@ def test_what_goes_wrong_ends_the_run_and_not_the_session(
     assert not session.over
 
 
-@pytest.mark.parametrize("law", ["no field", "operational-space law"])
+@pytest.mark.parametrize("law", ["operational-space law", *further("no field")])
 def test_another_law_goes_beside_it(law: str) -> None:
     """From the same state, with the same hand; the play itself does not notice."""
     both = [Session(playable("panda_obstacle")) for _ in range(2)]

@@ -14,6 +14,7 @@ import numpy as np
 import pinocchio as pin
 import pytest
 from browsers import PATIENCE, until
+from places import further
 
 from hsp_control import Robot
 from hsp_control.companions.viewer import Viewer
@@ -184,7 +185,7 @@ def test_the_ball_stays_under_the_pointer(page: Any) -> None:
 
 
 @pytest.mark.browser
-@pytest.mark.parametrize("axis", [0, 1, 2])
+@pytest.mark.parametrize("axis", [2, *further(0, 1)])
 def test_an_arrow_moves_along_its_axis(page: Any, axis: int) -> None:
     start = np.array(page.evaluate(HANDLE, ["hand", "arrow", axis]))
     along = pixel(page, [HAND[k] + 0.1 * (k == axis) for k in range(3)])
@@ -201,7 +202,7 @@ def test_an_arrow_moves_along_its_axis(page: Any, axis: int) -> None:
 
 
 @pytest.mark.browser
-@pytest.mark.parametrize("axis", [0, 1, 2])
+@pytest.mark.parametrize("axis", [0, *further(1, 2)])
 def test_a_ring_turns_about_its_axis(page: Any, axis: int) -> None:
     start = np.array(page.evaluate(HANDLE, ["hand", "ring", axis]))
     spoke = start - pixel(page, HAND)

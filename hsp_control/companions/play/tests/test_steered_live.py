@@ -11,6 +11,7 @@ from typing import Any
 
 import pytest
 from pages import Steering
+from places import further
 from played import wait_until
 
 import hsp_control as hsp
@@ -84,10 +85,11 @@ def test_a_page_moves_the_hand_and_stops_the_robot(
 
 
 @pytest.mark.process
+@pytest.mark.parametrize("steer", further("hardware"))  # test_steered_loop.py has more
 def test_a_robot_moves_while_the_key_is_held(
-    arguments: list[str], tmp_path: Path
+    steer: str, arguments: list[str], tmp_path: Path
 ) -> None:
-    live = SteeredLive("--steer=hardware", *arguments)
+    live = SteeredLive(f"--steer={steer}", *arguments)
     page = Steering(live.url)
     wait_until(lambda: any(c["type"] == "play_setup" for c in page.commands), 120.0)
     assert last(page, "play_setup")["loop"] == "held"

@@ -6,8 +6,9 @@ import sys
 from pathlib import Path
 
 import pytest
-from drawn_logs import both, changed, legend_texts, planar, visible
+from drawn_logs import PAPER, both, changed, legend_texts, planar, visible
 from matplotlib.figure import Figure, SubFigure
+from places import further
 
 import hsp_control.companions.plots as plots
 from hsp_control import Rollout
@@ -18,7 +19,7 @@ from hsp_control.common.exceptions import PlotError
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("name", ["obstacle", "several", "posture"])
+@pytest.mark.parametrize("name", ["several", *further("obstacle", "posture")])
 def test_one_row_is_drawn(logs: dict[str, Rollout], name: str) -> None:
     short = changed(logs[name], slice(1), status="interrupted", message="by the user")
     for figure in both(short):
@@ -27,13 +28,14 @@ def test_one_row_is_drawn(logs: dict[str, Rollout], name: str) -> None:
 
 
 @pytest.mark.slow
-def test_a_log_without_rows_says_so(logs: dict[str, Rollout]) -> None:
-    empty = changed(logs["rest"], slice(0), status="diverged")
+def test_a_log_without_rows_says_so() -> None:
+    whole = planar(PAPER["rest"])
+    empty = changed(whole, slice(0), status="diverged")
     for draw in (plots.paper_figure, plots.diagnostics_figure):
         with pytest.raises(PlotError, match=r"no rows to draw \(diverged\)"):
             draw(empty)
     with pytest.raises(PlotError, match="needs at least 1"):
-        plots.paper_figure(logs["rest"], times=[])
+        plots.paper_figure(whole, times=[])
 
 
 # --- files, and what drawing leaves behind -------------------------------------------
@@ -41,10 +43,8 @@ def test_a_log_without_rows_says_so(logs: dict[str, Rollout]) -> None:
 
 @pytest.mark.slow
 @pytest.mark.system
-def test_figures_are_written_in_every_format(
-    logs: dict[str, Rollout], tmp_path: Path
-) -> None:
-    log, folder = changed(logs["rest"], slice(20)), tmp_path / "new" / "folder"
+def test_figures_are_written_in_every_format(tmp_path: Path) -> None:
+    log, folder = changed(planar(PAPER["rest"]), slice(20)), tmp_path / "new" / "folder"
     files = plots.save_figures(log, folder, "run", ("pdf", "svg"))
     kinds = itertools.product(("paper", "diagnostics"), ("pdf", "svg"))
     assert files == [folder / f"run-{name}.{suffix}" for name, suffix in kinds]
@@ -52,14 +52,13 @@ def test_figures_are_written_in_every_format(
 
 
 @pytest.mark.slow
-def test_what_cannot_be_written_says_why(
-    logs: dict[str, Rollout], tmp_path: Path
-) -> None:
+def test_what_cannot_be_written_says_why(tmp_path: Path) -> None:
+    log = planar(PAPER["rest"])
     with pytest.raises(PlotError, match="no picture format 'pgn'; did you mean 'png'"):
-        plots.save_figures(logs["rest"], tmp_path, "run", ("pgn",))
+        plots.save_figures(log, tmp_path, "run", ("pgn",))
     (tmp_path / "file").touch()
     with pytest.raises(PlotError, match=r"run-paper\.png: cannot write the picture"):
-        plots.save_figures(logs["rest"], tmp_path / "file", "run")
+        plots.save_figures(log, tmp_path / "file", "run")
 
 
 @pytest.mark.slow
@@ -99,13 +98,13 @@ assert "matplotlib.pyplot" not in sys.modules
 
 
 @pytest.mark.slow
-def test_a_figure_shows_itself_in_a_notebook(logs: dict[str, Rollout]) -> None:
-    picture = plots.paper_figure(logs["rest"])._repr_png_()
+def test_a_figure_shows_itself_in_a_notebook() -> None:
+    picture = plots.paper_figure(planar(PAPER["rest"]))._repr_png_()
     assert picture.startswith(b"\x89PNG")
     assert len(picture) < 300_000
 
 
-SHOWN = ("equal", "obstacle", "space", "several", "posture")
+SHOWN = ("equal", "several", "posture", *further("obstacle", "space"))
 
 
 @pytest.fixture(scope="module")

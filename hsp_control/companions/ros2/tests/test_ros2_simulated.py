@@ -8,6 +8,7 @@ import pytest
 from live_rigs import PERIOD, law, watched
 from loaded_robots import panda
 from odd_errors import OddError
+from places import covering
 from played import wait_until
 from ros2_rigs import DOMAIN, fresh
 
@@ -141,8 +142,10 @@ def test_stamps_go_on_where_the_process_did_not(
     assert (steps.max() > 0.1) == (late > 0.1)
 
 
-@pytest.mark.parametrize("function", ["efforts", "send"])
-@pytest.mark.parametrize("raised", [OddError, MemoryError, GeneratorExit])
+@pytest.mark.parametrize(
+    ("function", "raised"),
+    covering(["efforts", "send"], [OddError, MemoryError, GeneratorExit]),
+)
 def test_whatever_a_topic_raises_stops_the_robot(
     served: Served,
     function: str,

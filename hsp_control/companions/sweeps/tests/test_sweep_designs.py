@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from places import further
 from scipy import stats
 from scipy.special import ndtr, ndtri
 
@@ -342,7 +343,7 @@ def test_a_figure_shows_the_parameters_that_are_named_as_wide_as_a_paper_needs()
         sweeps.sweep_figure(invented(), parameters=["upp"])
 
 
-@pytest.mark.parametrize("runs", [2, 3])
+@pytest.mark.parametrize("runs", [2, *further(3)])
 def test_two_or_three_values_give_a_figure_too(runs: int) -> None:
     whole = invented()
     few = {name: column[5 : 5 + runs] for name, column in whole.columns.items()}

@@ -4,6 +4,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from places import further
 
 import hsp_control.companions.plots as plots
 from hsp_control import Rollout, load_experiment
@@ -36,7 +37,7 @@ def held() -> ComparedRun:
 # -- the floor of held efforts --------------------------------------------------------
 
 
-@pytest.mark.parametrize("name", [PLANAR, "panda_obstacle"])
+@pytest.mark.parametrize("name", ["panda_obstacle", *further(PLANAR)])
 def test_the_floor_is_what_is_measured_and_falls_with_the_period(name: str) -> None:
     sizes = []
     for period in (0.001, 0.002, 0.005):
