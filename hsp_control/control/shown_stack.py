@@ -4,7 +4,7 @@ from collections.abc import Mapping
 from dataclasses import is_dataclass
 from inspect import ismethod
 from types import MappingProxyType
-from typing import TYPE_CHECKING, Any, NoReturn, cast
+from typing import Any, NoReturn, TypeVar, cast
 
 import numpy as np
 
@@ -16,8 +16,7 @@ from hsp_control.control.planned import PlannedTask
 from hsp_control.edge import BoundLaw
 from hsp_control.law import Problem
 
-if TYPE_CHECKING:  # a stack makes what is shown of it
-    from hsp_control.control.active_stack import ActiveStack
+Stack = TypeVar("Stack")  # `ActiveStack`, which makes what is shown of it
 
 _READS = {"flow", "diagnose", "field_value", "points_of", "in_world"}
 """Methods of a stack and its parts that change nothing which a step reads."""
@@ -60,9 +59,9 @@ class Shown:
         )
 
 
-def shown_stack(stack: "ActiveStack") -> "ActiveStack":
+def shown_stack(stack: Stack) -> Stack:
     """Return a stack whose arrays cannot be written, and which cannot be resolved."""
-    return cast("ActiveStack", Shown(stack, "active"))
+    return cast("Stack", Shown(stack, "active"))
 
 
 def _shown(value: Any, name: str) -> Any:
