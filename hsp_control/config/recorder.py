@@ -97,11 +97,14 @@ class Recorder:
         if self._begun == -inf:
             self._begun = state.t
             if self._config is not None:
+                placed = self._controller.setup.start.state
                 start = {
                     "configuration": state.q.tolist(),
                     "velocity": state.v.tolist(),
+                    "relative_to": placed.q.tolist(),
                 }
                 self._config["start"] = start
+                self._config["simulation"]["start_time"] = state.t
         elif self._last == self._begun:
             self._held = state.t - self._begun
         self._last = state.t

@@ -56,6 +56,29 @@ def test_a_recorded_loop_is_repeated(tmp_path: Path) -> None:
         recorder.record(output)
 
 
+def test_a_recorder_that_begins_later_repeats_its_part(tmp_path: Path) -> None:
+    """The circle is about where the controller began, and so is its time."""
+    path, robot = tmp_path / "part.npz", load("panda")
+    hand = hsp.FramePosition(name="hand", trajectory=hsp.Circle(0.05, 3.0), blend=0.01)
+    controller = hsp.Controller(robot, [hand], hsp.JointCentering())
+    q, v = robot.home(), np.zeros(robot.nv)
+    with hsp.Recorder(controller, path) as recorder:
+        for k in range(101):
+            output = controller.compute(5.0 + PERIOD * k, q, v)
+            if k >= 50:
+                recorder.record(output)
+            controller.applied(output.tau, PERIOD)
+            v = v + PERIOD * robot.forward_dynamics(q, v, output.tau)
+            q = robot.integrate(q, PERIOD * v)
+    log, again = hsp.Rollout.load(path), hsp.load_experiment(path).run()
+    np.testing.assert_allclose(again.t, np.linspace(0.05, 0.1, 6), atol=1e-12)
+    np.testing.assert_allclose(log.t, again.t, atol=1e-12)
+    np.testing.assert_allclose(
+        again["task.hand.reference"], log["task.hand.reference"], atol=1e-9
+    )
+    np.testing.assert_allclose(again.q, log.q, atol=2e-3)
+
+
 def test_what_was_sent_is_recorded_and_for_how_long_it_was_held(
     tmp_path: Path,
 ) -> None:
