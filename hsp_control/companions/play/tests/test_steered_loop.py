@@ -136,6 +136,17 @@ def test_it_stops_at_once(keyed: Steered, message: dict[str, Any], reason: str) 
     assert stopped == pytest.approx(0.1, abs=0.003)
 
 
+def test_what_a_page_says_after_the_stop_changes_nothing(steered: Steered) -> None:
+    values = steered.loop.handles.values
+    for gain, said in ((15.0, None), (20.0, {"do": "stop"})):
+        if said is not None:
+            steered.page.send(said)
+        steered.page.send({"do": "set", "id": "null_space_gain", "value": gain})
+        steered.loop.on_period(0.0)
+        assert values["null_space_gain"] == 15.0
+    assert steered.requests.reason == "stopped from the page"
+
+
 def test_a_word_that_is_too_much_is_dropped_and_nobody_waits() -> None:
     here, there = channel_pair()
     other = Channel(there)
