@@ -170,6 +170,7 @@ class VelocityCheck:
             np.where(self._by_v, np.abs(v), inf),
             np.where(self._by_q, np.abs(slope), inf),
         )
+        now = np.where(self._by_v | self._by_q, now, 0.0)  # of neither it is unknown
         speed, self._speed = np.maximum(now, self._speed), now
         if not still.any():
             self._still[:], self._before, self.dead = 0, speed, self._none

@@ -2,12 +2,13 @@
 
 import numpy as np
 import pytest
-from live_rigs import PERIOD
+from live_rigs import PERIOD, gravity, start
 from loaded_robots import panda
 
 from hsp_control.common.arrays import Array, Flags
-from hsp_control.live import LiveSettings
+from hsp_control.live import LiveSettings, Measurement
 from hsp_control.live.reaction_check import ReactionCheck
+from hsp_control.live.trusted_motion import TrustedMotion
 from hsp_control.live.velocity_check import VelocityCheck
 
 SETTINGS = LiveSettings()
@@ -61,3 +62,65 @@ def felt(share: float) -> bool:
 
 def test_what_moves_by_much_more_than_the_reaction_moves_for_another_reason() -> None:
     assert [felt(share) for share in (0.3, 1.0, 2.0)] == [False, True, False]
+
+
+@pytest.mark.parametrize("period", [0.001, 0.002, 0.01])
+def test_a_joint_that_accelerates_within_a_period_is_no_contradiction(
+    period: float,
+) -> None:
+    """Up to 100 rad/s²: its slope in 10 ms is 0.5 rad/s behind the velocity."""
+    check, w = VelocityCheck(panda(), SETTINGS, period), 50.0
+    t = period * np.arange(round(0.5 / period))
+    way, v = 2.0 / w * np.diff(1.0 - np.cos(w * t)), 2.0 * np.sin(w * t)
+    for k in range(1, len(t)):
+        a = 2.0 * w * np.cos(w * (t[k] - 0.5 * period))
+        check.update(np.full(7, way[k - 1]), np.full(7, v[k]), period, np.full(7, a))
+        assert not (check.doubtful | check.contradicted).any(), k
+    for _ in range(3):  # a lie is one all the same
+        check.update(np.zeros(7), np.full(7, 2.8), period, np.full(7, 100.0))
+    assert check.contradicted.all()
+
+
+class Motion:
+    """What is trusted of a Panda at rest, whose last joint says something else."""
+
+    def __init__(self, period: float) -> None:
+        self.trusted = TrustedMotion(panda(), SETTINGS, period)
+        self.period, self.count, self.q = period, 0, start()
+
+    def update(self, moves: float, says: float) -> str | None:
+        """Return the fault after a period."""
+        self.count += 1
+        self.q, v = self.q.copy(), np.zeros(7)
+        self.q[6] += moves * self.period
+        v[6] = says
+        passed = self.period if self.count > 1 else 0.0
+        told = Measurement(self.count, self.count * self.period, self.q, v)
+        self.trusted.update(told, passed, np.zeros(7, dtype=bool))
+        self.trusted.applied(self.q, np.zeros(7), gravity(self.q))
+        return self.trusted.fault
+
+
+@pytest.mark.parametrize("period", [0.001, 0.005, 0.01])
+def test_noise_of_a_velocity_is_no_motion(period: float) -> None:
+    motion, rng = Motion(period), np.random.default_rng(0)
+    for noise in rng.normal(0.0, 0.05, 100).tolist():
+        assert motion.update(0.0, noise) is None
+        if motion.count > 1:
+            assert motion.trusted.mean_velocity is not None
+            np.testing.assert_array_equal(motion.trusted.mean_velocity, 0.0)
+    for _ in range(20):
+        motion.update(0.2, 0.2)
+    assert motion.trusted.mean_velocity is not None
+    np.testing.assert_allclose(motion.trusted.mean_velocity, 0.2 * np.eye(7)[6])
+
+
+def test_one_noisy_velocity_of_a_braked_joint_is_no_acceleration() -> None:
+    motion = Motion(0.002)
+    for _ in range(50):
+        assert motion.update(0.2, 0.2) is None
+    motion.trusted.stop(np.zeros(7))
+    assert motion.update(0.2, 0.7) is None  # beyond what braking leaves, once
+    faults = [motion.update(0.6, 0.6) for _ in range(10)]  # the others rest
+    (found,) = filter(None, faults)
+    assert "panda_joint7 is braked, and moves at 0.6 rad/s" in found

@@ -137,13 +137,11 @@ def test_it_stops_at_once(keyed: Steered, message: dict[str, Any], reason: str) 
 
 
 def test_what_a_page_says_after_the_stop_changes_nothing(steered: Steered) -> None:
-    values = steered.loop.handles.values
-    for gain, said in ((15.0, None), (20.0, {"do": "stop"})):
-        if said is not None:
-            steered.page.send(said)
-        steered.page.send({"do": "set", "id": "null_space_gain", "value": gain})
-        steered.loop.on_period(0.0)
-        assert values["null_space_gain"] == 15.0
+    for x, said in ((0.5, {"do": "nothing"}), (0.6, {"do": "stop"})):
+        steered.page.send(said)
+        steered.page.send({"do": "obstacle", "name": "ball", "position": [x, 0.0, 1.0]})
+        steered.loop.listen()
+        assert steered.loop.handles.places()[1]["ball"] == [0.5, 0.0, 1.0]
     assert steered.requests.reason == "stopped from the page"
 
 
