@@ -158,7 +158,7 @@ class Recorder:
             rows = max(len(rollout) - 1, 1)
             settings = {"duration": rows * self._period, "log_period": self._period}
             ratio = self._period / self._held if self._held > 0.0 else 0.0
-            if ratio > 0.5 and abs(ratio - round(ratio)) < 1e-6 * ratio:
+            if abs(ratio - round(ratio)) < 1e-6 * ratio:
                 settings["control_period"] = self._period / round(ratio)
             self._config["simulation"] |= settings
             rollout.meta["config"] = self._config

@@ -99,6 +99,23 @@ def test_what_was_sent_is_recorded_and_for_how_long_it_was_held(
     assert simulation["duration"] == 4 * 5 * PERIOD
 
 
+@pytest.mark.parametrize(("log_period", "held"), [
+    (5 * PERIOD, PERIOD), (2.5 * PERIOD, None), (0.1 * PERIOD, None)
+])  # fmt: skip
+def test_how_long_efforts_were_held_is_logged_where_rows_have_whole_periods(
+    log_period: float, held: float | None, tmp_path: Path
+) -> None:
+    controller = law(hsp.JointCentering())
+    q, v = controller.robot.home(), np.zeros(7)
+    path = tmp_path / "rows.npz"
+    with hsp.Recorder(controller, path, log_period=log_period) as recorder:
+        for k in range(11):
+            recorder.record(controller.compute(PERIOD * k, q, v))
+    config = hsp.Rollout.load(path).config
+    assert config is not None
+    assert config["simulation"]["control_period"] == (held and pytest.approx(held))
+
+
 def test_what_cannot_be_repeated_says_why_and_an_error_ends_the_log(
     tmp_path: Path,
 ) -> None:
