@@ -264,7 +264,9 @@ class TrustedMotion:
         self.unknown_for = 0.0 if all_known else self.unknown_for + passed
         if (self._sensors.dead | self._pushed).any():  # its speed is unknown
             self.unknown_for = max(self.unknown_for, self._soon)
-        if self._useless:
+        unknown = ~(self._positions | self._velocities)
+        # Beside a joint that is only expected, one that stands may be dead, too.
+        if self._useless or (unknown.any() and check.stands.any()):
             self.unknown_for = inf
         both = self._positions & self._velocities
         self.doubtful = self.fault is None and bool((check.doubtful & both).any())

@@ -68,6 +68,7 @@ class VelocityCheck:
         doubtful: Joints whose last velocity is not used yet, shape (nv,).
         contradicted: Joints whose velocity contradicts their positions, shape (nv,).
         dead: Joints whose sensor is dead, shape (nv,).
+        stands: Joints whose trusted readings did not change by a bit, shape (nv,).
         halted: Joints that moved, and whose readings are now constant, shape (nv,).
         slope: Slope of the last positions, shape (nv,) [rad/s or m/s].
         difference: Between velocity and slope at the last one, shape (nv,).
@@ -110,6 +111,7 @@ class VelocityCheck:
         self._by_v: Flags = np.ones(nv, dtype=bool)  # trusted velocities
         self._none, self._nothing = np.zeros(nv, dtype=bool), np.zeros(nv)
         self.dead: Flags = self._none
+        self.stands: Flags = self._none
         self.halted: Flags = self._none
 
     def trust(self, positions: Flags, velocities: Flags) -> None:
@@ -163,6 +165,7 @@ class VelocityCheck:
         still = (size < _NO_CHANGE) | ~self._by_q
         still &= (v == self._last_v) | ~self._by_v
         still &= self._by_q | self._by_v
+        self.stands = still
         self._last_v = v
         # The speed before it stopped, of two states: the last may be partly wrong.
         # A measured speed, so that friction unknown to the model has no effect.
