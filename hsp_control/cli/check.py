@@ -203,11 +203,12 @@ def warn_of_reach(experiment: Experiment) -> None:
         print(f"hsp: {message}", file=sys.stderr)
     if robot.unactuated and experiment.scenario.plan is not None:
         return  # it moves contacts and references
-    duration = experiment.scenario.simulation.duration
-    asked = experiment.q0, duration, law.contacts, law.limits
+    settings = experiment.scenario.simulation
+    end = max(settings.end_time, settings.duration)  # also of a run from before t = 0
+    asked = experiment.q0, end, law.contacts, law.limits
     messages = [each.message for each in not_followed(robot, law.tasks, *asked)]
     push_off = experiment.scenario.plant.push_off
-    messages += missed_forces(law, experiment.q0, duration, push_off)
+    messages += missed_forces(law, experiment.q0, end, push_off)
     for message in messages:
         print(f"hsp: {message}", file=sys.stderr)
 

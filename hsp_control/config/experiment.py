@@ -189,9 +189,15 @@ class Experiment:
             q0 = scenario.start.configuration_of(
                 robot, contacts, tasks, scene, null_space.singularity_threshold
             )
-            if scenario.start.is_found:  # a repeated run begins there, too
-                found = InitialState(configuration=q0, velocity=scenario.start.velocity)
-                scenario = replace(scenario, start=found)
+            begin = scenario.start
+            if begin.is_found:  # a repeated run begins there, too
+                begin = InitialState(
+                    configuration=q0,
+                    velocity=begin.velocity,
+                    relative_to=begin.relative_to,
+                )
+                scenario = replace(scenario, start=begin)
+            relative_to = begin.relative_to_of(robot, q0)
         with document.at():
             limits = scenario.limits
             if scenario.plan is not None:
@@ -208,18 +214,19 @@ class Experiment:
                 contacts=contacts,
                 base=scenario.base,
                 scene=scene,
-                start=q0,
+                start=relative_to,
                 changes=scenario.changes,
             )
         with document.at("start"):
-            v0 = scenario.start.velocity_of(controller, q0)
+            t0 = scenario.simulation.start_time
+            v0 = begin.velocity_of(controller, t0, q0)
             if controller.limits is not None:
                 controller.limits.check_start(q0, v0)
         with document.at():  # errors of the first step would have no location
-            controller.check_derivatives(robot.state(0.0, q0, v0))
+            controller.check_derivatives(robot.state(t0, q0, v0))
         if scenario.plan is not None:
             with document.at("plan"):
-                scenario.plan.begin(controller).start(robot.state(0.0, q0, v0))
+                scenario.plan.begin(controller).start(robot.state(t0, q0, v0))
         with document.at():
             begun(scenario.estimators, controller, plant.inertial())
         _check_compensation(document, scenario, controller)
@@ -357,6 +364,7 @@ class Experiment:
             plan=self.scenario.plan,
             estimators=self.scenario.estimators,
             scene=self.scene,
+            start_time=settings.start_time,
             check_rate=False,  # checked when it was built, or disabled
             on_progress=on_progress,
             on_row=on_row,

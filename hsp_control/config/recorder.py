@@ -97,11 +97,14 @@ class Recorder:
         if self._begun == -inf:
             self._begun = state.t
             if self._config is not None:
+                placed = self._controller.setup.start.state
                 start = {
                     "configuration": state.q.tolist(),
                     "velocity": state.v.tolist(),
+                    "relative_to": placed.q.tolist(),
                 }
                 self._config["start"] = start
+                self._config["simulation"]["start_time"] = state.t
         elif self._last == self._begun:
             self._held = state.t - self._begun
         self._last = state.t
@@ -155,7 +158,7 @@ class Recorder:
             rows = max(len(rollout) - 1, 1)
             settings = {"duration": rows * self._period, "log_period": self._period}
             ratio = self._period / self._held if self._held > 0.0 else 0.0
-            if ratio > 0.5 and abs(ratio - round(ratio)) < 1e-6 * ratio:
+            if abs(ratio - round(ratio)) < 1e-6 * ratio:
                 settings["control_period"] = self._period / round(ratio)
             self._config["simulation"] |= settings
             rollout.meta["config"] = self._config

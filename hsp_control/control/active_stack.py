@@ -15,6 +15,7 @@ from hsp_control.constraints.contacts import Contact
 from hsp_control.constraints.contacts.contact import UnactuatedRows, unactuated_count
 from hsp_control.control.actuation.support import Support
 from hsp_control.control.planned import PlannedTask
+from hsp_control.control.shown_stack import shown_stack
 from hsp_control.declaration.nested import parts_within
 from hsp_control.edge import BoundLaw
 from hsp_control.edge.threshold import Following
@@ -173,6 +174,11 @@ class ActiveStack:
         """Resolve contacts, tasks and field at the state, into `law`."""
         self._plan(t)
         return self.law.outcome.outcome
+
+    @cached_property
+    def shown(self) -> "ActiveStack":
+        """This stack, as a modifier gets it: nothing in it can be changed."""
+        return shown_stack(self)
 
     @property
     def damped_level(self) -> int:

@@ -33,7 +33,7 @@ AccelerationModifier = Callable[
 """How compensators act between the law and the limits: a function of (state, active
 stack, a). It returns the acceleration to deliver, shape (nv,), and an additional effort
 besides M a + N, shape (nv,), or None. While tasks fade it is called for each set of
-them, weighted by the stack's `share`."""
+them, weighted by the stack's `share`. State and stack are read-only; a is a copy."""
 
 
 def _checked(found: object, robot: Robot) -> tuple[Array, Array | None]:
@@ -204,8 +204,9 @@ class Mixture:
         for active in self._parts:
             a, offset = active.acceleration, None
             if modifier is not None:
-                # A copy: a function of the user may change it in place.
-                found = modifier(self._state.read_only, active, a.copy())
+                # It may change its acceleration in place: that one is a copy.
+                state, shown = self._state.read_only, active.shown
+                found = modifier(state, shown, a.copy())
                 a, offset = _checked(found, self._state.robot)
             for limits, share in sets:
                 one = self.actuation(active, limits).deliver(a, offset)

@@ -23,10 +23,10 @@ from hsp_control.geometry.enclosing import (
 from hsp_control.geometry.mesh_loading import mesh_of, why_unread
 from hsp_control.robot import Robot
 from hsp_control.robot.description import mesh_files
-from hsp_control.robot.description.access import XmlError, read_xml
 from hsp_control.robot.description.loading import RobotPart
 from hsp_control.robot.description.mesh_units import MeshUnits, mesh_units
 from hsp_control.robot.description.sources import PINOCCHIO, BodyShape, RobotSource
+from hsp_control.robot.description.srdf import excluded_pairs
 from hsp_control.robot.description.urdf import parser_text, read_urdf
 
 Proxy = Literal["capsules", "spheres", "hulls", "meshes"]
@@ -391,7 +391,7 @@ def self_pairs(robot: Robot, links: Sequence[LinkShape]) -> list[tuple[int, int]
     Neighbours, which always touch, and pairs that the SRDF or MJCF disables are left
     out.
     """
-    disabled = _disabled(robot)
+    disabled = _disabled(robot, links)
     parents = list(robot.model.parents)
     pairs = []
     for i, first in enumerate(links):
@@ -416,20 +416,11 @@ def _neighbours(
     return min(a, b) > 0 or part_of(robot, first.link) is part_of(robot, second.link)
 
 
-def _disabled(robot: Robot) -> set[frozenset[str]]:
-    disabled = set()
+def _disabled(robot: Robot, links: Sequence[LinkShape]) -> set[frozenset[str]]:
+    disabled = set[frozenset[str]]()
     for part in robot.parts:
-        for pair in part.source.excluded:
+        own = {x.link for x in links if part_of(robot, x.link) is part}
+        bare = [link.removeprefix(part.prefix) for link in own]
+        for pair in excluded_pairs(part.source, bare):
             disabled.add(frozenset(part.prefix + link for link in pair))
-        if part.source.srdf is None:
-            continue
-        try:
-            srdf = read_xml(part.source.srdf)
-        except XmlError as error:
-            raise ModelError(error.within(part.source.srdf)) from None
-        except OSError as error:
-            raise ModelError(f"{part.source.srdf}: {error.strerror}") from error
-        for element in srdf.iter("disable_collisions"):
-            links = (element.get("link1", ""), element.get("link2", ""))
-            disabled.add(frozenset(part.prefix + link for link in links))
     return disabled

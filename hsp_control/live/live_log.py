@@ -76,7 +76,6 @@ class LoopLog:
         # whether the controller has raised; it is not called again
         self.controller_failed = False
         self._log: LogWriter | None = None
-        self._config, self._ran = meta.get("config"), 0.0
         if self.path is not None:
             self._log = LogWriter(controller, scene, 0, path=self.path, meta=meta)
 
@@ -108,8 +107,6 @@ class LoopLog:
             self._failed = True
             raise
         self._due.written(state.t, phase)
-        if phase == Phase.RUNNING:
-            self._ran = state.t
 
     def warm_up(self, reader: StateReader, limiter: EffortLimiter) -> None:
         """Make a row without writing it, so that later rows compile nothing."""
@@ -138,16 +135,7 @@ class LoopLog:
             "response": deadlines.response,
             "gap": deadlines.interval,
         }
-        self._log.end(report.status, report.reason, live=summary, **self._whole())
-
-    def _whole(self) -> dict[str, Any]:
-        """Return a configuration without a duration, with the one until the stop."""
-        if self._config is None or self._config["simulation"]["duration"] is not None:
-            return {}
-        settings = self._config["simulation"]
-        rows = max(round(self._ran / settings["log_period"]), 1)
-        settings |= {"duration": rows * settings["log_period"]}
-        return {"config": self._config}
+        self._log.end(report.status, report.reason, live=summary)
 
     def abandon(self) -> None:
         """Close the journal of a run that did not begin; another run may write it."""

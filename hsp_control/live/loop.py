@@ -156,11 +156,11 @@ def run_loop(
                     controller,
                     first.q,
                     first.v,
-                    start_time,
                     plan=plan,
                     estimators=estimators,
                     simulation={
                         "duration": duration,
+                        "start_time": start_time,
                         "log_period": log_period,
                         "control_period": period,
                     },

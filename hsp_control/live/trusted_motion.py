@@ -174,8 +174,15 @@ class TrustedMotion:
 
     @property
     def mean_velocity(self) -> Array | None:
-        """Mean velocity of some milliseconds, (nv,); None if it is not trusted."""
-        return self._check.mean if self._moving and self.complete else None
+        """Mean velocity of some milliseconds, (nv,); None if it is not trusted.
+
+        It is measured, or the slope of the positions where that is less: the noise of
+        a velocity is no motion.
+        """
+        if not (self._moving and self.complete):
+            return None
+        mean, slope = self._check.mean, self._check.slope
+        return np.where(np.abs(slope) < np.abs(mean), slope, mean)
 
     @property
     def ambiguous(self) -> bool:
@@ -236,7 +243,7 @@ class TrustedMotion:
             self._moving = True
             expected.begin(smaller(way / passed, new.v))
         expected.advance(passed)
-        check.update(way, new.v, passed)
+        check.update(way, new.v, passed, expected.acceleration)
         self._sensors.update(way, new.v, check.mean, passed)
         if self.complete:
             self._response.update(expected.acceleration, check.mean, passed)
@@ -257,7 +264,9 @@ class TrustedMotion:
         self.unknown_for = 0.0 if all_known else self.unknown_for + passed
         if (self._sensors.dead | self._pushed).any():  # its speed is unknown
             self.unknown_for = max(self.unknown_for, self._soon)
-        if self._useless:
+        unknown = ~(self._positions | self._velocities)
+        # Beside a joint that is only expected, one that stands may be dead, too.
+        if self._useless or (unknown.any() and check.stands.any()):
             self.unknown_for = inf
         both = self._positions & self._velocities
         self.doubtful = self.fault is None and bool((check.doubtful & both).any())
@@ -314,7 +323,8 @@ class TrustedMotion:
         sensor drives it, so that it is faster, or moves in the other direction.
         """
         slope, by_v, by_q = self._check.slope, self._expected.v[0], self._expected.v[1]
-        used = np.where(self._velocities, v, slope)
+        # Of a velocity, less what its noise alone may be.
+        used = np.where(self._velocities, smaller(v, self._check.mean), slope)
         expected = np.where(self._velocities, by_v, by_q)
         least, most = np.minimum(expected, 0.0), np.maximum(expected, 0.0)
         beyond = np.maximum(used - most, least - used)

@@ -5,7 +5,6 @@ from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
 from typing import Any, NamedTuple
-from xml.etree.ElementTree import Element
 
 import pinocchio as pin
 
@@ -17,8 +16,8 @@ from hsp_control.common.exceptions import (
 from hsp_control.common.resources import is_file
 from hsp_control.common.suggestions import listing
 from hsp_control.declaration.plain_data import plain_data
-from hsp_control.robot.description.access import ANYWHERE, Access, XmlError, read_xml
-from hsp_control.robot.description.loading import load_model, placement
+from hsp_control.robot.description.access import ANYWHERE, Access
+from hsp_control.robot.description.loading import RobotPart, load_model, placement
 from hsp_control.robot.description.mesh_files import find_file, places
 from hsp_control.robot.description.recorded_meshes import (
     is_recorded,
@@ -35,6 +34,7 @@ from hsp_control.robot.description.recorded_model import (
 )
 from hsp_control.robot.description.robot_description import OneRobot, RobotDescription
 from hsp_control.robot.description.sources import PINOCCHIO, RobotSource
+from hsp_control.robot.description.srdf import excluded_pairs
 from hsp_control.robot.robot import Robot
 
 _log = logging.getLogger(__name__)
@@ -53,7 +53,7 @@ def robot_record(robot: Robot) -> dict[str, Any]:
         return {
             "description": plain_data(description),
             "home": _home(robot),
-            "parts": [_text_record(part.source) for part in robot.parts],
+            "parts": [_text_record(robot, part) for part in robot.parts],
         }
     except HspControlError as error:
         return {"missing": str(error)}
@@ -86,8 +86,11 @@ def _model_record(robot: Robot) -> dict[str, Any]:
     }
 
 
-def _text_record(source: RobotSource) -> dict[str, Any]:
+def _text_record(robot: Robot, part: RobotPart) -> dict[str, Any]:
+    source = part.source
     text = text_of(source)
+    frames = [each for each in robot.model.frames if each.type == pin.FrameType.BODY]
+    links = [each.name.removeprefix(part.prefix) for each in frames]
     return {
         "name": source.name,
         "file": str(source.urdf),
@@ -98,7 +101,7 @@ def _text_record(source: RobotSource) -> dict[str, Any]:
         "motor_inertia": dict(source.motor_inertia),
         "end_effector": source.end_effector,
         "joint_coordinates": source.joint_coordinates,
-        "excluded": sorted(sorted(pair) for pair in _excluded(source)),
+        "excluded": sorted(map(sorted, excluded_pairs(source, links))),
     }
 
 
@@ -110,19 +113,6 @@ def text_of(source: RobotSource) -> bytes:
         return source.urdf.read_bytes()
     except OSError as error:
         raise ModelError(f"{source.urdf}: {error.strerror}") from None
-
-
-def _excluded(source: RobotSource) -> frozenset[frozenset[str]]:
-    """Return the links that never collide, including those of the SRDF."""
-    found = set(source.excluded)
-    if source.srdf is not None:
-        try:
-            srdf: Element = read_xml(source.srdf)
-        except (XmlError, OSError) as error:
-            raise ModelError(f"{source.srdf}: {error}") from None
-        for pair in srdf.iter("disable_collisions"):
-            found.add(frozenset((pair.get("link1", ""), pair.get("link2", ""))))
-    return frozenset(found)
 
 
 def recorded_robot(record: Any, access: Access = ANYWHERE) -> Robot:

@@ -4,7 +4,6 @@ from collections.abc import Iterable, Sequence
 from functools import partial
 from typing import Any
 
-import numpy as np
 from numpy.typing import ArrayLike
 
 from hsp_control.common.arrays import Array
@@ -70,7 +69,6 @@ def declared_run(
     controller: Controller,
     q: Array,
     v: Array,
-    t: float,
     *,
     plan: MotionPlan | None,
     estimators: Sequence[Estimator],
@@ -82,7 +80,6 @@ def declared_run(
         controller: The controller.
         q: Where the run begins, shape (nq,).
         v: The velocity there, shape (nv,).
-        t: The time there [s].
         plan: The plan, which only an `Experiment` can repeat.
         estimators: Estimators, as the plan.
         others: Further parts of the configuration, by their keys.
@@ -90,16 +87,11 @@ def declared_run(
     Returns:
         ``config``, in which all is data; or None, and why, as ``config_lost``.
     """
-    start, lost = controller._declared.start, ""
-    if t != 0.0:
-        lost = f"the run begins at t = {t:g} s"
-    elif plan is not None or estimators:
+    if plan is not None or estimators:
         lost = "its plan and estimators were given to the loop, not to an Experiment"
-    elif start is not None and not np.array_equal(start, q):
-        lost = "the run does not begin at the controller's own start"
-    if lost:
         return {"config": None, "config_lost": lost}
-    begin = InitialState(configuration=q, velocity=v)
+    start = controller._declared.start
+    begin = InitialState(configuration=q, velocity=v, relative_to=start)
     config, lost = declared_controller(controller, start=begin, **others)
     return {"config": config, **({"config_lost": lost} if lost else {})}
 

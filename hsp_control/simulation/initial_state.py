@@ -80,6 +80,10 @@ class InitialState(Part, error=ConfigurationError):
     velocity: Literal["rest", "flow"] | Vector = "rest"
     """Velocity: ``rest``, ``flow`` (that of the law without errors), or nv numbers
     [rad/s or m/s]."""
+    relative_to: Vector | None = None
+    """The configuration to which relative values refer, such as a circle without a
+    centre and ``target: start``, nq numbers [rad, m, or unit quaternions]; by default
+    the start itself."""
 
     def __post_init__(self) -> None:
         given = self._given()
@@ -136,12 +140,19 @@ class InitialState(Part, error=ConfigurationError):
             return q
         return _put_on_ground(self.ground, list(contacts), robot, q)
 
-    def velocity_of(self, controller: Controller, q: Array) -> Array:
-        """Return the start velocity, shape (nv,)."""
+    def relative_to_of(self, robot: Robot, q: Array) -> Array:
+        """Return the configuration of relative values, shape (nq,); q is the start."""
+        if self.relative_to is None:
+            return q
+        with within("relative_to"):
+            return robot.check_configuration(self.relative_to)
+
+    def velocity_of(self, controller: Controller, t: float, q: Array) -> Array:
+        """Return the start velocity at a time [s], shape (nv,)."""
         robot = controller.robot
         if isinstance(self.velocity, str):
             flows = self.velocity == "flow"
-            return controller.flow(0.0, q) if flows else np.zeros(robot.nv)
+            return controller.flow(t, q) if flows else np.zeros(robot.nv)
         with within("velocity"):
             return robot.check_tangent(self.velocity, "v0").copy()
 

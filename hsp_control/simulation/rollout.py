@@ -103,8 +103,22 @@ class Rollout:
 
     @property
     def config(self) -> dict[str, Any] | None:
-        """The resolved configuration of the run; None if a part of it is Python."""
-        return self.meta.get("config")
+        """The resolved configuration of the run; None if a part of it is Python.
+
+        That of a live loop without a duration has the one until its stop, or until it
+        was killed.
+        """
+        config: dict[str, Any] | None = self.meta.get("config")
+        settings = None if config is None else config.get("simulation")
+        if config is None or not isinstance(settings, dict):
+            return config
+        if settings.get("duration", 0.0) is not None:
+            return config
+        period, t = settings["log_period"], self.t
+        if "live.phase" in self.columns:
+            t = t[self["live.phase"] == 1.0]  # without its safe stop
+        rows = round(float(t[-1] - t[0]) / period) if len(t) else 0
+        return config | {"simulation": settings | {"duration": max(rows, 1) * period}}
 
     def measure(self, robot: Robot, function: Callable[[RobotState], Any]) -> Array:
         """Return a function of the state at every row, shape (N, ...).

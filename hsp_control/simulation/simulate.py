@@ -29,7 +29,7 @@ from hsp_control.control.first_state import (
 from hsp_control.control.motion_plan import MotionPlan, RunningPlan
 from hsp_control.declaration import Part, within
 from hsp_control.declaration.language import check_kind
-from hsp_control.declaration.quantities import Flag, Positive
+from hsp_control.declaration.quantities import Flag, Number, Positive
 from hsp_control.geometry.scene import Scene
 from hsp_control.robot.integrators import Dop853, Integrator, Rk4
 from hsp_control.simulation.control_chain import ControlChain
@@ -217,11 +217,11 @@ def simulate(
             controller,
             q,
             v,
-            start_time,
             plan=plan,
             estimators=estimators,
             simulation={
                 "duration": duration,
+                "start_time": start_time,
                 "log_period": log_period,
                 "control_period": control_period,
                 "check_rate": check_rate,
@@ -373,6 +373,14 @@ class SimulationSettings(Part, error=SimulationError):
     """The integrator of the robot's motion; by default ``rk4`` in steps of at most 1 ms
     for the plant ``rigid_body`` under efforts that are held, and otherwise
     ``dop853``."""
+    start_time: Number = 0.0
+    """Time of the first row [s], by the clock of references, schedules and changes;
+    `hsp live` and `hsp play` begin at 0."""
+
+    @property
+    def end_time(self) -> float:
+        """Time of the last row [s]."""
+        return self.start_time + self.duration
 
     def __post_init__(self) -> None:
         _count_rows(self.duration, self.log_period, self.control_period)

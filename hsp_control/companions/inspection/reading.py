@@ -10,6 +10,7 @@ from hsp_control.robot.description.access import XmlError, read_xml
 from hsp_control.robot.description.mesh_files import find_file, find_problem
 from hsp_control.robot.description.mesh_units import MeshUnits, mesh_units
 from hsp_control.robot.description.mimics import followers
+from hsp_control.robot.description.motor_inertia import transmissions
 from hsp_control.robot.description.sources import RobotSource
 
 _READ = {
@@ -48,12 +49,7 @@ def check_unread(xml: Element) -> Iterator[Finding]:
 def check_transmissions(xml: Element) -> Iterator[Finding]:
     """Yield transmissions of joints that do not exist, and joints with several."""
     joints = [joint.get("name", "") for joint in xml.findall("joint")]
-    by_joint: dict[str, list[str]] = {}
-    for transmission in xml.findall("transmission"):
-        name = transmission.get("name", "")
-        for driven in transmission.findall("joint"):
-            by_joint.setdefault(driven.get("name", ""), []).append(name)
-    for joint, names in by_joint.items():
+    for joint, names in transmissions(xml).items():
         about = f"transmission {listing(map(repr, names))}"
         if joint not in joints:
             yield Finding(
@@ -175,23 +171,21 @@ def check_srdf(xml: Element, source: RobotSource) -> Iterator[Finding]:
         return
     links = [link.get("name", "") for link in xml.findall("link")]
     unknown: dict[str, None] = {}
-    for pair in srdf.iter("disable_collisions"):
-        for end in ("link1", "link2"):
-            if (name := pair.get(end, "")) not in links:
-                unknown[name] = None
-    every = srdf.iter("disable_default_collisions")
-    whole = [each.get("link", "") for each in every]
-    if whole:
-        yield Finding(
-            "note",
-            "srdf",
-            source.srdf.name,
-            f"<disable_default_collisions> of {listing(map(repr, whole))} is not read",
-            "list the pairs of links with <disable_collisions>",
-        )
+    ends = {
+        "disable_collisions": ("link1", "link2"),
+        "enable_collisions": ("link1", "link2"),
+        "disable_default_collisions": ("link",),
+    }
+    unknown = {
+        name: None
+        for tag, attributes in ends.items()
+        for element in srdf.iter(tag)
+        for attribute in attributes
+        if (name := element.get(attribute, "")) not in links
+    }
     if unknown:
         first, *others = unknown
         named = f"{first!r}{did_you_mean(first, links)}"
         named += f" and {len(others)} more" * bool(others)
-        message = f"it disables collisions of links that do not exist: {named}"
+        message = f"it names links that do not exist: {named}"
         yield Finding("note", "srdf", source.srdf.name, message)

@@ -141,6 +141,7 @@ class SteeringPage(NamedTuple):
         # With a dead-man's key it returns when the key is held for the first time, or
         # when the operator stops.
         controller, period = experiment.controller, live_period(experiment)
+        controller.restart(origin=0.0)  # it has made the dry run
         controller.compute(0.0, experiment.q0, experiment.v0)
         _rehearse(controller, period, experiment)
         self.opening.open()

@@ -102,10 +102,10 @@ class LiveView:
     def _send_plots(self, recorder: LogWriter, now: float) -> None:
         """Send the plots of all rows computed so far, in place of the last ones."""
         before = time.thread_time()
-        duration = self._experiment.scenario.simulation.duration
+        end = self._experiment.scenario.simulation.end_time
         robot = self._experiment.robot
         try:
-            plots = plots_so_far(recorder, self._meta, robot, duration)
+            plots = plots_so_far(recorder, self._meta, robot, end)
         except LogError as error:
             _log.warning("%s; the run continues without plots", error)
             self._next_plots = float("inf")
@@ -116,13 +116,13 @@ class LiveView:
 
     def _commands(self, motion: RunMotion, rows: Rollout, rate: float) -> list[Any]:
         first = not self._pieces
-        duration = self._experiment.scenario.simulation.duration
+        settings = self._experiment.scenario.simulation
         clip = Clip(
             0.0,
             float(motion.times[-1]),
             list(self._run.tracks(motion)),
-            duration,
-            bands_of(rows, self._experiment.controller, duration=duration),
+            settings.end_time,
+            bands_of(rows, self._experiment.controller, duration=settings.duration),
         )
         view = self._viewer.view
         shown = (
@@ -138,10 +138,10 @@ def _preview(experiment: Experiment) -> Rollout:
     """Return a log of the references and obstacles, with the robot at its start."""
     # A stream would continue to the end of the preview.
     robot, controller = experiment.robot, experiment.controller.preview()
-    duration = experiment.scenario.simulation.duration
+    settings = experiment.scenario.simulation
     recorder = LogWriter(controller, experiment.scene, _PREVIEW_ROWS)
     state = RobotState(robot)
-    for t in np.linspace(0.0, duration, _PREVIEW_ROWS):
+    for t in np.linspace(settings.start_time, settings.end_time, _PREVIEW_ROWS):
         state.update(float(t), experiment.q0, experiment.v0)
         try:
             output = controller.compute(state)

@@ -34,6 +34,7 @@ from hsp_control.robot.description.mimics import (
     write_for_pinocchio,
 )
 from hsp_control.robot.description.motor_inertia import (
+    name_unknown_joints,
     rotors_of_urdf,
     write_motor_inertia,
 )
@@ -63,6 +64,7 @@ def load_model(
         rotors = rotors_of_urdf(xml)
     except ModelError as error:
         raise ModelError(f"{source.urdf}: {error}") from None
+    name_unknown_joints(xml, source.urdf)
     model = _parse(source, settings, xml)
     locks = source.locked if settings.locked is None else settings.locked
     if locks:

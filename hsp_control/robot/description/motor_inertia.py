@@ -7,6 +7,7 @@ and the rotor's inertia of its ``<actuator>``, which Drake calls ``drake:gear_ra
 and ``drake:rotor_inertia``.
 """
 
+import logging
 from collections.abc import Mapping
 from math import isfinite
 from typing import Annotated, Any, Literal
@@ -21,6 +22,8 @@ from hsp_control.common.exceptions import JointNotFoundError, ModelError
 from hsp_control.common.suggestions import did_you_mean, listing
 from hsp_control.declaration.quantities import ArrayField, NonNegative, ReadOnlyDict
 from hsp_control.robot.description.sources import RobotSource
+
+_log = logging.getLogger(__name__)
 
 MOST = 1e3
 """Largest inertia of a rotor [kg·m² or kg]: a large machine's first axis has 10."""
@@ -120,6 +123,28 @@ def rotors_of_urdf(robot: Element) -> dict[str, float]:
             gear = 1.0 if reduction is None else reduction
             found[joints[0]] = rotor * gear * gear
     return found
+
+
+def transmissions(robot: Element) -> dict[str, list[str]]:
+    """Return the names of a URDF's transmissions, by the names of their joints."""
+    found: dict[str, list[str]] = {}
+    for transmission in robot.findall("transmission"):
+        for driven in transmission.findall("joint"):
+            names = found.setdefault(driven.get("name", ""), [])
+            names.append(transmission.get("name", ""))
+    return found
+
+
+def name_unknown_joints(robot: Element, file: object) -> None:
+    """Log which transmissions of a URDF are of joints that it does not have."""
+    joints = [joint.get("name", "") for joint in robot.findall("joint")]
+    for joint, names in transmissions(robot).items():
+        if joint not in joints:
+            _log.warning(
+                "%s: transmission %s: its rotor counts for no joint: there is no "
+                "joint %r%s",
+                file, listing(map(repr, names)), joint, did_you_mean(joint, joints),
+            )  # fmt: skip
 
 
 def _number(elements: list[Element], names: set[str], joint: str) -> float | None:

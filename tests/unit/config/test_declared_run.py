@@ -1,5 +1,6 @@
 """A run that was made in Python is repeated by its log, or the log says why not."""
 
+import shutil
 from pathlib import Path
 from typing import Any
 
@@ -34,6 +35,22 @@ def repeated(log: Path) -> hsp.Rollout:
     return hsp.load_experiment(log).run()
 
 
+def test_a_simulation_repeats_from_where_and_when_it_began(tmp_path: Path) -> None:
+    """Relative values refer to another configuration, and a change is over before."""
+    made = law(start=ROBOT.home())
+    made.at(0.5).gains("tip", hsp.Gains(natural_frequency=3.0))
+    run = hsp.simulate(made, Q0, **RUN, start_time=1.0)
+    again = repeated(run.save(tmp_path / "run.npz"))
+    for name in ("t", "q", "tau"):
+        np.testing.assert_array_equal(again[name], run[name])
+    elsewhere = hsp.simulate(law(), Q0, **RUN, start_time=1.0)
+    assert not np.allclose(elsewhere.tau, run.tau)
+    again = hsp.load_experiment(tmp_path / "run.npz", "start.relative_to=null")
+    assert not np.allclose(again.run().tau, run.tau)
+    with pytest.raises(hsp.HspControlError, match=r"start\.relative_to: .* shape \(2,"):
+        hsp.load_experiment(tmp_path / "run.npz", "start.relative_to=[0, 1]")
+
+
 @pytest.mark.parametrize("given", [
     {}, {"control_period": None}, {"integrator": hsp.integrators.Rk4(0.0005)},
     {"plant": hsp.plants.RigidBodyPlant(ROBOT)},
@@ -62,7 +79,11 @@ def test_a_live_loop_repeats_as_a_simulation_until_its_stop(tmp_path: Path) -> N
     robot = SimulatedRobot(plant, Q0, np.zeros(3), 0.001)
     requests, log = OperatorRequests(), tmp_path / "loop.journal"
 
+    killed = tmp_path / "killed.journal"
+
     def on_period(t: float) -> None:
+        if t > 0.05 and not killed.exists():  # what a killed one leaves
+            shutil.copy(log, killed)
         if t > 0.1:
             requests.stop()
 
@@ -70,17 +91,16 @@ def test_a_live_loop_repeats_as_a_simulation_until_its_stop(tmp_path: Path) -> N
         law(), InProcessRobot(robot), log=log, requests=requests, on_period=on_period,
         clock=lambda: robot.t,
     )  # fmt: skip
-    again, run = repeated(log), hsp.Rollout.load(log)
-    assert again.t[-1] == pytest.approx(0.1)
-    np.testing.assert_allclose(again.q, run.q[: len(again)], atol=1e-12)
+    run = hsp.Rollout.load(log)
+    for left, duration in ((log, 0.1), (killed, 0.05)):
+        again = repeated(left)
+        assert again.t[-1] == pytest.approx(duration)
+        np.testing.assert_allclose(again.q, run.q[: len(again)], atol=1e-12)
 
 
 @pytest.mark.parametrize(("made", "given", "why"), [
     ({"field": hsp.FunctionCost(lambda state: state.q[0] ** 2)}, {},
      r"null_space\.fields\.0\.function: YAML cannot express <lambda>: it is Python"),
-    ({"start": ROBOT.home()}, {},
-     "the run does not begin at the controller's own start"),
-    ({}, {"start_time": 1.0}, "the run begins at t = 1 s"),
     ({}, {"plant": hsp.plants.RigidBodyPlant(heavier())},
      "its plant is a RigidBodyPlant that was built in Python; give a PlantPart"),
 ])  # fmt: skip

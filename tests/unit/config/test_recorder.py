@@ -56,6 +56,29 @@ def test_a_recorded_loop_is_repeated(tmp_path: Path) -> None:
         recorder.record(output)
 
 
+def test_a_recorder_that_begins_later_repeats_its_part(tmp_path: Path) -> None:
+    """The circle is about where the controller began, and so is its time."""
+    path, robot = tmp_path / "part.npz", load("panda")
+    hand = hsp.FramePosition(name="hand", trajectory=hsp.Circle(0.05, 3.0), blend=0.01)
+    controller = hsp.Controller(robot, [hand], hsp.JointCentering())
+    q, v = robot.home(), np.zeros(robot.nv)
+    with hsp.Recorder(controller, path) as recorder:
+        for k in range(101):
+            output = controller.compute(5.0 + PERIOD * k, q, v)
+            if k >= 50:
+                recorder.record(output)
+            controller.applied(output.tau, PERIOD)
+            v = v + PERIOD * robot.forward_dynamics(q, v, output.tau)
+            q = robot.integrate(q, PERIOD * v)
+    log, again = hsp.Rollout.load(path), hsp.load_experiment(path).run()
+    np.testing.assert_allclose(again.t, np.linspace(0.05, 0.1, 6), atol=1e-12)
+    np.testing.assert_allclose(log.t, again.t, atol=1e-12)
+    np.testing.assert_allclose(
+        again["task.hand.reference"], log["task.hand.reference"], atol=1e-9
+    )
+    np.testing.assert_allclose(again.q, log.q, atol=2e-3)
+
+
 def test_what_was_sent_is_recorded_and_for_how_long_it_was_held(
     tmp_path: Path,
 ) -> None:
@@ -74,6 +97,23 @@ def test_what_was_sent_is_recorded_and_for_how_long_it_was_held(
     assert simulation["control_period"] == pytest.approx(PERIOD)
     assert simulation["log_period"] == 5 * PERIOD
     assert simulation["duration"] == 4 * 5 * PERIOD
+
+
+@pytest.mark.parametrize(("log_period", "held"), [
+    (5 * PERIOD, PERIOD), (2.5 * PERIOD, None), (0.1 * PERIOD, None)
+])  # fmt: skip
+def test_how_long_efforts_were_held_is_logged_where_rows_have_whole_periods(
+    log_period: float, held: float | None, tmp_path: Path
+) -> None:
+    controller = law(hsp.JointCentering())
+    q, v = controller.robot.home(), np.zeros(7)
+    path = tmp_path / "rows.npz"
+    with hsp.Recorder(controller, path, log_period=log_period) as recorder:
+        for k in range(11):
+            recorder.record(controller.compute(PERIOD * k, q, v))
+    config = hsp.Rollout.load(path).config
+    assert config is not None
+    assert config["simulation"]["control_period"] == (held and pytest.approx(held))
 
 
 def test_what_cannot_be_repeated_says_why_and_an_error_ends_the_log(

@@ -52,6 +52,17 @@ def of(robot: Robot, *scene: Obstacle, **options: Any) -> RobotLimits:
     return Limits(**options).placed(at_home(robot, *scene))
 
 
+def test_a_joint_without_a_speed_has_the_largest_of_its_unit() -> None:
+    """Else it would compensate for the others' limits at any speed."""
+    own = panda().model.velocityLimit
+    assert own.max() > own[0]  # its joints have two
+    for missing in (0.0, np.finfo(np.float32).max):
+        model = panda().model.copy()
+        model.velocityLimit[0] = missing
+        limits = of(Robot.from_pinocchio(model))
+        np.testing.assert_array_equal(limits.velocity, [own.max(), *own[1:]])
+
+
 # --- numbers -------------------------------------------------------------------------
 
 

@@ -3,7 +3,8 @@
 import os
 import signal
 import threading
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
+from contextlib import suppress
 from typing import Any
 
 import numpy as np
@@ -269,6 +270,98 @@ def test_no_hook_can_change_the_controllers_robot() -> None:
         "FunctionCost.gradient", "FunctionCost.rate", "FunctionField.field",
         "field rate", "StateWeight", "modifier",
     }  # fmt: skip
+
+
+# -- the stack that a modifier gets ----------------------------------------------------
+
+
+def overwrite(shown: Any, seen: dict[int, Any], name: str = "active") -> set[str]:
+    """Write into all arrays that public attributes reach; return their names."""
+    if (
+        shown is None
+        or isinstance(shown, str | int | float | type)
+        or id(shown) in seen
+    ):
+        return set()
+    seen[id(shown)] = shown  # kept: an id is used again
+    if isinstance(shown, np.ndarray):
+        with suppress(ValueError):  # read-only
+            shown[...] = 7
+        return {name}
+    if isinstance(shown, Mapping):
+        inner = list(shown.items())
+    elif type(shown) in (tuple, list):
+        inner = list(enumerate(shown))
+    elif callable(shown):
+        return set()
+    else:
+        inner = []
+        for each in dir(getattr(shown, "_own", shown)):
+            if not each.startswith("_"):
+                with suppress(ImmutableError, AttributeError):
+                    inner.append((each, getattr(shown, each)))
+    every = (overwrite(each, seen, f"{name}.{key}") for key, each in inner)
+    return set[str]().union(*every)
+
+
+def test_a_modifier_cannot_write_the_stack() -> None:
+    """Nor what is bound to it: gains, their changes, contacts, tasks, the field."""
+    panda = hsp.Robot.load("panda")
+    press = hsp.contacts.CommandedForce([0.0, 0.0, 10.0])
+    wipe = hsp.contacts.SlidingContact(FRAME, friction=0.3, force=press)
+    hand = hsp.FramePosition(FRAME, hsp.Circle(radius=0.1, angular_rate=2.0))
+
+    def two(modifier: Any) -> list[Array]:
+        made = hsp.Controller(
+            panda, [hand], hsp.JointCentering(), contacts=[wipe], limits=None
+        )
+        made.at(0.0).ramp(1.0).gains(hand.name, hsp.Gains(natural_frequency=20.0))
+        q, v = panda.home(), np.full(NV, 0.1)
+        return [
+            made.compute(0.01 * k, q, v, modifier=modifier).tau.copy() for k in range(3)
+        ]
+
+    names = set[str]()
+
+    def modifier(state: RobotState, active: Any, a: Array) -> tuple[Array, None]:
+        names.update(overwrite(active, {}))
+        kept = a.copy()
+        a[:] = 7.0  # its own
+        return kept, None
+
+    expected = two(lambda state, active, a: (a, None))
+    np.testing.assert_array_equal(two(modifier), expected)
+    assert names >= {
+        "active.rows.jacobian", "active.acceleration", "active.law.problem.gain",
+        "active.law.problem.metric.W", "active.support.map", "active.support.forces",
+        "active.stacked.0.in_force.numbers", "active.stacked.0.planned.gains.initial",
+        "active.stacked.0.planned.gains.transitions.0.target", "active.memory",
+    }  # fmt: skip
+
+
+def test_a_modifier_cannot_step_the_stack() -> None:
+    panda = hsp.Robot.load("panda")
+    own = hsp.Controller(panda, [hsp.FramePosition(FRAME)])
+    q, v = panda.home(), np.zeros(NV)
+
+    def does(attack: Callable[[Any], Any]) -> None:
+        def modifier(state: RobotState, active: Any, a: Array) -> tuple[Array, None]:
+            attack(active)
+            return a, None
+
+        own.compute(0.0, q, v, modifier=modifier)
+
+    with pytest.raises(ValueError, match="read-only"):
+        does(lambda active: active.law.problem.gain.fill(0.0))
+    with pytest.raises(
+        ImmutableError, match=r"active.share cannot be assigned in a modifier: it is"
+    ):
+        does(lambda active: setattr(active, "share", 0.5))
+    with pytest.raises(
+        ImmutableError, match=r"active.law.call is not for a modifier: .*stack_at"
+    ):
+        does(lambda active: active.law.call(v))
+    does(lambda active: (active.flow(), active.diagnose(), active.field_value()))
 
 
 # -- the model and Pinocchio's data ----------------------------------------------------

@@ -2,7 +2,7 @@
 
 import copy
 import pickle
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Annotated, Any
 
 import jsonschema
@@ -12,7 +12,13 @@ from pydantic import TypeAdapter
 from hsp_control.common.exceptions import ConfigError, ImmutableError, SimulationError
 from hsp_control.declaration import Part
 from hsp_control.declaration.by_type import ByType
-from hsp_control.declaration.quantities import Count, ReadOnlyDict, Weights
+from hsp_control.declaration.quantities import (
+    READ_ONLY,
+    Count,
+    Number,
+    ReadOnlyDict,
+    Weights,
+)
 
 
 class Filter(Part, family="filters of a test", error=SimulationError):
@@ -33,6 +39,13 @@ class Noise(Filter, type="noise"):
     """Standard deviation [rad]."""
     seed: Count = 0
     """Seed [-]."""
+
+
+class Named(Filter, type="named"):
+    """Numbers by name."""
+
+    numbers: Annotated[Mapping[str, Number], READ_ONLY]
+    """The numbers, by name [-]."""
 
 
 class Differences(Filter, type="differences"):
@@ -56,6 +69,7 @@ SAME: list[tuple[dict[str, Any], list[Filter]]] = [
     ({"noise": [1.0, 2.0]}, [Noise([1.0, 2.0])]),
     ({"noise": {"seed": 3}}, [Noise(seed=3)]),
     ({"noise": None, "delay": False}, []),
+    ({"named": {"numbers": {"a": 1.0}}}, [Named({"a": 1.0})]),
     ({"differences": True, "noise": 0.2}, [Differences(), Noise(0.2)]),
 ]
 

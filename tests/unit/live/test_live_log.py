@@ -10,6 +10,7 @@ import hsp_control as hsp
 from hsp_control.common.arrays import Array
 from hsp_control.control.compensation import CompensatedController
 from hsp_control.live import LiveSettings, LoopReport, Measurement, Phase, run_loop
+from hsp_control.live.live_log import DueRows
 
 RESPONSE, LATE = 0.0003, 0.0017
 """How long each effort takes to be sent, and every tenth [s]."""
@@ -103,6 +104,18 @@ def test_its_end_has_the_counts_of_the_report(
     assert said["unseen"] == report.deadlines.skipped_states == len(LOST) + 1
     assert said["periods"] == report.deadlines.periods
     assert said["response"][-1] == pytest.approx(LATE)
+
+
+def test_no_time_has_two_rows() -> None:
+    """Neither at its end, nor where a phase begins: times of a log increase."""
+    due = DueRows(0.01)
+    assert due.is_due(0.0, Phase.RUNNING)
+    due.written(0.0, Phase.RUNNING)
+    assert not due.is_due(0.0, Phase.DAMPING)
+    assert not due.is_due(0.0, Phase.RUNNING, last=True)
+    assert not due.is_due(0.005, Phase.RUNNING)
+    assert due.is_due(0.005, Phase.RUNNING, last=True)
+    assert due.is_due(0.005, Phase.DAMPING)
 
 
 def test_a_phase_begins_with_a_row(tmp_path: Path) -> None:

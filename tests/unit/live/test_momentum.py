@@ -1,6 +1,7 @@
 """What changes a joint's momentum: efforts, bounded contacts, or a lie."""
 
 import numpy as np
+import pytest
 from live_rigs import PERIOD
 from loaded_robots import panda
 
@@ -92,3 +93,15 @@ def test_where_no_effort_limit_is_known_anything_may_push() -> None:
 def test_the_smaller_of_two_velocities_drives_no_joint() -> None:
     a, b = np.array([1.0, -0.2, 0.5, -1.0]), np.array([0.3, -0.9, -0.5, 0.0])
     assert smaller(a, b).tolist() == [0.3, -0.2, 0.0, 0.0]
+
+
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+def test_a_heavier_joint_follows_a_steady_effort_by_less(sign: float) -> None:
+    """Its momentum is between 0 and the impulse, however large that is."""
+    momentum, v = check(), np.zeros(7)
+    for k in range(300):
+        effort = sign * 300.0 * ONE * (k > 100)
+        v = v + PERIOD * 0.3 * effort / np.diag(INERTIA)
+        both = np.stack([v, v])
+        momentum.update(both, both, Driving(INERTIA, effort, ZERO), PERIOD)
+        assert not momentum.beyond.any(), k

@@ -72,3 +72,21 @@ def test_a_robot_waits_for_its_first_effort_without_an_end() -> None:
     assert robot.phase == Phase.WAITING
     robot.advance([robot.tau])
     assert robot.phase == Phase.RUNNING
+
+
+@pytest.mark.parametrize(("says", "held"), [(True, 6), (False, 1)])
+def test_after_a_lost_state_an_effort_is_near_the_one_before_it_too(
+    says: bool, held: int
+) -> None:
+    """The last may be lost; after five a line is dead one way, and efforts arrive."""
+    settings = LiveSettings(effort_rate=1000.0)
+    limiter, q = EffortLimiter(panda(), settings, PERIOD), start()
+    limiter.reset(q)
+    before = limiter.sent.copy()
+    limiter.robot_has(before if says else None)
+    steps = []
+    for _ in range(held + 3):
+        limiter.apply(before + 100.0, q)
+        steps.append((limiter.sent - before)[3])  # of 1 N·m
+        limiter.no_measurement()
+    np.testing.assert_allclose(steps, [1.0] * held + [2.0, 3.0, 4.0], atol=1e-9)

@@ -20,6 +20,7 @@ from hsp_control.null_space.fields import SelfClearance
 from hsp_control.robot import RobotDescription
 from hsp_control.robot.description.access import only_within
 from hsp_control.robot.description.robot_description import PlacedRobot
+from hsp_control.robot.recorded import recorded_robot, robot_record
 
 
 def names(robot: Robot) -> set[frozenset[str]]:
@@ -149,6 +150,43 @@ def test_the_srdf_beside_a_urdf_leaves_pairs_out(tmp_path: Path) -> None:
     with_it = names(Robot.load(urdf))
     (tmp_path / "arm.srdf").unlink()
     assert names(Robot.load(urdf)) - with_it == pair
+
+
+def test_an_srdf_disables_all_pairs_of_a_link_but_some(tmp_path: Path) -> None:
+    """As in MoveIt, and so in the record of a log; a pair that is disabled stays so."""
+    urdf, _ = arm_with_srdf(tmp_path, "pairs.srdf")
+    every = names(Robot.load(urdf))
+    kept, other, both = (
+        frozenset(("panda_link0", other))
+        for other in ("panda_hand", "panda_link5", "panda_link6")
+    )
+    assert every >= {kept, other, both}
+
+    def pair(tag: str, links: frozenset[str]) -> str:
+        first, second = links
+        return f'<{tag} link1="{first}" link2="{second}"/>'
+
+    srdf = tmp_path / "pairs.srdf"
+    srdf.write_text(
+        '<robot><disable_default_collisions link="panda_link0"/>'
+        + pair("enable_collisions", kept)
+        + pair("enable_collisions", both)
+        + pair("disable_collisions", both)
+        + "</robot>"
+    )
+    robot = Robot.load(urdf, srdf=srdf)
+    expected = {links for links in every if "panda_link0" not in links} | {kept}
+    assert names(robot) == expected
+    assert names(recorded_robot(robot_record(robot))) == expected
+    free = {"mimic": False}
+    two = Robot.load(RobotDescription(parts={
+        "left": PlacedRobot(urdf, **free, srdf=srdf),
+        "right": PlacedRobot(urdf, **free, position=(0.0, 5.0, 0.0)),
+    }))  # fmt: skip
+    assert names(recorded_robot(robot_record(two))) == names(two)
+    assert frozenset(("left_panda_link0", "left_panda_link5")) not in names(two)
+    assert frozenset(("right_panda_link0", "right_panda_link5")) in names(two)
+    assert frozenset(("left_panda_link0", "right_panda_link5")) in names(two)
 
 
 def test_an_srdf_may_be_named(tmp_path: Path) -> None:

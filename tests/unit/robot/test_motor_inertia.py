@@ -58,6 +58,19 @@ def armature(robot: hsp.Robot) -> list[float]:
     return [float(each) for each in robot.model.armature]
 
 
+def test_a_rotor_of_no_joint_is_named_when_the_robot_is_loaded(
+    tmp_path: Path, caplog: pytest.LogCaptureFixture
+) -> None:
+    armature(hsp.Robot.load(arm(tmp_path, PLAIN)))
+    assert not caplog.text
+    path = arm(tmp_path, PLAIN.replace('joint name="b"', 'joint name="bb"'))
+    assert armature(hsp.Robot.load(path)) == [0.0, 0.0]
+    assert (
+        f"{path}: transmission 't': its rotor counts for no joint: there is no joint "
+        "'bb'; did you mean 'b'?"
+    ) in caplog.text
+
+
 @pytest.mark.parametrize(
     ("transmission", "expected"),
     [("", 0.0), (PLAIN, 0.05), (DRAKE, 0.05), (OUTSIDE, 0.05), (SILENT, 0.0)],

@@ -25,6 +25,7 @@ def soft(lower: float, upper: float) -> str:
     ((-0.1, 0.2), (-0.1, 0.2)),
     ((-9.0, 0.2), (-3.0, 0.2)),
     ((0.0, 0.0), (-3.0, 3.0)),  # none
+    ((0.5, 0.5), (-3.0, 3.0)),
 ])  # fmt: skip
 def test_soft_limits_are_limits(
     given: tuple[float, float], kept: tuple[float, float], write: Write

@@ -43,6 +43,7 @@ from hsp_control.simulation.plants.model_changes import (
     changed,
 )
 from hsp_control.simulation.plants.sensors import (
+    DifferencedVelocity,
     Encoder,
     PositionNoise,
     Sensor,
@@ -214,6 +215,20 @@ def shown(
     random = seeded_generator(seed, type(sensor).__name__)
     sense = sensor.begin(robot, *states[0], random)
     return [sense(0.01 * k, *state) for k, state in enumerate(states)]
+
+
+@pytest.mark.parametrize("name", ROBOTS)
+def test_a_differenced_velocity_is_that_of_two_positions(name: str) -> None:
+    """The first one, one of the same time, and that of a root are passed on."""
+    robot = load(name)
+    (q, v), told = some_state(robot), np.ones(robot.nv)
+    sense = DifferencedVelocity().begin(robot, q, v, np.random.default_rng(0))
+    np.testing.assert_array_equal(sense(1.0, q, told)[1], told)
+    np.testing.assert_array_equal(sense(1.0, q, told)[1], told)
+    later = robot.integrate(q, 0.01 * v)
+    expected = np.where(robot.is_single_dof(), v, told)
+    np.testing.assert_allclose(sense(1.01, later, told)[1], expected, atol=1e-9)
+    assert (expected == told).sum() == (6 if name == "go2" else 0)
 
 
 @pytest.mark.parametrize("name", ROBOTS)

@@ -195,13 +195,17 @@ def test_an_srdf_is_looked_at(look: Look, tmp_path: Path) -> None:
     assert "srdf" not in look(ARM)
     srdf.write_text(pair.format("lowr"))
     (found,) = look(ARM)["srdf"]
-    assert found.message.startswith(
-        "it disables collisions of links that do not exist: 'lowr'"
-    )
+    assert found.message.startswith("it names links that do not exist: 'lowr'")
     assert "lower" in found.message
     srdf.write_text('<robot><disable_default_collisions link="upper"/></robot>')
-    (found,) = look(ARM)["srdf"]
-    assert "<disable_default_collisions> of 'upper' is not read" in found.message
+    assert "srdf" not in look(ARM)
+    for tag in (
+        'disable_default_collisions link="uper"',
+        'enable_collisions link1="uper"',
+    ):
+        srdf.write_text(f"<robot><{tag}/></robot>")
+        (found,) = look(ARM)["srdf"]
+        assert "'uper'" in found.message
     srdf.write_text("<robot>")
     (found,) = look(ARM)["srdf"]
     assert (found.severity, "malformed XML" in found.message) == ("error", True)

@@ -58,6 +58,18 @@ def test_what_is_loose_falls_onto_what_is_fixed() -> None:
     assert made.model.body("solid/ball/0").mass[0] == pytest.approx(3.0)
 
 
+def test_a_plant_pushes_off_as_its_slowest_solid_does() -> None:
+    """μ b d/(1 - d): on which of them a contact slides is not known."""
+    box = Box([1.0, 1.0, 1.0])
+    felt = Solid("felt", box, friction=0.8, slip_damping=10.0, impedance=0.5)
+    steel = Solid("steel", box, friction=0.2)
+    assert felt.push_off == pytest.approx(8.0)
+    assert steel.push_off > 100.0
+    for solids in ((felt, steel), (steel, felt)):
+        assert plant(*solids).declared.push_off == felt.push_off
+    assert plant().declared.push_off == 0.0
+
+
 @pytest.mark.parametrize(("make", "message"), [
     (lambda: plant(Solid("wall", Box([1.0, 1.0, 1.0])), contacts=()),
      "solids: nothing may touch them: declare contacts"),

@@ -36,7 +36,9 @@ class SteeredLive:
             text=True,
         )
         assert self.process.stdout is not None
+        self.before = ""  # what it said before it had an address
         for line in self.process.stdout:
+            self.before += line
             if found := re.match(r"Steer: (http\S+)", line):
                 self.url = found[1]
                 break
@@ -80,6 +82,7 @@ def test_a_page_moves_the_hand_and_stops_the_robot(
     text = live.text()
     assert live.process.returncode == 0, text
     assert "The loop: stopped from the page" in text
+    assert "Warning" not in live.before + text
     log = hsp.Rollout.load(tmp_path / "panda_obstacle-live.npz")
     assert log["task.hand.reference"][-1, 2] == pytest.approx(pose[2])
 

@@ -136,6 +136,15 @@ def test_it_stops_at_once(keyed: Steered, message: dict[str, Any], reason: str) 
     assert stopped == pytest.approx(0.1, abs=0.003)
 
 
+def test_what_a_page_says_after_the_stop_changes_nothing(steered: Steered) -> None:
+    for x, said in ((0.5, {"do": "nothing"}), (0.6, {"do": "stop"})):
+        steered.page.send(said)
+        steered.page.send({"do": "obstacle", "name": "ball", "position": [x, 0.0, 1.0]})
+        steered.loop.listen()
+        assert steered.loop.handles.places()[1]["ball"] == [0.5, 0.0, 1.0]
+    assert steered.requests.reason == "stopped from the page"
+
+
 def test_a_word_that_is_too_much_is_dropped_and_nobody_waits() -> None:
     here, there = channel_pair()
     other = Channel(there)

@@ -180,6 +180,22 @@ def test_a_file_is_in_the_order_of_the_plan(tmp_path: Path) -> None:
     assert one == other
 
 
+def test_what_was_lost_is_computed_again_and_nothing_else(tmp_path: Path) -> None:
+    ended = "completed", "diverged", "refused", "failed"
+    plan, folder = plan_of({"a": "10:60:6"}), tmp_path / "a.parquet"
+    files = RowFiles(plan, {}, folder, fresh=False)
+    for k, status in enumerate((*ended, "crashed", "timed out")):
+        files.add(Row(k, status))
+    files.close()
+    there = sorted(folder.glob("*.parquet"))
+    again = RowFiles(plan, {}, folder, fresh=False)
+    assert again.done == {0, 1, 2, 3}
+    assert again.failures == 3
+    assert again.table["status"].to_pylist() == [*ended]
+    again.close()  # nothing was added, and nothing is written anew
+    assert sorted(folder.glob("*.parquet")) == there
+
+
 def test_ctrl_c_while_a_file_is_written_leaves_no_part_of_it(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

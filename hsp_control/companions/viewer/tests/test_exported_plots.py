@@ -69,6 +69,9 @@ def test_where_no_floor_is_known_none_is_drawn(
     no_gain = {k: v for k, v in held.rollout.meta.items() if k != "null_space_gain"}
     unknown = Rollout(held.rollout.columns, no_gain)
     assert expected_floor(unknown, held.controller) is None
+    change = {"type": "null_space_gain", "gain": 20.0, "at": 1.0}
+    changing = Rollout(held.rollout.columns, {**held.rollout.meta, "changes": [change]})
+    assert expected_floor(changing, held.controller) is None
     anonymous = {k: v for k, v in held.rollout.meta.items() if k != "config"}
     assert held_period(Rollout(held.rollout.columns, anonymous)) is None
 

@@ -11,6 +11,7 @@ import pytest
 import hsp_control as hsp
 from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import FieldError, ViewerError
+from hsp_control.companions.viewer import watching
 from hsp_control.companions.viewer.commands import unpack
 from hsp_control.companions.viewer.live_picture import Picture
 from hsp_control.companions.viewer.transport import SceneRecorder
@@ -124,6 +125,23 @@ def drawn(watched: Watched) -> tuple[dict[str, Any], set[str]]:
     kept = [unpack(packed) for packed in recorder.scene.pop_all()]
     setup = next(each for each in kept if each["type"] == "play_setup")
     return setup, {each["path"] for each in kept}
+
+
+def test_rows_that_are_shown_no_more_take_no_disk(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr(watching, "_ROWS", 3)
+    loop = Loop(controller_of())
+    loop.step()
+    follower = Follower(loop.controller)
+    files = set[Path]()
+    for _ in range(8):
+        loop.step()
+        followed(follower)
+        files.add(follower.journal)
+        assert list(follower.journal.parent.iterdir()) == [follower.journal]
+    assert len(files) == 3
+    follower.end()
 
 
 def test_a_recorder_is_shown_with_its_distances_and_plots(tmp_path: Path) -> None:

@@ -8,6 +8,7 @@ import pytest
 from hsp_control import Controller, JointPosture, load_experiment
 from hsp_control.common.exceptions import EstimationError
 from hsp_control.companions.walking import ContactForces
+from hsp_control.constraints.contacts import PointContact
 from hsp_control.control.measurement import Measurement
 from hsp_control.simulation import simulate
 from hsp_control.simulation.plants import RigidContact, RigidContacts
@@ -71,6 +72,40 @@ def test_wrenches_that_push_on_a_robot_at_rest_are_found(name):
         out = running.update(Measurement(k, 0.01 * k, q, rest, applied=tau))
     for frame, wrench in pushes.items():
         assert out.wrenches[frame] == pytest.approx(wrench, abs=1e-8)
+
+
+def test_a_wrench_that_moves_nothing_is_zero():
+    """Of two contacts at one place the difference has no effect; each has half."""
+    experiment = load_experiment("whole_body/solo12_trunk")
+    robot, q, rest = experiment.robot, experiment.q0, np.zeros(experiment.robot.nv)
+    first = experiment.controller.contacts[0]
+    one, two = (
+        PointContact(first.frame, name="one"),
+        PointContact(first.frame, name="two"),
+    )
+    state, tau = robot.state(0.0, q, rest), robot.inverse_dynamics(q, rest, rest)
+    wrench = np.array([1.0, 2.0, 30.0, 0.0, 0.0, 0.0])
+    tau -= state.frame(first.frame).jacobian.T @ wrench
+    running = ContactForces(bandwidth=1e6).begin(
+        Controller(robot, [], contacts=[one, two]), None
+    )
+    for k in range(2):
+        out = running.update(Measurement(k, 0.01 * k, q, rest, applied=tau))
+    assert out.wrenches[first.frame] == pytest.approx(0.5 * wrench, abs=1e-8)
+
+
+@pytest.mark.parametrize("instead", [True, False])
+def test_measured_wrenches_are_replaced_if_asked_for(instead):
+    experiment = load_experiment("whole_body/solo12_trunk")
+    q, rest = experiment.q0, np.zeros(experiment.robot.nv)
+    frames = [each.frame for each in experiment.controller.contacts]
+    measured = np.full(6, 7.0)
+    running = ContactForces(instead=instead).begin(experiment.controller, None)
+    out = running.update(
+        Measurement(0, 0.0, q, rest, applied=rest, wrenches={frames[0]: measured})
+    )
+    assert np.array_equal(out.wrenches[frames[0]], measured) != instead
+    assert out.estimated == frozenset(frames if instead else frames[1:])
 
 
 def test_a_robot_without_contacts_is_refused():

@@ -1,0 +1,126 @@
+"""The checks of one joint's sensors, fed by hand: where each of them stops to judge."""
+
+import numpy as np
+import pytest
+from live_rigs import PERIOD, gravity, start
+from loaded_robots import panda
+
+from hsp_control.common.arrays import Array, Flags
+from hsp_control.live import LiveSettings, Measurement
+from hsp_control.live.reaction_check import ReactionCheck
+from hsp_control.live.trusted_motion import TrustedMotion
+from hsp_control.live.velocity_check import VelocityCheck
+
+SETTINGS = LiveSettings()
+
+
+def stopped(joints: list[int], speed: float) -> Flags:
+    """Return which sensors are dead after some joints stop in one period."""
+    check = VelocityCheck(panda(), SETTINGS, PERIOD)
+    v = np.zeros(7)
+    v[joints] = speed
+    for k in range(150):
+        now = v if k < 50 else np.zeros(7)
+        check.update(now * PERIOD, now, PERIOD)
+    return check.dead
+
+
+def test_friction_stops_one_slow_joint_in_a_period_and_not_several() -> None:
+    """At 50 rad/s² and in two periods: 0.1 rad/s, less where more of them stop."""
+    assert not stopped([0], 0.06).any()
+    assert not stopped([0, 1], 0.04).any()
+    assert stopped([0, 1], 0.06).tolist() == [True, True] + 5 * [False]
+    assert stopped([0], 0.11).tolist() == [True] + 6 * [False]
+
+
+@pytest.mark.parametrize(("missing", "doubtful"), [(2, True), (4, False)])
+def test_a_slope_across_a_gap_is_not_compared_with_the_velocity_after_it(
+    missing: int, doubtful: bool
+) -> None:
+    """The joint accelerated meanwhile: its slope is half of its velocity."""
+    check, found = VelocityCheck(panda(), SETTINGS, PERIOD), False
+    v = np.ones(7)
+    for k in range(300):
+        passed = (missing if k == 100 else 1) * PERIOD
+        speed, slope = (0.0, 0.0) if k < 100 else (1.0, 0.5 if k == 100 else 1.0)
+        check.update(slope * v * passed, speed * v, passed)
+        found |= bool(check.doubtful.any())
+        assert not check.contradicted.any(), k
+    assert found == doubtful
+
+
+def felt(share: float) -> bool:
+    """Return whether another joint's motion shows that a silent one moves."""
+    inertia = np.array([[1.0, 0.5], [0.5, 1.0]])
+    free: Array = np.linalg.solve(inertia, [1.0, 0.0])  # an effort on the first one
+    check = ReactionCheck(SETTINGS.velocity_error)
+    for k in range(300):
+        check.expect(np.array([True, False]), inertia, free)
+        check.update(share * k * PERIOD * free, PERIOD)
+    return check.felt
+
+
+def test_what_moves_by_much_more_than_the_reaction_moves_for_another_reason() -> None:
+    assert [felt(share) for share in (0.3, 1.0, 2.0)] == [False, True, False]
+
+
+@pytest.mark.parametrize("period", [0.001, 0.002, 0.01])
+def test_a_joint_that_accelerates_within_a_period_is_no_contradiction(
+    period: float,
+) -> None:
+    """Up to 100 rad/s²: its slope in 10 ms is 0.5 rad/s behind the velocity."""
+    check, w = VelocityCheck(panda(), SETTINGS, period), 50.0
+    t = period * np.arange(round(0.5 / period))
+    way, v = 2.0 / w * np.diff(1.0 - np.cos(w * t)), 2.0 * np.sin(w * t)
+    for k in range(1, len(t)):
+        a = 2.0 * w * np.cos(w * (t[k] - 0.5 * period))
+        check.update(np.full(7, way[k - 1]), np.full(7, v[k]), period, np.full(7, a))
+        assert not (check.doubtful | check.contradicted).any(), k
+    for _ in range(3):  # a lie is one all the same
+        check.update(np.zeros(7), np.full(7, 2.8), period, np.full(7, 100.0))
+    assert check.contradicted.all()
+
+
+class Motion:
+    """What is trusted of a Panda at rest, whose last joint says something else."""
+
+    def __init__(self, period: float) -> None:
+        self.trusted = TrustedMotion(panda(), SETTINGS, period)
+        self.period, self.count, self.q = period, 0, start()
+
+    def update(self, moves: float, says: float) -> str | None:
+        """Return the fault after a period."""
+        self.count += 1
+        self.q, v = self.q.copy(), np.zeros(7)
+        self.q[6] += moves * self.period
+        v[6] = says
+        passed = self.period if self.count > 1 else 0.0
+        told = Measurement(self.count, self.count * self.period, self.q, v)
+        self.trusted.update(told, passed, np.zeros(7, dtype=bool))
+        self.trusted.applied(self.q, np.zeros(7), gravity(self.q))
+        return self.trusted.fault
+
+
+@pytest.mark.parametrize("period", [0.001, 0.005, 0.01])
+def test_noise_of_a_velocity_is_no_motion(period: float) -> None:
+    motion, rng = Motion(period), np.random.default_rng(0)
+    for noise in rng.normal(0.0, 0.05, 100).tolist():
+        assert motion.update(0.0, noise) is None
+        if motion.count > 1:
+            assert motion.trusted.mean_velocity is not None
+            np.testing.assert_array_equal(motion.trusted.mean_velocity, 0.0)
+    for _ in range(20):
+        motion.update(0.2, 0.2)
+    assert motion.trusted.mean_velocity is not None
+    np.testing.assert_allclose(motion.trusted.mean_velocity, 0.2 * np.eye(7)[6])
+
+
+def test_one_noisy_velocity_of_a_braked_joint_is_no_acceleration() -> None:
+    motion = Motion(0.002)
+    for _ in range(50):
+        assert motion.update(0.2, 0.2) is None
+    motion.trusted.stop(np.zeros(7))
+    assert motion.update(0.2, 0.7) is None  # beyond what braking leaves, once
+    faults = [motion.update(0.6, 0.6) for _ in range(10)]  # the others rest
+    (found,) = filter(None, faults)
+    assert "panda_joint7 is braked, and moves at 0.6 rad/s" in found
