@@ -8,7 +8,8 @@ arrays, and Python keeps the pieces of the last second.
 """
 
 from bisect import bisect_right
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from copy import copy
 from math import ceil, inf
 from typing import Any, NamedTuple
@@ -300,22 +301,29 @@ class Planner:
         Args:
             messages: Those that the next step takes; by default one to stay here.
         """
-        kept = vars(self).copy()
-        memory, past, starts = _copied(self._memory), self._past[:], self._starts[:]
-        kept["_kept"] = self._kept.copy()
-        if not self.begun:
-            self.advance(0.0, [])
-        if not messages:
-            self.call(self.now)
-            value = self.chart.value_near(self.state)
-            messages = [Message.of(None, value[None], None)]
-        t = self.now + SOON
-        self.advance(t, messages)
-        self.advance(t + SOON, ())  # the step after it keeps what was before
-        vars(self).update(kept)
-        self._past, self._starts = past, starts
-        for name, array in memory.items():
-            self._memory[name][...] = array
+        with self._taken_back():
+            if not self.begun:
+                self.advance(0.0, ())
+            if not messages:
+                self.call(self.now)
+                value = self.chart.value_near(self.state)
+                messages = [Message.of(None, value[None], None)]
+            t = self.now + SOON
+            self.advance(t, messages)
+            self.advance(t + SOON, ())  # the step after it keeps what was before
+
+    @contextmanager
+    def _taken_back(self) -> Iterator[None]:
+        """Take back what is planned, and what is raised, too, leaves nothing."""
+        own = vars(self) | {"_kept": self._kept.copy()}
+        own |= {"_past": self._past.copy(), "_starts": self._starts.copy()}
+        memory = _copied(self._memory)
+        try:
+            yield
+        finally:
+            vars(self).update(own)
+            for name, array in memory.items():
+                self._memory[name][...] = array
 
     # -- without Python ---------------------------------------------------------------
 

@@ -25,6 +25,7 @@ from hsp_control.trajectories.streams.followed import (
     FollowedOrientation,
     FollowedPose,
 )
+from hsp_control.trajectories.streams.message import Message
 from hsp_control.trajectories.streams.planner import Planner, Room
 from hsp_control.trajectories.streams.sources import read_recording
 
@@ -333,6 +334,18 @@ def test_earlier_times_are_known_while_a_step_begins_many_pieces() -> None:
             known += 1
             np.testing.assert_allclose(found, expected, rtol=0.0, atol=1e-12)
     assert 10 < known < 50
+
+
+def test_what_a_rehearsal_raises_leaves_nothing() -> None:
+    stream = Stream([0.0]).anchored(None)
+    stream.sample(0.0)
+    stream.run.send([0.1])
+    stream.sample(0.1)
+    before = pickle.dumps(stream.run)
+    fits, does_not = (Message.of(None, np.ones((1, n)), None) for n in (1, 3))
+    with pytest.raises(ValueError, match="broadcast"):
+        stream.run._planned.rehearse([fits, does_not])
+    assert pickle.dumps(stream.run) == before
 
 
 def test_a_new_run_begins_anew_and_hears_only_what_is_new() -> None:
