@@ -104,7 +104,7 @@ Vector3 Piece::moved(double elapsed, const OwnState& now) {
   velocity(0.0);
   const double fastest = std::max(at.velocity.tail<3>().norm(), now.rate.tail<3>().norm());
   const double intervals = std::max(std::ceil(fastest * elapsed / turn), 1.0);
-  if (!(intervals < 1e6)) return Vector3::Constant(std::nan(""));  // a damaged file
+  if (!(intervals < 1e4)) return Vector3::Constant(std::nan(""));  // a damaged file
   const double half = 0.5 * elapsed / intervals;
   Vector3 sum = Vector3::Zero();
   for (double middle = half; middle < elapsed; middle += 2.0 * half)

@@ -32,15 +32,15 @@ struct Stream {
   MotionBounds<In> bounds;
   MessageQueue queue;
   KnownWaypoints waypoints;
-  InOut<'h', 'p'> pieces;                // the last ones, in a ring
-  InOutInts<1> piece;                    // number of the present one
-  InOut<'n'> velocity;                   // the command: linear, then angular
-  InOutInts<1> commanded;                // whether it is followed, instead of waypoints
-  InOutInts<1> in_tool;                  // whether it is in the body's axes
-  InOut<1> now, begun, heard, fades_at;  // [s]
-  InOutInts<1> silent;                   // whether it rests for lack of messages
-  InOutInts<1> lost;                     // whether no motion was found, not even to rest
-  InOutInts<1> taken, late, refused;     // numbers of messages
+  InOut<'h', 'p'> pieces;                   // the last ones, in a ring
+  InOutInts<1> piece;                       // number of the present one
+  InOut<'n'> velocity;                      // the command: linear, then angular
+  InOutInts<1> commanded;                   // whether it is followed, instead of waypoints
+  InOutInts<1> in_tool;                     // whether it is in the body's axes
+  InOut<1> now, begun, received, fades_at;  // [s]
+  InOutInts<1> silent;                      // whether it rests for lack of messages
+  InOutInts<1> lost;                        // whether no motion was found, not even to rest
+  InOutInts<1> taken, late, refused;        // numbers of messages
   SentMessage sent;
   ChartState<Out> out;
   PlannerMemory memory;
@@ -76,7 +76,7 @@ struct Stream {
   }
 
   // Time since the last message, or since the run began [s].
-  double age() const { return now[0] - std::max(heard[0], begun[0]); }
+  double age() const { return now[0] - std::max(received[0], begun[0]); }
 
   // Send a target; return whether it is valid.
   template <class Values> bool send_target(const Values& wanted) {
@@ -171,7 +171,7 @@ struct Stream {
   // Take the message in rows [k, end); return whether it changes the future reference.
   bool accept(Index k, Index end, double t) {
     ++taken[0];
-    heard[0] = t;
+    received[0] = t;
     if (!waypoints.take(queue, k, end, t, delay, policy == LATEST)) {
       ++late[0];
       return false;

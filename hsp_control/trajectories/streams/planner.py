@@ -130,7 +130,7 @@ class Planner:
         self._queued, self._known = memory["queue.count"], memory["waypoints.count"]
         self._what, self._times = memory["queue.what"], memory["queue.times"]
         self._values, self._rates = memory["queue.values"], memory["queue.rates"]
-        self._heard, self._begun = memory["heard"], memory["begun"]
+        self._received, self._begun = memory["received"], memory["begun"]
         self._piece, self._pieces = memory["piece"], memory["pieces"]
 
     # -- the reference ----------------------------------------------------------------
@@ -267,7 +267,7 @@ class Planner:
         """Time since the last message, or since the run began [s]."""
         if not self.begun:
             return 0.0
-        return self.now - float(max(self._heard.item(), self._begun.item()))
+        return self.now - float(max(self._received.item(), self._begun.item()))
 
     def count(self, of: str) -> int:
         """Return how many messages were ``taken``, ``late`` or ``refused``."""
@@ -384,7 +384,7 @@ def _memory(room: Room, chart: Chart) -> dict[str, Any]:
         "velocity": np.zeros(n),
         "now": never.copy(),
         "begun": never.copy(),
-        "heard": never.copy(),
+        "received": never.copy(),
         "fades_at": np.full(1, inf),
         **{name: count() for name in _INTEGERS},
         "sent.target": np.zeros(width),
