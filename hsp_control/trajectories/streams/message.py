@@ -107,6 +107,17 @@ class Message(NamedTuple):
         return cls(what, rows, values, velocities, size)
 
     @property
+    def t(self) -> float | None:
+        """Its time by the sender's clock [s]; None: unknown, now."""
+        return float(self.times[0, 0]) if self.what[0, 2] else None
+
+    @property
+    def axes(self) -> Axes | None:
+        """Axes of a velocity alone, if they were given."""
+        kind = KINDS[self.what[0, 0]]
+        return {"world velocity": "world", "tool velocity": "tool"}.get(kind)  # type: ignore[return-value]
+
+    @property
     def at(self) -> float:
         """When it is taken, by the controller's clock; -inf: at once [s]."""
         return float(self.times[0, 2])
@@ -118,10 +129,9 @@ class Message(NamedTuple):
             t: When the step was that took it [s].
         """
         data: dict[str, Any] = {"at": t if self.at == -inf else self.at}
-        kind, _, timed = self.what[0].tolist()
-        if timed:
-            data["t"] = self.times[0, 0].item()
-        chunk = KINDS[kind] == "chunk"
+        if self.t is not None:
+            data["t"] = self.t
+        chunk = KINDS[self.what[0, 0]] == "chunk"
         for one, several in (("value", "values"), ("velocity", "velocities")):
             array = getattr(self, several)
             if array is not None and chunk:
@@ -130,8 +140,8 @@ class Message(NamedTuple):
                 data[one] = array[0].tolist()
         if chunk:
             data["times"] = self.times[:, 1].tolist()
-        if " velocity" in KINDS[kind]:
-            data["axes"] = KINDS[kind].split()[0]
+        if self.axes is not None:
+            data["axes"] = self.axes
         return data
 
 

@@ -21,7 +21,7 @@ from hsp_control import (
 from hsp_control.common.exceptions import SimulationError
 from hsp_control.config import Experiment
 from hsp_control.constraints.limits import RobotLimits
-from hsp_control.control.actuation.actuation import LimitsOutcome
+from hsp_control.control.actuation.limit_checks import LimitsOutcome
 from hsp_control.control.bound_step import BoundStep, FreeStep
 from hsp_control.control.changes import Changes
 from hsp_control.control.controller import Controller
