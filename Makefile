@@ -61,9 +61,8 @@ SPREAD := -n $(WORKERS) --dist worksteal
 test: $(STAMP) $(ENGINE) ## run the tests, but for those of test-system
 	@$(BIN)/python -m pytest $(SPREAD) -m "not system" $(ARGS)
 
-# They wait for clocks and for processes: one more of them keeps the cores busy.
 test-system: $(STAMP) $(ENGINE) ## run those of browsers, notebooks, processes and whole walks
-	@$(BIN)/python -m pytest $(SPREAD) -n $$(($(WORKERS) + 1)) -m system $(ARGS)
+	@$(BIN)/python -m pytest $(SPREAD) -m system $(ARGS)
 
 thorough: assertions sanitize ## run the tests with more seeds, every configuration's page, some mutants
 	@HSP_THOROUGH=1 $(BIN)/python -m pytest $(SPREAD) $(ARGS)
