@@ -30,6 +30,9 @@ _LAST = 20
 """Number of periods of the safe stop after the sensor of a joint at rest has died."""
 _SMALL = 2.0
 """Maximum contradiction due to the lag, relative to the error of velocities."""
+_MOVES = 0.2
+"""Expected speed above which a joint's reading cannot stay the same to the last bit
+[rad/s or m/s]: encoders of 1e-4 rad change in each 0.5 ms."""
 _EFFORT = {"rad": "N·m", "m": "N"}
 
 
@@ -265,8 +268,10 @@ class TrustedMotion:
         if (self._sensors.dead | self._pushed).any():  # its speed is unknown
             self.unknown_for = max(self.unknown_for, self._soon)
         unknown = ~(self._positions | self._velocities)
-        # Beside a joint that is only expected, one that stands may be dead, too.
-        if self._useless or (unknown.any() and check.stands.any()):
+        # Beside a joint that is only expected, one that stands, and should move, may be
+        # dead, too.
+        stands = check.stands & (np.abs(expected.v[2]) > _MOVES)
+        if self._useless or (unknown.any() and stands.any()):
             self.unknown_for = inf
         both = self._positions & self._velocities
         self.doubtful = self.fault is None and bool((check.doubtful & both).any())
