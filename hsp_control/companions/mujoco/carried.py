@@ -8,7 +8,7 @@ import numpy as np
 
 from hsp_control import engine
 from hsp_control.companions.mujoco.coordinates import Joint
-from hsp_control.companions.mujoco.mjcf import MIN_INERTIA
+from hsp_control.companions.mujoco.mjcf import MIN_INERTIA, principal_inertia
 from hsp_control.robot import Robot
 
 
@@ -51,11 +51,11 @@ class CarriedInMujoco:
         mujoco, model = importlib.import_module("mujoco"), self._model
         model.opt.gravity = self._gravity
         for joint, body in zip(self._joints, self._bodies, strict=True):
-            principal, axes = np.linalg.eigh(self._inertia[joint].reshape(3, 3))
-            axes[:, 2] *= np.linalg.det(axes)  # a rotation
+            inertia = self._inertia[joint].reshape(3, 3)
+            principal, axes = principal_inertia(inertia)
             model.body_mass[body] = max(self._mass[joint], MIN_INERTIA)
             model.body_ipos[body] = self._center[joint]
-            model.body_inertia[body] = np.maximum(principal, MIN_INERTIA)
+            model.body_inertia[body] = principal
             mujoco.mju_mat2Quat(model.body_iquat[body], axes.ravel())
         # what MuJoCo derives from them, at its own reference posture
         mujoco.mj_setConst(model, mujoco.MjData(model))

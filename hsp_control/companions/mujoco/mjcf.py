@@ -324,14 +324,27 @@ def _add_body(parent: Element, robot: Robot, joint: Joint) -> Element:
     body = SubElement(parent, "body", name=joint.name)
     _place(body, robot.model.jointPlacements[joint.index])
     inertia = robot.model.inertias[joint.index]
-    principal, axes = np.linalg.eigh(inertia.inertia)
-    axes[:, 2] *= np.linalg.det(axes)  # a rotation
+    principal, axes = principal_inertia(inertia.inertia)
     inertial = SubElement(
         body, "inertial", mass=_numbers([max(inertia.mass, MIN_INERTIA)])
     )
     _place(inertial, pin.SE3(axes, inertia.lever))
-    inertial.set("diaginertia", _numbers(np.maximum(principal, MIN_INERTIA)))
+    inertial.set("diaginertia", _numbers(principal))
     return body
+
+
+def principal_inertia(inertia: Array) -> tuple[Array, Array]:
+    """Return the principal inertias that MuJoCo accepts, and their axes.
+
+    Args:
+        inertia: Inertia about the centre of mass, shape (3, 3) [kg·m²].
+
+    Returns:
+        The inertias, shape (3,), and a rotation with the axes as columns.
+    """
+    principal, axes = np.linalg.eigh(inertia)
+    axes[:, 2] *= np.linalg.det(axes)  # a rotation
+    return np.maximum(principal, MIN_INERTIA), axes
 
 
 def _joint_elements(joint: Joint) -> list[tuple[str, dict[str, str]]]:
