@@ -134,8 +134,6 @@ def _built(kind: str, place: Path) -> Path:
     if compiler() is None:
         environment.pop("CXX", None)
     make = ["cmake", "--build", str(place)]
-    if kind != "Release":  # Python's alone
-        make += ["--target", "_engine"]
     for command in ([*configure, *options], make):
         done = subprocess.run(
             command, capture_output=True, text=True, check=False, env=environment

@@ -177,7 +177,7 @@ class ActiveStack:
 
     @cached_property
     def shown(self) -> "ActiveStack":
-        """This stack, as a modifier gets it: nothing in it can be changed."""
+        """This stack as others than its step get it: nothing in it can be changed."""
         return shown_stack(self)
 
     @property

@@ -108,7 +108,7 @@ class Controller(Commanded):
             mixture = now.mixture
             # references, the law, and what it delivers within the limits
             delivered = mixture.step(self._state.t, modifier)
-            stack, damped = self.active_stack, mixture.damped
+            stack, damped = self._active, mixture.damped
             stack.check(delivered.effort)
             now.bind_step()
         self._memory.acceleration = delivered.acceleration
@@ -227,7 +227,7 @@ class Controller(Commanded):
         if now.gains.stiffening:
             if now.mixture.active is None:  # a copy, made since the step
                 now.mixture.resolve(self._state.t)
-            now.gains.delay(self.active_stack, self._state.t, period)
+            now.gains.delay(self._active, self._state.t, period)
 
     def _while_free(self, advance: Callable[[FreeStep], int]) -> int:
         """Let the engine's loop make steps that are free; return how many it made."""
@@ -378,11 +378,15 @@ class Controller(Commanded):
 
     @property
     def active_stack(self) -> ActiveStack:
-        """The contacts and tasks that the last `compute` resolved.
+        """The contacts and tasks that the last `compute` resolved, read-only.
 
         Raises:
             ControllerError: If there was none yet.
         """
+        return self._active.shown
+
+    @property
+    def _active(self) -> ActiveStack:
         active = self._in_force.mixture.active
         if active is None:
             raise ControllerError("nothing has been computed yet")
@@ -460,16 +464,16 @@ class Controller(Commanded):
             ahead._observe(state)
             ahead._advance()
             ahead._in_force.mixture.resolve(state.t)
-            return ahead.active_stack
+            return ahead._active
 
     @property
     def task_rows(self) -> Mapping[str, slice]:
         """The rows of each task in the last output's stack, by name."""
-        return self.active_stack.task_rows
+        return self._active.task_rows
 
     def diagnose(self) -> Diagnostics:
         """Return quantities to plot, after `compute`, at the same state."""
-        active = self.active_stack
+        active = self._active
         return Diagnostics(active.field_value(), *active.diagnose())
 
     def flow(self, t: float, q: ArrayLike) -> Array:
@@ -482,7 +486,7 @@ class Controller(Commanded):
         """
         ahead = self._ahead()
         ahead.compute(t, q, np.zeros(self.robot.nv))
-        return ahead.active_stack.flow()
+        return ahead._active.flow()
 
     def _ahead(self) -> "Controller":
         """Return a copy that goes on from here, to look ahead with its own times."""

@@ -1,4 +1,4 @@
-"""The active stack as a modifier gets it: it can change nothing that a step reads."""
+"""The active stack as a user or a modifier gets it, who cannot change a step by it."""
 
 from collections.abc import Mapping
 from dataclasses import is_dataclass
@@ -42,20 +42,20 @@ class Shown:
 
     def __getattr__(self, name: str) -> Any:
         if name.startswith("_"):
-            raise AttributeError(f"{self._name} has no {name!r} in a modifier")
+            raise AttributeError(f"{self._name} has no {name!r} to read")
         value = getattr(self._own, name)
         called = ismethod(value) and not is_dataclass(self._own)
         if name in _BOUND or (called and name not in _READS):
             raise ImmutableError(
-                f"{self._name}.{name} is not for a modifier: it would change the step "
-                "of its controller; take a copy, controller.stack_at(state)"
+                f"{self._name}.{name} would change the step of its controller; take a "
+                "copy, controller.stack_at(state)"
             )
         return _shown(value, f"{self._name}.{name}")
 
     def __setattr__(self, name: str, value: object) -> NoReturn:
         raise ImmutableError(
-            f"{self._name}.{name} cannot be assigned in a modifier: it is its "
-            "controller's; return another acceleration, or an effort"
+            f"{self._name}.{name} cannot be assigned: it is its controller's; a "
+            "modifier returns another acceleration, or an effort"
         )
 
 

@@ -46,6 +46,8 @@ except ImportError as error:
         f"({error}): install the package anew, with `pip install` or `make`"
     ) from error
 
+LIBRARY: str = sys.modules[f"{__name__}._engine"].__file__ or ""
+"""The file of the library in use."""
 _BY_NAME = {kind.name: kind for kind in _kinds}
 
 

@@ -7,12 +7,13 @@ from pathlib import Path
 from hsp_control import engine
 from hsp_control.common.exceptions import FreezeError
 
-_ENGINE = Path(engine.__file__).parent
+_ENGINE = Path(engine.LIBRARY).parent
+_PACKAGE = Path(engine.__file__).parent
 _SOURCES = Path(__file__).parents[2] / "engine"
 
 
 def library() -> Path:
-    """Return the shared library hsp_step.
+    """Return the shared library hsp_step: of the same build as the engine in use.
 
     Raises:
         FreezeError: If it was not built.
@@ -47,7 +48,7 @@ def cmake_folder() -> Path:
 
 def _folder(name: str, file: str) -> Path:
     """Return a folder of the package, or of the checkout that it is run from."""
-    own = _ENGINE / name
+    own = _PACKAGE / name
     return _there((own if own.is_dir() else _SOURCES / name) / file).parent
 
 

@@ -99,7 +99,7 @@ def test_levels_share_directions_as_the_law_does(
         controller = computed(threshold * values[-1], "none")
     else:
         controller = computed(threshold, "robot")
-    law = controller.active_stack.law
+    law = controller._active.law
     planned([law.damped_beside(state.v)]).run(0.0)  # as where a limit binds
     held = 10.0 ** rng.uniform(-7.0, 1.0, size=levels)  # from strict to as dear
     H = limit_oracle.deviation_cost(law, False, robot.size, held)
@@ -170,7 +170,7 @@ def test_efforts_are_continuous_near_a_straight_elbow(
         q[3] = angle
         tau = controller.compute(0.0, q, v).tau
         # At half a turn from its target an orientation has no error to follow.
-        turned = np.linalg.norm(controller.active_stack.rows.error[3:6])
+        turned = np.linalg.norm(controller._active.rows.error[3:6])
         return tau if turned < 3.1 else np.full(7, np.nan)
 
     for seed in range(24 if THOROUGH else 12):

@@ -76,12 +76,12 @@ def drawn(name: str, seed: int, spread: float) -> hsp.Controller:
 def actuation_of(made: hsp.Controller) -> Actuation:
     """Return what delivered the controller's last step."""
     ((limits, _),) = made._in_force.limits.sets
-    return made._in_force.mixture.actuation(made.active_stack, limits)
+    return made._in_force.mixture.actuation(made._active, limits)
 
 
 def repeated(made: hsp.Controller, barriers: Barriers | None = None) -> Delivered:
     """Return the nearest step at the controller's state, with rows of barriers."""
-    stack, state, actuation = made.active_stack, made.state, actuation_of(made)
+    stack, state, actuation = made._active, made.state, actuation_of(made)
     a, wanted = stack.law.acceleration, actuation._wanted
     wanted.acceleration[:], wanted.effort[:] = a, state.inverse_dynamics(a)
     if stack.support.size:
@@ -109,7 +109,7 @@ def test_it_is_the_optimum(name: str, spread: float, seed: int) -> None:
     _, a, forces, status, _ = repeated(made)
     if status != Status.LIMITED:
         return
-    stack, state = made.active_stack, made.state
+    stack, state = made._active, made.state
     weight, bounds = stack.support.weight, actuation_of(made)._limits.bounds
     wanted = actuation_of(made)._wanted.acceleration  # see `limited_target`
     made_by = actuation_of(made)._qp
@@ -159,7 +159,7 @@ def test_least_violation_is_the_least(seed: int) -> None:
         return
     assert (np.abs(out.tau) <= 2.0).all()
     M, bounds = made.state.mass_matrix, actuation_of(made)._limits.bounds
-    a = made.active_stack.law.acceleration
+    a = made._active.law.acceleration
     tau = made.state.inverse_dynamics(a)
     H = np.diag(np.concatenate([np.full(7, 1e-9), np.ones(7)]))
     effort, motion = np.hstack([M, 0.0 * M]), np.hstack([np.eye(7), np.eye(7)])
@@ -206,7 +206,7 @@ def test_a_violation_does_not_depend_on_how_far_what_is_wanted_is() -> None:
 
 def test_contacts_are_relaxed_less_than_distances() -> None:
     made = drawn("whole_body/solo12_trunk", 1, 0.0)
-    stack = made.active_stack
+    stack = made._active
     rise = stack.law.problem.task.jacobian[2]
     a = stack.law.acceleration
     asked = row(rise, float(rise @ a) + 4.0)

@@ -339,7 +339,8 @@ def test_a_modifier_cannot_write_the_stack() -> None:
     }  # fmt: skip
 
 
-def test_a_modifier_cannot_step_the_stack() -> None:
+@pytest.mark.parametrize("by", ["a modifier", "the controller"])
+def test_nobody_steps_the_active_stack(by: str) -> None:
     panda = hsp.Robot.load("panda")
     own = hsp.Controller(panda, [hsp.FramePosition(FRAME)])
     q, v = panda.home(), np.zeros(NV)
@@ -349,16 +350,18 @@ def test_a_modifier_cannot_step_the_stack() -> None:
             attack(active)
             return a, None
 
-        own.compute(0.0, q, v, modifier=modifier)
+        own.compute(0.0, q, v, modifier=modifier if by == "a modifier" else None)
+        if by == "the controller":
+            attack(own.active_stack)
 
     with pytest.raises(ValueError, match="read-only"):
         does(lambda active: active.law.problem.gain.fill(0.0))
     with pytest.raises(
-        ImmutableError, match=r"active.share cannot be assigned in a modifier: it is"
+        ImmutableError, match=r"active.share cannot be assigned: it is its"
     ):
         does(lambda active: setattr(active, "share", 0.5))
     with pytest.raises(
-        ImmutableError, match=r"active.law.call is not for a modifier: .*stack_at"
+        ImmutableError, match=r"active.law.call would change .*stack_at"
     ):
         does(lambda active: active.law.call(v))
     does(lambda active: (active.flow(), active.diagnose(), active.field_value()))

@@ -154,7 +154,7 @@ def test_what_a_level_asks_for_does_not_know_those_below(
         weight = hsp.metrics.MassMatrixMetric() if metric == "mass" else None
         made = hsp.Controller(robot, tasks[:count], metric=weight, start=robot.home())
         made.compute(0.0, q, v)
-        law = made.active_stack.law
+        law = made._active.law
         assert far or law.edge_level[0] == 0
         calls = [law.call(v, beside=True), law.self_motions(v)[0]]
         parted, (by_levels, _) = law.by_levels(v)

@@ -19,7 +19,7 @@ def test_in_the_middle_the_exact_law_counts_alone(away: float, damped: str) -> N
     task = hsp.FramePosition("panda_tcp", hsp.Hold(here + goal))
     made = hsp.Controller(robot, [task], start=q, limits=None)
     output = made.compute(0.0, q, np.zeros(7))
-    law = made.active_stack.law
+    law = made._active.law
     assert output.damped == damped
     assert law.outcome.outcome is (DAMPED if damped else EXACT)
 

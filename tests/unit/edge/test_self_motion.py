@@ -35,7 +35,7 @@ def test_it_is_what_the_law_does_with_a_field_and_not_without(
         start=robot.home(),
     )
     made.compute(0.0, q, v)
-    law = made.active_stack.law
+    law = made._active.law
     assert law.edge_level[0] > 0  # damped, and beyond limits
     _, (self_motions, _) = law.self_motions(v)
     whole, self_motion = law.edge.damped.copy(), self_motions[1].copy()
