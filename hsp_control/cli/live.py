@@ -37,6 +37,7 @@ from hsp_control.live import (
 from hsp_control.live.hardware import AdaptingHardware, LocatedHardware
 from hsp_control.live.operator_requests import stop_signals
 from hsp_control.simulation import Rollout
+from hsp_control.simulation.declared_run import with_duration
 from hsp_control.simulation.run_summary import summary_rows
 
 _DRY_RUN = 0.5  # duration of the dry run, in which every call is made once [s]
@@ -51,6 +52,7 @@ def live(options: argparse.Namespace) -> int:
     duration = simulation.duration if options.duration is None else options.duration
     if not duration > 0.0:
         raise LiveError(f"--duration {duration:g}; must be positive")
+    until = None if duration == inf else duration
     if options.robot is not None and (options.faults or options.cameras):
         raise LiveError(
             "--faults and --cameras are for the simulated robot: leave them out with "
@@ -84,12 +86,12 @@ def live(options: argparse.Namespace) -> int:
             report = run_loop(
                 compensated,
                 hardware,
-                duration=None if duration == inf else duration,
+                duration=until,
                 log=loop_log,
                 meta={
                     "name": f"{experiment.name}, live",
                     "title": experiment.scenario.title,
-                    "config": experiment.config,
+                    "config": with_duration(experiment.config, until),
                     "momentum_observer": _on_observer(experiment, real=real),
                 },
                 priority=options.priority,

@@ -28,6 +28,7 @@ from hsp_control.live.settings import LiveSettings
 from hsp_control.live.simulated_robot import SimulatedRobot
 from hsp_control.live.udp import CLOSED_BY_LOOP, Row, SensorLayout, UdpHardware, serve
 from hsp_control.robot import RobotState
+from hsp_control.simulation.declared_run import with_duration
 from hsp_control.simulation.limit_excess import LimitExcess
 from hsp_control.simulation.log_writer import LogWriter
 from hsp_control.simulation.plants import differing_bodies
@@ -251,7 +252,7 @@ class _RobotLog:
                 **robot.plant.describe(),
                 **differing_bodies(robot.plant, experiment.robot),
             },
-            "config": settings["config"],
+            "config": with_duration(settings["config"], None),
         }
         path = Path(settings["log"])
         scene = experiment.scene

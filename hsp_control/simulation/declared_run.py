@@ -1,6 +1,6 @@
 """The configuration of a run that was made in Python: with it, its log repeats it."""
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from functools import partial
 from typing import Any
 
@@ -53,6 +53,20 @@ def declared_controller(
         return None, str(error)
     config["imports"] = list(dict.fromkeys(own_modules(parts)))
     return config, ""
+
+
+def with_duration(
+    config: Mapping[str, Any] | None, duration: float | None
+) -> dict[str, Any] | None:
+    """Return a run's configuration with the duration that it was given [s].
+
+    Args:
+        config: The configuration; None: there is none.
+        duration: None: a log of it is repeated over what it has, see `Rollout.config`.
+    """
+    if config is None:
+        return None
+    return {**config, "simulation": {**config["simulation"], "duration": duration}}
 
 
 def _described(robot: Robot) -> RobotDescription:

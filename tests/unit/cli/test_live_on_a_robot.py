@@ -58,6 +58,8 @@ def test_it_begins_where_the_robot_is(
     assert main(command(tmp_path, "hold")) == 0
     run = Rollout.load(tmp_path / "panda_obstacle-live.npz")
     assert run["q"][0] == pytest.approx(hardware.q, abs=1e-6)
+    assert run.config is not None
+    assert run.config["simulation"]["duration"] == 0.1  # of the loop, not the file
     assert np.abs(run["task.hand.error"][run.t < 0.1]).max() < 1e-5
     # What became of it is said as `hsp run` says it.
     printed = " ".join(capsys.readouterr().out.split())
