@@ -71,7 +71,7 @@ thorough: assertions sanitize ## run the tests with more seeds, every configurat
 # What a library of the engine is built with, and the tests whose calls it then makes.
 CALLS ?= tests/unit/engine tests/unit/law tests/unit/edge tests/unit/tasks tests/unit/null_space \
   tests/unit/constraints tests/unit/trajectories tests/unit/geometry tests/unit/robot \
-  tests/unit/control -m "not system and not process"
+  tests/unit/control tests/unit/frozen -m "not system and not process"
 assertions: $(STAMP) $(ENGINE) ## those of the engine, with Eigen's assertions and no allocation
 	@HSP_ENGINE=$$($(BIN)/python hatch_build.py Debug) \
 	  $(BIN)/python -m pytest $(SPREAD) $(CALLS) $(ARGS)
@@ -82,6 +82,7 @@ sanitize: $(STAMP) $(ENGINE) ## those of the engine, under AddressSanitizer and 
 	@HSP_ENGINE=$$($(BIN)/python hatch_build.py Sanitized) \
 	  LD_PRELOAD="$$(g++ -print-file-name=libasan.so) $$(g++ -print-file-name=libstdc++.so.6)" \
 	  ASAN_OPTIONS=detect_leaks=0 UBSAN_OPTIONS=print_stacktrace=1 PYTHONMALLOC=malloc \
+	  CC="gcc -fsanitize=address" CXX="g++ -fsanitize=address" \
 	  $(BIN)/python -m pytest --capture=sys --timeout 1800 $(SPREAD) $(CALLS) $(ARGS)
 
 lint: $(STAMP) $(ENGINE) ## ruff, mypy --strict, the layers of the architecture

@@ -37,6 +37,8 @@ def replayed(program: Path, frozen: Path, states: Rows) -> Rows:
     """Return status and tau of a frozen controller at rows of t, q and v."""
     lines = "\n".join(" ".join(f"{x:.17g}" for x in row) for row in states)
     environment = {"PATH": "/usr/bin:/bin"}  # nothing of Python's
+    if sanitizer := os.environ.get("ASAN_OPTIONS"):
+        environment["ASAN_OPTIONS"] = sanitizer
     done = subprocess.run(
         [program, frozen],
         input=lines,

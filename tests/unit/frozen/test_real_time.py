@@ -1,5 +1,6 @@
 """A step of a frozen controller allocates nothing, and asks nothing of the system."""
 
+import os
 import subprocess
 import sys
 from collections.abc import Sequence
@@ -15,12 +16,18 @@ import hsp_control as hsp
 from hsp_control.constraints.contacts import CommandedForce
 from hsp_control.trajectories import StreamPose
 
+pytestmark = [
+    pytest.mark.skipif(sys.platform != "linux", reason="glibc's names, Linux' seccomp"),
+    pytest.mark.skipif(
+        "libasan" in os.environ.get("LD_PRELOAD", ""),
+        reason="AddressSanitizer has the allocations, and asks the system",
+    ),
+]
 SEED = 61
 Policy = Literal["latest", "interpolate", "extrapolate"]
 
 
 @pytest.mark.smoke
-@pytest.mark.skipif(sys.platform != "linux", reason="glibc's names, Linux' seccomp")
 @pytest.mark.parametrize(
     "name",
     ["panda_obstacle", "panda_limits", "ur5_position", "whole_body/solo12_trunk"],
@@ -32,7 +39,6 @@ def test_no_allocation_no_lock_no_system_call(name: str, tmp_path: Path) -> None
 
 
 @pytest.mark.smoke
-@pytest.mark.skipif(sys.platform != "linux", reason="glibc's names, Linux' seccomp")
 @pytest.mark.parametrize("policy", get_args(Policy))
 def test_targets_are_planned_for_without_any(policy: Policy, tmp_path: Path) -> None:
     experiment = hsp.load_experiment("panda_obstacle")
@@ -44,7 +50,6 @@ def test_targets_are_planned_for_without_any(policy: Policy, tmp_path: Path) -> 
     check_quiet(experiment, controller, tmp_path, *(f"hand.{x}" for x in inputs))
 
 
-@pytest.mark.skipif(sys.platform != "linux", reason="glibc's names, Linux' seccomp")
 def test_a_spring_follows_without_any(tmp_path: Path) -> None:
     experiment = hsp.load_experiment("panda_obstacle")
     soft = hsp.Impedance([300.0, 400.0, 500.0])
@@ -55,7 +60,6 @@ def test_a_spring_follows_without_any(tmp_path: Path) -> None:
     check_quiet(experiment, controller, tmp_path, *inputs)
 
 
-@pytest.mark.skipif(sys.platform != "linux", reason="glibc's names, Linux' seccomp")
 def test_tasks_come_and_go_without_any(tmp_path: Path) -> None:
     experiment = hsp.load_experiment("panda_obstacle")
     hand = hsp.FramePosition("panda_tcp", name="hand")
@@ -66,7 +70,6 @@ def test_tasks_come_and_go_without_any(tmp_path: Path) -> None:
     check_quiet(experiment, controller, tmp_path, *inputs, come_and_go=["hand", "turn"])
 
 
-@pytest.mark.skipif(sys.platform != "linux", reason="glibc's names, Linux' seccomp")
 def test_a_sliding_contact_presses_without_any(tmp_path: Path) -> None:
     experiment = hsp.load_experiment("forces/panda_wipe")
     own = experiment.controller
