@@ -51,7 +51,8 @@ void check_before(std::int64_t index, std::int64_t own, const Joint& joint, cons
                                 "; must come before it");
 }
 
-// Throws unless all numbers are finite, the axis has the norm 1, and no mass is negative.
+// Throws unless all numbers are finite, the axis has the norm 1, no mass is negative, and the
+// inertia is symmetric.
 void check_numbers(const Joint& joint) {
   const auto wrong = [&](const char* what) {
     return std::invalid_argument("joint '" + joint.name + "': " + what);
@@ -64,6 +65,7 @@ void check_numbers(const Joint& joint) {
   if (!(joint.mass >= 0.0 && std::isfinite(joint.mass))) throw wrong("its mass is not 0 or more");
   if (!(joint.center.allFinite() && joint.inertia.allFinite()))
     throw wrong("its centre of mass or its inertia is not finite");
+  if (joint.inertia != joint.inertia.transpose()) throw wrong("its inertia is not symmetric");
   for (const Joint& part : joint.parts) check_numbers(part);
 }
 
@@ -94,7 +96,7 @@ Model model_of(const std::vector<Joint>& joints, const Vector3& gravity, const V
       joint = Types::JointModelMimic(joint, leader, each.ratio, each.offset);
     }
     model.addJoint(each.parent, joint, placement_of(each), each.name);
-    model.inertias[own] = pin::Inertia(each.mass, each.center, each.inertia);
+    model.inertias[own] = spatial_inertia(each.mass, each.center, each.inertia);
   }
   if (!gravity.allFinite() || !armature.allFinite())
     throw std::invalid_argument("gravity or armature is not finite");
@@ -122,7 +124,7 @@ void Dynamics::put_down() {
 void Dynamics::carry(const Carried& body) {
   if (body.share > 0.0)
     pinocchio_->model.inertias[body.joint] +=
-        pin::Inertia(body.share * body.mass, body.center, body.share * body.inertia);
+        spatial_inertia(body.share * body.mass, body.center, body.share * body.inertia);
   pinocchio_->carried.push_back(body);
 }
 

@@ -35,6 +35,13 @@ template <class S, int O> struct JointTypes {
       boost::recursive_wrapper<JointDataMimic>>;
 };
 
+// Of a body whose inertia about its centre is symmetric but for rounding: Pinocchio's own
+// constructor asserts that there is none.
+inline pin::Inertia spatial_inertia(double mass, const Vector3& center, const Matrix3& I) {
+  const pin::Symmetric3::Vector6 lower{I(0, 0), I(1, 0), I(1, 1), I(2, 0), I(2, 1), I(2, 2)};
+  return {mass, center, pin::Symmetric3(lower)};
+}
+
 struct Dynamics::Pinocchio {
   using Model = pin::ModelTpl<double, 0, JointTypes>;
   using Data = pin::DataTpl<double, 0, JointTypes>;

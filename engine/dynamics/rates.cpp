@@ -45,7 +45,7 @@ void Dynamics::Pinocchio::compute_momentum_rates(bool of_masses) {
     for (const Carried& body : carried)
       rate[body.joint] +=
           body.rate *
-          data.oMi[body.joint].act(pin::Inertia(body.mass, body.center, body.inertia)).matrix();
+          data.oMi[body.joint].act(spatial_inertia(body.mass, body.center, body.inertia)).matrix();
   for (int i = model.njoints - 1; i > 0; --i) {
     const auto& joint = model.joints[i];
     const Index first = joint.idx_vExtended(), count = joint.nvExtended();
