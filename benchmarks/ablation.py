@@ -1,4 +1,4 @@
-"""What each constant of the edge is for: the same cases with half, twice or none of it.
+"""The effect of each constant of the edge: the same cases with half, twice or none.
 
     .venv/bin/python benchmarks/ablation.py [--cases N] [--robots ROBOT ...] [NAME ...]
 

@@ -53,7 +53,7 @@ STILL = 1e-3  # change of an effort in 1 ms, as a part of its limit
 
 
 class Case(NamedTuple):
-    """What a hand is asked for.
+    """A commanded motion of a hand.
 
     Attributes:
         robot: Name of the robot.

@@ -57,7 +57,7 @@ Compute = Callable[[float, Array, Array], Array]
 
 @dataclass
 class Point:
-    """What a controller reads of a target."""
+    """The target as a controller reads it."""
 
     position: Array
 
@@ -129,7 +129,7 @@ def wrong_arm(case: Case, kind: str, seed: int, delay: int = 0) -> SampledPlant:
 
 @dataclass
 class Run:
-    """What one run measured: of its end, or of the circle's last second."""
+    """Measurements of a run: at its end, or in the circle's last second."""
 
     position: float = np.inf  # [mm]
     angle: float = np.inf  # [°]

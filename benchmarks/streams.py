@@ -43,7 +43,7 @@ class Case(NamedTuple):
 
 
 class Received(Trajectory):
-    """What others do: the newest target held, or lines between targets, delayed."""
+    """Usual alternatives: the newest target held, or lines between targets, delayed."""
 
     begin: Any = None
     lines: bool = False

@@ -33,9 +33,9 @@ COPIED = (*CODE, "conftest.py", "tests", "robots", "configs", "docs", "pyproject
 TESTS_FAILED = 1
 """The exit status of pytest when tests ran and one failed."""
 LONGEST, MEMORY = 900.0, 16 << 30
-"""What the tests of one mutant may take: time [s], and memory that they ask for [B]."""
+"""Limits of the tests of one mutant: time [s], and allocated memory [B]."""
 FAST = ("tests/unit", "-m", "not slow and not process and not browser")
-"""What is asked when the tests of a room notice nothing: those of `make quick`."""
+"""Tests that run when those of a room detect nothing: those of `make quick`."""
 ROOMS = {
     "dynamics": ("robot", "tasks"),
     "compensation": ("simulation", "control"),
@@ -71,7 +71,7 @@ class Mutant(NamedTuple):
 
 
 class Verdict(NamedTuple):
-    """What became of a mutant.
+    """The outcome of a mutant.
 
     Attributes:
         word: ``caught``, ``SURVIVED``, ``void``: it does not compile, or no test ran.

@@ -113,7 +113,7 @@ def controller(arm: Arm, kind: str, q0: Array, rng: np.random.Generator) -> Any:
 
 
 class Setting(NamedTuple):
-    """What a row of the table is about.
+    """The subject of a row of the table.
 
     Attributes:
         robot: Its name.

@@ -123,7 +123,7 @@ class Controller(Commanded):
         memory, now, state = self._memory, self._in_force, self._state
         origin, q, v = memory.origin.item(), state.q.copy(), state.v.copy()
         active, damped = now.mixture.active, now.mixture.damped
-        # What fails here fails in a step as well, which says so, or is not there yet.
+        # An error here is raised in a step as well, or its cause is not there yet.
         with memory.kept(), suppress(Exception):
             for _ in range(times):
                 now.mixture.rehearse()

@@ -120,7 +120,7 @@ class InForce:
         memory.now = max(memory.now, t)
         if later is None or memory.now <= later.at:
             return
-        # What is in force is written. The next change binds the calls of the model and
+        # The values in force are written. The next change binds calls of the model and
         # the tools anew, and frees what is left here: to free it takes longer than a
         # step.
         over = self.time_line, self.setup, self.mixture, self.step, later

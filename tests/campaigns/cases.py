@@ -16,7 +16,7 @@ TIMEOUT = 60.0
 
 @dataclass
 class Count:
-    """What came of many cases.
+    """The outcome of many cases.
 
     Attributes:
         cases: How many.

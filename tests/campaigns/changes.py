@@ -29,7 +29,7 @@ PROCESS = 8_000_000  # as in `soak` [bytes]
 
 @dataclass(frozen=True)
 class Kept:
-    """What there is once all changes are over."""
+    """The memory once all changes are over."""
 
     text: str
     calls: int  # length of the step's plan in text

@@ -27,7 +27,7 @@ SAVES, INTERRUPTS = 500, 200
 
 @dataclass
 class Faults:
-    """What came of many faults.
+    """The outcome of many faults.
 
     Attributes:
         cases: How many.

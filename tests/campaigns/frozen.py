@@ -52,7 +52,7 @@ COMPENSATORS: dict[str, Any] = {
 
 @dataclass
 class Tally:
-    """What came of one configuration.
+    """The outcome of one configuration.
 
     Attributes:
         refused: Why it cannot be frozen; empty: it can.

@@ -38,7 +38,7 @@ OTHERS = (
 
 @dataclass
 class Tally:
-    """What came of many steps.
+    """The outcome of many steps.
 
     Attributes:
         steps: Steps.

@@ -22,15 +22,15 @@ CONFIG = "panda_obstacle"
 PERIOD = 1e-3
 MINUTES = 10.0
 PYTHON_GROWTH = 100_000
-"""What Python may have allocated more at the end than after the warm-up [bytes]."""
+"""Largest growth of Python's allocations between warm-up and end [bytes]."""
 PROCESS_GROWTH = 8_000_000
-"""What the process may hold more [bytes]: the allocator's pages, and no leak, which at
+"""Largest growth of the process [bytes]: the allocator's pages, and no leak, which at
 600000 steps would be more with 16 bytes a step."""
 
 
 @dataclass
 class Soak:
-    """What was read.
+    """Readings of memory.
 
     Attributes:
         steps: Control steps.

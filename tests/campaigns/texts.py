@@ -1,4 +1,4 @@
-"""What is done to bytes and lines of any file."""
+"""Mutations of bytes and lines of any file."""
 
 from collections.abc import Callable
 from random import Random

@@ -24,7 +24,7 @@ MEMORY = 12_000_000_000
 
 
 class Answer(NamedTuple):
-    """What came of a case.
+    """The outcome of a case.
 
     Attributes:
         index: The case's number.

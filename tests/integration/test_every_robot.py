@@ -271,6 +271,6 @@ def test_every_robot_is_driven_or_listed_with_its_reason() -> None:
         else:
             assert FLOATING in row.note or name == "cassie"
     assert "no URDF" in rows["cassie"].note
-    # What does not load as it is says what it is to be loaded with.
+    # A robot that does not load as it is names the options that it needs.
     for name in LOAD_OPTIONS:
         assert "load it with `" in rows[name].note

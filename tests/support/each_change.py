@@ -43,7 +43,7 @@ BACK: dict[str, Callable[[Changes], object]] = {
     "payload": lambda at: at.payload("panda_hand", 0.0),
     "tool": lambda at: at.tool("panda_tcp"),
 }
-"""What is needed so that the same change is possible again, or is one."""
+"""Conditions under which the same change is possible again, or is a change at all."""
 
 
 def controller(*tasks: hsp.Task) -> hsp.Controller:

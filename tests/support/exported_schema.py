@@ -23,5 +23,5 @@ def exported_schema() -> dict[str, Any]:
 
 @cache
 def validator() -> jsonschema.Draft202012Validator:
-    """What says whether data follow the schema."""
+    """A validator of data against the schema."""
     return jsonschema.Draft202012Validator(exported_schema())

@@ -264,7 +264,7 @@ def reach_cost(
 
 
 class ValueOnly(Cost):
-    """What a user writes first."""
+    """A user's first version."""
 
     frame: str
 
@@ -273,7 +273,7 @@ class ValueOnly(Cost):
 
 
 class WithGradient(ValueOnly):
-    """What a user writes next."""
+    """A user's next version."""
 
     def gradient(self, state: RobotState) -> Array:
         return reach_gradient(self.frame)(state)

@@ -14,7 +14,7 @@ Values = tuple[Array, Array]
 
 @dataclass
 class Sensors:
-    """What a lie may use: all true measurements before."""
+    """Input of a lie: all true measurements before."""
 
     joints: Flags  # those that it is about, shape (nv,)
     begin: int  # the number of the read at which it begins

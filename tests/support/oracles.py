@@ -57,7 +57,7 @@ def bounded_pseudo_inverse(J: Array, W: Array, threshold: float) -> Array:
 
 
 class Law(NamedTuple):
-    """What the law says at one state."""
+    """The law's result at one state."""
 
     acceleration: Array
     null_space_error: Array

@@ -55,7 +55,7 @@ _SYNTAX = {"json": json.loads, "toml": tomllib.loads}
 _PATIENCE = "--set live.missing=2000 --set live.watchdog=2000 --set live.age=60"
 """On a busy computer: what `hsp live` is given besides what the page says."""
 _BRIEFLY = "--duration 1"
-"""What `hsp live` is given where the page does not say how long it runs [s]."""
+"""Duration of `hsp live` where the page does not give one [s]."""
 _SHORT = "simulation.duration=0.02"
 
 

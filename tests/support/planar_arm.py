@@ -217,7 +217,7 @@ def cost_gradient_rate(number: int, t: float, theta: Array, theta_dot: Array) ->
 
 
 class PaperLaw(NamedTuple):
-    """What eqs. (7) and (13) say at one state.
+    """Eqs. (7) and (13) at one state.
 
     Attributes:
         tau: Torques on the absolute angles, shape (3,).

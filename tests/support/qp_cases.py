@@ -36,7 +36,7 @@ class Case(NamedTuple):
 
 
 class Answer(NamedTuple):
-    """What the solver returned."""
+    """The solver's result."""
 
     code: int
     x: Array

@@ -19,7 +19,7 @@ PARTS = (
     *("hsp_control.companions.viewer.command", "hsp_control.companions.plots"),
     *("matplotlib.pyplot", "matplotlib.backends.backend_agg", "trimesh"),
 )
-"""What the process imports first, where it is there. Nothing of it starts a thread."""
+"""Modules that the process imports first, if present. None of them starts a thread."""
 
 
 class ReadyCommands:

@@ -116,4 +116,4 @@ KINDS: dict[str, Callable[[Path], Robot]] = {
     "ball, rotors": lambda folder: _of_pinocchio(),
     "ball between leader and follower": lambda folder: _ball_between(),
 }
-"""What loads a robot of a kind, anew each time; its file is in the given folder."""
+"""Functions that load a robot of a kind, anew each time, from the given folder."""

@@ -1,4 +1,4 @@
-"""What a step delivers of the law's command, and what its calls write of it."""
+"""The effort that a step delivers, and the records that its calls write."""
 
 from typing import NamedTuple, Self
 
@@ -47,7 +47,7 @@ class Kept(NamedTuple):
 
 
 class CarriedStep:
-    """What the calls of a step deliver where contacts carry.
+    """Results of a step's calls where contacts carry.
 
     Attributes:
         qp: What is solved where it is not exact.

@@ -1,4 +1,4 @@
-"""What LeRobot's command line says of a loop."""
+"""Options of LeRobot's command line for a loop."""
 
 from dataclasses import dataclass, field
 

@@ -162,7 +162,7 @@ class Arm:
 
 
 class Uncalibrated:
-    """What LeRobot asks of a device that calibrates itself."""
+    """LeRobot's interface to a device that calibrates itself."""
 
     is_calibrated = True
 

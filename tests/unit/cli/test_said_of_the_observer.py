@@ -1,4 +1,4 @@
-"""What check and the summary of a run say of the momentum observer and of a load."""
+"""Notes of check and of a run's summary on the momentum observer and a load."""
 
 import json
 from pathlib import Path

@@ -1,4 +1,4 @@
-"""What cannot be meant is said where it happens: mm, degrees, a run that was damped."""
+"""Implausible input is reported where it occurs: mm, degrees, a damped run."""
 
 import warnings
 
@@ -16,7 +16,7 @@ REST = np.zeros(7)
 
 
 def told(target: object, **options: object) -> list[str]:
-    """What is said of a target where a loop begins."""
+    """Warnings about a target where a loop begins."""
     task = hsp.FramePosition("panda_tcp", target, name="hand", **options)  # type: ignore[arg-type]
     controller = hsp.Controller(PANDA, [task])
     with warnings.catch_warnings(record=True) as found:

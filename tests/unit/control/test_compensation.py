@@ -331,7 +331,7 @@ def test_half_of_the_power_passes_at_the_cut_off(order: int) -> None:
 def test_the_predictor_knows_where_the_robot_will_be(
     efforts: int, sensors: int
 ) -> None:
-    """What the law is shown is the state in which its effort acts, to Rk4's error."""
+    """The law sees the state in which its effort acts, to Rk4's error."""
     plant = hsp.plants.ImperfectPlant(
         hsp.plants.IntegratedPlant(hsp.plants.RigidBodyPlant(PANDA), Rk4(H)),
         [SensorDelay(sensors)] if sensors else [],

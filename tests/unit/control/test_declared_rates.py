@@ -22,7 +22,7 @@ HOME = ROBOT.home()
 A = np.random.default_rng(0).normal(size=(7, 7))
 
 
-# What is true: f = Σ sin(A q + t), its gradient, the rate of that, and a field.
+# The true ones: f = Σ sin(A q + t), its gradient, the rate of that, and a field.
 
 
 def f(s: hsp.RobotState) -> float:

@@ -1,4 +1,4 @@
-"""What deviations from the law cost, and postures that motors can hold."""
+"""The cost of deviations from the law, and postures that motors can hold."""
 
 from dataclasses import replace
 from typing import Any

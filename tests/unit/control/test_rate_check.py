@@ -1,4 +1,4 @@
-"""What a loop's rate allows: in theory, in the links of the chain, and on the robot."""
+"""Gains that a loop's rate permits: in theory, in the chain's links, on the robot."""
 
 import re
 from itertools import pairwise

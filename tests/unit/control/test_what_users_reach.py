@@ -1,4 +1,4 @@
-"""What a user reaches is not what steps: a mistake is one exact error, or harmless."""
+"""Users reach copies, not a step's arrays: mistakes are exact errors, or harmless."""
 
 import os
 import signal
@@ -57,7 +57,7 @@ ATTACKS: dict[str, Callable[[RobotState], object]] = {
     "centre": lambda s: s.centroidal.jacobian.fill(0.0),
     "companion": lambda s: s.ahead(0.01).q.fill(0.0),
 }
-"""What a part's own Python may do by mistake to the state that it is given."""
+"""Mistakes of a part's own Python with the state that it is given."""
 
 
 class Attacked:

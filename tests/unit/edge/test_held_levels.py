@@ -27,7 +27,7 @@ seeds = st.integers(0, 2**32 - 1)
 
 
 class Law(NamedTuple):
-    """What of a resolved law counts."""
+    """The relevant part of a resolved law."""
 
     problem: Any
     acceleration: Array
@@ -109,7 +109,7 @@ def costs(given: dict[str, Any]) -> list[float]:
 
 @given(seeds, st.floats(10.0, 1e6))
 def test_it_is_the_plain_formula(seed: int, size: float) -> None:
-    """What each level asks for beyond a limit, less what is below can give of it."""
+    """Commanded beyond a limit by each level, less the share that lower ones can meet."""
     asked = drawn(seed, size)
     call, held = held_levels(**asked)
     planned([call]).run(0.0)
@@ -136,7 +136,7 @@ def test_the_identity_is_a_metric_as_others(seed: int) -> None:
 def test_what_a_level_asks_for_does_not_know_those_below(
     metric: str, far: bool, seed: int
 ) -> None:
-    """What the first level makes of a is the law of a controller without the others.
+    """The first level's part of a is the law of a controller without the others.
 
     With a target out of reach that is the damped law's.
     """

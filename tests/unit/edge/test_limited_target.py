@@ -1,4 +1,4 @@
-"""What a step comes near to where a limit binds, beside plain formulas."""
+"""The acceleration a step approaches where a limit binds, beside plain formulas."""
 
 from typing import NamedTuple
 
@@ -22,7 +22,7 @@ seeds = st.integers(0, 2**32 - 1)
 
 
 class Asked(NamedTuple):
-    """What is asked for, and what limits permit."""
+    """Commanded accelerations, and those that limits permit."""
 
     M: Array
     a: Array

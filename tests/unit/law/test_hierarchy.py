@@ -100,7 +100,7 @@ def test_conflict_leaves_the_upper_level_exact(
     )
     np.testing.assert_allclose(x.J @ e_N, 0.0, rtol=0, atol=1e-9)
     expected, expected_e_N = lexicographic(x, [upper, lower])
-    # What rounding leaves of the blocked row (1e-16) acts with 2/threshold² = 2e4.
+    # The blocked row's rounding error (1e-16) is amplified by 2/threshold² = 2e4.
     np.testing.assert_allclose(e_N, expected_e_N, rtol=0, atol=1e-8)
     np.testing.assert_allclose(a, expected, rtol=1e-8, atol=1e-8)
 

@@ -204,7 +204,7 @@ def test_what_replaces_a_lie_may_die_as_well(kind: str) -> None:
     )
     assert report.ended == "fault"
     assert report.silent
-    # What was sent before ends by its rate; 0.94 rad/s if the positions are believed.
+    # The last effort ends by its rate; 0.94 rad/s if the positions are believed.
     assert np.array(robot.speeds)[robot.stopped :].max() < 0.6
 
 

@@ -1,4 +1,4 @@
-"""What the log of a loop says of each period, beside what robot and loop did."""
+"""The log of a loop, period by period, compared with robot and loop."""
 
 from pathlib import Path
 

@@ -50,7 +50,7 @@ def assert_held(rig: Rig, report: LoopReport) -> None:
     assert report.phase is Phase.HOLDING
     assert not report.silent
     assert report.speed < AT_REST
-    # What the loop sent until its end: `close` adds the robot's own stop afterwards.
+    # Efforts sent until the loop's end: `close` adds the robot's own stop afterwards.
     assert rig.robot.reason == "the loop has ended"
     assert np.abs(rig.robot.v).max() < AT_REST
 

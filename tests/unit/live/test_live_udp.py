@@ -240,7 +240,7 @@ def test_efforts_that_answer_old_states_are_nobody_s() -> None:
 def test_an_effort_may_answer_a_state_as_old_as_the_watchdog_waits(
     lag: int, in_time: bool
 ) -> None:
-    """What answers a state comes a period later, so a lag of nine is an age of ten."""
+    """The answer to a state comes a period later, so a lag of nine is an age of ten."""
     receiver, robot = Link(7), watched(LiveSettings(watchdog=10))
     link = Link(7, peer=receiver.address)
     tau = panda().inverse_dynamics(start(), np.zeros(7), np.zeros(7))

@@ -168,7 +168,7 @@ def test_every_mistake_is_named(
 
 
 class Reach(JacobianCost):
-    """What a user writes: minus half the square of the pose rows' Frobenius norm."""
+    """A user's cost: minus half the square of the pose rows' Frobenius norm."""
 
     rows: Rows = "pose"
     length: Positive = 0.5

@@ -115,7 +115,7 @@ def test_coordinates_of_the_robot_s_source() -> None:
 
 
 def test_a_metric_s_own_evaluate_is_compiled() -> None:
-    """What a subclass overrides in plain Python is what a step calls."""
+    """A step calls the methods that a subclass overrides in plain Python."""
 
     class Halved(ConstantMetric):
         """Half of a matrix."""

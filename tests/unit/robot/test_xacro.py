@@ -23,7 +23,7 @@ XACRO = ARM.replace(
 
 
 class ArgumentMissingError(Exception):
-    """What the stand-in raises for an argument without a value."""
+    """The stand-in's error for an argument without a value."""
 
 
 @pytest.fixture

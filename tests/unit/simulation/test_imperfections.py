@@ -183,7 +183,7 @@ def test_without_friction_it_is_the_ideal_plant_to_second_order(name: str) -> No
 
 
 def test_a_step_obeys_coulombs_law_in_every_joint() -> None:
-    """What is left of M Δv - h(tau - N) is h c sign(v), or less where v = 0."""
+    """The residual of M Δv - h(tau - N) is h c sign(v), or less where v = 0."""
     robot = load("panda")
     coulomb = np.array([5.0, 5.0, 3.0, 3.0, 1.0, 1.0, 0.5])
     plant = StickingPlant(robot, JointFriction.of(robot, coulomb), step=1e-4)

@@ -1,4 +1,4 @@
-"""What a plan is told once a period: contact forces obey the balance of momentum."""
+"""A plan's measurements, once a period: forces obey the balance of momentum."""
 
 import numpy as np
 import pytest

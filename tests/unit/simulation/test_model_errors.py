@@ -1,4 +1,4 @@
-"""What a loop bears of what its model lacks: told, and done by the arm."""
+"""Errors of the model that a loop tolerates: reported, and simulated."""
 
 import numpy as np
 import pytest

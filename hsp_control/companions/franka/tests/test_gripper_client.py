@@ -1,4 +1,4 @@
-"""What the gripper's process takes from a datagram, without a gripper."""
+"""The gripper's process reads commands from datagrams, without a gripper."""
 
 import json
 import socket

@@ -1,4 +1,4 @@
-"""What no robot has is named, and so is how files are read and what is not read."""
+"""Implausible values are reported, and so is how files are read, and ignored parts."""
 
 from collections.abc import Callable
 from pathlib import Path

@@ -550,7 +550,7 @@ def test_the_operational_space_law_keeps_the_tasks_and_not_the_field(
     for log in logs:
         assert np.abs(log["task.hand.error"]).max() < 2e-3
     late = exact.t > 1.5
-    # What is left of the exact one is the effort that is held for a millisecond.
+    # The exact one deviates because the effort is held for a millisecond.
     assert exact["null_space_norm"][late].max() < 0.02
     assert compared["null_space_norm"][late].max() > 0.3
     assert "operational" in compared.meta["changes_lost"]

@@ -536,7 +536,7 @@ def test_labels_are_right_at_every_ratio_and_range(page: Any) -> None:
 
 @pytest.mark.browser
 def test_a_slow_program_does_not_turn_a_knob_back(page: Any) -> None:
-    """What it says before it has heard of the change is not shown."""
+    """Its messages from before it received the change are not shown."""
     page.evaluate("play.panel.set('stiffness', 900)")
     page.evaluate("play.touched.set('set stiffness', performance.now() - 1000)")
     tell(page, "play_values", values={"stiffness": 400.0, "friction": False})

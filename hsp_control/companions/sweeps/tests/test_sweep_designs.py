@@ -167,7 +167,7 @@ def test_rows_are_in_the_order_of_the_plan() -> None:
 
 
 def test_a_file_is_in_the_order_of_the_plan(tmp_path: Path) -> None:
-    """What other tools read is the same bytes, in whichever order runs end."""
+    """The files for other tools have the same bytes, in whichever order runs end."""
     for name, order in (("one", (0, 1, 2)), ("other", (2, 0, 1))):
         files = RowFiles(plan_of({"a": "10:30:3"}), {}, tmp_path / name, fresh=False)
         for k in order:

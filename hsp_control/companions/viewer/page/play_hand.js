@@ -88,7 +88,7 @@ class PlayHand {
     };
   }
 
-  // What can be held under a pixel; nothing while one looks back.
+  // The movable thing under a pixel; nothing while one looks back.
   find(x, y, pointer) {
     if (this.play.bar.past.looking) return null;
     const {gizmos} = this.play, sight = this.play.sight.update();

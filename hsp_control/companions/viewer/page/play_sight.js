@@ -1,4 +1,4 @@
-// What the camera sees, and how a pointer moves things in it. Points and directions are in Pinocchio's
+// The camera's view, and how a pointer moves things in it. Points and directions are in Pinocchio's
 // axes (z up), which are those inside Meshcat's scene; pixels are those of pointer events.
 
 class Sight {

@@ -105,7 +105,7 @@ class RunPlot extends Plot {
     return dashed ? [5, run ? 3.6 : 3, ...dots] : dots;
   }
 
-  // What of a panel cannot change without other plots.
+  // Properties of a panel that change only with other plots.
   static lookOf({title, note, series}) {
     const look = ({name, run, color, dashed, band}) => [name, run, color, dashed, band];
     return JSON.stringify([title, note, series.map(look)]);

@@ -98,7 +98,7 @@ function simplify(object) {
     ? object.material.map(simple) : simple(object.material);
 }
 
-// What surrounds a dark stage, for surfaces to mirror: soft boxes above and beside it.
+// The surroundings of a dark stage, for surfaces to mirror: soft boxes above and beside it.
 function studio() {
   const {Scene, Mesh, BoxGeometry, MeshBasicMaterial, BackSide, PMREMGenerator} = MeshCat.THREE;
   const room = new Scene();

@@ -251,7 +251,7 @@ def test_a_mesh_that_cannot_be_read_is_named(monkeypatch: pytest.MonkeyPatch) ->
 
 
 def content_of(page: Path) -> dict[str, Any]:
-    """What a page holds, with its arrays in their places."""
+    """The content of a page, with its arrays in their places."""
     text = page.read_text(encoding="utf-8")
     block = re.search(r'id="content">([^<]*)<', text)
     assert block is not None

@@ -1,4 +1,4 @@
-"""What the view draws beside the robot is what the run did, recomputed another way."""
+"""The view's layers agree with the run, recomputed another way."""
 
 from typing import Any
 

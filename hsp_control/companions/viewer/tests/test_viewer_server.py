@@ -228,7 +228,7 @@ def steered() -> Iterator[PageServer]:
 
 
 def heard(server: PageServer, last: str) -> list[dict[str, Any]]:
-    """What the pages say, up to a message of a kind."""
+    """Messages of the pages, up to one of a kind."""
     found: list[dict[str, Any]] = []
     wait_until(
         lambda: found.extend(server.messages()) or (found and found[-1]["do"] == last),

@@ -1,4 +1,4 @@
-"""What a leg does to the centre of pressure: against Pinocchio's inverse dynamics."""
+"""A leg's effect on the centre of pressure, against Pinocchio's inverse dynamics."""
 
 import numpy as np
 import pinocchio as pin
