@@ -109,7 +109,7 @@ def costs(given: dict[str, Any]) -> list[float]:
 
 @given(seeds, st.floats(10.0, 1e6))
 def test_it_is_the_plain_formula(seed: int, size: float) -> None:
-    """Accelerations of levels beyond a limit, less the share that lower ones can meet."""
+    """Levels' accelerations beyond a limit, less the share that lower ones can meet."""
     asked = drawn(seed, size)
     call, held = held_levels(**asked)
     planned([call]).run(0.0)
