@@ -64,8 +64,8 @@ class HspCamera(Camera):
             with urlopen(self._url, timeout=self.config.timeout) as answer:
                 text = np.frombuffer(answer.read(), np.uint8)
         except HTTPError as error:
-            text = error.read().decode(errors="replace").partition("explanation: ")[2]
-            raise ConnectionError(f"{self._url}: {text.partition('</p>')[0]}") from None
+            page = error.read().decode(errors="replace").partition("explanation: ")[2]
+            raise ConnectionError(f"{self._url}: {page.partition('</p>')[0]}") from None
         except OSError as error:
             raise ConnectionError(
                 f"{self._url}: no picture ({error}); start a simulated arm with: "

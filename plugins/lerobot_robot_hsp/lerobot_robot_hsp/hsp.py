@@ -130,7 +130,7 @@ class Arm:
         return numbers[:3] + quaternion_of(numbers[3:])
 
     def _opening(self, state: dict[str, Any]) -> float | None:
-        """Return the opening: by the gripper's task, or as a Franka's gripper reports."""
+        """Return the opening, by the gripper's task or as a Franka's gripper sends."""
         task = state["tasks"].get(self._config.gripper_task)
         if task is not None or self._loop is None:
             return task["actual"][0] if task else None

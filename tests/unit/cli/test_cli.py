@@ -331,6 +331,7 @@ def versions_without(package: str) -> Callable[[str], str]:
         "there is no '--jsno' here; did you mean '--json'?",
     ),
     (["check", MOVING, "twice"], "'twice' is one argument too many"),
+    (["run", MOVING, "a=1"], "one argument too many; did you mean --set a=1?"),
     # Not taken for --strict.
     (["run", MOVING, "--st", "a=1"], "no '--st' here; did you mean '--set'?"),
 ])  # fmt: skip
