@@ -45,7 +45,7 @@ def pseudo_inverse(J: Array, W: Array) -> Array:
 def bounded_pseudo_inverse(J: Array, W: Array, threshold: float) -> Array:
     """Return J# with J's spectrum in the metric inverted by s q(s²), for any rank.
 
-    q(x) = 1/x from threshold² on, (2 - x/threshold²)/threshold² below:
+    χ(λ) = 1/λ from threshold² on, (2 - λ/threshold²)/threshold² below:
     ``docs/law.md``, Near singularities.
     """
     L = np.linalg.cholesky(W)
