@@ -43,7 +43,7 @@ def pseudo_inverse(J: Array, W: Array) -> Array:
 
 
 def bounded_pseudo_inverse(J: Array, W: Array, threshold: float) -> Array:
-    """Return J# with J's spectrum in the metric inverted by s q(s²), for any rank.
+    """Return J# with J's spectrum in the metric inverted by s χ(s²), for any rank.
 
     χ(λ) = 1/λ from threshold² on, (2 - λ/threshold²)/threshold² below:
     ``docs/law.md``, Near singularities.
