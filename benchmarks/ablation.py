@@ -34,7 +34,7 @@ from hsp_control.common.exceptions import HspControlError
 ROOT = Path(__file__).resolve().parents[1]
 ROBOTS, PERIOD = ("panda", "iiwa14", "xarm7"), 0.01
 OF_ABLATION = ("position", "levels", "just out", "axes", "spring above", "mass")
-NEAREST = ("position", "levels", "just out")  # the hand's distance counts
+NEAREST = ("position", "levels", "just out")  # the hand's distance is measured
 FIELDS = (300.0, 1e4)  # beside a step of 10 cm [rad/s]
 KEPT = 1e-3  # [m]
 

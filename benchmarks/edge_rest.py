@@ -64,7 +64,7 @@ class Case(NamedTuple):
         least: The smallest distance from it that it can have [m]; NaN: not looked for.
         number: Stiffness [N/m].
         vector: Force [N]; of a flip the axis; of a drag where it passes; of axes 1 for
-            each that counts.
+            each that is measured.
     """
 
     robot: str

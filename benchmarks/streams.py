@@ -24,7 +24,7 @@ BEGIN = 1.0  # measured from here on [s]
 
 
 class Arrival(NamedTuple):
-    """A message: when it arrives, when it was made, and what it says."""
+    """A message: when it arrives, when it was made, and its content."""
 
     at: float
     made: float

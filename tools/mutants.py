@@ -1,7 +1,7 @@
 """Break the code on purpose, and see whether a test notices: ``make mutants``.
 
 A mutant is one edit: of an operator, a number, a condition or a statement, drawn at
-random (`mutations.py`). The tests of its room are asked first, then the fast ones of
+random (`mutations.py`). The tests of its room run first, then the fast ones of
 all rooms. A mutant that survives is a claim that nobody checks, or an edit that changes
 nothing, such as of a bound that is never reached.
 
@@ -49,7 +49,7 @@ ROOMS = {
     "src": ("engine",),
     "include": ("frozen", "engine"),
 }
-"""The tests of a room of the engine that has no tests of its own name."""
+"""The tests of a room of the engine that has no tests of that name."""
 
 
 class Mutant(NamedTuple):

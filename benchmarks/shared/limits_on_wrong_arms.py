@@ -4,7 +4,7 @@ Masses ±20 %, centres ±10 mm, friction, a load of 1 kg that nobody declared, e
 2 ms late and then with a lag of 3 ms, a velocity with noise of 0.01 rad/s, at 1 kHz.
 Each case drives joints against their ranges: a pose, a posture, or a field that pushes.
 Without compensation, and with a momentum observer. How far the true position
-leaves its range, the speed its limit, and what the status told: a part of
+leaves its range, the speed its limit, and what the status reported: a part of
 `limit_rollouts.py`.
 """
 
@@ -180,7 +180,7 @@ def table(count: int) -> str:
     """Run so many cases of each setting, and return the table."""
     lines = (
         "| robot | against the errors | beyond a range, half / most [mrad] | by more "
-        "than 5 mrad | above a speed, most | rows told, missed, told without need |\n"
+        "than 5 mrad | above a speed, most | rows reported, missed, reported without need |\n"
         "|---|---|--:|--:|--:|--:|\n"
     )
     for setting in SETTINGS:

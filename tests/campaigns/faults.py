@@ -53,7 +53,7 @@ class Faults:
 
 
 def same(one: Rollout, other: Rollout) -> bool:
-    """Say whether the columns that both have are the same."""
+    """Return whether the columns that both have are the same."""
     return all(
         np.array_equal(one[name], other[name], equal_nan=True)
         for name in set(one.columns) & set(other.columns)
@@ -97,7 +97,7 @@ def full_disk(rollout: Rollout, size: int, random: Random, folder: Path) -> Faul
 
 
 def _save_and_leave(rollout: Rollout, path: Path, room: int, message: Path) -> None:
-    """Save with little room, write what was said, and end the process."""
+    """Save with little room, write the messages, and end the process."""
     text = "nothing"
     with message.open("w") as file:  # opened, and small, before there is no room
         if room:

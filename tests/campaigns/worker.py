@@ -1,4 +1,4 @@
-"""Runs cases in a process of its own, so that a crash or a hang is an answer, too.
+"""Runs cases in another process, so that a crash or a hang is a result, too.
 
 A case is a function of (seed, index): the parent sends both, the process makes the case
 from them and answers with one line. A process that dies is replaced.
@@ -20,7 +20,7 @@ from pathlib import Path
 from typing import Any, NamedTuple, Self
 
 MEMORY = 12_000_000_000
-"""Address space of a worker [bytes]: to ask for more is a failure."""
+"""Address space of a worker [bytes]: to allocate more is a failure."""
 
 
 class Answer(NamedTuple):
@@ -69,7 +69,7 @@ class Worker:
         self._first = False
         seconds = time.monotonic() - start
         if line is None:
-            process.send_signal(signal.SIGUSR1)  # says where it stands
+            process.send_signal(signal.SIGUSR1)  # reports where it is
             time.sleep(0.5)
             self.close()
             self._trace.seek(0)

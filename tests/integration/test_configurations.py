@@ -67,7 +67,7 @@ def least_manipulability(rollout: Rollout) -> float:
     return float(np.sqrt(rollout["manipulability"].min()))
 
 
-# Each says what its configuration is for, with bounds somewhat looser than it shows.
+# Each checks its configuration's purpose, with bounds somewhat looser than it shows.
 
 
 def the_hand_stays_able(experiment: Experiment, ours: Rollout, other: Rollout) -> None:

@@ -1,7 +1,7 @@
 """Every robot that is known, driven by the same few lines for a second of its time.
 
 Each holds a point, and where it can a pose, that it starts away from and with a speed
-of its own, while a posture and the middle of its range draw on the null space. Errors
+of the robot, while a posture and the middle of its range draw on the null space. Errors
 are taken from the logged motion by plain Pinocchio.
 """
 

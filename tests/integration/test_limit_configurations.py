@@ -1,4 +1,4 @@
-"""The configurations of configs/limits: the null space gives way, then the hand."""
+"""The configurations of configs/limits: the null space deviates, then the hand."""
 
 from functools import cache
 
@@ -43,7 +43,7 @@ def test_half_strength() -> None:
     free, _ = run("panda_half_strength", shorter, UNLIMITED)
     check_limits(ours, limits)
     assert limits is not None
-    assert (np.abs(free["tau"]) / limits.effort).max() > 1.05  # it is asked for
+    assert (np.abs(free["tau"]) / limits.effort).max() > 1.05  # it is commanded
     assert error(ours).max() < 3e-3
     limited = ours["status"] == Status.LIMITED
     first = int(np.flatnonzero(limited)[0])

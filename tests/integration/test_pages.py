@@ -113,7 +113,7 @@ def test_commands_stand_in_blocks_of_commands(page: str) -> None:
     """A block of text is what something prints: nobody runs it."""
     commands = {"hsp", "make", "pip", "python", "git", "cd", "source", "sudo"}
     for block in blocks_of(page):
-        assert block.language, f"{page}:{block.line} does not say its language"
+        assert block.language, f"{page}:{block.line} does not name its language"
         if block.language in OUTPUT and block.kind != "not run":
             first = {line.split(" ")[0] for line in block.text.splitlines()}
             assert not first & commands, f"{page}:{block.line}"

@@ -250,7 +250,7 @@ DURATION = 0.5  # of self-motion [s]
 
 @cache
 def tracked(which: str) -> tuple[Controller, Rollout]:
-    """Return a motion of 1 s from off the reference, at a velocity of its own."""
+    """Return a motion of 1 s from off the reference, at another velocity."""
     case = TASKS[which]
     robot = load(case.robot)
     q0 = home(case.robot)

@@ -100,7 +100,7 @@ class Passage:
         )
 
     def run(self, threshold: float, control_period: float | None = None) -> Rollout:
-        """Return the motion; it starts with a speed of its own."""
+        """Return the motion; it starts with a speed."""
         v0 = 0.05 * np.sin(1.0 + np.arange(self.robot.nv))
         return simulate(
             self.controller(threshold),
@@ -127,7 +127,7 @@ def stretched_planar_arm() -> Passage:
 
 
 def panda_out_of_reach(threshold: float) -> Passage:
-    """Its hand is asked for a point 15 cm out of reach, and back."""
+    """Its hand is commanded to a point 15 cm out of reach, and back."""
     robot = load("panda")
     q0, shoulder = robot.home(), np.array([0.0, 0.0, 0.333])
     here = robot.state(0.0, q0, np.zeros(7)).position("panda_tcp").copy()
@@ -317,7 +317,7 @@ def loaded(name: str) -> Robot:
 @pytest.mark.parametrize("largest", ["none", "robot"])
 @pytest.mark.parametrize("name", ROBOTS)
 def test_random_starts(name: str, largest: Any) -> None:
-    """20,000 if thorough: finite, bounded, exact where nothing is damped, and said so.
+    """20,000 if thorough: finite, bounded, exact where nothing is damped, and reported so.
 
     Half of them with a threshold that follows the feedback: then most are damped.
     """

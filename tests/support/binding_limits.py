@@ -80,7 +80,7 @@ class Case:
         """Return the largest change of an effort within 1e-9 s [N·m], and where [s].
 
         What a rate explains is left out: the largest change in the 1e-9 s before and
-        after. A force that rises where efforts can hardly bear it is steep, 1e5 N·m/s.
+        after. A force that rises where efforts can hardly hold it is steep, 1e5 N·m/s.
         """
         tau = {t: self.effort(controller, t) for t in times}
 

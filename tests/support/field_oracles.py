@@ -1,4 +1,4 @@
-"""Robots and obstacles for fields, and what plain Pinocchio says of each field's cost.
+"""Robots and obstacles for fields, and each field's cost by plain Pinocchio.
 
 A cost is written a second time with plain Pinocchio; g = -W⁻¹∇f of that, by differences
 of eighth order, is what the field must give. Between the oracles stand the fields that
@@ -48,7 +48,7 @@ OBSTACLE = Obstacle(
 
 @cache
 def load(name: str) -> Robot:
-    """Return a robot, or skip if example-robot-data is asked for and not there."""
+    """Return a robot, or skip if it is of example-robot-data and that is not there."""
     source, root = ROBOTS[name]
     if source not in {"planar3r", "panda"}:
         pytest.importorskip("example_robot_data")

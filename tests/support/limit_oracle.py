@@ -46,7 +46,7 @@ def level_costs(law: BoundLaw, supported: bool, size: float, held: Array) -> Arr
     """Return ρ of each level, then of the null space, shape (levels + 1,).
 
     What is below a level costs a part of the level's error over the robot's size, but
-    no more than a tenth and no less than priorities need; and what limits ask for,
+    no more than a tenth and no less than priorities need; and what limits require,
     ``held``, if that is more, but no more than the level itself. On contacts it is the
     least, whatever the error. Contacts cost as much as the level below them, and so do
     springs where there are none.

@@ -4,14 +4,14 @@ Python is executed in one namespace, commands in a shell, a YAML block is loaded
 for a moment, and a block behind a line such as "Save it as `mine.yaml`:" becomes that
 file. What cannot run so has a comment before it in the page, which no reader sees:
 
-    <!-- not run: needs an arm -->         it is skipped, and the test says why
+    <!-- not run: needs an arm -->         it is skipped, with this reason
     <!-- slow: a minute -->                only `make test-system` runs it
-    <!-- Ctrl-C: serves a page -->         it runs until it has said something
+    <!-- Ctrl-C: serves a page -->         it runs until it has printed something
     <!-- part of: {robot: {name: panda}} -->    YAML that is no whole configuration
     <!-- part of: forces/talos_wall KEY=VALUE -->    such YAML, laid over a bundled one
     <!-- lines of: engine/... -->          text that stands so in a file of the checkout
     <!-- background: a robot -->           it goes on until the page ends
-    <!-- fails: unstable gains -->         its status is 2, as the page says
+    <!-- fails: unstable gains -->         its status is 2, as in the page
     <!-- given: arm.urdf: robots/planar3r/planar3r.urdf -->    the reader's own file
 """
 
@@ -53,7 +53,7 @@ _FILE = re.compile(r"`([\w./-]+\.(\w+))`[^`]*:\s*$")
 _ENDINGS = {"python": "py", "sh": "sh", "yaml": "yaml", "c": "c", "cpp": "cpp"}
 _SYNTAX = {"json": json.loads, "toml": tomllib.loads}
 _PATIENCE = "--set live.missing=2000 --set live.watchdog=2000 --set live.age=60"
-"""On a busy computer: what `hsp live` is given besides what the page says."""
+"""On a busy computer: options of `hsp live` in addition to the page's."""
 _BRIEFLY = "--duration 1"
 """Duration of `hsp live` where the page does not give one [s]."""
 _SHORT = "simulation.duration=0.02"
@@ -67,7 +67,7 @@ class Block(NamedTuple):
         text: What is in it.
         line: The page's line on which its text begins.
         kind: The kind of the comment before it, if any.
-        reason: What the comment says.
+        reason: The text of the comment.
         file: The name of the file that it is, if any.
     """
 
@@ -173,7 +173,7 @@ def run_page(page: str, folder: Path, *, whole: bool) -> dict[str, Any]:
             elif block.language not in OUTPUT:
                 raise AssertionError(
                     f"{where}: a block of {block.language!r} is no file, and no "
-                    "comment says why it does not run"
+                    "comment gives the reason why it does not run"
                 )
     return space
 
@@ -266,7 +266,7 @@ class Shell:
             self._alone = (Path(gettempdir()) / "hsp-pages.lock").open("w")
             flock(self._alone, LOCK_EX)
         for line in lines_of(block.text):
-            for name in ("examples", "benchmarks"):  # the page says where they are
+            for name in ("examples", "benchmarks"):  # the page names their places
                 if re.search(rf"\b{name}/", line) and not Path(name).exists():
                     Path(name).symlink_to(ROOT / name)
             if re.match(r"hsp live\b", line) and "live.missing" not in line:

@@ -65,7 +65,7 @@ class Page(threading.Thread):
 
 
 class Steering(Page):
-    """A page that says things."""
+    """A page that sends messages."""
 
     def say(self, **message: Any) -> None:
         self.send(json.dumps(message))

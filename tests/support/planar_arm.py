@@ -264,7 +264,7 @@ def law(
         theta: Absolute angles θ, shape (3,) [rad].
         theta_dot: Their rates v = θ', shape (3,) [rad/s].
         field: g and its total rate g' for eq. (13), or None for φ_N = 0; e_N is then
-            told for g = 0: minus the self-motion, which nothing controls.
+            given for g = 0: minus the self-motion, which nothing controls.
 
     Returns:
         The torques and what they were made of.
@@ -363,7 +363,7 @@ def simulate_paper(number: int, duration: float = 10.0) -> PlanarSimulation:
         duration: Length [s], a multiple of 0.01 s, the distance of the rows.
 
     Returns:
-        The motion and what the law says along it.
+        The motion and the law's values along it.
     """
     start = MIRRORED_START if number == 4 else START
 

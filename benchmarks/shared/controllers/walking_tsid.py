@@ -85,7 +85,7 @@ def make(
     tau = np.zeros(nv)
 
     def switch(t: float, q: Array, v: Array) -> None:
-        """Let contacts and feet come and go as the plan says."""
+        """Let contacts and feet come and go by the plan."""
         for contact in controller.contacts:
             name, made = contact.name, soles[contact.name]
             if contact.active(t) and name not in bearing:
