@@ -23,7 +23,7 @@ MESSAGES, STREAMED = 30.0, 1.0  # of a stream: rate [1/s] and length [s]
 REST, WATCHED = (
     3.0,
     1.0,
-)  # after the target rests: until it is measured, for how long [s]
+)  # after the target rests: until it is measured, and how long [s]
 REST_OF_STREAM = 7.0  # this law's streams move at 0.5 m/s and arrive later [s]
 STILL = 1e-3  # change of an effort in 1 ms at rest, as a part of its limit
 SETTLED = 5e-3  # [m]

@@ -3,7 +3,7 @@
 `make bench` calls it with .venv-peers/bin/python. Peers that cannot be installed are
 written to .venv-peers/peers.json with the reason, which then stands in the table.
 
-TSID's wheels are built for Pinocchio 4.0, and abort with 4.1, which this package requires
+TSID's wheels are built for Pinocchio 4.0, and abort with 4.1, which this one needs
 for. Pinocchio's algorithms are compiled into its engine, so that another release may
 load the models: all peers but placo run with 4.0.
 """

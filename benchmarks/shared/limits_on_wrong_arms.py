@@ -180,7 +180,8 @@ def table(count: int) -> str:
     """Run so many cases of each setting, and return the table."""
     lines = (
         "| robot | against the errors | beyond a range, half / most [mrad] | by more "
-        "than 5 mrad | above a speed, most | rows reported, missed, reported without need |\n"
+        "than 5 mrad | above a speed, most | rows reported, missed, "
+        "reported without need |\n"
         "|---|---|--:|--:|--:|--:|\n"
     )
     for setting in SETTINGS:

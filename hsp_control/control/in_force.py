@@ -20,7 +20,7 @@ from hsp_control.engine.plans import planned
 from hsp_control.robot import RobotState
 
 MEMORY = 1.0
-"""Changes that were complete this long ago are forgotten [s]; an integrator may ask for
+"""Changes that were complete this long ago are forgotten [s]; an integrator may request
 earlier times than the last one."""
 
 

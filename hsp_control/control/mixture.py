@@ -37,7 +37,7 @@ them, weighted by the stack's `share`. State and stack are read-only; a is a cop
 
 
 def _checked(found: object, robot: Robot) -> tuple[Array, Array | None]:
-    """Return what a modifier returned, if it is as `AccelerationModifier` says."""
+    """Return what a modifier returned, if it is as in `AccelerationModifier`."""
     if not isinstance(found, tuple) or len(found) != 2:
         raise ControllerError(
             f"modifier returned {type(found).__name__}; needs (acceleration, effort or "

@@ -1,7 +1,7 @@
 """Run campaigns in full: ``python -m campaigns [NAME ...]`` in ``tests``, or make fuzz.
 
-Counts are kept in out/fuzz after every batch: what was interrupted is reported as far as it
-went. benchmarks/results/fuzz.md has them.
+Counts are kept in out/fuzz after every batch, also those of an interrupted campaign.
+benchmarks/results/fuzz.md has them.
 """
 
 import argparse

@@ -46,7 +46,7 @@ def pose_hand(**fields: Any) -> FramePose:
 def run(
     hand: hsp.Task, metric: Metric, pushes: list[Push], gain: float = 3.0, **how: Any
 ) -> Rollout:
-    """Return a run from rest, its null space off its field; pushes are unknown to it."""
+    """Return a run from rest, its null space off its field; it knows no pushes."""
     robot, q = panda(), start()
     away = robot.integrate(q, 0.4 * np.sin(1.0 + np.arange(7)))
     field = hsp.TargetPosture(away, weight=1.5)

@@ -1,6 +1,6 @@
 """Out of reach in the metric M(q): nothing shakes an arm at a limit.
 
-There a field demands of light wrists several times what limits permit. A step that began
+There a field demands several times what limits permit of wrists. A step that began
 to violate a limit by a tenth had left a quarter of that: the arms swung at 4 to 8 Hz.
 """
 

@@ -83,7 +83,7 @@ def test_talos_presses_against_a_wall() -> None:
 
 
 def test_talos_leans_while_it_is_heavier_than_its_model() -> None:
-    """Half of the way to 120 N, a tenth too heavy: it stands, and presses as commanded."""
+    """Halfway to 120 N, a tenth too heavy: it stands, and presses as commanded."""
     pytest.importorskip("example_robot_data")
     log = load_experiment("forces/talos_lean", "simulation.duration=2.2").run()
     assert log.meta["status"] == "completed"

@@ -317,7 +317,7 @@ def loaded(name: str) -> Robot:
 @pytest.mark.parametrize("largest", ["none", "robot"])
 @pytest.mark.parametrize("name", ROBOTS)
 def test_random_starts(name: str, largest: Any) -> None:
-    """20,000 if thorough: finite, bounded, exact where nothing is damped, and reported so.
+    """20,000 if thorough: finite, bounded, exact and so reported if undamped.
 
     Half of them with a threshold that follows the feedback: then most are damped.
     """

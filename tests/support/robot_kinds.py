@@ -1,4 +1,4 @@
-"""Robots of every kind that dynamics tell apart, made up and small.
+"""Robots of every kind that dynamics distinguish, invented and small.
 
 Mimic joints at the end and below free joints, chains of them, a follower before its
 leader, continuous, planar and spherical joints, floating bases, a loop that is closed

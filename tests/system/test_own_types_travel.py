@@ -103,7 +103,7 @@ def test_a_log_is_read_with_its_own_types(
 def test_a_module_of_a_package_is_found_on_the_path(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Who reads the log asks the same function as for a file."""
+    """A reader of the log calls the same function as for a file."""
     package = tmp_path / "elsewhere" / "own_package"
     package.mkdir(parents=True)
     (package / "__init__.py").touch()

@@ -1,4 +1,4 @@
-"""Whatever says again what pyproject.toml says agrees with it."""
+"""Copies of values in pyproject.toml agree with it."""
 
 import importlib.util
 import re

@@ -105,8 +105,8 @@ class Actuation:
 
         The last one returns whether it is exact and within the limits: then, where
         `direct`, it is delivered with the effort M a + N. Else the law's outcome and
-        `outcome` say what is not so. If a QP without forces and distances is all that
-        is needed where a bound is violated, it is solved at once; `is_nearest` says
+        `outcome` report the reason. If a QP without forces and distances is all that is
+        needed where a bound is violated, it is solved at once; `is_nearest` reports
         whether `nearest` is all that there is to deliver. Where contacts carry,
         the last one returns whether `carried` has an effort.
         """

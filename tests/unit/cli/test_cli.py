@@ -43,7 +43,7 @@ def test_run_leaves_a_log_that_numpy_alone_reads(
 def test_run_tells_a_program_what_it_did(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """The names are those of a sweep; what is told is what the log has."""
+    """The names are those of a sweep; the output agrees with the log."""
     arguments = ["run", MOVING, "--out", str(tmp_path), "--json", *SHORT]
     assert main(arguments) == 0
     told = json.loads(capsys.readouterr().out)

@@ -196,7 +196,7 @@ def test_a_foot_that_a_plan_switches(seed: int) -> None:
     for t in START + 0.1 + ABOUT:
         np.testing.assert_allclose(effort(t + FINEST), effort(t), rtol=0, atol=OF_LEGS)
     t = START + 0.2
-    for begins in (t, t + 0.01, t + 0.02):  # the last two: while it bears already
+    for begins in (t, t + 0.01, t + 0.02):  # the last two: while it carries already
         before = effort(begins - 1e-9)
         foot.set_down(begins, 0.1)
         np.testing.assert_allclose(effort(begins), before, rtol=0, atol=OF_LEGS)

@@ -164,7 +164,7 @@ def test_a_fixed_base_presses_with_what_is_commanded() -> None:
 
 
 class SlidingPlant(ContinuousPlant):
-    """A point on a plane: one rigid row, and kinetic friction that it does not tell."""
+    """A point on a plane: one rigid row, and unreported kinetic friction."""
 
     def __init__(self, robot: hsp.Robot, contact: SlidingContact) -> None:
         super().__init__(robot)

@@ -455,7 +455,7 @@ def test_a_sample_of_another_size_is_one_error() -> None:
 @pytest.mark.skipif(not hasattr(os, "fork"), reason="no processes that fork")
 @pytest.mark.filterwarnings("ignore:.*multi-threaded.*:DeprecationWarning")
 def test_a_fork_while_a_thread_computes_is_one_error() -> None:
-    """The child's copy is half a step: it says so, and waits for nobody."""
+    """The child's copy is half a step: it reports that, and waits for nobody."""
     inside, leave = threading.Event(), threading.Event()
 
     def slow(state: RobotState) -> float:

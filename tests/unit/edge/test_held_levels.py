@@ -169,7 +169,7 @@ def test_what_a_level_asks_for_does_not_know_those_below(
 def test_a_deviation_turns_no_faster_than_a_period_bears(
     angle: float, exponent: float
 ) -> None:
-    """A task along one direction of a plane asks one joint for x beyond its limit.
+    """A task along one direction of a plane moves one joint x beyond its limit.
 
     The nearest step, δ = H⁻¹c x/(cᵀH⁻¹c), turns with the direction by K at most for
     each radian, however large x is; with a cost of 1e-6 it would by 1e6 x.

@@ -120,7 +120,7 @@ def test_what_is_wrong_behind_a_right_checksum_is_no_crash(
 def test_a_changed_file_that_opens_steps_and_stops(
     frozen: Path, q: np.ndarray, tmp_path: Path
 ) -> None:
-    """Numbers may be any behind a right checksum: a status says so, and no crash."""
+    """Numbers may be any behind a right checksum: a status reports it, and no crash."""
     content, other = frozen.read_bytes(), tmp_path / "other.hsp"
     rng = np.random.default_rng(SEED)
     stepped = 0

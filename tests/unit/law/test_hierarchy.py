@@ -84,7 +84,7 @@ def test_recursion_is_the_stacked_law(form: int, seed: int, levels: list[int]) -
 def test_conflict_leaves_the_upper_level_exact(
     form: int, seed: int, upper: int, lower: int
 ) -> None:
-    """A lower level that asks for the upper's rows, and others: the oracle's answer."""
+    """A lower level that has the upper's rows, and others: the oracle's answer."""
     rng = np.random.default_rng(seed)
     x = numbers(seed, upper + lower, 7, form)
     mix = rng.standard_normal((lower, upper))

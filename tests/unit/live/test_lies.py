@@ -1,4 +1,4 @@
-"""Whatever a robot's sensors say, the loop and its safe stop accelerate no joint."""
+"""Whatever sensors report, the loop and its safe stop accelerate no joint."""
 
 from collections.abc import Callable
 from dataclasses import replace
@@ -510,7 +510,7 @@ def test_what_the_reaction_does_not_explain_is_something_else() -> None:
 
 
 def test_a_velocity_that_is_trusted_alone_may_stand_too() -> None:
-    """Positions that are not trusted any more may say what they like."""
+    """Positions that are not trusted any more may have any values."""
     check, none, all_ = VelocityCheck(panda(), SETTINGS, PERIOD), NONE, ~NONE
     check.trust(none, all_)
     for k in range(60):

@@ -1,4 +1,4 @@
-"""The robot's side: what it accepts, how it stops, and which effort it says it has."""
+"""The robot's side: what it accepts, how it stops, and which effort it reports."""
 
 from collections.abc import Iterable
 

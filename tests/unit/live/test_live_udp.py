@@ -193,7 +193,7 @@ def test_a_served_robot_runs_stops_and_says_why() -> None:
     tau = panda().inverse_dynamics(start(), np.zeros(7), np.zeros(7))
     seen: list[int] = []
 
-    def pilot() -> None:  # the server asks every period: the loop's turn
+    def pilot() -> None:  # the server polls every period: the loop's turn
         found = hardware.read(0.0)
         if found is None:
             return

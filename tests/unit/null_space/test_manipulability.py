@@ -51,7 +51,7 @@ def close(actual: Array, expected: Array, atol: float) -> None:
     np.testing.assert_allclose(actual, expected, rtol=0, atol=atol)
 
 
-# -- what the costs say ----------------------------------------------------------------
+# -- values of the costs ---------------------------------------------------------------
 
 
 def test_the_planar_arm_in_closed_form() -> None:

@@ -107,7 +107,7 @@ def one_of_many() -> hsp.Robot:
 
 
 def tilted() -> hsp.Robot:
-    """A joint that turns often about an axis of its own, and one that it leads."""
+    """A joint that turns often about its own axis, and one that it leads."""
     joints = "".join(
         f'<joint name="j{k}" type="continuous"><parent link="l{k}"/>'
         f'<child link="l{k + 1}"/><axis xyz="{axis}"/>'

@@ -1,4 +1,4 @@
-"""Xacro files: expanded where xacro is installed, else the message that says how."""
+"""Xacro files: expanded where xacro is installed, else an exact message."""
 
 import sys
 from pathlib import Path

@@ -328,7 +328,7 @@ def test_a_lag_acts_by_its_mean_over_the_period(time_constant: float) -> None:
 
 
 def test_a_drive_that_loses_efforts() -> None:
-    """Each is the commanded one, or what the last one was; the first is there."""
+    """Each is the commanded one, or the previous one; the first is there."""
     efforts = [np.full(7, float(k)) for k in range(2000)]
     found = [effort[0] for effort in driven(DroppedPeriods(0.3), efforts, seed=2)]
     lost = 0

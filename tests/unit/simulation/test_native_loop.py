@@ -308,7 +308,7 @@ def test_a_change_is_made_where_it_begins(what: str, counted: Counted) -> None:
 def test_a_motion_that_diverges_stops_the_same_way(
     log_period: float, counted: Counted
 ) -> None:
-    """K_N times the period is 20: joints run away natively, and their speed is told.
+    """K_N times the period is 20: joints run away natively; their speed is reported.
 
     Within a row of 1 s the effort is no number any more.
     """

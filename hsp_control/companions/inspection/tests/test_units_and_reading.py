@@ -167,7 +167,7 @@ def test_transmissions_are_looked_at(look: Look) -> None:
     gear = '<transmission name="{}"><joint name="{}"/></transmission></robot>'
     for transmissions, message in (
         ([("one", "shouldr")], "'shouldr' does not exist; did you mean 'shoulder'?"),
-        ([("one", "shoulder"), ("two", "shoulder")], "the last one's rotor counts"),
+        ([("one", "shoulder"), ("two", "shoulder")], "the last one's rotor is used"),
         ([("one", "shoulder"), ("two", "elbow")], ""),
     ):
         text = ARM

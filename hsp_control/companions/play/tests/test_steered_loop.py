@@ -27,7 +27,7 @@ from hsp_control.null_space.fields.weight import sample_weight
 
 
 class Steered:
-    """A steered loop in no real time; words are said at times of the loop."""
+    """A steered loop in no real time; messages come at times of the loop."""
 
     def __init__(self, journal: Path, **more: Any) -> None:
         self.experiment = hsp.load_experiment("panda_obstacle")

@@ -289,7 +289,7 @@ def test_sensitivities_are_those_that_were_put_in() -> None:
 
 def test_chance_is_that_of_the_completed_runs() -> None:
     """One correlation of twenty is beyond, of runs that have nothing to do with each
-    other: 4000 of 30 tell that share to 0.0035."""
+    other: 4000 of 30 estimate that share to 0.0035."""
     half = invented(60)
     half["status"][:30] = "diverged"
     noise = sweeps.sensitivity(half).noise
@@ -369,7 +369,7 @@ def test_two_or_three_values_give_a_figure_too(runs: int) -> None:
     points, line = first.lines
     assert len(points.get_xdata()) == len(line.get_xdata()) == runs
     assert np.all(np.diff(line.get_ydata()) > 0.0)
-    # Of so few nothing is said to be an influence, nor to be none.
+    # Of so few nothing is reported as an influence, nor as none.
     assert not any(each.get_title(loc="left") for each in figure.axes)
     with pytest.raises(SweepError, match=f"{runs} runs were completed"):
         sweeps.sensitivity(Sweep(few, whole.meta))

@@ -1,4 +1,4 @@
-"""A trot is a value, as is a crawl; what does not fit is said before a foot swings."""
+"""A trot is a value, as is a crawl; mistakes are refused before a foot swings."""
 
 from dataclasses import replace
 

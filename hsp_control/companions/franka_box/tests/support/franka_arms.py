@@ -104,7 +104,7 @@ class RunningBox:
 
     Attributes:
         host: Its address.
-        lines: What it has said.
+        lines: Its messages.
     """
 
     def __init__(self, host: str) -> None:

@@ -68,7 +68,7 @@ class Rig:
         server: Its server.
         box: The box.
         host: Its address.
-        said: What it has said.
+        said: Its messages.
     """
 
     def __init__(self, host: str, server: Server, said: list[str]) -> None:
