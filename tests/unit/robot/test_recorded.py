@@ -27,7 +27,7 @@ from hsp_control.robot.description.robot_description import (
     RobotDescription,
     ToolFrame,
 )
-from hsp_control.robot.recorded import recorded_robot, robot_record
+from hsp_control.robot.recorded import OtherRobotWarning, recorded_robot, robot_record
 
 TWO = RobotDescription(
     parts={
@@ -191,6 +191,17 @@ def test_an_edited_urdf_is_named_and_the_log_s_own_counts(
     with caplog.at_level(logging.WARNING):
         equal(recorded_robot(record), robot)
     assert f"{urdf} has changed since the log was made" in caplog.text
+    rest = np.zeros((1, robot.nv))
+    run = hsp.Rollout(
+        {
+            "t": np.zeros(1),
+            "q": robot.home()[None],
+            **dict.fromkeys(["v", "tau"], rest),
+        },
+        {"robot": {"record": record}},
+    )
+    with pytest.warns(OtherRobotWarning, match=r"is not the robot of the log"):
+        run.measure(hsp.Robot.load(urdf), lambda state: state.t)
     shutil.rmtree(urdf.parent)
     equal(recorded_robot(record), robot)
 
