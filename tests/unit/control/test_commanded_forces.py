@@ -259,7 +259,7 @@ def test_a_wrench_of_a_surface() -> None:
     np.testing.assert_allclose(moments, wrench[3:], atol=1e-9)
 
 
-# --- what is refused -----------------------------------------------------------------
+# --- refusals -----------------------------------------------------------------------
 
 
 def press(**options: Any) -> PointContact:

@@ -234,7 +234,7 @@ def test_a_task_of_another_form_is_logged_by_another_name() -> None:
         assert np.isnan(np.delete(error, rows, axis=0)).all()
 
 
-# --- what is refused -----------------------------------------------------------------
+# --- refusals -----------------------------------------------------------------------
 
 
 def test_a_floating_base_that_nothing_holds_is_refused() -> None:

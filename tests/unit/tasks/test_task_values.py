@@ -162,7 +162,7 @@ def test_a_point_and_an_orientation_are_held() -> None:
         np.testing.assert_allclose(held.rotation, TURNED.matrix())
 
 
-# --- what is refused -----------------------------------------------------------------
+# --- refusals -----------------------------------------------------------------------
 
 Wrong = dict[str, list[tuple[Any, str]]]
 _WRONG_TASK: Wrong = {
