@@ -99,14 +99,14 @@ class Controller(Commanded):
         step = now.step
         if step is None or modifier is not None or q is None or v is None:
             self._observe(t, q, v)  # the state
-            self._advance()  # to what is in force at its time
+            self._advance()  # to the values in force at its time
         else:
             delivered = step.make(t, q, v)  # type: ignore[arg-type]
             stack, damped = step.active, step.damped
             now.mixture.active = stack
         if delivered is None:
             mixture = now.mixture
-            # references, the law, and what it delivers within the limits
+            # references, the law, and the effort within the limits
             delivered = mixture.step(self._state.t, modifier)
             stack, damped = self.active_stack, mixture.damped
             stack.check(delivered.effort)

@@ -3,7 +3,7 @@
 
 class Sight {
   static REACH = 20;  // m: no drag leads farther from the eye
-  static NEAR = 0.08;  // of the picture's height: what is nearer to the robot is at the robot
+  static NEAR = 0.08;  // of the picture's height: a point nearer to the robot is at the robot
 
   constructor(viewer) { this.viewer = viewer; }
 

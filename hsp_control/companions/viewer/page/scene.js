@@ -194,7 +194,7 @@ function vector([x, y, z]) { return new MeshCat.THREE.Vector3(x, z, -y); }
 
 // Shares of the picture's height that are reserved for the player's bar and the title.
 const BAR = 0.1, TITLE = 0.06, WIDE = 16 / 9;  // WIDE: width over height
-let barHeight = 64;  // what the player's bar covers at the bottom of the picture [px]
+let barHeight = 64;  // height that the player's bar covers at the bottom of the picture [px]
 
 // Half the width of the robot's widest link [m]: the points are those of its skeleton.
 function girth() {
