@@ -48,7 +48,7 @@ class Loop:
         self._controller.restart()
 
     def step(self) -> None:
-        """Compute the effort: what a period costs without its input and output."""
+        """Compute the effort: the cost of a period without its input and output."""
         t = self.periods * self._period
         self._tau = self._controller.compute(t, self._q, self._v).tau
 

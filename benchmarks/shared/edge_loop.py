@@ -1,4 +1,4 @@
-"""A case of `edge.py` in closed loop, and what is measured of it.
+"""A case of `edge.py` in closed loop, and its measurements.
 
     python -m shared.edge_loop CASES LAW RESULTS    # `edge.py` calls it
 
@@ -92,7 +92,7 @@ class Case:
     rate: float = 0.0
 
     def __post_init__(self) -> None:
-        """Make arrays of what JSON has as lists."""
+        """Make arrays of JSON's lists."""
         for name in ("q0", "start", "rotation", "goal", "nearest", "plane"):
             setattr(self, name, np.asarray(getattr(self, name), dtype=float))
 
@@ -142,7 +142,7 @@ class Case:
         return pin.buildReducedModel(full, rigid, pin.neutral(full))
 
     def as_json(self) -> dict[str, Any]:
-        """Return what JSON can store, for ``Case(**...)``."""
+        """Return data for JSON, for ``Case(**...)``."""
         return {
             name: each.tolist() if isinstance(each, np.ndarray) else each
             for name, each in asdict(self).items()
@@ -226,7 +226,7 @@ def measure(case: Case, model: Any, run: tuple[Any, Any, Any, str]) -> dict[str,
 
 
 def main() -> None:
-    """Run a law in all cases, and write what was measured."""
+    """Run a law in all cases, and write the measurements."""
     cases, law, results = sys.argv[1:]
     module, arguments = LAWS[law]
     make = import_module(f"shared.controllers.{module}").make

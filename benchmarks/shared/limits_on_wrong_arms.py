@@ -117,7 +117,7 @@ class Setting(NamedTuple):
 
     Attributes:
         robot: Its name.
-        words: What is done about the errors.
+        words: The remedy for the errors.
         compensation: That.
         kinds: Kinds of cases, in turns.
         rotors: Inertia of rotors, of the model and of the arm [kg m²].

@@ -1,4 +1,4 @@
-"""Disks that fill, and Ctrl-C: what was computed before is readable."""
+"""Disks that fill, and Ctrl-C: earlier results are readable."""
 
 import os
 import resource
@@ -31,8 +31,8 @@ class Faults:
 
     Attributes:
         cases: How many.
-        outcomes: What came of them, in words.
-        wrong: What must not have been: examples.
+        outcomes: Their outcomes, in words.
+        wrong: Examples of wrong ones.
     """
 
     cases: int = 0
@@ -117,7 +117,7 @@ def _save_and_leave(rollout: Rollout, path: Path, room: int, message: Path) -> N
 
 
 def interrupted(random: Random, folder: Path, log: Path, longest: float) -> Faults:
-    """Send Ctrl-C to ``hsp`` at a random moment; what it leaves must be readable."""
+    """Send Ctrl-C to ``hsp`` at a random moment; its files must be readable."""
     found = Faults()
     commands = {
         "long run": ["run", CONFIG, "--out", str(folder), "--set",

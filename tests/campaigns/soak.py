@@ -1,8 +1,8 @@
 """Minutes of simulated time at 1 kHz, as on a robot: memory stays flat.
 
-The loop is that of a robot: measure, compute, apply, and nothing kept. What Python has
-allocated (tracemalloc) and what the process holds (its resident set) are read every
-simulated half minute, after a warm-up.
+The loop is that of a robot: measure, compute, apply, and nothing kept. Python's
+allocations (tracemalloc) and the memory of the process (its resident set) are read
+every simulated half minute, after a warm-up.
 """
 
 import gc
@@ -34,8 +34,8 @@ class Soak:
 
     Attributes:
         steps: Control steps.
-        python: What Python has allocated [bytes], from the warm-up on.
-        process: What the process holds [bytes], at the same moments.
+        python: Allocations of Python [bytes], from the warm-up on.
+        process: Memory of the process [bytes], at the same moments.
         worst_error: The largest task error after the first second, in the task's units.
     """
 

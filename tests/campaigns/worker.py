@@ -59,7 +59,7 @@ class Worker:
         self._trace = tempfile.TemporaryFile()  # noqa: SIM115
 
     def ask(self, seed: int, index: int) -> Answer:
-        """Return what came of a case."""
+        """Return the outcome of a case."""
         process = self._process or self._start()
         assert process.stdin is not None
         start = time.monotonic()
@@ -144,7 +144,7 @@ def serve(name: str) -> None:
     case: Any = getattr(importlib.import_module(module), function)
     resource.setrlimit(resource.RLIMIT_AS, (MEMORY, MEMORY))
     answers = os.fdopen(os.dup(1), "wb", buffering=0)
-    os.dup2(2, 1)  # what native code prints is no answer
+    os.dup2(2, 1)  # output of native code is no answer
     faulthandler.register(signal.SIGUSR1)
     faulthandler.enable()
     for line in sys.stdin.buffer:

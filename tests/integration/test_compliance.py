@@ -1,6 +1,6 @@
-"""A compliant hand along whole motions: what a force does to it, and what it does not.
+"""A compliant hand along whole motions: the effects of a force.
 
-The law runs in the integrator's stages, so that what is compared are the equations
+The law runs in the integrator's stages, so that the comparison is one of the equations
 themselves; where efforts are held, the difference is given.
 """
 
@@ -126,7 +126,7 @@ def inertia(q: Array, rows: int) -> Array:
 def test_the_energy_is_what_came_in_less_what_was_damped(metric: Metric) -> None:
     """E' = fᵀv - e'ᵀDe' + ½ eᵀK'e, E = ½ e'ᵀΛe' + ½ eᵀKe: passive at the hand.
 
-    The last term is what a growing stiffness adds.
+    The last term is the work of a growing stiffness.
     """
     robot, q = panda(), start()
     soft, hard = np.array([200.0, 300.0, 250.0]), np.array([900.0, 500.0, 700.0])

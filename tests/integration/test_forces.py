@@ -77,7 +77,7 @@ def test_talos_presses_against_a_wall() -> None:
         log[f"plant.contact.{side}_sole_link.force"] for side in ("left", "right")
     )
     inert = np.abs(np.asarray(soles)[:, 0] - force)[log.t > 1.5]
-    assert inert.max() < 10.0  # what is left accelerates the swaying body
+    assert inert.max() < 10.0  # the rest accelerates the swaying body
     assert np.linalg.norm(log["task.center_of_mass.error"], axis=1).max() < 1e-3
     assert log["status"].max() <= 1
 

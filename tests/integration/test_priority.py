@@ -74,7 +74,7 @@ def test_a_field_that_pushes_into_limits_leaves_the_task(name: str, field: str) 
 @pytest.mark.slow
 @pytest.mark.parametrize("name", ["panda", "xarm7"])
 def test_a_step_within_reach_is_made_whatever_a_field_asks_for(name: str) -> None:
-    """Its first accelerations are beyond what motors give, so that the step is damped.
+    """Its first accelerations are beyond the motors' limits, so that it is damped.
 
     A field's demand once passed for the tasks' there: the hand ended 0.6 and 0.8 m
     away. Now it is as quick as without a field.

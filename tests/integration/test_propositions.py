@@ -318,7 +318,7 @@ def moving(robot: Robot, name: str) -> NullSpaceField:
 
 @dataclass(frozen=True)
 class Run:
-    """A motion with a null space, and what is wanted of it."""
+    """A motion with a null space, and the expected one."""
 
     robot: str
     metric: str

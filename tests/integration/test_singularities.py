@@ -72,7 +72,7 @@ class Passage:
         start: Where it starts, shape (nq,).
         duration: How long it takes, with time to recover [s].
         threshold: The singularity threshold.
-        effort: What the largest effort stays below [N·m].
+        effort: Bound on the largest effort [N·m].
         step: Of the integrator [s].
     """
 
@@ -200,7 +200,7 @@ def damped_part(rollout: Rollout) -> tuple[int, int]:
 
 
 def decayed(rollout: Rollout, name: str, rows: slice) -> tuple[Array, Array]:
-    """Return e at some rows, and what the first of them leaves of it by the law."""
+    """Return e at some rows, and the law's decay from the first of them."""
     t = (rollout.t[rows] - rollout.t[rows][0])[:, None]
     e, e_dot = rollout[f"task.{name}.error"][rows], rollout[f"task.{name}.error_rate"]
     slope = e_dot[rows][0] + FREQUENCY * e[0]
@@ -209,9 +209,9 @@ def decayed(rollout: Rollout, name: str, rows: slice) -> tuple[Array, Array]:
 
 @every_passage
 def test_the_law_is_exact_until_the_threshold_is_met(which: str) -> None:
-    """Both propositions, to 1e-5 of what there was, until the singularity is there.
+    """Both propositions, to 1e-5 of the initial errors, until the singularity.
 
-    What is missing is the integrator's: the last joint speeds grow within milliseconds.
+    The difference is the integrator's: the last joint speeds grow within milliseconds.
     """
     passage, rollout = passed(which)
     first, _ = damped_part(rollout)

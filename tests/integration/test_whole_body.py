@@ -25,7 +25,7 @@ def rms(rollout: Rollout, task: str) -> float:
 
 
 def check_forces(rollout: Rollout) -> None:
-    """Forces push, stay within friction, and are what the engine answers."""
+    """Forces push, stay within friction, and are those of the engine."""
     names = [c.split(".")[1] for c in rollout.columns if c.endswith("friction_used")]
     assert names
     for name in names:

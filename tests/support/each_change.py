@@ -1,4 +1,4 @@
-"""One change of each kind, what takes it back, and a controller that takes them."""
+"""One change of each kind, its inverse, and a controller that accepts them."""
 
 from collections.abc import Callable
 

@@ -60,7 +60,7 @@ def spread(size: int, low: float, high: float) -> Array:
     return low + (high - low) * (0.5 + 0.5 * np.sin(1.0 + 2.3 * np.arange(size)))
 
 
-# --- what is known without the package -----------------------------------------------
+# --- known without the package -------------------------------------------------------
 
 
 NODES = np.arange(-4, 5)

@@ -1,4 +1,4 @@
-"""Plain NumPy forms of what the package computes, and differences: oracles for tests.
+"""Plain NumPy forms of the package's mathematics, and differences: oracles.
 
 Nothing here is fast, and nothing comes from the package: each formula stands as
 `law.md` or the paper prints it, inverses and all.

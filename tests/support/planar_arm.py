@@ -267,7 +267,7 @@ def law(
             given for g = 0: minus the self-motion, which nothing controls.
 
     Returns:
-        The torques and what they were made of.
+        The torques and their parts.
     """
     K_p, K_v, v = TASK_STIFFNESS, TASK_DAMPING, theta_dot
     J, J_dot = jacobian(theta), jacobian_rate(theta, theta_dot)

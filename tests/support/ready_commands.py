@@ -87,7 +87,7 @@ def serve() -> None:
 
 
 def _become(request: dict[str, Any], output: int) -> None:
-    """Do in a folder what `python -m hsp_control` or `python name.py` does, and end."""
+    """Run `python -m hsp_control` or `python name.py` in a folder, and end."""
     from runpy import run_path
 
     from hsp_control.cli import main
