@@ -355,6 +355,13 @@ def test_a_figure_shows_the_parameters_that_are_named_as_wide_as_a_paper_needs()
     assert len(figure.axes) == 8
     last = [each.get_xlabel() for each in figure.axes[-2:]]
     assert last == ["bowl", "up"]
+    whole = invented()
+    about = {"unit": "rad", "meaning": "rms error of hand orientation"}
+    meta = whole.meta | {"metrics": dict.fromkeys(whole.meta["metrics"], about)}
+    figure = sweeps.sweep_figure(Sweep(whole.columns, meta), parameters=["up"])
+    figure.draw_without_rendering()
+    labels = [axes.yaxis.label.get_window_extent() for axes in figure.axes]
+    assert min(label.x0 for label in labels) > 0.0
     with pytest.raises(PlotError, match="no parameter 'upp' varies; did you mean 'up'"):
         sweeps.sweep_figure(invented(), parameters=["upp"])
 
