@@ -349,8 +349,8 @@ def test_whatever_is_raised_around_a_served_robot_stops_it(
 
 def test_our_own_packets_that_come_back_are_foreign() -> None:
     """A switch that mirrors, or a second socket: states go on to count."""
-    robot = Link(7, hears=PacketKind.EFFORT)
-    loop = Link(7, peer=robot.address, hears=PacketKind.STATE)
+    robot = Link(7, receives=PacketKind.EFFORT)
+    loop = Link(7, peer=robot.address, receives=PacketKind.STATE)
     robot.peer = loop.address
     for k in range(5):
         for _ in range(3):  # the loop is ahead of the robot in its numbers
