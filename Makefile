@@ -25,7 +25,7 @@ help: ## list the targets
 	@awk 'BEGIN { FS = ":.*## " } /^##@ / { printf "\n%s\n", substr($$0, 5) } \
 	  /^[a-z-]+:.*## / { printf "  make %-12s %s\n", $$1, $$2 }' Makefile
 
-# The bytecode of what these import is written, whatever the shell says: without it each
+# The bytecode of what these import is written, whatever the shell's settings: without it each
 # later start takes longer, and tests start hundreds of processes.
 demo without-python test test-system thorough docs wheel-test: export PYTHONDONTWRITEBYTECODE :=
 # Without the field its terms weigh nothing: both runs log the same distance.
@@ -111,7 +111,7 @@ bench: $(STAMP) $(ENGINE) ## compare with other controllers, in .venv-peers
 fuzz: $(STAMP) $(ENGINE) ## random states, mutated files, faults, soak: hours
 	@PYTHONPATH=tests:tests/support nice $(BIN)/python -m campaigns $(ARGS)
 
-mutants: $(STAMP) $(ENGINE) ## break the code at random, say what share the tests notice
+mutants: $(STAMP) $(ENGINE) ## break the code at random, print the share that the tests detect
 	@$(BIN)/python tools/mutants.py $(ARGS)
 
 wheel: $(STAMP) $(ENGINE) ## build the wheel into dist/
@@ -163,7 +163,7 @@ docs: $(STAMP) $(ENGINE) ## build the site into docs/_build/html, with its repla
 	@$(BIN)/sphinx-build -q -W --keep-going -b html docs docs/_build/html
 	@echo "The site is docs/_build/html/index.html"
 
-links: $(STAMP) $(ENGINE) ## ask every other site that the site's pages link to (needs a network)
+links: $(STAMP) $(ENGINE) ## check the links to other sites (needs a network)
 	@$(BIN)/python tools/replays.py
 	@$(BIN)/sphinx-build -q -b linkcheck docs docs/_build/links
 
@@ -250,7 +250,7 @@ $(ENGINE): $(USE) hatch_build.py engine/CMakeLists.txt $(shell find engine -name
 	@touch $@
 
 # Sets the shell variable `python`: PYTHON if given, else the newest one that will do. A
-# candidate is asked, not trusted: some are shims of versions that are not installed.
+# candidate is run, not trusted: some are shims of versions that are not installed.
 define find-python
 python=; for candidate in $(if $(PYTHON),"$(PYTHON)",python3.14 python3.13 python3.12 python3.11 python3); do \
   if "$$candidate" -c 'import sys, venv; sys.exit(sys.version_info < (3, 11))' 2> /dev/null; \

@@ -56,7 +56,7 @@ def pytest_collection_finish() -> None:
     gc.enable()
     frozen = gc.get_freeze_count()
 
-    # Counting half a million objects takes 50 ms, and each loop asks before it begins.
+    # Counting half a million objects takes 50 ms, which each loop does as it begins.
     @wraps(gc.get_freeze_count)
     def known() -> int:
         return frozen
@@ -65,7 +65,7 @@ def pytest_collection_finish() -> None:
 
 
 def pytest_sessionfinish() -> None:
-    """Show the collector all of it again: what an end leaves is said as leaked."""
+    """Show the collector all of it again: what an end leaves is reported as leaked."""
     gc.unfreeze()
 
 
@@ -113,7 +113,7 @@ def pytest_ignore_collect(collection_path: Path, config: pytest.Config) -> bool 
 
 @pytest.hookimpl(tryfirst=True)  # others choose by it
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Say which tests are for `make test-system`.
+    """Mark the tests of `make test-system`.
 
     These are all of tests/system, and what starts processes or a browser elsewhere, but
     for what is marked as smoke.
@@ -127,5 +127,5 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
         if item.get_closest_marker("system") and not may_be_of_the_system(item.path):
             raise pytest.UsageError(
                 f"{item.path} has tests for `make test-system`, which would not find "
-                f"them: the file itself must say {STARTS_OTHERS.pattern}"
+                f"them: the file itself must contain {STARTS_OTHERS.pattern}"
             )

@@ -3,9 +3,9 @@
 pip runs it (the hook of the wheel, also of an editable one), and ``make`` where a
 source is newer than the library: ``python hatch_build.py``. A C++ compiler is taken
 from the variable CXX or from the path; where there is none, or CXX is ``zig``, it is
-the package ziglang. What that makes runs on any Linux of the last ten years, and the
-wheel says so. With Python 3.12 or newer the library keeps to Python's stable ABI, and
-one wheel serves 3.12 and all later ones.
+the package ziglang. Its library runs on any Linux of the last ten years, and the
+wheel's tag says so. With Python 3.12 or newer the library keeps to Python's stable ABI,
+and one wheel serves 3.12 and all later ones.
 """
 
 import os
@@ -37,7 +37,7 @@ OLD_LINUX = "manylinux_2_17"
 
 
 def compiler() -> str | None:
-    """Return the machine's own C++ compiler; None: zig is asked for, or stands in."""
+    """Return the machine's own C++ compiler; None: zig is requested, or stands in."""
     given = os.environ.get("CXX")
     if given == "zig":
         return None
@@ -167,7 +167,7 @@ def wheel_tag(library: str) -> str:
     """Return what a wheel with this library is for: Python, its ABI and the platform.
 
     Args:
-        library: The library's file name, in which CMake says whether it keeps to the
+        library: The library's file name, in which CMake marks whether it keeps to the
             stable ABI, which begins with Python 3.12 (nanobind needs no less).
     """
     # This Python's tags, the best first; what a compiler links against the libraries
@@ -193,7 +193,7 @@ class EngineHook(BuildHookInterface):  # type: ignore[misc]
     """Builds the engine where a wheel is built, also an editable one."""
 
     def dependencies(self) -> list[str]:
-        """Return what is needed besides what pyproject.toml says."""
+        """Return the requirements besides those of pyproject.toml."""
         return tools()
 
     def initialize(self, version: str, build_data: dict[str, Any]) -> None:

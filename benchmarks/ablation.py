@@ -1,9 +1,9 @@
-"""What each constant of the edge is for: the same cases with half, twice or none of it.
+"""The effect of each constant of the edge: the same cases with half, twice or none.
 
     .venv/bin/python benchmarks/ablation.py [--cases N] [--robots ROBOT ...] [NAME ...]
 
 A constant is replaced in a copy of the package; a line that is not found ends the
-benchmark, so that what is replaced is always a constant of the law as it is. Targets
+benchmark, so that always a constant of the present law is replaced. Targets
 out of reach with defaults only, the kinds of `edge_rest.py`, in the metrics I and M(q),
 at 10 ms, where a sampled loop tolerates least; and feasible tasks beside fields pushing
 into limits. Writes the table of constants into benchmarks/results/edge.md.
@@ -34,7 +34,7 @@ from hsp_control.common.exceptions import HspControlError
 ROOT = Path(__file__).resolve().parents[1]
 ROBOTS, PERIOD = ("panda", "iiwa14", "xarm7"), 0.01
 OF_ABLATION = ("position", "levels", "just out", "axes", "spring above", "mass")
-NEAREST = ("position", "levels", "just out")  # the hand's distance counts
+NEAREST = ("position", "levels", "just out")  # the hand's distance is measured
 FIELDS = (300.0, 1e4)  # beside a step of 10 cm [rad/s]
 KEPT = 1e-3  # [m]
 
@@ -44,7 +44,7 @@ _TARGET = "edge/limited_target.py"
 _HELD = "edge/held_levels.py"
 
 Edit = tuple[str, str, str]
-"""A file, a line's begin, and what replaces it."""
+"""A file, a line's begin, and its replacement."""
 
 
 def constant(file: str, line: str, **others: float) -> dict[str, Edit]:
@@ -53,7 +53,7 @@ def constant(file: str, line: str, **others: float) -> dict[str, Edit]:
     Args:
         file: Where it is.
         line: Its line's begin, with its value last.
-        **others: The others, by what they are.
+        **others: The others, by name.
     """
     begin = line.rsplit(" ", 1)[0]
     return {name: (file, line, f"{begin} {value}") for name, value in others.items()}

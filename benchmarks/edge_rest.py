@@ -40,7 +40,7 @@ KINDS = (
 AXES = ("axes", "unlimited")
 ABOVE = ("levels", "spring above", "just out")  # an orientation
 SPRINGS = ("spring", "steady", "spring above")
-JUST = -0.005, 0.01  # beyond what can be reached [m]
+JUST = -0.005, 0.01  # beyond the reach [m]
 OF_REST = tuple(kind for kind in KINDS if kind not in ("steady", "unlimited"))
 IN_THE_PLANE = ("position", "spring", "push", "stream", "drag", "step")
 STIFFNESS, HELD, PUSHED = (100.0, 2000.0), (5.0, 40.0), (50.0, 200.0)  # [N/m, N, N]
@@ -53,7 +53,7 @@ STILL = 1e-3  # change of an effort in 1 ms, as a part of its limit
 
 
 class Case(NamedTuple):
-    """What a hand is asked for.
+    """A commanded motion of a hand.
 
     Attributes:
         robot: Name of the robot.
@@ -64,7 +64,7 @@ class Case(NamedTuple):
         least: The smallest distance from it that it can have [m]; NaN: not looked for.
         number: Stiffness [N/m].
         vector: Force [N]; of a flip the axis; of a drag where it passes; of axes 1 for
-            each that counts.
+            each that is measured.
     """
 
     robot: str
@@ -117,7 +117,7 @@ def case(arm: Arm, kind: str, period: float, rng: np.random.Generator) -> Case:
     if kind == "drag":
         vector = here.translation + 0.3 * unit(rng)
     if kind == "step":
-        while True:  # within the ball whose radius is what is reached in its direction
+        while True:  # within the ball whose radius is the reach in its direction
             goal = here.translation + STEP * d
             target = Target(arm.frame, pin.SE3(np.eye(3), goal), 3)
             least = float(np.linalg.norm(goal - arm.nearest(target, x0, rng)))
@@ -133,7 +133,7 @@ def case(arm: Arm, kind: str, period: float, rng: np.random.Generator) -> Case:
 
 
 def messages(case: Case, here: pin.SE3, pose: bool) -> list[dict[str, Any]]:
-    """Return what is streamed: a line in a second, or a way that wanders for three."""
+    """Return a streamed path: a line in a second, or one that wanders for three."""
     goal, by, start = np.array(case.goal), np.array(case.vector), here.translation
     long = DRAGGED if case.kind == "drag" else LONG
     found = []

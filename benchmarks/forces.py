@@ -153,8 +153,9 @@ def row(label: str, found: Pressing) -> str:
 def head(task: str) -> str:
     """Return the head of a table."""
     return (
-        f"| | force, rms / max error [N] | contact lost | {task}, rms / max [mm] | "
-        "‖e_N‖, rms [rad/s] | planned off the command, max [N] | limited steps | |\n"
+        "| case | force, rms / max error [N] | contact lost | "
+        f"{task}, rms / max [mm] | ‖e_N‖, rms [rad/s] | "
+        "planned off the command, max [N] | limited steps | outcome |\n"
         "|---|--:|--:|--:|--:|--:|--:|---|\n"
     )
 
@@ -236,9 +237,9 @@ def main() -> None:
     print(text)
     replace_section(page, "wall", "\n" + text + "\n")
     text = (
-        "| | internal force, rms / max error [N] | slip in the hands, max [mm] | box "
-        "off the middle, max [mm] | hand, rms / max error [mm] | ‖e_N‖, max [rad/s] | "
-        "|\n|---|--:|--:|--:|--:|--:|---|\n"
+        "| case | internal force, rms / max error [N] | slip in the hands, max [mm] | "
+        "box off the middle, max [mm] | hand, rms / max error [mm] | "
+        "‖e_N‖, max [rad/s] | outcome |\n|---|--:|--:|--:|--:|--:|---|\n"
     )
     for label, overrides in CARRYING.items():
         text += f"| {label} | {carried(overrides)} |\n"

@@ -48,7 +48,7 @@ class Loop:
         self._controller.restart()
 
     def step(self) -> None:
-        """Compute the effort: what a period costs without its input and output."""
+        """Compute the effort: the cost of a period without its input and output."""
         t = self.periods * self._period
         self._tau = self._controller.compute(t, self._q, self._v).tau
 
@@ -115,7 +115,7 @@ def main() -> None:
             control += run(loop.step, loop.move, period, steps)
             empty += run(nothing, nothing, period, steps)
     (wake, steps_taken), (alone, _) = np.array(control).T, np.array(empty).T
-    print("| | median | p99 | p99.9 | worst |\n|---|--:|--:|--:|--:|")
+    print("| part of a period | median | p99 | p99.9 | worst |\n|---|--:|--:|--:|--:|")
     print(row("step: state and law", steps_taken))
     print(row("the same back to back, without waiting", np.array(back_to_back)))
     print(row("wake-up", wake))

@@ -177,7 +177,7 @@ PARTS = {
     "pushes": (limit_pushes.table, 20),
     "wrong_arms": (limits_on_wrong_arms.table, 40),
 }
-"""What makes each section of the page, and of how many cases of a kind."""
+"""The function that makes each section of the page, and its cases of a kind."""
 
 
 def main() -> None:

@@ -246,7 +246,7 @@ def row(name: str, label: str, run: Run, limits: RobotLimits) -> str:
 HEADER = (
     "| configuration | controller | largest effort / limit | largest rate "
     "[N·m/s] | largest speed / limit | minimum distance from a joint's limit "
-    "[mrad] | hand error, rms / max [mm] | ‖P(g − v)‖ rms [rad/s] | |\n"
+    "[mrad] | hand error, rms / max [mm] | ‖P(g − v)‖ rms [rad/s] | note |\n"
     "|---|---|--:|--:|--:|--:|--:|--:|---|\n"
 )
 

@@ -57,7 +57,7 @@ Compute = Callable[[float, Array, Array], Array]
 
 @dataclass
 class Point:
-    """What a controller reads of a target."""
+    """The target as a controller reads it."""
 
     position: Array
 
@@ -113,7 +113,7 @@ def ours(
 
 
 def wrong_arm(case: Case, kind: str, seed: int, delay: int = 0) -> SampledPlant:
-    """Return what moves: for ``exact`` the model, after a delay [periods]."""
+    """Return the plant: for ``exact`` the model, after a delay [periods]."""
     name = case.robot.name
     if kind == "exact":
         arm = WrongArm(name, seed, mass=0.0, com=0.0, delay=delay)
@@ -129,7 +129,7 @@ def wrong_arm(case: Case, kind: str, seed: int, delay: int = 0) -> SampledPlant:
 
 @dataclass
 class Run:
-    """What one run measured: of its end, or of the circle's last second."""
+    """Measurements of a run: at its end, or in the circle's last second."""
 
     position: float = np.inf  # [mm]
     angle: float = np.inf  # [°]
@@ -138,7 +138,7 @@ class Run:
 
 
 def measured(case: Case, plant: SampledPlant, compute: Compute) -> Run:
-    """Return what a run measures; all infinite if it diverges."""
+    """Return a run's measurements; all infinite if it diverges."""
     q, v = case.q0.copy(), np.zeros(case.robot.nv)
     plant.reset(0.0, q, v)
     errors, changes, last, fastest = [], [], np.zeros(case.robot.nv), 0.0
@@ -165,7 +165,7 @@ def measured(case: Case, plant: SampledPlant, compute: Compute) -> Run:
 def laws(
     case: Case, kind: str, missing: dict[str, str], *, alone: bool = False
 ) -> dict[str, Callable[[], Compute]]:
-    """Return what makes each controller of a case."""
+    """Return the functions that make the controllers of a case."""
 
     def chain(compensation: Compensation, **options: Any) -> Compute:
         command = ours(case, compensation, **options)
@@ -299,7 +299,7 @@ INTRODUCTION = """\
 Written by `.venv/bin/python benchmarks/real_arm.py{alone}`; do not edit.
 
 A pose is held for 3 s, or the hand moves on a circle of 8 cm at 2 rad/s, at 1 kHz. No
-law knows what differs. Median / worst of {seeds} seeds: the pose's error at the end,
+law knows the differences. Median / worst of {seeds} seeds: the pose's error at the end,
 and rms on the circle in its last second; the rms change of an effort in a period; how
 many rest, with no joint faster than 0.05 rad/s in the last second. – diverges.
 

@@ -346,7 +346,8 @@ def table(what: str, found: dict[str, Array]) -> str:
     """Return the table of a series with its fits."""
     first = next(iter(found.values()))
     head = "".join(f" {n:.0f} |" for n in first[:, 0])
-    text = f"## {what.capitalize()}\n\n{ABOUT.get(what, '')}.\n\n| |{head} fit |\n|---|"
+    text = f"## {what.capitalize()}\n\n{ABOUT.get(what, '')}.\n\n"
+    text += f"| controller |{head} fit |\n|---|"
     text += (len(first) + 1) * "--:|" + "\n"
     for name, rows in found.items():
         a, b, p = growth(rows)

@@ -24,7 +24,7 @@ BEGIN = 1.0  # measured from here on [s]
 
 
 class Arrival(NamedTuple):
-    """A message: when it arrives, when it was made, and what it says."""
+    """A message: when it arrives, when it was made, and its content."""
 
     at: float
     made: float
@@ -43,7 +43,7 @@ class Case(NamedTuple):
 
 
 class Received(Trajectory):
-    """What others do: the newest target held, or lines between targets, delayed."""
+    """Usual alternatives: the newest target held, or lines between targets, delayed."""
 
     begin: Any = None
     lines: bool = False

@@ -29,7 +29,7 @@ suppress_warnings = ["toc.empty_glob"]  # companions may have been taken away
 smartquotes = False  # a prime is a rate
 default_role = "py:obj"  # a name in backticks is a link wherever it is one of ours
 
-# `make links` asks other sites.
+# `make links` checks other sites.
 linkcheck_ignore = [r"https?://(localhost|127\.|10\.|172\.16\.|192\.168\.)"]
 linkcheck_anchors_ignore_for_url = [r"https://github\.com/"]
 linkcheck_timeout = 20

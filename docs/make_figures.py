@@ -74,7 +74,7 @@ PAPER = (
 
 
 def provenance(rollout: hsp.Rollout, times: tuple[float, ...]) -> dict[str, str]:
-    """Return what a picture says about its run, so that a test can repeat it.
+    """Return a picture's numbers of its run, so that a test can repeat it.
 
     The configuration, and at the frames the time, the robot's points [m] and
     det(J W⁻¹ Jᵀ).

@@ -1,4 +1,4 @@
-"""A loop of your own at 500 Hz; another thread says where the hand shall go."""
+"""A loop of your own at 500 Hz; another thread sends the hand's targets."""
 
 import threading
 import time

@@ -6,7 +6,7 @@
 ``keep`` writes the logs as a reference, outside of the tree. ``with`` runs the
 configurations again and names each column that differs, from which time on and by how
 much at most, and those that are missing; it exits 1 if there are any.
-A difference is no error by itself: who changes digits says why.
+A difference is no error by itself: whoever changes digits gives the reason.
 """
 
 import argparse

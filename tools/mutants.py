@@ -1,7 +1,7 @@
 """Break the code on purpose, and see whether a test notices: ``make mutants``.
 
 A mutant is one edit: of an operator, a number, a condition or a statement, drawn at
-random (`mutations.py`). The tests of its room are asked first, then the fast ones of
+random (`mutations.py`). The tests of its room run first, then the fast ones of
 all rooms. A mutant that survives is a claim that nobody checks, or an edit that changes
 nothing, such as of a bound that is never reached.
 
@@ -33,9 +33,9 @@ COPIED = (*CODE, "conftest.py", "tests", "robots", "configs", "docs", "pyproject
 TESTS_FAILED = 1
 """The exit status of pytest when tests ran and one failed."""
 LONGEST, MEMORY = 900.0, 16 << 30
-"""What the tests of one mutant may take: time [s], and memory that they ask for [B]."""
+"""Limits of the tests of one mutant: time [s], and allocated memory [B]."""
 FAST = ("tests/unit", "-m", "not slow and not process and not browser")
-"""What is asked when the tests of a room notice nothing: those of `make quick`."""
+"""Tests that run when those of a room detect nothing: those of `make quick`."""
 ROOMS = {
     "dynamics": ("robot", "tasks"),
     "compensation": ("simulation", "control"),
@@ -49,7 +49,7 @@ ROOMS = {
     "src": ("engine",),
     "include": ("frozen", "engine"),
 }
-"""The tests of a room of the engine that has no tests of its own name."""
+"""The tests of a room of the engine that has no tests of that name."""
 
 
 class Mutant(NamedTuple):
@@ -71,7 +71,7 @@ class Mutant(NamedTuple):
 
 
 class Verdict(NamedTuple):
-    """What became of a mutant.
+    """The outcome of a mutant.
 
     Attributes:
         word: ``caught``, ``SURVIVED``, ``void``: it does not compile, or no test ran.

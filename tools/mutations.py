@@ -17,14 +17,14 @@ OPERATORS: dict[type[ast.AST], type[ast.AST]] = {
     ast.Eq: ast.NotEq, ast.NotEq: ast.Eq, ast.Is: ast.IsNot, ast.IsNot: ast.Is,
     ast.In: ast.NotIn, ast.NotIn: ast.In,
 }  # fmt: skip
-"""What replaces an operator."""
+"""Replacements of operators."""
 WORDS = {
     " + ": " - ", " - ": " + ", " * ": " / ", " / ": " * ", " += ": " -= ",
     " -= ": " += ", " *= ": " /= ", " < ": " <= ", " > ": " >= ", " <= ": " < ",
     " >= ": " > ", " == ": " != ", " != ": " == ", " && ": " || ", " || ": " && ",
     "std::min(": "std::max(", "std::max(": "std::min(", "if (": "if (!(", " = ": None,
 }  # fmt: skip
-"""What replaces a word of the engine; None: the whole statement goes."""
+"""Replacements of the engine's words; None: the whole statement is removed."""
 NUMBER = re.compile(r"(?<![\w.])\d+\.\d+(?:e-?\d+)?(?![\w.])")
 NO_CODE = re.compile(r"^\s*(//|#|\*|template|static_assert|using|namespace|throw)")
 

@@ -29,7 +29,7 @@ REPLAYS: dict[str, dict[str, dict[str, object]]] = {
     "walking/talos_walk": {},
     "walking/solo12_trot": {},
 }
-"""What is shown, and the runs that are compared in it: changes of the null space."""
+"""Replays, and the runs that are compared in them: changes of the null space."""
 
 
 def main() -> None:

@@ -1,1 +1,1 @@
-"""What several benchmarks share: cases, controllers, timing, sections of pages."""
+"""Common parts of the benchmarks: cases, controllers, timing, sections of pages."""

@@ -1,6 +1,6 @@
 """The cases of `edge.py`: targets out of reach, and some within.
 
-"Out of reach" is certain: the target is that far beyond what the arm reaches in its
+"Out of reach" is certain: the target is that far beyond the arm's reach in its
 direction with any posture. The nearest point is that of inverse kinematics, the best of
 several starts.
 """

@@ -1,9 +1,9 @@
-"""A case of `edge.py` in closed loop, and what is measured of it.
+"""A case of `edge.py` in closed loop, and its measurements.
 
     python -m shared.edge_loop CASES LAW RESULTS    # `edge.py` calls it
 
 Rigid bodies, efforts held for 1 ms and clipped at the limits of the URDF. It needs
-NumPy and Pinocchio, and what its law needs: each law may have a Python of its own.
+NumPy and Pinocchio, and what its law needs: each law may have its own Python.
 """
 
 import json
@@ -20,7 +20,10 @@ import pinocchio as pin
 PERIOD = 1e-3  # an effort is held [s]
 BEGIN = 0.1  # the target rests at the start until then [s]
 MESSAGES, STREAMED = 30.0, 1.0  # of a stream: rate [1/s] and length [s]
-REST, WATCHED = 3.0, 1.0  # after the target rests: until it counts, for how long [s]
+REST, WATCHED = (
+    3.0,
+    1.0,
+)  # after the target rests: until it is measured, and how long [s]
 REST_OF_STREAM = 7.0  # this law's streams move at 0.5 m/s and arrive later [s]
 STILL = 1e-3  # change of an effort in 1 ms at rest, as a part of its limit
 SETTLED = 5e-3  # [m]
@@ -39,7 +42,7 @@ LAWS = {
 """Module of `controllers` and arguments of its ``make``, by law."""
 
 PACKAGES = {"pink": "pin-pink", "tsid": "tsid"}
-"""Whose version is told, by law."""
+"""The package whose version is reported, by law."""
 
 Compute = Callable[[float, Any, Any], Any]
 
@@ -62,7 +65,7 @@ class Case:
         urdf: Its description.
         joints: Names of the joints that are not rigid.
         frame: Name of the hand's frame.
-        rows: 3 if only the position counts, 6 for a pose.
+        rows: 3 for a position, 6 for a pose.
         q0: Configuration at the start, shape (nq,) [rad].
         start: Where the hand starts, shape (3,) [m].
         rotation: How the hand starts, and how it should be held, shape (3, 3).
@@ -89,13 +92,13 @@ class Case:
     rate: float = 0.0
 
     def __post_init__(self) -> None:
-        """Make arrays of what JSON has as lists."""
+        """Make arrays of JSON's lists."""
         for name in ("q0", "start", "rotation", "goal", "nearest", "plane"):
             setattr(self, name, np.asarray(getattr(self, name), dtype=float))
 
     @property
     def measured_from(self) -> float:
-        """When it counts: at rest, or after a turn of the circle [s]."""
+        """When it is measured: at rest, or after a turn of the circle [s]."""
         if self.kind == "circle":
             return BEGIN + 2.0 * np.pi / self.rate
         if self.kind == "stream":
@@ -139,7 +142,7 @@ class Case:
         return pin.buildReducedModel(full, rigid, pin.neutral(full))
 
     def as_json(self) -> dict[str, Any]:
-        """Return what JSON can store, for ``Case(**...)``."""
+        """Return data for JSON, for ``Case(**...)``."""
         return {
             name: each.tolist() if isinstance(each, np.ndarray) else each
             for name, each in asdict(self).items()
@@ -223,7 +226,7 @@ def measure(case: Case, model: Any, run: tuple[Any, Any, Any, str]) -> dict[str,
 
 
 def main() -> None:
-    """Run a law in all cases, and write what was measured."""
+    """Run a law in all cases, and write the measurements."""
     cases, law, results = sys.argv[1:]
     module, arguments = LAWS[law]
     make = import_module(f"shared.controllers.{module}").make

@@ -3,7 +3,7 @@
 `make bench` calls it with .venv-peers/bin/python. Peers that cannot be installed are
 written to .venv-peers/peers.json with the reason, which then stands in the table.
 
-TSID's wheels are built for Pinocchio 4.0, and abort with 4.1, which this package asks
+TSID's wheels are built for Pinocchio 4.0, and abort with 4.1, which this one needs
 for. Pinocchio's algorithms are compiled into its engine, so that another release may
 load the models: all peers but placo run with 4.0.
 """
@@ -97,7 +97,7 @@ def install_tsid() -> None:
 
 
 def install_placo() -> None:
-    """Install placo into an environment of its own: it needs pin 3.8."""
+    """Install placo into its own environment: it needs pin 3.8."""
     if not PLACO_HOME.joinpath("bin", "python").exists():
         # Debian's Python has no ensurepip: use the pip of this environment.
         run(sys.executable, "-m", "venv", "--without-pip", str(PLACO_HOME))

@@ -4,7 +4,7 @@ Masses ±20 %, centres ±10 mm, friction, a load of 1 kg that nobody declared, e
 2 ms late and then with a lag of 3 ms, a velocity with noise of 0.01 rad/s, at 1 kHz.
 Each case drives joints against their ranges: a pose, a posture, or a field that pushes.
 Without compensation, and with a momentum observer. How far the true position
-leaves its range, the speed its limit, and what the status told: a part of
+leaves its range, the speed its limit, and what the status reported: a part of
 `limit_rollouts.py`.
 """
 
@@ -113,11 +113,11 @@ def controller(arm: Arm, kind: str, q0: Array, rng: np.random.Generator) -> Any:
 
 
 class Setting(NamedTuple):
-    """What a row of the table is about.
+    """The subject of a row of the table.
 
     Attributes:
         robot: Its name.
-        words: What is done about the errors.
+        words: The remedy for the errors.
         compensation: That.
         kinds: Kinds of cases, in turns.
         rotors: Inertia of rotors, of the model and of the arm [kg m²].
@@ -180,7 +180,8 @@ def table(count: int) -> str:
     """Run so many cases of each setting, and return the table."""
     lines = (
         "| robot | against the errors | beyond a range, half / most [mrad] | by more "
-        "than 5 mrad | above a speed, most | rows told, missed, told without need |\n"
+        "than 5 mrad | above a speed, most | rows reported, missed, "
+        "reported without need |\n"
         "|---|---|--:|--:|--:|--:|\n"
     )
     for setting in SETTINGS:

@@ -24,7 +24,7 @@ def draw_figure(cells: Cells, plants: dict[str, list[str]], columns: list[str]) 
     """Draw and save the figure; its numbers are in the page's tables.
 
     Args:
-        cells: What was measured, by robot, engine, plant and compensation.
+        cells: The measurements, by robot, engine, plant and compensation.
         plants: The rows, by robot.
         columns: The compensations.
     """

@@ -1,4 +1,4 @@
-"""What benchmarks of random rollouts share: their numbers, and two processes."""
+"""Common parts of benchmarks of random rollouts: their numbers, and two processes."""
 
 from collections.abc import Callable, Iterable
 from concurrent.futures import ProcessPoolExecutor

@@ -102,7 +102,7 @@ def _namespace(name: str, module: ModuleType, homes: dict[str, str]) -> str:
 
 
 def _describe_arguments(value: type) -> None:
-    """Let a class say what its constructor takes, as a part does."""
+    """Let a class describe its constructor's arguments, as a part does."""
     made: Any = value.__init__  # type: ignore[misc]
     if "Args:" in (made.__doc__ or "") and ".declaration." not in made.__module__:
         value.__doc__ = f"{getdoc(value)}\n\n{getdoc(made)}"
@@ -116,7 +116,7 @@ def _overridden(value: type) -> str:
 
 
 def _bases(value: type) -> list[type]:
-    """Return the bases that say what a class is, not how it is declared."""
+    """Return the bases that a reader needs, not those of its declaration."""
     return [each for each in _ours(value) if ".declaration." not in each.__module__]
 
 

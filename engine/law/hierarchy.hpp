@@ -1,8 +1,8 @@
 // Strict priorities: the law for levels of tasks that may conflict.
 //
 //   Q_0 = W⁻¹,   G_k = J_k Q_{k-1} J_kᵀ                                   `open_level`
-//   a ← a + Q_{k-1} J_kᵀ q(G_k) (a_k - J_k'v - J_k a)                      `add_level`
-//   Q_k = Q_{k-1} - Q_{k-1} J_kᵀ q(G_k) J_k Q_{k-1}                      `close_level`
+//   a ← a + Q_{k-1} J_kᵀ χ(G_k) (a_k - J_k'v - J_k a)                      `add_level`
+//   Q_k = Q_{k-1} - Q_{k-1} J_kᵀ χ(G_k) J_k Q_{k-1}                      `close_level`
 //
 // Each level acts in the null space of the levels above. Those stay exact, whatever the lower
 // levels command. The field is the last level: with P = Q_K W, J_a the stack of all levels, and w
@@ -11,7 +11,7 @@
 //   φ_N = Q_K [ W(g' + K_N e_N) - J_a'ᵀ w + W'(x - e_N/2) ],   e_N = P x,  x = g - v
 //
 // so that V' = -e_NᵀW K_N e_N as long as the stack keeps its rank, conflicts included:
-// `add_null_space`. How far each inverse q(G_k) is bounded is the edge's,
+// `add_null_space`. How far each inverse χ(G_k) is bounded is the edge's,
 // `edge/damped_levels.hpp`, which goes through the levels.
 //
 // If the stack has full rank, this equals the law of `law.hpp` up to rounding. That law is then
@@ -27,7 +27,7 @@ namespace hsp {
 template <template <int...> class As> struct Projectors {
   As<'n', 'n'> Q;          // null space of the last level, Q_K = P W⁻¹
   As<'n', 'm'> QJ;         // Q_{k-1} J_kᵀ of all levels side by side
-  As<'m', 'm'> G_inverse;  // q(G_k) of all levels along the diagonal
+  As<'m', 'm'> G_inverse;  // χ(G_k) of all levels along the diagonal
 };
 
 // Q = W⁻¹ = (L Lᵀ)⁻¹
@@ -54,7 +54,7 @@ double open_level(const J& jacobian, const Q& projector, QJ&& product, G&& gram,
   return x.size() ? x.minCoeff() : std::numeric_limits<double>::infinity();
 }
 
-// q(G) of G = Σ x_r V_r V_rᵀ: 1/x where x is above threshold², and bounded below.
+// χ(G) of G = Σ x_r V_r V_rᵀ: 1/x where x is above threshold², and bounded below.
 template <class V, class X, class Out>
 void write_bounded_inverse(const V& turned, const X& x, double threshold, Out&& inverse) {
   const double floor = threshold * threshold;
@@ -65,14 +65,14 @@ void write_bounded_inverse(const V& turned, const X& x, double threshold, Out&& 
   }
 }
 
-// Add Q Jᵀ q(G) times the level's residual to a.
+// Add Q Jᵀ χ(G) times the level's residual to a.
 template <class QJ, class G, class Rest, class Row, class A>
 void add_level(const QJ& product, const G& inverse, const Rest& rest, Row&& row, A& a) {
   row.noalias() = inverse * rest;
   a.noalias() += product * row;
 }
 
-// Q ← Q - Q Jᵀ q(G) J Q, which stays symmetric.
+// Q ← Q - Q Jᵀ χ(G) J Q, which stays symmetric.
 template <class Q, class QJ, class G, class Row>
 void close_level(Q& projector, const QJ& product, const G& inverse, Row&& row) {
   for (Index i = 0; i < projector.rows(); ++i) {

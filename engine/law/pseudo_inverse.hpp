@@ -1,6 +1,6 @@
 // The weighted pseudo-inverse, exact away from singularities and bounded through them.
 //
-//   J# = W⁻¹Jᵀ q(J W⁻¹Jᵀ) = L⁻ᵀ B#,    B = J L⁻ᵀ,    W = L Lᵀ
+//   J# = W⁻¹Jᵀ χ(J W⁻¹Jᵀ) = L⁻ᵀ B#,    B = J L⁻ᵀ,    W = L Lᵀ
 //
 // In the whitened Jacobian B every metric is the Euclidean one, and B# = Qᵀ X is that of
 // `bounded_inverse`: it stays in these two factors, which the law multiplies by one after the

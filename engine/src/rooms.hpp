@@ -28,7 +28,7 @@ const Kind* const* trajectory_kinds();
 // The kinds of a library of a user's own, which stays loaded. Throws std::runtime_error.
 const Kind* const* library_kinds(const std::string& path);
 
-// What a step may be made of. None of them repeats anything as often as a number in memory says, so
+// Parts of a step. No part repeats anything as often as a number in memory requires, so
 // that a step ends whatever its memory holds.
 inline std::vector<const Kind* const*> step_rooms() {
   return {

@@ -6,7 +6,7 @@
 
 namespace hsp {
 
-// What a row is: a target; a velocity alone, in the stream's axes, in the world's or in the body's;
+// Kinds of rows: a target; a velocity alone, in the stream's axes, in the world's or in the body's;
 // a waypoint of a chunk, the first one or a later one.
 enum class MessageKind : std::int64_t {
   TARGET,

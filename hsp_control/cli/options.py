@@ -32,7 +32,11 @@ class Parser(argparse.ArgumentParser):
         if unknown:
             options = [name for name in unknown if name.startswith("-")]
             if not options:
-                self.error(f"{unknown[0]!r} is one argument too many")
+                known = self._option_string_actions
+                name = next((x for x in ("--over", "--set") if x in known), None)
+                hint = f"; did you mean {name} {unknown[0]}?" if name else ""
+                hint = hint if "=" in unknown[0] else ""
+                self.error(f"{unknown[0]!r} is one argument too many{hint}")
             hint = did_you_mean(options[0].split("=")[0], self._option_string_actions)
             self.error(f"there is no {options[0]!r} here{hint}")
         return found, unknown

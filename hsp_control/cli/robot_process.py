@@ -204,7 +204,7 @@ def _run(settings: dict[str, Any], stop_reason: Any) -> dict[str, Any]:
         peer=tuple(settings["peer"]),
         faults=Faults(**settings["faults"]),
         stream=2,
-        hears=PacketKind.EFFORT,
+        receives=PacketKind.EFFORT,
     )
     log = _RobotLog(experiment, robot, settings) if settings["log"] else None
     rows: list[Row] = [log.row] if log else []

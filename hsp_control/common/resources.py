@@ -1,4 +1,4 @@
-"""Find the bundled robots and configurations; tell files from folders."""
+"""Find the bundled robots and configurations; distinguish files from folders."""
 
 from collections.abc import Iterator
 from pathlib import Path

@@ -11,13 +11,13 @@ class Silence:
         """Begin at a time [s]."""
         self._looked, self._lasts = now, 0.0
 
-    def look(self, now: float, *, heard: bool) -> float:
+    def look(self, now: float, *, received: bool) -> float:
         """Return this time [s].
 
         Args:
             now: The time of this look [s].
-            heard: Whether a message arrived since the last look.
+            received: Whether a message arrived since the last look.
         """
-        self._lasts = 0.0 if heard else self._lasts + min(now - self._looked, _LOOK)
+        self._lasts = 0.0 if received else self._lasts + min(now - self._looked, _LOOK)
         self._looked = now
         return self._lasts

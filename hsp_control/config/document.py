@@ -90,6 +90,7 @@ class Document:
         self.recorded_robot: Any = None
         # of a log: SHA-256 of its imported code, by name
         self.recorded_code: dict[str, str] | None = None
+        self.imports_recorded_code = False  # also where files are read strictly
         self.given_code: frozenset[str] = frozenset()  # code that the user named, too
         self._data = deepcopy(data)
         self._origins: dict[KeyPath, Mark | str] = dict(marks)

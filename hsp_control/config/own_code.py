@@ -53,8 +53,8 @@ def run_imports(document: Document) -> None:
 def _import_again(name: str, document: Document) -> None:
     """Import the code that a log lists, if it is unchanged since the run."""
     then = (document.recorded_code or {}).get(name)
-    if document.access.strict:
-        why = "no code is run with --strict, and none to draw a figure"
+    if document.access.strict and not document.imports_recorded_code:
+        why = "no code is run with --strict"
     elif then is None or fingerprints([name]).get(name) != then:
         why = f"it is missing or was edited since the run; --import {name} imports it"
     else:

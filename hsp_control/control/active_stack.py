@@ -243,7 +243,7 @@ class ActiveStack:
         """
         call, triangle, length = self._diagnosis
         manipulability = call()
-        return length.item(), manipulability, triangle.tobytes()
+        return abs(length.item()), manipulability, triangle.tobytes()  # no -0
 
     @cached_property
     def _diagnosis(self) -> tuple[Callable[[], float], Array, Array]:

@@ -46,8 +46,8 @@ MOST_CHOSEN = 64
 class BoundMixture:
     """The law of each set of tasks within each set of limits, and the weighted mean.
 
-    All is one call, wherever each part delivers M a + N or what one QP finds, also with
-    contacts: it evaluates what changes, chooses the sets that have a share, makes their
+    All is one call, wherever parts deliver M a + N or the result of one QP, also with
+    contacts: it evaluates the changes, chooses the sets that have a share, makes their
     parts, and mixes them. Elsewhere `Mixture` makes the step, part by part.
     """
 
@@ -67,11 +67,11 @@ class BoundMixture:
         Args:
             state: The state that it moves.
             choice: The sets of contacts and tasks.
-            actuation: Returns what delivers the law of a stack within a set of limits,
+            actuation: Returns the actuation of a stack's law within a set of limits,
                 by its index.
             limits: The sets of limits.
-            origin: What the clock of its calls reads at time 0, shape (1,) [s].
-            evolving: The calls that write what changes, at a time.
+            origin: Reading of its calls' clock at time 0, shape (1,) [s].
+            evolving: The calls that write changing values, at a time.
         """
         self.state, self._choice = state, choice
         # in this order those with a share follow one another, each with one more part
@@ -159,9 +159,9 @@ class BoundMixture:
             self._on[place], self._shares[place] = 1, share
 
     def make(self, t: float, q: ArrayLike, v: ArrayLike) -> Delivered | None:
-        """Move to a state; return what is delivered there; None: Python has to."""
+        """Move to a state; return the delivered effort; None: Python has to."""
         mixed = self._move(t, q, v)
-        if mixed is None:  # refused: lists, for example, or what is not valid
+        if mixed is None:  # refused: lists, for example, or invalid values
             mixed = self.state.advance(self.move, t, q, v)
         if not mixed:
             return None

@@ -77,7 +77,7 @@ class Commanded(Composition):
         Args:
             of: The name of a task: the stream is the one that it follows once all
                 changes are over. Or a stream that was given to the controller, for an
-                obstacle, say, or for the position of a pose.
+                obstacle, for example, or for the position of a pose.
 
         Raises:
             ControllerError: If there is no such task, or it follows no stream, or

@@ -99,14 +99,14 @@ class Controller(Commanded):
         step = now.step
         if step is None or modifier is not None or q is None or v is None:
             self._observe(t, q, v)  # the state
-            self._advance()  # to what is in force at its time
+            self._advance()  # to the values in force at its time
         else:
             delivered = step.make(t, q, v)  # type: ignore[arg-type]
             stack, damped = step.active, step.damped
             now.mixture.active = stack
         if delivered is None:
             mixture = now.mixture
-            # references, the law, and what it delivers within the limits
+            # references, the law, and the effort within the limits
             delivered = mixture.step(self._state.t, modifier)
             stack, damped = self._active, mixture.damped
             stack.check(delivered.effort)
@@ -123,7 +123,7 @@ class Controller(Commanded):
         memory, now, state = self._memory, self._in_force, self._state
         origin, q, v = memory.origin.item(), state.q.copy(), state.v.copy()
         active, damped = now.mixture.active, now.mixture.damped
-        # What fails here fails in a step as well, which says so, or is not there yet.
+        # An error here is raised in a step as well, or its cause is not there yet.
         with memory.kept(), suppress(Exception):
             for _ in range(times):
                 now.mixture.rehearse()

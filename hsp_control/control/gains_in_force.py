@@ -40,7 +40,7 @@ _ROUNDING = 1e-7
 class GainsInForce:
     """Gains and impedances of the tasks, their offsets, and K_N, now."""
 
-    calls: PartCalls  # those that write what changes, at a time
+    calls: PartCalls  # those that write changing values, at a time
 
     def __init__(self, nv: int, memory: RunMemory) -> None:
         self._memory, self._waiting = memory, memory.waiting
@@ -79,7 +79,7 @@ class GainsInForce:
         return PlannedGains(setup, tasks, feedback, followed, changing, calls)
 
     def go_over_to(self, planned: "PlannedGains") -> object:
-        """Follow it from now on; return what was followed before."""
+        """Follow it from now on; return the record that was followed before."""
         before = self._tasks, self.feedback, self._followed
         self._setup, self._tasks, self.feedback, self._followed, *_ = planned
         self._changing, self.calls = planned.changing, planned.calls
@@ -111,7 +111,7 @@ class GainsInForce:
     def _evolving(
         self, setup: Setup, feedback: Mapping[int, FeedbackInForce]
     ) -> list[PartCall]:
-        """Return the calls of a setup that write what changes, but for impedances."""
+        """Return the calls of a setup that write changing values but impedances."""
         calls = list[PartCall]()
         for each in setup.tasks:
             if impedance_of(each.task) is None and not each.gains.constant:
@@ -183,7 +183,7 @@ class PlannedGains(NamedTuple):
     feedback: dict[int, FeedbackInForce]  # by key
     followed: dict[int, FollowedImpedance]  # by key, of those with an impedance
     changing: bool  # whether an impedance changes
-    calls: PartCalls  # those that write what changes, at a time
+    calls: PartCalls  # those that write changing values, at a time
 
 
 def changes_impedance(task: Task, numbers: Evolution[Array]) -> bool:

@@ -20,7 +20,7 @@ from hsp_control.engine.plans import planned
 from hsp_control.robot import RobotState
 
 MEMORY = 1.0
-"""Changes that were complete this long ago are forgotten [s]; an integrator may ask for
+"""Changes that were complete this long ago are forgotten [s]; an integrator may request
 earlier times than the last one."""
 
 
@@ -28,7 +28,7 @@ class InForce:
     """The part of a time line in force now, and the step that is bound for it.
 
     Gains, limits, model and tools are arrays that the calls of a step read, and while
-    they change it begins with those that write them. What steps call is bound in
+    they change it begins with those that write them. The calls of steps are bound in
     `follow`, when a change is made, also for the time when all changes are over.
     """
 
@@ -49,7 +49,7 @@ class InForce:
         self.step = None
         self.later = None
         self._tried = False  # whether to bind the step was tried
-        self._over: tuple[object, ...] | None = None  # what is not followed any more
+        self._over: tuple[object, ...] | None = None  # no longer followed
 
     def begin(self, time_line: TimeLine) -> None:
         """Make all that computes, and follow a time line."""
@@ -108,7 +108,7 @@ class InForce:
         self.later = AfterChanges(at, over, following, step, gains, limits)
 
     def advance(self, t: float) -> None:
-        """Write what is in force at a time [s]."""
+        """Write the values in force at a time [s]."""
         if self.later is not None:
             self.write(t)
             self.passed(t)
@@ -120,8 +120,8 @@ class InForce:
         memory.now = max(memory.now, t)
         if later is None or memory.now <= later.at:
             return
-        # What is in force is written. The next change binds the calls of the model and
-        # the tools anew, and frees what is left here: to free it takes longer than a
+        # The values in force are written. The next change binds calls of the model and
+        # the tools anew, and frees the rest here: to free it takes longer than a
         # step.
         over = self.time_line, self.setup, self.mixture, self.step, later
         self.time_line, self.setup = later.time_line, later.time_line.setup

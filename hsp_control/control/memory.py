@@ -71,7 +71,7 @@ class RunMemory:
 
     @contextmanager
     def kept(self) -> Iterator[None]:
-        """Take back what steps and sent efforts change, at the time of the last one."""
+        """Undo the effects of steps and sent efforts, at the time of the last one."""
         sent, clock, waiting = deepcopy(self.sent), copy(self.clock), {**self.waiting}
         # of the last step, whose arrays the calls write
         last, now = self.acceleration.copy(), self.now

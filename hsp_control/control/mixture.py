@@ -37,7 +37,7 @@ them, weighted by the stack's `share`. State and stack are read-only; a is a cop
 
 
 def _checked(found: object, robot: Robot) -> tuple[Array, Array | None]:
-    """Return what a modifier returned, if it is as `AccelerationModifier` says."""
+    """Return a modifier's result, if it is as in `AccelerationModifier`."""
     if not isinstance(found, tuple) or len(found) != 2:
         raise ControllerError(
             f"modifier returned {type(found).__name__}; needs (acceleration, effort or "
@@ -138,7 +138,7 @@ class Mixture:
     def step(self, t: float, modifier: AccelerationModifier | None) -> Delivered:
         """Resolve the law at the state and its time [s], and return the result.
 
-        Part by part: for a modifier, and what no `BoundMixture` can deliver.
+        Part by part: for a modifier, and where no `BoundMixture` is possible.
         """
         self._resolve(t, self._sets(t))
         return self._deliver(modifier)
@@ -229,8 +229,8 @@ class Mixture:
         """Return the step as one call; None: Python has to make some of it.
 
         Args:
-            origin: What the clock of its calls reads at time 0, shape (1,) [s].
-            evolving: The calls that write what changes, at a time.
+            origin: Reading of its calls' clock at time 0, shape (1,) [s].
+            evolving: The calls that write changing values, at a time.
         """
         state, limits = self._state, self._limits
         if self.steady:

@@ -16,7 +16,7 @@ from hsp_control.control.planned import PlannedTask
 from hsp_control.edge import BoundLaw
 from hsp_control.law import Problem
 
-Stack = TypeVar("Stack")  # `ActiveStack`, which makes what is shown of it
+Stack = TypeVar("Stack")  # `ActiveStack`, which makes its read-only view
 
 _READS = {"flow", "diagnose", "field_value", "points_of", "in_world"}
 """Methods of a stack and its parts that change nothing which a step reads."""

@@ -17,12 +17,12 @@ class Factors(NamedTuple):
 class Projectors(NamedTuple):
     """The projectors of the damped law of several levels.
 
-    Level k subtracts Q_{k-1} J_kᵀ q(G_k) J_k Q_{k-1} from Q_{k-1}, which gives Q_k.
+    Level k subtracts Q_{k-1} J_kᵀ χ(G_k) J_k Q_{k-1} from Q_{k-1}, which gives Q_k.
     """
 
     Q: Array  # null space of the last level, Q_K = P W⁻¹, shape (nv, nv)
     QJ: Array  # Q_{k-1} J_kᵀ of all levels side by side, shape (nv, m)
-    G_inverse: Array  # q(G_k) of all levels along the diagonal, shape (m, m)
+    G_inverse: Array  # χ(G_k) of all levels along the diagonal, shape (m, m)
 
     @classmethod
     def allocate(cls, m: int, nv: int) -> Self:

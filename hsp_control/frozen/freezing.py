@@ -130,10 +130,10 @@ def _image(
     held, delivered = np.array([period]), DeliveredAlone.allocate(robot.nv)
     sending = bound.limits.applying_all(delivered.tau, delivered.a, held)
     sets = TaskSets(own, bound, presences) if presences else None
-    says = reported(own, bound) if sets is None else sets.reported
+    reports = reported(own, bound) if sets is None else sets.reported
     chain = None
     if compensation is not None:
-        given = delivered, held, sending, says.damped_level
+        given = delivered, held, sending, reports.damped_level
         chain = CompensatedStep(own, bound, compensation, *given)
         check_sets(compensation, sets)
     check_stack(own, bound, chain is not None and bool(chain.stages))
@@ -141,7 +141,7 @@ def _image(
         move = _bare(bound, delivered, sending, sets)
     else:
         move = chain.move(sets)
-    inputs = [*inputs_of(own, bound, held, says)]
+    inputs = [*inputs_of(own, bound, held, reports)]
     inputs += model_inputs(own, bound, payloads)
     if sets is not None:
         inputs += presences_of(sets)
@@ -155,7 +155,7 @@ def _image(
     calls = Plan([*first, *values["calls"].calls, *last])
     move = engine.Move(**values | {"calls": calls, "origin": origin})
     ports: list[Port] = [
-        *_ports(own, says, delivered, held),
+        *_ports(own, reports, delivered, held),
         *(each.port for each in inputs),
     ]
     ports += targets_of(own, streams)
@@ -192,7 +192,7 @@ def _bare(
 
 
 def _ports(
-    own: Controller, says: Reported, delivered: DeliveredAlone, period: Array
+    own: Controller, reports: Reported, delivered: DeliveredAlone, period: Array
 ) -> Iterator[Port]:
     """Yield the inputs, and the outputs of a step."""
     effort, rate = "N·m or N", "rad/s² or m/s²"
@@ -206,10 +206,10 @@ def _ports(
     yield Port("status", "-", "outcome of the step", delivered.status)
     yield Port("delivered", "-", "whether there is an effort", delivered.delivered)
     yield Port("period", "s", "how long an effort is held", period)
-    damped = says.damped_level
+    damped = reports.damped_level
     yield Port("damped_level", "-", "first level with a bounded inverse, or 0", damped)
     for task in own.tasks:
-        e, units = says.errors[task.name], task.error_parts
+        e, units = reports.errors[task.name], task.error_parts
         unit = " and ".join(dict.fromkeys(each.unit for each in units))
         rates = " and ".join(dict.fromkeys(each.rate_unit for each in units))
         yield Port(f"{task.name}.error", unit, "e, reference - robot", e.error)

@@ -62,7 +62,7 @@ class Input(NamedTuple):
 
 
 def inputs_of(
-    own: Controller, bound: BoundStep, held: Array, says: Reported
+    own: Controller, bound: BoundStep, held: Array, reports: Reported
 ) -> Iterator[Input]:
     """Yield the inputs of a controller.
 
@@ -70,13 +70,13 @@ def inputs_of(
         own: The controller.
         bound: Its step.
         held: How long its efforts are held, shape (1,) [s].
-        says: Its reports of tasks.
+        reports: Its reports of tasks.
     """
     period = float(held[0])
     for task in own.tasks:
         impedance = impedance_of(task)
         if impedance is not None:
-            yield from _springs(task, impedance, bound, held, says)
+            yield from _springs(task, impedance, bound, held, reports)
             continue
         # A scalar error is unstable from these on, whatever the other one is.
         Kp, Kv, *_ = own.feedback(task.name)
@@ -103,12 +103,12 @@ def inputs_of(
 
 
 def _springs(
-    task: Task, impedance: Impedance, bound: BoundStep, held: Array, says: Reported
+    task: Task, impedance: Impedance, bound: BoundStep, held: Array, reports: Reported
 ) -> Iterator[Input]:
     """Yield the stiffness of a task, and its damping as it was declared."""
     in_force = next(x.in_force for x in bound.active.stacked if x.name == task.name)
     followed, numbers = FollowedImpedance(in_force, task.part_ends()), in_force.numbers
-    flat, error = numbers.reshape(-1), says.errors[task.name]
+    flat, error = numbers.reshape(-1), reports.errors[task.name]
     now = _evolution(flat, 0.0, LARGEST)
     planned = followed.planned.reshape(-1), followed.ramp
     evolve = engine.EvolveImpedance(

@@ -230,7 +230,7 @@ class Link:
         peer: Address | None = None,
         faults: Faults | None = None,
         stream: int = 0,
-        hears: PacketKind | None = None,
+        receives: PacketKind | None = None,
     ) -> None:
         """Open the socket.
 
@@ -240,10 +240,10 @@ class Link:
             peer: The other end's address; None: that of its first packet.
             faults: Faults to inject into packets sent.
             stream: Number of the stream of random numbers.
-            hears: The kind that is received besides BYE; None: any.
+            receives: The kind that is received besides BYE; None: any.
         """
         self.session, self.peer = session, peer
-        self._hears = hears
+        self._receives = receives
         self._faults = FaultInjector(faults or Faults(), stream)
         self._socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
         self._socket.setblocking(False)
@@ -357,8 +357,8 @@ class Link:
 
     def _is_reflected(self, packet: Packet) -> bool:
         """Return whether a packet is our own, or one of that kind."""
-        if self._hears is not None and packet.kind is not PacketKind.BYE:
-            return packet.kind is not self._hears
+        if self._receives is not None and packet.kind is not PacketKind.BYE:
+            return packet.kind is not self._receives
         return packet.kind is PacketKind.BYE and packet.stamp in self._byes
 
 

@@ -328,7 +328,7 @@ class TrustedMotion:
         sensor drives it, so that it is faster, or moves in the other direction.
         """
         slope, by_v, by_q = self._check.slope, self._expected.v[0], self._expected.v[1]
-        # Of a velocity, less what its noise alone may be.
+        # Of a velocity, less the largest effect of its noise alone.
         used = np.where(self._velocities, smaller(v, self._check.mean), slope)
         expected = np.where(self._velocities, by_v, by_q)
         least, most = np.minimum(expected, 0.0), np.maximum(expected, 0.0)

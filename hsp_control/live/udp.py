@@ -127,7 +127,7 @@ class UdpHardware:
         self._sensors = SensorLayout() if sensors is None else sensors
         session = secrets.randbits(63) if session is None else session
         self.link = Link(
-            session, address, faults=faults, stream=1, hears=PacketKind.STATE
+            session, address, faults=faults, stream=1, receives=PacketKind.STATE
         )
         self._age_estimator = AgeEstimator()
         self.closed = False

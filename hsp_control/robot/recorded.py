@@ -2,6 +2,7 @@
 
 import logging
 from collections.abc import Mapping
+from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -15,6 +16,7 @@ from hsp_control.common.exceptions import (
 )
 from hsp_control.common.resources import is_file
 from hsp_control.common.suggestions import listing
+from hsp_control.common.warned import warn
 from hsp_control.declaration.plain_data import plain_data
 from hsp_control.robot.description.access import ANYWHERE, Access
 from hsp_control.robot.description.loading import RobotPart, load_model, placement
@@ -151,6 +153,25 @@ def name_a_changed_scene(robot: Robot, record: Mapping[str, Any]) -> None:
             "%s has changed since the log was made: the robot is that of the file",
             robot.source.urdf,
         )
+
+
+class OtherRobotWarning(UserWarning):
+    """A robot that is given for a log is not the one in it."""
+
+
+def warn_of_another_robot(robot: Robot, meta: Mapping[str, Any]) -> None:
+    """Warn if the URDFs of a robot are not those in a log, for example edited since."""
+    record, description = usable_record(meta), robot.description
+    if record is None or description is None or "parts" not in record:
+        return
+    for part, then in zip(robot.parts, record["parts"], strict=False):
+        with suppress(ModelError, LookupError, TypeError):  # a missing file, or damage
+            if text_of(part.source) != unpacked(then["urdf"]):
+                warn(
+                    f"{part.source.urdf} is not the robot of the log: it was edited "
+                    "since, or is another; load_experiment(log).robot is the log's",
+                    OtherRobotWarning,
+                )
 
 
 def _of_model(record: Mapping[str, Any]) -> Robot:

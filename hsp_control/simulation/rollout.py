@@ -18,6 +18,7 @@ from hsp_control.common.exceptions import LogError
 from hsp_control.common.suggestions import did_you_mean, listing
 from hsp_control.declaration.language import spoken
 from hsp_control.robot import Robot, RobotState
+from hsp_control.robot.recorded import warn_of_another_robot
 from hsp_control.simulation.journal import KILLED, JournalReader, is_journal
 from hsp_control.simulation.log_shapes import WrongColumnError, check_columns
 from hsp_control.simulation.run_summary import damped_rows, summary_text
@@ -133,6 +134,8 @@ class Rollout:
         Raises:
             ShapeError: If the run is of another robot.
         """
+        if self.q.shape[1:] == (robot.nq,):
+            warn_of_another_robot(robot, self.meta)
         state = RobotState(robot)
         rows = zip(self.t.tolist(), self.q, self.v, strict=True)
         # Each update overwrites the state's arrays, so np.array must copy.

@@ -1,10 +1,10 @@
-"""Hears the state of an ``hsp live`` loop and sends it targets, with Python alone.
+"""Receives the state of an ``hsp live`` loop and sends it targets, with Python alone.
 
     loop = Loop("127.0.0.1:5006")
     x, y, z, *quaternion = loop.state()["frames"]["panda_tcp"]
     loop.send("127.0.0.1:5005", [x, y, z + 0.01, *quaternion])
 
-The loop must tell its state there: ``hsp live CONFIG --publish udp://127.0.0.1:5006``.
+The loop must publish its state there: ``hsp live CONFIG --publish udp://127.0.0.1:5006``.
 The keys of a state are in ``hsp_control/companions/datagrams/policies.md``.
 """
 
@@ -23,18 +23,18 @@ _POLL = 0.1
 
 
 class LoopError(ConnectionError):
-    """No state can be heard, or the loop has ended."""
+    """No state is received, or the loop has ended."""
 
 
 class Loop:
-    """A loop in another process; a thread hears its newest state."""
+    """A loop in another process; a thread receives its newest state."""
 
     def __init__(self, states: str, timeout: float = 2.0) -> None:
         """Listen.
 
         Args:
-            states: ``HOST:PORT`` where the loop tells its state.
-            timeout: Silence after which it counts as gone [s].
+            states: ``HOST:PORT`` where the loop publishes its state.
+            timeout: Silence after which the loop is regarded as ended [s].
 
         Raises:
             LoopError: If something else listens there.
@@ -97,9 +97,9 @@ class Loop:
         self._send(to, {"values": rows, "times": [float(each) for each in times]})
 
     def opening(self, gripper: str, wait: float = 0.0) -> float | None:
-        """Return how far a finger of a Franka's gripper was open when it told that.
+        """Return the last reported opening of a finger of a Franka's gripper.
 
-        It answers between its motions, at ``HOST:PORT``; None: never yet.
+        It reports between its motions, at ``HOST:PORT``; None: never yet.
         """
         self._out.sendto(b"{}", _address(gripper))
         while select([self._out], [], [], wait)[0]:

@@ -1,7 +1,7 @@
 """Run campaigns in full: ``python -m campaigns [NAME ...]`` in ``tests``, or make fuzz.
 
-Counts are kept in out/fuzz after every batch: what was interrupted is told as far as it
-went. benchmarks/results/fuzz.md has them.
+Counts are kept in out/fuzz after every batch, also those of an interrupted campaign.
+benchmarks/results/fuzz.md has them.
 """
 
 import argparse
@@ -57,7 +57,7 @@ def cases(progress: Progress, seed: int, share: float, kind: str) -> bool:
 
 
 def main(arguments: Iterable[str] | None = None) -> int:
-    """Run what is named, and say whether all was well."""
+    """Run the named campaigns, and return whether all was well."""
     stages: dict[str, Callable[[Progress, int, float], bool]] = {
         "states": states,
         **{kind: partial(cases, kind=kind) for kind in CASES},

@@ -1,4 +1,4 @@
-"""Ask the command line, in this process, and judge its answer."""
+"""Run the command line in this process, and judge its result."""
 
 import io
 import signal
@@ -21,7 +21,7 @@ def ask(arguments: Sequence[str], *, stop_after: float | None = None) -> list[st
     Args:
         arguments: The command line.
         stop_after: Press Ctrl-C after this many seconds, as a person would who has
-            asked for a long run; it must then end by itself.
+            made a long run; it must then end by itself.
     """
     out, errors = io.StringIO(), io.StringIO()
     try:

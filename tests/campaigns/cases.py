@@ -1,4 +1,4 @@
-"""Count what came of many mutated files."""
+"""Count the outcomes of many mutated files."""
 
 import tempfile
 from collections import Counter
@@ -16,7 +16,7 @@ TIMEOUT = 60.0
 
 @dataclass
 class Count:
-    """What came of many cases.
+    """The outcome of many cases.
 
     Attributes:
         cases: How many.
@@ -39,7 +39,7 @@ class Count:
 
 
 def warm_up() -> None:
-    """Compile what cases need: afterwards a case that takes a minute hangs."""
+    """Compile the cases' needs: afterwards a case that takes a minute hangs."""
     for config in bundled_configs():
         with tempfile.TemporaryDirectory() as folder:
             arguments = ["run", config, "--out", folder]
@@ -50,7 +50,7 @@ def warm_up() -> None:
 def count_cases(
     function: str, seed: int, cases: int, show: Callable[[Count], None] | None = None
 ) -> Count:
-    """Return what came of the first cases of a seed."""
+    """Return the outcome of the first cases of a seed."""
     count = Count()
     with Worker(function, TIMEOUT) as worker:
         for answer in worker.answers(seed, range(cases)):

@@ -1,4 +1,4 @@
-"""Changes of each kind while a controller runs: what is over leaves nothing.
+"""Changes of each kind while a controller runs: past ones leave nothing.
 
 After twenty changes of a kind and after a hundred thousand, a controller has the same
 representation, the same calls in a step, a pickle of the same size, and the process the
@@ -29,7 +29,7 @@ PROCESS = 8_000_000  # as in `soak` [bytes]
 
 @dataclass(frozen=True)
 class Kept:
-    """What there is once all changes are over."""
+    """The memory once all changes are over."""
 
     text: str
     calls: int  # length of the step's plan in text
@@ -39,7 +39,7 @@ class Kept:
     same: bool  # a pickle and a copy make the same step, to the last bit
 
     def grew_from(self, few: "Kept") -> str:
-        """Return what has grown; empty: nothing has."""
+        """Return the growth; empty: none."""
         grown = {
             "repr": self.text != few.text,
             "step": self.calls != few.calls,
@@ -79,7 +79,7 @@ class Repeated:
             self._step()
 
     def kept(self) -> Kept:
-        """Return what there is when all is over."""
+        """Return the memory when all is over."""
         for _ in range(3):
             self.k += OVER
             self._step()
@@ -99,7 +99,7 @@ KINDS = (*CHANGES, "target", "twist")
 
 
 def run(kind: str, number: int) -> Iterator[tuple[int, str]]:
-    """Make changes of a kind; yield how many there were, and at last what has grown."""
+    """Make changes of a kind; yield their number, and at last the growth."""
     repeated = Repeated(kind)
     for j in range(FEW):
         repeated.change(j)

@@ -1,4 +1,4 @@
-"""Do what a case must not, by its number: the harness has to notice."""
+"""Do something forbidden, by a case's number: the harness has to detect it."""
 
 import os
 import time

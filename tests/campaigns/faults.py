@@ -1,4 +1,4 @@
-"""Disks that fill, and Ctrl-C: what was computed before is readable."""
+"""Disks that fill, and Ctrl-C: earlier results are readable."""
 
 import os
 import resource
@@ -27,12 +27,12 @@ SAVES, INTERRUPTS = 500, 200
 
 @dataclass
 class Faults:
-    """What came of many faults.
+    """The outcome of many faults.
 
     Attributes:
         cases: How many.
-        outcomes: What came of them, in words.
-        wrong: What must not have been: examples.
+        outcomes: Their outcomes, in words.
+        wrong: Examples of wrong ones.
     """
 
     cases: int = 0
@@ -53,7 +53,7 @@ class Faults:
 
 
 def same(one: Rollout, other: Rollout) -> bool:
-    """Say whether the columns that both have are the same."""
+    """Return whether the columns that both have are the same."""
     return all(
         np.array_equal(one[name], other[name], equal_nan=True)
         for name in set(one.columns) & set(other.columns)
@@ -97,7 +97,7 @@ def full_disk(rollout: Rollout, size: int, random: Random, folder: Path) -> Faul
 
 
 def _save_and_leave(rollout: Rollout, path: Path, room: int, message: Path) -> None:
-    """Save with little room, write what was said, and end the process."""
+    """Save with little room, write the messages, and end the process."""
     text = "nothing"
     with message.open("w") as file:  # opened, and small, before there is no room
         if room:
@@ -117,7 +117,7 @@ def _save_and_leave(rollout: Rollout, path: Path, room: int, message: Path) -> N
 
 
 def interrupted(random: Random, folder: Path, log: Path, longest: float) -> Faults:
-    """Send Ctrl-C to ``hsp`` at a random moment; what it leaves must be readable."""
+    """Send Ctrl-C to ``hsp`` at a random moment; its files must be readable."""
     found = Faults()
     commands = {
         "long run": ["run", CONFIG, "--out", str(folder), "--set",

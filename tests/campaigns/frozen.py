@@ -52,7 +52,7 @@ COMPENSATORS: dict[str, Any] = {
 
 @dataclass
 class Tally:
-    """What came of one configuration.
+    """The outcome of one configuration.
 
     Attributes:
         refused: Why it cannot be frozen; empty: it can.
@@ -140,7 +140,7 @@ def compensated(experiment: hsp.Experiment, period: float) -> Compensation:
 def compared(
     name: str, drawn: int, duration: float, seed: int, *, compensators: bool = False
 ) -> Iterator[Tally]:
-    """Yield what came of a configuration so far.
+    """Yield the outcome of a configuration so far.
 
     Args:
         name: The configuration's name.

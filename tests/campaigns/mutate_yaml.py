@@ -38,7 +38,7 @@ TAGS = [
     "!!timestamp 2001-12-14",
     "!custom {{a: 1}}",
 ]
-"""What would run code, or make objects, in a loader that is not safe."""
+"""Tags that would run code, or make objects, in a loader that is not safe."""
 
 
 def mutated(data: bytes, random: Random, canary: str) -> bytes:

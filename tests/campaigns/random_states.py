@@ -38,7 +38,7 @@ OTHERS = (
 
 @dataclass
 class Tally:
-    """What came of many steps.
+    """The outcome of many steps.
 
     Attributes:
         steps: Steps.
@@ -65,7 +65,7 @@ class Tally:
     seconds: float = 0.0
 
     def note(self, where: str, what: str) -> None:
-        """Keep an example of what went wrong."""
+        """Keep an example of a failure."""
         if len(self.examples) < 20:
             self.examples.append(f"{where}: {what[:200]}")
 
@@ -127,7 +127,7 @@ class _Step:
         self._slack = ROUNDING * np.clip(self._effort, 1.0, 1e6)
 
     def take(self, state: RobotState, where: str) -> None:
-        """Take a step and count what came of it."""
+        """Take a step and count its outcome."""
         tally = self._tally
         low, high = -self._effort, self._effort
         if self._rated:

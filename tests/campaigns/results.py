@@ -1,4 +1,4 @@
-"""What the campaigns have counted, kept in files."""
+"""Counts of the campaigns, kept in files."""
 
 import json
 import platform

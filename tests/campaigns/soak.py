@@ -1,8 +1,8 @@
 """Minutes of simulated time at 1 kHz, as on a robot: memory stays flat.
 
-The loop is that of a robot: measure, compute, apply, and nothing kept. What Python has
-allocated (tracemalloc) and what the process holds (its resident set) are read every
-simulated half minute, after a warm-up.
+The loop is that of a robot: measure, compute, apply, and nothing kept. Python's
+allocations (tracemalloc) and the memory of the process (its resident set) are read
+every simulated half minute, after a warm-up.
 """
 
 import gc
@@ -22,20 +22,20 @@ CONFIG = "panda_obstacle"
 PERIOD = 1e-3
 MINUTES = 10.0
 PYTHON_GROWTH = 100_000
-"""What Python may have allocated more at the end than after the warm-up [bytes]."""
+"""Largest growth of Python's allocations between warm-up and end [bytes]."""
 PROCESS_GROWTH = 8_000_000
-"""What the process may hold more [bytes]: the allocator's pages, and no leak, which at
+"""Largest growth of the process [bytes]: the allocator's pages, and no leak, which at
 600000 steps would be more with 16 bytes a step."""
 
 
 @dataclass
 class Soak:
-    """What was read.
+    """Readings of memory.
 
     Attributes:
         steps: Control steps.
-        python: What Python has allocated [bytes], from the warm-up on.
-        process: What the process holds [bytes], at the same moments.
+        python: Allocations of Python [bytes], from the warm-up on.
+        process: Memory of the process [bytes], at the same moments.
         worst_error: The largest task error after the first second, in the task's units.
     """
 

@@ -1,4 +1,4 @@
-"""What is done to bytes and lines of any file."""
+"""Mutations of bytes and lines of any file."""
 
 from collections.abc import Callable
 from random import Random
@@ -26,7 +26,7 @@ def cut(data: bytes, random: Random) -> bytes:
 
 
 def repeated(data: bytes, random: Random) -> bytes:
-    """Say a piece once more, or many times."""
+    """Repeat a piece once, or many times."""
     a = random.randrange(len(data) + 1)
     b = min(len(data), a + random.choice((1, 10, 100)))
     return data[:b] + data[a:b] * random.choice((1, 2, 1000)) + data[b:]

@@ -58,7 +58,7 @@ simulation:
 
 
 def case(seed: int, index: int) -> list[str]:
-    """Return what came of case ``index``: see `worker`."""
+    """Return the outcome of case ``index``: see `worker`."""
     random = Random(f"urdf {seed} {index}")
     robots = [folder / f"{name}.urdf" for name, folder in bundled_robots().items()]
     bundled = random.random() < 0.5

@@ -1,4 +1,4 @@
-"""Runs cases in a process of its own, so that a crash or a hang is an answer, too.
+"""Runs cases in another process, so that a crash or a hang is a result, too.
 
 A case is a function of (seed, index): the parent sends both, the process makes the case
 from them and answers with one line. A process that dies is replaced.
@@ -20,11 +20,11 @@ from pathlib import Path
 from typing import Any, NamedTuple, Self
 
 MEMORY = 12_000_000_000
-"""Address space of a worker [bytes]: to ask for more is a failure."""
+"""Address space of a worker [bytes]: to allocate more is a failure."""
 
 
 class Answer(NamedTuple):
-    """What came of a case.
+    """The outcome of a case.
 
     Attributes:
         index: The case's number.
@@ -59,7 +59,7 @@ class Worker:
         self._trace = tempfile.TemporaryFile()  # noqa: SIM115
 
     def ask(self, seed: int, index: int) -> Answer:
-        """Return what came of a case."""
+        """Return the outcome of a case."""
         process = self._process or self._start()
         assert process.stdin is not None
         start = time.monotonic()
@@ -69,7 +69,7 @@ class Worker:
         self._first = False
         seconds = time.monotonic() - start
         if line is None:
-            process.send_signal(signal.SIGUSR1)  # says where it stands
+            process.send_signal(signal.SIGUSR1)  # reports where it is
             time.sleep(0.5)
             self.close()
             self._trace.seek(0)
@@ -144,7 +144,7 @@ def serve(name: str) -> None:
     case: Any = getattr(importlib.import_module(module), function)
     resource.setrlimit(resource.RLIMIT_AS, (MEMORY, MEMORY))
     answers = os.fdopen(os.dup(1), "wb", buffering=0)
-    os.dup2(2, 1)  # what native code prints is no answer
+    os.dup2(2, 1)  # output of native code is no answer
     faulthandler.register(signal.SIGUSR1)
     faulthandler.enable()
     for line in sys.stdin.buffer:

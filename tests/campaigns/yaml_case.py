@@ -13,7 +13,7 @@ STOP = 0.3
 
 
 def case(seed: int, index: int) -> list[str]:
-    """Return what came of case ``index``: see `worker`."""
+    """Return the outcome of case ``index``: see `worker`."""
     random = Random(f"yaml {seed} {index}")
     configs = bundled_configs()
     data = configs[random.choice(list(configs))].read_bytes()

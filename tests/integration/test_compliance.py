@@ -1,7 +1,7 @@
-"""A compliant hand along whole motions: what a force does to it, and what it does not.
+"""A compliant hand along whole motions: the effects of a force.
 
-The law runs in the integrator's stages, so that what is compared are the equations
-themselves; where efforts are held, the difference is said.
+The law runs in the integrator's stages, so that the comparison is one of the equations
+themselves; where efforts are held, the difference is given.
 """
 
 import pickle
@@ -46,7 +46,7 @@ def pose_hand(**fields: Any) -> FramePose:
 def run(
     hand: hsp.Task, metric: Metric, pushes: list[Push], gain: float = 3.0, **how: Any
 ) -> Rollout:
-    """Return a run from rest, its null space off its field; nobody tells of pushes."""
+    """Return a run from rest, its null space off its field; it knows no pushes."""
     robot, q = panda(), start()
     away = robot.integrate(q, 0.4 * np.sin(1.0 + np.arange(7)))
     field = hsp.TargetPosture(away, weight=1.5)
@@ -79,7 +79,7 @@ def test_an_unknown_force_at_the_hand_does_not_reach_the_null_space(name: str) -
     pushed = run(hand, MassMatrixMetric(), [push])
     predicted = pushed["null_space_norm"][0] * np.exp(-3.0 * pushed.t)
     assert predicted[0] > 0.05
-    assert np.abs(pushed["task.hand.error"]).max() > 0.02  # the hand gives way
+    assert np.abs(pushed["task.hand.error"]).max() > 0.02  # the hand yields
     np.testing.assert_allclose(pushed["null_space_norm"], predicted, rtol=1e-8)
     felt = run(hand, IdentityMetric(), [push])
     predicted = felt["null_space_norm"][0] * np.exp(-3.0 * felt.t)
@@ -126,7 +126,7 @@ def inertia(q: Array, rows: int) -> Array:
 def test_the_energy_is_what_came_in_less_what_was_damped(metric: Metric) -> None:
     """E' = fᵀv - e'ᵀDe' + ½ eᵀK'e, E = ½ e'ᵀΛe' + ½ eᵀKe: passive at the hand.
 
-    The last term is what a growing stiffness adds.
+    The last term is the work of a growing stiffness.
     """
     robot, q = panda(), start()
     soft, hard = np.array([200.0, 300.0, 250.0]), np.array([900.0, 500.0, 700.0])
@@ -149,7 +149,7 @@ def test_the_energy_is_what_came_in_less_what_was_damped(metric: Metric) -> None
     energy = np.array(kinetic) + 0.5 * (K * e**2).sum(axis=1)
     power = -rate @ FORCE - damping * (rate**2).sum(axis=1)
     ramped = 0.5 * (K_dot * e**2).sum(axis=1)
-    assert simpson(ramped, x=log.t) > 0.02  # it counts
+    assert simpson(ramped, x=log.t) > 0.02  # it is active
     gained = simpson(power + ramped, x=log.t)
     assert energy[-1] - energy[0] == pytest.approx(gained, rel=1e-6)
 
@@ -243,7 +243,7 @@ def test_limits_that_an_observer_tells_are_not_bound_by_a_push() -> None:
     assert (untold["status"] >= 2).any()
 
 
-# --- what the observer says ----------------------------------------------------------
+# --- the observer's estimate ---------------------------------------------------------
 
 
 def test_the_observer_finds_the_force_and_does_not_fight_it() -> None:

@@ -23,13 +23,13 @@ COARSE = (
     "simulation.log_period=0.02",
 )
 TRACKING = 1e-3
-"""Largest error of a hand at 250 Hz [m]; what remains is the effort being held."""
+"""Largest error of a hand at 250 Hz [m]; the rest is the effect of the held effort."""
 
 
 def run_both(name: str) -> tuple[Experiment, Rollout, Rollout]:
     """Return a configuration, its run, and the run without its first field.
 
-    The other has no limits either, which would do some of what the field does.
+    The other has no limits either, which would share the field's work.
     """
     text = bundled_configs()[name].read_text(encoding="utf-8")
     others = json.dumps(yaml.safe_load(text)["null_space"]["fields"][1:])
@@ -67,7 +67,7 @@ def least_manipulability(rollout: Rollout) -> float:
     return float(np.sqrt(rollout["manipulability"].min()))
 
 
-# Each says what its configuration is for, with bounds somewhat looser than it shows.
+# Each checks its configuration's purpose, with bounds somewhat looser than it shows.
 
 
 def the_hand_stays_able(experiment: Experiment, ours: Rollout, other: Rollout) -> None:
@@ -185,7 +185,7 @@ def test_the_first_effort_is_what_gravity_asks(name: str) -> None:
     assert not experiment.v0.any() or name.startswith("paper/")  # on its trajectory
     rest = np.zeros(robot.nv)
     gravity = robot.inverse_dynamics(q, rest, rest)
-    if robot.unactuated:  # what holds a posture on its feet, and nothing else
+    if robot.unactuated:  # a posture on its feet, and nothing else
         still = JointPosture(q, joints=robot.joint_names[1:])
         holding = Controller(robot, [still], limits=None, contacts=law.contacts)
         gravity = holding.compute(0.0, q, rest).tau

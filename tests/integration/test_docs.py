@@ -1,4 +1,4 @@
-"""What the documents claim is true; that they run, test_pages.py says."""
+"""The documents' claims are true; test_pages.py runs them."""
 
 import re
 import shlex

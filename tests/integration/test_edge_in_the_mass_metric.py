@@ -1,6 +1,6 @@
 """Out of reach in the metric M(q): nothing shakes an arm at a limit.
 
-There a field asks light wrists for several times what limits permit. A step that began
+There a field demands several times what limits permit of wrists. A step that began
 to violate a limit by a tenth had left a quarter of that: the arms swung at 4 to 8 Hz.
 """
 
@@ -59,7 +59,7 @@ def test_a_hand_above_an_orientation_rests(
 def test_a_task_that_asks_a_joint_beyond_its_limit_forever_rests() -> None:
     """A centre of mass out of reach holds joint 4 of an iiwa at its limit.
 
-    It asks for 11 rad/s² there. The null space gave that with the wrist, whose share of
+    It demands 11 rad/s² there. The null space gave that with the wrist, whose share of
     it turned within 4 mrad: the arm swung at 16 Hz.
     """
     robot, period = hsp.Robot.load("iiwa14"), 0.002

@@ -46,7 +46,7 @@ def test_the_hand_is_as_near_as_it_can_be_whatever_is_asked_below(name: str) -> 
 
 
 def test_an_orientation_that_is_met_gives_way_too() -> None:
-    """It asks for nothing, but would undo what the position above it draws."""
+    """It demands nothing, but would undo what the position above it draws."""
     q0 = np.array([-0.019, -1.491, 1.837, -2.484, -1.32, -0.043])
     away = np.array([-1.993, -0.799, 0.043])
     below = hsp.FrameOrientation(FRAMES["ur5"], priority=2)
@@ -71,7 +71,7 @@ def test_an_orientation_below_a_spring_out_of_reach_rests(
 
 
 def test_a_spring_above_an_orientation_rests_where_a_joint_is_at_its_limit() -> None:
-    """It swung at 8.5 Hz with what springs lend from 0.4 of the size on."""
+    """It swung at 8.5 Hz with the directions that springs release from 0.4 size on."""
     q0 = np.array([-0.2527, 0.469, -0.1675, -1.8041, 0.0461, 0.8357, 0.2226])
     goal, frame = [0.3359, -0.151, -0.899], load("iiwa14").end_effector
     hand = hsp.FramePosition(frame, hsp.Hold(goal), impedance=hsp.Impedance(126.8))
@@ -92,7 +92,7 @@ def test_a_spring_above_an_orientation_rests_where_a_joint_is_at_its_limit() -> 
 def test_a_hand_just_out_of_reach_rests_above_an_orientation(
     q0: list[float], goal: list[float]
 ) -> None:
-    """It asks for little, and what is below it for much."""
+    """It demands little, and what is below it much."""
     hand = hsp.FramePosition("panda_tcp", hsp.Hold(goal))
     below = hsp.FrameOrientation("panda_tcp", priority=2)
     assert rests(load("panda"), np.array(q0), hand, below, period=PERIOD)
@@ -115,7 +115,7 @@ def test_a_height_out_of_reach_rests(name: str) -> None:
 
 
 def test_a_field_does_not_shake_an_arm_that_a_spring_holds_stretched() -> None:
-    """It asks for the arm's bent posture, and motors and joints have no limits."""
+    """It demands the arm's bent posture, and motors and joints have no limits."""
     robot = load("planar3r")  # of 3 kg and 3 m: 100 1/s² at an error of 0.9 m
     assert robot.spring_force == pytest.approx((270.0, 270.0 * 1.5 / 2.0))
     q0 = robot.integrate(robot.neutral(), np.array([0.1, 0.6, 0.6]))

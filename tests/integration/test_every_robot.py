@@ -1,7 +1,7 @@
 """Every robot that is known, driven by the same few lines for a second of its time.
 
 Each holds a point, and where it can a pose, that it starts away from and with a speed
-of its own, while a posture and the middle of its range draw on the null space. Errors
+of the robot, while a posture and the middle of its range draw on the null space. Errors
 are taken from the logged motion by plain Pinocchio.
 """
 
@@ -271,6 +271,6 @@ def test_every_robot_is_driven_or_listed_with_its_reason() -> None:
         else:
             assert FLOATING in row.note or name == "cassie"
     assert "no URDF" in rows["cassie"].note
-    # What does not load as it is says what it is to be loaded with.
+    # A robot that does not load as it is names the options that it needs.
     for name in LOAD_OPTIONS:
         assert "load it with `" in rows[name].note

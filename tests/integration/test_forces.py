@@ -77,13 +77,13 @@ def test_talos_presses_against_a_wall() -> None:
         log[f"plant.contact.{side}_sole_link.force"] for side in ("left", "right")
     )
     inert = np.abs(np.asarray(soles)[:, 0] - force)[log.t > 1.5]
-    assert inert.max() < 10.0  # what is left accelerates the swaying body
+    assert inert.max() < 10.0  # the rest accelerates the swaying body
     assert np.linalg.norm(log["task.center_of_mass.error"], axis=1).max() < 1e-3
     assert log["status"].max() <= 1
 
 
 def test_talos_leans_while_it_is_heavier_than_its_model() -> None:
-    """Half of the way to 120 N, a tenth too heavy: it stands, and presses as asked."""
+    """Halfway to 120 N, a tenth too heavy: it stands, and presses as commanded."""
     pytest.importorskip("example_robot_data")
     log = load_experiment("forces/talos_lean", "simulation.duration=2.2").run()
     assert log.meta["status"] == "completed"

@@ -1,4 +1,4 @@
-"""The configurations of configs/limits: the null space gives way, then the hand."""
+"""The configurations of configs/limits: the null space deviates, then the hand."""
 
 from functools import cache
 
@@ -43,7 +43,7 @@ def test_half_strength() -> None:
     free, _ = run("panda_half_strength", shorter, UNLIMITED)
     check_limits(ours, limits)
     assert limits is not None
-    assert (np.abs(free["tau"]) / limits.effort).max() > 1.05  # it is asked for
+    assert (np.abs(free["tau"]) / limits.effort).max() > 1.05  # it is commanded
     assert error(ours).max() < 3e-3
     limited = ours["status"] == Status.LIMITED
     first = int(np.flatnonzero(limited)[0])
@@ -62,7 +62,7 @@ def test_towards_a_joint_limit() -> None:
     assert free["q"][:, 3].max() > limits.upper[3] + 0.5
     assert ours["q"][:, 3].max() > limits.upper[3] - 0.006  # up to the margin
     first, second, home = (np.searchsorted(ours.t, t) for t in (2.9, 4.9, 7.9))
-    # What a weight of 1e-3 leaves of strict order; below, that it is this weight's.
+    # The deviation from strict order at a weight of 1e-3; below, its cause.
     assert error(ours)[first] < 5e-4
     assert ours["null_space_norm"][first] > 1.0
     assert 5e-3 < error(ours)[second] < 0.05

@@ -62,7 +62,7 @@ def falling(length: float, angle: float) -> Array:
 
 
 def test_terms_are_the_pendulums_at_every_state(robot: Robot) -> None:
-    """The arrays follow the state: they are asked for once, and read after moving."""
+    """The arrays follow the state: they are requested once, and read after moving."""
     state = robot.state(0.0, [0.0], [0.0])
     tip, mass, world = state.frame("tip"), state.centroidal, state.world
     for angle, rate in ((0.3, 1.5), (-2.0, -0.4)):

@@ -41,7 +41,7 @@ NOT_RUN = [
 ]
 
 
-# --- what a page claims of the names that its Python leaves ---------------------------
+# --- claims of a page about the names that its Python leaves --------------------------
 
 
 def the_readme(space: dict[str, Any]) -> None:
@@ -110,10 +110,10 @@ def test_a_block_is_not_run(page: str, block) -> None:
 
 @pytest.mark.parametrize("page", WITH_BLOCKS)
 def test_commands_stand_in_blocks_of_commands(page: str) -> None:
-    """A block of text is what something prints: nobody runs it."""
+    """A block of text is output: nobody runs it."""
     commands = {"hsp", "make", "pip", "python", "git", "cd", "source", "sudo"}
     for block in blocks_of(page):
-        assert block.language, f"{page}:{block.line} does not say its language"
+        assert block.language, f"{page}:{block.line} does not name its language"
         if block.language in OUTPUT and block.kind != "not run":
             first = {line.split(" ")[0] for line in block.text.splitlines()}
             assert not first & commands, f"{page}:{block.line}"

@@ -28,7 +28,7 @@ def installed(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def hsp(installed: Path, line: str, where: Path, status: int = 0) -> str:
-    """Run a command with the example installed, and return what it prints."""
+    """Run a command with the example installed, and return its output."""
     environment = os.environ | {"PYTHONPATH": str(installed)}
     found, printed = READY.run(line.split(), where, environment)
     assert found == status, f"hsp {line}\n{printed}"

@@ -1,4 +1,4 @@
-"""No field takes a feasible task away, whatever it asks for and whatever binds."""
+"""No field makes a feasible task fail, whatever it demands and whatever binds."""
 
 from functools import partial
 
@@ -74,9 +74,9 @@ def test_a_field_that_pushes_into_limits_leaves_the_task(name: str, field: str) 
 @pytest.mark.slow
 @pytest.mark.parametrize("name", ["panda", "xarm7"])
 def test_a_step_within_reach_is_made_whatever_a_field_asks_for(name: str) -> None:
-    """Its first accelerations are beyond what motors give, so that the step is damped.
+    """Its first accelerations are beyond the motors' limits, so that it is damped.
 
-    What a field asks for once passed for the tasks' there: the hand ended 0.6 and 0.8 m
+    A field's demand once passed for the tasks' there: the hand ended 0.6 and 0.8 m
     away. Now it is as quick as without a field.
     """
     robot, rng = hsp.Robot.load(name), np.random.default_rng(1)

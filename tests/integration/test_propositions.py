@@ -250,7 +250,7 @@ DURATION = 0.5  # of self-motion [s]
 
 @cache
 def tracked(which: str) -> tuple[Controller, Rollout]:
-    """Return a motion of 1 s from off the reference, at a velocity of its own."""
+    """Return a motion of 1 s from off the reference, at another velocity."""
     case = TASKS[which]
     robot = load(case.robot)
     q0 = home(case.robot)
@@ -318,7 +318,7 @@ def moving(robot: Robot, name: str) -> NullSpaceField:
 
 @dataclass(frozen=True)
 class Run:
-    """A motion with a null space, and what is wanted of it."""
+    """A motion with a null space, and the expected one."""
 
     robot: str
     metric: str

@@ -1,4 +1,4 @@
-"""A push that the model does not know takes joints beyond their limits: it is told."""
+"""A push unknown to the model moves joints beyond their limits: it is reported."""
 
 import numpy as np
 import pytest
@@ -62,14 +62,14 @@ def test_a_joint_beyond_its_limit_is_told(case, tmp_path, capsys):
         every["joint_positions"] - limits.upper, limits.lower - every["joint_positions"]
     )
     outside = np.maximum(outside, 0.0)
-    # The push is stronger than the motors, and the status says when.
+    # The push is stronger than the motors, and the status shows when.
     worst, dof = np.unravel_index(outside.argmax(), outside.shape)
     assert outside[worst, dof] > 0.03
     fast = np.abs(every.v) > (1.0 + BEYOND_SPEED) * limits.velocity
     beyond = (outside > BEYOND_POSITION).any(axis=1) | fast.any(axis=1)
     np.testing.assert_array_equal(every["status"] == Status.BEYOND, beyond)
     np.testing.assert_array_equal(run["status"] == Status.BEYOND, beyond[::10])
-    # A row tells the worst control period since the row before it: none is missed.
+    # A row has the worst control period since the row before it: none is missed.
     told = run["position_excess"]
     assert len(told) == 31
     for row in range(1, 31):

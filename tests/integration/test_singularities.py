@@ -72,7 +72,7 @@ class Passage:
         start: Where it starts, shape (nq,).
         duration: How long it takes, with time to recover [s].
         threshold: The singularity threshold.
-        effort: What the largest effort stays below [N·m].
+        effort: Bound on the largest effort [N·m].
         step: Of the integrator [s].
     """
 
@@ -100,7 +100,7 @@ class Passage:
         )
 
     def run(self, threshold: float, control_period: float | None = None) -> Rollout:
-        """Return the motion; it starts with a speed of its own."""
+        """Return the motion; it starts with a speed."""
         v0 = 0.05 * np.sin(1.0 + np.arange(self.robot.nv))
         return simulate(
             self.controller(threshold),
@@ -127,7 +127,7 @@ def stretched_planar_arm() -> Passage:
 
 
 def panda_out_of_reach(threshold: float) -> Passage:
-    """Its hand is asked for a point 15 cm out of reach, and back."""
+    """Its hand is commanded to a point 15 cm out of reach, and back."""
     robot = load("panda")
     q0, shoulder = robot.home(), np.array([0.0, 0.0, 0.333])
     here = robot.state(0.0, q0, np.zeros(7)).position("panda_tcp").copy()
@@ -200,7 +200,7 @@ def damped_part(rollout: Rollout) -> tuple[int, int]:
 
 
 def decayed(rollout: Rollout, name: str, rows: slice) -> tuple[Array, Array]:
-    """Return e at some rows, and what the first of them leaves of it by the law."""
+    """Return e at some rows, and the law's decay from the first of them."""
     t = (rollout.t[rows] - rollout.t[rows][0])[:, None]
     e, e_dot = rollout[f"task.{name}.error"][rows], rollout[f"task.{name}.error_rate"]
     slope = e_dot[rows][0] + FREQUENCY * e[0]
@@ -209,9 +209,9 @@ def decayed(rollout: Rollout, name: str, rows: slice) -> tuple[Array, Array]:
 
 @every_passage
 def test_the_law_is_exact_until_the_threshold_is_met(which: str) -> None:
-    """Both propositions, to 1e-5 of what there was, until the singularity is there.
+    """Both propositions, to 1e-5 of the initial errors, until the singularity.
 
-    What is missing is the integrator's: the last joint speeds grow within milliseconds.
+    The difference is the integrator's: the last joint speeds grow within milliseconds.
     """
     passage, rollout = passed(which)
     first, _ = damped_part(rollout)
@@ -317,7 +317,7 @@ def loaded(name: str) -> Robot:
 @pytest.mark.parametrize("largest", ["none", "robot"])
 @pytest.mark.parametrize("name", ROBOTS)
 def test_random_starts(name: str, largest: Any) -> None:
-    """20,000 if thorough: finite, bounded, exact where nothing is damped, and said so.
+    """20,000 if thorough: finite, bounded, exact and so reported if undamped.
 
     Half of them with a threshold that follows the feedback: then most are damped.
     """

@@ -205,7 +205,7 @@ def test_a_recorded_file_is_followed_and_its_log_repeats_the_run(
     assert run["stream.hand.rejected"].max() == 0
     assert np.nanmax(np.abs(run["task.hand.error"])) < 1e-3
     log = run.save(tmp_path / "run.npz")
-    (tmp_path / "goals.jsonl").unlink()  # the log has what was heard
+    (tmp_path / "goals.jsonl").unlink()  # the log has the received messages
     again = hsp.load_experiment(log).run()
     assert np.array_equal(run.q, again.q)
     yaml = tmp_path / "again.yaml"

@@ -129,7 +129,7 @@ def test_a_pickle_goes_on_elsewhere_to_the_last_bit(
 def test_copies_go_on_and_what_looks_ahead_moves_nothing(
     kind: str, policy: str
 ) -> None:
-    """The copy hears what the original does; both are asked in turn."""
+    """The copy receives what the original does; both are called in turn."""
     expected = steps(amid(kind, policy), kind, range(FIRST, LAST))
     controller = amid(kind, policy)
     copy = deepcopy(controller)
@@ -175,7 +175,7 @@ def led(controller: hsp.Controller, first: int, last: int) -> list[np.ndarray]:
 def test_a_task_that_leaves_a_stream_goes_on_in_copies_and_beside_other_changes() -> (
     None
 ):
-    """A second later a stream knows where the change began, for who asks again."""
+    """A second later a stream still knows where the change began."""
     expected = np.array(led(leaving(), 30, 250))
     for k in (31, 180, 240):
         controller = leaving()

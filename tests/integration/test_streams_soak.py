@@ -28,7 +28,7 @@ EACH = 200  # targets in a part of the run, of 1 s
     "policy", ["interpolate", "twists", *further("latest", "extrapolate")]
 )
 def test_targets_are_forgotten(policy: Any, monkeypatch: pytest.MonkeyPatch) -> None:
-    """What may wait and be recorded is bounded, and full after the first part."""
+    """Waiting and recorded messages are bounded, and full after the first part."""
     monkeypatch.setattr(inbox, "CAPACITY", 64)
     monkeypatch.setattr(inbox, "BRIEF", 2_000)
     origin, rng = HERE.position.copy(), np.random.default_rng(2)

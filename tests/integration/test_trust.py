@@ -79,7 +79,7 @@ def test_no_code_runs_from_yaml(tag: str, tmp_path: Path) -> None:
 
 
 def test_no_pickle_is_opened(tmp_path: Path) -> None:
-    """The canary works: NumPy told to unpickle touches it."""
+    """The canary works: NumPy that may unpickle touches it."""
 
     class Touch:
         def __reduce__(self) -> tuple[Any, ...]:
@@ -310,7 +310,7 @@ def run() -> Rollout:
 
 
 def test_logs_that_say_little_are_drawn(run: Rollout, tmp_path: Path) -> None:
-    """Nothing of tasks, field, gain, metric; an obstacle of a shape of its own."""
+    """Nothing of tasks, field, gain, metric; an obstacle of its own type."""
     path = run.save(tmp_path / "log.npz")
     log = Rollout.load(path)
     for entry in ("tasks", "field", "null_space_gain", "metric", "versions", "columns"):

@@ -19,13 +19,13 @@ def run(name: str, *overrides: str) -> Rollout:
 
 
 def rms(rollout: Rollout, task: str) -> float:
-    """Return the root mean square of a task's error where it counts [m or rad]."""
+    """Return the root mean square of a task's error where it is active [m or rad]."""
     error = rollout[f"task.{task}.error"]
     return float(np.sqrt(np.nanmean((error**2).sum(axis=1))))
 
 
 def check_forces(rollout: Rollout) -> None:
-    """Forces push, stay within friction, and are what the engine answers."""
+    """Forces push, stay within friction, and are those of the engine."""
     names = [c.split(".")[1] for c in rollout.columns if c.endswith("friction_used")]
     assert names
     for name in names:
@@ -50,7 +50,7 @@ def test_talos_on_two_feet() -> None:
 
 
 def test_talos_with_a_weak_arm() -> None:
-    """At its torque limit, the hand gives way and comes back; all else goes on."""
+    """At its torque limit, the hand deviates and comes back; all else goes on."""
     name, shorter = "talos_weak_arm", "simulation.duration=3.4"
     rollout = run(name, shorter, "simulation.log_period=0.005")
     assert rollout.meta["status"] == "completed"
@@ -81,7 +81,7 @@ def test_solo_lifts_a_foot_and_puts_it_down() -> None:
     up = (t > 2.2) & (t < 3.4)
     assert rollout["task.foot.actual"][up, 2].min() > 0.06  # in the air
     assert not rollout["plant.contact.FL_FOOT.force"][up].any()
-    assert rollout["plant.contact.FL_FOOT.force"][-1, 2] > 4.0  # bears again
+    assert rollout["plant.contact.FL_FOOT.force"][-1, 2] > 4.0  # in contact again
     assert np.isnan(rollout["task.foot.error"][t < 1.5]).all()
     assert rollout["status"].max() < Status.RELAXED
     jumps = np.abs(np.diff(rollout["tau"], axis=0)).max(axis=1)

@@ -79,8 +79,8 @@ class Case:
     ) -> tuple[float, float]:
         """Return the largest change of an effort within 1e-9 s [N·m], and where [s].
 
-        What a rate explains is left out: the largest change in the 1e-9 s before and
-        after. A force that rises where efforts can hardly bear it is steep, 1e5 N·m/s.
+        Changes that a rate explains are left out: the largest in the 1e-9 s before and
+        after. A force that rises where efforts can hardly hold it is steep, 1e5 N·m/s.
         """
         tau = {t: self.effort(controller, t) for t in times}
 

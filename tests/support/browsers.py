@@ -29,7 +29,7 @@ def started() -> Iterator[Any]:
 
 
 def opened(browser: Any, url: str, **options: Any) -> tuple[Any, list[str]]:
-    """A page at an address, and the list of what its console finds wrong."""
+    """A page at an address, and the list of its console's errors."""
     page = browser.new_page(**options)
     page.set_default_timeout(1000.0 * PATIENCE)
     wrong: list[str] = []

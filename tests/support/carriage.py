@@ -1,4 +1,4 @@
-"""A carriage on a rail, which is a linear mode, and what proves its loop."""
+"""A carriage on a rail, which is a linear mode, and the proof of its loop."""
 
 from pathlib import Path
 
@@ -28,7 +28,7 @@ def check_that_it_is_the_loop(
 ) -> None:
     """By Cayley and Hamilton positions obey the transition's polynomial; not another's.
 
-    That is, once what was there before the run has passed.
+    That is, once the motion from before the run has passed.
     """
     worst = []
     for each in (loop, other):

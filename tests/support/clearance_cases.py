@@ -74,5 +74,5 @@ def flowing(field: Cost, state: Any, step: float) -> Array:
 
 
 def agree(one: Array, other: Array) -> bool:
-    """Return whether differences by two steps tell the same."""
+    """Return whether differences by two steps agree."""
     return bool(np.abs(one - other).max() <= 1e-8 * np.abs(other).max())

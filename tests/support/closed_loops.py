@@ -23,7 +23,7 @@ ROBOTS: dict[str, tuple[str, str | None]] = {
 
 @cache
 def load(name: str, gravity: bool = True) -> Robot:
-    """Return a robot, or skip if example-robot-data is asked for and not there."""
+    """Return a robot, or skip if it is of example-robot-data and that is not there."""
     source, root = ROBOTS[name]
     if source not in {"planar3r", "panda"}:
         pytest.importorskip("example_robot_data")

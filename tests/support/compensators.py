@@ -1,4 +1,4 @@
-"""Compensators and nothing besides: no momentum observer that nobody asked for."""
+"""Compensators and nothing besides: no momentum observer by default."""
 
 from typing import Any
 

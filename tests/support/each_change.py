@@ -1,4 +1,4 @@
-"""One change of each kind, what takes it back, and a controller that takes them."""
+"""One change of each kind, its inverse, and a controller that accepts them."""
 
 from collections.abc import Callable
 
@@ -43,7 +43,7 @@ BACK: dict[str, Callable[[Changes], object]] = {
     "payload": lambda at: at.payload("panda_hand", 0.0),
     "tool": lambda at: at.tool("panda_tcp"),
 }
-"""What is needed so that the same change is possible again, or is one."""
+"""Conditions under which the same change is possible again, or is a change at all."""
 
 
 def controller(*tasks: hsp.Task) -> hsp.Controller:

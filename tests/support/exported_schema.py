@@ -13,7 +13,7 @@ import jsonschema
 def exported_schema() -> dict[str, Any]:
     """The schema that `hsp schema` prints; not to be changed.
 
-    In a process of its own: types that other tests declare are not in it.
+    In another process: types that other tests declare are not in it.
     """
     command = [sys.executable, "-m", "hsp_control", "schema"]
     ran = subprocess.run(command, capture_output=True, text=True, check=True)
@@ -23,5 +23,5 @@ def exported_schema() -> dict[str, Any]:
 
 @cache
 def validator() -> jsonschema.Draft202012Validator:
-    """What says whether data follow the schema."""
+    """A validator of data against the schema."""
     return jsonschema.Draft202012Validator(exported_schema())

@@ -1,4 +1,4 @@
-"""Robots and obstacles for fields, and what plain Pinocchio says of each field's cost.
+"""Robots and obstacles for fields, and each field's cost by plain Pinocchio.
 
 A cost is written a second time with plain Pinocchio; g = -W⁻¹∇f of that, by differences
 of eighth order, is what the field must give. Between the oracles stand the fields that
@@ -48,7 +48,7 @@ OBSTACLE = Obstacle(
 
 @cache
 def load(name: str) -> Robot:
-    """Return a robot, or skip if example-robot-data is asked for and not there."""
+    """Return a robot, or skip if it is of example-robot-data and that is not there."""
     source, root = ROBOTS[name]
     if source not in {"planar3r", "panda"}:
         pytest.importorskip("example_robot_data")
@@ -60,7 +60,7 @@ def spread(size: int, low: float, high: float) -> Array:
     return low + (high - low) * (0.5 + 0.5 * np.sin(1.0 + 2.3 * np.arange(size)))
 
 
-# --- what is known without the package -----------------------------------------------
+# --- known without the package -------------------------------------------------------
 
 
 NODES = np.arange(-4, 5)
@@ -264,7 +264,7 @@ def reach_cost(
 
 
 class ValueOnly(Cost):
-    """What a user writes first."""
+    """A user's first version."""
 
     frame: str
 
@@ -273,7 +273,7 @@ class ValueOnly(Cost):
 
 
 class WithGradient(ValueOnly):
-    """What a user writes next."""
+    """A user's next version."""
 
     def gradient(self, state: RobotState) -> Array:
         return reach_gradient(self.frame)(state)

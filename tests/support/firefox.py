@@ -33,7 +33,7 @@ class Firefox:
     """A tab of a browser.
 
     Attributes:
-        wrong: What its console reports: errors and warnings.
+        wrong: Errors and warnings of its console.
     """
 
     def __init__(self, socket: WebSocketClientConnection) -> None:
@@ -75,7 +75,7 @@ class Firefox:
         )  # fmt: skip
 
     async def evaluate(self, expression: str) -> Any:
-        """Return what an expression is, as JSON has it."""
+        """Return the value of an expression, by JSON."""
         answer = await self._do(
             "script.evaluate", expression=f"JSON.stringify({expression})",
             target={"context": self._tab}, awaitPromise=True,
@@ -89,7 +89,7 @@ class Firefox:
                 await asyncio.sleep(0.1)
 
     async def picture(self) -> bytes:
-        """Return what it shows as a PNG."""
+        """Return its picture as a PNG."""
         shot = await self._do("browsingContext.captureScreenshot", context=self._tab)
         return base64.b64decode(shot["data"])
 

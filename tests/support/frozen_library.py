@@ -1,4 +1,4 @@
-"""``hsp_step.h`` in Python, by ctypes: for tests of what it refuses."""
+"""``hsp_step.h`` in Python, by ctypes: for tests of its refusals."""
 
 import ctypes
 import struct

@@ -1,4 +1,4 @@
-"""Lies of a robot's sensors about one joint or all: each a function of what is true."""
+"""Lies of a robot's sensors about one joint or all: each a function of the truth."""
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
@@ -14,7 +14,7 @@ Values = tuple[Array, Array]
 
 @dataclass
 class Sensors:
-    """What a lie may use: all true measurements before."""
+    """Input of a lie: all true measurements before."""
 
     joints: Flags  # those that it is about, shape (nv,)
     begin: int  # the number of the read at which it begins
@@ -194,7 +194,7 @@ LIES: dict[str, Lie] = {
 
 
 def is_seen_at_rest(lie: Lie) -> bool:
-    """Return whether a lie changes what is measured of an arm that stands."""
+    """Return whether a lie changes the measurements of an arm that stands."""
     sensors = Sensors(np.ones(7, dtype=bool), 2, np.random.default_rng(0))
     q, tau = 0.1 * np.arange(7), np.arange(7.0)
     for k in range(4):

@@ -45,8 +45,8 @@ def stacked(*rows: Rows) -> Rows:
 def level_costs(law: BoundLaw, supported: bool, size: float, held: Array) -> Array:
     """Return ρ of each level, then of the null space, shape (levels + 1,).
 
-    What is below a level costs a part of the level's error over the robot's size, but
-    no more than a tenth and no less than priorities need; and what limits ask for,
+    Levels below one cost a part of that level's error over the robot's size, but
+    no more than a tenth and no less than priorities need; and what limits require,
     ``held``, if that is more, but no more than the level itself. On contacts it is the
     least, whatever the error. Contacts cost as much as the level below them, and so do
     springs where there are none.
@@ -122,7 +122,7 @@ def limited_step(
         base: Degrees of freedom without a motor.
         weight: The robot's weight [N].
         size: The robot's size [m].
-        costs: What is below each level costs at least, shape (levels,).
+        costs: Least costs below each level, shape (levels,).
     """
     n, p = len(a), support.size
     H = np.zeros((n + p, n + p))

@@ -10,7 +10,7 @@ from hsp_control.common.resources import bundled_robots
 
 @cache
 def load(name: str, root: str | None = None) -> Robot:
-    """Return a robot; skip if example-robot-data is asked for and not there."""
+    """Return a robot; skip if it is of example-robot-data and that is not there."""
     if name not in bundled_robots():
         pytest.importorskip("example_robot_data")
     return Robot.load(name, root=root)  # type: ignore[arg-type]

@@ -2,7 +2,7 @@
 
 
 class OddError(BaseException):
-    """What only a bare ``except`` or one of `BaseException` catches.
+    """An exception that only a bare ``except`` or one of `BaseException` catches.
 
     Extensions in Rust raise such ones.
     """

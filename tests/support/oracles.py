@@ -1,4 +1,4 @@
-"""Plain NumPy forms of what the package computes, and differences: oracles for tests.
+"""Plain NumPy forms of the package's mathematics, and differences: oracles.
 
 Nothing here is fast, and nothing comes from the package: each formula stands as
 `law.md` or the paper prints it, inverses and all.
@@ -43,9 +43,9 @@ def pseudo_inverse(J: Array, W: Array) -> Array:
 
 
 def bounded_pseudo_inverse(J: Array, W: Array, threshold: float) -> Array:
-    """Return J# with J's spectrum in the metric inverted by s q(s²), for any rank.
+    """Return J# with J's spectrum in the metric inverted by s χ(s²), for any rank.
 
-    q(x) = 1/x from threshold² on, (2 - x/threshold²)/threshold² below:
+    χ(λ) = 1/λ from threshold² on, (2 - λ/threshold²)/threshold² below:
     ``docs/law.md``, Near singularities.
     """
     L = np.linalg.cholesky(W)
@@ -57,7 +57,7 @@ def bounded_pseudo_inverse(J: Array, W: Array, threshold: float) -> Array:
 
 
 class Law(NamedTuple):
-    """What the law says at one state."""
+    """The law's result at one state."""
 
     acceleration: Array
     null_space_error: Array

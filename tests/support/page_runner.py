@@ -2,16 +2,16 @@
 
 Python is executed in one namespace, commands in a shell, a YAML block is loaded and run
 for a moment, and a block behind a line such as "Save it as `mine.yaml`:" becomes that
-file. What cannot run so has a comment before it in the page, which no reader sees:
+file. A block that cannot run so has a comment before it, which no reader sees:
 
-    <!-- not run: needs an arm -->         it is skipped, and the test says why
+    <!-- not run: needs an arm -->         it is skipped, with this reason
     <!-- slow: a minute -->                only `make test-system` runs it
-    <!-- Ctrl-C: serves a page -->         it runs until it has said something
+    <!-- Ctrl-C: serves a page -->         it runs until it has printed something
     <!-- part of: {robot: {name: panda}} -->    YAML that is no whole configuration
     <!-- part of: forces/talos_wall KEY=VALUE -->    such YAML, laid over a bundled one
     <!-- lines of: engine/... -->          text that stands so in a file of the checkout
     <!-- background: a robot -->           it goes on until the page ends
-    <!-- fails: unstable gains -->         its status is 2, as the page says
+    <!-- fails: unstable gains -->         its status is 2, as in the page
     <!-- given: arm.urdf: robots/planar3r/planar3r.urdf -->    the reader's own file
 """
 
@@ -44,7 +44,7 @@ from hsp_control.common.resources import bundled_configs
 from hsp_control.declaration import Part, imported
 
 OUTPUT = {"text", "math", "bibtex"}
-"""Languages of blocks that show what is printed, or a formula."""
+"""Languages of blocks that show output, or a formula."""
 _FENCE = re.compile(r"^```([\w{].*?|)\n(.*?)^```$", re.MULTILINE | re.DOTALL)
 _KINDS = "not run|slow|Ctrl-C|background|fails|part of|lines of"
 _MARK = re.compile(rf"<!-- ({_KINDS}): ((?:(?!-->).)*) -->\s*$", re.DOTALL)
@@ -53,9 +53,9 @@ _FILE = re.compile(r"`([\w./-]+\.(\w+))`[^`]*:\s*$")
 _ENDINGS = {"python": "py", "sh": "sh", "yaml": "yaml", "c": "c", "cpp": "cpp"}
 _SYNTAX = {"json": json.loads, "toml": tomllib.loads}
 _PATIENCE = "--set live.missing=2000 --set live.watchdog=2000 --set live.age=60"
-"""On a busy computer: what `hsp live` is given besides what the page says."""
+"""On a busy computer: options of `hsp live` in addition to the page's."""
 _BRIEFLY = "--duration 1"
-"""What `hsp live` is given where the page does not say how long it runs [s]."""
+"""Duration of `hsp live` where the page does not give one [s]."""
 _SHORT = "simulation.duration=0.02"
 
 
@@ -64,10 +64,10 @@ class Block(NamedTuple):
 
     Attributes:
         language: Of its fence.
-        text: What is in it.
+        text: Its text.
         line: The page's line on which its text begins.
         kind: The kind of the comment before it, if any.
-        reason: What the comment says.
+        reason: The text of the comment.
         file: The name of the file that it is, if any.
     """
 
@@ -138,7 +138,7 @@ def run_page(page: str, folder: Path, *, whole: bool) -> dict[str, Any]:
     Args:
         page: Its path in the checkout.
         folder: An empty folder.
-        whole: Also what is slow, and commands.
+        whole: Also slow blocks, and commands.
     """
     text = (ROOT / page).read_text(encoding="utf-8")
     for name, source in _GIVEN.findall(text):
@@ -173,7 +173,7 @@ def run_page(page: str, folder: Path, *, whole: bool) -> dict[str, Any]:
             elif block.language not in OUTPUT:
                 raise AssertionError(
                     f"{where}: a block of {block.language!r} is no file, and no "
-                    "comment says why it does not run"
+                    "comment gives the reason why it does not run"
                 )
     return space
 
@@ -234,7 +234,7 @@ def _check_yaml(block: Block, where: str) -> None:
 
 
 class Shell:
-    """A folder in which commands are typed; what still runs ends with it."""
+    """A folder in which commands are typed; running ones end with it."""
 
     def __init__(self, folder: Path) -> None:
         self._folder = folder
@@ -260,13 +260,13 @@ class Shell:
     def run(self, block: Block, where: str) -> None:
         """Type each line of a block; one that fails is an error.
 
-        What ends in ``&`` goes on until the page ends.
+        A line that ends in ``&`` goes on until the page ends.
         """
         if self._alone is None:  # pages name ports: one at a time on this computer
             self._alone = (Path(gettempdir()) / "hsp-pages.lock").open("w")
             flock(self._alone, LOCK_EX)
         for line in lines_of(block.text):
-            for name in ("examples", "benchmarks"):  # the page says where they are
+            for name in ("examples", "benchmarks"):  # the page names their places
                 if re.search(rf"\b{name}/", line) and not Path(name).exists():
                     Path(name).symlink_to(ROOT / name)
             if re.match(r"hsp live\b", line) and "live.missing" not in line:
@@ -322,7 +322,7 @@ class Running(NamedTuple):
     about: str
 
     def wait_for(self, pattern: str, seconds: float = 60.0) -> re.Match[str] | None:
-        """Return what it prints, or None if it does not in that time."""
+        """Return its output, or None if there is none in that time."""
         end = monotonic() + seconds
         while monotonic() < end:
             ended = self.process.poll() is not None
@@ -334,7 +334,7 @@ class Running(NamedTuple):
         return None
 
     def end(self) -> int:
-        """Press Ctrl-C, and return the exit status; what ignores it is killed."""
+        """Press Ctrl-C, and return the exit status; one that ignores it is killed."""
         with suppress(ProcessLookupError):
             os.killpg(self.process.pid, signal.SIGINT)
         try:

@@ -20,7 +20,7 @@ def scene_request(url: str, **headers: str) -> HTTPRequest:
 
 
 class Page(threading.Thread):
-    """What a browser does: connect, take commands, answer when it has drawn."""
+    """A browser's part: connect, receive commands, answer when it has drawn."""
 
     def __init__(self, url: str, pause: float = 0.0) -> None:
         super().__init__(daemon=True)
@@ -65,7 +65,7 @@ class Page(threading.Thread):
 
 
 class Steering(Page):
-    """A page that says things."""
+    """A page that sends messages."""
 
     def say(self, **message: Any) -> None:
         self.send(json.dumps(message))

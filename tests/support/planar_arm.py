@@ -217,7 +217,7 @@ def cost_gradient_rate(number: int, t: float, theta: Array, theta_dot: Array) ->
 
 
 class PaperLaw(NamedTuple):
-    """What eqs. (7) and (13) say at one state.
+    """Eqs. (7) and (13) at one state.
 
     Attributes:
         tau: Torques on the absolute angles, shape (3,).
@@ -264,10 +264,10 @@ def law(
         theta: Absolute angles θ, shape (3,) [rad].
         theta_dot: Their rates v = θ', shape (3,) [rad/s].
         field: g and its total rate g' for eq. (13), or None for φ_N = 0; e_N is then
-            told for g = 0: minus the self-motion, which nothing controls.
+            given for g = 0: minus the self-motion, which nothing controls.
 
     Returns:
-        The torques and what they were made of.
+        The torques and their parts.
     """
     K_p, K_v, v = TASK_STIFFNESS, TASK_DAMPING, theta_dot
     J, J_dot = jacobian(theta), jacobian_rate(theta, theta_dot)
@@ -363,7 +363,7 @@ def simulate_paper(number: int, duration: float = 10.0) -> PlanarSimulation:
         duration: Length [s], a multiple of 0.01 s, the distance of the rows.
 
     Returns:
-        The motion and what the law says along it.
+        The motion and the law's values along it.
     """
     start = MIRRORED_START if number == 4 else START
 

@@ -1,4 +1,4 @@
-"""`hsp play` in a process of its own, for tests of what its pages do."""
+"""`hsp play` in another process, for tests of its pages."""
 
 import re
 import signal

@@ -1,4 +1,4 @@
-"""Random QPs of many kinds, their solution by other solvers, what proves an optimum.
+"""Random QPs of many kinds, their solution by other solvers, proofs of an optimum.
 
 The oracles solve in y, x = x0 + J y, with rows of length 1: there the cost is ½ ‖y‖²,
 so that they suffer least from the scales of the cost and of the rows.
@@ -36,7 +36,7 @@ class Case(NamedTuple):
 
 
 class Answer(NamedTuple):
-    """What the solver returned."""
+    """The solver's result."""
 
     code: int
     x: Array
@@ -305,7 +305,7 @@ def by_daqp(case: Case) -> Array | None:
     return case.x0 + case.JT.T @ y if flag >= 1 else None
 
 
-# --- what proves an optimum ----------------------------------------------------------
+# --- proofs of an optimum ------------------------------------------------------------
 
 
 def cost(case: Case, x: Array) -> float:

@@ -19,7 +19,7 @@ PARTS = (
     *("hsp_control.companions.viewer.command", "hsp_control.companions.plots"),
     *("matplotlib.pyplot", "matplotlib.backends.backend_agg", "trimesh"),
 )
-"""What the process imports first, where it is there. Nothing of it starts a thread."""
+"""Modules that the process imports first, if present. None of them starts a thread."""
 
 
 class ReadyCommands:
@@ -87,7 +87,7 @@ def serve() -> None:
 
 
 def _become(request: dict[str, Any], output: int) -> None:
-    """Do in a folder what `python -m hsp_control` or `python name.py` does, and end."""
+    """Run `python -m hsp_control` or `python name.py` in a folder, and end."""
     from runpy import run_path
 
     from hsp_control.cli import main

@@ -1,4 +1,4 @@
-"""The robots of example-robot-data that cannot be loaded, and what is said of each."""
+"""The robots of example-robot-data that cannot be loaded, and their messages."""
 
 NO_MASS = (
     "no mass moves with bravo_finger1_joint, bravo_finger2_joint, so that the mass"

@@ -1,4 +1,4 @@
-"""Robots of every kind that dynamics tell apart, made up and small.
+"""Robots of every kind that dynamics distinguish, invented and small.
 
 Mimic joints at the end and below free joints, chains of them, a follower before its
 leader, continuous, planar and spherical joints, floating bases, a loop that is closed
@@ -116,4 +116,4 @@ KINDS: dict[str, Callable[[Path], Robot]] = {
     "ball, rotors": lambda folder: _of_pinocchio(),
     "ball between leader and follower": lambda folder: _ball_between(),
 }
-"""What loads a robot of a kind, anew each time; its file is in the given folder."""
+"""Functions that load a robot of a kind, anew each time, from the given folder."""

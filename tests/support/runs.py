@@ -1,4 +1,4 @@
-"""Runs of a loop, held or continuous, and what the propositions say of their logs."""
+"""Runs of a loop, held or continuous, and the propositions as checks of their logs."""
 
 from typing import Any
 
@@ -35,7 +35,7 @@ def check_errors(log: hsp.Rollout, w: float, *tasks: str, atol: float) -> None:
 def check_null_space(
     log: hsp.Rollout, K_N: float, *, least: float, rtol: float
 ) -> None:
-    """Check ‖e_N‖' = -K_N ‖e_N‖, from a norm that is not too small to tell."""
+    """Check ‖e_N‖' = -K_N ‖e_N‖, from a norm above rounding."""
     norm = log["null_space_norm"]
     assert norm[0] > least
     assert_allclose(norm, norm[0] * np.exp(-K_N * log.t), rtol=rtol)

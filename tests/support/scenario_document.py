@@ -18,7 +18,7 @@ Vector3 = Annotated[list[float], Field(min_length=3, max_length=3)]
 
 
 class Part(BaseModel):
-    """What all parts of the small schema below share."""
+    """The base of all parts of the small schema below."""
 
     model_config = ConfigDict(extra="forbid", frozen=True, strict=True)
 

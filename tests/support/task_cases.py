@@ -1,4 +1,4 @@
-"""Every task on several robots, and what plain Pinocchio says of their motion.
+"""Every task on several robots, and their motion by plain Pinocchio.
 
 The motion is q(s) = q ⊕ (s v + ½ s² a) at the times t + s: differences are of eighth
 order in s, whose step is a fixed part of the motion's own time scale, so that their

@@ -1,4 +1,4 @@
-"""Types commands of ``hsp`` as a user does, each in a process of its own."""
+"""Types commands of ``hsp`` as a user does, each in its own process."""
 
 import io
 import os
@@ -14,7 +14,7 @@ from ready_commands import ReadyCommands
 from hsp_control.cli import main
 
 PATIENCE = "--set live.missing=2000 --set live.watchdog=2000 --set live.age=60"
-"""What `hsp live` is given on a busy computer."""
+"""Options of `hsp live` on a busy computer."""
 
 
 READY = ReadyCommands()
@@ -37,7 +37,7 @@ def script(name: str, folder: Path) -> str:
 
 
 def played(command: list[str], folder: Path) -> str:
-    """Begin a play, and end it two seconds after it has said how one ends it."""
+    """Begin a play, and end it two seconds after it has printed how one ends it."""
     with subprocess.Popen(
         command, cwd=folder, text=True, env=without_display(),
         stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.STDOUT,
@@ -62,7 +62,7 @@ def without_display() -> dict[str, str]:
 
 
 def in_this_process(line: str, folder: Path, status: int = 0) -> str:
-    """Do what `hsp` does, without a process of its own, which takes a second to begin.
+    """Do what `hsp` does, without another process, which takes a second to begin.
 
     How a command begins and ends only a process shows: one test of each is enough.
     """

@@ -44,7 +44,7 @@ def assert_is_a_value(value: Part, names: Mapping[str, Any]) -> None:
 
 
 def assert_documented(cls: type[Part]) -> None:
-    """Check that a class says what it is, and each of its fields in which unit."""
+    """Check that a class has a description, and each of its fields a unit."""
     assert cls.__doc__
     for field in value_fields(cls):
         said = cls.documentation[field.name]

@@ -44,7 +44,7 @@ MORE_ARMS: dict[str, list[float] | None] = {
 
 @dataclass(frozen=True)
 class WrongArm:
-    """An arm, and what its model does not say."""
+    """An arm, and properties that its model lacks."""
 
     name: str
     seed: int

@@ -1,4 +1,4 @@
-"""Every command that takes a log takes each that anything of ours writes."""
+"""Every command that reads a log reads all that anything of ours writes."""
 
 from pathlib import Path
 
@@ -56,7 +56,7 @@ REPEATED = (
     *("simulated", "from_pinocchio", "loop"),
 )
 """Logs with a configuration that is data: `hsp run` repeats them."""
-OTHERS = {  # by what `hsp run` says of it
+OTHERS = {  # by the output of `hsp run`
     "function": "was made from Python and contains no configuration",
     "task": "was made from Python and contains no configuration",
 }

@@ -82,7 +82,7 @@ def test_the_lesson_s_cells_run(folder: Path) -> None:
 
 
 def test_examples_are_short_and_on_the_page() -> None:
-    """Each has 10 to 60 lines; the page shows each with a picture of its own."""
+    """Each has 10 to 60 lines; the page shows each with its picture."""
     for name in [*SCRIPTS, *CONFIGURATIONS]:
         assert 10 <= lines_of(name) <= 65, name
         assert f"examples/{name})" in PAGE, name

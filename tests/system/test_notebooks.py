@@ -1,7 +1,7 @@
-"""The notebooks run, say what they say without a warning, and are kept as they run.
+"""The notebooks run without a warning, and are stored with the output of a run.
 
-Each is executed once, with the code of its answers, in a kernel of its own as Jupyter
-would, in a folder of its own. What is kept of the outputs is text and small pictures.
+Each is executed once, with the code of its answers, in another kernel as Jupyter
+would, in another folder. Of the outputs text and small pictures are stored.
 """
 
 import base64
@@ -56,7 +56,7 @@ def printed(notebook: Any) -> str:
 
 
 def with_answers(notebook: Any) -> Any:
-    """Return a copy in which the code of the answers is a cell of its own."""
+    """Return a copy in which the code of the answers is another cell."""
     answered = copy.deepcopy(notebook)
     for code in ANSWER.findall(notebook.cells[-1].source):
         answered.cells.append(nbformat.v4.new_code_cell(code))
@@ -64,7 +64,7 @@ def with_answers(notebook: Any) -> Any:
 
 
 def words(cell: Any) -> tuple[list[str], int]:
-    """Return what a cell says, without its numbers, and how many pictures it has."""
+    """Return a cell's output without numbers, and the number of its pictures."""
     kept = cell.get("outputs", [])
     said = "".join(out.text for out in kept if out.output_type == "stream")
     return NUMBER.sub("", said).split(), sum("data" in out for out in kept)

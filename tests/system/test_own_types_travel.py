@@ -95,13 +95,15 @@ def folders(tmp_path_factory: pytest.TempPathFactory) -> Callable[[str], Path]:
 def test_a_log_is_read_with_its_own_types(
     folders: Callable[[str], Path], how: str, what: str
 ) -> None:
-    assert WITHOUT_CONTROLLER not in hsp(WITH_LOG[what], folders(how))
+    said = hsp(WITH_LOG[what], folders(how))
+    assert WITHOUT_CONTROLLER not in said
+    assert "is not imported" not in said
 
 
 def test_a_module_of_a_package_is_found_on_the_path(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Who reads the log asks the same function as for a file."""
+    """A reader of the log calls the same function as for a file."""
     package = tmp_path / "elsewhere" / "own_package"
     package.mkdir(parents=True)
     (package / "__init__.py").touch()

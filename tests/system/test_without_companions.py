@@ -30,7 +30,7 @@ def without_companions(folder: str, names: list[str]) -> set[str]:
 
 
 def needs_mujoco(configuration: Path) -> bool:
-    """Say whether a configuration's plant is a companion's."""
+    """Return whether a configuration's plant is a companion's."""
     return "mujoco" in configuration.read_text(encoding="utf-8")
 
 

@@ -1,4 +1,4 @@
-"""Mutants are made of any code, and their runner says truly what became of each."""
+"""Mutants are made of any code, and their runner reports the outcomes truly."""
 
 from pathlib import Path
 

@@ -29,7 +29,7 @@ def imported(code: str, **environment: str) -> set[str]:
 
 
 def test_types_and_names_agree() -> None:
-    """What a type checker reads is what is looked up at run time."""
+    """A type checker reads the names that are looked up at run time."""
     tree = ast.parse(Path(hsp_control.__file__).read_text(encoding="utf-8"))
     seen = {
         name.asname or name.name: (node.module, name.name)
@@ -69,7 +69,7 @@ def test_the_law_reads_alone() -> None:
 
 
 def test_few_names_are_at_the_top() -> None:
-    """What most programs need; a hint leads to the others."""
+    """The names that most programs need; a hint leads to the others."""
     names = [name for name in hsp_control._HOMES if name not in hsp_control._NAMESPACES]
     assert len(names) <= 45
     message = r"no attribute 'Spline'; there is hsp_control\.trajectories\.Spline$"
@@ -114,7 +114,7 @@ FISH = {
     "_ARGCOMPLETE_DFS": "\t",
     "_ARGCOMPLETE_SUPPRESS_SPACE": "1",
 }
-"""What fish tells a command: it shows what is told of each choice beside it."""
+"""The environment that fish gives a command: it shows a help beside each choice."""
 
 
 @pytest.mark.process

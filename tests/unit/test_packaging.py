@@ -1,4 +1,4 @@
-"""Whatever says again what pyproject.toml says agrees with it."""
+"""Copies of values in pyproject.toml agree with it."""
 
 import importlib.util
 import re
@@ -22,7 +22,7 @@ if not (ROOT / "pyproject.toml").is_file():
 PROJECT: dict[str, Any] = tomllib.loads((ROOT / "pyproject.toml").read_text())
 
 SHOWN = PROJECT["tool"]["hatch"]["metadata"]["hooks"]["fancy-pypi-readme"]
-"""What PyPI shows."""
+"""The page on PyPI."""
 
 IN_CONDA = {
     "pin": "pinocchio",
@@ -31,7 +31,7 @@ IN_CONDA = {
     "cmeel-eigen": "eigen",
     "cmeel-boost": "libboost-headers",
 }
-"""What conda-forge calls packages that have another name on PyPI."""
+"""Names in conda-forge of packages that have another one on PyPI."""
 
 
 def conda_form(text: str) -> str:

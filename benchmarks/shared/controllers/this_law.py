@@ -7,7 +7,7 @@ from hsp_control.common.arrays import Array
 from shared.cases import FRAME, Case
 
 Reads = Callable[[hsp.Controller], object]
-"""What is read of a controller after a step."""
+"""The quantities read from a controller after a step."""
 
 
 def make(

@@ -38,7 +38,7 @@ def make(case: Case, model: Any, *, bounded: bool = True) -> Compute:
 
     Args:
         case: The case.
-        model: What other controllers are told of the robot.
+        model: The robot's model for other controllers.
         bounded: False: no largest error, and efforts may jump.
     """
     robot = hsp.Robot.load(case.robot)

@@ -1,4 +1,4 @@
-"""TSID that walks: its tasks and contacts follow what a plan writes for this law.
+"""TSID that walks: its tasks and contacts follow a plan for this law.
 
 As in its exercise ``ex_4``: centre of mass, trunk and swing feet with weight 1 and the
 posture with a smaller one are one cost; soles are constraints that come and go.
@@ -33,7 +33,7 @@ _FADED = 1e-6  # the least share of a force, as in this law
 def make(
     controller: Controller, q0: Array, *, gain: float, posture_weight: float
 ) -> tuple[Callable[[float, Array, Array], Array], list[str]]:
-    """Return what computes the effort, and the list of the solver's statuses.
+    """Return the function of the effort, and the list of the solver's statuses.
 
     Args:
         controller: A controller that is made of a plan's parts: its contacts' schedules
@@ -85,7 +85,7 @@ def make(
     tau = np.zeros(nv)
 
     def switch(t: float, q: Array, v: Array) -> None:
-        """Let contacts and feet come and go as the plan says."""
+        """Let contacts and feet come and go by the plan."""
         for contact in controller.contacts:
             name, made = contact.name, soles[contact.name]
             if contact.active(t) and name not in bearing:

@@ -97,7 +97,7 @@ def show(address: str, plant: Plant) -> Callable[..., object]:
                 f"{where}: the process that draws its pictures has ended"
             )
         before, counted = counted, alive.value
-        if silence.look(monotonic(), heard=counted != before) > _HANGS:
+        if silence.look(monotonic(), received=counted != before) > _HANGS:
             raise HardwareError(
                 f"{where}: the process that draws its pictures has not responded for "
                 f"{_HANGS:g} s"

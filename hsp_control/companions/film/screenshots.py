@@ -1,4 +1,4 @@
-"""Takes screenshots of a page at exact times of the run."""
+"""Screenshots of a page at exact times of the run."""
 
 import base64
 from collections.abc import Iterator

@@ -109,7 +109,7 @@ class ClientProcess:
 
         Without requests it reports periodically that it is alive.
         """
-        heard = False
+        received = False
         while select([self._link], [], [], 0.0)[0]:
             try:
                 said = self._link.recv(client.LONGEST)
@@ -117,8 +117,8 @@ class ClientProcess:
                 said = b""
             if not said:
                 return "has ended"
-            heard = True
-        hangs = self._silence.look(monotonic(), heard=heard) > _HANGS
+            received = True
+        hangs = self._silence.look(monotonic(), received=received) > _HANGS
         return f"has sent nothing for {_HANGS:g} s" if hangs else ""
 
     def _ended(self) -> str:

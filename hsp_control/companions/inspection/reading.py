@@ -57,14 +57,14 @@ def check_transmissions(xml: Element) -> Iterator[Finding]:
                 "transmission",
                 about,
                 f"its joint {joint!r} does not exist{did_you_mean(joint, joints)}",
-                "correct the name: its rotor counts for no joint",
+                "correct the name: its rotor is assigned to no joint",
             )
         elif len(names) > 1:
             yield Finding(
                 "warning",
                 "transmission",
                 about,
-                f"all are of joint {joint!r}: the last one's rotor counts",
+                f"all are of joint {joint!r}: the last one's rotor is used",
                 "keep one of them",
             )
 

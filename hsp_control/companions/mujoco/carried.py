@@ -16,7 +16,7 @@ class CarriedInMujoco:
     """Lets a MuJoCo model have the bodies and the gravity of an engine's dynamics.
 
     Attributes:
-        dynamics: The dynamics; what they carry is written by `write`.
+        dynamics: The dynamics; `write` sets the bodies that they carry.
     """
 
     def __init__(self, robot: Robot, model: Any, joints: Sequence[Joint]) -> None:
@@ -43,7 +43,7 @@ class CarriedInMujoco:
         self._written = self._numbers.copy()
 
     def write(self) -> None:
-        """Write what has changed since the last time."""
+        """Write the changes since the last time."""
         self._read()
         if np.array_equal(self._numbers, self._written):
             return
@@ -57,5 +57,5 @@ class CarriedInMujoco:
             model.body_ipos[body] = self._center[joint]
             model.body_inertia[body] = principal
             mujoco.mju_mat2Quat(model.body_iquat[body], axes.ravel())
-        # what MuJoCo derives from them, at its own reference posture
+        # quantities that MuJoCo derives from them, at its own reference posture
         mujoco.mj_setConst(model, mujoco.MjData(model))

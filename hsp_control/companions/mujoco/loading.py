@@ -333,7 +333,7 @@ def _of_actuators(selection: Selection) -> Iterator[Lack]:
             for joint in selection.moving
             if on_joints and joint not in direct and scene.jnt_type[joint] != free
         ],
-        "no actuator acts on them; the controller takes them for actuated",
+        "no actuator acts on them; the controller regards them as actuated",
     )
 
 

@@ -85,7 +85,7 @@ def _for_robot(name: str) -> dict[str, Any]:
     pose = robot.nv >= 6
     has_home = bool(np.any(robot.home() != robot.neutral()))
     return {
-        "title": f"{name}: take its hand, push the ball against its elbow",
+        "title": f"{name}: drag its hand, push the ball against its elbow",
         "robot": {"name": name},
         **({} if has_home else {"start": "auto"}),
         "scene": {"obstacles": {"ball": ball, **({"floor": floor} if clear else {})}},

@@ -66,11 +66,12 @@ _floors: "WeakKeyDictionary[Rollout, Array | None]" = WeakKeyDictionary()
 def floor_of(rollout: Rollout) -> Array | None:
     """Return `expected_floor` for a log alone, whose controller is rebuilt; cached.
 
-    A log may be untrusted: only packaged files are read.
+    A log may be untrusted: only packaged files are read, and of the code that it lists
+    only files on this computer are imported that are the same as in the run.
     """
     if rollout not in _floors:
         packaged = only_within(packaged_folders())
-        controller = logged_controller(rollout, packaged)
+        controller = logged_controller(rollout, packaged, True)
         _floors[rollout] = expected_floor(rollout, controller)
     return _floors[rollout]
 

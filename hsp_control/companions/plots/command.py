@@ -13,7 +13,7 @@ def _add_options(plot: argparse.ArgumentParser) -> None:
         nargs="+",
         type=Path,
         metavar="LOG",
-        help="written by hsp run; several are drawn in the same panels",
+        help="a log of any run; several are drawn in the same panels",
     )
     plot.add_argument("--out", type=Path, metavar="DIR", help="default: beside the log")
     plot.add_argument(
@@ -111,6 +111,8 @@ def _plot(options: argparse.Namespace) -> int:
             )
     for file in files:
         out.print(f"Figure: {file}")
+    for name, log in zip(names, logs, strict=False):  # a shell chose the order
+        out.print(f"{name}: {log}", markup=False)
     return 0
 
 

@@ -81,16 +81,29 @@ def literal_text(name: str) -> str:
 
 
 def _fitting(axes: Axes, labels: Sequence[str]) -> int:
-    """Return how many columns fit below the axes; entries run down the columns."""
+    """Return the number of columns of a legend that fit below the axes."""
     figure = axes.get_figure(root=True)
     assert figure is not None
     # The layout is computed later: a narrow figure leaves less space beside the labels.
     share = 1.1 if figure.get_figwidth() > _WIDE else 0.9
-    width = axes.get_window_extent().width / figure.dpi * 72.0 / _LEGEND * share
+    return columns_within(axes.get_window_extent().width / figure.dpi * share, labels)
+
+
+def columns_within(
+    inches: float, labels: Sequence[str], handle: float = _HANDLE
+) -> int:
+    """Return the number of columns of a legend that fit into a width.
+
+    Args:
+        inches: The width.
+        labels: The texts of its entries, which run down the columns.
+        handle: Width beside a text, over the font size.
+    """
+    width = inches * 72.0 / _LEGEND
     for columns in range(len(labels), 1, -1):
         rows = -(-len(labels) // columns)
         wide = sum(
-            max(map(len, labels[start : start + rows])) * _LETTER + _HANDLE + _GAP
+            max(map(len, labels[start : start + rows])) * _LETTER + handle + _GAP
             for start in range(0, len(labels), rows)
         )
         if wide - _GAP <= width:

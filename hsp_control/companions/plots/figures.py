@@ -321,6 +321,7 @@ def _draw_together(
 ) -> None:
     """Draw runs in one panel: one or two curves by colour, more of them by dashes."""
     spans, count = [], 0
+    named: list[Artist] = []  # the first log's legend is used for all
     for number, run in enumerate(runs):
         known: set[Artist] = {*axes.lines, *axes.patches, *axes.collections}
         axes.autoscale(axis="y")
@@ -328,9 +329,11 @@ def _draw_together(
         spans.append((*axes.get_xlim(), *axes.get_ylim()))
         if len(runs) == 1:
             return
-        for artist in (*axes.lines, *axes.patches, *axes.collections):
-            if number and artist not in known:
-                artist.set_label("_")  # the first log's legend is used for all
+        drawn = (*axes.lines, *axes.patches, *axes.collections)
+        fresh = [x for x in drawn if x not in known and _label(x)]
+        if number:
+            _shorten_labels(named, fresh)
+        named = named or fresh
         lines = [line for line in axes.lines if line not in known]
         thick = [
             line
@@ -349,18 +352,42 @@ def _draw_together(
     curves.legend_below(axes)
 
 
+def _label(artist: Artist) -> str:
+    """Return an artist's label; empty if the legend leaves it out."""
+    text = str(artist.get_label())
+    return "" if text.startswith("_") else text
+
+
+def _shorten_labels(named: Sequence[Artist], others: Sequence[Artist]) -> None:
+    """Keep of labels what is true of another log, too: `KIND, a number of the first`.
+
+    The labels of the other log are removed.
+    """
+    for first, other in zip(named, others, strict=False):
+        kind, comma, _ = _label(first).partition(", ")
+        same = _label(first) == _label(other)
+        if comma and not same and _label(other).partition(", ")[0] == kind:
+            first.set_label(kind)
+    for other in others:
+        other.set_label("_")
+
+
+_NAME_HANDLE, _NAME_PAD = 3.0, 0.5  # beside a log's name, over the font size
+
+
 def _name_logs(figure: Figure, names: Sequence[str]) -> None:
     """Add a legend that names the logs, above the panels."""
     samples = [
         Line2D([], [], color=palette.run(k), linestyle=_LOG_DASHES[k % 4], label=name)
         for k, name in enumerate(map(curves.math_text, names))
     ]
-    long = sum(map(len, names)) > 14 * figure.get_figwidth()
     figure.legend(
         handles=samples,
         loc="outside upper left",
-        ncols=1 if long else len(names),
-        handlelength=3.0,
+        ncols=curves.columns_within(
+            figure.get_figwidth(), names, _NAME_HANDLE + _NAME_PAD
+        ),
+        handlelength=_NAME_HANDLE,
     )
 
 

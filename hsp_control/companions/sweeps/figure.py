@@ -87,12 +87,12 @@ def sweep_figure(
             metric = sweep.meta["metrics"][found.outcomes[j]]
             label = textwrap.fill(f"{metric['meaning']} [{metric['unit']}]", 22)
             grid[j, 0].set_ylabel(literal_text(label), fontsize=8.4)
-            grid[j, 0].yaxis.set_label_coords(-0.63 / each, 0.5)
         for k, i in enumerate(columns):
             grid[-1, k].set_xlabel(
                 literal_text(_wrapped(found.parameters[i], round(15.0 * each))),
                 fontsize=8.4,
             )
+        figure.align_ylabels(grid[:, 0])
     return figure
 
 

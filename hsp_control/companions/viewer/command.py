@@ -23,7 +23,11 @@ if TYPE_CHECKING:
 
 def _add_view_options(view: argparse.ArgumentParser) -> None:
     view.add_argument(
-        "logs", nargs="+", type=Path, metavar="LOG", help="a log written by hsp run"
+        "logs",
+        nargs="+",
+        type=Path,
+        metavar="LOG",
+        help="a log of hsp run, live or play, or of Python",
     )
     where = view.add_mutually_exclusive_group()
     where.add_argument(

@@ -44,6 +44,7 @@ from hsp_control.control.interface import Controller
 from hsp_control.declaration.language import check_kind
 from hsp_control.geometry.scene import Scene
 from hsp_control.robot import Robot, RobotState
+from hsp_control.robot.recorded import warn_of_another_robot
 from hsp_control.simulation import Rollout
 
 StageContent = RunDrawing | Comparison | SceneDrawing
@@ -330,6 +331,7 @@ class Viewer:
         self, rollout: Rollout, controller: Controller | None, **playing: Any
     ) -> None:
         run = self._run(rollout, controller)
+        warn_of_another_robot(self.robot, rollout.meta)
         stage = self._stage(run, rollout.meta.get("title"))
         self._obstacles = None
         self.transport.send([*stage, *set_clip(run.clip(), **playing)])

@@ -252,9 +252,8 @@ class Follower:
         changes, known = {id(each): each for each in controller.changes}, self._changes
         for change in (changes[key] for key in changes if key not in known):
             with controller._lock:
-                own = deepcopy(
-                    change
-                )  # its stream continues from the state of the loop's
+                # its stream continues from the state of the loop's
+                own = deepcopy(change)
             self._copy.change(own)
         self._changes = changes
 

@@ -84,7 +84,7 @@ class Actuation:
             self._qp = self._limited_step(0 if holding is None else len(holding.least))
             # the result where the QP was solved at once
             self.nearest = Delivered(*self._qp.result, LIMITED, 0.0)
-        # what the calls deliver where contacts carry; None: Python has to
+        # the calls' results where contacts carry; None: Python has to
         self.carried: CarriedStep | None = None
         if support.size:
             support.bind(law)
@@ -105,8 +105,8 @@ class Actuation:
 
         The last one returns whether it is exact and within the limits: then, where
         `direct`, it is delivered with the effort M a + N. Else the law's outcome and
-        `outcome` say what is not so. If a QP without forces and distances is all that
-        is needed where a bound is violated, it is solved at once; `is_nearest` says
+        `outcome` report the reason. If a QP without forces and distances is all that is
+        needed where a bound is violated, it is solved at once; `is_nearest` reports
         whether `nearest` is all that there is to deliver. Where contacts carry,
         the last one returns whether `carried` has an effort.
         """
@@ -136,7 +136,7 @@ class Actuation:
     def keeping(
         self, acceleration: Array, effort: Array, forces: Array, kept: Kept
     ) -> PartCall:
-        """Return the call that keeps what is delivered, after `calls`.
+        """Return the call that keeps the delivered effort, after `calls`.
 
         Args:
             acceleration: Where it writes the acceleration, shape (nv,).
@@ -211,7 +211,7 @@ class Actuation:
     def _delivering_forces(
         self, carried: CarriedStep, delivered: DeliveredAlone, forces: Array
     ) -> PartCall:
-        """Return the call that decides what is delivered where contacts carry."""
+        """Return the call that chooses the delivered effort where contacts carry."""
         bounds, result = self._limits.bounds, carried.qp.result
         return PartCall(
             engine.DeliverWithForces,
@@ -308,7 +308,7 @@ class Actuation:
         return self._delivered(a, offset)
 
     def delivered(self, a: Array) -> Delivered:
-        """Return what is delivered of the law's acceleration a (nv,), after `calls`."""
+        """Return the effort for the law's acceleration a (nv,), after `calls`."""
         if self.carried is None:
             return self._delivered(a, None)
         return self.carried.result(a, self._qp_outcome)

@@ -1,4 +1,4 @@
-"""What a step delivers of the law's command, and what its calls write of it."""
+"""The effort that a step delivers, and the records that its calls write."""
 
 from typing import NamedTuple, Self
 
@@ -47,15 +47,15 @@ class Kept(NamedTuple):
 
 
 class CarriedStep:
-    """What the calls of a step deliver where contacts carry.
+    """Results of a step's calls where contacts carry.
 
     Attributes:
-        qp: What is solved where it is not exact.
+        qp: The QP, solved where the law is not exact.
         exact: Whether the law's acceleration is delivered with the forces of minimum
             norm, shape (1,).
         redistribute: Whether it needs others, shape (1,).
         nearest: Whether it has to change, shape (1,).
-        delivered: What is delivered, and its status.
+        delivered: The delivered effort, and its status.
         forces: The forces, shape (p,) [N].
     """
 
@@ -67,7 +67,7 @@ class CarriedStep:
         self.forces = np.zeros_like(qp.result.forces)
 
     def result(self, a: Array, outcome: QPOutcome) -> Delivered:
-        """Return what is delivered for the law's acceleration a, shape (nv,)."""
+        """Return the delivered effort for the law's acceleration a, shape (nv,)."""
         own, forces = self.delivered, self.forces
         if (number := own.status.item()) == 0:
             return Delivered(own.tau, a, forces, EXACT, 0.0)

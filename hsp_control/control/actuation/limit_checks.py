@@ -37,7 +37,7 @@ class LimitChecks:
     """Compares an acceleration, and M a + N, with a set of limits.
 
     Attributes:
-        outcome: What the calls find.
+        outcome: The calls' results.
         rows: Room for the rows A a ≥ b that the engine writes, by kind: of
         ``barriers``, or of ``holding`` against static efforts.
         compiled: Whether it writes all of them; else Python does.

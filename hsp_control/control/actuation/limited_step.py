@@ -405,7 +405,7 @@ class LimitedStep:
         return (None, np.inf) if self._outcome.unsolved.item() else self.found()
 
     def found(self) -> tuple[Status, float]:
-        """Return what was solved, and the largest violation of a relaxed limit."""
+        """Return the solution, and the largest violation of a relaxed limit."""
         status = STATUSES[self._outcome.status.item()]
         return status, self.relaxation.item() if status is RELAXED else 0.0
 

@@ -65,7 +65,7 @@ Measured = list[tuple[str, Callable[[], Array]]]
 
 
 class LimitsAt(NamedTuple):
-    """What `LimitsInForce` follows."""
+    """The limits that `LimitsInForce` follows."""
 
     all: list[LimitSet]  # the sets that are in force, or will be
     evolutions: list[Evolution[float]]  # the share of each
@@ -125,7 +125,7 @@ class LimitsInForce:
         return LimitsAt(sets, evolutions, shares, calls, rate, bars)
 
     def go_over_to(self, planned: "LimitsAt") -> object:
-        """Follow it from now on; return what held what was followed before."""
+        """Follow it from now on; return the record that was followed before."""
         before = self._planned, self._measured
         if not self._rate:
             self.sent.forget_rate()
@@ -148,7 +148,7 @@ class LimitsInForce:
 
     @property
     def measured(self) -> Measured:
-        """What returns the distances of the barriers in force, by their names.
+        """A function that returns the distances of the barriers in force, by name.
 
         The engine's steps write those of shapes; an own barrier is evaluated again.
         """
@@ -219,7 +219,7 @@ class LimitsInForce:
         return calls
 
     def update(self) -> None:
-        """Find what the last effort leaves for the next one."""
+        """Find the range that the last effort leaves for the next one."""
         for each in self.all:
             if each.rate:
                 each.update()

@@ -82,7 +82,7 @@ class Support:
             if not planned.always:
                 self._scheduled.append((planned, columns, full))
         self._update: engine.Plan | None = None
-        # what `minimum_norm_forces` reads, and wrote last: the remaining effort, shape
+        # input and last result of `minimum_norm_forces`: the remaining effort, shape
         # (nv,), and forces, shape (size,) [N]
         self._wanted, self.tau = np.zeros(nv), np.zeros(nv)
         self.forces = np.zeros(self.size)
@@ -110,7 +110,7 @@ class Support:
         self.permits()
 
     def _updating(self, law: BoundLaw) -> PartCalls:
-        """Return the calls that do what `update` does."""
+        """Return the calls that are equivalent to `update`."""
         calls = list[AnyCall]()
         commands = {id(planned): each.weight for planned, each in self._commanded}
         for planned, columns, full in self._scheduled:
@@ -154,7 +154,7 @@ class Support:
         return calls
 
     def calls(self, wanted: Array, law: BoundLaw) -> PartCalls:
-        """Return the calls that do what `update` and `minimum_norm_forces` do.
+        """Return the calls equivalent to `update` and `minimum_norm_forces`.
 
         Args:
             wanted: The effort without contact forces, shape (nv,) [N·m or N].

@@ -176,7 +176,7 @@ def _product(
 
 
 def weight_calls(weight: Weight | float, time: Array) -> tuple[PartCalls, Array] | None:
-    """Return what `Weight.calls` does; None: it is a number, or is in Python."""
+    """Return the result of `Weight.calls`; None: it is a number, or is in Python."""
     if not isinstance(weight, Weight):
         return None
     native = implemented_by(weight, "calls", "sample") == "calls"

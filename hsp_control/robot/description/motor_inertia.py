@@ -141,7 +141,7 @@ def name_unknown_joints(robot: Element, file: object) -> None:
     for joint, names in transmissions(robot).items():
         if joint not in joints:
             _log.warning(
-                "%s: transmission %s: its rotor counts for no joint: there is no "
+                "%s: transmission %s: its rotor is assigned to no joint: there is no "
                 "joint %r%s",
                 file, listing(map(repr, names)), joint, did_you_mean(joint, joints),
             )  # fmt: skip

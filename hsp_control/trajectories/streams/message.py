@@ -29,7 +29,7 @@ KINDS = (
     *("target", "velocity", "world velocity", "tool velocity"),
     *("chunk", "chunk goes on"),
 )
-"""What a row is: a target, a velocity alone, in the stream's axes or in those it says,
+"""Kinds of rows: a target, a velocity alone, in the stream's axes or in its own ones,
 or a waypoint of a chunk, the first one or a later one."""
 
 

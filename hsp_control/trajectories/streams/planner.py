@@ -59,7 +59,7 @@ class Room(NamedTuple):
 
     @classmethod
     def without_python(cls, policy: Policy, period: float) -> "Room":
-        """Return what suffices for a message each period [s], which no call extends."""
+        """Return the room for a message each period [s], which no call extends."""
         arrivals = ceil(1.1 * _CLOCK / period) + 2  # periods are not exactly equal
         most = 1
         if policy.name != "latest":
@@ -78,7 +78,7 @@ class Planner:
         chart: The coordinates.
         policy: The conversion of messages to goals.
         state: The reference at a time, in its chart: always the same arrays.
-        sent: What a program without Python sends next: ``target``, initially the start
+        sent: Next message of a program without Python: ``target``, initially the start
         (linear coordinates, then perhaps a quaternion (x, y, z, w)), ``velocity``
         (linear, then angular), and the next target's ``rate`` and ``time`` [s].
         call: The engine's call, of the kind Stream.
@@ -100,7 +100,7 @@ class Planner:
         self.restart()
         self._past: list[Array] = []  # earlier pieces, as numbers
         self._starts: list[float] = []  # and when they begin [s]
-        self._oldest = self._start = -inf  # of what is known, and of the present piece
+        self._oldest = self._start = -inf  # of the waypoints, and of the present piece
         self._number = 0  # of the present piece
         self._kept: dict[float, float] = {}
         self.now = -inf
@@ -310,11 +310,11 @@ class Planner:
                 messages = [Message.of(None, value[None], None)]
             t = self.now + SOON
             self.advance(t, messages)
-            self.advance(t + SOON, ())  # the step after it keeps what was before
+            self.advance(t + SOON, ())  # the step after it keeps the plan before
 
     @contextmanager
     def _taken_back(self) -> Iterator[None]:
-        """Take back what is planned, and what is raised, too, leaves nothing."""
+        """Undo the plan; an error leaves nothing either."""
         own = vars(self) | {"_kept": self._kept.copy()}
         own |= {"_past": self._past.copy(), "_starts": self._starts.copy()}
         memory = _copied(self._memory)

@@ -244,7 +244,7 @@ class StreamRun:
 
     @property
     def alone(self) -> Planner | None:
-        """What plans without Python; None: it receives messages in Python."""
+        """The planner without Python; None: messages are received in Python."""
         return None if self._period_alone is None else self._planned
 
     def __repr__(self) -> str:

@@ -14,7 +14,7 @@ from .config_hsp import HspCameraConfig
 
 
 class HspCamera(Camera):
-    """Asks for a picture whenever one is needed: it shows the scene as it is then."""
+    """Requests a picture whenever one is needed: it shows the scene as it is then."""
 
     def __init__(self, config: HspCameraConfig) -> None:
         """Begin without a connection."""
@@ -44,7 +44,7 @@ class HspCamera(Camera):
         self._open = True
 
     def read(self, *_: Any) -> np.ndarray:
-        """Return what the camera sees now, red first, shape (height, width, 3).
+        """Return the camera's present picture, red first, shape (height, width, 3).
 
         Raises:
             ConnectionError: If nobody answers.
@@ -64,8 +64,8 @@ class HspCamera(Camera):
             with urlopen(self._url, timeout=self.config.timeout) as answer:
                 text = np.frombuffer(answer.read(), np.uint8)
         except HTTPError as error:
-            said = error.read().decode(errors="replace").partition("explanation: ")[2]
-            raise ConnectionError(f"{self._url}: {said.partition('</p>')[0]}") from None
+            page = error.read().decode(errors="replace").partition("explanation: ")[2]
+            raise ConnectionError(f"{self._url}: {page.partition('</p>')[0]}") from None
         except OSError as error:
             raise ConnectionError(
                 f"{self._url}: no picture ({error}); start a simulated arm with: "

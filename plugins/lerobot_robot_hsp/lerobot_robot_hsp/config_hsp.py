@@ -1,4 +1,4 @@
-"""What LeRobot's command line says of a loop."""
+"""Options of LeRobot's command line for a loop."""
 
 from dataclasses import dataclass, field
 
@@ -19,14 +19,14 @@ class HspCameraConfig(CameraConfig):
 
 @dataclass(kw_only=True)
 class LoopConfig:
-    """Where a loop tells its state, and what of it is an action."""
+    """Where a loop publishes its state, and which part of it is an action."""
 
     states: str = "127.0.0.1:5006"  # HOST:PORT of hsp live --publish udp://HOST:PORT
     task: str = "hand"  # the task that follows actions
     action: str = "pose"  # pose: ee.x ... ee.wz; joints: JOINT.pos
-    frame: str = ""  # whose pose is observed; by default the first one told
+    frame: str = ""  # whose pose is observed; by default the first of the state
     gripper_task: str = ""  # the joint_posture of a gripper; "": there is none
-    timeout: float = 2.0  # silence after which the loop counts as gone [s]
+    timeout: float = 2.0  # silence after which the loop is regarded as ended [s]
 
     def __post_init__(self) -> None:
         """Check the action."""
@@ -52,6 +52,6 @@ class HspRobotConfig(LoopConfig, RobotConfig):
 @TeleoperatorConfig.register_subclass("hsp_leader")
 @dataclass(kw_only=True)
 class HspLeaderConfig(LoopConfig, TeleoperatorConfig):
-    """An arm whose loop tells where it is: where it goes, the robot follows."""
+    """An arm whose loop publishes its pose, which the robot follows."""
 
     states: str = "127.0.0.1:5016"

@@ -1,4 +1,4 @@
-"""The robot and the leader: what LeRobot calls, in words of a loop's datagrams."""
+"""The robot and the leader: LeRobot's calls as datagrams of a loop."""
 
 from functools import cached_property
 from typing import Any
@@ -15,11 +15,11 @@ _POSE = ("ee.x", "ee.y", "ee.z", "ee.wx", "ee.wy", "ee.wz")
 _WRENCH = ("ee.fx", "ee.fy", "ee.fz", "ee.mx", "ee.my", "ee.mz")
 GRIPPER = "gripper.pos"
 _ANSWER = 2.0
-"""How long a Franka's gripper may take to answer: a motion of its fingers [s]."""
+"""Longest time until a Franka's gripper answers: a motion of its fingers [s]."""
 
 
 class Arm:
-    """Reads a loop's states, and knows the names of what is in them."""
+    """Reads a loop's states, and knows the names of their numbers."""
 
     def __init__(self, config: LoopConfig) -> None:
         """Begin without a connection."""
@@ -58,7 +58,7 @@ class Arm:
 
     @cached_property
     def first(self) -> dict[str, Any]:
-        """A state of the loop, for names: LeRobot asks for them before it connects."""
+        """A state of the loop, for names: LeRobot reads them before it connects."""
         if self._loop is not None:
             return self._loop.state()
         self.connect()
@@ -108,7 +108,7 @@ class Arm:
         return dict(zip(_POSE, [*position, *self._turn], strict=True))
 
     def action(self, state: dict[str, Any]) -> dict[str, float]:
-        """Return the action that leads to a state: what a follower must do."""
+        """Return the action that leads a follower to a state."""
         config = self._config
         if config.action == "pose":
             found = self.pose(state)
@@ -120,7 +120,7 @@ class Arm:
         return found
 
     def values(self, action: dict[str, Any]) -> list[float]:
-        """Return the target that an action declares, as a stream hears it."""
+        """Return the target that an action declares, as a stream receives it."""
         missing = [name for name in self.action_features if name not in action]
         if missing:
             raise ValueError(f"the action has no {missing[0]}; it needs {missing}")
@@ -130,7 +130,7 @@ class Arm:
         return numbers[:3] + quaternion_of(numbers[3:])
 
     def _opening(self, state: dict[str, Any]) -> float | None:
-        """Return that of the gripper's task, or what a Franka's gripper tells."""
+        """Return the opening, by the gripper's task or as a Franka's gripper sends."""
         task = state["tasks"].get(self._config.gripper_task)
         if task is not None or self._loop is None:
             return task["actual"][0] if task else None
@@ -143,12 +143,12 @@ class Arm:
         return self._config.frame or next(iter(state["frames"]))
 
     def _has_gripper(self) -> bool:
-        """Whether a Franka's gripper answers where openings are heard."""
+        """Whether a Franka's gripper answers at the address of its targets."""
         there = getattr(self._config, "gripper_targets", "")
         return bool(there) and self.loop.opening(there, _ANSWER) is not None
 
     def _check(self, state: dict[str, Any]) -> None:
-        """Refuse a loop without the tasks and the frame that are asked for."""
+        """Refuse a loop without the requested tasks and frame."""
         config, tasks = self._config, state["tasks"]
         for task in filter(None, (config.task, config.gripper_task)):
             if task not in tasks and not (task != config.task and self._has_gripper()):
@@ -157,12 +157,13 @@ class Arm:
             raise LoopError(f"task {config.task!r} moves no joints; action is joints")
         if self._frame(state) not in state["frames"]:
             raise LoopError(
-                f"the loop tells no pose of {config.frame!r}; of {[*state['frames']]}"
+                f"the loop publishes no pose of {config.frame!r}; "
+                f"it has {[*state['frames']]}"
             )
 
 
 class Uncalibrated:
-    """What LeRobot asks of a device that calibrates itself."""
+    """LeRobot's interface to a device that calibrates itself."""
 
     is_calibrated = True
 
@@ -201,7 +202,7 @@ class HspRobot(Uncalibrated, Robot):
 
     @property
     def is_connected(self) -> bool:
-        """Whether it hears the loop, and all cameras are open."""
+        """Whether it receives the loop's states, and all cameras are open."""
         cameras = self.cameras.values()
         return self.arm.is_connected and all(each.is_connected for each in cameras)
 
@@ -209,7 +210,7 @@ class HspRobot(Uncalibrated, Robot):
         """Listen to the loop, and open the cameras.
 
         Raises:
-            LoopError: If no loop tells its state, or it lacks what is asked for.
+            LoopError: If no loop publishes its state, or it lacks a requested task.
         """
         self.arm.connect()
         try:
@@ -234,7 +235,7 @@ class HspRobot(Uncalibrated, Robot):
         """Send a target, and return it as it was sent.
 
         The loop goes there within its bounds; a target out of reach is no error, and
-        ``ee.bounded`` says how far away it is.
+        ``ee.bounded`` is its distance beyond them.
         """
         self.arm.loop.send(self.config.targets, self.arm.values(action))
         if self.config.gripper_task:
@@ -243,10 +244,10 @@ class HspRobot(Uncalibrated, Robot):
         return {name: float(action[name]) for name in self.action_features}
 
     def send_chunk(self, actions: list[dict[str, Any]], times: list[float]) -> None:
-        """Send a policy's chunk, which replaces what was to follow of earlier ones.
+        """Send a policy's chunk, which replaces the rest of earlier ones.
 
         Args:
-            actions: One after another, each as for `send_action`.
+            actions: One after another, as for `send_action`.
             times: When, from now, increasing [s]; of an old chunk the first are past.
         """
         rows = [self.arm.values(each) for each in actions]
@@ -286,14 +287,14 @@ class HspLeader(Uncalibrated, Teleoperator):
 
     @property
     def is_connected(self) -> bool:
-        """Whether it hears its loop."""
+        """Whether it receives its loop's states."""
         return self.arm.is_connected
 
     def connect(self, calibrate: bool = True) -> None:
         """Listen to the leader's loop.
 
         Raises:
-            LoopError: If no loop tells its state, or it lacks what is asked for.
+            LoopError: If no loop publishes its state, or it lacks a requested task.
         """
         self.arm.connect()
 

@@ -122,7 +122,7 @@ def franka(tmp_path: Path) -> Iterator[Running]:
 
 @pytest.fixture
 def leader() -> Iterator[str]:
-    """Something that tells where it is, on a circle; returns the address."""
+    """A sender of poses on a circle; returns the address."""
     address = f"127.0.0.1:{free_port()}"
     where = ["0.3069", "0", "0.4869"]  # where the hand starts
     script = str(PLUGIN / "tests/leader.py")

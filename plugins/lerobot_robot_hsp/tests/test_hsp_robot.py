@@ -71,7 +71,7 @@ def test_actions_may_be_joint_positions(arm: Running) -> None:
     )
     assert list(robot.action_features) == ["panda_finger_joint1.pos"]
     with robot:
-        # The loop hears one sender, that of the last test until it is silent for 2 s.
+        # The loop accepts one sender, that of the last test until it is silent for 2 s.
         while robot.arm.loop.state()["streams"]["fingers"]["age"] < 2.5:
             sleep(0.1)
         robot.send_action({"panda_finger_joint1.pos": 0.01})
@@ -84,7 +84,7 @@ def test_actions_may_be_joint_positions(arm: Running) -> None:
     [
         ({"task": "tip"}, r"no task 'tip'; it has \['hand', 'fingers'\]"),
         ({"action": "joints"}, "task 'hand' moves no joints"),
-        ({"frame": "wrist"}, "tells no pose of 'wrist'"),
+        ({"frame": "wrist"}, "publishes no pose of 'wrist'"),
     ],
 )
 def test_what_the_loop_lacks_is_named(
@@ -102,7 +102,7 @@ def test_without_a_loop_it_says_how_to_start_one() -> None:
 
 
 def lerobot(command: str, home: Path, options: dict) -> str:
-    """Run a command of LeRobot without a hub; return what it says."""
+    """Run a command of LeRobot without a hub; return its output."""
     words = [f"--{name}={value}" for name, value in options.items()]
     done = subprocess.run(
         [str(Path(sys.executable).parent / f"lerobot-{command}"), *words],

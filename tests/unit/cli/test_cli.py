@@ -43,7 +43,7 @@ def test_run_leaves_a_log_that_numpy_alone_reads(
 def test_run_tells_a_program_what_it_did(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """The names are those of a sweep; what is told is what the log has."""
+    """The names are those of a sweep; the output agrees with the log."""
     arguments = ["run", MOVING, "--out", str(tmp_path), "--json", *SHORT]
     assert main(arguments) == 0
     told = json.loads(capsys.readouterr().out)
@@ -331,6 +331,7 @@ def versions_without(package: str) -> Callable[[str], str]:
         "there is no '--jsno' here; did you mean '--json'?",
     ),
     (["check", MOVING, "twice"], "'twice' is one argument too many"),
+    (["run", MOVING, "a=1"], "one argument too many; did you mean --set a=1?"),
     # Not taken for --strict.
     (["run", MOVING, "--st", "a=1"], "no '--st' here; did you mean '--set'?"),
 ])  # fmt: skip

@@ -1,4 +1,4 @@
-"""What a terminal shows while a command works, and what a pipe does not get."""
+"""Progress that a terminal shows while a command works, and a pipe does not."""
 
 import io
 

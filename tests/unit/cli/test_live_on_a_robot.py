@@ -61,7 +61,7 @@ def test_it_begins_where_the_robot_is(
     assert run.config is not None
     assert run.config["simulation"]["duration"] == 0.1  # of the loop, not the file
     assert np.abs(run["task.hand.error"][run.t < 0.1]).max() < 1e-5
-    # What became of it is said as `hsp run` says it.
+    # The outcome is printed as `hsp run` prints it.
     printed = " ".join(capsys.readouterr().out.split())
     for name, words in summary_rows(run):
         assert " ".join(f"{name} {words}".split()) in printed

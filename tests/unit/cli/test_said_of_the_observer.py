@@ -1,4 +1,4 @@
-"""What check and the summary of a run say of the momentum observer and of a load."""
+"""Notes of check and of a run's summary on the momentum observer and a load."""
 
 import json
 from pathlib import Path
@@ -72,7 +72,7 @@ def test_a_run_says_how_much_nobody_explained() -> None:
 
 
 def test_a_safe_stop_hides_nothing_of_what_an_observer_found() -> None:
-    """Of each live run it was said: up to nan N·m, and never that it is a lot."""
+    """Each live run once printed: up to nan N·m, and never that it is a lot."""
     beside = {**LOAD, "payload": {**LOAD["payload"], "center": [0.15, 0.0, 0.0]}}
     log = load_experiment(CONFIG | {"plant": beside}).run()
     known = [*unexplained_rows(log)]

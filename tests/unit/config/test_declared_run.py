@@ -1,4 +1,4 @@
-"""A run that was made in Python is repeated by its log, or the log says why not."""
+"""A run made in Python is repeated by its log, or the log names the obstacle."""
 
 import shutil
 from pathlib import Path

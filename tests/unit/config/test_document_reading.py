@@ -60,7 +60,7 @@ def test_every_key_path_has_a_location() -> None:
     assert document.location(("tasks", "elbow", "gains")) == "panda.yaml:11"
     # Behind an alias, the line to mend is where its anchor stands.
     assert document.location(("tasks", "elbow", "gains", "kp")) == "panda.yaml:5"
-    # What is missing is missing in its nearest ancestor.
+    # A missing key is reported at its nearest ancestor.
     assert document.location(("tasks", "hand", "gains", "ki", 3)) == "panda.yaml:5"
     assert document.location(("nothing",)) == "panda.yaml:1"
 

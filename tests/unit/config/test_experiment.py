@@ -1,4 +1,4 @@
-"""YAML and Python are two faces of the same objects, and every error says where."""
+"""YAML and Python make the same objects, and every error names its place."""
 
 import json
 import re
@@ -146,7 +146,7 @@ def test_a_log_of_a_robot_file_can_be_repeated_from_elsewhere(
     assert load_experiment(log).robot.nv == 3
 
 
-# Each row: what is changed, the class of the error, and what its message says.
+# Each row: what is changed, the class of the error, and its message.
 MISTAKES = [
     ("robot.name", "pandda", "RobotNotFoundError",
      "robot.name: no ... 'pandda' ... 'panda'"),

@@ -1,4 +1,4 @@
-"""A configuration as plain data says the same: logs keep it like this."""
+"""A configuration as plain data has the same meaning: logs keep it like this."""
 
 import json
 from dataclasses import fields
@@ -154,7 +154,7 @@ def test_an_experiment_of_parts_goes_to_yaml_and_back(tmp_path: Path) -> None:
     first, second = made.run(), again.run()
     np.testing.assert_array_equal(first.tau, second.tau)
     assert not list(validator().iter_errors(yaml.safe_load(made.to_yaml())))
-    # A log says the same, and its run can be repeated.
+    # A log has the same, and its run can be repeated.
     log = load_experiment(first.save(tmp_path / "run.npz"))
     np.testing.assert_array_equal(log.run().tau, first.tau)
 

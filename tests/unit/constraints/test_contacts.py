@@ -322,7 +322,7 @@ def test_null_space_decays_on_the_constrained_plant() -> None:
     assert np.abs(rollout["task.hand.error"]).max() < 1e-7
 
 
-# --- what is refused -----------------------------------------------------------------
+# --- refusals -----------------------------------------------------------------------
 
 
 def test_a_floating_base_needs_support() -> None:

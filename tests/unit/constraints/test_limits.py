@@ -87,7 +87,7 @@ def test_by_default_they_are_the_robots_own() -> None:
 
 
 def test_by_default_gravity_may_overload_no_motor_of_an_arm() -> None:
-    """Where it could ask for more than a motor has in some posture, it is limited."""
+    """Where it could demand more than a motor has in some posture, it is limited."""
     robot, rng, rest = panda(), np.random.default_rng(1), np.zeros(7)
     for _ in range(2000):
         asked = robot.inverse_dynamics(robot.random_configuration(rng), rest, rest)

@@ -125,7 +125,7 @@ def test_limits_as_yaml_says_them() -> None:
     )
 
 
-# --- what is refused -----------------------------------------------------------------
+# --- refusals -----------------------------------------------------------------------
 
 WRONG: dict[type[Part], list[tuple[str, Any, str]]] = {
     PointContact: [

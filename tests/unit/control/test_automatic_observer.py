@@ -54,7 +54,7 @@ def test_it_is_on_at_a_rate_that_suits_the_period(period: float, rate: float) ->
     assert words == f"on, {rate:g} 1/s (auto)"
     # half of each joint's effort limit
     assert own.clip == tuple(0.5 * PANDA.model.effortLimit)
-    # What runs on a robot learns the period from its periods, and is the same.
+    # On a robot the period is found from the calls, and the result is the same.
     command, declared = (
         CompensatedController(controller()),
         CompensatedController(controller(), Compensation(momentum_observer=own)),
@@ -132,7 +132,7 @@ def test_in_a_simulation_it_is_on_where_the_plant_is_not_the_model(name: str) ->
 
 
 def test_a_spring_that_comes_while_it_runs_yields() -> None:
-    """What is cancelled fades while a task with an impedance counts."""
+    """The cancelled disturbance fades while a task with an impedance is active."""
     made = hsp.Controller(PANDA, [hsp.FrameOrientation("panda_tcp", name="turn")])
     command = CompensatedController(made)
     push = np.zeros(7)

@@ -1,4 +1,4 @@
-"""What steps call is bound when a change is made, and not in a step."""
+"""The calls of steps are bound when a change is made, and not in a step."""
 
 import pickle
 from collections.abc import Iterator

@@ -19,7 +19,7 @@ CHANGES: dict[str, Callable[[Changes], object]] = {
     "add": lambda at: at.add(POSTURE),
     "remove": lambda at: at.remove("turned"),
     "exchange": lambda at: at.remove("turned").add(POSTURE),
-    # both at once are damped: they ask for the same motion
+    # both at once are damped: they demand the same motion
     "same": lambda at: at.remove("hand").add(hsp.FramePosition("panda_tcp")),
     "limits": lambda at: at.limits(hsp.Limits(bandwidth=30.0)),
     "no limits": lambda at: at.limits(None),

@@ -232,7 +232,7 @@ def test_the_error_equation_holds_while_gains_change() -> None:
 
 
 def test_the_error_equation_holds_while_references_change() -> None:
-    """Of a position and an orientation, whose error counts from what is in between."""
+    """Of a position and an orientation, whose error is that of a frame in between."""
     turned = replace(TURNED, priority=1)
     law = hsp.Controller(
         panda(), [far(), turned], hsp.JointCentering(), null_space_gain=K_N, limits=None
@@ -264,7 +264,7 @@ def test_the_error_equation_of_other_tasks_holds_while_one_comes_and_goes(
     log = run(law)
     expected = solution(log, lambda t: GAINS.matrices(3))
     np.testing.assert_allclose(log["task.hand.error"], expected, rtol=0, atol=1e-8)
-    # While it counts fully its own error obeys its own equation.
+    # While its weight is one its error obeys its equation.
     t, e = log.t, log["task.turned.error"]
     alone = (t >= 0.3) & (t <= 0.4)
     first = np.flatnonzero(alone)[0]

@@ -111,7 +111,7 @@ def test_efforts_and_forces_of_legs_are_continuous(seed: int) -> None:
             for old, now in ((before.tau, after.tau), (before.forces, after.forces)):
                 np.testing.assert_allclose(now, old, rtol=0, atol=1e-6)
     assume(Status.LIMITED in statuses)
-    # What no motor drives is what the forces drive, in between as well.
+    # The unactuated rows are those of the contact forces, in between as well.
     out = controller.compute(robot.state(START + 0.5 * RAMP, q, v))
     support, state = controller.active_stack.support, controller.state
     wanted = state.inverse_dynamics(out.acceleration)
@@ -196,7 +196,7 @@ def test_a_foot_that_a_plan_switches(seed: int) -> None:
     for t in START + 0.1 + ABOUT:
         np.testing.assert_allclose(effort(t + FINEST), effort(t), rtol=0, atol=OF_LEGS)
     t = START + 0.2
-    for begins in (t, t + 0.01, t + 0.02):  # the last two: while it bears already
+    for begins in (t, t + 0.01, t + 0.02):  # the last two: while it carries already
         before = effort(begins - 1e-9)
         foot.set_down(begins, 0.1)
         np.testing.assert_allclose(effort(begins), before, rtol=0, atol=OF_LEGS)
@@ -263,7 +263,7 @@ def test_a_change_of_limits_is_compiled_when_it_is_made(
 @given(seed=seeds)
 @many
 def test_a_mixture_keeps_the_limits(name: str, seed: int) -> None:
-    """What each set of tasks delivers is within them, and so is what lies between."""
+    """The effort of each set of tasks is within the limits, and so is their mean."""
     case = Case(name, seed)
     controller = a_task_is_added(case)
     for t in START + RAMP * case.rng.uniform(0.0, 1.0, 5):

@@ -1,4 +1,4 @@
-"""What cannot be meant is said where it happens: mm, degrees, a run that was damped."""
+"""Implausible input is reported where it occurs: mm, degrees, a damped run."""
 
 import warnings
 
@@ -8,6 +8,7 @@ import pytest
 import hsp_control as hsp
 from hsp_control.cli import main
 from hsp_control.common.exceptions import HspControlError, LimitError
+from hsp_control.control.clock_check import ClockWarning
 from hsp_control.control.first_state import StartWarning
 from hsp_control.simulation.simulate import RunWarning
 
@@ -16,7 +17,7 @@ REST = np.zeros(7)
 
 
 def told(target: object, **options: object) -> list[str]:
-    """What is said of a target where a loop begins."""
+    """Warnings about a target where a loop begins."""
     task = hsp.FramePosition("panda_tcp", target, name="hand", **options)  # type: ignore[arg-type]
     controller = hsp.Controller(PANDA, [task])
     with warnings.catch_warnings(record=True) as found:
@@ -86,6 +87,16 @@ def test_degrees_are_named_in_python_and_in_yaml(
     given = f"start={{configuration: {degrees}}}"
     assert main(["check", "panda_limits", "--set", given]) == 2
     assert "degrees? Angles are in rad" in capsys.readouterr().err
+
+
+def test_a_recorded_loop_whose_times_are_milliseconds_is_warned_of() -> None:
+    """It gives no period; the first step shows it."""
+    controller = hsp.Controller(PANDA, [hsp.FramePosition("panda_tcp")])
+    recorder = hsp.Recorder(controller)
+    recorder.record(controller.compute(0.0, PANDA.home(), REST))
+    with pytest.warns(ClockWarning, match=r"1 s apart: milliseconds\? Times are in s"):
+        recorder.record(controller.compute(1.0, PANDA.home(), REST))
+    recorder.close()
 
 
 def test_the_command_line_says_the_same(capsys: pytest.CaptureFixture[str]) -> None:

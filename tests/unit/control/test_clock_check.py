@@ -1,4 +1,4 @@
-"""Times that cannot be those of a loop are said once."""
+"""Times that cannot be those of a loop are reported once."""
 
 import re
 import warnings
@@ -16,7 +16,7 @@ H = 0.002
 
 
 def told(times: Sequence[float], period: float = H) -> list[str]:
-    """Return what is said of the clock of a loop."""
+    """Return the messages about the clock of a loop."""
     robot = hsp.Robot.load("panda")
     controller = hsp.Controller(robot, [hsp.FramePosition()])
     with warnings.catch_warnings(record=True) as caught:
@@ -50,7 +50,7 @@ def test_a_clock_of_something_else_is_said_once(
 
 
 def test_a_state_with_the_time_of_a_clock_is_said() -> None:
-    """Its time counts from the first step already."""
+    """Its time is measured from the first step already."""
     robot = hsp.Robot.load("panda")
     controller = hsp.Controller(robot, [hsp.FramePosition()])
     state = robot.state(1.76e9, robot.home(), np.zeros(7))

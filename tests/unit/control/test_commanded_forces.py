@@ -164,7 +164,7 @@ def test_a_fixed_base_presses_with_what_is_commanded() -> None:
 
 
 class SlidingPlant(ContinuousPlant):
-    """A point on a plane: one rigid row, and kinetic friction that it does not tell."""
+    """A point on a plane: one rigid row, and unreported kinetic friction."""
 
     def __init__(self, robot: hsp.Robot, contact: SlidingContact) -> None:
         super().__init__(robot)
@@ -259,7 +259,7 @@ def test_a_wrench_of_a_surface() -> None:
     np.testing.assert_allclose(moments, wrench[3:], atol=1e-9)
 
 
-# --- what is refused -----------------------------------------------------------------
+# --- refusals -----------------------------------------------------------------------
 
 
 def press(**options: Any) -> PointContact:

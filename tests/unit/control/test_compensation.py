@@ -123,7 +123,7 @@ def test_the_observer_is_a_low_pass_on_what_pushes(name: str, rate: float) -> No
 
 
 def test_what_is_cancelled_is_clipped() -> None:
-    """Beyond it the arm gives way as if there were no observer."""
+    """Beyond it the arm yields as if there were no observer."""
     heavy = changed(PANDA, [Inertias(1.5)])
     plant = hsp.plants.RigidBodyPlant(heavy)
     clipped, free = (
@@ -157,7 +157,7 @@ def test_what_is_cancelled_is_clipped() -> None:
 def test_known_friction_costs_nothing_and_the_observer_leaves_it_alone() -> None:
     """Oil in all joints, known exactly: the law is what it was without any.
 
-    What the observer would cancel, were it told of the feed-forward, is all of it: the
+    The observer would cancel all of it if the feed-forward were part of its model: the
     friction here is some 0.5 N·m.
     """
     made = controller(away=0.0)
@@ -331,7 +331,7 @@ def test_half_of_the_power_passes_at_the_cut_off(order: int) -> None:
 def test_the_predictor_knows_where_the_robot_will_be(
     efforts: int, sensors: int
 ) -> None:
-    """What the law is shown is the state in which its effort acts, to Rk4's error."""
+    """The law sees the state in which its effort acts, to Rk4's error."""
     plant = hsp.plants.ImperfectPlant(
         hsp.plants.IntegratedPlant(hsp.plants.RigidBodyPlant(PANDA), Rk4(H)),
         [SensorDelay(sensors)] if sensors else [],

@@ -22,7 +22,7 @@ HOME = ROBOT.home()
 A = np.random.default_rng(0).normal(size=(7, 7))
 
 
-# What is true: f = Σ sin(A q + t), its gradient, the rate of that, and a field.
+# The true ones: f = Σ sin(A q + t), its gradient, the rate of that, and a field.
 
 
 def f(s: hsp.RobotState) -> float:
@@ -408,7 +408,7 @@ def test_it_is_looked_at_once_and_on_a_state_of_its_own() -> None:
             effort, plain.compute(1.0 + 0.001 * k, HOME, v).tau
         )
     assert sum(not np.array_equal(each, v) for _, each in seen) == 7
-    assert min(t for t, _ in seen) == 1.0  # nothing is asked before the run begins
+    assert min(t for t, _ in seen) == 1.0  # nothing is called before the run begins
     np.testing.assert_array_equal(one.state.q, HOME)
 
 

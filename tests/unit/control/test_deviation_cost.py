@@ -1,4 +1,4 @@
-"""What deviations from the law cost, and postures that motors can hold."""
+"""The cost of deviations from the law, and postures that motors can hold."""
 
 from dataclasses import replace
 from typing import Any
@@ -107,7 +107,7 @@ def test_levels_share_directions_as_the_law_does(
 
 
 FIELD = 0.01 * hsp.JointCentering()
-"""It asks for less than the limits permit far from them."""
+"""It demands less than the limits permit far from them."""
 
 
 def on_springs(limits: hsp.Limits | None, *below: hsp.FramePosition) -> hsp.Controller:

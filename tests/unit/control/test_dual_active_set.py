@@ -135,7 +135,7 @@ def with_slacks(case: Case, softness: Array) -> Case:
 def test_a_slack_is_one_more_unknown(kind: str, seed: int) -> None:
     """The same x as DAQP's with all slacks; half of the constraints are soft.
 
-    Where the hard ones contradict each other both say so.
+    Where the hard ones contradict each other both report it.
     """
     rng = np.random.default_rng(seed)
     case = KINDS[kind](rng)._replace(equalities=0)
@@ -206,7 +206,7 @@ def test_contradictions_are_infeasible(
 
 
 def test_iterations_are_limited() -> None:
-    """With a limit of none: the code says so."""
+    """With a limit of none: the code reports it."""
     case = degenerate(np.random.default_rng(5))
     assert answer(case).code == SOLVED
     assert answer(case, iterations=0).code == EXHAUSTED

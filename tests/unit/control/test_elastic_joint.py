@@ -20,7 +20,7 @@ H, OMEGA = 0.001, 20.0
 
 
 class Sprung(SampledPlant):
-    """A carriage that a motor pulls by a spring; it measures where the joint says."""
+    """A carriage that a motor pulls by a spring; it measures at the joint."""
 
     def __init__(self, robot: Robot, joint: ElasticJoint) -> None:
         super().__init__(robot)

@@ -169,7 +169,7 @@ FIRST_EFFORT = (
 
 
 def test_a_loop_of_ones_own_is_told_once_when_it_sends() -> None:
-    """What is only computed moves nothing; a restart is another start."""
+    """Computing alone moves nothing; a restart is another start."""
     circle = hsp.Circle(radius=0.1, angular_rate=2.0)
     hand = hsp.FramePose("panda_tcp", circle)
     law = hsp.Controller(panda(), [hand], hsp.JointCentering(), limits=None)

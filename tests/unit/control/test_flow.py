@@ -28,7 +28,7 @@ def swaying_posture(state: hsp.RobotState) -> Array:
 
 @metrics
 def test_flow_meets_the_task_and_follows_the_field(kind: str) -> None:
-    """v = J#x_d' + P g: J v = x_d', and v - g is as small as the metric can tell."""
+    """v = J#x_d' + P g: J v = x_d', and v - g is smallest in the metric."""
     metric = METRICS[kind](7)
     field = FunctionField(swaying_posture)
     tasks = [track(), hold_orientation()]

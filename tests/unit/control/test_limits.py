@@ -327,7 +327,7 @@ def test_the_error_of_the_acceleration_is_what_is_observed() -> None:
     np.testing.assert_array_equal(held.lasting, held.quick)
     np.testing.assert_allclose(held.least, 0.0, atol=1e-9)
     state.update(0.1, q, v)
-    effort.record(tau, a, 0.02)  # a longer period counts alone
+    effort.record(tau, a, 0.02)  # a longer period is used alone
     engine.Observe(v=v + 0.02 * (a - 8.0), held=held)(0.12)
     np.testing.assert_allclose(held.error, [8.0, 8.0, 8.0], rtol=1e-9)
     # The first one's mean still has the old sign: nothing of it is there any more.
@@ -384,7 +384,7 @@ def test_what_is_measured_beyond_a_limit_is_told_in_that_step(dof: int) -> None:
         for sign in (-1.0, 1.0):
             assert told(law, dof, speed=1.021 * sign) is Status.BEYOND
             assert told(law, dof, speed=1.019 * sign) < Status.BEYOND
-    # Where one set of limits follows another, that of either counts.
+    # Where one set of limits follows another, that of either is used.
     wide = hsp.Limits(position="none", velocity=10.0)
     law.at(-1.0).ramp(10.0).limits(wide)
     assert told(law, dof, away=1.1e-3) is Status.BEYOND
@@ -465,6 +465,6 @@ def test_things_stay_apart() -> None:
             for t, q, v in zip(rollout.t, rollout["q"], rollout["v"], strict=True)
         )
         error = np.abs(rollout["task.hand.error"]).max()
-        assert error < 1e-4  # the elbow gives way, the hand stays
+        assert error < 1e-4  # the elbow deviates, the hand stays
     assert least[False] < 0.0
     assert least[True] > 0.02 - 1e-3

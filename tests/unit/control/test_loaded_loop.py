@@ -87,7 +87,7 @@ CASES: dict[str, tuple[dict[str, Any], int]] = {
 @pytest.mark.slow
 @pytest.mark.parametrize("case", CASES if THOROUGH else ["measured two periods late"])
 def test_the_robot_grows_and_decays_at_the_rate_of_the_linear_loop(case: str) -> None:
-    """On both sides of the boundary, with the load that the linear loop tells.
+    """On both sides of the boundary, with the load that the linear loop predicts.
 
     A point mass: the difference of the mass matrices is linear in it.
     """
@@ -180,7 +180,7 @@ def test_configurations_with_a_payload_are_warned_of_it() -> None:
 
 
 def test_weight_that_nothing_holds_is_told_and_an_observer_holds_it() -> None:
-    """The arm does what is told: its posture runs away, or stays where it is."""
+    """The arm does as predicted: its posture runs away, or stays where it is."""
     arm = hsp.Robot.load("panda")
     hand = hsp.FramePosition("panda_tcp", gains=hsp.Gains(natural_frequency=20.0))
     true = changed(arm, [Payload(frame="panda_hand", mass=1.0)])

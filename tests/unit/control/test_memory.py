@@ -1,4 +1,4 @@
-"""What a controller remembers is one record: whatever is copied goes on like it."""
+"""A controller's memory is one record: every copy continues identically."""
 
 import pickle
 import warnings
@@ -84,7 +84,7 @@ def test_a_copy_says_nothing_that_was_said(kind: str) -> None:
 
 
 def test_a_restart_remembers_nothing() -> None:
-    """What is left is that of a new one, but for how often it began."""
+    """The remaining memory is that of a new one, but for the number of begins."""
     made, new = controller(), controller()
     for k in range(60):
         computed(made, k)

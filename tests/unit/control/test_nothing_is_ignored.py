@@ -1,4 +1,4 @@
-"""Whatever is assigned, given or asked for counts, or is refused."""
+"""Whatever is assigned or given has an effect, or is refused."""
 
 from collections.abc import Mapping
 from typing import Any

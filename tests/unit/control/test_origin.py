@@ -59,7 +59,7 @@ def test_a_clock_may_begin_anywhere(clock: float) -> None:
 
 
 def test_the_first_step_of_a_clock_is_near_gravity() -> None:
-    """What counts from the first step is still ahead: the blend, and the circle."""
+    """Times measured from the first step are still ahead: the blend, and the circle."""
     q, rest = ROBOT.home(), np.zeros(7)
     gravity = ROBOT.inverse_dynamics(q, rest, rest)
     tau = controller().compute(1.76e9, q, rest).tau

@@ -39,7 +39,7 @@ class Forgetful(hsp.changes.Change):
 
 
 class OtherMetric(hsp.changes.Change):
-    """What has no ramp."""
+    """A change without a ramp."""
 
     def apply(self, setup: Any) -> Any:
         return replace(setup, metric=hsp.metrics.MassMatrixMetric())

@@ -1,4 +1,4 @@
-"""What a loop's rate allows: in theory, in the links of the chain, and on the robot."""
+"""Gains that a loop's rate permits: in theory, in the chain's links, on the robot."""
 
 import re
 from itertools import pairwise
@@ -179,7 +179,7 @@ def test_a_lag_of_the_drives_is_in_the_linear_loop(
 
 @pytest.mark.slow
 def test_integral_action_that_a_heavier_robot_does_not_bear_is_told() -> None:
-    """The weightless arm agrees: 10 % beside what is told its motion dies or grows."""
+    """The weightless arm agrees: 10 % beside the prediction it decays or grows."""
     robot = Robot.load("panda", gravity=[0.0, 0.0, 0.0])
     task = JointPosture(Q0, gains=Gains(natural_frequency=20.0))
     made = Controller(robot, [task], limits=None)

@@ -1,4 +1,4 @@
-"""The stream of a task, as a controller gives it: heard in whichever run it is."""
+"""The stream of a task, as a controller gives it: received in whichever run it is."""
 
 import pickle
 from collections.abc import Callable

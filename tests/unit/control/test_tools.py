@@ -166,7 +166,7 @@ def test_a_tip_stays_where_it_is_to_be_while_it_is_exchanged() -> None:
 
 
 def test_a_target_counts_from_the_tool_there_is() -> None:
-    """What is relative in a change refers to the tip, and so does a copy of the run."""
+    """Relative values of a change refer to the tip, and so does a copy of the run."""
     made = hsp.Controller(ROBOT, [hsp.FramePosition(FRAME, name="hand")])
     q, v = ROBOT.home(), np.zeros(7)
     made.at(0.0).ramp(0.1).tool(FRAME, TIP)

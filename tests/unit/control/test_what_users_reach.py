@@ -1,4 +1,4 @@
-"""What a user reaches is not what steps: a mistake is one exact error, or harmless."""
+"""Users reach copies, not a step's arrays: mistakes are exact errors, or harmless."""
 
 import os
 import signal
@@ -57,7 +57,7 @@ ATTACKS: dict[str, Callable[[RobotState], object]] = {
     "centre": lambda s: s.centroidal.jacobian.fill(0.0),
     "companion": lambda s: s.ahead(0.01).q.fill(0.0),
 }
-"""What a part's own Python may do by mistake to the state that it is given."""
+"""Mistakes of a part's own Python with the state that it is given."""
 
 
 class Attacked:
@@ -458,7 +458,7 @@ def test_a_sample_of_another_size_is_one_error() -> None:
 @pytest.mark.skipif(not hasattr(os, "fork"), reason="no processes that fork")
 @pytest.mark.filterwarnings("ignore:.*multi-threaded.*:DeprecationWarning")
 def test_a_fork_while_a_thread_computes_is_one_error() -> None:
-    """The child's copy is half a step: it says so, and waits for nobody."""
+    """The child's copy is half a step: it reports that, and waits for nobody."""
     inside, leave = threading.Event(), threading.Event()
 
     def slow(state: RobotState) -> float:

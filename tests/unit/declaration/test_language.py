@@ -36,7 +36,7 @@ def run(robot: hsp.Robot, **times: float) -> hsp.Rollout:
     return hsp.simulate(compose(robot), robot.home(), **times)
 
 
-# What is typed in Python, and its message; what is given to --set, and its message.
+# Input in Python and its message; input of --set and its message.
 MISTAKES: list[tuple[Callable[[Any], Any], str, str, str]] = [
     (lambda _: hsp.FramePose("hand", "circle"),
      "'circle', a str ... hsp.trajectories.Circle(",

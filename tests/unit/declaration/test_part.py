@@ -84,7 +84,7 @@ class Rod(Gadget, type="rod"):
     """A long one."""
 
     size: Positive
-    """Length [m]; a field, where the base class asks for a property."""
+    """Length [m]; a field, where the base class requires a property."""
     mass: NonNegative = 1.0
     """Mass [kg]."""
 
@@ -236,7 +236,7 @@ class Entry:
 
 @pytest.fixture
 def plug(monkeypatch: pytest.MonkeyPatch) -> Callable[..., Any]:
-    """Return a function that installs entry points for a family of its own."""
+    """Return a function that installs entry points for another family."""
 
     class Slot(Part, family="slots", error=GadgetError):
         pass

@@ -27,7 +27,7 @@ seeds = st.integers(0, 2**32 - 1)
 
 
 class Law(NamedTuple):
-    """What of a resolved law counts."""
+    """The relevant part of a resolved law."""
 
     problem: Any
     acceleration: Array
@@ -109,7 +109,7 @@ def costs(given: dict[str, Any]) -> list[float]:
 
 @given(seeds, st.floats(10.0, 1e6))
 def test_it_is_the_plain_formula(seed: int, size: float) -> None:
-    """What each level asks for beyond a limit, less what is below can give of it."""
+    """Levels' accelerations beyond a limit, less the share that lower ones can meet."""
     asked = drawn(seed, size)
     call, held = held_levels(**asked)
     planned([call]).run(0.0)
@@ -136,7 +136,7 @@ def test_the_identity_is_a_metric_as_others(seed: int) -> None:
 def test_what_a_level_asks_for_does_not_know_those_below(
     metric: str, far: bool, seed: int
 ) -> None:
-    """What the first level makes of a is the law of a controller without the others.
+    """The first level's part of a is the law of a controller without the others.
 
     With a target out of reach that is the damped law's.
     """
@@ -169,7 +169,7 @@ def test_what_a_level_asks_for_does_not_know_those_below(
 def test_a_deviation_turns_no_faster_than_a_period_bears(
     angle: float, exponent: float
 ) -> None:
-    """A task along one direction of a plane asks one joint for x beyond its limit.
+    """A task along one direction of a plane moves one joint x beyond its limit.
 
     The nearest step, δ = H⁻¹c x/(cᵀH⁻¹c), turns with the direction by K at most for
     each radian, however large x is; with a cost of 1e-6 it would by 1e6 x.

@@ -1,4 +1,4 @@
-"""What a step comes near to where a limit binds, beside plain formulas."""
+"""The acceleration a step approaches where a limit binds, beside plain formulas."""
 
 from typing import NamedTuple
 
@@ -22,7 +22,7 @@ seeds = st.integers(0, 2**32 - 1)
 
 
 class Asked(NamedTuple):
-    """What is asked for, and what limits permit."""
+    """Commanded accelerations, and those that limits permit."""
 
     M: Array
     a: Array
@@ -101,7 +101,7 @@ def test_it_is_the_plain_formula(seed: int, size: float) -> None:
 
 @given(seeds)
 def test_within_limits_nothing_changes(seed: int) -> None:
-    """Whatever the damped law and a field ask for."""
+    """Whatever the damped law and a field demand."""
     asked = drawn(seed, 1e4, 10.0)
     asked.a[:] = 0.0
     asked.effort[:] = 0.0
@@ -110,7 +110,7 @@ def test_within_limits_nothing_changes(seed: int) -> None:
 
 @given(seeds, st.floats(1e-6, 3.0))
 def test_no_more_is_lost_than_is_beyond(seed: int, beyond: float) -> None:
-    """Of what a field asks for, against tasks, E/(1 + E) is lost where a is E beyond.
+    """Of a field's demand against tasks E/(1 + E) is lost where a is E beyond.
 
     What loses more where it begins to violate a limit swings from one side of it to the
     other.

@@ -1,4 +1,4 @@
-"""What the law's outcome says where an exact law stands beside the damped one."""
+"""The law's outcome where an exact law stands beside the damped one."""
 
 import numpy as np
 import pytest

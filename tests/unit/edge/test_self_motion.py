@@ -1,4 +1,4 @@
-"""What limits take for the null space's is all that a field makes of the law."""
+"""The null-space part that limits see is the whole effect of a field on the law."""
 
 import numpy as np
 import pytest

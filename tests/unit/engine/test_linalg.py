@@ -85,7 +85,7 @@ def test_cholesky(seed: int, n: int, exponent: float, scale: float) -> None:
     assert (np.diag(L) > 0.0).all()
     np.testing.assert_array_equal(np.triu(L, 1), 0.0)
     close(L @ L.T, A, 4 * n * EPS * scale)
-    # The factor itself is as uncertain as A's condition number says.
+    # The factor itself is as uncertain as A's condition number.
     close(L, np.linalg.cholesky(A), 10 * n * EPS * np.sqrt(scale) * 10.0**-exponent)
 
 

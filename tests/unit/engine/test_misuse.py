@@ -1,6 +1,6 @@
 """Misuse of the engine from Python: it is refused, or harmless, and never memory.
 
-What may end a process is tried in a process of its own.
+Calls that may end a process are tried in another one.
 """
 
 import gc
@@ -109,11 +109,11 @@ def odd_arguments(kind: engine.Kind, seed: int) -> dict[str, Any]:
 
 
 def try_kinds(trace: Path, rounds: int) -> None:
-    """Make and run calls of all kinds with odd arguments; say which, before each."""
+    """Make and run calls of all kinds with odd arguments; print each before it."""
     done = 0
     for kind in kinds:
         if kind.name in ("EqualSteps", "Periods"):
-            continue  # they do as they are told: as many times as numbers say
+            continue  # they repeat as often as their numbers require
         for seed in range(rounds):
             trace.write_text(f"{kind.name} with the seed {seed}")
             try:
@@ -130,7 +130,7 @@ def try_kinds(trace: Path, rounds: int) -> None:
 def alone(
     code: str, *arguments: str, flags: tuple[str, ...] = ()
 ) -> subprocess.CompletedProcess[str]:
-    """Run a program in a process of its own, with what this file has."""
+    """Run a program in another process, with this file's definitions."""
     folders = [
         str(Path(__file__).parent),
         str(Path(wording.__code__.co_filename).parent),

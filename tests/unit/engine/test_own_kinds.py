@@ -134,7 +134,7 @@ def test_a_library_beside_its_file_needs_no_compiler(
 
 @pytest.mark.slow
 def test_what_does_not_compile_says_what_the_compiler_says(source: Path) -> None:
-    """What is wrong in the code, and that a kind needs a description."""
+    """Errors in the code are reported, and a kind needs a description."""
     wrong = SOURCE.replace("2.0 * x;", "2.0 * z;").replace("doc =", "words =")
     source.write_text(wrong)
     with pytest.raises(EngineError, match="does not compile:") as raised:

@@ -1,4 +1,4 @@
-"""What a step costs beside time: no memory; and all ready tasks, fields and metrics."""
+"""A step allocates no memory, with all ready tasks, fields and metrics."""
 
 import gc
 import sys

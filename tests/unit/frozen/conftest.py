@@ -1,4 +1,4 @@
-"""What tests of frozen controllers share: the example that replays one, a library."""
+"""Fixtures of tests of frozen controllers: the example that replays one, a library."""
 
 from pathlib import Path
 

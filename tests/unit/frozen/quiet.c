@@ -1,5 +1,5 @@
 /* Step a frozen controller at states of a file, again and again, send to the inputs that are named,
- * and say what it did besides:
+ * and print what it did besides:
  * allocations and locks are counted, and a system call ends the process, if the kernel lets us ask
  * for that (seccomp). */
 #define _GNU_SOURCE

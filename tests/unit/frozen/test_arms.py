@@ -59,5 +59,5 @@ def test_a_controller_of_ros2_control_brakes(
     assert effort[20] == effort[19]  # the last one
     assert effort[21] != effort[20]  # that of the stop
     assert len({*effort[21:30]}) == 1  # it holds a robot that is at rest
-    # Without a state: the last effort for five periods, then the manager is told.
+    # Without a state: the last effort for five periods, then the manager is informed.
     assert [k for k, ok in enumerate(went) if not ok] == [*range(35, 40)]

@@ -1,4 +1,4 @@
-"""What ``hsp_step.h`` refuses, and what it says."""
+"""Refusals of ``hsp_step.h`` and their messages."""
 
 from pathlib import Path
 from threading import Thread
@@ -120,7 +120,7 @@ def test_what_is_wrong_behind_a_right_checksum_is_no_crash(
 def test_a_changed_file_that_opens_steps_and_stops(
     frozen: Path, q: np.ndarray, tmp_path: Path
 ) -> None:
-    """Numbers may be any behind a right checksum: a status says so, and no crash."""
+    """Numbers may be any behind a right checksum: a status reports it, and no crash."""
     content, other = frozen.read_bytes(), tmp_path / "other.hsp"
     rng = np.random.default_rng(SEED)
     stepped = 0
@@ -142,7 +142,7 @@ def test_a_changed_file_that_opens_steps_and_stops(
 
 
 def test_a_number_has_one_type(frozen: Path, tmp_path: Path) -> None:
-    """What was checked as an index is never written as a real number."""
+    """A value checked as an index is never written as a real number."""
     content, other = bytearray(frozen.read_bytes()), tmp_path / "other.hsp"
     layout = Layout(bytes(content))
     index, real = layout.place("Once", "stamp"), layout.place("JointJacobians", "q")

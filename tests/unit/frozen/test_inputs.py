@@ -188,7 +188,7 @@ def test_too_many_ramps_at_a_time(tmp_path: Path) -> None:
 
 
 def said(mass: float, center: list[float], moments: list[float]) -> np.ndarray:
-    """Return a payload as a program says it, of moments about the frame's axes."""
+    """Return a payload as a program sets it, of moments about the frame's axes."""
     a, b, c = moments
     return np.array([mass, *center, a, 0.0, 0.0, b, 0.0, c])
 

@@ -1,4 +1,4 @@
-"""A step of a frozen controller allocates nothing, and asks nothing of the system."""
+"""A step of a frozen controller allocates nothing, and makes no system call."""
 
 import os
 import subprocess

@@ -152,7 +152,7 @@ def test_it_can_be_the_first_that_is_asked(opened: Opened) -> None:
 # -- nothing is known ---------------------------------------------------------------
 
 REPEATED = 5
-"""Periods in a row with the last effort, as `hsp_step.h` says."""
+"""Periods in a row with the last effort, as in `hsp_step.h`."""
 
 
 def test_a_dead_sensor_does_not_drive_the_arm(opened: Opened) -> None:

@@ -116,7 +116,7 @@ def test_targets_and_velocities_whenever_they_come(kind: str, tmp_path: Path) ->
 
 
 class Sender:
-    """A program that sends by a clock of its own, which restarts at times."""
+    """A program that sends by its own clock, which restarts at times."""
 
     def __init__(self, rng: np.random.Generator) -> None:
         self.rng, self.offset = rng, 1e3

@@ -108,7 +108,7 @@ def test_primitives_serve_and_the_missing_mesh_is_named(
         (ball,) = link_shapes(robot)
         (again,) = link_shapes(robot, "hulls")
     assert ball.link == again.link == "base"
-    (record,) = caplog.records  # said once
+    (record,) = caplog.records  # logged once
     text = record.getMessage()
     assert "of 1 links are missing, which distances therefore do not see: arm" in text
     assert "(package://acme_arm/upper.stl)" in text

@@ -239,7 +239,7 @@ def test_nothing_is_nan_where_a_normal_has_no_direction(
 
 
 def test_meshes_hulls_clouds_and_terrain(tmp_path: Path) -> None:
-    """What stands for what: a convex mesh is its hull, a notched one is not; a flat
+    """Shapes that replace others: a convex mesh its hull, a notched one not; a flat
     terrain is a plane; a cloud is its cubes, whichever way Coal names the witnesses.
     """
     robot = load("panda")

@@ -170,7 +170,7 @@ def test_meshes_without_a_place_or_a_hull(tmp_path: Path) -> None:
 def test_a_robot_without_geometry_gets_capsules_and_one_warning(
     tmp_path: Path, caplog: pytest.LogCaptureFixture
 ) -> None:
-    """From joint to joint, and a ball at the last; said once for all its fields."""
+    """From joint to joint, and a ball at the last; logged once for all its fields."""
     robot = odd_robot(tmp_path)
     rounded = Obstacle("ball", Sphere(0.1), Hold([1.0, 0.0, 0.0]))
     flat = Obstacle("box", Box((0.1, 0.1, 0.1)), Hold([-1.0, 0.0, 0.0]))

@@ -50,7 +50,7 @@ def test_distances_see_a_mesh_in_metres_and_upright(
 def test_an_obstacle_is_in_metres_and_upright(
     name: str, unit: str | None, up: str | None, tmp_path: Path
 ) -> None:
-    """Its scale is a factor on what the file says."""
+    """Its scale is a factor on the file's unit."""
     mesh = Mesh(tetrahedron(tmp_path / name, unit, up), scale=0.5)
     assert_same_points(np.array(mesh.geometry().vertices()), 0.5 * CORNERS)
     assert mesh.bounding_radius == pytest.approx(1.5)

@@ -84,7 +84,7 @@ def test_recursion_is_the_stacked_law(form: int, seed: int, levels: list[int]) -
 def test_conflict_leaves_the_upper_level_exact(
     form: int, seed: int, upper: int, lower: int
 ) -> None:
-    """A lower level that asks for the upper's rows, and others: the oracle's answer."""
+    """A lower level that has the upper's rows, and others: the oracle's answer."""
     rng = np.random.default_rng(seed)
     x = numbers(seed, upper + lower, 7, form)
     mix = rng.standard_normal((lower, upper))
@@ -100,7 +100,7 @@ def test_conflict_leaves_the_upper_level_exact(
     )
     np.testing.assert_allclose(x.J @ e_N, 0.0, rtol=0, atol=1e-9)
     expected, expected_e_N = lexicographic(x, [upper, lower])
-    # What rounding leaves of the blocked row (1e-16) acts with 2/threshold² = 2e4.
+    # The blocked row's rounding error (1e-16) is amplified by 2/threshold² = 2e4.
     np.testing.assert_allclose(e_N, expected_e_N, rtol=0, atol=1e-8)
     np.testing.assert_allclose(a, expected, rtol=1e-8, atol=1e-8)
 

@@ -115,7 +115,7 @@ def assert_moore_penrose(J: Array, J_sharp: Array, W: Array, atol: float) -> Non
         (J_sharp @ J @ J_sharp, J_sharp),
         (J @ J_sharp, (J @ J_sharp).T),
         (W @ J_sharp @ J, (W @ J_sharp @ J).T),
-        # What the law makes of them: W P = PᵀW, J P = 0 and P P = P.
+        # The law's projector: W P = PᵀW, J P = 0 and P P = P.
         (J @ (np.eye(n) - J_sharp @ J), np.zeros_like(J)),
     ]
     for actual, expected in pairs:

@@ -117,7 +117,7 @@ def matrix_gain(nv: int, W: Array) -> Array:
 
 
 class Terms(NamedTuple):
-    """What the oracle needs, from the state, tasks, field and metric themselves."""
+    """The oracle's input, from the state, tasks, field and metric themselves."""
 
     J: Array
     J_dot: Array

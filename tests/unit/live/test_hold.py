@@ -65,7 +65,7 @@ def test_it_begins_at_the_latest_after_the_longest_damping() -> None:
 
 
 def test_it_pulls_back_to_where_it_began_with_the_inertia_there() -> None:
-    """However far the robot has been moved, and wherever it was asked meanwhile."""
+    """However far the robot has been moved, and wherever it was commanded meanwhile."""
     stop, q0 = stopped()
     M0, _ = mass_and_gravity(q0)
     rng = np.random.default_rng(2)

@@ -1,4 +1,4 @@
-"""Whatever a robot's sensors say, the loop and its safe stop accelerate no joint."""
+"""Whatever sensors report, the loop and its safe stop accelerate no joint."""
 
 from collections.abc import Callable
 from dataclasses import replace
@@ -204,7 +204,7 @@ def test_what_replaces_a_lie_may_die_as_well(kind: str) -> None:
     )
     assert report.ended == "fault"
     assert report.silent
-    # What was sent before ends by its rate; 0.94 rad/s if the positions are believed.
+    # The last effort ends by its rate; 0.94 rad/s if the positions are believed.
     assert np.array(robot.speeds)[robot.stopped :].max() < 0.6
 
 
@@ -510,7 +510,7 @@ def test_what_the_reaction_does_not_explain_is_something_else() -> None:
 
 
 def test_a_velocity_that_is_trusted_alone_may_stand_too() -> None:
-    """Positions that are not trusted any more may say what they like."""
+    """Positions that are not trusted any more may have any values."""
     check, none, all_ = VelocityCheck(panda(), SETTINGS, PERIOD), NONE, ~NONE
     check.trust(none, all_)
     for k in range(60):

@@ -64,7 +64,7 @@ def run(robot: Rig, **options: Any) -> LoopReport:
 
 
 def assert_safe(robot: Rig, report: LoopReport) -> None:
-    """What was sent keeps its limits, and the robot is at rest."""
+    """The sent efforts keep their limits, and the robot is at rest."""
     sent = np.array(robot.sent)
     assert np.isfinite(sent).all()
     assert np.abs(sent).max() <= EFFORT + 1e-9

@@ -1,4 +1,4 @@
-"""What the log of a loop says of each period, beside what robot and loop did."""
+"""The log of a loop, period by period, compared with robot and loop."""
 
 from pathlib import Path
 
@@ -21,7 +21,7 @@ UNSEEN = 80
 
 
 class Told(Rig):
-    """A robot that says how old its states are, and takes its time with efforts."""
+    """A robot that reports the age of its states, and applies efforts late."""
 
     def __init__(self) -> None:
         super().__init__(watched())
@@ -154,7 +154,7 @@ def test_a_stop_without_states_is_logged_as_predicted(tmp_path: Path) -> None:
 
 
 def test_efforts_follow_limits_that_fall_in_a_run() -> None:
-    """Also of a source that asks for more than its controller may."""
+    """Also of a source that commands more than its controller may."""
 
     class Strong(CompensatedController):
         def effort(self, t: float, q: Array, v: Array, period: float) -> Array:
@@ -173,7 +173,7 @@ def test_efforts_follow_limits_that_fall_in_a_run() -> None:
 
 def test_after_an_effort_that_was_not_sent_the_rate_counts_from_the_last_one() -> None:
     class Fails(Rig):
-        """Does not say which effort it has, so that its loop must know."""
+        """Does not report which effort it has, so that its loop must know."""
 
         def read(self, timeout: float) -> Measurement | None:
             found = super().read(timeout)

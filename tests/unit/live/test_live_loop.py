@@ -50,7 +50,7 @@ def assert_held(rig: Rig, report: LoopReport) -> None:
     assert report.phase is Phase.HOLDING
     assert not report.silent
     assert report.speed < AT_REST
-    # What the loop sent until its end: `close` adds the robot's own stop afterwards.
+    # Efforts sent until the loop's end: `close` adds the robot's own stop afterwards.
     assert rig.robot.reason == "the loop has ended"
     assert np.abs(rig.robot.v).max() < AT_REST
 
@@ -234,7 +234,7 @@ def test_a_task_of_another_form_is_logged_by_another_name() -> None:
         assert np.isnan(np.delete(error, rows, axis=0)).all()
 
 
-# --- what is refused -----------------------------------------------------------------
+# --- refusals -----------------------------------------------------------------------
 
 
 def test_a_floating_base_that_nothing_holds_is_refused() -> None:

@@ -1,4 +1,4 @@
-"""The robot's side: what it accepts, how it stops, and which effort it says it has."""
+"""The robot's side: what it accepts, how it stops, and which effort it reports."""
 
 from collections.abc import Iterable
 
@@ -241,7 +241,7 @@ def test_nothing_presses_while_brakes_hold_a_robot(
 def test_a_stop_keeps_the_limits_of_motors_that_bear_gravity_themselves(
     sign: float,
 ) -> None:
-    """What is sent is tau - g: the limits of tau, and not of that, hold for it."""
+    """The sent effort is tau - g: the limits apply to tau, not to it."""
     q, limit = start(), 40.0
     chosen = LiveSettings(effort_rate=4e4, effort=limit, compensates_gravity=True)
     limiter = EffortLimiter(panda(), chosen, PERIOD)
@@ -255,7 +255,7 @@ def test_a_stop_keeps_the_limits_of_motors_that_bear_gravity_themselves(
 
 
 def test_a_lost_effort_corrects_the_momentum_observer() -> None:
-    """What is compensated counts from the applied effort, not from the sent one."""
+    """Compensation is computed from the applied effort, not from the sent one."""
     observer = Compensation(momentum_observer=MomentumObserver(200.0, cancel=False))
 
     class Watching(CompensatedController):

@@ -193,7 +193,7 @@ def test_a_served_robot_runs_stops_and_says_why() -> None:
     tau = panda().inverse_dynamics(start(), np.zeros(7), np.zeros(7))
     seen: list[int] = []
 
-    def pilot() -> None:  # the server asks every period: the loop's turn
+    def pilot() -> None:  # the server polls every period: the loop's turn
         found = hardware.read(0.0)
         if found is None:
             return
@@ -240,7 +240,7 @@ def test_efforts_that_answer_old_states_are_nobody_s() -> None:
 def test_an_effort_may_answer_a_state_as_old_as_the_watchdog_waits(
     lag: int, in_time: bool
 ) -> None:
-    """What answers a state comes a period later, so a lag of nine is an age of ten."""
+    """The answer to a state comes a period later, so a lag of nine is an age of ten."""
     receiver, robot = Link(7), watched(LiveSettings(watchdog=10))
     link = Link(7, peer=receiver.address)
     tau = panda().inverse_dynamics(start(), np.zeros(7), np.zeros(7))
@@ -349,8 +349,8 @@ def test_whatever_is_raised_around_a_served_robot_stops_it(
 
 def test_our_own_packets_that_come_back_are_foreign() -> None:
     """A switch that mirrors, or a second socket: states go on to count."""
-    robot = Link(7, hears=PacketKind.EFFORT)
-    loop = Link(7, peer=robot.address, hears=PacketKind.STATE)
+    robot = Link(7, receives=PacketKind.EFFORT)
+    loop = Link(7, peer=robot.address, receives=PacketKind.STATE)
     robot.peer = loop.address
     for k in range(5):
         for _ in range(3):  # the loop is ahead of the robot in its numbers

@@ -1,4 +1,4 @@
-"""What changes a joint's momentum: efforts, bounded contacts, or a lie."""
+"""Causes of a change of momentum: efforts, bounded contacts, or a lie."""
 
 import numpy as np
 import pytest

@@ -82,7 +82,7 @@ def test_a_joint_that_accelerates_within_a_period_is_no_contradiction(
 
 
 class Motion:
-    """What is trusted of a Panda at rest, whose last joint says something else."""
+    """Trusted sources of a Panda at rest whose last joint reports a motion."""
 
     def __init__(self, period: float) -> None:
         self.trusted = TrustedMotion(panda(), SETTINGS, period)

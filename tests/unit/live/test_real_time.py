@@ -1,4 +1,4 @@
-"""What a loop in real time needs: priority, no collector."""
+"""Needs of a loop in real time: priority, no collector."""
 
 import gc
 import inspect

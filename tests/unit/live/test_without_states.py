@@ -11,7 +11,7 @@ from hsp_control.live.state_reader import StateReader
 
 
 class Silent:
-    """Hardware with a clock of its own that sends states until it is told to be still.
+    """Hardware with its own clock that sends states until it is stopped.
 
     Attributes:
         now: Its clock [s].

@@ -105,7 +105,7 @@ def calls(monkeypatch: pytest.MonkeyPatch) -> list[int]:
 
 
 def test_distances_are_measured_once_per_state(calls: list[int]) -> None:
-    """However often they are asked for; and four times more along the flow, for g'.
+    """However often they are requested; and four times more along the flow, for g'.
 
     That is Coal's part; distances in closed form have an exact rate.
     """

@@ -97,7 +97,7 @@ TOUCHING = {
 
 
 def test_a_start_in_contact_is_refused_where_the_configuration_says_so() -> None:
-    """A barrier cannot push out what is inside already; the pair and depth are said."""
+    """A barrier cannot push out what is inside already; pair and depth are named."""
     with pytest.raises(SceneError) as caught:
         load_experiment(TOUCHING)
     robot = load("panda")

@@ -65,7 +65,7 @@ def test_field_and_its_rate(case: tuple[str, str], metric_name: str) -> None:
 
     rate = derivative(along, 0.005)
     scale = scale + np.abs(rate).max()
-    # What W⁻¹ is known to, of a g that may be far larger than its rate, over the step.
+    # The error of W⁻¹, times g, which may be far larger than its rate, over the step.
     rounding = 0.25 * np.finfo(float).eps * np.linalg.cond(W(q)) * np.abs(g).max()
     atol = member.rate_accuracy * scale + rounding / 0.005
     np.testing.assert_allclose(g_dot, rate, rtol=0, atol=atol)

@@ -74,7 +74,7 @@ def cost(value: Any = 0.0, *, name: str = "", **options: Any) -> FunctionCost:
 
 
 class Wrong(ValueOnly):
-    """A cost whose value or gradient is what it is told."""
+    """A cost whose value or gradient is a given one."""
 
     given: Any
     slope: Any = None

@@ -51,7 +51,7 @@ def close(actual: Array, expected: Array, atol: float) -> None:
     np.testing.assert_allclose(actual, expected, rtol=0, atol=atol)
 
 
-# -- what the costs say ----------------------------------------------------------------
+# -- values of the costs ---------------------------------------------------------------
 
 
 def test_the_planar_arm_in_closed_form() -> None:
@@ -168,7 +168,7 @@ def test_every_mistake_is_named(
 
 
 class Reach(JacobianCost):
-    """What a user writes: minus half the square of the pose rows' Frobenius norm."""
+    """A user's cost: minus half the square of the pose rows' Frobenius norm."""
 
     rows: Rows = "pose"
     length: Positive = 0.5

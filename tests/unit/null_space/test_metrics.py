@@ -26,7 +26,7 @@ seeds = st.integers(0, 2**32 - 1)
 
 
 def test_the_mass_matrix_over_the_robots_own_inertia() -> None:
-    """P is that of M itself; a descent is as much quicker as the inertia says."""
+    """P is that of M itself; a descent is quicker in proportion to the inertia."""
     robot, rng = load("panda"), np.random.default_rng(32)
     state = robot.state(0.0, robot.random_configuration(rng), rng.standard_normal(7))
     metric = MassMatrixMetric(inertia="robot").placed(Start(state, Scene()))
@@ -115,7 +115,7 @@ def test_coordinates_of_the_robot_s_source() -> None:
 
 
 def test_a_metric_s_own_evaluate_is_compiled() -> None:
-    """What a subclass overrides in plain Python is what a step calls."""
+    """A step calls the methods that a subclass overrides in plain Python."""
 
     class Halved(ConstantMetric):
         """Half of a matrix."""

@@ -80,7 +80,7 @@ def test_pairs_of_links_that_are_watched() -> None:
     assert frozenset(("panda_link0", "panda_hand")) in watched
     assert frozenset(("panda_link3", "panda_link4")) not in watched  # neighbours
     assert frozenset(("panda_hand", "panda_leftfinger")) not in watched  # one joint
-    assert without  # the SRDF says something
+    assert without  # with pairs in the SRDF
     assert not watched & without
     assert watched <= expected
     home = still(robot)

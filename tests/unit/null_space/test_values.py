@@ -93,7 +93,7 @@ NAMES = {key: value for module in MODULES for key, value in vars(module).items()
 
 @every_member
 def test_members_are_values(name: str) -> None:
-    """The `repr` is the call that makes an equal value; any one field counts."""
+    """The `repr` is the call that makes an equal value; every field has an effect."""
     member = members()[name]
     assert_documented(member)
     for arguments in EXAMPLES[name]:

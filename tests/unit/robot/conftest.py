@@ -1,4 +1,4 @@
-"""What tests of robots share."""
+"""Fixtures of the tests of robots."""
 
 from collections.abc import Callable
 from pathlib import Path

@@ -117,7 +117,7 @@ def test_inverse_dynamics_is_m_a_plus_n_and_forward_dynamics_undoes_it(
     np.testing.assert_allclose(
         robot.inverse_dynamics(q, v, a), tau, rtol=0, atol=1e-13 * scale
     )
-    # Solving loses what the condition number says: at most 1e6 here.
+    # Solving loses digits by the condition number: at most 1e6 here.
     back = robot.forward_dynamics(q, v, tau)
     cond = np.linalg.cond(state.mass_matrix)
     np.testing.assert_allclose(back, a, rtol=0, atol=1e-14 * cond + 1e-12)

@@ -76,7 +76,7 @@ def test_sdf_only_robot_is_not_listed_and_is_refused_by_name() -> None:
 
 
 def test_without_example_robot_data(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Bundled robots still load; the error for others says what to install."""
+    """Bundled robots still load; the error for others names the package to install."""
     real = importlib.util.find_spec
 
     def find_spec(name: str, package: str | None = None) -> Any:

@@ -198,7 +198,7 @@ def welded(parent: str, name: str) -> list[str]:
           joint("weld", "b", "hand_camera", "fixed")], "b"),
         ([chain("base", "a", "b"), link("left_finger"),
           joint("weld", "b", "left_finger", "fixed")], "b"),
-        # What was welded on to be the hand comes before what was welded on later.
+        # The body that was welded on as the hand precedes those welded on later.
         ([chain("base", "a", "b"), *welded("b", "my_tcp"), *welded("b", "cover")],
          "my_tcp"),
         ([chain("base", "a", "b"), *welded("b", "ee_link"), *welded("b", "tool0"),

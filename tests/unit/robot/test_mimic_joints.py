@@ -23,7 +23,7 @@ TYPES = "revolute", "continuous", "prismatic"
 def pair(
     multiplier: float, limits: str = "", dynamics: str = "", leader: str = "revolute"
 ) -> str:
-    """Return a leader and its follower, with what is said of the follower."""
+    """Return a leader and its follower, with the follower's attributes."""
     mimic = follow("leader", multiplier, 0.1)
     text = chain(
         ("leader", leader, ""), ("follower", "revolute", mimic + dynamics),

@@ -66,8 +66,8 @@ def test_a_rotor_of_no_joint_is_named_when_the_robot_is_loaded(
     path = arm(tmp_path, PLAIN.replace('joint name="b"', 'joint name="bb"'))
     assert armature(hsp.Robot.load(path)) == [0.0, 0.0]
     assert (
-        f"{path}: transmission 't': its rotor counts for no joint: there is no joint "
-        "'bb'; did you mean 'b'?"
+        f"{path}: transmission 't': its rotor is assigned to no joint: there is no "
+        "joint 'bb'; did you mean 'b'?"
     ) in caplog.text
 
 

@@ -115,7 +115,7 @@ def sliding() -> Robot:
 
 
 def test_the_slides_of_a_translation_keep_their_limits() -> None:
-    """The hand is asked for 0.9 m: the slide ends at 0.2 m."""
+    """The hand is commanded to 0.9 m: the slide ends at 0.2 m."""
     robot = sliding()
     lower, upper = robot.position_limits()
     np.testing.assert_array_equal(lower, [-0.2, -0.2, -0.2, -2.0])

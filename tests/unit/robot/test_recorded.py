@@ -27,7 +27,7 @@ from hsp_control.robot.description.robot_description import (
     RobotDescription,
     ToolFrame,
 )
-from hsp_control.robot.recorded import recorded_robot, robot_record
+from hsp_control.robot.recorded import OtherRobotWarning, recorded_robot, robot_record
 
 TWO = RobotDescription(
     parts={
@@ -107,7 +107,7 @@ def one_of_many() -> hsp.Robot:
 
 
 def tilted() -> hsp.Robot:
-    """A joint that turns often about an axis of its own, and one that it leads."""
+    """A joint that turns often about its own axis, and one that it leads."""
     joints = "".join(
         f'<joint name="j{k}" type="continuous"><parent link="l{k}"/>'
         f'<child link="l{k + 1}"/><axis xyz="{axis}"/>'
@@ -191,6 +191,17 @@ def test_an_edited_urdf_is_named_and_the_log_s_own_counts(
     with caplog.at_level(logging.WARNING):
         equal(recorded_robot(record), robot)
     assert f"{urdf} has changed since the log was made" in caplog.text
+    rest = np.zeros((1, robot.nv))
+    run = hsp.Rollout(
+        {
+            "t": np.zeros(1),
+            "q": robot.home()[None],
+            **dict.fromkeys(["v", "tau"], rest),
+        },
+        {"robot": {"record": record}},
+    )
+    with pytest.warns(OtherRobotWarning, match=r"is not the robot of the log"):
+        run.measure(hsp.Robot.load(urdf), lambda state: state.t)
     shutil.rmtree(urdf.parent)
     equal(recorded_robot(record), robot)
 

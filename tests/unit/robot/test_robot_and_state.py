@@ -128,7 +128,7 @@ def test_unknown_joint(joint: str, hint: str) -> None:
 def test_pickle_and_deep_copy_round_trip(
     case: str, duplicate: Callable[[Robot], Robot]
 ) -> None:
-    """The other robot is another object that says the same, to the last bit."""
+    """The other robot is another object with the same results, to the last bit."""
     robot, q, v, _ = draw(case, seed=28)
     if robot.mimics and duplicate is by_pickle:
         # Pinocchio would restore a model that ends the process when it is used.

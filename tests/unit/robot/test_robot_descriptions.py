@@ -44,7 +44,7 @@ def installed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 @pytest.mark.usefixtures("installed")
 def test_by_name_and_by_description(capsys: pytest.CaptureFixture[str]) -> None:
     named = Robot.load("arm_description")
-    assert capsys.readouterr().out == ""  # what is cloned is said on standard error
+    assert capsys.readouterr().out == ""  # cloning is reported on standard error
     described = Robot.load(RobotDescription(description="arm_description"))
     assert named.source == described.source
     assert named.name == "arm_description"

@@ -1,4 +1,4 @@
-"""The bundled robots are what their READMEs say, read by plain Pinocchio."""
+"""The bundled robots agree with their READMEs, read by plain Pinocchio."""
 
 import re
 from pathlib import Path
@@ -40,7 +40,7 @@ def urdf(name: str) -> Path:
 
 
 def robot_yaml(name: str) -> dict[str, Any]:
-    """Return what a bundled robot's robot.yaml says."""
+    """Return the content of a bundled robot's robot.yaml."""
     return yaml.safe_load((ROBOTS / name / "robot.yaml").read_text(encoding="utf-8"))
 
 

@@ -1,4 +1,4 @@
-"""Check that one state can be moved, asked in any order and fed wrong numbers."""
+"""Check that one state can be moved, read in any order and fed wrong numbers."""
 
 import gc
 import itertools

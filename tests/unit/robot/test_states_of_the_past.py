@@ -25,7 +25,7 @@ kinds = pytest.mark.parametrize("kind", KINDS)
 
 
 class Used:
-    """All that computes something of one robot, to be asked again and again."""
+    """All that computes something of one robot, to be called again and again."""
 
     def __init__(self, robot: Robot) -> None:
         self.robot = robot
@@ -110,7 +110,7 @@ def reductions(folder: Path) -> Iterator[tuple[str, Robot, Robot, Array, Array]]
         file = folder / f"{kind}.urdf"
         file.write_text(text)
         robot, free = Robot.load(file), Robot.load(file, mimic=False)
-        # each as its URDF says: q_free = A q_free + B q + b, link by link of a chain
+        # each as in its URDF: q_free = A q_free + B q + b, link by link of a chain
         A, B, b = (np.zeros((free.nv, *each)) for each in ((free.nv,), (robot.nv,), ()))
         for name in robot.joint_names:
             own, there = (each.velocity_index(name) for each in (robot, free))

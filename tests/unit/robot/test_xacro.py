@@ -1,4 +1,4 @@
-"""Xacro files: expanded where xacro is installed, else the message that says how."""
+"""Xacro files: expanded where xacro is installed, else an exact message."""
 
 import sys
 from pathlib import Path
@@ -23,7 +23,7 @@ XACRO = ARM.replace(
 
 
 class ArgumentMissingError(Exception):
-    """What the stand-in raises for an argument without a value."""
+    """The stand-in's error for an argument without a value."""
 
 
 @pytest.fixture

@@ -1,4 +1,4 @@
-"""What tests of runs share."""
+"""Fixtures of the tests of runs."""
 
 import pytest
 from closed_loops import EXACT, planar_controller, planar_start

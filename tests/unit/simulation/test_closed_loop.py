@@ -42,7 +42,7 @@ def test_sampled_control_converges_in_first_order(which: str) -> None:
 
 
 class Spy(RigidBodyPlant):
-    """A plant that writes down what it is asked."""
+    """A plant that records its calls."""
 
     def __init__(self, robot: Robot) -> None:
         super().__init__(robot)

@@ -1,4 +1,4 @@
-"""A plant that its motors cannot move is told, with the number that would do."""
+"""A plant that its motors cannot move is reported, with a feasible number."""
 
 import re
 from typing import Any

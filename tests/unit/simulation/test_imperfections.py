@@ -183,7 +183,7 @@ def test_without_friction_it_is_the_ideal_plant_to_second_order(name: str) -> No
 
 
 def test_a_step_obeys_coulombs_law_in_every_joint() -> None:
-    """What is left of M Δv - h(tau - N) is h c sign(v), or less where v = 0."""
+    """The residual of M Δv - h(tau - N) is h c sign(v), or less where v = 0."""
     robot = load("panda")
     coulomb = np.array([5.0, 5.0, 3.0, 3.0, 1.0, 1.0, 0.5])
     plant = StickingPlant(robot, JointFriction.of(robot, coulomb), step=1e-4)
@@ -328,7 +328,7 @@ def test_a_lag_acts_by_its_mean_over_the_period(time_constant: float) -> None:
 
 
 def test_a_drive_that_loses_efforts() -> None:
-    """Each is the commanded one, or what the last one was; the first is there."""
+    """Each is the commanded one, or the previous one; the first is there."""
     efforts = [np.full(7, float(k)) for k in range(2000)]
     found = [effort[0] for effort in driven(DroppedPeriods(0.3), efforts, seed=2)]
     lost = 0

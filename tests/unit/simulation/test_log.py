@@ -32,7 +32,7 @@ from hsp_control.trajectories import Lissajous
 
 
 def test_columns(planar_run: Rollout) -> None:
-    """Every column is described, of the length of t, and says what the state says."""
+    """Every column is described, of the length of t, and agrees with the state."""
     run, controller = planar_run, planar_controller()
     robot = controller.robot
     assert set(run.meta["columns"]) == set(run.columns)

@@ -1,4 +1,4 @@
-"""What a plan is told once a period: contact forces obey the balance of momentum."""
+"""A plan's measurements, once a period: forces obey the balance of momentum."""
 
 import numpy as np
 import pytest
@@ -19,7 +19,7 @@ FEET = ("FL_FOOT", "FR_FOOT", "HL_FOOT", "HR_FOOT")
 
 
 class Listening(RunningPlan):
-    """Keeps what it is told; says that the robot falls at a time."""
+    """Keeps its measurements; reports that the robot falls at a time."""
 
     def __init__(self, falls_at: float = np.inf) -> None:
         super().__init__(Falls())

@@ -1,4 +1,4 @@
-"""What a loop bears of what its model lacks: told, and done by the arm."""
+"""Errors of the model that a loop tolerates: reported, and simulated."""
 
 import numpy as np
 import pytest
@@ -65,7 +65,7 @@ def test_a_delay_that_is_told_is_borne_and_a_longer_one_is_not(name: str) -> Non
 
 @pytest.mark.parametrize("rotors", [0.05, *further(0.02)])
 def test_rotors_that_the_drives_hide_cost_delay(rotors: float) -> None:
-    """Too much of a rotor is too strong a law: of a bare arm it bears less delay."""
+    """Too much of a rotor is too strong a law: it tolerates less delay."""
     made, q = holding(WrongArm("panda", 0, motor_inertia=rotors))
     found = model_errors(made, q, H, Compensation())
     assert found is not None
@@ -93,7 +93,7 @@ class Pushed(RigidBodyPlant):
 
 @pytest.mark.parametrize("joint", [3, *further(0, 5)])
 def test_an_unknown_effort_moves_the_hand_as_far_as_is_told(joint: int) -> None:
-    """A hundredth of what is told for 1 N·m, where the arm is linear."""
+    """A hundredth of the reported value for 1 N·m, where the arm is linear."""
     small = 0.01
     for compensation in (*further(ALONE), Compensation()):
         found, made, q = borne("panda", compensation)
@@ -116,7 +116,7 @@ def test_an_unknown_effort_moves_the_hand_as_far_as_is_told(joint: int) -> None:
 
 @pytest.mark.parametrize("name", ARMS)
 def test_no_mode_grows_by_default_and_it_takes_no_time(name: str) -> None:
-    """Where it does without an observer it is told, in words as well."""
+    """A loop without an observer is reported as such, in words as well."""
     found, made, q = borne(name, Compensation())
     assert (found.growing, found.growth) == (0, 0.0)
     assert lines(found)["masses ±20 %"] == "no growing mode"

@@ -240,7 +240,7 @@ def test_after_it_the_controller_is_at_its_last_step(
 def test_no_state_between_two_rows_is_missed(
     counted: Counted, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """What is seen beyond limits, here beyond 0.05 rad/s, is seen in each period."""
+    """Excesses of limits, here beyond 0.05 rad/s, are found in every period."""
 
     def strict(limits: RobotLimits | None) -> RobotLimits:
         assert limits is not None
@@ -272,7 +272,7 @@ CHANGES: dict[str, Callable[[Changes], object]] = {
 
 @pytest.mark.parametrize("what", ["task", "limits", *further("gain", "field")])
 def test_a_change_is_made_where_it_begins(what: str, counted: Counted) -> None:
-    """What changes is made in Python; a second after its end the loop goes on.
+    """Changing parts are Python's; a second after their end the native loop continues.
 
     It goes on with what is in force then.
     """
@@ -308,7 +308,7 @@ def test_a_change_is_made_where_it_begins(what: str, counted: Counted) -> None:
 def test_a_motion_that_diverges_stops_the_same_way(
     log_period: float, counted: Counted
 ) -> None:
-    """K_N times the period is 20: joints run away natively, and their speed is told.
+    """K_N times the period is 20: joints run away natively; their speed is reported.
 
     Within a row of 1 s the effort is no number any more.
     """

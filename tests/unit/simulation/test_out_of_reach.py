@@ -1,4 +1,4 @@
-"""Which rows of a log tell that a target is far away, or out of reach."""
+"""Rows of a log in which a target is far away, or out of reach, are found."""
 
 from typing import Any
 

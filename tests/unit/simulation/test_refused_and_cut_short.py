@@ -19,7 +19,7 @@ from hsp_control.common.exceptions import (
 from hsp_control.null_space.fields import FunctionField
 from hsp_control.robot.integrators import Rk4, SemiImplicitEuler
 
-# --- what is refused -----------------------------------------------------------------
+# --- refusals -----------------------------------------------------------------------
 
 
 NO_MULTIPLE = "is not a whole multiple of"

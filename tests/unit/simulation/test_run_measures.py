@@ -1,4 +1,4 @@
-"""Every measure of a run is what its meaning says, computed from the log by NumPy."""
+"""Every measure of a run agrees with its definition, computed by NumPy."""
 
 from functools import cache
 

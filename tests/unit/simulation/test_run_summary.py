@@ -1,4 +1,4 @@
-"""What a run's table says in words, of numbers that are made up."""
+"""Sentences of a run's table, for invented numbers."""
 
 from typing import Any
 

@@ -210,7 +210,7 @@ def test_angular_momentum_obeys_its_first_order_equation(
     np.testing.assert_allclose(
         sample.jacobian @ a + sample.jacobian_dot @ v, rate, rtol=0, atol=1e-9 * scale
     )
-    # Where the law is obeyed, ℓ' = a_x, the error's rate is what the sample says.
+    # Where the law is obeyed, ℓ' = a_x, the error's rate is the sample's.
     desired = target.sample(TIME)
     np.testing.assert_allclose(sample.error, desired.position - momentum(0.0))
     np.testing.assert_allclose(

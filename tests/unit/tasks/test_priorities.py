@@ -96,6 +96,6 @@ def test_a_controller_s_levels(quadruped: Robot) -> None:
     found = {task.name: priority_of(task, quadruped) for task in controller.tasks}
     for name, priority in (("FR_FOOT", 1), ("FL_FOOT", 2), ("posture", 5)):
         assert found[name] == priority
-    # The placed tasks say what the user said, and no more.
+    # The placed tasks have the user's values, and no more.
     given = {task.name: task.priority for task in controller.tasks}
     assert given == {task.name: task.priority for task in tasks}

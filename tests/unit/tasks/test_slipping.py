@@ -95,7 +95,7 @@ def test_no_part_pulls_with_more_and_slips_only_there(kind: str, seed: int) -> N
 
 
 def test_the_default_of_a_robot() -> None:
-    """What its strongest motor holds at half of its size, and half of its effort."""
+    """The force its strongest motor holds at half its size, and half of its effort."""
     robot = panda()
     task = placed(hsp.FramePose("panda_tcp", impedance=hsp.Impedance(100.0)), robot)
     strongest = 87.0

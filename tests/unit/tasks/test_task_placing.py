@@ -152,7 +152,7 @@ def test_a_point_trajectory_of_a_pose_holds_the_orientation() -> None:
     world = Circle(0.1, 2.0, POINT)
     placed = place(FramePose(trajectory=world), here)
     assert placed.trajectory == ComposedPose(world, HoldOrientation(R))
-    # As the same said with a pose; for a relative pose, in the reference's axes.
+    # As the same with a pose; for a relative pose, in the reference's axes.
     said = FramePose(trajectory=ComposedPose(position=world))
     assert place(said, here) == placed
     relative = seen(here, TCP, "panda_link2")

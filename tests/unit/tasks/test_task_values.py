@@ -162,7 +162,7 @@ def test_a_point_and_an_orientation_are_held() -> None:
         np.testing.assert_allclose(held.rotation, TURNED.matrix())
 
 
-# --- what is refused -----------------------------------------------------------------
+# --- refusals -----------------------------------------------------------------------
 
 Wrong = dict[str, list[tuple[Any, str]]]
 _WRONG_TASK: Wrong = {
@@ -254,7 +254,7 @@ WRONG: dict[type[Part], Wrong] = {
     RelativePose: {**_WRONG_TRACKING, **_WRONG_FRAME, "trajectory": _WRONG_POSE,
      "reference": [(None, "reference: ... expected a str")]},
 }  # fmt: skip
-"""For each field, wrong values and what is said about them."""
+"""For each field, wrong values and their messages."""
 
 
 @pytest.mark.parametrize(

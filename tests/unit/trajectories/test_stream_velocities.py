@@ -158,7 +158,7 @@ def test_a_stick_that_is_let_go_of_in_a_long_change_stops_the_hand_as_soon() -> 
 
 
 def test_what_is_repeated_is_not_begun_again() -> None:
-    """How often a stick says the same changes no bit of the motion."""
+    """The rate at which a stick repeats a velocity changes no bit of the motion."""
     found = []
     for every in (5, 20, 90):
         stream = StreamPose(axes="tool").anchored(START)

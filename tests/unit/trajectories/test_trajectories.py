@@ -266,7 +266,7 @@ def test_a_trajectory_of_ones_own() -> None:
 
 
 MIRROR = np.diag([1.0, 1.0, -1.0])
-# What belongs to one field is in test_trajectory_values; here is how they fit together.
+# Single fields are in test_trajectory_values; here is how they fit together.
 ERRORS: dict[str, Callable[[], Any]] = {
     "Line: end ... (2) ... (3,)": (
      lambda: Line([1, 2, 3], 1, start=[0, 0])),

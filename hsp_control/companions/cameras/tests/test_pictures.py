@@ -1,4 +1,4 @@
-"""What another process sees through the cameras of a MuJoCo scene."""
+"""Pictures of a MuJoCo scene's cameras, as another process receives them."""
 
 import multiprocessing
 import os

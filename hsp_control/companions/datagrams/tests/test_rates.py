@@ -1,4 +1,4 @@
-"""What is told at a rate is told at that rate."""
+"""States are published at the rate that is set."""
 
 import numpy as np
 import pytest

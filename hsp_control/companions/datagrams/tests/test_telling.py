@@ -1,4 +1,4 @@
-"""What a live loop tells a policy, heard by plain sockets, in Python and elsewhere."""
+"""States that a live loop publishes, received by plain sockets, in Python and C."""
 
 import json
 import math

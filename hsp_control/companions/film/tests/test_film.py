@@ -1,4 +1,4 @@
-"""Films: their moments, what is refused, and what is said where something lacks."""
+"""Films: their moments, refusals, and messages where something is missing."""
 
 import re
 import sys

@@ -172,7 +172,7 @@ def test_a_gripper_s_process_that_hangs_is_noticed(
             now += step
             assert not process.trouble()
         theirs.send(client.ALIVE)
-        for _ in range(51):  # the first one hears it
+        for _ in range(51):  # the first one receives it
             now += 0.0999
             assert not process.trouble()
         now += 0.0999

@@ -19,7 +19,7 @@ CARRIED = pin.Inertia(0.9, np.array([0.01, -0.02, 0.06]), np.diag([3e-3, 2e-3, 2
 
 
 def said(body: pin.Inertia = CARRIED) -> dict[str, Any]:
-    """Return a load as a Franka says it."""
+    """Return a load as a Franka reports it."""
     inertia = body.inertia.ravel().tolist()
     return {"mass": body.mass, "center": body.lever.tolist(), "inertia": inertia}
 

@@ -1,4 +1,4 @@
-"""What is written behind franka://, and what the arm's errors are told as."""
+"""Settings behind franka://, and the messages of the arm's errors."""
 
 from pathlib import Path
 

@@ -1,4 +1,4 @@
-"""What the gripper's process takes from a datagram, without a gripper."""
+"""The gripper's process reads commands from datagrams, without a gripper."""
 
 import json
 import socket
@@ -45,7 +45,7 @@ def test_nothing_else_moves_the_fingers(message: Any) -> None:
 
 
 def test_its_own_answers_that_come_back_are_no_orders() -> None:
-    """A policy that sends back what it hears: they answered each other without end."""
+    """A policy that echoes messages: they answered each other without end."""
     made, openings = gripper(), []
     state = SimpleNamespace(width=0.03, is_grasped=True)
     made.gripper = SimpleNamespace(

@@ -1,6 +1,6 @@
 """A Franka arm behind pylibfranka, unmodified, and the control box on loopback.
 
-All in lockstep: the box waits for each command. The client has a process of its own,
+All in lockstep: the box waits for each command. The client has its own process,
 and what hangs there is killed.
 """
 

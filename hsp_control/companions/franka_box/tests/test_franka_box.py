@@ -1,4 +1,4 @@
-"""The box and the real client: pylibfranka in a process of its own, in lockstep.
+"""The box and the real client: pylibfranka in another process, in lockstep.
 
 A client can hang where libfranka waits for ever, so each has a time limit.
 """

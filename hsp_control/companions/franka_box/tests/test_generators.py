@@ -62,7 +62,7 @@ def test_joints_follow_the_hand_to_its_pose() -> None:
 def test_a_client_that_is_late_for_its_first_commands_has_begun(
     late: int, jerk: float
 ) -> None:
-    """What arrives first is no start at rest: the second would be a jerk of 19 j/6."""
+    """The first command is no start at rest: the second would be a jerk of 19 j/6."""
     generator, model = made(HandPoses)
     start = model.hand_at(home())[0]
     for step in (late, late + 1):

@@ -1,4 +1,4 @@
-"""The server and clients that speak badly: one line each, and the box goes on."""
+"""The server and faulty clients: one line each, and the box goes on."""
 
 import socket
 import struct
@@ -30,7 +30,7 @@ MOVE = struct.pack("<II", 2, 4).ljust(113, b"\0")
 
 
 class RawClient:
-    """A client that can say anything."""
+    """A client that can send anything."""
 
     def __init__(self, rig: Rig) -> None:
         self.tcp = socket.create_connection((rig.host, PORT), LONGEST)

@@ -1,4 +1,4 @@
-"""The layouts of the protocol, and the arm as clients are told it."""
+"""The layouts of the protocol, and the arm as clients receive it."""
 
 from pathlib import Path
 
@@ -101,7 +101,7 @@ def test_velocity_limits_are_those_that_libfranka_computes() -> None:
 
 
 def test_velocity_limits_are_read_beside_transmissions(tmp_path: Path) -> None:
-    """A URDF names its joints again where it says what drives them."""
+    """A URDF names its joints again in its transmissions."""
     urdf, arm = panda().robot.source.urdf.read_text(), tmp_path / "arm.urdf"
     slower = '<position_based_velocity_limits velocity_offset="0.3"/>'
     driven = '<transmission name="t"><joint name="panda_joint3"/></transmission>'

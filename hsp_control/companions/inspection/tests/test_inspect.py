@@ -125,7 +125,7 @@ def test_a_mass_matrix_that_is_nearly_singular(look: Look) -> None:
 
 
 def test_motors_that_cannot_hold_the_robot_at_home(look: Look, tmp_path: Path) -> None:
-    """What gravity requires is the slope of the potential energy."""
+    """The effort against gravity is the gradient of the potential energy."""
     assert "effort" not in look(ARM)
     robot = Robot.load(tmp_path / "arm.urdf")
     model, home = robot.model, robot.home()

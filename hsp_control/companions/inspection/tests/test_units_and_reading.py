@@ -1,4 +1,4 @@
-"""What no robot has is named, and so is how files are read and what is not read."""
+"""Implausible values are reported, and so is how files are read, and ignored parts."""
 
 from collections.abc import Callable
 from pathlib import Path
@@ -167,7 +167,7 @@ def test_transmissions_are_looked_at(look: Look) -> None:
     gear = '<transmission name="{}"><joint name="{}"/></transmission></robot>'
     for transmissions, message in (
         ([("one", "shouldr")], "'shouldr' does not exist; did you mean 'shoulder'?"),
-        ([("one", "shoulder"), ("two", "shoulder")], "the last one's rotor counts"),
+        ([("one", "shoulder"), ("two", "shoulder")], "the last one's rotor is used"),
         ([("one", "shoulder"), ("two", "elbow")], ""),
     ):
         text = ARM

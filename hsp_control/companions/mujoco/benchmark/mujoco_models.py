@@ -3,7 +3,7 @@ r"""Compare robots made of MuJoCo's models with MuJoCo, for every MJCF of many p
     .venv/bin/python hsp_control/companions/mujoco/benchmark/mujoco_models.py \
         [--folder NAME=PATH ...]
 
-Downloads the packages, without what they depend on, into a temporary folder; or takes
+Downloads the packages, without their dependencies, into a temporary folder; or uses
 the MJCF files of a folder. Every file that MuJoCo compiles and that has a joint is made
 a robot as a whole. Writes mujoco_models.csv and a section of results.md.
 """
@@ -150,7 +150,7 @@ def numbers_of(found: Differences) -> list[str]:
 
 
 def table(rows: list[Row], counts: dict[str, tuple[str, int, int]]) -> str:
-    """Return the table by package, and the list of what does not agree."""
+    """Return the table by package, and the list of disagreements."""
     lines = [
         f"MuJoCo {mujoco.__version__}, {STATES} random states of each model.",
         "",

@@ -1,4 +1,4 @@
-"""What is said of commanded forces before a run, and after it."""
+"""Notes on commanded forces before a run, and after it."""
 
 import re
 from pathlib import Path

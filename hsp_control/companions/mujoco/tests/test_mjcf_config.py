@@ -61,7 +61,7 @@ def test_a_configuration_runs_in_its_scene(
     rollout = experiment.run()
     assert rollout.meta["plant"]["motors"] == ["j1", "j2", "j3", "j4"]
     assert "plant.contact.ball.force" in rollout.columns
-    # The log says enough to repeat the run.
+    # The log has enough to repeat the run.
     path = folder / "run.npz"
     rollout.save(path)
     again = load_experiment(path).run()

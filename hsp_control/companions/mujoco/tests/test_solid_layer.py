@@ -1,4 +1,4 @@
-"""The solid things of a plant: drawn where they are, moved as the log says."""
+"""The solid things of a plant: drawn where they are, moved as in the log."""
 
 import numpy as np
 import pytest

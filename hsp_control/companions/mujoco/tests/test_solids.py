@@ -1,4 +1,4 @@
-"""Solids in MuJoCo: where they stand, whose friction counts, and what is refused."""
+"""Solids in MuJoCo: where they stand, whose friction is used, and refusals."""
 
 from typing import Any
 

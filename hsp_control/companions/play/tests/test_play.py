@@ -1,4 +1,4 @@
-"""A session that is played with, without a page: what is said becomes motion."""
+"""A session of a play, without a page: messages become motion."""
 
 import math
 from asyncio import CancelledError
@@ -107,7 +107,7 @@ def test_its_own_path_comes_back(session: Session) -> None:
 
 
 def test_the_elbow_of_the_posture_leads_the_null_space(tmp_path: Path) -> None:
-    """The elbow follows as the theorem says, the hand does not notice; and back."""
+    """The elbow follows as in the theorem, the hand is undisturbed; and back."""
     session = Session(playable("panda"))
     go(session, 0.3)
     start = pose_of(session, "posture")
@@ -191,7 +191,7 @@ def test_nonsense_is_answered_and_moves_nothing(
 
 
 class Told:
-    """Keeps the gains that a knob asks for."""
+    """Keeps the gains that a knob sets."""
 
     def gains(self, name: str, gains: hsp.Gains) -> None:
         self.made = gains.matrices(6)
@@ -383,12 +383,12 @@ def test_what_fails_beside_a_play_ends_alone(
     session.receive({"do": "compare", "law": "no field"})
 
     def fail(_: object) -> None:
-        raise RuntimeError("an error of its own")
+        raise RuntimeError("an error in a field")
 
     monkeypatch.setattr(OtherLaw, "advance", fail)
     go(session, 0.1)
     assert session.other is None
-    assert "no field: RuntimeError: an error of its own" in session.handles.message
+    assert "no field: RuntimeError: an error in a field" in session.handles.message
 
 
 def test_the_log_has_an_end(session: Session, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -458,7 +458,7 @@ def test_the_picture_follows_what_is_dragged(session: Session) -> None:
 
 
 def test_a_target_out_of_reach_is_said_and_by_how_much(still: Session) -> None:
-    """Half a metre too high; within reach again nothing is said."""
+    """Half a metre too high; within reach again there is no message."""
     recorder = Recorder()
     picture = Picture(still, Viewer(still.experiment.robot, transport=recorder))
 
@@ -550,7 +550,7 @@ def test_the_operational_space_law_keeps_the_tasks_and_not_the_field(
     for log in logs:
         assert np.abs(log["task.hand.error"]).max() < 2e-3
     late = exact.t > 1.5
-    # What is left of the exact one is the effort that is held for a millisecond.
+    # The exact one deviates because the effort is held for a millisecond.
     assert exact["null_space_norm"][late].max() < 0.02
     assert compared["null_space_norm"][late].max() > 0.3
     assert "operational" in compared.meta["changes_lost"]

@@ -112,7 +112,7 @@ def test_hand_ball_and_elbow(browser: Any, played: Played, tmp_path: Path) -> No
     assert np.linalg.norm(elbow[-1] - elbow[0]) > 0.1
     played.end()
     assert played.process.returncode == 0
-    # The page says so, and finds the next start.
+    # The page reports it, and finds the next start.
     until(page, "document.getElementById('lost').textContent.includes('has ended')")
     assert page.evaluate("play.panel.fields.every((field) => field.disabled)")
     assert page.evaluate("play.bar.acting.every((button) => button.disabled)")

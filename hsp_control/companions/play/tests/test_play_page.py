@@ -1,4 +1,4 @@
-"""The page of `hsp play` in a real browser: what the hand moves, and what it tells.
+"""The page of `hsp play` in a real browser: motions of the hand, and messages.
 
 Chromium without a window; where there is none these tests are skipped, but not in CI.
 The page is that of a real server. Its commands come from the tests, which also keep
@@ -51,7 +51,7 @@ SETUP: dict[str, Any] = {
     "pull": True, "loop": "simulated", "period_ms": 1.0,
 }  # fmt: skip
 
-# Keep what the page says; the server gets only what it knows.
+# Keep the page's messages; the server gets only those that it knows.
 LISTEN = """() => {
   window.sent = [];
   const {connection} = viewer, send = connection.send.bind(connection);
@@ -455,7 +455,7 @@ def test_a_link_is_pulled(page: Any) -> None:
 
 
 def told_until(page: Any, values: dict[str, Any], expression: str) -> None:
-    """Say what the settings are, as with each picture, until an expression is true."""
+    """Send the settings, as with each picture, until an expression is true."""
     text = json.dumps(values)
     until(page, f"viewer.handle_command({{type: 'play_values', values: {text}}}), "
           + expression)  # fmt: skip
@@ -472,7 +472,7 @@ def test_a_refused_value_goes_back(page: Any) -> None:
     assert until_sent(page, "set")[-1] == {"do": "set", "id": "stiffness", "value": 200}
     assert shown.inner_text() == "200 N/m"
     tell(page, "play_values", values={"stiffness": 400.0})
-    assert shown.inner_text() == "200 N/m"  # the program had not heard of it yet
+    assert shown.inner_text() == "200 N/m"  # the program had not received it yet
     page.evaluate("Play.ECHO = PlayPanel.PATIENCE = 0")
     told_until(page, {"stiffness": 400.0}, "document.querySelector('#play-stiffness')"
                ".getAttribute('aria-valuetext') === '400 N/m'")  # fmt: skip
@@ -536,7 +536,7 @@ def test_labels_are_right_at_every_ratio_and_range(page: Any) -> None:
 
 @pytest.mark.browser
 def test_a_slow_program_does_not_turn_a_knob_back(page: Any) -> None:
-    """What it says before it has heard of the change is not shown."""
+    """Its messages from before it received the change are not shown."""
     page.evaluate("play.panel.set('stiffness', 900)")
     page.evaluate("play.touched.set('set stiffness', performance.now() - 1000)")
     tell(page, "play_values", values={"stiffness": 400.0, "friction": False})

@@ -36,7 +36,7 @@ class SteeredLive:
             text=True,
         )
         assert self.process.stdout is not None
-        self.before = ""  # what it said before it had an address
+        self.before = ""  # its messages before it had an address
         for line in self.process.stdout:
             self.before += line
             if found := re.match(r"Steer: (http\S+)", line):
@@ -106,7 +106,7 @@ def test_a_robot_moves_while_the_key_is_held(
     holding = threading.Thread(target=hold)
     holding.start()
     wait_until(lambda: moving(page) or live.process.poll() is not None)
-    let_go.set()  # and says nothing of it
+    let_go.set()  # without a message
     holding.join()
     text = live.text()
     assert live.process.returncode == 0, text

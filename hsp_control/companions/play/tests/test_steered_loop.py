@@ -27,7 +27,7 @@ from hsp_control.null_space.fields.weight import sample_weight
 
 
 class Steered:
-    """A steered loop in no real time; words are said at times of the loop."""
+    """A steered loop in no real time; messages come at times of the loop."""
 
     def __init__(self, journal: Path, **more: Any) -> None:
         self.experiment = hsp.load_experiment("panda_obstacle")
@@ -162,7 +162,7 @@ def test_a_word_that_is_too_much_is_dropped_and_nobody_waits() -> None:
 
 
 def test_the_picture_follows_the_journal(steered: Steered) -> None:
-    """What the mirror draws are the loop's rows; its field follows the loop's."""
+    """The mirror draws the loop's rows; its field follows the loop's."""
     experiment = hsp.load_experiment("panda_obstacle")
     heard, page_end = channel_pair()
     mirror = Mirror(experiment, 0.001, steered.journal, heard, held=False)

@@ -44,6 +44,21 @@ def test_logs_share_panels_and_a_legend_names_them(log: Rollout) -> None:
 
 
 @pytest.mark.slow
+def test_a_narrow_figure_names_all_its_logs(log: Rollout) -> None:
+    """Within its width; of the predictions the legend has what is true of all."""
+    logs = [log, *(changed(log, slice(None), {}) for _ in range(3))]
+    logs[2].meta["null_space_gain"] = (3.0 * np.eye(3)).tolist()
+    names = [f"$K_N = {k}$" for k in (4, 8, 16, 32)]
+    figure = plots.diagnostics_figure(
+        *logs, names=names, panels=["null_space"], width="84mm"
+    )
+    figure.draw_without_rendering()
+    (legend,) = figure.legends
+    assert legend.get_window_extent().x1 <= figure.bbox.x1
+    assert "predicted: exp(−$K_N$ t)" in legend_texts(figure.axes[0])
+
+
+@pytest.mark.slow
 def test_a_figure_for_a_paper_has_its_width_and_chosen_panels(
     log: Rollout, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

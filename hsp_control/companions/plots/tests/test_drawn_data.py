@@ -1,4 +1,4 @@
-"""Check that what is drawn is what the log says, predictions of e_N among it."""
+"""Check that figures show the log's numbers, predictions of e_N among them."""
 
 import matplotlib as mpl
 import numpy as np
@@ -77,7 +77,7 @@ def sample_inside(shape: shapes.Shape, rng: np.random.Generator) -> np.ndarray:
     raise AssertionError(shape)
 
 
-# --- what is drawn is what the log says ----------------------------------------------
+# --- curves are the log's numbers ----------------------------------------------------
 
 
 @pytest.mark.slow

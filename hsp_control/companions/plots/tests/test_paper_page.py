@@ -85,7 +85,7 @@ def farthest_apart(here: Rollout) -> float:
 
 
 def log_channels(number: int, run: Rollout) -> dict[str, float]:
-    """Return what the page may say of a run, in SI units."""
+    """Return the numbers that the page may have of a run, in SI units."""
     det, late = run["manipulability"], run.t >= 5.0
     found = {
         "largest tracking error from 5 s on": np.abs(run["task.tip.error"][late]).max(),
@@ -122,7 +122,7 @@ def table(number: int) -> dict[str, str]:
 
 
 def agrees(printed: str, measured: float) -> bool:
-    """Say whether a printed bound holds, or a printed number is the measured one."""
+    """Return whether a printed bound holds, or a printed number is the measured one."""
     bound, digits, unit = re.fullmatch(r"([<>]?) ?([\d.e-]+) ?(\S*)", printed).groups()
     value = float(digits) * UNITS[unit]
     if bound:

@@ -45,7 +45,7 @@ def gains(tmp_path: Path, logs: dict[str, hsp.Rollout]) -> list[str]:
 
 @pytest.mark.slow
 def test_logs_of_a_pattern_are_drawn_in_the_order_of_their_numbers(
-    gains: list[str],
+    gains: list[str], capsys: pytest.CaptureFixture[str]
 ) -> None:
     numbered = [f"null_space.gain={k}" for k in (2, 8, 16)]
     assert plotted(*gains) == numbered
@@ -53,6 +53,7 @@ def test_logs_of_a_pattern_are_drawn_in_the_order_of_their_numbers(
     assert plotted(*given) == [numbered[1], numbered[2], numbered[0]]
     named = plotted(*gains, "--names", "$K_N$ = 16, a_b$, $K_N$")
     assert named == ["$K_N$ = 16", r"a_b\$", "$K_N$"]
+    assert f"a_b$: {gains[1]}" in capsys.readouterr().out.replace("\n", "")
 
 
 @pytest.mark.slow

@@ -1,4 +1,4 @@
-"""What Rerun draws stands where the shape is: each in its own way of saying so."""
+"""Rerun draws every kind of shape where it is."""
 
 from dataclasses import dataclass
 from pathlib import Path

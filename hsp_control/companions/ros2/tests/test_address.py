@@ -1,4 +1,4 @@
-"""Addresses of topics: what is not said has ROS 2's default, what is wrong is named."""
+"""Addresses of topics: missing parts have ROS 2's default, wrong ones are named."""
 
 import pytest
 

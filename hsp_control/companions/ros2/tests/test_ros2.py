@@ -59,7 +59,7 @@ def test_a_client_drives_the_simulated_robot(
     for names, q, v, effort, _ in log:
         assert names == list(panda().dof_names)
         heard = np.concatenate([q, v, effort])
-        # The client may hear a state twice more before its first effort arrives.
+        # The client may receive a state twice more before its first effort arrives.
         last = next(
             k for k in range(last, len(reached)) if np.array_equal(reached[k], heard)
         )

@@ -27,7 +27,7 @@ LONG = 30.0
 
 
 class Rig:
-    """A robot that publishes states and hears efforts, and the hardware for it."""
+    """A robot that publishes states and receives efforts, and the hardware for it."""
 
     def __init__(self, options: str = "", **message: object) -> None:
         controller, states, self.address = fresh()
@@ -284,7 +284,7 @@ def test_without_cyclone_the_extra_is_named(monkeypatch: pytest.MonkeyPatch) -> 
 def test_a_state_is_as_old_as_it_waited_longer_than_the_quickest(
     rig: tuple[Rig, Ros2Hardware], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """By its stamp, whatever the robot's clock says; its number plays no part."""
+    """By its stamp, whatever the robot's clock shows; its number plays no part."""
     _, hardware = rig
     now = [0.0]
     monkeypatch.setattr(ros2_hardware, "monotonic", lambda: now[0])
@@ -309,7 +309,7 @@ def test_a_state_is_as_old_as_it_waited_longer_than_the_quickest(
 
 
 def sender_of(hardware: Ros2Hardware) -> int:
-    """Return the publisher that the hardware hears."""
+    """Return the publisher that the hardware receives from."""
     sender = hardware._sender
     assert sender is not None
     return sender

@@ -1,4 +1,4 @@
-"""What watchers hear: the state, the effort and the poses of the tasks."""
+"""Published topics: the state, the effort and the poses of the tasks."""
 
 import numpy as np
 import pytest

@@ -64,7 +64,7 @@ class Way(NamedTuple):
 
 
 class Run(NamedTuple):
-    """Where the hand began, and what happened at each step of the simulation."""
+    """The hand's start, and the motion at each step of the simulation."""
 
     start: pin.SE3
     t: Array
@@ -146,7 +146,7 @@ def jump(t: float, start: pin.SE3) -> pin.SE3:
 
 
 def run(way: Way, goal: Callable[[float, pin.SE3], pin.SE3], duration: float) -> Run:
-    """Return what happens in an environment."""
+    """Return the motion in an environment."""
     env = made(way)
     arm, data = env.robots[0].part_controllers["right"], env.sim.data
     site = env.sim.model.site_name2id(arm.ref_name)

@@ -96,7 +96,7 @@ def test_efforts_are_clipped_and_the_observer_knows(robot: hsp.Robot) -> None:
     strongest = robot.model.upperEffortLimit
     assert (np.abs(effort) <= strongest).all()
     assert (np.abs(effort) == strongest).any()
-    # What the clipped effort does is no disturbance.
+    # The effect of a clipped effort is no disturbance.
     state = robot.state(0.0, q, rest)
     acceleration = np.linalg.solve(state.mass_matrix, effort - state.nonlinear_effects)
     hand.effort(PERIOD, q, PERIOD * acceleration, PERIOD)

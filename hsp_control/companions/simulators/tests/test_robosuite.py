@@ -1,6 +1,6 @@
 """HSP_POSE in robosuite's own environments: `make sims` runs this.
 
-robosuite needs another MuJoCo than the other tests, and an environment of its own.
+robosuite needs another MuJoCo than the other tests, and its own environment.
 """
 
 import re
@@ -117,7 +117,7 @@ def test_an_action_means_what_it_means_to_osc_pose(frame: str) -> None:
     """The goals of both are the same; if goals jump, so is the motion, roughly.
 
     Where the wrist's motors do not reach their limits: OSC_POSE leaves out how rotation
-    and translation are coupled, and so asks for less.
+    and translation are coupled, and so demands less.
     """
     actions = np.random.default_rng(0).uniform(-0.5, 0.5, (10, 7))
     actions[:, 3:6] *= 0.1

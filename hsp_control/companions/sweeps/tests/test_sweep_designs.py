@@ -167,7 +167,7 @@ def test_rows_are_in_the_order_of_the_plan() -> None:
 
 
 def test_a_file_is_in_the_order_of_the_plan(tmp_path: Path) -> None:
-    """What other tools read is the same bytes, in whichever order runs end."""
+    """The files for other tools have the same bytes, in whichever order runs end."""
     for name, order in (("one", (0, 1, 2)), ("other", (2, 0, 1))):
         files = RowFiles(plan_of({"a": "10:30:3"}), {}, tmp_path / name, fresh=False)
         for k in order:
@@ -289,7 +289,7 @@ def test_sensitivities_are_those_that_were_put_in() -> None:
 
 def test_chance_is_that_of_the_completed_runs() -> None:
     """One correlation of twenty is beyond, of runs that have nothing to do with each
-    other: 4000 of 30 tell that share to 0.0035."""
+    other: 4000 of 30 estimate that share to 0.0035."""
     half = invented(60)
     half["status"][:30] = "diverged"
     noise = sweeps.sensitivity(half).noise
@@ -355,6 +355,13 @@ def test_a_figure_shows_the_parameters_that_are_named_as_wide_as_a_paper_needs()
     assert len(figure.axes) == 8
     last = [each.get_xlabel() for each in figure.axes[-2:]]
     assert last == ["bowl", "up"]
+    whole = invented()
+    about = {"unit": "rad", "meaning": "rms error of hand orientation"}
+    meta = whole.meta | {"metrics": dict.fromkeys(whole.meta["metrics"], about)}
+    figure = sweeps.sweep_figure(Sweep(whole.columns, meta), parameters=["up"])
+    figure.draw_without_rendering()
+    labels = [axes.yaxis.label.get_window_extent() for axes in figure.axes]
+    assert min(label.x0 for label in labels) > 0.0
     with pytest.raises(PlotError, match="no parameter 'upp' varies; did you mean 'up'"):
         sweeps.sweep_figure(invented(), parameters=["upp"])
 
@@ -369,7 +376,7 @@ def test_two_or_three_values_give_a_figure_too(runs: int) -> None:
     points, line = first.lines
     assert len(points.get_xdata()) == len(line.get_xdata()) == runs
     assert np.all(np.diff(line.get_ydata()) > 0.0)
-    # Of so few nothing is said to be an influence, nor to be none.
+    # Of so few nothing is reported as an influence, nor as none.
     assert not any(each.get_title(loc="left") for each in figure.axes)
     with pytest.raises(SweepError, match=f"{runs} runs were completed"):
         sweeps.sensitivity(Sweep(few, whole.meta))

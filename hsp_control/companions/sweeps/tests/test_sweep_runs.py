@@ -267,7 +267,7 @@ def running(word: str, parent: psutil.Process) -> list[psutil.Process]:
     """Return the children that were called with a word; not those that have ended."""
     found = []
     for child in parent.children():
-        with suppress(psutil.NoSuchProcess):  # also nobody has asked how it ended
+        with suppress(psutil.NoSuchProcess):  # also nobody has read how it ended
             if word in " ".join(child.cmdline()):
                 found.append(child)
     return found
@@ -339,7 +339,7 @@ import hsp_control as hsp
 import beside
 
 class Sway(hsp.Cost, type="sway"):
-    \"\"\"A cost of its own.\"\"\"
+    \"\"\"A cost of the user.\"\"\"
     size: float = 1.0
     \"\"\"Size [-].\"\"\"
     def value(self, state):

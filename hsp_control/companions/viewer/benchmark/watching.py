@@ -1,4 +1,4 @@
-"""What a watched loop costs: a step, and its lateness, with and without the thread.
+"""The cost of watching a loop: a step, and its lateness, with and without the thread.
 
     python hsp_control/companions/viewer/benchmark/watching.py [SECONDS] [PERIOD]
 

@@ -1,4 +1,4 @@
-// Elements, buttons and keys: what all parts of the page are made of.
+// Elements, buttons and keys: the parts of the page.
 "use strict";
 
 // An element with properties, attributes and children.

@@ -1,4 +1,4 @@
-// The legend, whose rows are switches: each shows and hides the nodes of what it names. What the user
+// The legend, whose rows are switches: each shows and hides the nodes that it names. What the user
 // chooses is kept as long as the page is open, also when the nodes are drawn again. In small windows
 // the rows are behind a button.
 
@@ -76,7 +76,7 @@ class Legend {
       - this.viewer.dom_element.getBoundingClientRect().left;
   }
 
-  // The height of what the caption covers at the top of the picture [px].
+  // The height that the caption covers at the top of the picture [px].
   get covered() {
     const heading = part("h1", this.caption);
     return this.small.matches ? heading.offsetTop + heading.offsetHeight : 0;

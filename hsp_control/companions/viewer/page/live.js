@@ -112,7 +112,7 @@ class LivePlot extends Plot {
     });
   }
 
-  // The lines of what is shown; a curve that is shown alone has only its own.
+  // The lines of the shown curves; a curve that is shown alone has only its own.
   get ownLines() {
     return this.lines.filter(({curves}) => this.alone === null || curves.includes(this.alone));
   }

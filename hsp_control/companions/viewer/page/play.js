@@ -77,14 +77,14 @@ class Play {
     return this.light;
   }
 
-  // The picture has room for what the bar covers of it.
+  // The picture has room for the part that the bar covers.
   leaveRoom() {
     const {bottom} = this.viewer.dom_element.getBoundingClientRect();
     barHeight = Math.max(0, bottom - this.bar.row.getBoundingClientRect().top);
     refit();
   }
 
-  // After a reset the plots are the same: they keep what is shown alone.
+  // After a reset the plots are the same: they keep the curve that is shown alone.
   setUpPlots(definitions) {
     const text = JSON.stringify(definitions);
     if (text === this.plotsText) return this.plots.clear();

@@ -1,4 +1,4 @@
-// The handles of what is moved: of a target a ball, arrows along the world's axes and rings about
+// The handles of movable things: of a target a ball, arrows along the world's axes and rings about
 // its own; of an obstacle itself, and arrows. A line to the floor shows their height. Sizes are in
 // pixels, whatever the distance. Where the robot hides a handle it is drawn through it, translucent. A
 // pointer finds handles by its distance from them on the screen; a finger's reach is larger.

@@ -1,4 +1,4 @@
-// Pointers and keys in the scene of `hsp play`: what is under them, and what they move.
+// Pointers and keys in the scene of `hsp play`: the things under them, and their motion.
 "use strict";
 
 // The hand finds, in this order: a handle, an obstacle, a link of the robot; all else is left to the
@@ -60,7 +60,7 @@ class PlayHand {
     if (event.pointerType !== "touch") this.look(event.clientX, event.clientY, event.pointerType);
   }
 
-  // End the drag, and release in the program what it moved; not if another page steers (`silent`).
+  // End the drag, and release in the program the thing that it moved; not if another page steers (`silent`).
   end(silent = false) {
     const {grip, play, pane} = this;
     if (!grip) return;
@@ -88,7 +88,7 @@ class PlayHand {
     };
   }
 
-  // What can be held under a pixel; nothing while one looks back.
+  // The movable thing under a pixel; nothing while one looks back.
   find(x, y, pointer) {
     if (this.play.bar.past.looking) return null;
     const {gizmos} = this.play, sight = this.play.sight.update();
@@ -97,7 +97,7 @@ class PlayHand {
     return best ?? this.findLink(x, y);
   }
 
-  // The link of the robot under a pixel. What is fixed to joint 0, the world, cannot be pulled.
+  // The link of the robot under a pixel. Links fixed to joint 0, the world, cannot be pulled.
   findLink(x, y) {
     const {setup, sight} = this.play, robot = this.viewer.scene_tree.children.robot;
     if (!setup?.pull || !robot) return null;
@@ -109,7 +109,7 @@ class PlayHand {
             local: node(path).worldToLocal(first.point.clone())};
   }
 
-  // Find what is under a pointer without a button, at most once a frame.
+  // Find the thing under a pointer without a button, at most once a frame.
   look(...pointer) {
     if (!this.looking) requestAnimationFrame(() => {
       const at = this.looking, {play} = this;
@@ -130,7 +130,7 @@ class PlayHand {
     event.preventDefault();
   }
 
-  // The path of the node that holds an object: what is drawn there has no name.
+  // The path of the node that holds an object: the object itself has no name.
   static pathOf({name, parent}) {
     return parent ? `${PlayHand.pathOf(parent)}${name && `/${name}`}` : "";
   }

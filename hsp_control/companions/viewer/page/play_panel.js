@@ -210,7 +210,7 @@ class PlayPanel {
   }
 }
 
-// The poses of the last ten seconds, and the slider that looks back at them. What is shown is then
+// The poses of the last ten seconds, and the slider that looks back at them. The picture is then
 // the past, targets and obstacles too, and none can be dragged: a simulation pauses, a live loop
 // goes on.
 class PlayPast {
@@ -223,7 +223,7 @@ class PlayPast {
 
   get looking() { return Number(this.input.value) < 0; }
 
-  // Keep what is drawn; return whether it is to be shown.
+  // Keep the drawn poses; return whether they are to be shown.
   take(tracks) {
     this.last = tracks;
     return !this.looking;
@@ -304,7 +304,7 @@ class PlayBars {
   }
 }
 
-// The picture as a file, and a film of what the page shows from now on.
+// The picture as a file, and a film of the page from now on.
 class PlayCamera {
   constructor(viewer, title) { Object.assign(this, {viewer, title, recorder: null}); }
 
@@ -344,7 +344,7 @@ class PlayCamera {
   }
 }
 
-// Over the scene: the name of what is selected or dragged, and the spring by which a link is pulled;
+// Over the scene: the name of the selected or dragged thing, and the spring by which a link is pulled;
 // and an invisible button at each target and obstacle, for the Tab key and screen readers.
 class PlayOverlay {
   constructor() {

@@ -1,9 +1,9 @@
-// What the camera sees, and how a pointer moves things in it. Points and directions are in Pinocchio's
+// The camera's view, and how a pointer moves things in it. Points and directions are in Pinocchio's
 // axes (z up), which are those inside Meshcat's scene; pixels are those of pointer events.
 
 class Sight {
   static REACH = 20;  // m: no drag leads farther from the eye
-  static NEAR = 0.08;  // of the picture's height: what is nearer to the robot is at the robot
+  static NEAR = 0.08;  // of the picture's height: a point nearer to the robot is at the robot
 
   constructor(viewer) { this.viewer = viewer; }
 

@@ -1,6 +1,6 @@
 // The player: moves the scene along a clip, without a server or a file.
 //
-// A clip is what viewer/clip.py writes: clocks (times), tracks that refer to them, and bands for the
+// A clip is written by viewer/clip.py: clocks (times), tracks that refer to them, and bands for the
 // time line. Before its first time and after its last one a track keeps its first and last value; all
 // but "visible" are interpolated, quaternions spherically. A path that is not in the scene is ignored.
 //
@@ -23,7 +23,7 @@ class Player extends EventTarget {
     this._emit("state");
   }
 
-  // The bands of what is seen.
+  // The bands of the visible things.
   get marks() {
     return [...this.bands.values()].filter(({run}) => this.run === null || run === this.run);
   }
@@ -116,7 +116,7 @@ class Player extends EventTarget {
     if (!this.open && next >= end) this.pause();
   }
 
-  // Add a band; what goes on where the last interval of its name ended is one with it.
+  // Add a band; one that begins where the last interval of its name ended continues that.
   _mark({spans, ...band}) {
     const key = `${band.run}\n${band.name}`, known = this.bands.get(key)?.spans ?? [];
     for (const [from, to] of spans) {

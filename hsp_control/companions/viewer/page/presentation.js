@@ -1,4 +1,4 @@
-// Presenting: the scene, its title and what happens now, as large as the screen. Legend, panels and
+// Presenting: the scene, its title and the present event, as large as the screen. Legend, panels and
 // details are put away. When the pointer has rested for two seconds, it and the bar go, too, until
 // it moves, or for the Tab key; and the camera sways about its target, until the user moves it.
 

@@ -23,7 +23,7 @@ class Side {
   // Remove them; whether the user wants to see any is kept.
   clear() { document.body.classList.add("without-plots"); }
 
-  // Show other data; what the user has made of the plots stays, if they have the same curves.
+  // Show other data; the user's changes of the plots stay, if they have the same curves.
   show({runs, start, end, damped, panels}) {
     document.body.classList.remove("without-plots");
     const {zoomed, plots} = this;
@@ -105,7 +105,7 @@ class RunPlot extends Plot {
     return dashed ? [5, run ? 3.6 : 3, ...dots] : dots;
   }
 
-  // What of a panel cannot change without other plots.
+  // Properties of a panel that change only with other plots.
   static lookOf({title, note, series}) {
     const look = ({name, run, color, dashed, band}) => [name, run, color, dashed, band];
     return JSON.stringify([title, note, series.map(look)]);
@@ -167,7 +167,7 @@ class RunPlot extends Plot {
     return this.panel.series.find((each) => each.name === name && each.run === run);
   }
 
-  // The axis: the packed range; of a part of the curves, or of time, what that part needs.
+  // The axis: the packed range; of a part of the curves, or of time, the range of that part.
   range(least, most) {
     const {low, high, logarithmic, edges} = this.panel;
     if ((!this.side.zoomed && this.alone === null) || least === null) return [low, high];

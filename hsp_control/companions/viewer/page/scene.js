@@ -98,7 +98,7 @@ function simplify(object) {
     ? object.material.map(simple) : simple(object.material);
 }
 
-// What surrounds a dark stage, for surfaces to mirror: soft boxes above and beside it.
+// The surroundings of a dark stage, for surfaces to mirror: soft boxes above and beside it.
 function studio() {
   const {Scene, Mesh, BoxGeometry, MeshBasicMaterial, BackSide, PMREMGenerator} = MeshCat.THREE;
   const room = new Scene();
@@ -194,7 +194,7 @@ function vector([x, y, z]) { return new MeshCat.THREE.Vector3(x, z, -y); }
 
 // Shares of the picture's height that are reserved for the player's bar and the title.
 const BAR = 0.1, TITLE = 0.06, WIDE = 16 / 9;  // WIDE: width over height
-let barHeight = 64;  // what the player's bar covers at the bottom of the picture [px]
+let barHeight = 64;  // height that the player's bar covers at the bottom of the picture [px]
 
 // Half the width of the robot's widest link [m]: the points are those of its skeleton.
 function girth() {

@@ -1,4 +1,4 @@
-// What the scene shows beside Meshcat's objects: trails, ghosts, and the lengths of bars.
+// Things in the scene beside Meshcat's objects: trails, ghosts, and the lengths of bars.
 "use strict";
 
 // Tint an object and all below it, and make them translucent.

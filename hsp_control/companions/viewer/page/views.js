@@ -14,7 +14,7 @@ class Views {
     }));
   }
 
-  // The program has placed the camera: what it sees first, or a view that a configuration names.
+  // The program has placed the camera: the first view, or one that a configuration names.
   begin(command) {
     this.command = command;
     this.select(command.view ?? "");
@@ -41,7 +41,7 @@ class Views {
   }
 
   // See these points, too, in Pinocchio's axes, and keep seeing them; not while the tool is followed.
-  // What is farther away than three times the scene's size stays outside.
+  // Things farther away than three times the scene's size stay outside.
   widen(points) {
     const {command, name} = this, known = command.points.map((point) => vector(point));
     if (!untouched() || name === "tool") return;

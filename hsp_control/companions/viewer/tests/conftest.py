@@ -1,4 +1,4 @@
-"""What tests of the view share: a short run, and an arm."""
+"""Fixtures of the tests of the view: a short run, and an arm."""
 
 import pytest
 from clips import Recorder

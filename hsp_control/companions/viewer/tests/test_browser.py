@@ -38,7 +38,7 @@ PLANAR = "paper/4_moving_obstacle"
 
 WIDTH = "document.querySelector('#side .u-over').clientWidth"  # of the plots' curves
 END = "uPlot.sync('run').plots[0].scales.x.max"  # of the axis of time
-# What a page shows once it has drawn: without the two frames, a picture may be stale.
+# The page's picture once it has drawn: without the two frames, it may be stale.
 SETTLE = """() => { viewer.render(); return new Promise((drawn) =>
   requestAnimationFrame(() => requestAnimationFrame(drawn))); }"""
 
@@ -73,7 +73,7 @@ class Watched:
         browsers.until(self.page, expression)
 
     def picture(self, selector: str = "#meshcat-pane") -> np.ndarray:
-        """What is seen of an element now, shape (height, width, 3)."""
+        """The present picture of an element, shape (height, width, 3)."""
         self.page.evaluate(SETTLE)
         data = self.page.locator(selector).screenshot()
         return np.asarray(Image.open(io.BytesIO(data)).convert("RGB")).astype(int)

@@ -23,7 +23,7 @@ HELD = {
     "left": np.array([*PLACES["left"][:2], PLACES["left"][1], PLACES["left"][3]]),
     "right": np.array([PLACES["right"][1], *PLACES["right"][1:]]),
 }
-"""Where nobody says where a contact is, it stays where it was, or where it will be."""
+"""Where the place of a contact is unknown, it stays where it was, or will be."""
 
 
 @pytest.fixture(scope="module")

@@ -198,7 +198,7 @@ def test_a_collada_file_keeps_its_place_colour_and_outside() -> None:
     (piece,) = read_mesh({**thing, "data": collada(mirrored, PLAIN)}, "it")
     assert piece.color == pytest.approx((1.0, 0.5, 0.0, 1.0), abs=0.01)
     corners = piece.vertices[piece.triangles[0]]
-    # Neither unit nor up axis counts; the node's own matrix does.
+    # Neither unit nor up axis has an effect; the node's own matrix does.
     assert {tuple(corner) for corner in corners.tolist()} == {
         (0.5, 0.0, 0.0), (-1.5, 0.0, 0.0), (0.5, 2.0, 0.0),
     }  # fmt: skip
@@ -251,7 +251,7 @@ def test_a_mesh_that_cannot_be_read_is_named(monkeypatch: pytest.MonkeyPatch) ->
 
 
 def content_of(page: Path) -> dict[str, Any]:
-    """What a page holds, with its arrays in their places."""
+    """The content of a page, with its arrays in their places."""
     text = page.read_text(encoding="utf-8")
     block = re.search(r'id="content">([^<]*)<', text)
     assert block is not None

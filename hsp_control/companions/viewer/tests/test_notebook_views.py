@@ -98,7 +98,7 @@ def test_a_viewer_is_shown_after_its_server_has_ended(
     assert view.evaluate("[player.time, player.playing]") == [0, False]
     notebook.page.keyboard.press(" ")
     until(view, "player.time > 0.02")
-    # What it holds cannot reach the notebook.
+    # Its content cannot reach the notebook.
     assert view.evaluate("window.origin") == "null"
     notebook.close()
 

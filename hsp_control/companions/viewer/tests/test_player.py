@@ -135,7 +135,7 @@ def test_it_is_steered_from_the_keyboard(page: Any) -> None:
     assert player(page, "playing") is False
 
 
-# Told by the player's own events: a slow machine may draw no picture of any one moment.
+# By the player's own events: a slow machine may draw no picture of any one moment.
 COUNT_ROUNDS = """window.rounds = 0;
 let last = player.time;
 player.addEventListener("time", ({detail}) => {

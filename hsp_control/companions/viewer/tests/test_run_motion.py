@@ -1,4 +1,4 @@
-"""What is drawn between two rows of a coarse log: each thing on its own geodesic."""
+"""Between two rows of a coarse log everything moves on its own geodesic."""
 
 import numpy as np
 import pinocchio as pin
@@ -51,7 +51,7 @@ def test_what_is_drawn_between_two_rows_is_on_the_way_from_one_to_the_other(
         wanted = begin @ pin.exp3(share * pin.log3(begin.T @ end))
         found = turn(rows["object.box.quaternion"][k])
         np.testing.assert_allclose(found, wanted, atol=1e-9)
-    # What is known on a row stays known there, beside a row where it is not.
+    # A value that is known on a row stays known there, beside a row where it is not.
     on_rows = np.isin(rows.t, t)
     np.testing.assert_array_equal(rows["half"][on_rows], half)
     assert np.isnan(rows["half"][~on_rows]).all()

@@ -1,4 +1,4 @@
-"""What the view draws beside the robot is what the run did, recomputed another way."""
+"""The view's layers agree with the run, recomputed another way."""
 
 from typing import Any
 
@@ -366,7 +366,7 @@ def test_contact_forces_are_arrows_at_their_points(recorder: Recorder) -> None:
         "t": np.array([0.0, 0.02]),
         "q": np.tile(robot.home(), (2, 1)),
         "v": np.zeros((2, robot.nv)),
-        # Where a contact that is off is, the log does not say.
+        # The place of a contact that is off is not in the log.
         "contact.left/foot.position": np.array([[0.1, 0.2, 0.3], [np.nan] * 3]),
         "contact.left/foot.force": np.array([weight, np.zeros(3)]),
         "contact.halved.force": np.zeros((2, 3)),  # without its place: left out

@@ -228,7 +228,7 @@ def steered() -> Iterator[PageServer]:
 
 
 def heard(server: PageServer, last: str) -> list[dict[str, Any]]:
-    """What the pages say, up to a message of a kind."""
+    """Messages of the pages, up to one of a kind."""
     found: list[dict[str, Any]] = []
     wait_until(
         lambda: found.extend(server.messages()) or (found and found[-1]["do"] == last),
@@ -282,7 +282,7 @@ def test_a_key_that_others_can_read_is_not_kept(
 def test_a_page_that_lost_its_program_keeps_its_key(
     steered: PageServer,
 ) -> None:
-    """Whoever listens there answers a question if it has the key, and is not told."""
+    """A listener answers a question if it has the key, and does not learn it."""
     assert steered.url is not None
     address, _, query = steered.url.partition("?")
     key, question = query.removeprefix("key="), "a1b2"
@@ -375,7 +375,7 @@ def test_one_page_steers_at_a_time(steered: PageServer) -> None:
 
 @pytest.mark.slow
 def test_a_flood_is_no_more_than_its_newest_words(steered: PageServer) -> None:
-    """10,000 messages while nobody listens: the last of each kind is what counts."""
+    """10,000 messages while nobody listens: the last of each kind is used."""
     assert steered.url is not None
     page = Steering(steered.url)
     wait_until(lambda: page.drives() == (True, True))

@@ -93,7 +93,7 @@ def test_changes_targets_and_a_new_beginning_are_followed() -> None:
     assert row["acceleration"][0] == pytest.approx(output.acceleration, abs=1e-6)
     goal = loop.controller.robot.state(0.0, loop.q, loop.v).position("panda_tcp")
     loop.controller.set_target("hand", [*goal, 1.0, 0.0, 0.0, 0.0])
-    for _ in range(60):  # the copy hears the same message, at its own steps
+    for _ in range(60):  # the copy receives the same message, at its own steps
         output = loop.step()
         row = followed(follower)
     assert row["task.hand.error"][0] == pytest.approx(output.error("hand"), abs=1e-6)
@@ -193,7 +193,7 @@ def test_what_fails_is_said_and_does_not_reach_the_loop() -> None:
         fails = None
         loop.step(3)
         _until(lambda: not page.failure)
-        fails = CancelledError()  # no `Exception`: the thread ends, and says why
+        fails = CancelledError()  # no `Exception`: the thread ends, and reports why
         with pytest.raises(CancelledError):
             loop.step()
         _until(lambda: page.failure == "CancelledError")

@@ -68,7 +68,7 @@ CASES: dict[str, dict[str, Any]] = {
     },
     "crawl, 0.06 m/s": {"plan": {"type": "crawl", "speed": 0.06}, "duration": 9.0},
 }
-"""What is different in each case. No plan is told the friction."""
+"""The difference of each case. The friction is unknown to all plans."""
 NOISE = {"position_noise": 1e-4, "velocity_noise": 0.01}
 """Noise of the encoders [rad, rad/s]; that of the unit is an ADIS16448's."""
 UNTIL, DURATION = 4.0, 6.0

@@ -43,7 +43,7 @@ class Biped:
         sole: The corners of the left sole in its frame, two opposite ones: x and y of
             both, and z; the right one is its mirror image [m].
         bent: Joints of the left and of the right leg, with ``{}`` for the side [rad].
-        sides: What ``{}`` stands for.
+        sides: The values of ``{}``.
     """
 
     robot: dict[str, Any]

@@ -121,7 +121,7 @@ class Run:
     way: float = 0.0
 
     def log(self, values: dict[str, float]) -> None:
-        """Add what was measured in a period; what is missing is NaN."""
+        """Add the measurements of a period; missing ones are NaN."""
         for key, value in values.items():
             self.columns.setdefault(key, []).append(value)
 

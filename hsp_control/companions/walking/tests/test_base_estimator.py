@@ -32,7 +32,7 @@ EXACT = Imu(
 
 
 class Listening(RunningPlan):
-    """Keeps what it is told."""
+    """Keeps its measurements."""
 
     def __init__(self):
         super().__init__(Listens())

@@ -41,7 +41,7 @@ def test_it_crawls_and_stands_again():
 
 @pytest.mark.slow
 def test_it_could_stop_at_any_time():
-    """The centre of mass is above the triangle of the feet that bear."""
+    """The centre of mass is above the triangle of the standing feet."""
     run = crawl()
     mass = run["task.center_of_mass.actual"]
     for k in np.flatnonzero(run["plan.phase"] > 1):

@@ -32,7 +32,7 @@ def test_talos_takes_a_step_on_an_estimated_base():
     assert largest(run, "position_error") < 0.02
     assert largest(run, "rotation_error") < 0.02
     assert largest(run, "velocity_error") < 0.03
-    # The law has computed with the estimate, and the log says both.
+    # The law has computed with the estimate, and the log has both.
     assert not np.array_equal(run["estimate.base"], run.q[:, :7])
     error = run["estimate.base"][:, :3] - run.q[:, :3]
     assert error == pytest.approx(run["estimate.position_error"])

@@ -1,4 +1,4 @@
-"""What the joints say of contacts is what the whole configuration says."""
+"""Contacts by the legs' joints equal those of the whole configuration."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""What a leg does to the centre of pressure: against Pinocchio's inverse dynamics."""
+"""A leg's effect on the centre of pressure, against Pinocchio's inverse dynamics."""
 
 import numpy as np
 import pinocchio as pin
@@ -30,7 +30,7 @@ def talos():
 def pressed(state, rows, wanted):
     """Return where the ground pushes for the smallest motion with accelerations, (2,).
 
-    From the wrench at the root, which inverse dynamics says; relative to the centre of
+    From the wrench at the root, by inverse dynamics; relative to the centre of
     mass, on the ground 1 m below it.
     """
     a = np.linalg.lstsq(rows, wanted)[0]

@@ -123,7 +123,7 @@ def test_a_regular_end_lets_the_plan_come_to_rest(by: str) -> None:
     assert report.ended == {"duration": "completed", "operator": "operator"}[by]
     assert report.at_rest
     assert 0.7 < report.t < 0.7 + 4.0  # `StopSettings.coming_to_rest`
-    # It stands: the contacts bear its weight, and its trunk is level and high.
+    # It stands: the contacts carry its weight, and its trunk is level and high.
     wrenches = robot.robot.measured().wrenches
     assert set(wrenches) == set(FEET)
     weight = 9.81 * sum(each.mass for each in experiment.robot.model.inertias)

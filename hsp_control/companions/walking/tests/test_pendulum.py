@@ -91,7 +91,7 @@ def test_a_phase_takes_as_long_as_the_component_needs():
         found = in_step(phase, last, there, W, (0.075, 0.3))
         assert found.duration == pytest.approx(duration, abs=0.6 * 0.225 / 200)
         assert np.array_equal(found.end, phase.end)
-        # What lies beside the way changes little: the nearest point counts.
+        # A point beside the path changes little: the nearest point is used.
         along = there - phase._replace(duration=duration - 1e-3).first_dcm(last, W)
         beside = 0.02 * np.array([-along[1], along[0]]) / np.linalg.norm(along)
         found = in_step(phase, last, there + beside, W, (0.075, 0.3))

@@ -25,7 +25,7 @@ def told(rule, *overrides):
 
 
 def feel(experiment, running, t, force):
-    """Tell a force, and return the contact's and the task's switches."""
+    """Set a measured force, and return the contact's and the task's switches."""
     q, v = experiment.q0, np.zeros(experiment.robot.nv)
     wrenches = {} if force is None else {FOOT: np.array([0, 0, force, 0, 0, 0.0])}
     running.update(Measurement(0, t, q, v, wrenches=wrenches))

@@ -1,4 +1,4 @@
-"""A trot is a value, as is a crawl; what does not fit is said before a foot swings."""
+"""A trot is a value, as is a crawl; mistakes are refused before a foot swings."""
 
 from dataclasses import replace
 
@@ -75,7 +75,7 @@ def test_a_leg_needs_three_joints(solo):
 
 
 def test_barriers_let_legs_swing():
-    """What is given stays; what changes later keeps it."""
+    """A given value stays, also through later changes."""
     controller = load_experiment(TROT).controller
     assert controller.limits.bandwidth == BANDWIDTH
     controller.at(0.1).ramp(0.0).limits(Limits(velocity=0.5))

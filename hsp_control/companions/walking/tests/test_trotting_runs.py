@@ -1,4 +1,4 @@
-"""Solo takes some diagonal steps and stands: on MuJoCo, as its configuration says."""
+"""Solo takes some diagonal steps and stands: on MuJoCo, by its configuration."""
 
 from dataclasses import replace
 from functools import cache
@@ -116,7 +116,7 @@ def test_a_streamed_velocity_is_followed_and_repeated_from_the_log(tmp_path):
             recorder.plan.streams[0].send([0.0, 0.0, 0.0])
 
     run = experiment.run(on_row=drive)
-    assert (run["plan.phase"][:20] == 0).all()  # it stands until it is told
+    assert (run["plan.phase"][:20] == 0).all()  # it stands until it is commanded
     assert run["plan.velocity"].max() > 0.1
     again = load_experiment(run.save(tmp_path / "trot.npz")).run()
     for name in run.columns:

@@ -1,4 +1,4 @@
-"""A walk is a value; what does not fit it is said before the first step."""
+"""A walk is a value; what does not fit it is refused before the first step."""
 
 import re
 from dataclasses import replace
@@ -154,7 +154,7 @@ def test_falls_are_found(talos):
         detector.check(moved(step))
     step[4] = 0.7
     detector.check(moved(step))
-    step[4] = tilted  # the tilt counts from the start
+    step[4] = tilted  # the tilt is measured from the start
     leaning = moved(step)
     FallDetector("base_link", feet, leaning).check(leaning)
     knees = np.zeros(talos.nv)

@@ -1,4 +1,4 @@
-"""Talos takes two steps and stands: on MuJoCo, as its configuration says."""
+"""Talos takes two steps and stands: on MuJoCo, by its configuration."""
 
 import re
 from functools import cache

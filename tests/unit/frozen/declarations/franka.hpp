@@ -1,4 +1,4 @@
-// What franka.cpp uses of libfranka: an arm of seven joints whose fourth state is not finite.
+// The part of libfranka that franka.cpp uses: an arm of seven joints whose fourth state is not finite.
 #pragma once
 #include <array>
 #include <cmath>

@@ -1,4 +1,4 @@
-// What ros2_controller.cpp uses of ros2_control, with the interfaces of Humble or of a later one.
+// The part of ros2_control that ros2_controller.cpp uses, with the interfaces of Humble or of a later one.
 #pragma once
 #include <cstdio>
 #include <map>

@@ -104,7 +104,7 @@ class RunningBox:
 
     Attributes:
         host: Its address.
-        lines: What it has said.
+        lines: Its messages.
     """
 
     def __init__(self, host: str) -> None:
@@ -113,7 +113,7 @@ class RunningBox:
 
     @property
     def address(self) -> str:
-        """What stands behind ``franka://``."""
+        """The address behind ``franka://``."""
         return f"{self.host}?realtime=ignore"
 
     def wait_alone(self) -> None:

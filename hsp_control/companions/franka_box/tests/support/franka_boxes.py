@@ -33,7 +33,7 @@ robot = franka.Robot(sys.argv[1], franka.RealtimeConfig.kIgnore)
 def damped(state, effort):
     return franka.Torques((effort - 5.0 * np.array(state.dq)).tolist())
 """
-"""What the clients of these tests begin with."""
+"""The beginning of the clients of these tests."""
 
 
 def command(**fields: Any) -> Any:
@@ -68,7 +68,7 @@ class Rig:
         server: Its server.
         box: The box.
         host: Its address.
-        said: What it has said.
+        said: Its messages.
     """
 
     def __init__(self, host: str, server: Server, said: list[str]) -> None:

@@ -34,7 +34,7 @@ def planar(number: int) -> hsp.Rollout:
 
 @dataclass
 class Arm:
-    """A Panda at home, and what it can be asked to do."""
+    """A Panda at home, and tasks for it."""
 
     robot: hsp.Robot = field(default_factory=lambda: hsp.Robot.load("panda"))
     tcp: str = "panda_tcp"

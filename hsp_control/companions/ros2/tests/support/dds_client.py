@@ -151,7 +151,7 @@ def drive(client: Client, controller: str, states: str, count: int) -> list[obje
 def robot(
     client: Client, controller: str, states: str, count: int, joints: list[str]
 ) -> list[object]:
-    """Move as it likes: one step with each effort that it hears."""
+    """Move arbitrarily: one step with each effort that it receives."""
     writer = client.writer(states, JointState)
     reader = client.reader(f"{controller}/commands", Numbers)
     start = [float(each.partition("=")[2]) for each in joints]
@@ -182,7 +182,7 @@ def robot(
 
 
 def watch(client: Client, topic: str, count: int) -> list[object]:
-    """Hear poses."""
+    """Receive poses."""
     reader = client.reader(topic, PoseStamped)
     found = (client.next(reader) for _ in range(count))
     return [

@@ -67,7 +67,7 @@ def joint_state(
 
 
 class Broadcaster:
-    """Publishes states in a thread until it is told to be still.
+    """Publishes states in a thread until it is stopped.
 
     Attributes:
         stamp: The stamp of the last state [ns].

@@ -10,7 +10,7 @@ from hsp_control.companions.viewer.commands import CLIP, Json, key_of, unpack
 
 
 class Recorder(SceneRecorder):
-    """A recorder that says what it keeps."""
+    """A recorder that returns its content."""
 
     def paths(self, below: str = "") -> list[str]:
         """Return the paths of all objects that begin with ``below``."""
@@ -70,7 +70,7 @@ class Clip:
         return self._tracks[path, name][1]
 
     def value(self, path: str, name: str, time: float) -> np.ndarray:
-        """Return what a track says at a time, as the page's player would."""
+        """Return a track's value at a time, as the page's player would."""
         times, values = self._tracks[path, name]
         row = int(np.clip(np.searchsorted(times, time, "right") - 1, 0, len(times) - 1))
         after = min(row + 1, len(times) - 1)
