@@ -76,7 +76,7 @@ void check_follower(const Joint& own, const AnyJoint& joint, const AnyJoint& lea
   if (fits && leader.shortname() != "JointModelMimic" && own.type != "JointModelComposite") return;
   throw std::invalid_argument("joint '" + own.name +
                               "' cannot follow: both have one degree of freedom and as many "
-                              "coordinates, and what it follows follows nothing");
+                              "coordinates, and its leader follows no joint");
 }
 
 using Model = pin::ModelTpl<double, 0, JointTypes>;

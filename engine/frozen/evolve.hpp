@@ -13,7 +13,7 @@ namespace hsp {
 
 struct Evolve {
   static constexpr const char* doc =
-      "x(t): each transition k crossfades from what was before, x_(k-1)(t) + s_k (target_k - "
+      "x(t): each transition k crossfades from the value before, x_(k-1)(t) + s_k (target_k - "
       "x_(k-1)(t)).";
   InOut<'n'> initial;       // x before all transitions that are kept
   InOut<'k', 'n'> targets;  // in order of time

@@ -180,7 +180,7 @@ const char* accepted(const Port& port) {
            "0, and with the other one damped and stable at this period";
   if (port.input)
     return port.input->definite ? "a gain needs to be finite and positive definite, with entries "
-                                  "below what is stable at this period"
+                                  "below the largest that is stable at this period"
            : port.input->cone.rows()
                ? "a force needs to be finite, to push, and to stay within the "
                  "friction pyramid at each point"
@@ -229,7 +229,7 @@ hsp_status change(hsp_controller& of, const char* name, const double* values, st
   }
   // A target's motion is bounded already: no ramp.
   if (!port->input && duration > 0.0)
-    return refused(of, "what is sent to a stream has no ramp: set it; its motion is bounded");
+    return refused(of, "the target of a stream has no ramp: set it; its motion is bounded");
   if (port->stream)
     return sent(*port->stream, port->part, wanted) ? HSP_OK : refused(of, accepted(*port));
   if (!port->input->permits(wanted)) return refused(of, accepted(*port));

@@ -84,7 +84,7 @@ struct KeepLevel {
 
 struct MixSets {
   static constexpr const char* doc =
-      "The weighted mean of what the sets deliver, which not even by rounding leaves their range, "
+      "The weighted mean of the efforts of sets, which not even by rounding leaves their range, "
       "with the worst status; the last one stays where one has nothing. Whether there is one.";
   Ints<'s'> on;
   In<'s'> shares;

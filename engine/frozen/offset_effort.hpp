@@ -9,7 +9,7 @@ namespace hsp {
 
 struct OffsetEffort {
   static constexpr const char* doc =
-      "The effort M a + N and an offset, and whether it, or what was checked before, violates a "
+      "The effort M a + N and an offset, and whether it, or an earlier check, violates a "
       "limit.";
   In<'n'> effort, offset, lower, upper;
   Out<'n'> wanted;

@@ -35,9 +35,8 @@ struct KeepPart {
 
 struct MixParts {
   static constexpr const char* doc =
-      "The weighted mean of what parts deliver, which not even by rounding leaves their range, "
-      "with "
-      "the worst status: whether each that has a share has kept something.";
+      "The weighted mean of the efforts of parts, which not even by rounding leaves their range, "
+      "with the worst status: whether each that has a share has kept something.";
   In<'s'> shares;      // of each set of tasks
   In<'l'> limits;      // of each set of limits
   In<'k', 'm'> parts;  // of each set of tasks within each set of limits

@@ -282,6 +282,10 @@ REFUSED: dict[str, tuple[Callable[[], Any], str]] = {
         lambda: chain(joint(inertia=(np.nan,) * 9)),
         "... inertia ... finite",
     ),
+    "half an inertia": (
+        lambda: chain(joint(inertia=(1.0, 0.5, 0.0, 0.4, 1.0, 0.0, 0.0, 0.0, 1.0))),
+        "... 'a': ... inertia ... not symmetric",
+    ),
     "no armature": (
         lambda: chain(joint(), armature=("x",)),
         "... armature is numbers",
