@@ -78,7 +78,7 @@ struct Weights {
   }
 };
 
-struct Bodies {
+struct BodyInertias {
   static constexpr const char* doc =
       "The body at each joint, payloads included: mass [kg], centre [m] and the inertia about it "
       "[kg·m²], in the joint's axes; and gravity.";

@@ -2,7 +2,7 @@
 
 namespace hsp {
 const Kind* const* dynamics_kinds() {
-  return kinds<JointJacobians, Carry, ChangeGravity, Weights, Bodies, Difference, InverseDynamics,
-               ForwardDynamics, MassMatrix, MassMatrixRate, CentroidalMotion>();
+  return kinds<JointJacobians, Carry, ChangeGravity, Weights, BodyInertias, Difference,
+               InverseDynamics, ForwardDynamics, MassMatrix, MassMatrixRate, CentroidalMotion>();
 }
 }  // namespace hsp

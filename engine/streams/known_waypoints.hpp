@@ -79,7 +79,7 @@ struct KnownWaypoints {
         k = std::max<Index>(k - 1, 0);
       }
       for (Index i = size(); i > k; --i) copy(i - 1, i);
-      ++count[0];
+      count[0] = size() + 1;
     }
     times[k] = time;
     values.row(k) = queue.values.row(row);

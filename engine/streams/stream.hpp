@@ -49,10 +49,11 @@ struct Stream {
   enum Policy { LATEST, INTERPOLATE, EXTRAPOLATE };
   static constexpr double infinite = std::numeric_limits<double>::infinity();
   static constexpr double nothing = std::numeric_limits<double>::quiet_NaN();
-  static constexpr double largest = 1e6;      // of a number that is sent: see `message.py`
-  static constexpr double latest = 1e12;      // time of a clock [s]
-  static constexpr double unit = 1e-3;        // deviation of a quaternion's norm from 1
-  static constexpr Index most_besides = 100;  // pieces of a step that lead to no waypoint
+  static constexpr double largest = 1e6;         // of a number that is sent: see `message.py`
+  static constexpr double latest = 1e12;         // time of a clock [s]
+  static constexpr double unit = 1e-3;           // deviation of a quaternion's norm from 1
+  static constexpr Index most = Index{1} << 62;  // of what is counted: no run goes on to 2^63
+  static constexpr Index most_besides = 100;     // pieces of a step that lead to no waypoint
 
   void check() const {
     check_piece(pieces.cols(), out.x.size());
@@ -62,6 +63,10 @@ struct Stream {
     check_at_least("queue.what", queue.what.rows(), 1);
     check_at_least("waypoints.times", waypoints.times.size(), 1);
     check_at_least("waypoints.clock.seen_at", waypoints.clock.seen_at.size(), 1);
+    check_index("piece", piece[0], most);
+    check_index("taken", taken[0], most);
+    check_index("late", late[0], most);
+    check_index("refused", refused[0], most);
   }
 
   bool operator()(double t) {

@@ -32,7 +32,7 @@ class CarriedInMujoco:
         )
         self._mass, self._center = mass, center.reshape(count, 3)
         self._inertia, self._gravity = inertia.reshape(count, 9), gravity
-        self._read = engine.Bodies(
+        self._read = engine.BodyInertias(
             dynamics=self.dynamics,
             mass=self._mass,
             center=self._center,

@@ -204,6 +204,20 @@ def test_a_message_that_is_taken_at_no_time_ends(tmp_path: Path) -> None:
         opened.step(0.001 * k, robot.home(), v)
 
 
+@pytest.mark.parametrize("name", ["piece", "taken", "late", "refused"])
+def test_a_count_that_could_overflow_is_refused(name: str, tmp_path: Path) -> None:
+    robot = hsp.Robot.load("panda")
+    hand = hsp.FramePosition("panda_tcp", hsp.Stream())
+    declared = hsp.Controller(robot, [hand], start=robot.home())
+    file = hsp.freeze(declared, tmp_path / "stream.hsp")
+    content = bytearray(file.read_bytes())
+    at = Layout(bytes(content)).array("Stream", name)
+    content[at : at + 8] = np.int64(2**63 - 1).tobytes()
+    file.write_bytes(summed(bytes(content)))
+    with pytest.raises(RuntimeError, match=f"{name} has the index {2**63 - 1}"):
+        Opened(file)
+
+
 # -- steps --------------------------------------------------------------------------
 
 
