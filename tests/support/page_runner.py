@@ -52,8 +52,6 @@ _GIVEN = re.compile(r"<!-- given: (\S+): (\S+) -->")
 _FILE = re.compile(r"`([\w./-]+\.(\w+))`[^`]*:\s*$")
 _ENDINGS = {"python": "py", "sh": "sh", "yaml": "yaml", "c": "c", "cpp": "cpp"}
 _SYNTAX = {"json": json.loads, "toml": tomllib.loads}
-_PATIENCE = "--set live.missing=2000 --set live.watchdog=2000 --set live.age=60"
-"""On a busy computer: what `hsp live` is given besides what the page says."""
 _BRIEFLY = "--duration 1"
 """What `hsp live` is given where the page does not say how long it runs [s]."""
 _SHORT = "simulation.duration=0.02"
@@ -269,8 +267,8 @@ class Shell:
             for name in ("examples", "benchmarks"):  # the page says where they are
                 if re.search(rf"\b{name}/", line) and not Path(name).exists():
                     Path(name).symlink_to(ROOT / name)
-            if re.match(r"hsp live\b", line) and "live.missing" not in line:
-                line = f"{line} {_PATIENCE}"
+            if re.match(r"hsp live\b", line):  # the computer may be busy
+                line += "" if "--robot" in line else " --lockstep"
                 line += "" if "--duration" in line else f" {_BRIEFLY}"
             if line.endswith("&") or block.kind == "background":
                 self._background.append(self._start(line.rstrip("& "), where))

@@ -13,10 +13,6 @@ from ready_commands import ReadyCommands
 
 from hsp_control.cli import main
 
-PATIENCE = "--set live.missing=2000 --set live.watchdog=2000 --set live.age=60"
-"""What `hsp live` is given on a busy computer."""
-
-
 READY = ReadyCommands()
 
 

@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 from places import THOROUGH, further
-from typing_commands import PATIENCE, hsp, in_this_process, script
+from typing_commands import hsp, in_this_process, script
 
 CONFIG = """
 robot: {name: panda}
@@ -78,7 +78,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     (folder / "mine.yaml").write_text(CONFIG)
     (folder / "logs.py").write_text(PYTHON)
     hsp("run mine.yaml", folder)
-    hsp(f"live mine.yaml {PATIENCE}", folder)
+    hsp("live mine.yaml --lockstep", folder)
     hsp("play mine.yaml --no-browser", folder)
     script("logs.py", folder)
     return folder

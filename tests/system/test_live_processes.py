@@ -83,9 +83,7 @@ def test_a_bad_line_is_seen_counted_and_survived(tmp_path: Path) -> None:
     experiment = hsp.load_experiment(CONFIG)
     logs = tmp_path / "loop.journal", tmp_path / "robot.journal"
     faults = Faults(late=0.03, lost=0.03, duplicated=0.03, corrupted=0.03, seed=1)
-    with RobotProcess(
-        experiment, faults=faults, log=logs[1], lockstep=True
-    ) as robot:
+    with RobotProcess(experiment, faults=faults, log=logs[1], lockstep=True) as robot:
         report = run_loop(
             experiment.controller,
             robot.hardware,

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 from places import THOROUGH, further
-from typing_commands import PATIENCE, hsp, script
+from typing_commands import hsp, script
 
 PARTS = """
 import hsp_control as hsp
@@ -35,11 +35,10 @@ null_space:
     - {type: nod, height: 1, weight: 0.001}
 simulation: {duration: 0.05, control_period: 0.001}
 """
-"""At rest: a live loop that is given few periods finds no wrong effort."""
 WITH_CONFIGURATION = {
     "run": "run mine.yaml",
     "check": "check mine.yaml",
-    "live": f"live mine.yaml {PATIENCE}",
+    "live": "live mine.yaml --lockstep",
     "play": "play mine.yaml --no-browser",
     "sweep": "sweep mine.yaml --over null_space.gain=5,6 --workers 1",
 }

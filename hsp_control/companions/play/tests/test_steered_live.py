@@ -18,12 +18,7 @@ import hsp_control as hsp
 from hsp_control.cli import main
 
 # On a machine with much else to do, processes wait for one another.
-PATIENT = [
-    "--set=live.missing=5000",
-    "--set=live.watchdog=5000",
-    "--set=live.age=10",
-    "--set=simulation.control_period=0.002",
-]
+PATIENT = ["--lockstep", "--set=simulation.control_period=0.002"]
 
 
 class SteeredLive:
