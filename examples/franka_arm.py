@@ -10,7 +10,7 @@ import hsp_control as hsp
 from hsp_control.companions.franka import connect
 
 address = sys.argv[1] if len(sys.argv) > 1 else "172.16.0.2"
-if address == "127.0.0.1":
+if address.startswith("127."):
     address += "?realtime=ignore&lockstep=true"  # no real-time kernel
 robot = hsp.Robot.load("panda")  # of an arm: what `hsp franka-model` writes
 arm = connect(address, robot, 0.001)

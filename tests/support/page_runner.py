@@ -270,6 +270,8 @@ class Shell:
             if re.match(r"hsp live\b", line):  # the computer may be busy
                 line += "" if "--robot" in line else " --lockstep"
                 line += "" if "--duration" in line else f" {_BRIEFLY}"
+            if re.match(r"hsp franka-box .*--lockstep", line):
+                line = line.replace("--lockstep", "--lockstep --patience 60")
             if line.endswith("&") or block.kind == "background":
                 self._background.append(self._start(line.rstrip("& "), where))
             elif block.kind == "Ctrl-C":

@@ -108,7 +108,8 @@ def seen(tmp_path: Path) -> Iterator[Running]:
 @pytest.fixture
 def franka(tmp_path: Path) -> Iterator[Running]:
     """A Franka, as far as its control box is one."""
-    command = [HSP, "franka-box", "panda", "--lockstep", "--host", "127.0.0.2"]
+    command = [HSP, "franka-box", "panda", "--lockstep", "--patience", "60"]
+    command += ["--host", "127.0.0.2"]
     with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as box:
         assert box.stdout is not None
         assert "in lockstep" in box.stdout.readline()

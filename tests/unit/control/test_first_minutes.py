@@ -257,7 +257,7 @@ def test_another_thread_waits() -> None:
     def cost(state: Any) -> float:
         if threading.current_thread().name == "slow" and not go.is_set():
             entered.set()
-            go.wait(10.0)
+            go.wait(60.0)
         return float(state.q @ state.q)
 
     law = holding(field=hsp.TargetPosture("home") + hsp.FunctionCost(cost))
@@ -270,14 +270,14 @@ def test_another_thread_waits() -> None:
         threading.Thread(target=lambda: found.append(law.flow(*second[:2]))),
     ]
     slow.start()
-    assert entered.wait(10.0)
+    assert entered.wait(60.0)
     for thread in quick:
         thread.start()
     time.sleep(0.05)
     assert not found
     go.set()
     for thread in (slow, *quick):
-        thread.join(10.0)
+        thread.join(60.0)
         assert not thread.is_alive()
     assert len(found) == 2
     (one,) = [each for each in found if not isinstance(each, np.ndarray)]

@@ -42,7 +42,6 @@ def cell(tmp_path: Path) -> hsp.Experiment:
         "tasks": {"tip": {"type": "frame_position", "frame": "tip"}},
         "plant": "mujoco_scene",
         "simulation": {"duration": 0.1, "control_period": 0.002},
-        "live": {"missing": 1000, "age": 5.0, "watchdog": 1000},
     })  # fmt: skip
 
 
@@ -95,7 +94,7 @@ def test_a_picture_shows_the_scene_as_it_is_then(
 @DRAWS
 @pytest.mark.process
 def test_a_robot_in_its_own_process_is_seen(cell: hsp.Experiment, address: str) -> None:
-    with RobotProcess(cell, cameras=f"http://{address}") as robot:
+    with RobotProcess(cell, cameras=f"http://{address}", lockstep=True) as robot:
         assert seen(address, "above.jpg")[0] == 0.0
         options = {"settings": cell.scenario.live, "duration": 0.1}
         run_loop(cell.controller, robot.hardware, **options)

@@ -136,7 +136,7 @@ def test_a_killed_box_ends_the_loop() -> None:
     address = host(1)
     command = [sys.executable, "-m", "hsp_control", "franka-box", "panda"]
     with subprocess.Popen(
-        [*command, "--lockstep", "--host", address],
+        [*command, "--lockstep", "--patience", "60", "--host", address],
         stdout=subprocess.PIPE,
         text=True,
         cwd=ROOT,

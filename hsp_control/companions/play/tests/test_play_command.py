@@ -52,7 +52,7 @@ def test_a_page_steers_and_the_log_repeats_it(played: Played, tmp_path: Path) ->
     wait_until(lambda: last(page, "play_state")["message"].startswith("saved: "))
     assert (tmp_path / "panda_obstacle-play.npz").is_file()
     page.leave()
-    page.join(10.0)
+    page.join(60.0)
     text = played.end()
     assert played.process.returncode == 0, text
     log = hsp.Rollout.load(tmp_path / "panda_obstacle-play.npz")
