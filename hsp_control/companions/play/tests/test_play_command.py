@@ -40,7 +40,9 @@ def test_a_page_steers_and_the_log_repeats_it(played: Played, tmp_path: Path) ->
         assert targets is not None
         return float(targets["poses"]["hand"][2])
 
+    begun = last(page, "play_state")["t"]
     page.say(do="move", target="hand", pose=pose)
+    wait_until(lambda: last(page, "play_state")["t"] > begun + 0.5)
     wait_until(lambda: abs(height() - pose[2]) < 1e-6)
     page.say(do="set", id="null_space_gain", value=20.0)
     wait_until(lambda: last(page, "play_values")["values"]["null_space_gain"] == 20.0)
