@@ -3,8 +3,8 @@
     .venv/bin/python tools/replays.py [--brief] [NAME ...]
 
 Writes ``docs/_static/replays``. A page that is newer than its configuration stays;
-delete the folder to have all of them anew. With ``--brief`` all are one page, of a run of a
-tenth of a second: enough to check that the site can be built.
+delete the folder to have all of them anew. With ``--brief`` all are one page, of a run
+of a tenth of a second: enough to check that the site can be built.
 """
 
 import shutil
