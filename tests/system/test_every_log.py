@@ -67,6 +67,8 @@ TAKERS = {
 }
 """Commands, and what they write; unless thorough they take logs in turn."""
 LOGS = [*REPEATED, *OTHERS]
+if not THOROUGH:  # written as a recorder's, and as that of a function of one's own
+    LOGS = [each for each in LOGS if each not in {"simulated", "task"}]
 VIEW = "view {log} --no-browser"
 VIEWED = "mine", "loop"
 """And a walk; a view reads a log as an export does."""
