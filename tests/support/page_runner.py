@@ -36,7 +36,7 @@ from typing import Any, NamedTuple, TextIO
 from urllib.request import urlopen
 
 import yaml
-from places import ROOT
+from places import ROOT, THOROUGH
 from typing_commands import READY
 
 from hsp_control import load_experiment
@@ -275,7 +275,8 @@ class Shell:
             if line.endswith("&") or block.kind == "background":
                 self._background.append(self._start(line.rstrip("& "), where))
             elif block.kind == "Ctrl-C":
-                self._interrupted(line, where)
+                if THOROUGH or not _of_the_readme(line) or where.startswith("README"):
+                    self._interrupted(line, where, serves="page" in block.reason)
             elif re.fullmatch(r"hsp [\w ./=-]+", line) and not block.kind:
                 words = line.split()[1:]
                 status, said = READY.run(words, self._folder, self._environment)
@@ -303,15 +304,22 @@ class Shell:
             running.wait_for(r".")
         return running
 
-    def _interrupted(self, line: str, where: str) -> None:
+    def _interrupted(self, line: str, where: str, *, serves: bool) -> None:
         """Start a command, look at its page if it serves one, and press Ctrl-C."""
         running = self._start(line, where)
-        served = running.wait_for(r"http://\S+", 15.0)  # not all serve one
-        if served:
+        if serves:
+            served = running.wait_for(r"http://\S+", 200.0)
+            assert served, f"{where}: {line}: no page\n{running.output.read_text()}"
             with urlopen(served[0], timeout=20) as answer:
                 assert answer.status == 200
         status = running.end()
         assert status in {0, 130}, f"{running.about}\n{running.output.read_text()}"
+
+
+def _of_the_readme(line: str) -> bool:
+    """Return whether the README has this command as well, where it is run."""
+    lines = (ROOT / "README.md").read_text(encoding="utf-8").splitlines()
+    return line.split("#")[0].strip() in {each.split("#")[0].strip() for each in lines}
 
 
 class Running(NamedTuple):
