@@ -13,6 +13,7 @@ from field_cases import placed
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from loaded_robots import load
+from oracles import close
 from places import THOROUGH
 from wording import wording
 
@@ -45,10 +46,6 @@ def coupling(nv: int) -> Array:
     """Return a metric that couples all joints."""
     A = np.eye(nv) + 0.2 * np.random.default_rng(nv).normal(size=(nv, nv))
     return A.T @ A
-
-
-def close(actual: Array, expected: Array, atol: float) -> None:
-    np.testing.assert_allclose(actual, expected, rtol=0, atol=atol)
 
 
 # -- what the costs say ----------------------------------------------------------------

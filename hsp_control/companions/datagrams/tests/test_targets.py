@@ -11,6 +11,7 @@ import numpy as np
 import pinocchio as pin
 import pytest
 from places import ROOT
+from ports import free_port
 from wording import wording
 
 import hsp_control as hsp
@@ -22,12 +23,6 @@ from hsp_control.config.document import read_document
 from hsp_control.trajectories.streams.followed import FollowedPoint, FollowedPose
 from hsp_control.trajectories.streams.inbox import Inbox
 from hsp_control.trajectories.streams.message import Space
-
-
-def free_port() -> int:
-    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
-        probe.bind(("127.0.0.1", 0))
-        return int(probe.getsockname()[1])
 
 
 @pytest.fixture
