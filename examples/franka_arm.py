@@ -10,8 +10,8 @@ import hsp_control as hsp
 from hsp_control.companions.franka import connect
 
 address = sys.argv[1] if len(sys.argv) > 1 else "172.16.0.2"
-if address == "127.0.0.1":
-    address += "?realtime=ignore"  # the box needs no real-time kernel
+if address.startswith("127."):
+    address += "?realtime=ignore&lockstep=true"  # no real-time kernel
 robot = hsp.Robot.load("panda")  # of an arm: what `hsp franka-model` writes
 arm = connect(address, robot, 0.001)
 experiment = hsp.load_experiment(
@@ -19,7 +19,6 @@ experiment = hsp.load_experiment(
     f"start={{configuration: {arm.q.tolist()}}}",  # where it is
     "tasks.hand.gains.natural_frequency=3",  # begin gently
     "null_space.gain=1",
-    "live.missing=1000",
 )
 settings = arm.adapted(experiment.scenario.live)
 report = hsp.run_loop(

@@ -34,7 +34,7 @@ if __name__ == "__main__":
         hand = hsp.FramePose("panda_tcp")
         field = cost + hsp.JointCentering(weight=0.2)
         controller = hsp.Controller(robot, [hand], field, null_space_gain=8.0)
-        run = hsp.simulate(controller, robot.home(), duration=3.0, control_period=0.001)
+        run = hsp.simulate(controller, robot.home(), duration=3.0, control_period=0.002)
         moved = run.measure(robot, lambda state: state.position("panda_link4")[1])
         print(f"{name}: the elbow goes from {moved[0]:.3f} to {moved[-1]:.3f} m")
         run.save(f"out/own_cost_{name}.npz")

@@ -76,7 +76,7 @@ class Robot {
         if (newest_ == 0 && ++starting_ < 12) continue;  // the robot may take a minute to start
         return false;
       }
-      if (static_cast<std::size_t>(size) < sizeof head + 4) continue;
+      if (static_cast<std::size_t>(size) < sizeof head + 4) continue;  // also the end of a turn
       const std::size_t body = size - 4;
       std::uint32_t check;
       std::memcpy(&head, data, sizeof head);
@@ -110,6 +110,11 @@ class Robot {
     sendto(socket_, data, body + 4, 0, reinterpret_cast<const sockaddr*>(&peer_), peer_size_);
   }
 
+  // To a robot in lockstep: it is its turn, with an empty datagram.
+  void end_turn() {
+    sendto(socket_, nullptr, 0, 0, reinterpret_cast<const sockaddr*>(&peer_), peer_size_);
+  }
+
  private:
   int socket_;
   std::uint64_t session_, newest_ = 0, sent_ = 0;
@@ -138,11 +143,13 @@ int run(char** arguments) {
     if (status < 0 && refused++ == 0)
       std::fprintf(stderr, "live: t = %g s: %s\n", state.t, controller.last_error());
     robot.send(EFFORT, tau);
+    robot.end_turn();
     // Once a step is refused, or at the end: brake, and hold for 200 periods.
     stopping = stopping || status < 0 || state.t >= duration;
     held += status == HSP_HOLDING;
   }
   for (int i = 0; i < 3; ++i) robot.send(BYE);  // one may be lost
+  robot.end_turn();
   std::sort(times.begin(), times.end());
   const auto part = [&](double x) {
     return times[static_cast<std::size_t>(x * (times.size() - 1))];

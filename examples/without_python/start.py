@@ -1,6 +1,7 @@
 """Close the loop of a simulated arm with a controller that runs without Python.
 
     python start.py [CONFIG] [--duration S] [--out DIR] [--set KEY=VALUE]
+        [--lockstep]
 
 It freezes a configuration, compiles `live.cpp`, starts the simulated robot of
 ``hsp live`` in one process and the C++ loop in another, and waits. Python is needed to
@@ -43,6 +44,7 @@ def main() -> int:
     parser.add_argument("--duration", type=float, default=10.0, metavar="S")
     parser.add_argument("--set", action="append", default=[], metavar="KEY=VALUE")
     parser.add_argument("--out", type=Path, default=Path("out"), metavar="DIR")
+    parser.add_argument("--lockstep", action="store_true", help="not in real time")
     options = parser.parse_args()
     options.out.mkdir(parents=True, exist_ok=True)
     experiment = hsp.load_experiment(options.config, *options.set)
@@ -54,7 +56,7 @@ def main() -> int:
     )
     program = compiled(HERE / "live.cpp", options.out)
     log = options.out / f"{experiment.name}-robot.journal"
-    robot = RobotProcess(experiment, log=log)
+    robot = RobotProcess(experiment, log=log, lockstep=options.lockstep)
     (_, port), session = robot.hardware.address, robot.hardware.session
     robot.hardware.link.close()  # the loop listens there instead
     command = [str(each) for each in (program, frozen, port, session, options.duration)]

@@ -53,10 +53,11 @@ def live(options: argparse.Namespace) -> int:
     if not duration > 0.0:
         raise LiveError(f"--duration {duration:g}; must be positive")
     until = None if duration == inf else duration
-    if options.robot is not None and (options.faults or options.cameras):
+    simulated = options.faults or options.cameras or options.lockstep
+    if options.robot is not None and simulated:
         raise LiveError(
-            "--faults and --cameras are for the simulated robot: leave them out with "
-            "--robot"
+            "--faults, --cameras and --lockstep are for the simulated robot: leave "
+            "them out with --robot"
         )
     # The experiment
     name = Path(loaded.document.name).stem
@@ -149,6 +150,7 @@ def live(options: argparse.Namespace) -> int:
             log=robot_log,
             log_period=simulation.log_period,
             cameras=options.cameras,
+            lockstep=options.lockstep,
         ) as robot:
             report = run(robot.hardware)
             robot_report = robot.wait()

@@ -166,6 +166,11 @@ def add_live(live: argparse.ArgumentParser) -> None:
         "directions; delay=PACKETS of late ones, and seed=N",
     )
     live.add_argument(
+        "--lockstep",
+        action="store_true",
+        help="loop and robot wait for each other: on a busy computer, in a debugger",
+    )
+    live.add_argument(
         "--out", type=Path, default=Path("out"), metavar="DIR", help="default: out"
     )
     live.add_argument(

@@ -64,13 +64,18 @@ class RobotProcess:
         log: str | Path | None = None,
         log_period: float = 0.01,
         cameras: str | None = None,
+        lockstep: bool = False,
     ) -> None:
         check_live(experiment)
         faults = faults or Faults()
         period = live_period(experiment)
         measured = simulated_robot(experiment).measured()
         self.hardware = UdpHardware(
-            experiment.robot, period, faults=faults, sensors=SensorLayout.of(measured)
+            experiment.robot,
+            period,
+            faults=faults,
+            sensors=SensorLayout.of(measured),
+            alive=self._runs if lockstep else None,
         )
         self._settings = {
             "config": without_sources(experiment.config),
@@ -82,6 +87,7 @@ class RobotProcess:
             "log": None if log is None else str(Path(log).absolute()),
             "log_period": log_period,
             "cameras": cameras,
+            "lockstep": lockstep,
             "peer": self.hardware.address,
             "session": self.hardware.session,
         }
@@ -124,6 +130,9 @@ class RobotProcess:
             self.close()
             late = "" if ready else f" in {timeout:g} s"
             raise HardwareError(reply or f"the simulated robot did not start{late}")
+
+    def _runs(self) -> bool:
+        return self.process is not None and self.process.poll() is None
 
     def wait(self, timeout: float = 15.0) -> dict[str, Any] | None:
         """Wait until the robot has stopped and its process has ended."""
@@ -212,7 +221,13 @@ def _run(settings: dict[str, Any], stop_reason: Any) -> dict[str, Any]:
         address, known = installed("--cameras", settings["cameras"], "cameras")
         rows.append(known.load()(address, robot.plant))
     _print(READY)
-    served = serve(robot, link, stop_reason=stop_reason, on_rows=rows)
+    served = serve(
+        robot,
+        link,
+        stop_reason=stop_reason,
+        on_rows=rows,
+        lockstep=settings["lockstep"],
+    )
     link.send(PacketKind.BYE)  # its number shows the loop how many packets were lost
     reason = robot.reason or "no effort arrived"
     report: dict[str, Any] = {

@@ -211,6 +211,8 @@ _BUFFER = 4 << 20
 """Size of the receive buffer [bytes]: some thousand packets."""
 _MAX_DATAGRAM = 65536
 _NOTHING = np.zeros(0)
+_END_OF_TURN = b""
+"""An empty datagram after the packets of a turn, which faults may hold back."""
 
 
 class Link:
@@ -260,6 +262,7 @@ class Link:
         self.address: Address = self._socket.getsockname()
         self.newest = self._sent = 0
         self._byes: set[int] = set()  # when ours were sent [ns]
+        self._turn: list[Packet] = []  # accepted, of a turn that has not ended
         self.counts: Counter[str] = Counter(
             dict.fromkeys(
                 ("sent", "accepted", "corrupted", "foreign", "duplicated", "stale"), 0
@@ -321,22 +324,54 @@ class Link:
                 accepted = self._drain()
         return accepted
 
+    def end_turn(self) -> None:
+        """Say that it is the other end's turn, in lockstep; always arrives."""
+        if self.peer is not None:
+            with suppress(OSError):
+                self._socket.sendto(_END_OF_TURN, self.peer)
+
+    def turn(self, timeout: float) -> list[Packet] | None:
+        """Return the accepted packets of the other end's turn, in lockstep.
+
+        None if it does not end in time [s]; they are then returned later.
+        """
+        end = monotonic() + timeout
+        while self._socket.fileno() >= 0:
+            received = self._next()
+            if received is None:
+                ready, _, _ = select([self._socket], [], [], max(end - monotonic(), 0))
+                if not ready:
+                    return None
+            elif received[0] == _END_OF_TURN and received[1] == self.peer:
+                turn, self._turn = self._turn, []
+                return turn
+            elif (packet := self._classify(*received)) is not None:
+                self._turn.append(packet)
+        return None
+
     def close(self) -> None:
         """Close the socket; a second call does nothing."""
         self._socket.close()
 
     def _drain(self) -> list[Packet]:
         accepted: list[Packet] = []
-        while True:
-            try:
-                data, sender = self._socket.recvfrom(_MAX_DATAGRAM)
-            except BlockingIOError:
-                return accepted
-            except ConnectionRefusedError:  # the other end had closed when we sent
+        while (received := self._next()) is not None:
+            data, sender = received
+            if data == _END_OF_TURN and sender == self.peer:
                 continue
             packet = self._classify(data, sender)
             if packet is not None:
                 accepted.append(packet)
+        return accepted
+
+    def _next(self) -> tuple[bytes, Address] | None:
+        while True:
+            try:
+                return self._socket.recvfrom(_MAX_DATAGRAM)
+            except BlockingIOError:
+                return None
+            except ConnectionRefusedError:  # the other end had closed when we sent
+                continue
 
     def _classify(self, data: bytes, sender: Address) -> Packet | None:
         packet = decode(data)

@@ -18,6 +18,7 @@ from hsp_control.live.link import (
     AgeEstimator,
     Faults,
     Link,
+    Packet,
     PacketKind,
 )
 from hsp_control.live.real_time import no_garbage_collection
@@ -81,6 +82,10 @@ class SensorLayout(NamedTuple):
         )
 
 
+_PAUSE = 0.1
+"""Time after which it is asked again whether the other end still runs [s]."""
+_AGAIN = 0.5
+"""Time between two states of a robot in lockstep that waits for an effort [s]."""
 _BYES = 3
 """Number of BYE packets that are sent: one may be lost."""
 
@@ -94,10 +99,9 @@ class UdpHardware:
     Attributes:
         period: Time between two states [s].
         link: The connection, with its counts of packets.
+        real_time: Whether its time passes as ours does: not in lockstep.
         closed: Whether `close` was called.
     """
-
-    real_time = True
 
     def __init__(
         self,
@@ -108,6 +112,7 @@ class UdpHardware:
         session: int | None = None,
         faults: Faults | None = None,
         sensors: SensorLayout | None = None,
+        alive: Callable[[], bool] | None = None,
     ) -> None:
         """Open the socket.
 
@@ -118,6 +123,8 @@ class UdpHardware:
             session: A number that the robot uses, too; None: a random one.
             faults: Faults to inject into the efforts sent.
             sensors: The robot's sensors besides those of q and v; None: none.
+            alive: In lockstep with a robot that is served so: whether it still is; its
+                next state is waited for as long. None: real time.
 
         Raises:
             HardwareError: If the address does not exist or is in use.
@@ -130,6 +137,10 @@ class UdpHardware:
             session, address, faults=faults, stream=1, receives=PacketKind.STATE
         )
         self._age_estimator = AgeEstimator()
+        self._alive, self.real_time = alive, alive is None
+        self._last: Measurement | None = None
+        self._started = False  # whether an effort was sent
+        self._our_turn = True
         self.closed = False
 
     @property
@@ -144,28 +155,51 @@ class UdpHardware:
 
     def read(self, timeout: float) -> Measurement | None:
         """Return the newest state; see `Hardware.read`."""
-        states = [p for p in self.link.receive(timeout) if p.kind is PacketKind.STATE]
+        in_turn = self._alive is not None and self._started
+        packets = self._robot_s_turn() if in_turn else self.link.receive(timeout)
+        states = [p for p in packets if p.kind is PacketKind.STATE]
         for packet in states:
             age = self._age_estimator.age(monotonic(), 1e-9 * packet.stamp)
         if not states:
-            return None
+            # A robot in lockstep that waits for its first effort is where it was.
+            return None if in_turn or self.real_time else self._last
         measured = self._sensors.unpack(packet.payload, self._robot)
-        return measured._replace(
+        self._last = measured._replace(
             sequence=packet.sequence,
             t=packet.t,
-            age=age,
+            age=age if self.real_time else 0.0,
             halted=packet.phase > Phase.RUNNING,
         )
+        return self._last
+
+    def _robot_s_turn(self) -> list[Packet]:
+        """Wait for what the robot sends in its turn; nothing once it has ended."""
+        self._end_turn()
+        while (packets := self.link.turn(_PAUSE)) is None:
+            if self._alive is not None and not self._alive():
+                self._alive = None
+                return []
+        self._our_turn = True
+        return packets
+
+    def _end_turn(self) -> None:
+        if self._alive is not None and self._our_turn:
+            self.link.end_turn()
+            self._our_turn = False
 
     def write(self, effort: Array) -> None:
         """Send an effort; see `Hardware.write`."""
         self.link.send(PacketKind.EFFORT, effort)
+        self._started = True
+        self._end_turn()
 
     def close(self) -> None:
         """Send the end of the session; packets that still arrive can be counted."""
         if not self.closed and self.link.peer is not None:
             for _ in range(_BYES):
                 self.link.send(PacketKind.BYE)
+            if not self.real_time:
+                self.link.end_turn()
         self.closed = True
 
     def drain(self) -> None:
@@ -207,6 +241,7 @@ def serve(
     stop_reason: Callable[[], str | None],
     start_timeout: float = 60.0,
     on_rows: Sequence[Row] = (),
+    lockstep: bool = False,
 ) -> ServerReport:
     """Run a robot in real time, until it has stopped and was held.
 
@@ -217,6 +252,9 @@ def serve(
     If this process overruns by more than a period, the robot's time stands still
     meanwhile, so that the loop's efforts are not late.
 
+    In lockstep a period also waits until the loop has ended its turn, which it has with
+    each state: neither is ever late, however busy the computer.
+
     An exception of the connection or of ``on_rows`` stops the robot, too; then
     ``on_rows`` is not called any more.
 
@@ -224,8 +262,10 @@ def serve(
         robot: The robot, waiting for its first effort.
         link: The connection; its peer is known.
         stop_reason: Called every period; returns a reason to stop, or None.
-        start_timeout: Maximum time to wait for the first effort [s].
+        start_timeout: Maximum time to wait for the first effort [s], in lockstep for
+            each.
         on_rows: Called after the state was sent, in the rest of the period.
+        lockstep: Whether to wait for the loop.
 
     Returns:
         The counts.
@@ -233,6 +273,22 @@ def serve(
     report, nv = ServerReport(), robot.plant.robot.nv
     sensors = SensorLayout.of(robot.measured())
     state_sequence = 0
+    alone = False  # whether no loop is there any more
+
+    def received() -> list[Packet]:
+        if not lockstep or alone:
+            return link.receive(0.0)
+        if robot.phase == Phase.WAITING:
+            return link.turn(_AGAIN) or []
+        end = monotonic() + start_timeout
+        while (packets := link.turn(_PAUSE)) is None:
+            if stop_reason() is not None:
+                return []
+            if monotonic() > end:
+                robot.halt(f"the loop did not answer for {start_timeout:g} s")
+                return []
+        return packets
+
     with no_garbage_collection():
         begin = monotonic()
         give_up = begin + start_timeout
@@ -246,9 +302,10 @@ def serve(
                 begin = now
             efforts = []
             with _halting(robot, "no effort can be received"):
-                for packet in link.receive(0.0):
+                for packet in received():
                     if packet.kind is PacketKind.BYE:
                         robot.halt(CLOSED_BY_LOOP)
+                        alone = True
                     elif packet.kind is PacketKind.EFFORT and len(packet.payload) == nv:
                         if state_sequence - packet.acks > robot.watchdog:
                             report.outdated += 1
@@ -260,12 +317,15 @@ def serve(
                     return report
             elif reason is not None:
                 robot.halt(reason)
+                alone = True
             t, q, v = robot.t, robot.q, robot.v
             robot.advance(efforts)
             state = sensors.pack(robot.measured())
             with _halting(robot, "no state can be sent"), suppress(OSError):
                 # A failing connection loses packets.
                 link.send(PacketKind.STATE, state, t=robot.t, phase=int(robot.phase))
+            if lockstep and robot.phase != Phase.WAITING:
+                link.end_turn()
             state_sequence = link.counts["sent"]
             done = robot.done
             if robot.t > t:

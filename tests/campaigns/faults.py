@@ -138,11 +138,11 @@ def interrupted(random: Random, folder: Path, log: Path, longest: float) -> Faul
     time.sleep(random.uniform(0.0, longest))
     process.send_signal(signal.SIGINT)
     try:
-        _, errors = process.communicate(timeout=60.0)
+        _, errors = process.communicate(timeout=200.0)
     except subprocess.TimeoutExpired:
         process.kill()
         _, errors = process.communicate()
-        found.add(which, f"did not end within a minute: {errors}")
+        found.add(which, f"did not end in 200 s: {errors}")
         return found
     status, problem = process.returncode, ""
     outcome = {0: "done before", 130: "stopped"}.get(status, f"status {status}")

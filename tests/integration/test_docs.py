@@ -43,7 +43,7 @@ def commands(text: str) -> list[list[str]]:
     """Return the words behind `hsp` of each command in a page's shell blocks."""
     shell = "".join(blocks(text, "sh") + blocks(text, "text")).replace("\\\n", " ")
     found = (
-        re.match(r"(?:\$ |\.venv/bin/)?hsp ((?:[^#>&|]|\S[#>&|])*)", line.strip())
+        re.match(r"(?:\$ |\.venv/bin/)?hsp ((?:\S[#>&|]|[^#>&|])*)", line.strip())
         for line in shell.splitlines()
     )
     return [shlex.split(command[1]) for command in found if command]

@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 import pinocchio as pin
 import pytest
+from field_oracles import constant
 from places import THOROUGH
 from states import moved
 
@@ -55,11 +56,6 @@ def simulated(
         controller, q0, duration=DURATION, control_period=period,
         log_period=max(period, 0.005), integrator=Rk4(min(period, 1e-3)),
     )  # fmt: skip
-
-
-def constant(g: Array, state: hsp.RobotState) -> Array:
-    """Return a field that is the same everywhere."""
-    return g
 
 
 def unmoved(state: hsp.RobotState) -> Array:

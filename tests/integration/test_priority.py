@@ -4,6 +4,7 @@ from functools import partial
 
 import numpy as np
 import pytest
+from field_oracles import constant
 from places import covering
 
 import hsp_control as hsp
@@ -18,11 +19,6 @@ ARMS = {
     "ur5": (0.0, -1.2, 1.8, -2.2, -1.57, 0.0),
 }
 KEPT, TURNED = 1e-3, np.deg2rad(0.1)  # [m, rad]
-
-
-def constant(g: Array, state: hsp.RobotState) -> Array:
-    """Return g."""
-    return g
 
 
 def growing(g: Array, state: hsp.RobotState) -> Array:

@@ -46,6 +46,11 @@ OBSTACLE = Obstacle(
 )
 
 
+def constant(g: Array, state: RobotState) -> Array:
+    """Return g, the value of a field that is the same everywhere."""
+    return g
+
+
 @cache
 def load(name: str) -> Robot:
     """Return a robot, or skip if it is of example-robot-data and that is not there."""

@@ -17,6 +17,11 @@ from numpy.typing import NDArray
 Array = NDArray[np.float64]
 
 
+def close(actual: Array, expected: Array, atol: float) -> None:
+    """Assert that numbers are equal to an absolute tolerance."""
+    np.testing.assert_allclose(actual, expected, rtol=0, atol=atol)
+
+
 def slope(function: Callable[[float], Any], step: float) -> Array:
     """Return f'(0) by six points: error h⁶ f⁽⁷⁾/140 beside rounding, about 2 ε|f|/h."""
     weights = ((1.0, 45.0), (2.0, -9.0), (3.0, 1.0))

@@ -36,7 +36,7 @@ from typing import Any, NamedTuple, TextIO
 from urllib.request import urlopen
 
 import yaml
-from places import ROOT
+from places import ROOT, THOROUGH
 from typing_commands import READY
 
 from hsp_control import load_experiment
@@ -52,8 +52,6 @@ _GIVEN = re.compile(r"<!-- given: (\S+): (\S+) -->")
 _FILE = re.compile(r"`([\w./-]+\.(\w+))`[^`]*:\s*$")
 _ENDINGS = {"python": "py", "sh": "sh", "yaml": "yaml", "c": "c", "cpp": "cpp"}
 _SYNTAX = {"json": json.loads, "toml": tomllib.loads}
-_PATIENCE = "--set live.missing=2000 --set live.watchdog=2000 --set live.age=60"
-"""On a busy computer: options of `hsp live` in addition to the page's."""
 _BRIEFLY = "--duration 1"
 """Duration of `hsp live` where the page does not give one [s]."""
 _SHORT = "simulation.duration=0.02"
@@ -269,13 +267,16 @@ class Shell:
             for name in ("examples", "benchmarks"):  # the page names their places
                 if re.search(rf"\b{name}/", line) and not Path(name).exists():
                     Path(name).symlink_to(ROOT / name)
-            if re.match(r"hsp live\b", line) and "live.missing" not in line:
-                line = f"{line} {_PATIENCE}"
+            if re.match(r"hsp live\b", line):  # the computer may be busy
+                line += "" if "--robot" in line else " --lockstep"
                 line += "" if "--duration" in line else f" {_BRIEFLY}"
+            if re.match(r"hsp franka-box .*--lockstep", line):
+                line = line.replace("--lockstep", "--lockstep --patience 60")
             if line.endswith("&") or block.kind == "background":
                 self._background.append(self._start(line.rstrip("& "), where))
             elif block.kind == "Ctrl-C":
-                self._interrupted(line, where)
+                if THOROUGH or not _of_the_readme(line) or where.startswith("README"):
+                    self._interrupted(line, where, serves="page" in block.reason)
             elif re.fullmatch(r"hsp [\w ./=-]+", line) and not block.kind:
                 words = line.split()[1:]
                 status, said = READY.run(words, self._folder, self._environment)
@@ -303,15 +304,22 @@ class Shell:
             running.wait_for(r".")
         return running
 
-    def _interrupted(self, line: str, where: str) -> None:
+    def _interrupted(self, line: str, where: str, *, serves: bool) -> None:
         """Start a command, look at its page if it serves one, and press Ctrl-C."""
         running = self._start(line, where)
-        served = running.wait_for(r"http://\S+", 15.0)  # not all serve one
-        if served:
+        if serves:
+            served = running.wait_for(r"http://\S+", 200.0)
+            assert served, f"{where}: {line}: no page\n{running.output.read_text()}"
             with urlopen(served[0], timeout=20) as answer:
                 assert answer.status == 200
         status = running.end()
         assert status in {0, 130}, f"{running.about}\n{running.output.read_text()}"
+
+
+def _of_the_readme(line: str) -> bool:
+    """Return whether the README has this command as well, where it is run."""
+    lines = (ROOT / "README.md").read_text(encoding="utf-8").splitlines()
+    return line.split("#")[0].strip() in {each.split("#")[0].strip() for each in lines}
 
 
 class Running(NamedTuple):

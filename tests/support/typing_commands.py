@@ -9,13 +9,10 @@ import time
 from contextlib import chdir, redirect_stderr, redirect_stdout
 from pathlib import Path
 
+import psutil
 from ready_commands import ReadyCommands
 
 from hsp_control.cli import main
-
-PATIENCE = "--set live.missing=2000 --set live.watchdog=2000 --set live.age=60"
-"""Options of `hsp live` on a busy computer."""
-
 
 READY = ReadyCommands()
 
@@ -37,7 +34,7 @@ def script(name: str, folder: Path) -> str:
 
 
 def played(command: list[str], folder: Path) -> str:
-    """Begin a play, and end it two seconds after it has printed how one ends it."""
+    """Begin a play, and end it once it has computed for a while."""
     with subprocess.Popen(
         command, cwd=folder, text=True, env=without_display(),
         stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.STDOUT,
@@ -48,7 +45,10 @@ def played(command: list[str], folder: Path) -> str:
             begin += line
             if line.startswith("Ctrl-C ends it"):
                 break
-        time.sleep(2.0)  # some rows; even one is a log
+        begun = psutil.Process(play.pid)
+        enough = begun.cpu_times().user + 0.3  # some rows; even one is a log
+        while begun.is_running() and begun.cpu_times().user < enough:
+            time.sleep(0.05)
         play.send_signal(signal.SIGINT)
         said = begin + play.communicate(timeout=250)[0]
     assert play.returncode == 0, said

@@ -12,4 +12,5 @@ def wording(message: str) -> str:
     """
     beginning = "" if message.startswith("...") else "^"
     pieces = message.removeprefix("...").split(" ... ")
-    return f"(?s){beginning}{'.*'.join(re.escape(piece.strip()) for piece in pieces)}"
+    words = ".*".join(re.escape(piece.strip()) for piece in pieces)
+    return f"(?s:{beginning}{words})"

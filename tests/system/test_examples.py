@@ -62,9 +62,11 @@ def test_a_configuration_runs(name: str, folder: Path) -> None:
 
 def test_a_franka_s_box_is_moved(folder: Path) -> None:
     skip_without("franka_arm.py")
+    host = "127.0.0.9"  # no other test's
+    command = f"hsp franka-box panda_obstacle --lockstep --patience 60 --host {host}"
     with Shell(folder) as shell:
-        box: Running = shell._start("hsp franka-box panda_obstacle --lockstep", "box")
-        printed = typed([sys.executable, "franka_arm.py", "127.0.0.1"], folder)
+        box: Running = shell._start(command, "box")
+        printed = typed([sys.executable, "franka_arm.py", host], folder)
         box.end()
     assert printed.startswith("completed")
 

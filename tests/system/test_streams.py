@@ -21,9 +21,10 @@ def test_a_run_follows_another_process_and_its_log_repeats_it(tmp_path: Path) ->
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
         probe.bind(("127.0.0.1", 0))
         port = probe.getsockname()[1]
-    policy = subprocess.Popen(
-        [sys.executable, str(EXAMPLE / "policy.py"), str(port), "600"]
-    )
+        policy = subprocess.Popen(
+            [sys.executable, str(EXAMPLE / "policy.py"), str(port), "600"]
+        )
+        probe.recv(1000)  # it has begun, however busy the computer
     try:
         source = f"tasks.hand.trajectory.source=udp://127.0.0.1:{port}"
         arguments = ["run", str(EXAMPLE / "panda.yaml"), "--out", str(tmp_path)]

@@ -22,6 +22,8 @@ The arm accepts 1000, relative to an effort that it reports in single precision:
 N·m are reported to 4e-6, which is 0.004 N·m/s."""
 _START = 5.0
 """Longest time to start or end the torque control [s]."""
+_LONGEST = 60.0
+"""Longest wait for a state in lockstep [s]."""
 _LAST_WORDS = 1.5
 """Time to wait for the client's message when it receives nothing for 1 s [s]."""
 
@@ -37,10 +39,10 @@ class FrankaHardware:
         period: Time between two states [s].
         q: Configuration when it was connected, shape (7,) [rad].
         lines: Findings and settings of the connection, one sentence each.
+        real_time: Whether its time passes as ours does: not in lockstep.
     """
 
     period = 0.001
-    real_time = True
 
     def __init__(
         self,
@@ -56,7 +58,7 @@ class FrankaHardware:
         Args:
             robot: The controller's model.
             process: The process.
-            settings: The filter's settings are used here.
+            settings: The filter's settings and the lockstep are used here.
             q: Its configuration, shape (7,) [rad].
             lines: Findings and settings of the connection.
             gripper: The process that drives its gripper; the loop never waits for it.
@@ -64,6 +66,7 @@ class FrankaHardware:
         self._robot, self._process, self._gripper = robot, process, gripper
         self.q, self.lines = q, lines
         self._reads, self._origin = 0, 0.0
+        self.real_time = not settings.lockstep
         self._running = self._closed = False
         self._effort = np.zeros(7)
         self._sent_any = False
@@ -92,7 +95,8 @@ class FrankaHardware:
         """Return the state that follows the last effort; see `Hardware.read`.
 
         Raises:
-            HardwareError: If the arm stopped by itself, does not start or is lost.
+            HardwareError: If the arm stopped by itself, does not start or is lost, or
+                a box in lockstep does not answer.
         """
         if not self._process.waiting:
             if self._running:  # the loop sent nothing: the last effort is held
@@ -100,8 +104,12 @@ class FrankaHardware:
             else:
                 self._process.ask(client.READ if self._reads == 0 else client.START)
         starts = self._reads == 1
+        if not self.real_time:
+            timeout = _LONGEST
         answer = self._process.receive(max(timeout, _START) if starts else timeout)
         if answer is None:
+            if not self.real_time:
+                raise HardwareError(f"the box sent no state for {_LONGEST:g} s")
             if starts:
                 raise HardwareError(f"torque control did not start in {_START:g} s")
             return None

@@ -16,27 +16,26 @@ from hsp_datagrams import Loop
 PLUGIN = Path(__file__).resolve().parents[1]
 ROOT = PLUGIN.parents[1]
 HSP = os.environ.get("HSP", str(ROOT / ".venv/bin/hsp"))
-PATIENT = {  # a machine that runs tests is late
-    "live.missing": 2000,
-    "live.age": 10,
-    "live.watchdog": 2000,
-    "live.velocity_margin": 2,
+GENTLE = {
     "simulation.control_period": 0.005,
     "null_space.gain": 2,
     "tasks.hand.gains.natural_frequency": 4,
+    "tasks.fingers.gains.natural_frequency": 4,
 }
-FINGERS = {"tasks.fingers.gains.natural_frequency": 4}
 LOOPS = {  # a configuration, what is set of it, and options
     "simulated": (
         PLUGIN / "panda.yaml",
-        {**PATIENT, **FINGERS, "simulation.integrator.step": 0.005},
-        [],
+        {**GENTLE, "simulation.integrator.step": 0.005},
+        ["--lockstep"],
     ),
-    "seen": (PLUGIN / "scene.yaml", {**PATIENT, **FINGERS}, []),
+    "seen": (PLUGIN / "scene.yaml", GENTLE, ["--lockstep"]),
     "franka": (
         ROOT / "examples/stream/panda.yaml",
-        {"live.missing": 2000, "live.age": 10},
-        ["--robot", "franka://127.0.0.2?realtime=ignore&gripper=udp://{gripper}"],
+        {},
+        [
+            "--robot",
+            "franka://127.0.0.2?realtime=ignore&lockstep=true&gripper=udp://{gripper}",
+        ],
     ),
 }
 
@@ -109,7 +108,8 @@ def seen(tmp_path: Path) -> Iterator[Running]:
 @pytest.fixture
 def franka(tmp_path: Path) -> Iterator[Running]:
     """A Franka, as far as its control box is one."""
-    command = [HSP, "franka-box", "panda", "--lockstep", "--host", "127.0.0.2"]
+    command = [HSP, "franka-box", "panda", "--lockstep", "--patience", "60"]
+    command += ["--host", "127.0.0.2"]
     with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as box:
         assert box.stdout is not None
         assert "in lockstep" in box.stdout.readline()

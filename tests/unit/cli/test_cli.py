@@ -251,10 +251,8 @@ def test_check_warns_of_motors_that_cannot_hold_the_robot(
     text = capsys.readouterr().out
     assert "bind at the start: the law is not exact there" in text
     (line,) = [line for line in text.splitlines() if "cannot hold" in line]
-    assert line == (
-        "At the start joint 'panda_joint2' cannot hold the robot: gravity requires "
-        "23.2 N·m of it, its limit is 20."
-    )
+    told = "At the start joint 'panda_joint2' ... 23.2 N·m ... 20"
+    assert re.search(wording(told), line)
     assert main(["check", "panda_obstacle", *weak, "--json"]) == 0
     told = json.loads(capsys.readouterr().out)
     assert (told["limits"], told["advice"]) == ("limited", [line])
@@ -374,10 +372,8 @@ def test_a_library_that_a_slim_system_lacks_is_named(
     reason = "cannot open shared object file: No such file or directory"
     lacks("libgomp.so.1", reason)
     assert main(["check", MOVING]) == 2
-    assert capsys.readouterr().err == (
-        "hsp: libgomp.so.1 is missing on this system: "
-        "install libgomp1 (Debian, Ubuntu) or libgomp (Fedora)\n"
-    )
+    told = "hsp: libgomp.so.1 ... libgomp1 (Debian ... libgomp"
+    assert re.search(wording(told), capsys.readouterr().err)
     lacks("libother.so", reason)
     assert main(["check", MOVING]) == 2
     assert "libother.so is missing on this system" in capsys.readouterr().err

@@ -72,11 +72,8 @@ def test_mistakes_in_overrides(override: str, expected: str) -> None:
 
 
 def test_mistakes_of_overrides_come_last() -> None:
-    assert message("robot: a\nview: 3", "steps=x") == (
-        "panda.yaml:2: view: 3 is an integer; expected true or false\n"
-        "and 1 more:\n"
-        "  'steps=x': steps: 'x' is text; expected an integer"
-    )
+    told = "panda.yaml:2: view: 3 ... and 1 more: ... 'steps=x': steps: 'x' ... integer"
+    assert re.search(wording(told), message("robot: a\nview: 3", "steps=x"))
 
 
 # --- errors raised later -------------------------------------------------------------

@@ -191,16 +191,15 @@ tasks: {hand: {}}
 
 
 def test_several_mistakes_are_listed_in_the_order_of_the_file() -> None:
-    assert message(SEVERAL) == (
-        "panda.yaml:1: integrator: unknown value 'rk5'; did you mean 'rk4'? "
-        "(allowed: euler, rk4)\n"
-        "and 7 more:\n"
-        "  panda.yaml:2: stepz: unknown key 'stepz'; did you mean 'steps'? "
-        "(allowed: robot, tasks, fields, route, frames, steps, view, integrator)\n"
-        "  panda.yaml:3: robot: 7 is an integer; expected text\n"
-        "  panda.yaml:5: fields.0.weight: 'a' is text; expected a number\n"
-        "  panda.yaml:5: fields.0.middel: unknown key 'middel'; did you mean 'middle'? "
-        "(allowed: type, weight, middle)\n"
-        "  panda.yaml:6: fields.1.weight: 'b' is text; expected a number\n"
-        "  ... (2 not shown)"
+    first, more, *lines, last = message(SEVERAL).splitlines()
+    assert (more, last) == ("and 7 more:", "  ... (2 not shown)")
+    expected = (
+        "panda.yaml:1: integrator: ... 'rk5' ... 'rk4'",
+        "panda.yaml:2: stepz: ... 'steps'",
+        "panda.yaml:3: robot: 7 ... text",
+        "panda.yaml:5: fields.0.weight: 'a' ... number",
+        "panda.yaml:5: fields.0.middel: ... 'middle'",
+        "panda.yaml:6: fields.1.weight: 'b' ... number",
     )
+    for told, line in zip(expected, [first, *lines], strict=True):
+        assert re.search(wording(told), line.strip())

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 from compensation_cases import ALL, EVERYTHING, PANDA, Q0, H, circle, controller
+from loaded_robots import load
 from wording import wording
 
 from hsp_control import Robot
@@ -79,8 +80,7 @@ def test_compensators_are_values() -> None:
 
 
 def walker() -> Robot:
-    pytest.importorskip("example_robot_data")
-    return Robot.load("solo12")
+    return load("solo12")
 
 
 @pytest.mark.parametrize(

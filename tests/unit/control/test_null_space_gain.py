@@ -13,6 +13,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from places import THOROUGH
 from robot_cases import load
+from wording import wording
 
 import hsp_control as hsp
 from hsp_control import Controller, FramePosition, Robot, TargetPosture
@@ -123,11 +124,8 @@ def damping(nv: int, rng: np.random.Generator) -> Array:
     return np.asarray(5.0 * np.eye(nv) + root @ root.T)
 
 
-REFUSED = (
-    "null_space_gain is no multiple of the identity, and the metric "
-    r"\(MassMatrixMetric\) changes with the configuration: at some configurations the "
-    "null-space error could grow instead of decay; needs one number, for example 2.5, "
-    "or a metric that does not change$"
+REFUSED = wording(
+    "... null_space_gain is no multiple ... MassMatrixMetric ... one number ... 2.5"
 )
 
 

@@ -191,9 +191,8 @@ def test_integral_action_that_a_heavier_robot_does_not_bear_is_told() -> None:
         assert found.path == ("compensation", "integral_action")
         assert not found.unstable
         told = re.fullmatch(
-            r"if the robot is (.*) times as heavy at task 'posture' as its model, .*"
-            r"design for a factor of 5: use Ki of at most (.*) times this, "
-            r"or a (faster )?momentum .*",
+            r"if the robot is (.*) times as heavy at task 'posture' .* factor of 5: .*"
+            r"Ki of at most (.*) times this, or a (faster )?momentum .*",
             found.message,
         )
         assert told is not None
@@ -433,10 +432,8 @@ def test_the_command_line_says_what_is_close(
     file.write_text(yaml.safe_dump(config(null_space={"gain": 500})))
     for command in (["check", str(file)], ["run", str(file), "--out", str(tmp_path)]):
         assert main(command) == 0
-        assert (
-            "hsp: null_space.gain: K_N times the period is 0.5; at most 0.2 is reco"
-            in capsys.readouterr().err
-        )
+        said = capsys.readouterr().err
+        assert re.search(wording("...hsp: null_space.gain: ... 0.5 ... 0.2"), said)
     assert main(["check", str(file), "--set", "null_space.gain=2500"]) == 2
     assert "unstable at this rate" in capsys.readouterr().err
 

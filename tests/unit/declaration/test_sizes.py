@@ -5,6 +5,7 @@ from typing import Any
 import numpy as np
 import pytest
 from pydantic import TypeAdapter, ValidationError
+from wording import wording
 
 import hsp_control as hsp
 from hsp_control.common.exceptions import HspControlError
@@ -71,11 +72,9 @@ def test_the_largest_that_is_allowed_gives_an_effort(panda: hsp.Robot) -> None:
 
 
 def test_the_message_says_where_and_what_would_be_right(panda: hsp.Robot) -> None:
-    with pytest.raises(HspControlError) as raised:
+    told = wording("Hold: point.1: 1e+150 ... 1e+30")
+    with pytest.raises(HspControlError, match=told):
         hsp.FramePosition("panda_tcp", [0.4, 1e150, 0.4])
-    assert str(raised.value) == (
-        "Hold: point.1: 1e+150 is absurdly large; its size must be 1e+30 at most"
-    )
 
 
 def test_a_gain_of_the_null_space_is_not_huge(panda: hsp.Robot) -> None:

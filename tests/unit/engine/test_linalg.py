@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from hypothesis import assume, given
 from hypothesis import strategies as st
+from oracles import close
 
 from hsp_control import engine
 from hsp_control.common.arrays import Array
@@ -64,10 +65,6 @@ def triangularise_rows(Y: Array) -> float:
 
 def smallest_singular_value_bound(X: Array) -> float:
     return engine.SmallestSingularValueBound(X=X)()
-
-
-def close(actual: Array, expected: Array, atol: float) -> None:
-    np.testing.assert_allclose(actual, expected, rtol=0, atol=atol)
 
 
 # --- triangles -----------------------------------------------------------------------

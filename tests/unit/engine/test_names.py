@@ -5,7 +5,7 @@ from collections import defaultdict
 
 from places import ROOT
 
-TYPE = re.compile(r"^(?:template <[^>]*> )?(?:struct|class) (\w+)[^;:]*(?::[^:][^;]*)?{", re.M)
+TYPE = re.compile(r"^(?:template <.*> )?(?:struct|class) (\w+) (?:: .*)?\{", re.M)
 
 
 def test_no_two_types_have_one_name() -> None:

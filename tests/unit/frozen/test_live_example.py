@@ -15,9 +15,7 @@ import hsp_control as hsp
 def test_a_loop_in_cpp_moves_the_simulated_arm(tmp_path: Path) -> None:
     compiled(EXAMPLE / "live.cpp", tmp_path, "-std=c++20", language="c++")
     command = [sys.executable, str(EXAMPLE / "start.py"), "panda_limits"]
-    # A busy machine may let the robot wait: that is not what is tested.
-    command += ["--set", "live.watchdog=5000"]
-    command += ["--duration", "2", "--out", str(tmp_path)]
+    command += ["--duration", "2", "--lockstep", "--out", str(tmp_path)]
     done = subprocess.run(command, capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr
     assert " 0 refused" in done.stdout

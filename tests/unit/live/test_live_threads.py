@@ -68,8 +68,8 @@ def test_what_a_streams_thread_raises_ends_in_the_safe_stop(
         def after_some(t: float) -> None:
             if t > 20 * PERIOD:
                 kind.go.set()
-                assert kind.ended.wait(10.0)
-                sources._threads["mine://here"].join(10.0)
+                assert kind.ended.wait(60.0)
+                sources._threads["mine://here"].join(60.0)
 
         controller, rig = streamed(kind, monkeypatch), Rig(watched())
         return run_loop(controller, rig, duration=0.1, on_period=after_some)

@@ -1,6 +1,8 @@
 """Datagrams, faults and links: every packet is sorted, every fault is counted."""
 
 import struct
+import threading
+import time
 from collections.abc import Iterator
 
 import numpy as np
@@ -279,6 +281,74 @@ def test_a_robot_that_nobody_wants_or_whose_parent_dies_ends() -> None:
     assert robot.reason == "its parent is gone"
     assert robot.phase is Phase.HOLDING
     hardware.close()
+    hardware.drain()
+    link.close()
+
+
+def test_a_turn_ends_where_the_other_end_says_so() -> None:
+    """Packets may be lost, and strangers may say what they like."""
+    here, there = Link(7), Link(7, peer=None, faults=Faults(lost=1.0))
+    stranger = Link(7, peer=here.address)
+    there.peer = here.address
+    here.peer = there.address
+    there.send(PacketKind.STATE, np.ones(2))
+    stranger.end_turn()
+    assert here.turn(0.05) is None
+    there.end_turn()
+    there.send(PacketKind.BYE)
+    assert here.turn(60.0) == []  # the state was lost; the BYE is of the next one
+    there.end_turn()
+    assert [each.kind for each in here.turn(60.0) or []] == [PacketKind.BYE]
+    there.end_turn()
+    assert here.receive(0.0) == []
+    assert here.counts["corrupted"] == 1  # the stranger's
+    for link in (here, there, stranger):
+        link.close()
+    assert here.turn(0.0) is None
+
+
+@pytest.mark.slow
+def test_in_lockstep_a_robot_waits_for_the_loop_and_a_loop_for_the_robot() -> None:
+    lives = [True]
+    hardware = UdpHardware(panda(), PERIOD, alive=lambda: lives[0])
+    robot = watched(LiveSettings(watchdog=1))
+    link = Link(hardware.session, peer=hardware.address)
+    tau = panda().inverse_dynamics(start(), np.zeros(7), np.zeros(7))
+    reads = 0
+
+    def loop() -> None:
+        nonlocal reads
+        while hardware.read(60.0) is None:
+            pass
+        for k in range(30):
+            time.sleep(0.01 * (k == 10))  # late, with a watchdog of 2 ms
+            hardware.write(tau)
+            assert hardware.read(0.0) is not None
+            reads += 1
+        hardware.close()
+
+    thread = threading.Thread(target=loop)
+    thread.start()
+    serve(robot, link, stop_reason=lambda: None, lockstep=True)
+    thread.join(60.0)
+    assert (robot.reason, reads) == (CLOSED_BY_LOOP, 30)
+    assert link.counts["accepted"] == 30 + 3
+    lives[0] = False
+    while hardware.read(0.0) is not None:  # what it sent while it stopped
+        pass
+    hardware.drain()
+    link.close()
+
+
+def test_in_lockstep_a_robot_whose_loop_is_silent_stops() -> None:
+    hardware = UdpHardware(panda(), PERIOD, alive=lambda: True)
+    robot = watched()
+    link = Link(hardware.session, peer=hardware.address)
+    link.send(PacketKind.STATE, np.zeros(14))
+    assert hardware.read(60.0) is not None
+    hardware.write(np.zeros(7))
+    serve(robot, link, stop_reason=lambda: None, start_timeout=0.3, lockstep=True)
+    assert robot.reason == "the loop did not answer for 0.3 s"
     hardware.drain()
     link.close()
 

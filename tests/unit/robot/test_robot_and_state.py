@@ -13,6 +13,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from loaded_robots import panda
 from robot_cases import ROBOTS, assert_equal_terms, by_pickle, draw, everything, load
+from wording import wording
 
 from hsp_control import Controller, Robot, RobotState, TargetPosture
 from hsp_control.common.exceptions import (
@@ -22,10 +23,7 @@ from hsp_control.common.exceptions import (
     ModelError,
 )
 
-ADVICE = (
-    "cannot be assigned, as all terms belong to one t, q and v: call "
-    r"state\.update\(t, q, v\)$"
-)
+ADVICE = wording("... cannot be assigned ... state.update(t, q, v)")
 
 
 def controller() -> Controller:

@@ -417,7 +417,7 @@ def test_what_a_killed_hsp_run_leaves_is_a_log_for_all_commands(
         stderr=subprocess.DEVNULL,
     )
     path = tmp_path / "2_rest-simulation.duration=1000.journal"
-    end = time.monotonic() + 60
+    end = time.monotonic() + 200
     try:
         while not (path.exists() and path.stat().st_size > 100_000):
             assert time.monotonic() < end
@@ -430,7 +430,6 @@ def test_what_a_killed_hsp_run_leaves_is_a_log_for_all_commands(
     assert len(read) > 50
     assert main(["plot", str(path), "--out", str(tmp_path)]) == 0
     assert path.with_name(f"{path.stem}-paper.png").is_file()
-    assert main(["export", str(path), "--html", str(tmp_path / "a.html")]) == 0
     assert main(["check", str(path)]) == 0
     capsys.readouterr()
     # One that is not killed leaves an `.npz` alone.

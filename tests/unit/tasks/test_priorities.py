@@ -25,8 +25,7 @@ UP = (0.0, 0.0, 1.0)
 
 @pytest.fixture(scope="module")
 def quadruped() -> Robot:
-    pytest.importorskip("example_robot_data")
-    return Robot.load("solo12")
+    return load("solo12")
 
 
 def every_task(trunk: str, foot: str) -> dict[str, tuple[Task, bool]]:

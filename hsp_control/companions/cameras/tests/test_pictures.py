@@ -42,7 +42,6 @@ def cell(tmp_path: Path) -> hsp.Experiment:
         "tasks": {"tip": {"type": "frame_position", "frame": "tip"}},
         "plant": "mujoco_scene",
         "simulation": {"duration": 0.1, "control_period": 0.002},
-        "live": {"missing": 1000, "age": 5.0, "watchdog": 1000},
     })  # fmt: skip
 
 
@@ -95,11 +94,18 @@ def test_a_picture_shows_the_scene_as_it_is_then(
 @DRAWS
 @pytest.mark.process
 def test_a_robot_in_its_own_process_is_seen(cell: hsp.Experiment, address: str) -> None:
-    with RobotProcess(cell, cameras=f"http://{address}") as robot:
+    with RobotProcess(cell, cameras=f"http://{address}", lockstep=True) as robot:
         assert seen(address, "above.jpg")[0] == 0.0
+        looked: list[float] = []
+
+        def look(t: float) -> None:
+            if t > 0.09 and not looked:  # the robot waits meanwhile
+                wait_until(lambda: seen(address, "above.jpg")[0] >= 0.05)
+                looked.append(t)
+
         options = {"settings": cell.scenario.live, "duration": 0.1}
-        run_loop(cell.controller, robot.hardware, **options)
-        wait_until(lambda: seen(address, "above.jpg")[0] >= 0.05)
+        run_loop(cell.controller, robot.hardware, **options, on_period=look)
+        assert looked
     with pytest.raises(OSError, match="refused"):
         seen(address, "above.jpg")
 

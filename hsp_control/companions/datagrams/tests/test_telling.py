@@ -15,6 +15,7 @@ import numpy as np
 import pytest
 from live_rigs import Rig, start
 from loaded_robots import panda
+from ports import free_port
 
 import hsp_control as hsp
 from hsp_control.common.exceptions import HardwareError
@@ -93,9 +94,7 @@ def test_the_page_s_client_hears_and_answers(capsys: pytest.CaptureFixture) -> N
     assert len(client.splitlines()) <= 12
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as goals:
         goals.bind(("127.0.0.1", 0))
-        with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
-            probe.bind(("127.0.0.1", 0))
-            port = probe.getsockname()[1]
+        port = free_port()
         client = client.replace("5005", str(goals.getsockname()[1]))
         client = client.replace("5006", str(port))
         space: dict = {}

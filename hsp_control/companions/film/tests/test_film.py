@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from wording import wording
 
 from hsp_control import Rollout, load_experiment
 from hsp_control.cli import main
@@ -105,8 +106,6 @@ def test_the_command_says_what_it_wants(
         main(["export", log, "--gif=a.gif", "--size=800"])
     assert "'800' is not WIDTHxHEIGHT" in capsys.readouterr().err
     assert main(["export", log, log, "--gif", str(tmp_path / "a.gif")]) == 2
-    assert capsys.readouterr().err == (
-        "hsp: a film shows one run, 2 logs are given: give one log, or --html for a "
-        "page with a switch between them\n"
-    )
+    said = capsys.readouterr().err
+    assert re.search(wording("hsp: ... one run ... 2 logs ... --html"), said)
     assert not (tmp_path / "a.gif").exists()

@@ -37,12 +37,14 @@ class Answers:
     Attributes:
         asked: The letters of the requests.
         efforts: Those that were sent.
+        patience: How long the last answer was waited for [s].
     """
 
     def __init__(self) -> None:
         self.asked = b""
         self.efforts: list[Array] = []
         self.waiting = self.late = self.closed = False
+        self.patience = 0.0
         self.last_words = ""
         self.fault: str | None = None
         self.t = 7.0
@@ -55,6 +57,7 @@ class Answers:
             self.efforts.append(np.array(client.REQUEST.unpack(message)[1:]))
 
     def receive(self, timeout: float) -> bytes | None:
+        self.patience = timeout
         self.fault = self.fault or self.last_words or None
         if self.fault is not None:
             raise HardwareError(self.fault)
@@ -119,6 +122,17 @@ def test_an_effort_answers_a_state() -> None:
     assert hardware.fault == "a reflex"
     hardware.close()
     assert b"F" not in answers.asked
+
+
+def test_a_box_in_lockstep_is_waited_for() -> None:
+    hardware, answers = arm(lockstep=True)
+    assert not hardware.real_time
+    state(hardware)
+    state(hardware)
+    assert answers.patience == 60.0
+    answers.late = True
+    with pytest.raises(HardwareError, match="sent no state for 60 s"):
+        hardware.read(0.001)
 
 
 def test_states_are_numbered_by_the_arm_s_time() -> None:

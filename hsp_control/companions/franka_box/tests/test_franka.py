@@ -14,14 +14,13 @@ import subprocess
 import sys
 import threading
 from contextlib import closing
-from importlib.metadata import EntryPoint
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 import yaml
-from franka_arms import Patiently, circle, connect_patiently, host, serving
+from franka_arms import LOOPBACK, circle, host, serving
 from franka_boxes import served
 from places import ROOT
 
@@ -44,7 +43,6 @@ from hsp_control.live import (
     LoopReport,
     OperatorRequests,
     SimulatedRobot,
-    hardware,
     run_loop,
 )
 from hsp_control.live.simulated_robot import sampled
@@ -60,7 +58,7 @@ def moved(arm: FrankaHardware, experiment: Any = None, **options: Any) -> LoopRe
     experiment = experiment or circle()
     settings = arm.adapted(LiveSettings())
     defaults = {"duration": 1.0, "settings": settings, "log_period": PERIOD}
-    return run_loop(experiment.controller, Patiently(arm), **defaults | options)
+    return run_loop(experiment.controller, arm, **defaults | options)
 
 
 @pytest.mark.process
@@ -138,7 +136,7 @@ def test_a_killed_box_ends_the_loop() -> None:
     address = host(1)
     command = [sys.executable, "-m", "hsp_control", "franka-box", "panda"]
     with subprocess.Popen(
-        [*command, "--lockstep", "--host", address],
+        [*command, "--lockstep", "--patience", "60", "--host", address],
         stdout=subprocess.PIPE,
         text=True,
         cwd=ROOT,
@@ -147,7 +145,7 @@ def test_a_killed_box_ends_the_loop() -> None:
             assert box.stdout is not None
             assert f"behind {address}" in box.stdout.readline()
             experiment = circle()
-            arm = connect(f"{address}?realtime=ignore", experiment.robot, PERIOD)
+            arm = connect(f"{address}?{LOOPBACK}", experiment.robot, PERIOD)
 
             def kill(t: float) -> None:
                 if t >= 0.2 and box.poll() is None:
@@ -194,14 +192,14 @@ def test_a_client_that_hangs_is_killed(monkeypatch: pytest.MonkeyPatch) -> None:
         thread = threading.Thread(target=close_without_answer)
         thread.start()
         with pytest.raises(HardwareError, match="did not answer for 1 s"):
-            connect(f"{address}?realtime=ignore", Robot.load("panda"), PERIOD)
+            connect(f"{address}?{LOOPBACK}", Robot.load("panda"), PERIOD)
         thread.join()
 
 
 @pytest.mark.process
 def test_who_only_reads_sets_no_thresholds(tmp_path: Path) -> None:
     with served() as rig:
-        address = f"{rig.host}?realtime=ignore"
+        address = f"{rig.host}?{LOOPBACK}"
         assert main(["franka-model", address, str(tmp_path / "read.urdf")]) == 0
         assert np.isinf(rig.box.thresholds.upper_effort).all()
         connect(address, Robot.load("panda"), PERIOD).close()
@@ -215,7 +213,9 @@ def test_the_load_is_in_both_models(tmp_path: Path) -> None:
     heavy = {"frame": "panda_link8", "mass": 0.8, "center": [0.02, 0.0, 0.15]}
     experiment = circle(plant={"type": "rigid_body", "payload": heavy})
     with serving(experiment) as box:
-        settings = FrankaSettings(box.host, realtime="ignore", load=Load(**load))
+        settings = FrankaSettings(
+            box.host, realtime="ignore", lockstep=True, load=Load(**load)
+        )
         with pytest.raises(HardwareError, match=r"differs .* carries 1\.56 kg"):
             connect(settings, experiment.robot, PERIOD)
         box.wait_alone()
@@ -319,10 +319,6 @@ def test_the_arm_has_seven_joints_and_a_millisecond() -> None:
 def test_the_command_line_drives_the_arm(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    entry = EntryPoint(
-        "franka", "franka_arms:connect_patiently", "hsp_control.hardware"
-    )
-    monkeypatch.setattr(hardware, "entry_points", lambda group: {"franka": entry})
     later = PUSH | {"start": 0.9}
     experiment = circle(plant={"type": "rigid_body", "pushes": [later]})
     file = tmp_path / "circle.yaml"
@@ -372,7 +368,6 @@ def test_the_page_is_true(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> No
         if command[0] != "install":
             command_line().parse_args(command)
     (snippet,) = re.findall(r"```python\n(.*?)```", text, re.DOTALL)
-    monkeypatch.setattr("hsp_control.companions.franka.connect", connect_patiently)
     with serving(load_experiment("panda_obstacle")) as box:
         snippet = snippet.replace("172.16.0.2", box.address)
         space: dict[str, Any] = {}

@@ -74,6 +74,6 @@ def test_who_leaves_during_a_motion_makes_room(served: Gripper) -> None:
         payload = struct.pack("<2d", 0.0, 1.01e-3)
         first.sendall(HEADER.pack(MOVE, 1, HEADER.size + len(payload)) + payload)
     with closing(client()) as made:
-        made.settimeout(10.0)
+        made.settimeout(60.0)
         assert asked(made, CONNECT, struct.pack("<HH", 3, 0)) == 0
     assert served.width > 0.07

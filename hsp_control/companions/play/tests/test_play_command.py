@@ -40,7 +40,9 @@ def test_a_page_steers_and_the_log_repeats_it(played: Played, tmp_path: Path) ->
         assert targets is not None
         return float(targets["poses"]["hand"][2])
 
+    begun = last(page, "play_state")["t"]
     page.say(do="move", target="hand", pose=pose)
+    wait_until(lambda: last(page, "play_state")["t"] > begun + 0.5)
     wait_until(lambda: abs(height() - pose[2]) < 1e-6)
     page.say(do="set", id="null_space_gain", value=20.0)
     wait_until(lambda: last(page, "play_values")["values"]["null_space_gain"] == 20.0)
@@ -52,7 +54,7 @@ def test_a_page_steers_and_the_log_repeats_it(played: Played, tmp_path: Path) ->
     wait_until(lambda: last(page, "play_state")["message"].startswith("saved: "))
     assert (tmp_path / "panda_obstacle-play.npz").is_file()
     page.leave()
-    page.join(10.0)
+    page.join(60.0)
     text = played.end()
     assert played.process.returncode == 0, text
     log = hsp.Rollout.load(tmp_path / "panda_obstacle-play.npz")

@@ -18,12 +18,7 @@ import hsp_control as hsp
 from hsp_control.cli import main
 
 # On a machine with much else to do, processes wait for one another.
-PATIENT = [
-    "--set=live.missing=5000",
-    "--set=live.watchdog=5000",
-    "--set=live.age=10",
-    "--set=simulation.control_period=0.002",
-]
+PATIENT = ["--lockstep", "--set=simulation.control_period=0.002"]
 
 
 class SteeredLive:
@@ -71,11 +66,14 @@ def test_a_page_moves_the_hand_and_stops_the_robot(
     assert last(page, "play_setup")["loop"] == "live"
     pose = list(last(page, "play_setup")["targets"][0]["pose"])
     pose[2] += 0.05
+    begun = last(page, "play_state")["t"]
     page.say(do="move", target="hand", pose=pose)
 
     def reached() -> bool:
+        # In the period in which it is sent, the page shows where it is to go.
         hand = last(page, "play_targets")["poses"]["hand"]
-        return abs(hand[2] - pose[2]) < 1e-6
+        moved = last(page, "play_state")["t"] > begun + 0.5
+        return moved and abs(hand[2] - pose[2]) < 1e-6
 
     wait_until(reached)
     page.say(do="stop")

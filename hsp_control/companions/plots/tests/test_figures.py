@@ -45,8 +45,9 @@ def test_a_log_without_rows_says_so() -> None:
 @pytest.mark.system
 def test_figures_are_written_in_every_format(tmp_path: Path) -> None:
     log, folder = changed(planar(PAPER["rest"]), slice(20)), tmp_path / "new" / "folder"
-    files = plots.save_figures(log, folder, "run", ("pdf", "svg"))
-    kinds = itertools.product(("paper", "diagnostics"), ("pdf", "svg"))
+    formats = "svg", *further("pdf")  # which an example writes
+    files = plots.save_figures(log, folder, "run", formats)
+    kinds = itertools.product(("paper", "diagnostics"), formats)
     assert files == [folder / f"run-{name}.{suffix}" for name, suffix in kinds]
     assert all(5_000 < file.stat().st_size < 500_000 for file in files)
 

@@ -1,5 +1,6 @@
 """A robot on topics: joints by name, states by stamp, and everything wrong is named."""
 
+import re
 from collections.abc import Iterator
 from contextlib import contextmanager
 
@@ -245,13 +246,23 @@ def refused(message: str) -> Iterator[None]:
         yield
 
 
+def refuses(address: str, message: str) -> None:
+    """Check why; on a busy computer what it waits for comes late."""
+    for patience in (1.0, 10.0, 60.0):
+        with pytest.raises(HardwareError) as caught:
+            Ros2Hardware(address, panda(), PERIOD, timeout=patience)
+        if re.search(message, str(caught.value)):
+            return
+    raise AssertionError(caught.value)
+
+
 def test_a_robot_that_is_not_there_is_not_waited_for_in_silence() -> None:
     controller, states, address = fresh()
     with refused(rf"no publisher of {states} in domain {DOMAIN} \(topics with sens"):
         Ros2Hardware(address, panda(), PERIOD, timeout=0.2)
     robot = Broadcaster(states)
-    with robot.sending(), refused(rf"no subscriber of {controller}/commands"):
-        Ros2Hardware(address, panda(), PERIOD, timeout=5.0)
+    with robot.sending():
+        refuses(address, f"no subscriber of {controller}/commands")
 
 
 @pytest.mark.parametrize(("message", "reason"), [
@@ -266,8 +277,8 @@ def test_a_robot_that_does_not_fit_is_refused(
     message: dict[str, object], reason: str
 ) -> None:
     rig = Rig(**message)
-    with rig.robot.sending(), refused(reason):
-        Ros2Hardware(rig.address, panda(), PERIOD, timeout=2.0)
+    with rig.robot.sending():
+        refuses(rig.address, reason)
 
 
 def test_without_cyclone_the_extra_is_named(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -84,6 +84,9 @@ function drawLightly() {
   viewer.set_dirty();
 }
 
+// `page.html#light` asks for it, before the first picture.
+if (new URLSearchParams(location.hash.slice(1)).has("light")) drawLightly();
+
 function simplify(object) {
   if (object.isLight) object.castShadow = false;
   if (!object.material) return;

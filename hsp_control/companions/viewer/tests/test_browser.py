@@ -56,14 +56,16 @@ def planar_page(planar: Rollout, tmp_path_factory: pytest.TempPathFactory) -> Pa
 class Watched:
     """A page, and all that went wrong on it."""
 
-    def __init__(self, browser: Any, address: str, size: tuple[int, int]) -> None:
+    def __init__(
+        self, browser: Any, address: str, size: tuple[int, int], *, lightly: bool
+    ) -> None:
         self.page = browser.new_page(viewport={"width": size[0], "height": size[1]})
         self.wrong: list[str] = []
         self.requests: list[str] = []
         self.page.on("console", self._on_console)
         self.page.on("pageerror", lambda error: self.wrong.append(str(error)))
         self.page.on("request", lambda request: self.requests.append(request.url))
-        self.page.goto(address)
+        self.page.goto(browsers.light(address) if lightly else address)
 
     def _on_console(self, message: Any) -> None:
         if message.type in {"error", "warning"} and HARMLESS not in message.text:
@@ -97,11 +99,15 @@ def watch(browser: Any) -> Iterator[Callable[..., Watched]]:
     opened: list[Watched] = []
 
     def open_watched(
-        address: str | Path, size: tuple[int, int] = SIZE, at: str = ""
+        address: str | Path,
+        size: tuple[int, int] = SIZE,
+        at: str = "",
+        *,
+        lightly: bool = True,
     ) -> Watched:
         if isinstance(address, Path):
             address = address.resolve().as_uri() + at
-        opened.append(Watched(browser, address, size))
+        opened.append(Watched(browser, address, size, lightly=lightly))
         return opened[-1]
 
     yield open_watched
@@ -114,10 +120,8 @@ def watch(browser: Any) -> Iterator[Callable[..., Watched]]:
 def exported(
     watch: Callable[..., Watched], page: Path, *, fully: bool = False, **about: Any
 ) -> Watched:
-    watched = watch(page, **about)
+    watched = watch(page, lightly=not fully, **about)
     watched.page.wait_for_selector("body[data-ready]", state="attached")
-    if not fully:
-        browsers.draw_lightly(watched.page)
     return watched
 
 
@@ -430,7 +434,6 @@ def test_the_live_view_has_the_run_s_plots(
     with Viewer(experiment.robot) as viewer:
         watched = watch(viewer.url)
         page = watched.page
-        browsers.draw_lightly(page)
         live = LiveView(viewer, experiment)
         assert not page.locator("#side").is_visible()  # there is no run yet
         log = experiment.run(on_row=on_row)

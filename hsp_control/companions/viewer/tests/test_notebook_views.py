@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from browsers import HARMLESS, draw_lightly, until
+from browsers import HARMLESS, until
 
 import hsp_control as hsp
 from hsp_control import Rollout, load_experiment
@@ -48,7 +48,7 @@ class Notebook:
         self.views = self.page.frames[1:]
         for view in self.views:
             until(view, "document.body.dataset.ready === 'yes'")
-            draw_lightly(view)
+            view.evaluate("drawLightly()")
 
     def _on_console(self, message: Any) -> None:
         if message.type in {"error", "warning"} and HARMLESS not in message.text:

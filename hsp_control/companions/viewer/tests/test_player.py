@@ -35,9 +35,9 @@ def viewer() -> Iterator[Viewer]:
 @pytest.fixture(scope="module")
 def opened(browser: Any, viewer: Viewer) -> Iterator[tuple[Any, list[str]]]:
     size = {"width": 900, "height": 600}
-    page, wrong = browsers.opened(browser, str(viewer.url), viewport=size)
+    url = str(viewer.url)
+    page, wrong = browsers.opened(browser, url, lightly=True, viewport=size)
     assert viewer.wait_for_browser(200.0)
-    browsers.draw_lightly(page)
     yield page, wrong
     page.close()
 

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from live_rigs import start
 from loaded_robots import panda
+from places import THOROUGH, further
 
 import hsp_control as hsp
 from hsp_control.cli.live_experiment import check_live, simulated_robot
@@ -99,16 +100,17 @@ def test_a_live_plan_does_what_the_simulation_does(tmp_path: Path) -> None:
             log[name][:count], run[name][:count], rtol=1e-7, atol=1e-9, err_msg=name
         )
     assert 2.0 in run["plan.phase"], "no foot swung: the test would compare standing"
-    # A run of the log is a run of its configuration.
-    again = hsp.load_experiment(log.meta["config"]).run()
-    for name in ("q", "tau", "plan.phase"):
-        np.testing.assert_array_equal(again[name], run[name])
+    if THOROUGH:  # a run of the log is a run of its configuration
+        again = hsp.load_experiment(log.meta["config"]).run()
+        for name in ("q", "tau", "plan.phase"):
+            np.testing.assert_array_equal(again[name], run[name])
+    assert log.meta["config"] == experiment.config
     assert report.ended == "fault", "it was not given the time to come to rest"
 
 
 @pytest.mark.system
 @pytest.mark.slow
-@pytest.mark.parametrize("by", ["duration", "operator"])
+@pytest.mark.parametrize("by", ["operator", *further("duration")])  # as a walk below
 def test_a_regular_end_lets_the_plan_come_to_rest(by: str) -> None:
     experiment, requests = trotting(), OperatorRequests()
 

@@ -132,7 +132,8 @@ def test_it_trots_where_it_can_be_touched():
         assert not session.over
     run = session.rollout()
     assert run["plan.phase"][-1] == 2
-    untouched = trot()
+    short = "simulation.duration=0.4", "simulation.log_period=0.005"
+    untouched = load_experiment("walking/solo12_trot", *short).run()
     rows = run.t.searchsorted(0.3)
     same = untouched.t.searchsorted(run.t[rows])
     assert untouched.t[same] == pytest.approx(run.t[rows])

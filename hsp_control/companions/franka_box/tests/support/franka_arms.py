@@ -7,54 +7,14 @@ from contextlib import contextmanager
 from time import sleep
 from typing import Any
 
-import numpy as np
-from numpy.typing import NDArray
-
-from hsp_control import Robot, load_experiment
-from hsp_control.companions.franka import FrankaHardware, connect
+from hsp_control import load_experiment
 from hsp_control.companions.franka.layouts import PERIOD
 from hsp_control.companions.franka_box import Arm, ControlBox, Server
 from hsp_control.config import Experiment
-from hsp_control.live import LiveSettings, Measurement
 from hsp_control.live.simulated_robot import sampled
 
-
-class Patiently:
-    """An arm whose next state is waited for: the loop is in lockstep, too.
-
-    Attributes:
-        period: Time between two states [s].
-        arm: The arm.
-        q: Configuration when it was connected, shape (7,) [rad].
-        lines: What was found and set.
-    """
-
-    def __init__(self, arm: FrankaHardware) -> None:
-        self.arm, self.period = arm, arm.period
-        self.q, self.lines = arm.q, arm.lines
-
-    @property
-    def fault(self) -> str | None:
-        return self.arm.fault
-
-    def adapted(self, settings: LiveSettings) -> LiveSettings:
-        return self.arm.adapted(settings)
-
-    def read(self, timeout: float) -> Measurement | None:
-        found = self.arm.read(60.0)
-        assert found is not None, "neither a state nor an error in a minute"
-        return found
-
-    def write(self, effort: NDArray[np.float64]) -> None:
-        self.arm.write(effort)
-
-    def close(self) -> None:
-        self.arm.close()
-
-
-def connect_patiently(address: str, robot: Robot, period: float) -> Patiently:
-    """Connect as an entry point does."""
-    return Patiently(connect(address, robot, period))
+LOOPBACK = "realtime=ignore&lockstep=true"
+"""What stands behind the address of a box in lockstep."""
 
 
 def host(number: int = 0) -> str:
@@ -114,7 +74,7 @@ class RunningBox:
     @property
     def address(self) -> str:
         """The address behind ``franka://``."""
-        return f"{self.host}?realtime=ignore"
+        return f"{self.host}?{LOOPBACK}"
 
     def wait_alone(self) -> None:
         """Wait until it has noticed that its clients have gone."""
