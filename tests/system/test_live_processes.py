@@ -193,6 +193,12 @@ def test_the_loop_s_process_is_killed(tmp_path: Path) -> None:
     assert log.status == "interrupted"
     assert_whole(log)
     assert set(log["live.phase"]) == {Phase.RUNNING}
+    # Repeated, they last as long as the command was given, and as long as it ran.
+    assert log.config is not None
+    assert truth.config is not None
+    ran = np.ptp(truth.t[truth["live.phase"] == Phase.RUNNING])
+    assert log.config["simulation"]["duration"] == 60.0
+    assert truth.config["simulation"]["duration"] == pytest.approx(ran, abs=0.01)
 
 
 @pytest.mark.smoke
