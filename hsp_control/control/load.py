@@ -5,7 +5,7 @@ from math import ceil
 import numpy as np
 
 from hsp_control import engine
-from hsp_control.common.arrays import Array, Indices
+from hsp_control.common.arrays import Array, Flags, Indices
 from hsp_control.engine.plans import PartCall
 from hsp_control.robot import RobotState
 
@@ -36,6 +36,9 @@ class LoadEstimate:
     is smaller. Then the estimate is the mean ∫ (M v' - (tau - N)) dt / (t + T₀), and a
     constant load is known up to T₀/(t + T₀) of it: 17 % after 0.25 s, 47 % with K.
 
+    Until a sensor is found to be dead, the effort that moves its joint seems to hold a
+    load. Of such a joint the estimate at the last change of its readings is used.
+
     How much a wrong measurement leaves in it is bounded: an error x of the velocity is
     an impulse M x, and changes the estimate by M x times the gain at most; one that
     begins less than 0.2 s before the stop by nothing. Frozen in the stop, that moves
@@ -52,7 +55,7 @@ class LoadEstimate:
         """Begin without a load; ``period`` is that between two states [s]."""
         self.bound, self.load = np.zeros((2, nv))
         self._learnt, self._time = np.zeros((2, 1))
-        self._v, self._driving, self._estimate = np.zeros((3, nv))
+        self._v, self._driving, self._estimate, self._changed = np.zeros((4, nv))
         self._past = np.zeros((max(ceil(_BEFORE / period - 1e-9), 1), nv))
         self._count: Indices = np.zeros(1, dtype=np.int64)
 
@@ -63,10 +66,18 @@ class LoadEstimate:
         """
         self.bound[:] = np.where(np.isfinite(limits), _CONTACT * limits, 0.0)
 
-    def use(self, *, newest: bool) -> None:
-        """Set `load` to the newest estimate, or to the one of 0.2 s ago."""
+    def changed(self, joints: Flags) -> None:
+        """Record the joints whose readings have just changed, shape (nv,)."""
+        self._changed[joints] = self._estimate[joints]
+
+    def use(self, *, newest: bool, dead: Flags) -> None:
+        """Set `load` to the newest estimate, or to the one of 0.2 s ago.
+
+        ``dead`` are the joints whose sensors have died, shape (nv,).
+        """
         oldest = self._past[self._count.item() % len(self._past)]
         chosen = self._estimate if newest else oldest
+        chosen = np.where(dead, self._changed, chosen)
         self.load[:] = np.clip(chosen, -self.bound, self.bound)
 
     def forget(self) -> None:
@@ -82,7 +93,7 @@ class LoadEstimate:
     @property
     def _memory(self) -> tuple[Array | Indices, ...]:
         times = self._learnt, self._time
-        numbers = self._v, self._driving, self._estimate, self._past
+        numbers = self._v, self._driving, self._estimate, self._changed, self._past
         return *times, *numbers, self._count, self.load
 
     def call(self, state: RobotState, acts: Array) -> PartCall:

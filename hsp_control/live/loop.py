@@ -145,7 +145,7 @@ def run_loop(
             for _ in range(_WARM_UP):
                 chain.effort(first._replace(t=start_time, applied=None), period)
                 safe_stop.effort(reader.state)
-                safe_stop.observe(reader.state, limiter.applied)
+                safe_stop.observe(reader.state, limiter.applied, reader.silent)
                 limiter.reset(first.q)
             end = np.inf if duration is None else start_time + duration - 0.5 * period
             warn_of_slow_efforts(robot, first.q, limits)
@@ -324,9 +324,9 @@ class LiveRun:
             self.stop("fault", f"the effort is not finite: {tau.tolist()}")
         self.send(before)
         if self.consistent and reader.measurement is not None:
-            self.safe_stop.observe(reader.state, limiter.applied)
+            self.safe_stop.observe(reader.state, limiter.applied, reader.silent)
         if stops:
-            self.safe_stop.trust(measurements=self.consistent)
+            self.safe_stop.trust(measurements=self.consistent, dead=reader.dead)
             reader.stop(self.safe_stop.load)
         response = reader.effort_sent(limiter.applied)
         self.report_applied_effort()
@@ -414,7 +414,8 @@ class LiveRun:
         self.phase = Phase.DAMPING
         self.ended, self.reason, self.error = ended, reason, error
         self.safe_stop.begin()
-        self.safe_stop.trust(measurements=self.consistent)
+        dead = self.reader.dead
+        self.safe_stop.trust(measurements=self.consistent, dead=dead)
         self.reader.stop(self.safe_stop.load)
 
     def fail(self, error: BaseException) -> None:

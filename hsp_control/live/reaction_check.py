@@ -8,6 +8,9 @@ from hsp_control.common.arrays import Array, Flags
 
 _WASHOUT = 0.1
 """Time constant with which a change of velocity is forgotten [s]."""
+_LATELY = 0.2
+"""Time constant with which the silent joints' own motion is forgotten [s]: until it is
+found, they move unseen."""
 _MEMORY = 0.1
 """Time constant of the mean squares that are compared [s]."""
 _FELT, _MOST = 0.5, 1.6
@@ -31,6 +34,8 @@ class ReactionCheck:
 
     Attributes:
         felt: Whether the reaction on the others shows that the silent joints move.
+        gained: The velocity that the silent ones have gained lately, as far as the
+        reaction shows; 0 of the others, shape (nv,) [rad/s or m/s].
     """
 
     def __init__(self, error: float) -> None:
@@ -50,6 +55,8 @@ class ReactionCheck:
         self._sums = np.zeros((3, others))
         self._squares = np.zeros(3)
         self._rest, self._added = np.zeros((2, others))
+        self._free, self._sum = np.zeros((2, silent.size))
+        self.gained: Array = np.zeros(silent.size)
         self._inertia = np.zeros((others, others))
         self._v: Array | None = None
         self._lasts = 0.0
@@ -71,6 +78,7 @@ class ReactionCheck:
         self._inertia = inertia[np.ix_(others, others)]
         self._rest[:] = np.linalg.solve(self._inertia, (inertia @ free)[others])
         self._added = free[others] - self._rest
+        self._free = np.where(silent, free, 0.0)
 
     def update(self, v: Array, passed: float) -> None:
         """Judge a new state.
@@ -84,6 +92,7 @@ class ReactionCheck:
         now = v[~self._silent]
         last = now if self._v is None else self._v
         self._v = now
+        self._sum = exp(-passed / _LATELY) * self._sum + passed * self._free
         self._sums *= exp(-passed / _WASHOUT)
         self._sums += np.stack([passed * self._rest, passed * self._added, now - last])
         at_rest, added, measured = self._sums
@@ -105,3 +114,5 @@ class ReactionCheck:
         )
         self._lasts = self._lasts + passed if felt else 0.0
         self.felt = self._lasts >= _HELD
+        if self.felt:
+            self.gained = min(both / reaction, 1.0) * self._sum

@@ -5,7 +5,7 @@ from enum import IntEnum
 
 import numpy as np
 
-from hsp_control.common.arrays import Array
+from hsp_control.common.arrays import Array, Flags
 from hsp_control.constraints.contacts import Contact
 from hsp_control.control.measurement import Measurement
 from hsp_control.control.stop import STEEPEST, BoundStop
@@ -133,21 +133,27 @@ class SafeStop:
             self._bound.load.forget()
         self.begin()
 
-    def observe(self, state: RobotState, acts: Array) -> None:
+    def observe(self, state: RobotState, acts: Array, silent: Flags) -> None:
         """Learn from a period, also of the stop while measurements are consistent.
 
         Args:
             state: The robot's state.
             acts: The effort that acts from now on, shape (nv,).
+            silent: Joints whose readings are the same to the last bit, shape (nv,).
         """
-        self._bound_to(state).load.permit(self._effort_limits)
+        load = self._bound_to(state).load
+        load.permit(self._effort_limits)
         self._acts[:] = acts
         self._learn()
+        load.changed(~silent)
 
-    def trust(self, *, measurements: bool) -> None:
-        """Use the newest load; or, if a measurement is wrong, that of before it."""
+    def trust(self, *, measurements: bool, dead: Flags) -> None:
+        """Use the newest load; or, if a measurement is wrong, that of before it.
+
+        ``dead`` are the joints whose sensors have died, shape (nv,).
+        """
         if self._bound is not None:
-            self._bound.load.use(newest=measurements)
+            self._bound.load.use(newest=measurements, dead=dead)
 
     def effort(self, state: RobotState) -> Array:
         """Return the effort of this period at the state, shape (nv,); once a period."""

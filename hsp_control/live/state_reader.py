@@ -474,6 +474,16 @@ class StateReader:
         return self._motion.ambiguous
 
     @property
+    def silent(self) -> Flags:
+        """Joints whose readings did not change by a bit, shape (nv,)."""
+        return self._motion.silent
+
+    @property
+    def dead(self) -> Flags:
+        """Joints whose sensors have died, shape (nv,)."""
+        return self._motion.dead
+
+    @property
     def speed(self) -> float:
         """Speed of the fastest joint, a mean of some milliseconds, or as predicted."""
         mean = self._motion.mean_velocity

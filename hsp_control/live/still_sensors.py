@@ -115,6 +115,12 @@ class StillSensors:
                 dead |= quiet
         self.dead = dead
 
+    @property
+    def gained(self) -> Array:
+        """Velocity that dead ones have gained since, as the others show, (nv,)."""
+        felt = self._reaction.felt
+        return self._reaction.gained if felt else np.zeros(self._v.size)
+
     def why(self, i: int) -> str:
         """Return why the sensor of a dead joint is dead."""
         if self._alive[i] > _ALIVE:

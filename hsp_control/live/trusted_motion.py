@@ -4,7 +4,7 @@ from math import exp, inf
 
 import numpy as np
 
-from hsp_control.common.arrays import Array, Flags, Indices
+from hsp_control.common.arrays import Array, Flags
 from hsp_control.common.exceptions import HspControlError
 from hsp_control.control.measurement import Measurement
 from hsp_control.engine import Dynamics
@@ -20,10 +20,14 @@ _BANDWIDTH = 30.0
 _ALONE = 3.0
 """The rate if the other source was wrong: a braked joint must follow its effort
 [1/s]."""
-_MEMORY = 0.2
-"""Time constant with which a surprise is forgotten [s]."""
+_MEMORY = 0.5
+"""Time constant with which a surprise is forgotten [s]: that of the sum of small
+differences, which may reveal one so much later."""
 _CLEARLY = 0.5
 """Ratio of surprises below which one source is right, and the other wrong."""
+_LEAP = 0.03
+"""Change of a velocity that is none, besides twice the largest recent surprise [rad/s
+or m/s]."""
 _SPREAD = 0.25
 """Tolerance of a joint's velocity, relative to the expected one."""
 _LAST = 20
@@ -40,14 +44,16 @@ class ExpectedMotion:
     """The velocity of a joint expected by the model, from each of its sources.
 
     The sources are the rows of all arrays: the measured velocity, the slope of the
-    positions, and their mean. Each expectation is integrated with the model under the
-    efforts applied, and follows its source by a limited step, so that a jump of a
-    sensor is not followed at once; a second state estimates the acceleration that the
-    model lacks.
+    positions, and the mean of the trusted ones of these. Each expectation is integrated
+    with the model under the efforts applied, and follows its source by a limited step,
+    so that a jump of a sensor is not followed at once; a second state estimates the
+    acceleration that the model lacks.
 
     Attributes:
         v: The expected velocities, shape (3, nv) [rad/s or m/s].
+        before: Those before the last sources were followed, shape (3, nv).
         surprise: The largest recent differences, shape (3, nv).
+        usual: Those before the last one, shape (3, nv).
         acceleration: The acceleration by the applied efforts and the model, shape
         (nv,).
     """
@@ -64,7 +70,9 @@ class ExpectedMotion:
     def begin(self, v: Array) -> None:
         """Begin at a velocity, shape (nv,), for all sources."""
         self.v: Array = np.tile(v, (3, 1))
+        self.before = self.v
         self.surprise: Array = np.zeros((3, v.size))
+        self.usual = self.surprise
         self._missed = np.zeros((3, v.size))
         self.acceleration: Array = np.zeros(v.size)
 
@@ -84,24 +92,39 @@ class ExpectedMotion:
         self.v = self.v + passed * (self.acceleration + self._missed)
 
     def follow(
-        self, velocity: Array, slope: Array, known: Indices, passed: float
+        self, measured: Array, trusted: Flags, passed: float, *, braked: bool
     ) -> None:
-        """Compare with the sources, shapes (nv,), and follow them.
+        """Compare with the sources, and follow them.
 
-        ``known`` is the number of trusted ones, shape (nv,). A joint without one
-        continues as expected.
+        Args:
+            measured: The velocity, and the slope of the positions, shape (2, nv).
+            trusted: Whether each is trusted, shape (2, nv). A joint without a trusted
+                one continues as expected.
+            passed: Time since the last ones [s].
+            braked: Whether the joints are braked, and must follow their efforts.
         """
-        sources = self._sources
-        sources[0], sources[1] = velocity, slope
-        sources[2] = 0.5 * (velocity + slope)
+        sources, known = self._sources, trusted.sum(axis=0)
+        sources[:2] = measured
+        sources[2] = (trusted * measured).sum(axis=0) / np.maximum(known, 1)
+        if braked:
+            known = np.minimum(known, 1)
         difference = sources - self.v
-        faded = exp(-passed / _MEMORY) * self.surprise
-        self.surprise = np.maximum(faded, np.abs(difference))
+        self.before, self.usual = self.v, exp(-passed / _MEMORY) * self.surprise
+        self.surprise = np.maximum(self.usual, np.abs(difference))
         step = np.minimum(np.maximum(difference, -self._error), self._error)
         rate = self._rates[known]
         self.v = self.v + np.minimum(2.0 * rate * passed, 1.0) * step
         gain = min(self._rate**2 * passed, self._rate)
         self._missed = (self._missed + gain * step) * (known == 2)
+
+    def leave(self, wrong: Flags, trusted: Flags) -> None:
+        """Take back the last step of joints of which a source is wrong, shape (nv,).
+
+        They follow the one that is trusted still, shape (2, nv), or none.
+        """
+        by_v, by_q, neither = self.before
+        kept = np.where(trusted[0], by_v, np.where(trusted[1], by_q, neither))
+        self.v[2] = np.where(wrong, kept, self.v[2])
 
 
 class TrustedMotion:
@@ -126,6 +149,7 @@ class TrustedMotion:
         fault: The contradiction, or None.
         doubtful: Whether the last measurement should not be used, though it is not a
         fault yet.
+        dead: Joints whose sensors have died, shape (nv,).
         complete: Whether all measurements are trusted.
         stopping: Whether the joints are braked.
         unknown_for: Time for which some joint was only expected, not measured [s].
@@ -160,6 +184,7 @@ class TrustedMotion:
         self._response.restart()
         self._momentum.restart()
         self._contrary = np.zeros(self._robot.nv, dtype=bool)
+        self.dead: Flags = np.zeros(self._robot.nv, dtype=bool)
         self._pushed = np.zeros(self._robot.nv, dtype=bool)
         self.last: Measurement | None = None
         self._q: Array = np.zeros(0)  # the last trusted configuration
@@ -191,6 +216,11 @@ class TrustedMotion:
     def ambiguous(self) -> bool:
         """Whether a joint was pushed hard or is measured wrong, which is undecided."""
         return bool(self._pushed.any())
+
+    @property
+    def silent(self) -> Flags:
+        """Joints whose trusted readings did not change by a bit, shape (nv,)."""
+        return self._check.stands
 
     @property
     def trusted_positions(self) -> Flags:
@@ -254,15 +284,15 @@ class TrustedMotion:
                 now = np.stack([new.v, way / passed])
                 means = np.stack([check.mean, check.slope])
                 self._momentum.update(now, means, driving, passed)
-        known = self._velocities.astype(np.int64) + self._positions
-        if self.stopping:  # braked joints must decelerate
-            known = np.minimum(known, 1)
-        expected.follow(check.mean, check.slope, known, passed)
+        trusted = np.stack([self._velocities, self._positions])
+        measured = np.stack([check.mean, check.slope])
+        expected.follow(measured, trusted, passed, braked=self.stopping)
         self._judge(new.v, jumps)
         if self.complete:
             self.doubtful = bool(check.doubtful.any())
             self._q = new.q
             return new
+        self._leave(new.v, trusted)
         all_known = (self._velocities | self._positions).all()
         self.unknown_for = 0.0 if all_known else self.unknown_for + passed
         if (self._sensors.dead | self._pushed).any():  # its speed is unknown
@@ -277,11 +307,38 @@ class TrustedMotion:
         self.doubtful = self.fault is None and bool((check.doubtful & both).any())
         v = np.where(self._positions, check.slope, expected.v[2])
         v = np.where(self._velocities, new.v, v)
+        v = np.where(both, self._alike(new.v), v)
         v = np.where(self._pushed, smaller(new.v, v), v)
         way = self._robot.difference(self._q, new.q)
         way = np.where(self._positions, way, passed * v)
         self._q = self._robot.integrate(self._q, way)
         return new._replace(q=self._q, v=v)
+
+    def _alike(self, v: Array) -> Array:
+        """Return the velocities of joints of which no source was found wrong, (nv,).
+
+        What makes the velocities of some joints wrong may do so with all, and be small
+        in the others; the same holds for positions.
+        """
+        slope = self._check.slope
+        if not (self._positions & ~self._velocities).any():
+            return v
+        if not (self._velocities & ~self._positions).any():
+            return slope
+        return smaller(v, slope)
+
+    def _leave(self, v: Array, before: Flags) -> None:
+        """Expect the motion of joints whose trusted sources, shape (2, nv), are fewer.
+
+        A sensor that has died reports the velocity of that time.
+        """
+        expected, sensors = self._expected, self._sensors
+        trusted = np.stack([self._velocities, self._positions])
+        expected.leave((before & ~trusted).any(axis=0), trusted)
+        died = self._check.stands & before.all(axis=0) & ~trusted.any(axis=0)
+        self.dead |= died
+        reported = np.where(sensors.dead, v + sensors.gained, expected.before[0])
+        expected.v[2] = np.where(died, reported, expected.v[2])
 
     def _judge(self, v: Array, jumps: Flags) -> None:
         """Find the wrong sources, and those not trusted from now on."""
@@ -300,12 +357,17 @@ class TrustedMotion:
         greatest = np.maximum(by_v, by_q)
         good_v = by_v < _CLEARLY * greatest
         small = check.difference < _SMALL * self._error
-        good_q = (by_q < _CLEARLY * greatest) | (~good_v & small)
+        good_q = by_q < _CLEARLY * greatest
+        frozen = wrong & check.stands & ~good_q
+        good_q |= ~good_v & small
         good_q &= ~jumps
         self._positions &= ~wrong | good_q
-        smooth = np.abs(v - self._expected.v[0]) < 0.5 * self._error
+        # Where velocities jump as well as positions, the whole message is wrong.
+        leaps = np.abs(v - self._expected.before[0])
+        leaps -= np.minimum(_LEAP + 2.0 * self._expected.usual[0], 0.5 * self._error)
+        smooth = (leaps[jumps] < 0.0).all()
         self._velocities &= ~wrong | (good_v & ~jumps) | (jumps & smooth)
-        lost = dead & (self._positions | self._velocities)
+        lost = (dead | frozen) & (self._positions | self._velocities)
         if self.complete:
             self._contrary |= contrary & both
             self._pushed |= pushed & both & ~(wrong | dead)

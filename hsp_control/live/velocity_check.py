@@ -181,8 +181,13 @@ class VelocityCheck:
             return
         self._before = np.where(still, self._before, speed)
         self._still = np.where(still, self._still + 1, 0)
-        moved = self._before * self._still * self._period
-        far = moved > np.maximum(_STEP, np.minimum(_STEPS * self._step, _COARSEST))
+        lasted = self._still * self._period
+        step = np.maximum(_STEP, np.minimum(_STEPS * self._step, _COARSEST))
+        far = self._before * lasted > step
+        # No encoder stands still at a speed that is reported for so long.
+        frozen = (self._still >= _STILL) & (np.abs(v) > _WENT)
+        frozen &= (np.abs(v) * lasted > step) & self._by_q & self._by_v
+        self.contradicted = self.contradicted | (frozen & self._judged)
         # Friction may stop one joint soon, but not several in the same period.
         went = still & (self._before > _WENT)
         self.halted = went

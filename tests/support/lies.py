@@ -19,6 +19,7 @@ class Sensors:
     joints: Flags  # those that it is about, shape (nv,)
     begin: int  # the number of the read at which it begins
     rng: np.random.Generator
+    period: float = PERIOD
     q: list[Array] = field(default_factory=list)
     v: list[Array] = field(default_factory=list)
     first: Measurement | None = None  # the measurement at which it began
@@ -27,18 +28,18 @@ class Sensors:
 
     def ago(self, seconds: float) -> Values:
         """Return q and v of some time ago, or of the beginning."""
-        k = min(round(seconds / PERIOD), len(self.q) - 1)
+        k = min(round(seconds / self.period), len(self.q) - 1)
         return self.q[-1 - k], self.v[-1 - k]
 
     @property
     def since(self) -> float:
         """Time since the lie began [s]."""
-        return (self.reads - self.begin) * PERIOD
+        return (self.reads - self.begin) * self.period
 
     def filtered(self, value: Array, frequency: float) -> Array:
         """Return a value after a first-order filter that begins with the lie."""
         before = value if self.memory is None else self.memory
-        part = 1.0 - np.exp(-2.0 * np.pi * frequency * PERIOD)
+        part = 1.0 - np.exp(-2.0 * np.pi * frequency * self.period)
         self.memory = before + part * (value - before)
         return self.memory
 

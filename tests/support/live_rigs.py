@@ -37,9 +37,11 @@ def law(
     return hsp.Controller(panda(), [task], field, null_space_gain=10.0, limits=limits)
 
 
-def watched(settings: LiveSettings | None = None) -> SimulatedRobot:
-    plant = IntegratedPlant(RigidBodyPlant(panda()), SemiImplicitEuler(PERIOD))
-    return SimulatedRobot(plant, start(), np.zeros(7), PERIOD, settings=settings)
+def watched(
+    settings: LiveSettings | None = None, period: float = PERIOD
+) -> SimulatedRobot:
+    plant = IntegratedPlant(RigidBodyPlant(panda()), SemiImplicitEuler(period))
+    return SimulatedRobot(plant, start(), np.zeros(7), period, settings=settings)
 
 
 Trick = Callable[[Measurement], Measurement | None]

@@ -92,7 +92,7 @@ def test_it_goes_on_with_the_load_that_the_steps_showed(opened: Opened) -> None:
     state = hsp.RobotState(experiment.robot)
     for k in range(600):
         assert opened.step(k * H, q, v) >= OK
-        expected.observe(state.update(k * H, q, v), opened.tau)
+        expected.observe(state.update(k * H, q, v), opened.tau, np.zeros(7, bool))
     np.testing.assert_array_equal(opened.get("stop.load", 7), expected.load)
     assert np.abs(expected.load).max() > 0.1
     for k in range(600, 900):

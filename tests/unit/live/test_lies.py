@@ -48,12 +48,14 @@ FASTER = 1.5
 class Liar(Rig):
     """A robot whose sensors lie about some joints, and its true speeds."""
 
-    def __init__(self, lie: Lie | None, joints: list[int], begin: int) -> None:
-        super().__init__(watched(PATIENT))
+    def __init__(
+        self, lie: Lie | None, joints: list[int], begin: int, period: float = PERIOD
+    ) -> None:
+        super().__init__(watched(PATIENT, period))
         about = np.zeros(7, dtype=bool)
         about[joints] = True
         self.lie = lie
-        self.sensors = Sensors(about, begin, np.random.default_rng(0))
+        self.sensors = Sensors(about, begin, np.random.default_rng(0), period)
         self.speeds: list[Array] = []
         self.stopped = 0  # the number of the last read before the safe stop
 
@@ -85,13 +87,15 @@ def resting() -> hsp.Controller:
     return hsp.Controller(panda(), [task], field, null_space_gain=10.0)
 
 
-def run(begin: int, lie: Lie | None, joints: list[int]) -> tuple[Liar, LoopReport]:
-    robot = Liar(lie, joints, begin)
+def run(
+    begin: int, lie: Lie | None, joints: list[int], period: float = PERIOD
+) -> tuple[Liar, LoopReport]:
+    robot = Liar(lie, joints, begin, period)
     law = resting() if begin == AT_REST else moving()
     return robot, run_loop(
         law,
         robot,
-        duration=(begin + WATCHED) * PERIOD,
+        duration=(begin + WATCHED) * period,
         settings=SETTINGS,
         on_period=lambda t: robot.running(),
     )
@@ -316,6 +320,47 @@ def test_what_real_sensors_do_is_no_lie(
     settings = replace(SETTINGS, velocity_margin=1.0)
     report = run_loop(moving(), robot, duration=1.2, settings=settings)
     assert report.ended == "completed", report.reason
+
+
+@pytest.mark.parametrize(
+    ("kind", "joints"),
+    [
+        *(("position: stuck", [1]), ("position: stuck", ALL), ("both: frozen", [3])),
+        *(("both: mirrored", ALL), ("both: other joints'", ALL)),
+        *(("velocity: another joint's", ALL), ("both: +1 and +0.1", ALL)),
+    ],
+)
+def test_no_lie_accelerates_a_joint_in_long_periods(
+    kind: str, joints: list[int]
+) -> None:
+    """An effort acts for 10 ms, and what is found then was believed for longer."""
+    for begin in (IN_MOTION, AT_REST)[: 1 + is_seen_at_rest(LIES[kind])]:
+        robot, report = run(begin, LIES[kind], joints, 0.01)
+        assert report.ended == "fault"
+        speeds = np.array(robot.speeds)
+        at_fault, after = speeds[robot.stopped - 1], speeds[robot.stopped :]
+        assert (after <= np.maximum(FASTER * at_fault, 0.3)).all(), report.reason
+        assert np.abs(robot.robot.v).max() < 0.05
+
+
+@pytest.mark.parametrize("period", [0.001, 0.005, 0.01])
+@pytest.mark.parametrize(("speed", "wrong"), [(0.06, True), (0.2, True), (0.04, False)])
+def test_no_encoder_stands_still_at_a_reported_speed(
+    period: float, speed: float, *, wrong: bool
+) -> None:
+    """It would have moved 2 mrad, which no fine encoder misses; a bias is tolerated."""
+    check, v = VelocityCheck(panda(), SETTINGS, period), np.full(7, speed)
+    for k in range(round(0.1 / period)):
+        way = 1e-4 * (-1) ** k  # steps of the encoder
+        check.update(np.full(7, way), np.zeros(7), period)
+    lasts = 3 + round(2e-3 / speed / period)
+    found = [
+        k
+        for k in range(2 * lasts)
+        if check.update(0.0 * v, v, period) or any(check.contradicted)
+    ]
+    assert bool(found) == wrong
+    assert not wrong or found[0] <= lasts
 
 
 PERIODS = [0.001, *further(0.002, 0.005, 0.01)]

@@ -6,7 +6,7 @@ import pytest
 from live_rigs import PERIOD, panda, start
 
 import hsp_control as hsp
-from hsp_control.common.arrays import Array
+from hsp_control.common.arrays import Array, Flags
 from hsp_control.live import InProcessRobot, SimulatedRobot
 from hsp_control.live.safe_stop import SafeStop
 from hsp_control.live.settings import StopSettings
@@ -17,6 +17,7 @@ RATE, BEFORE, AHEAD = 3.0, 0.2, 0.05
 """Of the estimate [1/s], how old it is when it is used, and its head start [s]."""
 LOAD = np.array([0.0, 4.0, -1.0, -5.0, 0.2, -2.0, 0.1])
 ZERO = np.zeros(7)
+NONE = np.zeros(7, dtype=bool)
 
 
 def stop(limits: Array = LIMITS) -> SafeStop:
@@ -24,13 +25,18 @@ def stop(limits: Array = LIMITS) -> SafeStop:
 
 
 def observe(
-    safe: SafeStop, load: Array, states: int, v: Array = ZERO, begin: int = 0
+    safe: SafeStop,
+    load: Array,
+    states: int,
+    v: Array = ZERO,
+    begin: int = 0,
+    silent: Flags = NONE,
 ) -> None:
     """Show states at one posture, which efforts and a load hold."""
     state = panda().state(0.0, start(), v)
     for k in range(begin, begin + states):
         state.update(k * PERIOD, start(), v)
-        safe.observe(state, state.nonlinear_effects - load)
+        safe.observe(state, state.nonlinear_effects - load, silent)
 
 
 def test_a_load_is_found_by_a_mean_then_by_a_low_pass_and_used_later() -> None:
@@ -80,6 +86,19 @@ def test_a_wrong_velocity_leaves_a_bounded_load() -> None:
     np.testing.assert_allclose(safe.load, RATE * momentum, rtol=1e-9, atol=1e-12)
     observe(safe, ZERO, 1000, v=wrong, begin=301 + late)
     assert (np.abs(safe.load) < 0.1 * RATE * np.abs(momentum).max()).all()
+
+
+def test_what_a_dead_sensor_hides_is_no_load() -> None:
+    """Its joint seems to be held against the effort that accelerates it."""
+    safe, silent = stop(), NONE.copy()
+    silent[3] = True
+    observe(safe, LOAD, 1000)
+    observe(safe, LOAD - 20.0 * np.eye(7)[3], 1000, begin=1000, silent=silent)
+    found = (1.0 - (1.0 - RATE * PERIOD) ** 1000) * LOAD
+    for dead in (NONE, silent):
+        safe.trust(measurements=False, dead=dead)
+        held = np.abs(safe.load - found) < 0.1 * np.abs(LOAD) + 1e-9
+        assert held.tolist() == (dead | (np.arange(7) != 3)).tolist()
 
 
 def test_nothing_is_learnt_across_a_gap() -> None:
