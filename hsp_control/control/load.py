@@ -37,7 +37,7 @@ class LoadEstimate:
     constant load is known up to T₀/(t + T₀) of it: 17 % after 0.25 s, 47 % with K.
 
     Until a sensor is found to be dead, the effort that moves its joint seems to hold a
-    load. Of such a joint the estimate at the last change of its readings is used.
+    load. Of such a joint the estimate before the last change of its readings is used.
 
     How much a wrong measurement leaves in it is bounded: an error x of the velocity is
     an impulse M x, and changes the estimate by M x times the gain at most; one that
@@ -67,7 +67,7 @@ class LoadEstimate:
         self.bound[:] = np.where(np.isfinite(limits), _CONTACT * limits, 0.0)
 
     def changed(self, joints: Flags) -> None:
-        """Record the joints whose readings have just changed, shape (nv,)."""
+        """Record the joints whose readings change at the next state, shape (nv,)."""
         self._changed[joints] = self._estimate[joints]
 
     def use(self, *, newest: bool, dead: Flags) -> None:

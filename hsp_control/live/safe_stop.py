@@ -144,8 +144,8 @@ class SafeStop:
         load = self._bound_to(state).load
         load.permit(self._effort_limits)
         self._acts[:] = acts
+        load.changed(~silent)  # without what the last change itself is taken for
         self._learn()
-        load.changed(~silent)
 
     def trust(self, *, measurements: bool, dead: Flags) -> None:
         """Use the newest load; or, if a measurement is wrong, that of before it.

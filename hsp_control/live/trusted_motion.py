@@ -337,7 +337,10 @@ class TrustedMotion:
         expected.leave((before & ~trusted).any(axis=0), trusted)
         died = self._check.stands & before.all(axis=0) & ~trusted.any(axis=0)
         self.dead |= died
-        reported = np.where(sensors.dead, v + sensors.gained, expected.before[0])
+        followed = expected.before[0]
+        reported = np.where(sensors.dead, v + sensors.gained, followed)
+        stopped = np.copysign(self._check.before, followed)
+        reported = np.where(self._check.dead, stopped, reported)
         expected.v[2] = np.where(died, reported, expected.v[2])
 
     def _judge(self, v: Array, jumps: Flags) -> None:

@@ -70,6 +70,7 @@ class VelocityCheck:
         dead: Joints whose sensor is dead, shape (nv,).
         stands: Joints whose trusted readings did not change by a bit, shape (nv,).
         halted: Joints that moved, and whose readings are now constant, shape (nv,).
+        before: Speed of joints before their readings became constant, shape (nv,).
         slope: Slope of the last positions, shape (nv,) [rad/s or m/s].
         difference: Between velocity and slope at the last one, shape (nv,).
         mean: Mean velocity in the same time, shape (nv,).
@@ -101,7 +102,8 @@ class VelocityCheck:
         self._sum, self._fastest, self._doubts, self._beyond = np.zeros((4, nv))
         self._still = np.zeros(nv, dtype=np.int64)
         self._step = np.full(nv, inf)  # the smallest change of a position
-        self._before, self._last_v, self._speed = np.zeros((3, nv))
+        self._last_v, self._speed = np.zeros((2, nv))
+        self.before: Array = np.zeros(nv)
         self.slope: Array = np.zeros(nv)
         self.mean: Array = np.zeros(nv)
         self.difference: Array = np.zeros(nv)
@@ -176,21 +178,21 @@ class VelocityCheck:
         now = np.where(self._by_v | self._by_q, now, 0.0)  # of neither it is unknown
         speed, self._speed = np.maximum(now, self._speed), now
         if not still.any():
-            self._still[:], self._before, self.dead = 0, speed, self._none
+            self._still[:], self.before, self.dead = 0, speed, self._none
             self.halted = self._none
             return
-        self._before = np.where(still, self._before, speed)
+        self.before = np.where(still, self.before, speed)
         self._still = np.where(still, self._still + 1, 0)
         lasted = self._still * self._period
         step = np.maximum(_STEP, np.minimum(_STEPS * self._step, _COARSEST))
-        far = self._before * lasted > step
+        far = self.before * lasted > step
         # No encoder stands still at a speed that is reported for so long.
         frozen = (self._still >= _STILL) & (np.abs(v) > _WENT)
         frozen &= (np.abs(v) * lasted > step) & self._by_q & self._by_v
         self.contradicted = self.contradicted | (frozen & self._judged)
         # Friction may stop one joint soon, but not several in the same period.
-        went = still & (self._before > _WENT)
+        went = still & (self.before > _WENT)
         self.halted = went
         together = (went[:, None] & (self._still[:, None] == self._still)).sum(axis=0)
-        fast = self._before > 2.0 * _STOPS * self._period / np.maximum(together, 1)
+        fast = self.before > 2.0 * _STOPS * self._period / np.maximum(together, 1)
         self.dead = (self._still >= _STILL) & fast & far & self._judged
