@@ -4,12 +4,14 @@ from collections.abc import Iterable
 from difflib import get_close_matches
 
 
-def nearest(word: str, options: Iterable[str]) -> str | None:
+def nearest(word: object, options: Iterable[str]) -> str | None:
     """Return the option that the user probably meant by ``word``, or None.
 
     One of similar spelling, else the shortest that contains the word of three letters
-    or more, or is contained in it: ``hand`` finds ``panda_hand``.
+    or more, or is contained in it: ``hand`` finds ``panda_hand``. No word: None.
     """
+    if not isinstance(word, str):
+        return None
     folded = {option.casefold(): option for option in options}
     target = word.casefold()
     if close := get_close_matches(target, folded, n=1):
@@ -22,7 +24,7 @@ def nearest(word: str, options: Iterable[str]) -> str | None:
     return folded[min(related, key=len)] if related else None
 
 
-def did_you_mean(word: str, options: Iterable[str]) -> str:
+def did_you_mean(word: object, options: Iterable[str]) -> str:
     """Return ``; did you mean 'x'?`` with the nearest option, or an empty string."""
     near = nearest(word, options)
     return "" if near is None else f"; did you mean {near!r}?"

@@ -283,7 +283,7 @@ class Structure:
         """
         try:
             return self._frame_ids[name]
-        except KeyError:
+        except (KeyError, TypeError):  # also what is no name, such as a list
             raise FrameNotFoundError(
                 f"no frame {name!r}{did_you_mean(name, self.frame_names)} "
                 f"(the model has {listing(self.frame_names)})"
@@ -295,7 +295,7 @@ class Structure:
         Raises:
             JointNotFoundError: If there is no moving joint with this name.
         """
-        if joint not in self.joints:
+        if not isinstance(joint, str) or joint not in self.joints:
             raise JointNotFoundError(
                 f"no joint {joint!r}{did_you_mean(joint, self.joint_names)} "
                 f"(the model has {listing(self.joint_names)})"

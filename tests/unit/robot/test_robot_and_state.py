@@ -105,6 +105,15 @@ def test_unknown_frame() -> None:
         robot.frame_id("hand")
 
 
+@pytest.mark.parametrize("name", [3, ["panda_hand"], None])
+def test_what_is_no_name_is_no_frame_and_no_joint(name: Any) -> None:
+    robot = draw("panda", seed=22)[0]
+    with pytest.raises(FrameNotFoundError, match=re.escape(f"no frame {name!r} (")):
+        robot.frame_id(name)
+    with pytest.raises(JointNotFoundError, match=re.escape(f"no joint {name!r} (")):
+        robot.velocity_index(name)
+
+
 @pytest.mark.parametrize(("joint", "hint"), [
     ("panda_joint8", "; did you mean 'panda_joint"),
     ("panda_finger_joint1", "; did you mean 'panda_joint"),  # locked
