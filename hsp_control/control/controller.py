@@ -495,8 +495,12 @@ class Controller(Commanded):
         ahead._memory.count_from(0.0)
         return ahead
 
+    def __copy__(self) -> "Controller":
+        """Return a copy that continues independently, of the same robot object."""
+        with self._lock:
+            return self._copy()
+
     def _copy(self) -> "Controller":
-        """Return a copy of the same robot object."""
         return deepcopy(self, {id(self._declared.robot): self._declared.robot})
 
     def preview(self, changes: Sequence[Change] | None = None) -> "Controller":

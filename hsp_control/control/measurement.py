@@ -1,12 +1,28 @@
 """The measurement of a robot at one time, and the log channels of a run's parts."""
 
-from collections.abc import Mapping
-from types import MappingProxyType
+from collections.abc import Iterator, Mapping
 from typing import NamedTuple
 
 from hsp_control.common.arrays import Array
 
-NO_WRENCHES: Mapping[str, Array] = MappingProxyType({})
+
+class _NoWrenches(Mapping[str, Array]):
+    """A mapping without items, which no one can add to, and which can be pickled."""
+
+    def __getitem__(self, key: str) -> Array:
+        raise KeyError(key)
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(())
+
+    def __len__(self) -> int:
+        return 0
+
+    def __repr__(self) -> str:
+        return "{}"
+
+
+NO_WRENCHES: Mapping[str, Array] = _NoWrenches()
 """Of a robot that measures no contact."""
 
 

@@ -11,6 +11,8 @@ controller expects, so that r contains all other forces.
 """
 
 from collections.abc import Mapping
+from copy import deepcopy
+from typing import Any
 
 import numpy as np
 
@@ -70,6 +72,17 @@ class CompensatedController:
         self.feels_contacts = feedback is not None and feedback.force == "measured"
         self._changes_state = (own.velocity_filter or own.predictor) is not None
         self.restart()
+
+    def __setstate__(self, saved: dict[str, Any]) -> None:
+        """Go on with the state of the copy's own controller."""
+        vars(self).update(saved)
+        self.state = self.controller.state
+        if self.compensation.predictor is None:
+            self._measured = self._run.measured = self.state
+
+    def __copy__(self) -> "CompensatedController":
+        """Return a copy that continues independently, of the same robot object."""
+        return deepcopy(self, {id(self.state.robot): self.state.robot})
 
     def restart(self, *, origin: float | None = None) -> None:
         """Reset all memory, for a new run; see `Controller.restart`."""

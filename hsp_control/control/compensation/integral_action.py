@@ -97,22 +97,17 @@ class IntegralAction(Part, error=CompensationError):
 class RunningIntegral(Stage):
     """Integral action in one run: it keeps the integrals."""
 
+    _bound: dict[str, tuple[Array, Callable[[], object]]] | None = None
+
     def __init__(self, declared: IntegralAction, controller: Controller) -> None:
         self._controller = controller
         self._limit = np.inf if declared.limit is None else declared.limit
         self._gains = declared.gains(controller.tasks)
-        self._feedback = {name: controller.feedback(name) for name in self._gains}
         # ∫e by task, shape (m,) [m·s or rad·s]
         self.integrals: dict[str, Array] = {
             name: np.zeros(len(Ki)) for name, Ki in self._gains.items()
         }
         self._period, self._hindered = np.zeros(1), np.zeros(1, dtype=np.int64)
-        never = np.zeros(1, dtype=np.int64)
-        self._bound: dict[str, tuple[Array, Callable[[], object]]] = {}
-        for name, Ki in self._gains.items():
-            e = np.zeros(len(Ki))
-            call = self._call(name, e, self._period, never, never, self._hindered)
-            self._bound[name] = e, planned([call]).call()
 
     def finish(self, run: Run) -> None:
         """Integrate the errors of the fully active tasks; see `Stage.finish`."""
@@ -155,7 +150,7 @@ class RunningIntegral(Stage):
             starting=starting,
             limited=int(Status.LIMITED),
             integral=self.integrals[name],
-            offset=self._feedback[name].offset,
+            offset=self._controller.feedback(name).offset,
         )
 
     def log_channels(self, run: Run) -> Mapping[str, LogChannel]:
@@ -170,11 +165,22 @@ class RunningIntegral(Stage):
     ) -> None:
         """Integrate the errors over one period, for the next effort."""
         self._period[:], self._hindered[:] = period, saturated
-        for name, (e, integrate) in self._bound.items():
+        for name in self._gains:
             given = errors.get(name)
             if given is not None:
+                e, integrate = self._integrating(name)
                 e[:] = given
                 integrate()
+
+    def _integrating(self, name: str) -> tuple[Array, Callable[[], object]]:
+        """Return the error that the call integrates, and the call."""
+        if self._bound is None:
+            self._bound = {}
+        if name not in self._bound:
+            e, never = np.zeros(len(self._gains[name])), np.zeros(1, dtype=np.int64)
+            call = self._call(name, e, self._period, never, never, self._hindered)
+            self._bound[name] = e, planned([call]).call()
+        return self._bound[name]
 
 
 def _check_decay(task: Task, Ki: Array) -> None:

@@ -107,6 +107,8 @@ class _BoundObserver(NamedTuple):
 class RunningObserver(Stage):
     """A momentum observer in one run: it keeps the estimate and the last momentum."""
 
+    _bound: _BoundObserver | None = None
+
     def __init__(
         self,
         bandwidth: float,
@@ -119,12 +121,16 @@ class RunningObserver(Stage):
         self._most_per_period = most_per_period
         # the low-pass's states, the last of them r, shape (nv,) [N·m or N]
         self._memory = np.zeros((order, len(clip)))
-        self.disturbance: Array = self._memory[-1]
         self.cancelled: Array = np.zeros(len(clip))
         # p and Cᵀv - G at the last measurement, and whether there was one
         self._momentum, self._drift = np.zeros((2, len(clip)))
         self._begun = np.zeros(1, dtype=np.int64)
-        self._bound: _BoundObserver | None = None
+
+    @property
+    def disturbance(self) -> Array:
+        """The estimate r, shape (nv,) [N·m or N]; a view."""
+        r: Array = self._memory[-1]
+        return r
 
     def update(self, state: RobotState, tau: Array, period: float) -> Array:
         """Return r; ``tau`` is the effort on the model in the period that ends."""

@@ -2,7 +2,7 @@
 
 from collections import deque
 from collections.abc import Mapping
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -72,7 +72,16 @@ class AloneCalls(NamedTuple):
 
 
 class Stage:
-    """A compensator in one run; by default a method changes nothing."""
+    """A compensator in one run; by default a method changes nothing.
+
+    Its memory is its attributes. ``_bound`` are the engine's calls on them, made at
+    their first use; a copy makes its own.
+    """
+
+    _bound: Any = None
+
+    def __getstate__(self) -> dict[str, Any]:
+        return {name: own for name, own in vars(self).items() if name != "_bound"}
 
     def measure(self, run: Run) -> None:
         """Change the time and the state for which the law is evaluated."""

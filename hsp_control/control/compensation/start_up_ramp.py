@@ -33,11 +33,15 @@ class StartUpRamp(Part, error=CompensationError):
 class RunningRamp(Stage):
     """A start-up ramp in one run: it knows when and where it began."""
 
+    _bound: tuple[Array, Callable[[], object]] | None = None
+
     def __init__(self, declared: StartUpRamp) -> None:
         self._declared = declared
         self._starting = np.zeros(1, dtype=np.int64)
         self._begun: tuple[float, Array] | None = None  # at the first state
-        self._bound: tuple[Array, Callable[[], object]] | None = None
+        # of robots whose joints have one degree of freedom each, as arrays
+        self._begin, self._first = np.zeros(1), np.zeros(0)
+        self._has_begun = np.zeros(1, dtype=np.int64)
 
     def act(self, run: Run, state: RobotState, active: ActiveStack) -> None:
         """Blend the law's acceleration with the holding one; see `Stage.act`."""
@@ -73,6 +77,8 @@ class RunningRamp(Stage):
 
     def _call(self, state: RobotState, a: Array, starting: Indices) -> PartCall:
         """Return the blend; the first call begins it."""
+        if not len(self._first):
+            self._first = np.zeros(state.robot.nq)
         return PartCall(
             engine.StartUp,
             time=state.time,
@@ -81,9 +87,9 @@ class RunningRamp(Stage):
             joints=state.robot.single_dof_joints,
             duration=self._declared.duration,
             natural_frequency=self._declared.natural_frequency,
-            begin=np.zeros(1),
-            first=np.zeros(state.robot.nq),
-            begun=np.zeros(1, dtype=np.int64),
+            begin=self._begin,
+            first=self._first,
+            begun=self._has_begun,
             starting=starting,
             a=a,
         )

@@ -66,11 +66,13 @@ class VelocityFilter(Part, error=CompensationError):
 class RunningFilter(Stage):
     """A velocity filter in one run: it keeps the last inputs and outputs."""
 
+    _bound: tuple[Array, Callable[[], object]] | None = None
+
     def __init__(self, declared: VelocityFilter) -> None:
         self._filter = declared
         self._b, self._a = np.zeros(3), np.zeros(2)
         self._begun = np.zeros(1, dtype=np.int64)
-        self._bound: tuple[Array, Callable[[], object]] | None = None
+        self._past = np.zeros((4, 0))  # the last inputs and outputs, by joint
 
     def measure(self, run: Run) -> None:
         """Filter the velocity; see `Stage.measure`."""
@@ -94,6 +96,7 @@ class RunningFilter(Stage):
         return AloneCalls(measure=[self._call(shared.v)])
 
     def _call(self, v: Array) -> PartCall:
-        past, begun = np.zeros((4, len(v))), self._begun
-        numbers = {"b": self._b, "a": self._a, "past": past, "begun": begun}
+        if self._past.shape[1] != len(v):
+            self._past = np.zeros((4, len(v)))
+        numbers = {"b": self._b, "a": self._a, "past": self._past, "begun": self._begun}
         return PartCall(engine.FilterVelocity, **numbers, v=v)

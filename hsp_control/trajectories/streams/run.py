@@ -1,7 +1,7 @@
 """A stream in one run: its messages, and the resulting reference."""
 
 from collections.abc import Mapping
-from copy import copy
+from copy import copy, deepcopy
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -26,9 +26,10 @@ from hsp_control.trajectories.streams.streamed import Streamed
 class StreamRun:
     """A stream in one run of a controller: takes messages, and plans the reference.
 
-    A controller stores the runs of its streams. A copy continues from the present
-    state, and also receives the messages to this one, without removing them. A pickle
-    continues likewise, and receives the messages to itself.
+    A controller stores the runs of its streams. A copy or a pickle continues from the
+    present state, with the messages that wait, and receives the later ones to itself. A
+    copy of a stream that listens to a source reads what arrives there, too, and leaves
+    it for this one.
 
     Attributes:
         declared: The declared stream; the next run begins with the untaken messages to
@@ -251,11 +252,14 @@ class StreamRun:
         return f"StreamRun of {self.declared!r}"
 
     def __deepcopy__(self, memo: dict[int, Any]) -> "StreamRun":
-        """Return a copy that continues independently."""
+        """Return a copy that continues independently, with the messages that wait."""
         memo[id(self)] = other = copy(self)
-        other._aside = True
-        if self._reader is not None:
-            other._reader = self._reader.copy()
+        other._inbox, reader = deepcopy(self._inbox, memo), self._reader
+        if reader is not None and reader.inbox is self._inbox:
+            other._reader = deepcopy(reader, memo)  # of the same copy of the queue
+        else:  # a source has one queue for all that read it
+            other._aside = True
+            other._reader = None if reader is None else reader.copy()
         if self._planner is not None:
             other._planner = self._planner.copy()
         return other

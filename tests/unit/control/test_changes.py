@@ -76,7 +76,8 @@ def test_in_the_end_it_is_as_if_built_that_way(name: str, seed: int) -> None:
 
 
 @pytest.mark.parametrize(
-    "duplicate", [copy.deepcopy, lambda each: pickle.loads(pickle.dumps(each))]
+    "duplicate",
+    [copy.copy, copy.deepcopy, lambda each: pickle.loads(pickle.dumps(each))],
 )
 @given(seeds)
 @quick

@@ -1,6 +1,8 @@
 """Each compensator by itself, and what they are worth together."""
 
+import copy
 import pickle
+from collections.abc import Callable
 from dataclasses import replace
 from typing import Any
 
@@ -72,6 +74,10 @@ def test_without_compensators_it_is_the_controller_to_the_last_bit() -> None:
         q, v = plant.advance(ours.t[k], end, tau)
 
 
+def pickled(each: Any) -> Any:
+    return pickle.loads(pickle.dumps(each))
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("name", [*EVERYTHING, "all"])
 def test_a_run_repeats_itself_and_its_compensators_travel(name: str) -> None:
@@ -88,6 +94,36 @@ def test_a_run_repeats_itself_and_its_compensators_travel(name: str) -> None:
     # Nothing stays behind in the controller or its tasks.
     assert_array_equal(bare.tau, run(controller(), duration=0.05).tau)
     assert set(bare.columns) <= set(first.columns)
+
+
+@pytest.mark.parametrize("copied", [copy.copy, copy.deepcopy, pickled])
+@pytest.mark.parametrize("name", [*EVERYTHING, "default", "all"])
+def test_a_copy_of_a_chain_goes_on_and_moves_nothing(
+    name: str, copied: Callable[[Any], Any]
+) -> None:
+    """In the middle of a run in which other efforts act than were returned."""
+    alone = {} if name in ("default", "all") else {name: EVERYTHING[name]}
+    compensation = {"default": Compensation(), "all": ALL}.get(name) or only(**alone)
+    original, untouched = (
+        CompensatedController(controller(), compensation) for _ in range(2)
+    )
+
+    def efforts(of: CompensatedController, begin: int, end: int) -> list[bytes]:
+        found = []
+        for k in range(begin, end):
+            q, v = (
+                Q0 + 1e-3 * np.sin(0.1 * k + np.arange(7)),
+                0.1 * np.cos(0.1 * k + Q0),
+            )
+            found.append(of.effort(k * H, q, v, H).tobytes())
+            of.applied(0.9 * of.output.tau, H)
+        return found
+
+    efforts(original, 0, 20), efforts(untouched, 0, 20)
+    twin = copied(original)
+    expected = efforts(untouched, 20, 60)
+    assert efforts(twin, 20, 60) == expected
+    assert efforts(original, 20, 60) == expected
 
 
 def test_compensators_need_a_control_period() -> None:

@@ -2,7 +2,7 @@
 
 import pickle
 from collections.abc import Callable
-from copy import deepcopy
+from copy import copy, deepcopy
 from threading import Thread
 from typing import Any
 
@@ -163,3 +163,20 @@ def test_what_looks_ahead_moves_no_stream_of(what: str) -> None:
     assert efforts(begun(), looking=True) == expected
     assert efforts(deepcopy(begun())) == expected
     assert efforts(pickle.loads(pickle.dumps(begun()))) == expected
+
+
+@pytest.mark.parametrize(
+    "copied", [copy, deepcopy, lambda each: pickle.loads(pickle.dumps(each))]
+)
+def test_a_message_to_a_copy_moves_the_copy_alone(copied: Callable[[Any], Any]) -> None:
+    """What waited when it was made moves both."""
+    made, rest = hsp.Controller(ROBOT, [hsp.FramePosition(name="hand")]), np.zeros(7)
+    made.compute(0.0, ROBOT.home(), rest)
+    made.set_target("hand", [0.4, 0.1, 0.5])
+    again = copied(made)
+    before = [each.compute(0.1, ROBOT.home(), rest).tau for each in (made, again)]
+    np.testing.assert_array_equal(*before)
+    again.set_target("hand", [0.4, -0.1, 0.5])
+    for t in (0.3, 0.6):
+        after = [each.compute(t, ROBOT.home(), rest).tau for each in (made, again)]
+    assert np.abs(after[1] - after[0]).max() > 0.1
