@@ -27,7 +27,7 @@ class ImperfectPlant(SampledPlant):
     """A plant whose measurements and efforts pass through imperfect sensors and drives.
 
     The measured state and the applied effort are logged beside the true state and the
-    commanded effort. A copy, or a pickle, must be reset before it is advanced.
+    commanded effort. A copy, or a pickle, begins its sensors and drives anew.
     """
 
     def __init__(
@@ -63,7 +63,9 @@ class ImperfectPlant(SampledPlant):
     def measure(self, t: float, q: Array, v: Array) -> tuple[Array, Array]:
         """Return the output of the last sensor; see `SampledPlant.measure`."""
         q, v = self.plant.measure(t, q, v)
-        for sense in self._sensing:
+        if self._sensing is None:
+            self._begin(q, v)
+        for sense in self._sensing or ():
             q, v = sense(t, q, v)
         self._measured = q, v
         return q, v
@@ -71,7 +73,9 @@ class ImperfectPlant(SampledPlant):
     def advance(self, t: float, end: float, tau: Array) -> tuple[Array, Array]:
         """Advance under the output of the drives; see `SampledPlant.advance`."""
         effort, delay = tau, 0.0
-        for drive in self._driving:
+        if self._driving is None:
+            self._begin(*self._measured)
+        for drive in self._driving or ():
             if isinstance(drive, RunningLag):
                 drive.period = end - t
             effort, later = drive(effort)
@@ -114,7 +118,7 @@ class ImperfectPlant(SampledPlant):
 
     def inertial(self) -> Inertial | None:
         """Return the reading of its own unit, or of the plant's."""
-        for sense in self._sensing:
+        for sense in self._sensing or ():
             if isinstance(sense, RunningImu):
                 return sense.reading
         return self.plant.inertial()
@@ -129,17 +133,19 @@ class ImperfectPlant(SampledPlant):
         }
 
     def __getstate__(self) -> dict[str, Any]:
-        return {**vars(self), "_sensing": [], "_driving": []}
+        return {**vars(self), "_sensing": None, "_driving": None}
 
     def _begin(self, q: Array, v: Array) -> None:
         """Begin all sensors and drives, for a start at (q, v)."""
-        self._sensing: list[Sensing] = []
-        self._driving: list[Driving] = []
+        sensing, driving = list[Sensing](), list[Driving]()
         for sensor in self.sensors:
             with within("sensors", sensor.yaml_type or type(sensor).__name__):
                 random = seeded_generator(self.seed, type(sensor).__name__)
-                self._sensing.append(sensor.begin(self.robot, q, v, random))
+                sensing.append(sensor.begin(self.robot, q, v, random))
         for drive in self.drives:
             with within("drives", drive.yaml_type or type(drive).__name__):
                 random = seeded_generator(self.seed, type(drive).__name__)
-                self._driving.append(drive.begin(self.robot, random))
+                driving.append(drive.begin(self.robot, random))
+        # None in a copy, which has not begun them yet.
+        self._sensing: list[Sensing] | None = sensing
+        self._driving: list[Driving] | None = driving

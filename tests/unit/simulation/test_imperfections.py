@@ -1,6 +1,8 @@
 """Plants that are not the model: each imperfection alone, and all in the loop."""
 
+import pickle
 from collections.abc import Callable, Sequence
+from copy import deepcopy
 from functools import cache
 from typing import Any
 
@@ -460,6 +462,39 @@ def test_the_log_has_the_truth_beside_what_was_measured_and_what_acted() -> None
     assert described["sensors"][1] == {"type": "VelocityNoise", "std": 0.02}
     assert described["drives"][0] == {"type": "EffortDelay", "periods": 1}
     assert described["seed"] == 5
+
+
+@pytest.mark.parametrize(
+    "copied", [deepcopy, lambda each: pickle.loads(pickle.dumps(each))]
+)
+def test_a_copy_begins_its_sensors_and_drives_anew(
+    copied: Callable[[Any], Any],
+) -> None:
+    """It had none; the original goes on as if there were no copy."""
+
+    def moved(plant: ImperfectPlant, times: range, q: Array, v: Array) -> list[Array]:
+        found = []
+        for k in times:
+            found += plant.measure(k * 1e-3, q, v)
+            tau = np.full(7, 5.0 * np.sin(k))
+            q, v = plant.advance(k * 1e-3, (k + 1) * 1e-3, tau)
+        return [*found, q, v]
+
+    parts = [Encoder(0.01), VelocityNoise(0.02)], [EffortDelay(2), EffortLag(0.005)]
+    plants = [ImperfectPlant(ideal_plant("panda"), *parts, seed=1) for _ in range(2)]
+    start = plants[0].robot.home(), np.zeros(7)
+    for each in plants:
+        each.reset(0.0, *start)
+        now = moved(each, range(5), *start)[-2:]
+    twin = copied(plants[0])
+    begun = ImperfectPlant(ideal_plant("panda"), *parts, seed=1)
+    begun.reset(0.005, *now)
+    found, expected = (moved(each, range(5, 9), *now) for each in (twin, begun))
+    np.testing.assert_array_equal(found[0], expected[0])  # a step of the encoder
+    np.testing.assert_array_equal(found[1], expected[1])  # the same noise
+    np.testing.assert_array_equal(
+        moved(plants[0], range(5, 9), *now), moved(plants[1], range(5, 9), *now)
+    )
 
 
 # --- refusals ------------------------------------------------------------------------
