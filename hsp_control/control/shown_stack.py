@@ -58,6 +58,12 @@ class Shown:
             "modifier returns another acceleration, or an effort"
         )
 
+    def __reduce__(self) -> NoReturn:
+        raise ImmutableError(
+            f"{self._name} cannot be copied or pickled: it is its controller's; take a "
+            "copy, controller.stack_at(state)"
+        )
+
 
 def shown_stack(stack: Stack) -> Stack:
     """Return a stack whose arrays cannot be written, and which cannot be resolved."""

@@ -2,8 +2,9 @@
 
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
+from copy import deepcopy
 from dataclasses import fields, is_dataclass
-from typing import Any, ClassVar, TypeVar
+from typing import Any, ClassVar, Self, TypeVar
 
 import numpy as np
 
@@ -120,8 +121,11 @@ class SampledPlant(Plant, ABC):
 
     Examples are an engine with its own integrator, joints with stiction, drives with
     delays, and a real robot. A run is one `reset`, then one `measure` and one `advance`
-    per control period.
+    per control period. A copy moves by itself.
     """
+
+    def __copy__(self) -> Self:
+        return deepcopy(self, {id(self.robot): self.robot})
 
     @abstractmethod
     def reset(self, t: float, q: Array, v: Array) -> None:

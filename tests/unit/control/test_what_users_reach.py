@@ -1,6 +1,8 @@
 """Users reach copies, not a step's arrays: mistakes are exact errors, or harmless."""
 
+import copy
 import os
+import pickle
 import signal
 import threading
 from collections.abc import Callable, Mapping
@@ -495,3 +497,12 @@ def test_a_fork_while_a_thread_computes_is_one_error() -> None:
     thread.join()
     assert os.waitstatus_to_exitcode(os.waitpid(child, 0)[1]) == 0
     own.compute(0.0, q, v)  # here all is as it was
+
+
+@pytest.mark.parametrize("copied", [copy.copy, copy.deepcopy, pickle.dumps])
+def test_what_a_step_writes_is_not_copied(copied: Callable[[object], object]) -> None:
+    """A copy would need its controller's calls; `stack_at` returns one that has them."""
+    made = hsp.Controller(hsp.Robot.load("panda"), [hsp.FramePosition(name="hand")])
+    made.compute(0.0, made.robot.home(), np.zeros(NV))
+    with pytest.raises(ImmutableError, match=r"active cannot be copied.*stack_at"):
+        copied(made.active_stack)

@@ -2,7 +2,7 @@
 
 import pickle
 from collections.abc import Callable, Sequence
-from copy import deepcopy
+from copy import copy, deepcopy
 from functools import cache
 from typing import Any
 
@@ -465,7 +465,7 @@ def test_the_log_has_the_truth_beside_what_was_measured_and_what_acted() -> None
 
 
 @pytest.mark.parametrize(
-    "copied", [deepcopy, lambda each: pickle.loads(pickle.dumps(each))]
+    "copied", [copy, deepcopy, lambda each: pickle.loads(pickle.dumps(each))]
 )
 def test_a_copy_begins_its_sensors_and_drives_anew(
     copied: Callable[[Any], Any],
