@@ -501,7 +501,7 @@ def test_a_fork_while_a_thread_computes_is_one_error() -> None:
 
 @pytest.mark.parametrize("copied", [copy.copy, copy.deepcopy, pickle.dumps])
 def test_what_a_step_writes_is_not_copied(copied: Callable[[object], object]) -> None:
-    """A copy would need its controller's calls; `stack_at` returns one that has them."""
+    """A copy would need its controller; `stack_at` returns one that has it."""
     made = hsp.Controller(hsp.Robot.load("panda"), [hsp.FramePosition(name="hand")])
     made.compute(0.0, made.robot.home(), np.zeros(NV))
     with pytest.raises(ImmutableError, match=r"active cannot be copied.*stack_at"):
