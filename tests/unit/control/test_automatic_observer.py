@@ -221,7 +221,7 @@ RIGID = {("xarm7", "a load of 1 kg")}
 
 
 SEEDS = 3 if THOROUGH else 1
-USUAL = {"all": ["panda", "xarm7"], "a load of 1 kg": ["iiwa14", "ur5"]}
+USUAL = {"all": ["xarm7"], "a load of 1 kg": ["ur5"]}
 """Arms of a case, unless thorough."""
 """Of arms that are not their models, of each kind."""
 
