@@ -17,8 +17,8 @@ from pathlib import Path
 import pytest
 from hypothesis import settings
 
-# A sixth of Hypothesis' own number of examples, but for `make thorough`.
-EXAMPLES = 100 if os.environ.get("HSP_THOROUGH") else 16
+# A tenth of Hypothesis' own number of examples, but for `make thorough`.
+EXAMPLES = 100 if os.environ.get("HSP_THOROUGH") else 10
 settings.register_profile(
     "proof", derandomize=True, deadline=None, max_examples=EXAMPLES
 )

@@ -276,6 +276,7 @@ def serve(
     alone = False  # whether no loop is there any more
 
     def received() -> list[Packet]:
+        nonlocal alone
         if not lockstep or alone:
             return link.receive(0.0)
         if robot.phase == Phase.WAITING:
@@ -286,6 +287,7 @@ def serve(
                 return []
             if monotonic() > end:
                 robot.halt(f"the loop did not answer for {start_timeout:g} s")
+                alone = True  # else each period of the stop would wait as long
                 return []
         return packets
 

@@ -11,7 +11,7 @@ from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import ModelError
 from hsp_control.engine import Dynamics
 from hsp_control.engine.plans import PartCall, PartCalls
-from hsp_control.robot.dynamics import dynamics_of
+from hsp_control.robot.dynamics import ModelNumbers, model_numbers
 from hsp_control.robot.kinematics import Term
 from hsp_control.robot.structure import Structure
 
@@ -174,7 +174,16 @@ class RobotModel(Structure):
         They are those of the model as it is now: change its masses before states,
         controllers and plants are made of it.
         """
-        return dynamics_of(self.model)
+        before, numbers = self._numbers
+        if before != self.model:  # which takes a hundredth of reading it
+            before, numbers = self.model.copy(), model_numbers(self.model)
+            self.__dict__["_numbers"] = before, numbers
+        return Dynamics(*numbers)
+
+    @cached_property
+    def _numbers(self) -> tuple[pin.Model, ModelNumbers]:
+        """A copy of the model, and its numbers."""
+        return self.model.copy(), model_numbers(self.model)
 
     @cached_property
     def _own(self) -> Dynamics:

@@ -238,7 +238,7 @@ def test_limits_that_an_observer_tells_are_not_bound_by_a_push() -> None:
     away = np.abs(log["task.hand.error"][early, 1])
     assert away.max() == pytest.approx(0.05, rel=0.02)
     untold = hsp.load_experiment(
-        CARTESIAN, "simulation.duration=2.5", "compensation.momentum_observer=null"
+        CARTESIAN, "simulation.duration=1.5", "compensation.momentum_observer=null"
     ).run()
     assert (untold["status"] >= 2).any()
 

@@ -61,11 +61,25 @@ class Case:
         return Robot.load(self.name, **LOAD_OPTIONS.get(self.name, {}), **self.options)
 
 
+ALIKE = {
+    *("bravo7_no_ee", "falcon_bravo7_gripper", "falcon_bravo7_no_ee"),
+    *("bluevolta_bravo7_gripper", "bluevolta_bravo7_no_ee", "double_pendulum_simple"),
+    *("ur3", "ur3_gripper", "ur3_limited", "ur5_gripper", "ur5_limited", "ur10"),
+    *("ur10_limited", "tiago", "tiago_no_hand", "allegro_left_hand", "alexander"),
+    *("alex_nub_hands", "alex_sake_hands", "a1", "b1", "go1", "anymal", "g1"),
+    *("icub", "simple_humanoid", "so100", "solo8", "talos_box", "talos_full"),
+    *("talos_full_box", "talos_legs"),
+}
+"""Robots beside which there is another one with the same joints."""
 CASES = [
-    *(Case(name) for name in BUNDLED + FIXED),
+    *(Case(name) for name in BUNDLED + FIXED if THOROUGH or name not in ALIKE),
     Case("panda", {"locked": {}}),  # fingers free, one of them the other's mimic
     *(Case(name, {"root": "planar"}) for name in MOBILE),
-    *(Case(n, {"root": "fixed"}) for n in FLOATING_BASE if n not in NO_JOINTS),
+    *(
+        Case(n, {"root": "fixed"})
+        for n in FLOATING_BASE
+        if n not in NO_JOINTS and (THOROUGH or n not in ALIKE)
+    ),
 ]
 
 

@@ -69,8 +69,10 @@ def test_it_runs_plots_and_exports(installed: Path, tmp_path: Path) -> None:
 
 @pytest.mark.process
 @pytest.mark.slow
-def test_it_sweeps(installed: Path, tmp_path: Path) -> None:
-    line = f"sweep {DEMO} --over plant.damping=0:2:2 --out s.parquet --workers 1"
+@pytest.mark.parametrize("workers", further(1))  # a worker finds types as any process
+def test_it_sweeps(workers: int, installed: Path, tmp_path: Path) -> None:
+    over = "--over plant.damping=0:2:2 --out s.parquet"
+    line = f"sweep {DEMO} {over} --workers {workers}"
     hsp(installed, f"{line} --set simulation.duration=0.2", tmp_path)
 
 

@@ -109,7 +109,7 @@ def test_a_clutch_that_closes_elsewhere_makes_no_jump() -> None:
     stream, start = hsp.StreamPose(delay=0.05), hand_pose(PANDA)
     controller = hsp.Controller(PANDA, [hsp.FramePose("panda_tcp", stream)])
 
-    times = iter(PERIOD * np.arange(3001))
+    times = iter(PERIOD * np.arange(2401))
 
     def lead(_: LogWriter) -> None:
         t = next(times)
@@ -120,7 +120,7 @@ def test_a_clutch_that_closes_elsewhere_makes_no_jump() -> None:
     run = hsp.simulate(
         controller,
         PANDA.home(),
-        duration=3.0,
+        duration=2.4,
         control_period=PERIOD,
         log_period=PERIOD,
         on_row=lead,

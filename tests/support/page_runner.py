@@ -277,9 +277,10 @@ class Shell:
             elif block.kind == "Ctrl-C":
                 if THOROUGH or not _of_the_readme(line) or where.startswith("README"):
                     self._interrupted(line, where, serves="page" in block.reason)
-            elif re.fullmatch(r"hsp [\w ./=-]+", line) and not block.kind:
-                words = line.split()[1:]
-                status, said = READY.run(words, self._folder, self._environment)
+            elif re.fullmatch(r"hsp [\w ./=*-]+", line) and not block.kind:
+                status, said = READY.run(
+                    self._words(line)[1:], self._folder, self._environment
+                )
                 assert status == 0, f"{where}: {line}\n{said}"
             else:
                 done = subprocess.run(
@@ -289,6 +290,21 @@ class Shell:
                 )  # fmt: skip
                 status = 2 if block.kind == "fails" else 0
                 assert done.returncode == status, f"{where}: {line}\n{done.stdout}"
+
+    def _words(self, line: str) -> list[str]:
+        """Return the words of a command, with the files of a pattern in its place."""
+        return [
+            file
+            for word in line.split()
+            for file in (
+                sorted(
+                    str(each.relative_to(self._folder))
+                    for each in self._folder.glob(word)
+                )
+                if "*" in word
+                else [word]
+            )
+        ]
 
     def _start(self, line: str, where: str) -> "Running":
         """Start a command, and wait until it has printed something."""

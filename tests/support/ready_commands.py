@@ -6,6 +6,7 @@ starts is seen where plays and commands that need a shell run (`page_runner.py`)
 """
 
 import atexit
+import gc
 import json
 import os
 import signal
@@ -16,8 +17,12 @@ from typing import Any
 
 PARTS = (
     *("hsp_control.cli.commands", "hsp_control.cli.live"),
-    *("hsp_control.companions.viewer.command", "hsp_control.companions.plots"),
-    *("matplotlib.pyplot", "matplotlib.backends.backend_agg", "trimesh"),
+    *("hsp_control.companions.viewer.command", "hsp_control.companions.viewer.pages"),
+    *("hsp_control.companions.viewer.page_server", "hsp_control.companions.plots"),
+    *("hsp_control.companions.plots.figures", "hsp_control.companions.plots.command"),
+    *("hsp_control.companions.inspection.command", "hsp_control.companions.walking"),
+    *("matplotlib.pyplot", "matplotlib.backends.backend_agg", "PIL.JpegImagePlugin"),
+    *("tornado.platform.asyncio", "trimesh", "example_robot_data", "rich._emoji_codes"),
 )
 """Modules that the process imports first, if present. None of them starts a thread."""
 
@@ -72,18 +77,24 @@ def serve() -> None:
     for part in PARTS:
         with suppress(ImportError):  # a companion that was taken away
             import_module(part)
+    from multiprocessing import get_context
     from tempfile import TemporaryFile
 
     requests, answers = os.fdopen(os.dup(0)), os.fdopen(os.dup(1), "w")
+    fork = get_context("fork")
+    gc.collect()
+    gc.freeze()  # a fork that looked for garbage would copy all of it
     for line in requests:
         with TemporaryFile() as printed:
-            child = os.fork()
-            if child == 0:
-                _become(json.loads(line), printed.fileno())
-            status = os.waitstatus_to_exitcode(os.waitpid(child, 0)[1])
+            # Ends without taking the interpreter apart, which would copy it, too.
+            child = fork.Process(
+                target=_become, args=(json.loads(line), printed.fileno())
+            )
+            child.start()
+            child.join()
             printed.seek(0)
             said = printed.read().decode()
-        print(json.dumps([status, said]), file=answers, flush=True)
+        print(json.dumps([child.exitcode, said]), file=answers, flush=True)
 
 
 def _become(request: dict[str, Any], output: int) -> None:

@@ -45,7 +45,7 @@ WITH_CONFIGURATION = {
 WITH_LOG = {
     "view": "view out/mine.npz --no-browser",
     "export": "export out/mine.npz --html out/mine.html",
-    "plot": "plot out/mine.npz",
+    "plot": "plot out/mine.npz --panels null_space",
     "run": "run out/mine.npz",
     "of a live loop": "view out/mine-live.npz --no-browser",
     "of its robot": "view out/mine-robot.npz --no-browser",

@@ -120,8 +120,9 @@ def checkout(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 
 @pytest.mark.process
+@pytest.mark.parametrize("number", further(3))  # `make thorough` runs it, too
 def test_the_runner_tells_who_was_caught(
-    checkout: Path, capsys: pytest.CaptureFixture[str]
+    number: int, checkout: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     """Each is tried alone, and the code is afterwards what it was."""
     tests = "test_area.py"
@@ -130,6 +131,7 @@ def test_the_runner_tells_who_was_caught(
         mutant("a + b", "a - b", tests),
         mutant("a * b", "a / b", "test_area.py -k volume"),
     ]
+    assert len(tried) == number
     found = [verdict.word for _, verdict in mutants.tried(checkout, tried)]
     assert found == ["caught", "SURVIVED", "void"]
     first, second, third = capsys.readouterr().out.splitlines()

@@ -93,7 +93,7 @@ def test_a_hand_that_is_drawn_below_stays_above() -> None:
     task = hsp.FramePosition("panda_tcp", deep, name="hand")
     barrier = FrameHeight(minimum=here[2] - 0.1)
     law = hsp.Controller(robot, [task], limits=hsp.Limits(barriers=[barrier]))
-    run = held(law, robot.home(), duration=3.0)
+    run = held(law, robot.home(), duration=2.2)
     heights = here[2] - 0.3 - run["task.hand.error"][:, 2]
     assert heights.min() > barrier.minimum - 1e-4
     assert heights[-1] == pytest.approx(barrier.minimum, abs=1e-3)

@@ -459,7 +459,7 @@ def test_things_stay_apart() -> None:
     for limited in (False, True):
         limits = hsp.Limits(barriers=[ObstacleDistance(0.02)])
         law = elbow(limits if limited else None)
-        rollout = held(law, robot.home(), duration=1.6)
+        rollout = held(law, robot.home(), duration=1.1)
         least[limited] = min(
             float(proximity.measure(robot.state(t, q, v)).min())
             for t, q, v in zip(rollout.t, rollout["q"], rollout["v"], strict=True)

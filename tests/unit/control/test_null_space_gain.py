@@ -21,7 +21,7 @@ from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import GainError
 from hsp_control.control.fitting import checked_gain
 
-COUNT = 2500 if THOROUGH else 1000
+COUNT = 2500 if THOROUGH else 500
 """Gains for each of four robots."""
 ROBOTS = ("planar3r", "panda", "ur5", "talos_arm_free_flyer")
 seeds = st.integers(0, 2**32 - 1)

@@ -106,7 +106,7 @@ def test_targets_and_velocities_whenever_they_come(kind: str, tmp_path: Path) ->
     )
     pair.target(random_target(kind, rng, 0.1))  # before the first step
     for far in (1e-4, 0.02, 0.3, 1.0):  # in time, and as fast as it may
-        for _ in range(12):
+        for _ in range(12 if THOROUGH else 6):
             for _ in range(rng.integers(3)):  # none, one, or two between two steps
                 if rng.random() < 0.5:
                     pair.target(random_target(kind, rng, far))
@@ -146,7 +146,7 @@ def test_targets_with_velocities_and_times(kind: str, tmp_path: Path) -> None:
         pair.target(value, **given)
 
     for far in (0.002, 0.05, 0.5):
-        for _ in range(40 if THOROUGH else 15):
+        for _ in range(40 if THOROUGH else 8):
             orders = ["", "t", "t", "t", "v", "tv", "vt", "vtv", "tt", "ttvtt"]
             for each in orders[rng.integers(len(orders))]:
                 if each == "t":

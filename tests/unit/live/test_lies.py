@@ -318,7 +318,7 @@ def test_what_real_sensors_do_is_no_lie(
         encoder = 1e-4  # a coarse one comes with a filter
     robot = Noisy(noise, delay, frequency, 0.1, encoder, seed=3)
     settings = replace(SETTINGS, velocity_margin=1.0)
-    report = run_loop(moving(), robot, duration=1.2, settings=settings)
+    report = run_loop(moving(), robot, duration=0.8, settings=settings)
     assert report.ended == "completed", report.reason
 
 
@@ -379,7 +379,7 @@ def test_noise_of_hours_is_no_lie(period: float) -> None:
     filtered, last = np.zeros(7), 0.0
     part = 1.0 - np.exp(-2.0 * np.pi * 20.0 * period)
     delay = 0.005
-    for k in range(8000 if THOROUGH else 4000):
+    for k in range(8000 if THOROUGH else 2500):
         t = k * period
         q = q0 + size * np.sin(rate * t) / rate
         v = size * np.cos(rate * max(t - delay, 0.0)) + rng.normal(0.0, 0.05, 7)
@@ -689,7 +689,7 @@ def test_wrong_masses_are_no_lie(share: float) -> None:
     plant = IntegratedPlant(RigidBodyPlant(heavy), SemiImplicitEuler(PERIOD))
     robot.robot = SimulatedRobot(plant, start(), np.zeros(7), PERIOD, settings=PATIENT)
     settings = replace(SETTINGS, velocity_margin=1.0)
-    report = run_loop(moving(), robot, duration=1.5, settings=settings)
+    report = run_loop(moving(), robot, duration=1.0, settings=settings)
     assert report.ended == "completed", report.reason  # its stop does not sink
     assert report.at_rest
 
@@ -703,7 +703,7 @@ def test_an_unknown_load_is_no_lie() -> None:
     loaded = hsp.Robot.from_pinocchio(model)
     plant = IntegratedPlant(RigidBodyPlant(loaded), SemiImplicitEuler(PERIOD))
     robot = Rig(SimulatedRobot(plant, start(), np.zeros(7), PERIOD, settings=PATIENT))
-    report = run_loop(moving(), robot, duration=2.0, settings=SETTINGS)
+    report = run_loop(moving(), robot, duration=1.5, settings=SETTINGS)
     assert report.ended == "completed", report.reason  # its stop does not sink
     assert report.at_rest
 

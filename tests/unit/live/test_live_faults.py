@@ -134,7 +134,7 @@ ODD_RESULTS = st.one_of(
 
 
 @pytest.mark.slow
-@settings(max_examples=100 if THOROUGH else 8)
+@settings(max_examples=100 if THOROUGH else 5)
 @given(odd=ODD_RESULTS, count=st.sampled_from([1, 30, 20_000]))
 def test_whatever_read_returns(odd: Trick, count: int) -> None:
     robot = rig(always(odd, BEGIN, count))
@@ -384,7 +384,7 @@ class Failing(Rig):
 
 
 @pytest.mark.slow
-@settings(max_examples=100 if THOROUGH else 10)
+@settings(max_examples=100 if THOROUGH else 6)
 @given(
     method=st.sampled_from(["read", "write", "close", "on_period", "change"]),
     error=ERRORS,

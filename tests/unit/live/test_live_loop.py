@@ -200,7 +200,7 @@ def test_field_gains_and_tasks_change_without_a_jump(tmp_path: Path) -> None:
 
     log = tmp_path / "run.journal"
     report = run_loop(
-        controller, rig, duration=2.0, requests=requests, on_period=on_period, log=log,
+        controller, rig, duration=1.0, requests=requests, on_period=on_period, log=log,
         log_period=PERIOD,
     )  # fmt: skip
     assert report.ended == "completed", report.reason
@@ -284,7 +284,7 @@ def test_a_robot_that_is_silent_or_unfit_is_not_started() -> None:
 @pytest.mark.parametrize("at_first", [None, *further(Limits())])
 def test_the_monitor_follows_limits_that_change(at_first: Limits | None) -> None:
     q = start()
-    wide = PositionRange(q - 0.3, q + 0.3)
+    wide = PositionRange(q - 0.2, q + 0.2)
     narrow = PositionRange(q - 0.05, q + 0.05)
     unaware = law()
 

@@ -340,15 +340,26 @@ def test_in_lockstep_a_robot_waits_for_the_loop_and_a_loop_for_the_robot() -> No
     link.close()
 
 
-def test_in_lockstep_a_robot_whose_loop_is_silent_stops() -> None:
+def test_in_lockstep_a_robot_whose_loop_is_silent_stops(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """It waits for an answer once, and not in each period of its stop."""
     hardware = UdpHardware(panda(), PERIOD, alive=lambda: True)
     robot = watched()
     link = Link(hardware.session, peer=hardware.address)
     link.send(PacketKind.STATE, np.zeros(14))
     assert hardware.read(60.0) is not None
     hardware.write(np.zeros(7))
+    turn, waited = link.turn, list[str]()
+
+    def noted(timeout: float) -> list[Packet] | None:
+        waited.append(robot.reason)
+        return turn(timeout)
+
+    monkeypatch.setattr(link, "turn", noted)
     serve(robot, link, stop_reason=lambda: None, start_timeout=0.3, lockstep=True)
     assert robot.reason == "the loop did not answer for 0.3 s"
+    assert not any(waited)
     hardware.drain()
     link.close()
 

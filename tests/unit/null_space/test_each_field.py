@@ -51,12 +51,12 @@ def test_joint_centering_draws_no_joint_faster_than_its_weight() -> None:
 def test_target_posture_is_smooth_all_the_way_round() -> None:
     """Three turns through pi: slope and rate change by no more than their bounds.
 
-    ∇f = w sin d has slope w, (∇f)' = w cos d v has slope w |v|: 0.01 rad of turning
-    changes them by 0.01 of that; ½d² would jump by 2 pi w.
+    ∇f = w sin d has slope w, (∇f)' = w cos d v has slope w |v|: 0.02 rad of turning
+    changes them by 0.02 of that; ½d² would jump by 2 pi w.
     """
     robot = load("planar3r")
     field = posture("planar3r", weights=[2.0, 3.0, 0.0])
-    v, step = np.array([1.0, -1.0, 1.0]), 0.01
+    v, step = np.array([1.0, -1.0, 1.0]), 0.02
     q = target("planar3r")
     slopes, rates, values = [], [], []
     for _ in range(int(6.0 * np.pi / step)):
@@ -69,7 +69,7 @@ def test_target_posture_is_smooth_all_the_way_round() -> None:
     assert np.abs(np.diff(slopes, axis=0)).max() <= bound
     assert np.abs(np.diff(rates, axis=0)).max() <= bound
     assert np.abs(np.diff(values)).max() <= 5.0 * step * (1 + 1e-9)
-    assert max(values) == pytest.approx(10.0, abs=1e-4)
+    assert max(values) == pytest.approx(10.0, abs=3e-4)
     # It winds: a whole turn further all is the same again.
     turn = round(2.0 * np.pi / step)
     np.testing.assert_allclose(slopes[turn], slopes[0], atol=3 * step)

@@ -12,7 +12,7 @@ import pytest
 from numpy.testing import assert_allclose
 from robot_cases import ROBOTS, draw
 
-from hsp_control import engine
+from hsp_control import Robot, engine
 from hsp_control.common.arrays import Array
 from hsp_control.robot.dynamics import dynamics_of, model_numbers
 from hsp_control.robot.gravity import Gravity
@@ -156,3 +156,31 @@ def test_numbers_that_are_no_robot_are_refused() -> None:
         engine.Dynamics((joints[0]._replace(leader=-2),), gravity, armature[:1])
     with pytest.raises(ValueError, match="armature has 6 entries; needs 7"):
         engine.Dynamics(joints, gravity, armature[1:])
+
+
+def test_dynamics_are_those_of_the_model_as_it_is_now() -> None:
+    """Whose numbers are read once, and again after each change."""
+    robot = Robot.load("panda")
+    q, zero = robot.home(), np.zeros(7)
+
+    def heavier(model: pin.Model) -> None:
+        model.inertias[6].mass *= 1.0 + 1e-9
+
+    def rotors(model: pin.Model) -> None:
+        model.armature[3] += 1e-3
+
+    def tilted(model: pin.Model) -> None:
+        model.gravity.linear = np.array([1.0, 0.0, -9.81])
+
+    def moved(model: pin.Model) -> None:
+        model.jointPlacements[5].translation += 1e-6
+
+    for change in (heavier, rotors, tilted, moved):
+        before = robot.inverse_dynamics(q, zero, np.ones(7), robot.dynamics())
+        change(robot.model)
+        data = robot.model.createData()
+        expected = pin.rnea(robot.model, data, q, zero, np.ones(7))
+        for _ in range(2):
+            found = robot.inverse_dynamics(q, zero, np.ones(7), robot.dynamics())
+            assert_allclose(found, expected, rtol=0, atol=1e-12)
+        assert not np.array_equal(before, found), change.__name__

@@ -19,7 +19,13 @@ from live_rigs import PERIOD, Rig, law, start, watched
 from hsp_control import Rollout, load_experiment, simulate
 from hsp_control.cli import main
 from hsp_control.common.exceptions import LogError
-from hsp_control.live import LiveSettings, Phase, StopSettings, run_loop
+from hsp_control.live import (
+    LiveSettings,
+    LoopReport,
+    Phase,
+    StopSettings,
+    run_loop,
+)
 from hsp_control.simulation import journal
 from hsp_control.simulation.journal import (
     KILLED,
@@ -372,26 +378,40 @@ class Interrupting:
         raise KeyboardInterrupt
 
 
+def brief_loop(log: Path) -> LoopReport:
+    quick = LiveSettings(stop=StopSettings(hold=0.02))
+    options: Any = {"duration": 0.06, "log_period": PERIOD, "settings": quick}
+    return run_loop(law(), Rig(watched(quick)), log=log, **options)
+
+
+@pytest.fixture(scope="module")
+def brief(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, int]:
+    """Return the journal of a loop, and how often it was written to."""
+    path, counted = (
+        tmp_path_factory.mktemp("brief") / "a.journal",
+        Interrupting(None, 0),
+    )
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(journal.os, "write", counted)
+        assert brief_loop(path).ended == "completed"
+    return path, counted.calls
+
+
 @pytest.mark.system
 @pytest.mark.parametrize("cut", [0, 5, 200, None])
 @pytest.mark.parametrize("row", [20, -1])
 def test_ctrl_c_within_a_row_loses_none(
-    cut: int | None, row: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    cut: int | None,
+    row: int,
+    brief: tuple[Path, int],
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     """Also within the end of the journal, which is its last frame."""
-    quick = LiveSettings(stop=StopSettings(hold=0.02))
-
-    def loop(log: Path) -> Any:
-        options: Any = {"duration": 0.06, "log_period": PERIOD, "settings": quick}
-        return run_loop(law(), Rig(watched(quick)), log=log, **options)
-
-    path = tmp_path / "whole.journal"
-    counted = Interrupting(None, -1)
-    monkeypatch.setattr(journal.os, "write", counted)
-    assert loop(path).ended == "completed"
-    at = row if row > 0 else counted.calls
+    path, calls = brief
+    at = row if row > 0 else calls
     monkeypatch.setattr(journal.os, "write", Interrupting(cut, at))
-    report = loop(tmp_path / "cut.journal")
+    report = brief_loop(tmp_path / "cut.journal")
     monkeypatch.undo()
     read, reference = Rollout.load(tmp_path / "cut.journal"), Rollout.load(path)
     if row > 0:

@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 from loaded_robots import panda
+from places import further
 from task_cases import GAINS, TIME, Case, Direction, every_task, place, placed
 from wording import wording
 
@@ -59,7 +60,7 @@ def test_the_largest_errors_of_a_robot() -> None:
         assert placed(each, robot).largest_error == each.largest_error
 
 
-@pytest.mark.parametrize("largest", [0.02, 0.1])
+@pytest.mark.parametrize("largest", [0.02, *further(0.1)])
 def test_its_energy_falls(largest: float) -> None:
     """E = ½|e'|² + ∫ Kp s(e)·de falls by ∫ Kv|e'|² dt: the equation is a gradient's."""
     robot, k = panda(), 100.0

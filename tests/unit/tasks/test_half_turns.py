@@ -9,6 +9,7 @@ import pytest
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 from loaded_robots import panda
+from places import THOROUGH
 from task_cases import GAINS, TIME, TOOL, Case, Pose, Tumble, frame_along, place
 
 from hsp_control import Controller, FrameOrientation, Gains, Pointing, simulate
@@ -37,7 +38,7 @@ def panda_state() -> Any:
 
 
 @pytest.mark.slow
-@settings(max_examples=300, deadline=None, derandomize=True)
+@settings(max_examples=300 if THOROUGH else 100, deadline=None, derandomize=True)
 @given(near_pi, directions)
 @example(np.pi, np.array([1.0, 0.0, 0.0]))
 @example(np.pi, np.array([0.0, 1.0, 0.0]))
@@ -63,7 +64,7 @@ def test_orientation_through_half_a_turn(angle: float, axis: Array) -> None:
 
 
 @pytest.mark.slow
-@settings(max_examples=300, deadline=None, derandomize=True)
+@settings(max_examples=300 if THOROUGH else 100, deadline=None, derandomize=True)
 @given(near_pi, st.floats(-np.pi, np.pi), st.sampled_from(["still", "tumbling"]))
 @example(np.pi, 0.0, "still")
 @example(np.pi, 0.0, "tumbling")

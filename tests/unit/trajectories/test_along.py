@@ -45,7 +45,7 @@ from hsp_control.trajectories import (
     UniformLine,
 )
 
-quick = settings(max_examples=25 if THOROUGH else 10)
+quick = settings(max_examples=25 if THOROUGH else 6)
 seeds = st.integers(0, 10**6)
 
 

@@ -216,7 +216,7 @@ def test_a_spin_that_is_followed_by_a_target_keeps_its_bound() -> None:
         assert np.abs(away.np - np.eye(4)).max() < 1e-7
 
 
-@settings(max_examples=25 if THOROUGH else 8)
+@settings(max_examples=25 if THOROUGH else 5)
 @given(st.integers(0, 2**32 - 1), st.floats(0.0, 0.3))
 def test_bounds_hold_in_the_axes_of_the_command(seed: int, delay: float) -> None:
     """Random velocities in the tool's axes, at random times, and pauses."""
@@ -239,7 +239,7 @@ def test_bounds_hold_in_the_axes_of_the_command(seed: int, delay: float) -> None
     assert_integral(stream, np.linspace(0.1, 0.98, 20))
 
 
-@settings(max_examples=25 if THOROUGH else 8)
+@settings(max_examples=25 if THOROUGH else 5)
 @given(st.integers(0, 2**32 - 1), st.floats(0.0, 0.3))
 def test_targets_and_velocities_in_both_axes_follow_each_other(
     seed: int, delay: float

@@ -105,7 +105,7 @@ def hostile(rng: np.random.Generator, stream: Any, n: int) -> Callable[[float], 
     return feed
 
 
-@settings(max_examples=25 if THOROUGH else 8)
+@settings(max_examples=25 if THOROUGH else 5)
 @given(st.integers(0, 2**32 - 1), st.sampled_from(POLICIES), st.floats(0.0, 0.3))
 def test_points_keep_their_bounds_whatever_is_sent(
     seed: int, policy: Any, delay: float
@@ -124,7 +124,7 @@ def test_points_keep_their_bounds_whatever_is_sent(
     assert_derivatives(x, rate, acceleration, 80.0)
 
 
-@settings(max_examples=25 if THOROUGH else 8)
+@settings(max_examples=25 if THOROUGH else 5)
 @given(st.integers(0, 2**32 - 1), st.sampled_from(POLICIES), st.floats(0.0, 0.3))
 def test_poses_keep_their_bounds_whatever_is_sent(
     seed: int, policy: Any, delay: float

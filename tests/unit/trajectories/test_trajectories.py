@@ -66,7 +66,7 @@ ROUGH = {
 }
 
 every_member = pytest.mark.parametrize("name", MEMBERS)
-SPARSE = 1 if THOROUGH else 4  # of the steps without a knot, one in so many
+SPARSE = 1 if THOROUGH else 8  # of the steps without a knot, one in so many
 quick = settings(max_examples=60, deadline=None, derandomize=True)
 
 

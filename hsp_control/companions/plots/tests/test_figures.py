@@ -105,7 +105,7 @@ def test_a_figure_shows_itself_in_a_notebook() -> None:
     assert len(picture) < 300_000
 
 
-SHOWN = ("equal", "several", "posture", *further("obstacle", "space"))
+SHOWN = ("equal", "several", *further("posture", "obstacle", "space"))
 
 
 @pytest.fixture(scope="module")

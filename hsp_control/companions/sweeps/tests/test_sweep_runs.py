@@ -30,8 +30,8 @@ from hsp_control.companions.sweeps.row_files import RowFiles, read_rows
 # Some tenths of a second each.
 SECONDS = 3
 SLOWER = [QUICK[1], f"simulation.duration={SECONDS}"]
-GAINS = {"null_space.gain": "1:20:12"}
-RUNS = 12
+GAINS = {"null_space.gain": "1:20:8"}
+RUNS = 8
 
 
 def same(one: Sweep, other: Sweep) -> None:
@@ -275,7 +275,7 @@ def running(word: str, parent: psutil.Process) -> list[psutil.Process]:
 
 @pytest.mark.process
 @pytest.mark.slow
-@pytest.mark.parametrize("after", further((2, 9)))
+@pytest.mark.parametrize("after", further((2, 6)))
 def test_a_killed_worker_is_replaced(after: tuple[int, int], whole: Sweep) -> None:
     killed: list[int] = []
 

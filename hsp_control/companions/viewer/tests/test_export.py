@@ -58,7 +58,7 @@ TALOS = {
     },
     "null_space": {"gain": 5, "fields": [{"type": "joint_centering", "weight": 1}]},
     "simulation": {
-        "duration": 10 if THOROUGH else 2,
+        "duration": 10 if THOROUGH else 0.5,
         "integrator": {"type": "rk4", "step": 0.01},
     },
 }

@@ -73,7 +73,7 @@ def swaying():
     simulate(
         experiment.controller,
         experiment.q0,
-        duration=1.5,
+        duration=1.0,
         control_period=0.002,
         log_period=0.1,
         integrator=experiment.integrator,
