@@ -57,10 +57,11 @@ quick: $(STAMP) $(ENGINE) ## what to run after every edit: a minute of CPU
 	  $(ARGS)
 
 # Each process begins with its own files, and takes tests of another one when it has none.
-SPREAD := -n $(WORKERS) --dist worksteal
+SPREAD = -n $(WORKERS) --dist worksteal
 test: $(STAMP) $(ENGINE) ## run the tests, but for those of test-system
 	@$(BIN)/python -m pytest $(SPREAD) -m "not system" $(ARGS)
 
+test-system: WORKERS := 3# they wait a third of the time, for processes and browsers
 test-system: $(STAMP) $(ENGINE) ## run those of browsers, notebooks, processes and whole walks
 	@$(BIN)/python -m pytest $(SPREAD) -m system $(ARGS)
 
