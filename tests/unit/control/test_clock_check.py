@@ -92,3 +92,35 @@ def test_the_integrators_stages_are_no_clock() -> None:
         warnings.simplefilter("error", ClockWarning)
         for t in (0.0, 0.5, 0.25, 0.25, 0.0, 0.5, *(a for a, _ in pairwise(STEPS))):
             controller.compute(t, robot.home(), np.zeros(7))
+
+
+def moved(unit: float, noise: float = 0.0, *, kind: str = "numbers") -> list[str]:
+    """Return the messages of a loop whose robot moves, or rests with noise of v."""
+    rng = np.random.default_rng(2)
+    robot = hsp.Robot.load("panda")
+    controller = hsp.Controller(robot, [hsp.FramePosition()])
+    still = np.zeros(7) if noise else np.linspace(-0.5, 0.4, 7)
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always")
+        for t in np.arange(300) * 1e-3:
+            q = robot.home() + t * still + noise * 1e-3 * rng.normal(size=7)
+            v = still + noise * rng.normal(size=7)
+            if kind == "state":
+                controller.compute(robot.state(unit * t, q, v))
+            else:
+                controller.compute(unit * t, q, v)
+    return [str(each.message) for each in caught if each.category is ClockWarning]
+
+
+@pytest.mark.parametrize("kind", ["numbers", "state"])
+def test_times_in_milliseconds_are_said_once_where_only_compute_is_called(
+    kind: str,
+) -> None:
+    (found,) = moved(1000.0, kind=kind)
+    assert re.search(r"the last step 1 s: milliseconds\? Times are in s", found)
+    assert moved(1.0, kind=kind) == []
+
+
+def test_a_robot_that_rests_shows_no_unit() -> None:
+    for unit in (1.0, 1000.0):
+        assert moved(unit, noise=0.2) == []
