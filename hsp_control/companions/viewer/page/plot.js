@@ -100,9 +100,10 @@ class Plot {
       const indices = Array.from({length: 25}, (_, k) => posToIdx(start + width * k / 24));
       const heights = indices.flatMap((i) => shown.map((curve) => curve[i] ?? null))
         .map((value) => value === null ? Infinity : Math.abs(valToPos(value, "y") - middle));
-      return {side, below, middle, gap: Math.min(...heights)};
-    })).filter(({side, middle}) => middle >= 8 && middle <= clientHeight - 8 && named.every(
-      (other) => other.side !== side || Math.abs(other.middle - middle) >= 14));
+      return {side, below, start, width, middle, gap: Math.min(...heights)};
+    })).filter(({start, middle}) => middle >= 8 && middle <= clientHeight - 8
+      && named.every((other) => Math.abs(other.middle - middle) >= 14
+        || other.start >= start + width || start >= other.start + other.width));
     return places.find(({side, below, gap}) => gap >= 9 && side === last?.side && below === last.below)
       ?? places.reduce((best, place) => place.gap > (best?.gap ?? -1) ? place : best, null);
   }
