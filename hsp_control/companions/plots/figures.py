@@ -160,7 +160,7 @@ def paper_figure(
     with styled():
         strip_of = (wide, 0.75 * wide) if narrow else (0.62 * wide, 0.245 * wide)
         if paired:
-            strip_of = 0.52 * wide, 1.1 * wide
+            strip_of = 0.43 * wide, 1.1 * wide
         columns = columns_for(rollout, len(rows), *strip_of)
         if paired:
             # Two columns: a and b, then c above e, and d beside both.
@@ -170,7 +170,7 @@ def paper_figure(
                 2, 1, squeeze=False, height_ratios=high
             ).ravel()
             left, right = first.subfigures(1, 2, width_ratios=(0.9, 1.0))
-            beside, strip = second.subfigures(1, 2, width_ratios=(0.9, 1.0))
+            beside, strip = second.subfigures(1, 2, width_ratios=(1.0, 0.75))
             below, together = beside.subfigures(2, 1, height_ratios=(0.44, 0.66))
             a, b, c = (part.add_subplot() for part in (left, right, below))
         elif narrow:
@@ -209,7 +209,7 @@ def paper_figure(
                 cell.set(xlabel="", ylabel="")
         strip.suptitle("(d)  Selected frames", **_HEADING)
         e = together.add_subplot()
-        draw_superimposed(e, rollout, rows, letter=0.055 if paired else 0.035)
+        draw_superimposed(e, rollout, rows, letter=0.075 if paired else 0.035)
         e.set_anchor("N")
         together.suptitle("(e)  Frames together", **_HEADING)
         titles = ["End effector", "Joints", title]
