@@ -22,6 +22,10 @@ _MOVES = 1e-3
 _SURE = 20
 """Moving steps in a row after which the unit is known: noise has any sign."""
 
+_LOOKS = 300
+"""Steps that are looked at for it, after the first one and after a new target: later
+ones cost nothing."""
+
 
 class ClockWarning(UserWarning):
     """The times that a controller is given are not those of its loop."""
@@ -37,7 +41,7 @@ class ClockCheck:
         self._told = False
         self.undecided = True  # whether `moved` has to look at another step
         self._before: tuple[float, Array, Array] | None = None
-        self._milli = self._same = 0
+        self._milli = self._same = self._looks = 0
 
     def begin(self, t: float) -> None:
         """Look at the time of the first step [s]."""
@@ -50,6 +54,7 @@ class ClockCheck:
 
     def change(self, at: float, now: float) -> None:
         """Look at the time of a change that is made now [s]."""
+        self.look_again()
         if at - now > _LATE:
             self._tell(
                 f"a change at t = {at:.10g} s begins in {(at - now) / 86400.0:.0f} "
@@ -88,12 +93,19 @@ class ClockCheck:
         if self._count >= enough:
             self._tell(_MESSAGES[kind].format(t=t, passed=passed, period=held))
 
+    def look_again(self) -> None:
+        """Look at the next steps, where the unit of times is not known yet."""
+        self._looks = 0
+        self.undecided = max(self._same, self._milli) < _SURE
+
     def moved(self, state: RobotState) -> None:
         """Compare the way since the last step with velocity times time.
 
         They show the unit of times where no period is given, and are compared until
         it is known, in some first steps of the motion.
         """
+        self._looks += 1
+        self.undecided = self._looks < _LOOKS
         v = state.v
         if v.dot(v) < _MOVES**2:
             self._before = None
@@ -106,7 +118,7 @@ class ClockCheck:
         ratio = way.dot(difference) / max(way.dot(way), 1e-300)
         self._same = self._same + 1 if _SAME[0] < ratio < _SAME[1] else 0
         self._milli = self._milli + 1 if _MILLI[0] < ratio < _MILLI[1] else 0
-        self.undecided = max(self._same, self._milli) < _SURE
+        self.undecided &= max(self._same, self._milli) < _SURE
         if self._milli >= _SURE and not self._told:
             self._tell(
                 f"positions change by {ratio:.2g} times velocity times time, the last "

@@ -124,3 +124,24 @@ def test_times_in_milliseconds_are_said_once_where_only_compute_is_called(
 def test_a_robot_that_rests_shows_no_unit() -> None:
     for unit in (1.0, 1000.0):
         assert moved(unit, noise=0.2) == []
+
+
+def test_a_target_after_a_long_rest_shows_the_unit() -> None:
+    """While it rests nothing is looked at, so that a step costs nothing."""
+    robot = hsp.Robot.load("panda")
+    controller = hsp.Controller(robot, [hsp.FramePosition(name="hand")])
+    clock, v = controller._memory.clock, np.full(7, 0.2)
+    for k in range(320):
+        controller.compute(float(k), robot.home(), np.zeros(7))
+    assert not clock.undecided
+    target = robot.state(0.0, robot.home(), v).position("panda_tcp")
+    controller.set_target("hand", target)
+    assert controller._memory.clock.undecided
+
+    def move() -> None:
+        for k in range(40):
+            q = robot.home() + k * 1e-3 * v
+            controller.compute(320.0 + k, q, v)
+
+    with pytest.warns(ClockWarning, match="milliseconds"):
+        move()
