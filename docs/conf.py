@@ -21,6 +21,7 @@ extensions = [
     "plain_docstrings",  # from here on: docs/_site
     "mathml",
     "reference",
+    "not_run",
     "replays",
     "lecture",
 ]

@@ -22,6 +22,7 @@ import hsp_control as hsp
 
 HOUSE = str(Path(hsp.__file__).parent)
 PAGE = Path(__file__).parents[1] / "docs/development/architecture.md"
+LATER = 400  # the unit of times is looked at in the first 300 steps
 KP, GAIN = 101.234567, 7.654321  # numbers that nothing else has [1/s², 1/s]
 
 
@@ -101,7 +102,9 @@ def main() -> None:
     )
     q, v = robot.home(), np.zeros(robot.nv)
     counts = list[int]()
-    for k, name in enumerate(("first step", "later step")):
+    for k, name in ((0, "first step"), (LATER, "later step")):
+        for earlier in range(1, k):
+            controller.compute(0.001 * earlier, q, v)
         functions, classes = traced(lambda k=k: controller.compute(0.001 * k, q, v))
         files = {file for file, _ in functions}
         counts += [len(functions), len(classes), len(files)]

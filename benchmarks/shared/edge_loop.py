@@ -48,7 +48,7 @@ Compute = Callable[[float, Any, Any], Any]
 
 
 class Sample(NamedTuple):
-    """Where the hand should be: x, x' and x'', shape (3,) each."""
+    """Where the hand should be: x, x' and x'', shapes (3,)."""
 
     position: Any
     velocity: Any

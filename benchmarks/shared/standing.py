@@ -93,7 +93,7 @@ class Standing:
         robot: The robot.
         q0: Start configuration, at rest, with the soles on the ground, shape (nq,).
         weight: Weight of the robot [N].
-        soles_at: Positions of the sole frames at the start, shape (3,) each [m].
+        soles_at: Positions of the sole frames at the start, shapes (3,) [m].
         com: Trajectory of the centre of mass.
         hand: Trajectory of the hand.
         upright: Desired orientation of the trunk, shape (3, 3).
@@ -230,7 +230,7 @@ class Standing:
         Args:
             q: Configuration, shape (nq,).
             wrenches: Force and moment on each sole, about its frame's origin, in world
-                axes, shape (6,) each [N, N·m].
+                axes, shapes (6,) [N, N·m].
         """
         state = self._state.update(0.0, q, np.zeros(self.robot.nv))
         for name, wrench in zip(self.body.soles, wrenches, strict=True):
@@ -249,7 +249,7 @@ class Engine:
         self.plant, self.advance = plant, advance
 
     def wrenches(self, t: float, q: Array, v: Array, tau: Array) -> list[Array]:
-        """Return the wrench on each sole, about its frame's origin, shape (6,) each."""
+        """Return the wrench on each sole, about its frame's origin, shapes (6,)."""
         channels = self.plant.log_channels(t, q, v, tau)
         forces = [name for name in channels if name.endswith(".force")]
         return [

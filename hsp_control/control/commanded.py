@@ -69,6 +69,7 @@ class Commanded(Composition):
         value = target_of(followed, target, lambda: self._here().state)
         if not np.abs(value).max() < self._declared.robot.size:  # else it is in reach
             warn_of_far_target(self._here().state, followed, value)
+        self._memory.clock.look_again()
         return self._sent(task, value=value)
 
     def stream(self, of: str | Streamed) -> StreamHandle:

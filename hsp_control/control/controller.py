@@ -115,6 +115,8 @@ class Controller(Commanded):
         output = ControlOutput(delivered, stack, damped, now.limits.measured)
         if now.later is not None:
             now.passed(self._state.t)
+        if self._memory.clock.undecided:
+            self._memory.clock.moved(self._state)
         return output
 
     def _rehearse(self, times: int) -> None:

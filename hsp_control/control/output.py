@@ -136,7 +136,7 @@ class ControlOutput:
 
     @property
     def field(self) -> FieldSample:
-        """G and g', shape (nv,) each."""
+        """G and g', shapes (nv,)."""
         return self._record.field
 
     @property

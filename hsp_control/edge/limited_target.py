@@ -39,7 +39,7 @@ times the permitted value."""
 
 
 class Permitted(NamedTuple):
-    """The bounds far from all limits, shape (nv,) each; inf without one."""
+    """The bounds far from all limits, shapes (nv,); inf without one."""
 
     effort: Array  # [N·m or N]
     acceleration: Array  # [rad/s² or m/s²]
@@ -64,7 +64,7 @@ class Permitted(NamedTuple):
 class Parts(NamedTuple):
     """The law's acceleration and the damped law's, and their components."""
 
-    law: Array  # shape (nv,) each
+    law: Array  # shapes (nv,)
     damped: Array
     law_self_motion: Array  # φ_N
     damped_self_motion: Array
@@ -73,7 +73,7 @@ class Parts(NamedTuple):
 
 
 class Within(NamedTuple):
-    """Bounds on the acceleration, shape (nv,) each."""
+    """Bounds on the acceleration, shapes (nv,)."""
 
     lower: Array
     upper: Array

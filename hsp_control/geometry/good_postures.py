@@ -184,8 +184,7 @@ class PostureSearch:
     ) -> tuple[list[Reached], list[Judgement]]:
         """Return where inverse kinematics end, and those postures that are there.
 
-        ``starts``: where each begins, and the posture that attracts it, shape (nv,)
-        each.
+        ``starts``: where each begins, and the posture that attracts it, shapes (nv,).
         """
         bounds = self._lower, self._upper
         found = [

@@ -24,7 +24,7 @@ EXACT, DAMPED, NOT_FINITE = tuple(Outcome)
 
 
 class LawOutcome(NamedTuple):
-    """The law's outcome in a step, which the engine writes, shape (1,) each."""
+    """The law's outcome in a step, which the engine writes, shapes (1,)."""
 
     damped_level: Indices
     """The first level whose inverse is bounded, from 1 on; 0: none is."""

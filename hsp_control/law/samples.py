@@ -61,7 +61,7 @@ class FieldSample(NamedTuple):
 
     @classmethod
     def allocate(cls, nv: int) -> "FieldSample":
-        """Return a sample of zeros, shape (nv,) each."""
+        """Return a sample of zeros, shapes (nv,)."""
         return cls(np.zeros(nv), np.zeros(nv))
 
 

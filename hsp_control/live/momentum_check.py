@@ -76,7 +76,7 @@ class _Window:
         return smaller(*(v - self._velocities[(k + 1) % (self.states + 1)]))
 
     def bounds(self) -> tuple[Array, Array]:
-        """Return the least and greatest impulse of such a time, shape (nv,) each."""
+        """Return the least and greatest impulse of such a time, shapes (nv,)."""
         return np.minimum.reduce(self._impulses), np.maximum.reduce(self._impulses)
 
 

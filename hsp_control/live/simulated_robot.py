@@ -206,7 +206,7 @@ class SimulatedRobot:
         """Simulate a period.
 
         Args:
-            efforts: Efforts that arrived in it, shape (nv,) each; the last one is used.
+            efforts: Efforts that arrived in it, shapes (nv,); the last one is used.
         """
         if self.phase <= Phase.RUNNING:
             self._receive(efforts)

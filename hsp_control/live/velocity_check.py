@@ -117,7 +117,7 @@ class VelocityCheck:
         self.halted: Flags = self._none
 
     def trust(self, positions: Flags, velocities: Flags) -> None:
-        """Set the trusted sources, (nv,) each; a sensor with constant ones is dead."""
+        """Set the trusted sources, shapes (nv,); one with constant values is dead."""
         self._by_q, self._by_v = positions.copy(), velocities.copy()
 
     def update(

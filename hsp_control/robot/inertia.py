@@ -16,7 +16,7 @@ from hsp_control.robot.kinematics import PointMotion, Term
 def inertia_terms(
     dynamics: Dynamics, q: Array, v: Array, stamp: Indices
 ) -> tuple[Term, Term]:
-    """Return M (CRBA) and M' along v, shape (nv, nv) each."""
+    """Return M (CRBA) and M' along v, shapes (nv, nv)."""
     M, M_dot = np.zeros((v.size, v.size)), np.zeros((v.size, v.size))
     mass_matrix = PartCall(engine.MassMatrix, dynamics=dynamics, q=q, M=M)
     rate = PartCall(engine.MassMatrixRate, dynamics=dynamics, q=q, v=v, M_dot=M_dot)

@@ -28,7 +28,7 @@ MOST = 100
 class _Timing(NamedTuple):
     """The k-th period begins at start + k span/periods."""
 
-    start: Array  # shape (1,) each [s]
+    start: Array  # shapes (1,) [s]
     span: Array
     periods: Indices
     first: Indices  # the period that begins now

@@ -61,7 +61,7 @@ class CenterOfMass(TrackingTask, type="center_of_mass"):
         return self.trajectory.sample(state.t).velocity
 
     def measure(self, state: RobotState) -> tuple[Array, Array]:
-        """Return c_d and c along the tracked axes, shape (m,) each [m]."""
+        """Return c_d and c along the tracked axes, shapes (m,) [m]."""
         desired = self.trajectory.sample(state.t)
         return desired.position, state.centroidal.position[axis_indices(self.axes)]
 
@@ -124,7 +124,7 @@ class AngularMomentum(Task, type="angular_momentum"):
         return self.trajectory.sample(state.t).position
 
     def measure(self, state: RobotState) -> tuple[Array, Array]:
-        """Return ℓ_d and ℓ in world axes, shape (3,) each [m²/s]."""
+        """Return ℓ_d and ℓ in world axes, shapes (3,) [m²/s]."""
         mass = state.centroidal
         actual = mass.momentum_matrix @ state.v / mass.mass
         return self.trajectory.sample(state.t).position, actual

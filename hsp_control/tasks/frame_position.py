@@ -60,7 +60,7 @@ class FramePosition(FrameTask, TrackingTask, CompliantTask, type="frame_position
         return rate
 
     def measure(self, state: RobotState) -> tuple[Array, Array]:
-        """Return x_d and x along the tracked axes, shape (m,) each [m]."""
+        """Return x_d and x along the tracked axes, shapes (m,) [m]."""
         desired = self._reference_at(state).position.copy()
         return desired, state.position(self.frame_name)[axis_indices(self.axes)]
 

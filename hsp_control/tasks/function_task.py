@@ -124,7 +124,7 @@ class FunctionTask(TrackingTask, type="function_task"):
         return np.asarray(self._reference_at(state).velocity - moves)
 
     def measure(self, state: RobotState) -> tuple[Array, Array]:
-        """Return x_d and y, shape (m,) each."""
+        """Return x_d and y, shapes (m,)."""
         return self._reference_at(state).position.copy(), self.value(state)
 
     # --- results of functions --------------------------------------------------------

@@ -108,7 +108,7 @@ class JointPosture(CompliantTask, type="joint_posture"):
         return self.displacement.sample(state.t).velocity
 
     def measure(self, state: RobotState) -> tuple[Array, Array]:
-        """Return desired and actual joint positions, shape (m,) each [rad or m].
+        """Return desired and actual joint positions, shapes (m,) [rad or m].
 
         The desired position of a continuous joint is the one nearest to the actual
         position.

@@ -140,7 +140,7 @@ class Pointing(FrameTask, type="pointing"):
         return self._normals @ frame.rotation.T @ rate
 
     def measure(self, state: RobotState) -> tuple[Array, Array]:
-        """Return desired and actual direction, unit vectors in the world, (3,) each."""
+        """Return desired and actual direction in the world, unit vectors (3,)."""
         desired = self._desired.sample(state.t).rotation[:, 2].copy()
         return desired, state.frame(self.frame_name).rotation @ self._axis
 

@@ -41,7 +41,7 @@ def first_derivative(
 def both_derivatives(
     function: Callable[[float], Array], t: float, step: float
 ) -> tuple[Array, Array]:
-    """Return f'(t) and f''(t), shape (n,) each; ``step`` is h [s]."""
+    """Return f'(t) and f''(t), shapes (n,); ``step`` is h [s]."""
     values = np.stack([function(t + k * step) for k in _OFFSETS])
     return _FIRST @ values / step, _SECOND @ values / (step * step)
 

@@ -283,7 +283,7 @@ class ScrewInterpolation(PoseTrajectory, type="screw"):
 
 
 def _screw(positions: Array, rotations: Array) -> tuple[Array, Array]:
-    """Return a and b, shape (3,) each, in the world frame.
+    """Return a and b, shapes (3,), in the world frame.
 
     (a, b) is the constant twist that moves the body from start to end in one second: a
     is the rotation vector [rad], b the velocity of the origin at the start [m];

@@ -156,7 +156,7 @@ class Trajectory(Part, ABC, family="trajectories", error=TrajectoryError):
         raise TypeError(f"{type(self).__name__} implements neither call nor sample")
 
     def sample(self, t: float, out: TrajectorySample | None = None) -> TrajectorySample:
-        """Return x(t), x'(t) and x''(t), shape (n,) each.
+        """Return x(t), x'(t) and x''(t), shapes (n,).
 
         Start an implementation with ``out = self._output(out)``, write all entries, and
         return ``out``.

@@ -88,6 +88,24 @@ class Firefox:
             while not await self.evaluate(f"Boolean({expression})"):
                 await asyncio.sleep(0.1)
 
+    async def drag(self, x: float, y: float, dx: float, dy: float) -> None:
+        """Press the mouse at a pixel, move it in eight steps, and let it go."""
+        moves = [
+            {"type": "pointerMove", "x": round(x + dx * k / 8),
+             "y": round(y + dy * k / 8), "duration": 30}
+            for k in range(9)
+        ]  # fmt: skip
+        moves[1:1] = [{"type": "pointerDown", "button": 0}]
+        moves.append({"type": "pointerUp", "button": 0})
+        mouse = {"type": "pointer", "id": "mouse", "actions": moves}
+        await self._do("input.performActions", context=self._tab, actions=[mouse])
+
+    async def press(self, key: str) -> None:
+        """Press a key and let it go."""
+        strokes = [{"type": kind, "value": key} for kind in ("keyDown", "keyUp")]
+        keyboard = {"type": "key", "id": "keyboard", "actions": strokes}
+        await self._do("input.performActions", context=self._tab, actions=[keyboard])
+
     async def picture(self) -> bytes:
         """Return its picture as a PNG."""
         shot = await self._do("browsingContext.captureScreenshot", context=self._tab)

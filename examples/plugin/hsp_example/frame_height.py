@@ -62,7 +62,7 @@ class FrameHeight(SecondOrderTask, type="frame_height"):
         return self.trajectory.sample(state.t).velocity
 
     def measure(self, state: RobotState) -> tuple[Array, Array]:
-        """Return z_d and z, shape (1,) each [m]."""
+        """Return z_d and z, shapes (1,) [m]."""
         assert self.frame is not None
         desired = self.trajectory.sample(state.t).position
         return desired, state.position(self.frame)[2:].copy()

@@ -32,7 +32,7 @@ _ANY_DECELERATION = 1e9
 
 @dataclass(frozen=True)
 class ArmLimits:
-    """Limits of the joints, shape (7,) each.
+    """Limits of the joints, shapes (7,).
 
     Attributes:
         lower: Smallest positions [rad].
@@ -51,7 +51,7 @@ class ArmLimits:
     deceleration: Array
 
     def velocities(self, q: Array) -> tuple[Array, Array]:
-        """Return the lowest and highest velocities at q, shape (7,) each [rad/s].
+        """Return the lowest and highest velocities at q, shapes (7,) [rad/s].
 
             v_max(q) = min(v, max(0, -o + sqrt(2 d (q_upper - q))))
 

@@ -89,7 +89,7 @@ class Model:
         return np.vstack([K.rotation.T @ J[:3], K.rotation.T @ J[3:]])
 
     def external_wrench(self) -> tuple[Array, Array]:
-        """Return the wrench of the arm on its surroundings at K, shape (6,) each.
+        """Return the wrench of the arm on its surroundings at K, shapes (6,).
 
         In the base's axes and in those of K; zero near a singularity.
         """

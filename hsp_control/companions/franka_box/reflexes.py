@@ -74,7 +74,7 @@ class Violation(NamedTuple):
 
 
 class Reference(NamedTuple):
-    """A commanded motion, shape (7,) each.
+    """A commanded motion, shapes (7,).
 
     Attributes:
         q: Position [rad].

@@ -63,7 +63,7 @@ def check_gyration(
     Args:
         xml: The URDF.
         robot: The robot; inertias of links that do not move are ignored.
-        shapes: Points of the links' shapes in their frames, (k, 3) each [m].
+        shapes: Points of the links' shapes in their frames, shapes (k, 3) [m].
     """
     moving = {f.name for f in robot.model.frames if f.parentJoint > 0}
     known = _known_points(xml)

@@ -127,7 +127,7 @@ def draw_lines(
 
     If the named lines differ in their units, names show them; lines without a name are
     drawn only if they share a unit with named ones. A lower or upper limit of a named
-    line is drawn if it comes near. Shapes: t (N,), values (N, k), limits (k,) each.
+    line is drawn if it comes near. Shapes: t (N,), values (N, k), limits (k,).
     """
     units = list(units or [""] * len(names))
     named = lively(values)

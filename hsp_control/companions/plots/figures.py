@@ -158,25 +158,27 @@ def paper_figure(
     narrow = wide < _NARROW
     paired = narrow and wide > _ONE_COLUMN and bool(path_view(rollout).names)
     with styled():
-        high_of = 0.5 if paired else 0.75
-        strip_of = (wide, high_of * wide) if narrow else (0.62 * wide, 0.245 * wide)
+        strip_of = (wide, 0.75 * wide) if narrow else (0.62 * wide, 0.245 * wide)
+        if paired:
+            strip_of = 0.43 * wide, 1.1 * wide
         columns = columns_for(rollout, len(rows), *strip_of)
         if paired:
-            # Two columns: a and b, c and e, and below them d.
-            high = [0.66 * wide, 0.62 * wide, high_of * wide]
+            # Two columns: a and b, then c above e, and d beside both.
+            high = [0.66 * wide, 1.1 * wide]
             figure = new_figure(wide, sum(high))
-            first, second, strip = figure.subfigures(
-                3, 1, squeeze=False, height_ratios=high
+            first, second = figure.subfigures(
+                2, 1, squeeze=False, height_ratios=high
             ).ravel()
             left, right = first.subfigures(1, 2, width_ratios=(0.9, 1.0))
-            below, together = second.subfigures(1, 2, width_ratios=(0.9, 1.0))
+            beside, strip = second.subfigures(1, 2, width_ratios=(1.0, 0.75))
+            below, together = beside.subfigures(2, 1, height_ratios=(0.44, 0.66))
             a, b, c = (part.add_subplot() for part in (left, right, below))
         elif narrow:
             # One below the other: a, b, c, then d and e.
             named = len(log_series.lively(rollout.tau))  # in the legend of b
             lines = 0.14 * named if named > 3 else 0.0
             b_high = 0.85 * wide + lines
-            high = [0.9 * wide, b_high, 0.75 * wide, 0.85 * wide, 0.9 * wide]
+            high = [0.9 * wide, b_high, 0.75 * wide, 0.75 * wide, 0.9 * wide]
             figure = new_figure(wide, sum(high))
             parts = figure.subfigures(5, 1, squeeze=False, height_ratios=high).ravel()
             a, b, c = (part.add_subplot() for part in parts[:3])
@@ -207,7 +209,7 @@ def paper_figure(
                 cell.set(xlabel="", ylabel="")
         strip.suptitle("(d)  Selected frames", **_HEADING)
         e = together.add_subplot()
-        draw_superimposed(e, rollout, rows, letter=0.055 if paired else 0.035)
+        draw_superimposed(e, rollout, rows, letter=0.075 if paired else 0.035)
         e.set_anchor("N")
         together.suptitle("(e)  Frames together", **_HEADING)
         titles = ["End effector", "Joints", title]

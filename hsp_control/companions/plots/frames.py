@@ -28,6 +28,7 @@ from hsp_control.companions.plots.world import (
 from hsp_control.simulation import Rollout
 
 _BEYOND = 1.5  # distance of a number from the last point, over the size of its letters
+_LABELS, _TITLE, _BETWEEN = 0.5, 0.25, 0.1  # beside and between frames [in]
 MAX_TICKS = 10  # with more frames, their times are not the ticks of the time scale
 
 
@@ -111,7 +112,11 @@ def draw_superimposed(
 
 
 def columns_for(rollout: Rollout, count: int, width: float, height: float) -> int:
-    """Return the number of columns for which the frames are largest."""
+    """Return the number of columns for which the frames are largest.
+
+    ``width`` and ``height`` are those of all frames with their titles and the axes'
+    labels [in].
+    """
     scene = _Surroundings.of(rollout)
     page = scene.view.project(scene.shown(shadows=True))
     w, h = (float(np.ptp(coordinate)) + 1e-9 for coordinate in page)
@@ -119,7 +124,9 @@ def columns_for(rollout: Rollout, count: int, width: float, height: float) -> in
     def scale(columns: int) -> float:
         rows = -(-count // columns)
         filled = count / (rows * columns)
-        return filled * min(width / columns / w, height / rows / h)
+        across = (width - _LABELS) / columns - _BETWEEN
+        down = (height - _LABELS) / rows - _TITLE
+        return filled * min(across / w, down / h)
 
     return max(range(1, count + 1), key=scale)
 

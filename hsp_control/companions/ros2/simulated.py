@@ -73,7 +73,7 @@ class RobotTopics:
         return bool(self._efforts) or self._subscription.wait(timeout)
 
     def efforts(self, most: int) -> list[Array]:
-        """Return the oldest queued efforts, shape (nv,) each.
+        """Return the oldest queued efforts, shapes (nv,).
 
         Args:
             most: Their maximum number.

@@ -205,7 +205,7 @@ def self_motion(
 def _joint_rates(
     controller: Controller, motion: RunMotion
 ) -> tuple[Array, Array, Array]:
-    """Return positions, P v and P g of the joints, (N, njoints - 1, 3) each."""
+    """Return positions, P v and P g of the joints, shapes (N, njoints - 1, 3)."""
     controller = controller.preview()
     data = controller.robot.model.createData()
     rows: list[tuple[Array, Array, Array]] = []

@@ -152,7 +152,7 @@ class Comparison:
         ]
 
     def _compute_offsets(self) -> list[Array]:
-        """Return the offset of each run [m], shape (3,) each."""
+        """Return the offset of each run [m], shapes (3,)."""
         if self._beside is None:
             return [np.zeros(3) for _ in self._runs]
         offsets: list[Array] = []

@@ -33,7 +33,7 @@ from hsp_control.simulation import Rollout
 _log = logging.getLogger(__name__)
 
 ROOT = "/obstacles"
-_OPACITY, _PALE = 0.75, 0.05
+_OPACITY, _WALL, _PALE = 0.75, 0.2, 0.05
 _EXTENT = 4.0  # edge of the square that represents a half-space, over the scene's size
 _NAMED = 3  # number of obstacles that the legend names
 
@@ -48,12 +48,19 @@ _FACES = np.array(
 )  # fmt: skip
 
 
-def obstacle(shape: Shape, size: float, color: str = OBSTACLE) -> Json:
-    """Return a shape as a three.js object, in a scene of a size [m]."""
+def obstacle(
+    shape: Shape, size: float, color: str = OBSTACLE, *, upward: float = 1.0
+) -> Json:
+    """Return a shape as a three.js object, in a scene of a size [m].
+
+    ``upward``: the vertical component of its z axis; a half-space is a floor or a wall.
+    """
     surface = threejs.material(color, opacity=_OPACITY, glow=0.3)
     solid, pose = surface_of(shape, size)
-    if isinstance(shape, shapes.HalfSpace):  # a floor or a wall: it must not glare
-        surface = threejs.material(MUTED, opacity=_PALE, glow=0.3) | {"side": 2}
+    if isinstance(shape, shapes.HalfSpace):  # it must not glare
+        wall = abs(upward) < 0.5
+        shade, opacity = (color, _WALL) if wall else (MUTED, _PALE)
+        surface = threejs.material(shade, opacity=opacity, glow=0.3) | {"side": 2}
     elif solid["type"] == "BufferGeometry" and not isinstance(shape, shapes.PointCloud):
         surface |= {"side": 2}
     thing = threejs.mesh(solid, surface, pose)
@@ -162,7 +169,9 @@ class SceneDrawing:
     def draw(self, size: float) -> Iterator[PageCommand]:
         """Yield the commands that draw it in a scene of the given size [m]."""
         for item in self._scene.values():
-            yield set_object(_node(item.name), obstacle(item.shape, size))
+            upward = float(item.placement(0.0).rotation[2, 2])
+            thing = obstacle(item.shape, size, upward=upward)
+            yield set_object(_node(item.name), thing)
 
     def move(self, time: float) -> Iterator[PageCommand]:
         """Yield the commands that move the obstacles to a time [s]."""
@@ -229,13 +238,23 @@ def obstacle_layer(motion: RunMotion, root: str) -> Layer:
 
     def draw(size: float) -> Iterator[PageCommand]:
         for name, shape in known.items():
-            yield set_object(_node(name, root), obstacle(shape, size))
+            thing = obstacle(shape, size, upward=_upward(name, motion))
+            yield set_object(_node(name, root), thing)
 
     def tracks(motion: RunMotion) -> Iterator[Track]:
         for name in known:
             yield from obstacle_tracks(_node(name, root), name, motion)
 
     return Layer(draw, tracks, lambda: _obstacle_legend(known, root))
+
+
+def _upward(name: str, motion: RunMotion) -> float:
+    """Return the vertical component of an obstacle's z axis at the first row."""
+    turns = f"obstacle.{name}.quaternion"
+    if turns not in motion.rows:
+        return 1.0
+    x, y, _, _ = motion.rows[turns][0]
+    return float(1.0 - 2.0 * (x * x + y * y))
 
 
 def obstacle_tracks(path: str, name: str, motion: RunMotion) -> Iterator[Track]:
@@ -262,7 +281,9 @@ def solid_layer(motion: RunMotion, root: str) -> Layer:
     def draw(size: float) -> Iterator[PageCommand]:
         for each in solids:
             path = _node(each.name, root)
-            yield set_object(path, obstacle(each.shape, size, SOLID))
+            upward = float(each.placement.rotation[2, 2])
+            thing = obstacle(each.shape, size, SOLID, upward=upward)
+            yield set_object(path, thing)
             yield set_transform(path, each.placement.homogeneous)
 
     def tracks(motion: RunMotion) -> Iterator[Track]:

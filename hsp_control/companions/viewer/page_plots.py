@@ -78,7 +78,9 @@ def panels_of(
         values = np.column_stack([each.values for each in watched])
         curves, unit = _lines(values, [each.label for each in watched])
         edges = dict.fromkeys(
-            Edge(each.edge, each.edge_name) for each in watched if each.edge is not None
+            Edge(each.edge, each.edge_name or "contact")
+            for each in watched
+            if each.edge is not None
         )
         yield Panel("Minimum distance", "m", curves, edges=list(edges))
     joints = log_series.joint_names(rollout)

@@ -235,7 +235,7 @@ def look_at(
         "radius": _THICKNESS * scene_size(points),
         "size": scene_size(points),
         "views": {name: _from(direction) for name, direction in VIEWS.items()},
-        "tool": _tool_of(robot),
+        **_tool_of(robot),
         "view": named,
     }
     if eye is not None and not fit:
@@ -263,10 +263,12 @@ def _up(direction: Array) -> list[float]:
     return [0.0, 1.0, 0.0] if steep else [0.0, 0.0, 1.0]
 
 
-def _tool_of(robot: Robot) -> str:
-    """Return the node of the joint that carries the end effector."""
+def _tool_of(robot: Robot) -> Json:
+    """Return the node of the joint that carries the end effector, and its point [m]."""
     frame = robot.model.frames[robot.frame_id(robot.end_effector)]
-    return f"/robot/{path_element(robot.model.names[frame.parentJoint])}"
+    joint = path_element(robot.model.names[frame.parentJoint])
+    point = frame.placement.translation.tolist()
+    return {"tool": f"/robot/{joint}", "tool_point": point}
 
 
 def viewing_direction(

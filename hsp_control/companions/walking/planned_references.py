@@ -63,7 +63,7 @@ class Fed(Written, Trajectory):
         velocity: ArrayLike = 0.0,
         acceleration: ArrayLike = 0.0,
     ) -> None:
-        """Write x, x' and x'' at time t [s], shape (n,) each."""
+        """Write x, x' and x'' at time t [s], shapes (n,)."""
         rows = self.memory[1:].reshape(3, self.size)
         rows[0], rows[1], rows[2] = position, velocity, acceleration
         self.memory[0] = t

@@ -9,7 +9,7 @@ from hsp_control.common.arrays import Array
 
 
 class FootMotion(NamedTuple):
-    """Position, velocity and acceleration, shape (n,) each [m, m/s, m/s²]."""
+    """Position, velocity and acceleration, shapes (n,) [m, m/s, m/s²]."""
 
     position: Array
     velocity: Array

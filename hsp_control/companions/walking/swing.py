@@ -89,7 +89,7 @@ class Swing:
             self._down = self._descending(vertical, t)
 
     def position(self, t: float) -> FootMotion:
-        """Return x, x' and x'' of the foot's frame, shape (3,) each."""
+        """Return x, x' and x'' of the foot's frame, shapes (3,)."""
         along, vertical = self._along.sample(t), self._vertical(t)
         return FootMotion(
             *(np.append(a[:2], z) for a, z in zip(along, vertical, strict=True))
@@ -110,7 +110,7 @@ class Swing:
         return FootMotion(rotation, s_dot * self._axis, s_ddot * self._axis)
 
     def _vertical(self, t: float) -> FootMotion:
-        """Return z, z' and z'', shape (1,) each."""
+        """Return z, z' and z'', shapes (1,)."""
         if t < self._up.end:
             return self._up.sample(t)
         if t < self._down.end:

@@ -260,7 +260,7 @@ class Contact(Part, ABC, family="contacts", error=ContactError):
     def call(self, state: RobotState) -> PartCall:
         """Return a kind of call with its arguments but ``v``, ``damping``, ``out``.
 
-        It writes J and J', shape (rows, nv) each, e' = -J v, and the acceleration Kd e'
+        It writes J and J', shapes (rows, nv), e' = -J v, and the acceleration Kd e'
         that damps it; see `Task.call` for its arguments.
         """
 

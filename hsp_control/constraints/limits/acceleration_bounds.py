@@ -33,7 +33,7 @@ class Ends(NamedTuple):
 
     @classmethod
     def of(cls, lower: Array, upper: Array, velocity: Array) -> "Ends":
-        """Return the ends of the limits themselves, shape (nv,) each."""
+        """Return the ends of the limits themselves, shapes (nv,)."""
         return cls(
             lower - BEYOND_POSITION,
             upper + BEYOND_POSITION,
@@ -42,7 +42,7 @@ class Ends(NamedTuple):
 
 
 class Bounds(NamedTuple):
-    """Bounds of one step, shape (nv,) each."""
+    """Bounds of one step, shapes (nv,)."""
 
     a_lower: Array  # lower bound on the acceleration
     a_upper: Array  # upper bound on the acceleration

@@ -40,7 +40,7 @@ class DeliveredAlone(NamedTuple):
 
 
 class Kept(NamedTuple):
-    """Which part of a mixture was kept, shape (1,) each."""
+    """Which part of a mixture was kept, shapes (1,)."""
 
     which: Indices  # 0: none, Python has to look
     status: Indices  # the `Status` where contacts carry

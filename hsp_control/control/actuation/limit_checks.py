@@ -14,7 +14,7 @@ from hsp_control.robot import RobotState
 
 
 class LimitsOutcome(NamedTuple):
-    """Results of a check of the limits: the engine writes 0 or 1, shape (1,) each."""
+    """Results of a check of the limits: the engine writes 0 or 1, shapes (1,)."""
 
     motion: Indices
     """Whether a bound on the accelerations is violated."""

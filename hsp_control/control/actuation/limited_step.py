@@ -72,7 +72,7 @@ forces unique, and is small beside the cost of any deviation."""
 
 
 class QPOutcome(NamedTuple):
-    """The outcome of a QP, written by the engine, shape (1,) each."""
+    """The outcome of a QP, written by the engine, shapes (1,)."""
 
     unsolved: Indices
     """1 where there is no result: none was requested, the constraints contradict each

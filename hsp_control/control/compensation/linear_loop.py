@@ -209,7 +209,7 @@ _STEP = 1e-5
 
 
 def null_space_rates(controller: Controller, state: RobotState) -> tuple[Array, Array]:
-    """Return K_N and the field's slope A ≥ 0 in the null space, shape (k, k) each."""
+    """Return K_N and the field's slope A ≥ 0 in the null space, shapes (k, k)."""
     # Both are in coordinates that are orthonormal in the metric. A is the symmetric
     # part of -∂g/∂q, by central differences, `without_saddles`.
     nothing = np.zeros((0, 0))

@@ -27,7 +27,7 @@ _SAME = 1e-6
 """Values that differ by less than this part are the same [-]."""
 
 ValueAndRate = Callable[[RobotState], tuple[Array, Array]]
-"""A value and its declared rate at a state, shape (n,) each."""
+"""A value and its declared rate at a state, shapes (n,)."""
 
 
 class Declared(NamedTuple):

@@ -120,7 +120,7 @@ class Clearance(Cost):
         return rate
 
     def differentiate(self, state: RobotState, gradient: Array, rate: Array) -> None:
-        """Write ∇f and (∇f)', shape (nv,) each; see `Cost.differentiate`."""
+        """Write ∇f and (∇f)', shapes (nv,); see `Cost.differentiate`."""
         self.value(state)
         proximity, slopes, curvatures, *_ = self._work(state)
         closed_form, coal = proximity.closed_form, proximity.coal

@@ -53,7 +53,7 @@ class Cost(NullSpaceField):
     def call(self, state: RobotState) -> PartCall:
         """Return a kind of call with its arguments, without ``gradient`` and ``rate``.
 
-        With these two it writes ∇f and (∇f)', shape (nv,) each, and returns f; see
+        With these two it writes ∇f and (∇f)', shapes (nv,), and returns f; see
         `Task.call` for its arguments.
         """
         raise TypeError(f"{type(self).__name__} implements neither call nor value")

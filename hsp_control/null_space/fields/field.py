@@ -131,7 +131,7 @@ class NullSpaceField(Part, ABC, family="fields", error=FieldError):
             state: The robot's state: t, q, v and the kinematics.
             metric: The joint-space metric at this state.
             form: The metric's form, see `Metric`.
-            out: The sample to write into, shape (nv,) each.
+            out: The sample to write into, shapes (nv,).
         """
 
         def make() -> tuple[tuple[MetricSample, FieldSample], PartCalls]:

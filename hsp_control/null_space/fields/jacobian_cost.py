@@ -98,8 +98,8 @@ class JacobianCost(Cost):
     def terms_call(self, nv: int) -> PartCall:
         """Return a kind of call with its arguments, instead of `terms`.
 
-        The others are ``J``, ``J_dot``, ``slope`` and ``slope_rate``, shape (k, nv)
-        each. It writes the last two, ∂φ/∂J and its rate, and returns φ.
+        The others are ``J``, ``J_dot``, ``slope`` and ``slope_rate``, shapes (k, nv).
+        It writes the last two, ∂φ/∂J and its rate, and returns φ.
         """
 
         def write(J: Array, J_dot: Array, slope: Array, slope_rate: Array) -> float:

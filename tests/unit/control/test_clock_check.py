@@ -92,3 +92,56 @@ def test_the_integrators_stages_are_no_clock() -> None:
         warnings.simplefilter("error", ClockWarning)
         for t in (0.0, 0.5, 0.25, 0.25, 0.0, 0.5, *(a for a, _ in pairwise(STEPS))):
             controller.compute(t, robot.home(), np.zeros(7))
+
+
+def moved(unit: float, noise: float = 0.0, *, kind: str = "numbers") -> list[str]:
+    """Return the messages of a loop whose robot moves, or rests with noise of v."""
+    rng = np.random.default_rng(2)
+    robot = hsp.Robot.load("panda")
+    controller = hsp.Controller(robot, [hsp.FramePosition()])
+    still = np.zeros(7) if noise else np.linspace(-0.5, 0.4, 7)
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always")
+        for t in np.arange(300) * 1e-3:
+            q = robot.home() + t * still + noise * 1e-3 * rng.normal(size=7)
+            v = still + noise * rng.normal(size=7)
+            if kind == "state":
+                controller.compute(robot.state(unit * t, q, v))
+            else:
+                controller.compute(unit * t, q, v)
+    return [str(each.message) for each in caught if each.category is ClockWarning]
+
+
+@pytest.mark.parametrize("kind", ["numbers", "state"])
+def test_times_in_milliseconds_are_said_once_where_only_compute_is_called(
+    kind: str,
+) -> None:
+    (found,) = moved(1000.0, kind=kind)
+    assert re.search(r"the last step 1 s: milliseconds\? Times are in s", found)
+    assert moved(1.0, kind=kind) == []
+
+
+def test_a_robot_that_rests_shows_no_unit() -> None:
+    for unit in (1.0, 1000.0):
+        assert moved(unit, noise=0.2) == []
+
+
+def test_a_target_after_a_long_rest_shows_the_unit() -> None:
+    """While it rests nothing is looked at, so that a step costs nothing."""
+    robot = hsp.Robot.load("panda")
+    controller = hsp.Controller(robot, [hsp.FramePosition(name="hand")])
+    clock, v = controller._memory.clock, np.full(7, 0.2)
+    for k in range(320):
+        controller.compute(float(k), robot.home(), np.zeros(7))
+    assert not clock.undecided
+    target = robot.state(0.0, robot.home(), v).position("panda_tcp")
+    controller.set_target("hand", target)
+    assert controller._memory.clock.undecided
+
+    def move() -> None:
+        for k in range(40):
+            q = robot.home() + k * 1e-3 * v
+            controller.compute(320.0 + k, q, v)
+
+    with pytest.warns(ClockWarning, match="milliseconds"):
+        move()

@@ -15,7 +15,7 @@ pytest.importorskip("mujoco")
 
 
 def poses_of(commands):
-    """Return the poses that commands set, shape (4, 4) each."""
+    """Return the poses that commands set, shapes (4, 4)."""
     return [
         np.frombuffer(c.packed[-128:], "<f8").reshape(4, 4).T
         for c in commands

@@ -1,9 +1,10 @@
-"""`hsp play` in Firefox, where it is installed: it draws, and fits three windows."""
+"""`hsp play` in Firefox, where it is installed: mouse, keys, and three windows."""
 
 import asyncio
 from pathlib import Path
 
 import firefox
+import numpy as np
 import pytest
 from places import further
 from played import Played
@@ -25,6 +26,7 @@ HAND = """(() => {
   const {x, y} = play.sight.update().project(play.gizmos.get("target hand").position);
   return [x, y, viewer.dom_element.clientWidth, viewer.dom_element.clientHeight];
 })()"""
+TARGET = "play.gizmos.get('target hand').position.toArray()"
 SIZES = (1280, 800, 1.0), (1000, 640, 2.0), (390, 844, 2.0)
 
 
@@ -55,6 +57,14 @@ def test_firefox_draws_a_play_in_windows_of_three_sizes(
                 assert 0 < y < down, width
                 assert await page.evaluate(COLOURS) > 10, width
                 assert await page.evaluate(ERRORS) == 0, width
+                before = await page.evaluate(TARGET)
+                await page.drag(x, y, -30.0, -20.0)
+                after = await page.evaluate(TARGET)
+                assert np.linalg.norm(np.subtract(after, before)) > 0.02, width
+            await page.press("o")
+            await page.until("play.law === 'no field'")
+            await page.press(" ")
+            await page.until("!play.state.running")
             assert (await page.picture()).startswith(b"\x89PNG")
             assert page.wrong == []
 

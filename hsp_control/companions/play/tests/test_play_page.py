@@ -6,7 +6,7 @@ what it answers.
 """
 
 import json
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from typing import Any
 
 import browsers
@@ -607,9 +607,47 @@ def test_the_slider_looks_back(page: Any) -> None:
         "back.dispatchEvent(new Event('input')); back.value = -2.5; })()"
     )
     assert page.evaluate(handle) == pytest.approx(0.7)
+    page.evaluate("play.touched.clear()")  # as after a moment
     for running in (False, True):  # it pauses, and later goes on
         tell(page, "play_state", t=6.0, running=running, rate=1.0, message="")
     assert not page.evaluate("play.bar.past.looking")
+    # It pauses also where a start is under way, and the space bar goes on from there.
+    page.evaluate(
+        "(() => { sent.length = 0; const back = document.querySelector('.back'); "
+        "back.value = -2; back.dispatchEvent(new Event('input')); })()"
+    )
+    tell(page, "play_state", t=6.5, running=False, rate=1.0, message="")
+    tell(page, "play_state", t=6.5, running=True, rate=1.0, message="")  # older
+    assert page.evaluate("play.bar.past.looking")
+    assert until_sent(page, "pause")
+    tell(page, "play_state", t=6.6, running=False, rate=1.0, message="")
+    page.locator(".play-bar .back").focus()
+    page.keyboard.press(" ")
+    assert until_sent(page, "go")
+
+
+@pytest.mark.browser
+def test_the_name_of_a_line_covers_no_curve(page: Any) -> None:
+    """It stays where it is, until a curve or another name is there."""
+    place = """([curve, named, last]) => {
+      const over = {clientWidth: 200, clientHeight: 88};
+      const chart = {over, data: [curve, curve], series: [{}, {show: true}],
+                     valToPos: (value) => 88 - value,
+                     posToIdx: (x) => Math.round(x / 200 * (curve.length - 1))};
+      return Plot.placeOf("contact", 78, chart, named, last)?.side;
+    }"""
+
+    def side(curve: list[float], named: Sequence[Any] = (), last: Any = None) -> Any:
+        return page.evaluate(place, [curve, list(named), last])
+
+    falling = np.linspace(80.0, 18.0, 100).tolist()  # 18 is in the middle of a name
+    assert side(falling) == "left"
+    assert side(falling[::-1]) == "right"
+    above = {"below": False}
+    flat = [60.0] * 100
+    assert side(flat, last={"side": "center", **above}) == "center"
+    taken = [{"start": 0, "width": 60, "middle": 70}]
+    assert side(falling, taken, {"side": "left", **above}) == "center"
 
 
 @pytest.mark.browser

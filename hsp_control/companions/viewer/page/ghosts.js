@@ -44,7 +44,9 @@ class Ghosts {
     known.style.setProperty("--color", color);
   }
 
+  // A label that would cover another one stands below it.
   layOut(sight) {
+    const placed = [];
     for (const [name, label] of this.labels) {
       const [ghost] = this.groups.get(name) ?? [];
       if (label.hidden || !ghost) continue;
@@ -53,7 +55,13 @@ class Ghosts {
       const {right, bottom} = part("#caption h1").getBoundingClientRect();
       const {offsetWidth: width, offsetHeight: height} = label;
       const hides = top.x - width / 2 < right && top.y - 40 - height < bottom;
-      PlayOverlay.put(label, top.x, hides ? bottom + height + 6 : top.y - 40);
+      let y = hides ? bottom + height + 6 : top.y - 40;
+      for (const other of placed) {
+        const beside = Math.abs(other.x - top.x) > (other.width + width) / 2;
+        if (!beside && Math.abs(other.y - y) < height + 4) y = other.y + height + 4;
+      }
+      placed.push({x: top.x, y, width});
+      PlayOverlay.put(label, top.x, y);
     }
   }
 }

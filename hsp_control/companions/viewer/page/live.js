@@ -123,19 +123,13 @@ class LivePlot extends Plot {
       this.columns[k].some((own) => own !== null && own / value > LivePlot.NEAR));
   }
 
-  // Limits and contacts within the axis, with their names at the left.
-  drawLines({over, scales: {y: {min, max}}, valToPos}) {
+  // Limits and contacts within the axis, with their names.
+  drawLines(chart) {
+    const {min, max} = chart.scales.y;
     const inside = this.ownLines.filter((line) =>
       line.value >= min && line.value <= max && this.isNear(line));
-    const named = [];  // where names stand: none covers another one
-    this.marks.replaceChildren(...inside.map(({value, name}) => {
-      const top = Math.round(valToPos(value, "y"));
-      const free = name && named.every((other) => Math.abs(other - top) >= 14);
-      if (free) named.push(top);
-      return make("i", {className: top < 16 ? "edge below" : "edge", style: `top: ${top}px`},
-                  ...free ? [make("span", {}, name)] : []);
-    }));
-    over.prepend(this.marks);
+    this.marks.replaceChildren(...this.drawnLines(chart, inside));
+    chart.over.prepend(this.marks);
   }
 
   update() {

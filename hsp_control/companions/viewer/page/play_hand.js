@@ -163,7 +163,7 @@ class PlayKeys {
     if (!play.ready || player.loaded) return null;
     const inControl = target.matches?.("input, button, [tabindex]")
       && target.closest(".play-panel, .play-bar, #caption");
-    if (inControl && (key === " " || way)) return null;
+    if (inControl && (key === " " && target.type !== "range" || way)) return null;
     if (key === "Escape") return () => this.escape();
     if (/^[1-9]$/.test(key)) {
       const button = [...play.overlay.buttons.values()][key - 1];

@@ -217,7 +217,7 @@ class PlayPast {
   static SPAN = 10;  // s
 
   constructor(play, input) {
-    Object.assign(this, {play, input, poses: [], last: null, places: new Map()});
+    Object.assign(this, {play, input, poses: [], last: null, places: new Map(), began: false});
     on(input, "input", () => this.look());
   }
 
@@ -243,14 +243,18 @@ class PlayPast {
     }
     const old = this.poses.findIndex((pose) => pose.t > t - PlayPast.SPAN);
     if (old > 50) this.poses.splice(0, old);
-    if (this.looking && running && this.play.simulated && this.paused) this.leave();
+    const goes = running && this.paused && this.play.isFresh("back");  // no older message
+    if (this.looking && goes && this.play.simulated) this.leave();
     this.paused = !running;
   }
 
   look() {
     const {play} = this, end = this.poses.at(-1)?.t;
     if (end === undefined) return;
-    if (play.simulated && play.state.running) play.act("pause");
+    const begins = this.looking && !this.began;
+    this.began = this.looking;
+    play.touch("back");
+    if (play.simulated && (begins || play.state.running)) play.act("pause");
     const wanted = end + Number(this.input.value);
     const pose = this.poses.findLast(({t}) => t <= wanted) ?? this.poses[0];
     player.pose(pose.tracks);
@@ -261,7 +265,10 @@ class PlayPast {
     play.viewer.set_dirty();
   }
 
-  leave() { this.input.value = 0; }
+  leave() {
+    this.input.value = 0;
+    this.began = false;
+  }
 }
 
 // Each joint's position within its range, and its speed and effort relative to their limits.

@@ -72,6 +72,42 @@ class Plot {
     }
   }
 
+  // Lines across a chart; the name of a line is left out where it stands already, or has no room.
+  drawnLines(chart, lines) {
+    const named = [];
+    this.places ??= new Map();  // line -> where its name stands
+    return lines.map(({value, name}) => {
+      const top = Math.round(chart.valToPos(value, "y")), key = `${value} ${name}`;
+      const again = named.some((other) => other.name === name && Math.abs(other.top - top) < 14);
+      const place = name && !again ? Plot.placeOf(name, top, chart, named, this.places.get(key)) : null;
+      this.places.set(key, place);
+      if (place) named.push({name, top, ...place});
+      const {side, below} = place ?? {side: "left", below: top < 16};
+      return make("i", {className: below ? "edge below" : "edge",
+                        style: `top: ${top}px; text-align: ${side}`},
+                  ...place ? [make("span", {}, name)] : []);
+    });
+  }
+
+  // Where the name of a line does not cover a curve, nor another name: its last place as long as that
+  // is so, else the place that is farthest from the curves.
+  static placeOf(name, top, {data, series, over, valToPos, posToIdx}, named, last) {
+    const {clientWidth, clientHeight} = over, width = Math.min(10 + 6 * name.length, clientWidth);
+    const shown = data.filter((_, k) => k > 0 && series[k].show);
+    const starts = {left: 0, right: clientWidth - width, center: (clientWidth - width) / 2};
+    const places = Object.entries(starts).flatMap(([side, start]) => [false, true].map((below) => {
+      const middle = top + (below ? 8 : -8);
+      const indices = Array.from({length: 25}, (_, k) => posToIdx(start + width * k / 24));
+      const heights = indices.flatMap((i) => shown.map((curve) => curve[i] ?? null))
+        .map((value) => value === null ? Infinity : Math.abs(valToPos(value, "y") - middle));
+      return {side, below, start, width, middle, gap: Math.min(...heights)};
+    })).filter(({start, middle}) => middle >= 8 && middle <= clientHeight - 8
+      && named.every((other) => Math.abs(other.middle - middle) >= 14
+        || other.start >= start + width || start >= other.start + other.width));
+    return places.find(({side, below, gap}) => gap >= 9 && side === last?.side && below === last.below)
+      ?? places.reduce((best, place) => place.gap > (best?.gap ?? -1) ? place : best, null);
+  }
+
   // The labels of ticks; the last one has the unit.
   static numbers(unit) {
     return (_, ticks, axis, space, step) => {

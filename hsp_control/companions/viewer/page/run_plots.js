@@ -181,22 +181,15 @@ class RunPlot extends Plot {
   }
 
   // Marks of when the law is damped near a singularity, and of where there is contact.
-  drawMarks({over, valToPos}) {
-    const {damped, from, to} = this.side;
+  drawMarks(chart) {
+    const {damped} = this.side;
     const spans = damped.flatMap((each, run) => this.faint(run) ? [] : each);
     const singular = spans.map((ends) => {
-      const [left, right] = ends.map((time) => valToPos(time, "x"));
+      const [left, right] = ends.map((time) => chart.valToPos(time, "x"));
       return make("i", {className: "damped", style: `left: ${left}px; width: ${right - left}px`});
     });
-    const contacts = this.panel.edges.map(({value, name}) => {
-      // The label stands at the end of the line that is farther from the curves.
-      const [before, after] = [0.15, 0.85].map((share) => Math.min(...this.curves.map((curve) =>
-        Math.abs((valueAt(curve, from + share * (to - from)) ?? Infinity) - value))));
-      const side = before > after ? "left" : "right", top = Math.round(valToPos(value, "y"));
-      return make("i", {className: "edge", style: `top: ${top}px; text-align: ${side}`}, name);
-    });
-    this.marks.replaceChildren(...singular, ...contacts);
-    over.prepend(this.marks);
+    this.marks.replaceChildren(...singular, ...this.drawnLines(chart, this.panel.edges));
+    chart.over.prepend(this.marks);
   }
 
   // The cursor at the player's time: a line, and a dot on each curve.

@@ -28,7 +28,7 @@ class Views {
 
   // Place the camera, also for another size of the window.
   place() {
-    const {command, name, viewer} = this, {views, tool, ...first} = command;
+    const {command, name, viewer} = this, {views, tool, tool_point, ...first} = command;
     this.followed = name === "tool" ? this.toolPlace() : null;
     if (!name) this.show(first);
     else if (!this.followed) this.show({...first, eye: undefined, ...views[name] ?? views.front});
@@ -58,9 +58,9 @@ class Views {
 
   // Where the tool is, in three.js's axes.
   toolPlace() {
-    const object = findNode(this.viewer, this.command.tool)?.object;
+    const {tool, tool_point: point} = this.command, object = findNode(this.viewer, tool)?.object;
     object?.updateWorldMatrix(true, false);
-    return object ? new MeshCat.THREE.Vector3().setFromMatrixPosition(object.matrixWorld) : null;
+    return object ? object.localToWorld(new MeshCat.THREE.Vector3(...point)) : null;
   }
 
   // How far the tool has moved since the last picture; null where it is not followed.

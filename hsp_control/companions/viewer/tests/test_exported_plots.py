@@ -104,7 +104,7 @@ def test_a_distance_to_a_centre_says_so_and_has_the_radius_as_its_line(
     # Between surfaces, contact is at zero; a log that does not know is taken so.
     columns = {"distance.point_distance": {"unit": "m", "meaning": ""}}
     old = Rollout(log.columns, log.meta | {"columns": log.meta["columns"] | columns})
-    assert distance(old).edges == [Edge(0.0, "")]
+    assert distance(old).edges == [Edge(0.0, "contact")]
     # A box has no radius.
     disk = log.meta["obstacles"]["disk"] | {"shape": "Box"}
     boxed = Rollout(log.columns, log.meta | {"obstacles": {"disk": disk}})

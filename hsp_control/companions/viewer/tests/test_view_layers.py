@@ -18,6 +18,7 @@ from hsp_control.companions.viewer.arrows import ELLIPSOID_SECONDS, principal_ax
 from hsp_control.companions.viewer.clearances import capsules, zone
 from hsp_control.companions.viewer.commands import CAPTION, CLIP, unpack
 from hsp_control.companions.viewer.motion import motion_of
+from hsp_control.companions.viewer.obstacles import _upward, obstacle
 from hsp_control.companions.viewer.run_drawing import LAYERS
 from hsp_control.geometry.shapes import (
     Box,
@@ -334,6 +335,19 @@ def test_a_zone_lies_at_the_influence_from_its_obstacle(
             coal.DistanceResult(),
         )
         assert distance == pytest.approx(influence, abs=slack + 2e-6)
+
+
+def test_a_wall_is_seen_and_a_floor_does_not_glare() -> None:
+    """A half-space is a wall where its z axis is nearly horizontal, also in a log."""
+    experiment = load_experiment("ur5_position", "simulation.duration=0.02")
+    motion = motion_of(experiment.robot, experiment.run())
+    assert _upward("board", motion) == pytest.approx(0.0, abs=1e-6)
+    shades = [
+        obstacle(HalfSpace(), 1.0, upward=upward)["materials"][0]["opacity"]
+        for upward in (-1.0, 0.0, 1.0)
+    ]
+    assert shades[1] > 3.0 * shades[0]
+    assert shades[0] == shades[2]
 
 
 # -- the ellipsoid --------------------------------------------------------------------
