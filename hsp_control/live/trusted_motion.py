@@ -361,7 +361,7 @@ class TrustedMotion:
         good_v = by_v < _CLEARLY * greatest
         small = check.difference < _SMALL * self._error
         good_q = by_q < _CLEARLY * greatest
-        frozen = wrong & check.stands & ~good_q
+        frozen = wrong & ~good_q & (check.stands | (check.unmoved & ~good_v))
         good_q |= ~good_v & small
         good_q &= ~jumps
         self._positions &= ~wrong | good_q

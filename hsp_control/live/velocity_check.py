@@ -68,6 +68,7 @@ class VelocityCheck:
         doubtful: Joints whose last velocity is not used yet, shape (nv,).
         contradicted: Joints whose velocity contradicts their positions, shape (nv,).
         dead: Joints whose sensor is dead, shape (nv,).
+        unmoved: Joints whose positions did not change by a bit, shape (nv,).
         stands: Joints whose trusted readings did not change by a bit, shape (nv,).
         halted: Joints that moved, and whose readings are now constant, shape (nv,).
         before: Speed of joints before their readings became constant, shape (nv,).
@@ -113,6 +114,7 @@ class VelocityCheck:
         self._by_v: Flags = np.ones(nv, dtype=bool)  # trusted velocities
         self._none, self._nothing = np.zeros(nv, dtype=bool), np.zeros(nv)
         self.dead: Flags = self._none
+        self.unmoved: Flags = self._none
         self.stands: Flags = self._none
         self.halted: Flags = self._none
 
@@ -161,10 +163,11 @@ class VelocityCheck:
 
     def _find_dead(self, way: Array, v: Array, slope: Array) -> None:
         size = np.abs(way)
+        self.unmoved = size < _NO_CHANGE
         self._step = np.where(
             size > _NO_CHANGE, np.minimum(size, self._step), self._step
         )
-        still = (size < _NO_CHANGE) | ~self._by_q
+        still = self.unmoved | ~self._by_q
         still &= (v == self._last_v) | ~self._by_v
         still &= self._by_q | self._by_v
         self.stands = still

@@ -1,8 +1,9 @@
 """Changes of each kind while a controller runs: past ones leave nothing.
 
-After twenty changes of a kind and after a hundred thousand, a controller has the same
-representation, the same calls in a step, a pickle of the same size, and the process the
-same number of Python's objects; and a copy makes the same step.
+After twenty changes of a kind (of messages, when their record is full) and after a
+hundred thousand, a controller has the same representation, the same calls in a step, a
+pickle of the same size, and the process the same number of Python's objects; and a copy
+makes the same step.
 """
 
 import gc
@@ -19,6 +20,9 @@ import hsp_control as hsp
 from campaigns.results import keep
 
 NUMBER, FEW = 100_000, 20
+RECORDED = 7000
+"""Messages of a stream after which it records no more without a log: those to which the
+later ones are compared."""
 RAMP = 2e-3
 EVERY = 3  # steps from one change to the next; each meets the ramp of the one before
 OVER = 2000  # steps after which all changes are forgotten
@@ -100,11 +104,11 @@ KINDS = (*CHANGES, "target", "twist")
 
 def run(kind: str, number: int) -> Iterator[tuple[int, str]]:
     """Make changes of a kind; yield their number, and at last the growth."""
-    repeated = Repeated(kind)
-    for j in range(FEW):
+    repeated, some = Repeated(kind), RECORDED if kind in ("target", "twist") else FEW
+    for j in range(some):
         repeated.change(j)
-    few = repeated.kept()
-    for j in range(FEW, 2 * (number // 2)):
+    few, number = repeated.kept(), max(number, 2 * some)
+    for j in range(some, 2 * (number // 2)):
         repeated.change(j)
         if j % 100 == 0:
             yield j, ""
