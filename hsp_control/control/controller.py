@@ -5,6 +5,7 @@ from contextlib import suppress
 from copy import deepcopy
 from math import isfinite
 from time import perf_counter
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -500,10 +501,17 @@ class Controller(Commanded):
     def __copy__(self) -> "Controller":
         """Return a copy that continues independently, of the same robot object."""
         with self._lock:
-            return self._copy()
+            return deepcopy(self, {id(self._declared.robot): self._declared.robot})
 
     def _copy(self) -> "Controller":
-        return deepcopy(self, {id(self._declared.robot): self._declared.robot})
+        """Return a copy that looks on, of the same robot object.
+
+        It also receives the messages to this one's streams, which stay there.
+        """
+        memo: dict[int, Any] = {id(self._declared.robot): self._declared.robot}
+        for each in self._memory.streams:
+            memo |= each.shared
+        return deepcopy(self, memo)
 
     def preview(self, changes: Sequence[Change] | None = None) -> "Controller":
         """Return a copy at the beginning of a run: to look ahead, or at a log.

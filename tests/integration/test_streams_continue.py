@@ -129,11 +129,11 @@ def test_a_pickle_goes_on_elsewhere_to_the_last_bit(
 def test_copies_go_on_and_what_looks_ahead_moves_nothing(
     kind: str, policy: str
 ) -> None:
-    """The copy receives what the original does; both are called in turn."""
+    """One that looks on receives what the original does; all are called in turn."""
     expected = steps(amid(kind, policy), kind, range(FIRST, LAST))
     controller = amid(kind, policy)
-    copy = deepcopy(controller)
-    found, copied = [], []
+    copy, onlooker = deepcopy(controller), controller._copy()
+    found, copied, looked = [], [], []
     for k in range(FIRST, LAST):
         if k % 20 == 5:
             controller.flow(PERIOD * k + 0.5, Q)
@@ -144,10 +144,12 @@ def test_copies_go_on_and_what_looks_ahead_moves_nothing(
             deepcopy(controller).compute(PERIOD * k + 3.0, Q, V)
             pickle.loads(pickle.dumps(controller)).compute(PERIOD * k + 3.0, Q, V)
         found += steps(controller, kind, [k])
-        copied.append(copy.compute(PERIOD * k, Q, V).tau.tobytes())
-        copy.applied(np.zeros(7), PERIOD)
+        copied += steps(copy, kind, [k])
+        looked.append(onlooker.compute(PERIOD * k, Q, V).tau.tobytes())
+        onlooker.applied(np.zeros(7), PERIOD)
     assert found == expected
     assert copied == expected
+    assert looked == expected
 
 
 def leaving() -> hsp.Controller:

@@ -252,8 +252,11 @@ class Follower:
         changes, known = {id(each): each for each in controller.changes}, self._changes
         for change in (changes[key] for key in changes if key not in known):
             with controller._lock:
-                # its stream continues from the state of the loop's
-                own = deepcopy(change)
+                # its stream continues from the state of the loop's, and looks on
+                memo: dict[int, Any] = {}
+                for each in controller._memory.streams:
+                    memo |= each.shared
+                own = deepcopy(change, memo)
             self._copy.change(own)
         self._changes = changes
 

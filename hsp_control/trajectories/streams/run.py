@@ -28,8 +28,8 @@ class StreamRun:
 
     A controller stores the runs of its streams. A copy or a pickle continues from the
     present state, with the messages that wait, and receives the later ones to itself. A
-    copy of a stream that listens to a source reads what arrives there, too, and leaves
-    it for this one.
+    copy of a stream that listens to a source, and one with a `shared` queue, receives
+    the messages to this one, and leaves them there.
 
     Attributes:
         declared: The declared stream; the next run begins with the untaken messages to
@@ -235,6 +235,11 @@ class StreamRun:
 
     # -- without Python ---------------------------------------------------------------
 
+    @property
+    def shared(self) -> dict[int, Any]:
+        """The memo of `deepcopy` for a copy that looks on: the queue itself."""
+        return {id(self._inbox): self._inbox}
+
     def leave_python(self, period: float) -> None:
         """Receive only messages of a program, from the start on.
 
@@ -255,11 +260,12 @@ class StreamRun:
         """Return a copy that continues independently, with the messages that wait."""
         memo[id(self)] = other = copy(self)
         other._inbox, reader = deepcopy(self._inbox, memo), self._reader
-        if reader is not None and reader.inbox is self._inbox:
-            other._reader = deepcopy(reader, memo)  # of the same copy of the queue
-        else:  # a source has one queue for all that read it
+        listens = reader is not None and reader.inbox is not self._inbox
+        if listens or other._inbox is self._inbox:  # see `shared`
             other._aside = True
             other._reader = None if reader is None else reader.copy()
+        else:
+            other._reader = deepcopy(reader, memo)  # of the same copy of the queue
         if self._planner is not None:
             other._planner = self._planner.copy()
         return other

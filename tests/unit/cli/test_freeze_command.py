@@ -1,5 +1,6 @@
 """``hsp freeze``: a configuration's controller for a program without Python."""
 
+import os
 import re
 import shutil
 import subprocess
@@ -93,15 +94,19 @@ def test_the_page_leads_to_an_arm_that_moves(tmp_path: Path) -> None:
         pytest.skip("there is no C compiler")
     section = PAGE.read_text("utf-8").split("\n## ")[1]
     found = re.findall(r"`([\w.]+)`[^`]*:\n\n```\w+\n(.*?)```", section, re.DOTALL)
-    assert [name for name, _ in found] == ["panda.yaml", "loop.c", "arm.py"]
+    names = ["panda.yaml", "loop.c", "arm.py", "CMakeLists.txt"]
+    assert [name for name, _ in found] == names
     for name, text in found:
         (tmp_path / name).write_text(text, "utf-8")
     commands = "".join(re.findall(r"```sh\n(.*?)```", section, re.DOTALL))
     shell = f'hsp() {{ {sys.executable} -m hsp_control "$@"; }}\n'
     shell += f'python() {{ {sys.executable} "$@"; }}\n'
+    # CMake came with the package's own build where the machine has none.
+    path = f"{Path(sys.executable).parent}{os.pathsep}{os.environ['PATH']}"
     run = subprocess.run(
         ["bash", "-euc", shell + commands],
         cwd=tmp_path,
+        env=os.environ | {"PATH": path},
         capture_output=True,
         text=True,
         check=False,
