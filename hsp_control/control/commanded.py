@@ -23,7 +23,7 @@ from hsp_control.trajectories.streams.message import Axes
 from hsp_control.trajectories.streams.run import StreamRun
 from hsp_control.trajectories.streams.streamed import Streamed
 
-_REHEARSALS = 3
+_REHEARSALS = 5
 """Of a change: the first fills the processor's caches, the others train its
 predictions."""
 
