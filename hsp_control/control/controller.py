@@ -5,7 +5,6 @@ from contextlib import suppress
 from copy import deepcopy
 from math import isfinite
 from time import perf_counter
-from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -508,10 +507,8 @@ class Controller(Commanded):
 
         It also receives the messages to this one's streams, which stay there.
         """
-        memo: dict[int, Any] = {id(self._declared.robot): self._declared.robot}
-        for each in self._memory.streams:
-            memo |= each.shared
-        return deepcopy(self, memo)
+        robot = self._declared.robot
+        return deepcopy(self, {id(robot): robot} | self._memory.queues)
 
     def preview(self, changes: Sequence[Change] | None = None) -> "Controller":
         """Return a copy at the beginning of a run: to look ahead, or at a log.

@@ -4,7 +4,7 @@ from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from copy import copy, deepcopy
 from dataclasses import dataclass, field
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -98,6 +98,11 @@ class RunMemory:
                     run.follow(same[-1])
                 before.append(run)
         self.streams = tuple(now)
+
+    @property
+    def queues(self) -> dict[int, Any]:
+        """The memo of `deepcopy` for a copy that looks on: it reads these streams."""
+        return {key: own for run in self.streams for key, own in run.shared.items()}
 
     def count_from(self, origin: float) -> None:
         """Count times from a reading of the clock [s]."""

@@ -317,8 +317,8 @@ class TrustedMotion:
     def _alike(self, v: Array) -> Array:
         """Return the velocities of joints of which no source was found wrong, (nv,).
 
-        What makes the velocities of some joints wrong may do so with all, and be small
-        in the others; the same holds for positions.
+        The cause of wrong velocities may act on all joints, and its effect be too small
+        to be found in these; the same holds for positions.
         """
         slope = self._check.slope
         if not (self._positions & ~self._velocities).any():

@@ -253,10 +253,7 @@ class Follower:
         for change in (changes[key] for key in changes if key not in known):
             with controller._lock:
                 # its stream continues from the state of the loop's, and looks on
-                memo: dict[int, Any] = {}
-                for each in controller._memory.streams:
-                    memo |= each.shared
-                own = deepcopy(change, memo)
+                own = deepcopy(change, controller._memory.queues)
             self._copy.change(own)
         self._changes = changes
 

@@ -63,9 +63,9 @@ class ImperfectPlant(SampledPlant):
     def measure(self, t: float, q: Array, v: Array) -> tuple[Array, Array]:
         """Return the output of the last sensor; see `SampledPlant.measure`."""
         q, v = self.plant.measure(t, q, v)
-        if self._sensing is None:
+        if not self._begun:
             self._begin(q, v)
-        for sense in self._sensing or ():
+        for sense in self._sensing:
             q, v = sense(t, q, v)
         self._measured = q, v
         return q, v
@@ -73,9 +73,9 @@ class ImperfectPlant(SampledPlant):
     def advance(self, t: float, end: float, tau: Array) -> tuple[Array, Array]:
         """Advance under the output of the drives; see `SampledPlant.advance`."""
         effort, delay = tau, 0.0
-        if self._driving is None:
+        if not self._begun:
             self._begin(*self._measured)
-        for drive in self._driving or ():
+        for drive in self._driving:
             if isinstance(drive, RunningLag):
                 drive.period = end - t
             effort, later = drive(effort)
@@ -118,7 +118,7 @@ class ImperfectPlant(SampledPlant):
 
     def inertial(self) -> Inertial | None:
         """Return the reading of its own unit, or of the plant's."""
-        for sense in self._sensing or ():
+        for sense in self._sensing:
             if isinstance(sense, RunningImu):
                 return sense.reading
         return self.plant.inertial()
@@ -133,19 +133,18 @@ class ImperfectPlant(SampledPlant):
         }
 
     def __getstate__(self) -> dict[str, Any]:
-        return {**vars(self), "_sensing": None, "_driving": None}
+        return {**vars(self), "_sensing": [], "_driving": [], "_begun": False}
 
     def _begin(self, q: Array, v: Array) -> None:
         """Begin all sensors and drives, for a start at (q, v)."""
-        sensing, driving = list[Sensing](), list[Driving]()
+        self._sensing: list[Sensing] = []
+        self._driving: list[Driving] = []
+        self._begun = True  # not in a copy
         for sensor in self.sensors:
             with within("sensors", sensor.yaml_type or type(sensor).__name__):
                 random = seeded_generator(self.seed, type(sensor).__name__)
-                sensing.append(sensor.begin(self.robot, q, v, random))
+                self._sensing.append(sensor.begin(self.robot, q, v, random))
         for drive in self.drives:
             with within("drives", drive.yaml_type or type(drive).__name__):
                 random = seeded_generator(self.seed, type(drive).__name__)
-                driving.append(drive.begin(self.robot, random))
-        # None in a copy, which has not begun them yet.
-        self._sensing: list[Sensing] | None = sensing
-        self._driving: list[Driving] | None = driving
+                self._driving.append(drive.begin(self.robot, random))
