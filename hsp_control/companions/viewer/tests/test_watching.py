@@ -92,11 +92,14 @@ def test_changes_targets_and_a_new_beginning_are_followed() -> None:
     row = followed(follower)
     assert row["acceleration"][0] == pytest.approx(output.acceleration, abs=1e-6)
     goal = loop.controller.robot.state(0.0, loop.q, loop.v).position("panda_tcp")
-    loop.controller.set_target("hand", [*goal, 1.0, 0.0, 0.0, 0.0])
-    for _ in range(60):  # the copy receives the same message, at its own steps
-        output = loop.step()
-        row = followed(follower)
-    assert row["task.hand.error"][0] == pytest.approx(output.error("hand"), abs=1e-6)
+    for away in (0.0, 0.05):  # to a stream that is new, and to one that is followed
+        target = [goal[0] - away, *goal[1:], 1.0, 0.0, 0.0, 0.0]
+        loop.controller.set_target("hand", target)
+        for _ in range(60):  # the copy receives the same message, at its own steps
+            output = loop.step()
+            row = followed(follower)
+        error = output.error("hand")
+        assert row["task.hand.error"][0] == pytest.approx(error, abs=1e-6)
     journal = follower.journal
     loop.controller.restart()
     loop.step(3)
