@@ -464,6 +464,7 @@ def test_the_live_view_has_the_run_s_plots(
         assert page.locator("#side").is_visible()
         local = ("http://127.0.0.1", "ws://127.0.0.1", "data:")
         assert all(request.startswith(local) for request in watched.requests)
+        page.close()  # one that outlives its server asks for it, which is an error
 
 
 # -- films ----------------------------------------------------------------------------
