@@ -20,7 +20,7 @@ import hsp_control as hsp
 from campaigns.results import keep
 
 NUMBER, FEW = 100_000, 20
-RECORDED = 7000
+RECORDED = 10_000
 """Messages of a stream after which it records no more without a log: those to which the
 later ones are compared."""
 RAMP = 2e-3
