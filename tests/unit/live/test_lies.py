@@ -328,18 +328,20 @@ class Noisy(Rig):
         lost: float,
         encoder: float,
         seed: int,
+        period: float = PERIOD,
+        arm: hsp.Robot | None = None,
     ) -> None:
-        super().__init__(watched(PATIENT))
+        super().__init__(watched(PATIENT, period, arm))
         self.noise, self.lost, self.encoder = noise, lost, encoder
-        self.delayed = [np.zeros(7)] * (round(delay / PERIOD) + 1)
-        self.part = 1.0 - np.exp(-2.0 * np.pi * frequency * PERIOD)
-        self.filtered = np.zeros(7)
+        self.delayed = [0.0 * self.robot.v] * (round(delay / period) + 1)
+        self.part = 1.0 - np.exp(-2.0 * np.pi * frequency * period)
+        self.filtered = self.delayed[0]
         self.rng = np.random.default_rng(seed)
 
     def read(self, timeout: float) -> Measurement | None:
         found = super().read(timeout)
         assert found is not None
-        v = found.v + self.rng.normal(0.0, self.noise, 7)
+        v = found.v + self.rng.normal(0.0, self.noise, found.v.size)
         self.filtered = self.filtered + self.part * (v - self.filtered)
         self.delayed = [*self.delayed[1:], self.filtered]
         q = found.q
@@ -367,6 +369,44 @@ def test_what_real_sensors_do_is_no_lie(
     settings = replace(SETTINGS, velocity_margin=1.0)
     report = run_loop(moving(), robot, duration=0.8, settings=settings)
     assert report.ended == "completed", report.reason
+
+
+def of_other_masses(arm: str, share: float) -> hsp.Robot:
+    """Return an arm whose masses are its model's times a factor."""
+    model = load(arm).model.copy()
+    for inertia in list(model.inertias)[1:]:  # not of a slice, which is a copy
+        inertia.mass *= share
+        inertia.inertia = inertia.inertia * share
+    return hsp.Robot.from_pinocchio(model)
+
+
+@pytest.mark.parametrize(
+    ("arm", "period", "share"),
+    [
+        *(("panda", 0.005, 1.0), ("xarm7", 0.002, 0.8)),
+        *further(
+            *(
+                (arm, period, share)
+                for arm in ("panda", "xarm7", "ur5", "iiwa14")
+                for period in (0.001, 0.002, 0.005, 0.01)
+                for share in (1.0, 0.8, 1.2)
+            )
+        ),
+    ],
+)
+def test_a_velocity_that_lags_from_the_first_state_on_is_no_lie(
+    arm: str, period: float, share: float
+) -> None:
+    """Before it the robot was at rest: a joint is at 0.5 rad/s before it reports any.
+
+    The filter of 20 Hz and the delay of 5 ms; encoder or noise, and masses.
+    """
+    for noise, encoder in ((0.05, 1.5e-3), (0.0, 0.0)):
+        wrong = of_other_masses(arm, share)
+        robot = Noisy(noise, 0.005, 20.0, 0.1, encoder, 3, period, wrong)
+        settings = replace(SETTINGS, velocity_margin=1.0)
+        report = run_loop(moving(arm), robot, duration=0.8, settings=settings)
+        assert report.ended == "completed", report.reason
 
 
 @pytest.mark.parametrize(
@@ -724,14 +764,8 @@ def test_noise_in_motion_says_nothing_of_rest() -> None:
 @pytest.mark.parametrize("share", [1.2, *further(0.8)])
 def test_wrong_masses_are_no_lie(share: float) -> None:
     """With noise, delay, filter and lost states."""
-    robot = Noisy(0.05, 0.005, 20.0, 0.1, 0.0, seed=3)
-    model = panda().model.copy()
-    for inertia in list(model.inertias)[1:]:  # not of a slice, which is a copy
-        inertia.mass *= share
-        inertia.inertia = inertia.inertia * share
-    heavy = hsp.Robot.from_pinocchio(model)
-    plant = IntegratedPlant(RigidBodyPlant(heavy), SemiImplicitEuler(PERIOD))
-    robot.robot = SimulatedRobot(plant, start(), np.zeros(7), PERIOD, settings=PATIENT)
+    heavy = of_other_masses("panda", share)
+    robot = Noisy(0.05, 0.005, 20.0, 0.1, 0.0, seed=3, arm=heavy)
     settings = replace(SETTINGS, velocity_margin=1.0)
     report = run_loop(moving(), robot, duration=1.0, settings=settings)
     assert report.ended == "completed", report.reason  # its stop does not sink
