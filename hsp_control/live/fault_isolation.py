@@ -8,9 +8,6 @@ _CLEARLY = 0.5
 """Ratio of surprises below which one source is right, and the other wrong."""
 _BEYOND_DOUBT = 0.3
 """The ratio below which the same kind of source is wrong in joints in doubt, too."""
-_SMALL = 0.05
-"""Surprise below which a source is right beyond doubt only, and no evidence of other
-joints [rad/s or m/s]."""
 
 
 class FaultIsolation:
@@ -42,10 +39,8 @@ class FaultIsolation:
                 expectation, shape (2, nv) [rad/s or m/s].
         """
         greatest = surprise.max(axis=0)
-        beyond_doubt = surprise < _BEYOND_DOUBT * greatest
-        evident = greatest > _SMALL
-        right = np.where(evident, surprise < _CLEARLY * greatest, beyond_doubt)
-        clear = beyond_doubt & evident
+        right = surprise < _CLEARLY * greatest
+        clear = surprise < _BEYOND_DOUBT * greatest
         # A source is wrong beyond doubt where the other one is right.
         self._wrong_kind |= (wrong & clear[::-1]).any(axis=1)
         doubtful = self.undecided | ~clear.any(axis=0)
