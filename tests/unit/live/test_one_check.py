@@ -118,12 +118,12 @@ def test_a_source_that_is_trusted_again_is_expected_where_it_is() -> None:
     for _ in range(100):
         motion.update(0.0, 0.0)
     for _ in range(60):  # both sources leave the expectation, by as much
-        motion.update(0.5, -0.5, effort=-0.1)
+        motion.update(1.0, -1.0, effort=-0.1)
     trusted = motion.trusted
     assert not trusted.trusted_positions[6]
     assert trusted._expected.v[2, 6] < -0.5  # the effort acts in the model alone
     for _ in range(30):  # a clear case: velocities are wrong
-        motion.update(0.5, -0.5, first=3.0)
+        motion.update(1.0, -1.0, first=3.0)
     assert trusted.trusted_positions.all()
 
 
