@@ -8,6 +8,9 @@ _CLEARLY = 0.5
 """Ratio of surprises below which one source is right, and the other wrong."""
 _BEYOND_DOUBT = 0.3
 """The ratio below which the same kind of source is wrong in joints in doubt, too."""
+_OTHERWISE = 0.1
+"""The ratio below which it is another kind in another joint: the faults of some spoil
+what is expected of the others."""
 
 
 class FaultIsolation:
@@ -40,7 +43,8 @@ class FaultIsolation:
         """
         greatest = surprise.max(axis=0)
         right = surprise < _CLEARLY * greatest
-        clear = surprise < _BEYOND_DOUBT * greatest
+        known = self._wrong_kind[0] != self._wrong_kind[1]
+        clear = surprise < (_OTHERWISE if known else _BEYOND_DOUBT) * greatest
         # A source is wrong beyond doubt where the other one is right.
         self._wrong_kind |= (wrong & clear[::-1]).any(axis=1)
         doubtful = self.undecided | ~clear.any(axis=0)

@@ -268,7 +268,6 @@ class TrustedMotion:
             self._pushed |= pushed & both & ~(wrong | dead)
             lost |= (contrary | pushed) & both
         lost |= runs | self._left(v) & (self._positions ^ self._velocities)
-        self._isolation.undecided &= ~(dead | jumps)
         # Efforts are harmful if a joint moves against them: only the robot can brake.
         self._useless |= bool(runs.any() or self._contrary.any())
         self._positions &= ~lost

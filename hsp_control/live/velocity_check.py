@@ -38,6 +38,9 @@ _STOPS = 50.0
 """Maximum deceleration of a joint by friction [rad/s² or m/s²]."""
 _WENT = 0.05
 """Speed above which a joint has moved before it stopped [rad/s or m/s]."""
+_ALONE = 0.2
+"""The speed above which a joint does not stop at once whose other sensor is wrong
+[rad/s or m/s]."""
 _STEP = 2e-3
 """Maximum step of an encoder [rad or m], until smaller changes are observed: between
 two steps a velocity computed from them is constant, too."""
@@ -199,4 +202,6 @@ class VelocityCheck:
         self.halted = went
         together = (went[:, None] & (self._still[:, None] == self._still)).sum(axis=0)
         fast = self.before > 2.0 * _STOPS * self._period / np.maximum(together, 1)
+        # Where one sensor was wrong, the other one is more likely dead than the joint.
+        fast |= (self._by_q ^ self._by_v) & (self.before > _ALONE)
         self.dead = (self._still >= _STILL) & fast & far & self._judged

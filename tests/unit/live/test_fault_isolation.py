@@ -37,14 +37,18 @@ def test_of_joints_in_doubt_one_that_is_undecided_leaves_none_decided() -> None:
 def test_the_kind_that_is_wrong_elsewhere_is_wrong_in_joints_in_doubt(
     wrong: tuple[bool, bool],
 ) -> None:
-    """Whatever their own surprises; also later, but not where the case is clear."""
+    """Whatever their own surprises; later too, but where these are clearer still."""
     right = wrong[::-1]
-    clear = (1.0, CLEAR) if wrong == V else (CLEAR, 1.0)
+
+    def of(ratio: float, source: tuple[bool, bool]) -> tuple[float, float]:
+        return (1.0, ratio) if source == V else (ratio, 1.0)
+
     isolation = FaultIsolation(3)
-    found = isolated(isolation, clear, (DOUBTFUL, 1.0), (1.0, UNDECIDED))
-    assert found == [right] * 3
-    later = isolated(isolation, (1.0, DOUBTFUL), clear[::-1], (0.5, 0.5), wrong="111")
-    assert later[1] == wrong  # that source of this joint is right
+    doubtful = (DOUBTFUL, 1.0), (1.0, UNDECIDED)
+    assert isolated(isolation, of(CLEAR, wrong), *doubtful) == [right] * 3
+    assert isolated(isolation, *doubtful, of(CLEAR, right)) == [right] * 3
+    found = isolated(isolation, *doubtful, of(0.05, right))
+    assert found[2] == wrong  # that source of this joint is right
 
 
 def test_joints_that_are_not_wrong_say_nothing_of_a_kind() -> None:

@@ -173,6 +173,8 @@ def test_no_lie_accelerates_a_joint(kind: str, begin: int) -> None:
         ("xarm7", 0.001, "position: stuck", ALL),
         ("xarm7", 0.002, "both: stuck, with +1", [1]),
         ("xarm7", 0.002, "both: mirrored", ALL),
+        ("xarm7", 0.005, "both: stuck, with +1", [1]),
+        ("xarm7", 0.005, "both: mirrored", ALL),
         ("ur5", 0.001, "both: contrary", ALL[:6]),
         *further(
             *(

@@ -82,23 +82,49 @@ def test_a_joint_that_accelerates_within_a_period_is_no_contradiction(
 
 
 class Motion:
-    """Trusted sources of a Panda at rest whose last joint reports a motion."""
+    """Trusted sources of a Panda at rest whose joints report a motion."""
 
     def __init__(self, period: float) -> None:
         self.trusted = TrustedMotion(panda(), SETTINGS, period)
         self.period, self.count, self.q = period, 0, start()
 
-    def update(self, moves: float, says: float) -> str | None:
-        """Return the fault after a period."""
+    def update(
+        self, moves: float, says: float, *, first: float = 0.0, effort: float = 0.0
+    ) -> str | None:
+        """Return the fault after a period.
+
+        Args:
+            moves: Slope of the last joint's positions [rad/s].
+            says: Its velocity [rad/s].
+            first: Velocity of the first joint, whose positions are constant [rad/s].
+            effort: Of the last joint from now on, besides gravity [N·m].
+        """
         self.count += 1
         self.q, v = self.q.copy(), np.zeros(7)
         self.q[6] += moves * self.period
-        v[6] = says
+        v[[0, 6]] = first, says
         passed = self.period if self.count > 1 else 0.0
         told = Measurement(self.count, self.count * self.period, self.q, v)
         self.trusted.update(told, passed, np.zeros(7, dtype=bool))
-        self.trusted.applied(self.q, np.zeros(7), gravity(self.q))
+        tau = gravity(self.q)
+        tau[6] += effort
+        self.trusted.applied(self.q, np.zeros(7), tau)
         return self.trusted.fault
+
+
+def test_a_source_that_is_trusted_again_is_expected_where_it_is() -> None:
+    """Meanwhile the model expected the joint elsewhere, as its load is not known."""
+    motion = Motion(PERIOD)
+    for _ in range(100):
+        motion.update(0.0, 0.0)
+    for _ in range(60):  # both sources leave the expectation, by as much
+        motion.update(1.0, -1.0, effort=-0.1)
+    trusted = motion.trusted
+    assert not trusted.trusted_positions[6]
+    assert trusted._expected.v[2, 6] < -0.5  # the effort acts in the model alone
+    for _ in range(30):  # a clear case: velocities are wrong
+        motion.update(1.0, -1.0, first=3.0)
+    assert trusted.trusted_positions.all()
 
 
 @pytest.mark.parametrize("period", [0.001, 0.005, 0.01])
