@@ -23,7 +23,7 @@ NOTEBOOKS = sorted((ROOT / "notebooks").glob("*.ipynb"))
 NAMES = [path.stem for path in NOTEBOOKS]
 USUAL = ["03_your_robot", "04_command_it_now"]
 """The others, of the law, of fields and of walking, take half a minute each and more,
-and show what other tests prove: `make thorough`."""
+and repeat what other tests prove: `make thorough`."""
 NUMBER = re.compile(r"[-+]?\d[\d.]*(e[-+]?\d+)?")
 ANSWER = re.compile(r"^```python\n(.*?)^```$", re.MULTILINE | re.DOTALL)
 
@@ -75,7 +75,7 @@ def pictures(notebook: Any) -> list[bytes]:
     return [base64.b64decode(picture) for picture in found if picture]
 
 
-# ------------------------------------------------------------------ what they promise
+# ------------------------------------------------------------- what the texts promise
 
 
 def the_law(said: str) -> None:
@@ -149,7 +149,7 @@ PROMISES = {
 @pytest.mark.timeout(400)
 @pytest.mark.parametrize("name", NAMES if THOROUGH else USUAL)
 def test_a_notebook_runs_and_keeps_its_promises(name: str, tmp_path: Path) -> None:
-    """Without a warning, with its figures inline and light, and with true numbers.
+    """Each notebook runs without a warning; figures are inline and small, numbers true.
 
     One test, so that two workers do not run the same notebook.
     """
@@ -162,7 +162,7 @@ def test_a_notebook_runs_and_keeps_its_promises(name: str, tmp_path: Path) -> No
             assert page.startswith("<iframe srcdoc=")
             assert len(page) < 2_000_000
         else:
-            # A mere object as a cell's value is a semicolon forgotten.
+            # A bare object as a cell's value shows that a semicolon is missing.
             assert "image/png" in out.data, out.data
     shown = pictures(notebook)
     assert len(shown) >= 3

@@ -1,4 +1,4 @@
-"""A type of one's own is known to every command: by ``--import``, or by one list."""
+"""User-defined types reach every command, by ``--import`` or by the list in YAML."""
 
 from collections.abc import Callable
 from functools import cache
@@ -55,7 +55,7 @@ USUAL = {
     "parts.py": ["run", "check", "live", "play"],
     "--import": ["run", "live", "sweep"],
 }
-"""With a list, and with the option: each command unless thorough once, or twice."""
+"""Commands with the list and with the option; all pairs of both if thorough."""
 WITHOUT_CONTROLLER = "no controller, only the log's columns are drawn"
 
 
@@ -64,7 +64,7 @@ CASES = [
     *(("--import", what) for what in ("run", "of its robot")),
     *further(*(("--import", what) for what in WITH_LOG)),
 ]
-"""A log names the modules of its types, however these were found."""
+"""A log names the modules of its types, however they were imported."""
 
 
 @pytest.fixture(scope="module")
@@ -102,7 +102,7 @@ def test_a_log_is_read_with_its_own_types(
 def test_a_module_of_a_package_is_found_on_the_path(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """A reader of the log calls the same function as for a file."""
+    """A reader of the log imports the modules as for a configuration."""
     package = tmp_path / "elsewhere" / "own_package"
     package.mkdir(parents=True)
     (package / "__init__.py").touch()
@@ -171,7 +171,7 @@ with hsp.Recorder(arm, "out/recorded.npz") as recorder:
             said = hsp(f"view out/{log}.npz --no-browser", tmp_path)
             known = WITHOUT_CONTROLLER not in said
             assert known == (name == "one"), (name, log)
-        if THOROUGH:  # test_every_log.py takes others so
+        if THOROUGH:  # other commands: test_every_log.py
             hsp("export out/experiment.npz --html out/experiment.html", tmp_path)
             hsp("plot out/own.npz", tmp_path)
         if name == "one":
@@ -183,7 +183,7 @@ def test_freeze_and_inspect_import_too(tmp_path: Path) -> None:
     (tmp_path / "parts.py").write_text(f"{PARTS}\nopen('run', 'w').close()\n")
     (tmp_path / "mine.yaml").write_text(CONFIG)
     said = hsp("freeze mine.yaml --import parts.py", tmp_path, status=2)
-    assert "Python" in said  # a type that it knows, and cannot freeze
+    assert "Python" in said  # the type is known, but cannot be frozen
     assert "no type" not in said
     (tmp_path / "run").unlink()
     hsp("inspect panda --import parts.py", tmp_path)

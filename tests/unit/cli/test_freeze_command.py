@@ -89,7 +89,7 @@ PAGE = Path(__file__).parents[3] / "docs/how_to/without_python.md"
 @pytest.mark.process
 @pytest.mark.smoke
 def test_the_page_leads_to_an_arm_that_moves(tmp_path: Path) -> None:
-    """Its first section, in a shell, in an empty folder."""
+    """The page's first section, in a shell, in an empty folder."""
     if not shutil.which("cc"):
         pytest.skip("there is no C compiler")
     section = PAGE.read_text("utf-8").split("\n## ")[1]
@@ -101,7 +101,7 @@ def test_the_page_leads_to_an_arm_that_moves(tmp_path: Path) -> None:
     commands = "".join(re.findall(r"```sh\n(.*?)```", section, re.DOTALL))
     shell = f'hsp() {{ {sys.executable} -m hsp_control "$@"; }}\n'
     shell += f'python() {{ {sys.executable} "$@"; }}\n'
-    # CMake came with the package's own build where the machine has none.
+    # Without CMake on the machine, the package's build brought its own.
     path = f"{Path(sys.executable).parent}{os.pathsep}{os.environ['PATH']}"
     run = subprocess.run(
         ["bash", "-euc", shell + commands],

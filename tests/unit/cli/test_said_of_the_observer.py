@@ -72,7 +72,7 @@ def test_a_run_says_how_much_nobody_explained() -> None:
 
 
 def test_a_safe_stop_hides_nothing_of_what_an_observer_found() -> None:
-    """Each live run once printed: up to nan N·m, and never that it is a lot."""
+    """Every live run once printed "up to nan N·m", and never warned of a large load."""
     beside = {**LOAD, "payload": {**LOAD["payload"], "center": [0.15, 0.0, 0.0]}}
     log = load_experiment(CONFIG | {"plant": beside}).run()
     known = [*unexplained_rows(log)]

@@ -1,4 +1,4 @@
-"""Commands write to whatever they are given: nothing, ASCII, a pipe that is closed."""
+"""Commands write to any stdout: none, ASCII only, or a closed pipe."""
 
 import os
 import subprocess
@@ -62,7 +62,7 @@ from hsp_control.cli.streams import lost_text, make_usable
 make_usable()
 make_usable()
 for k in range(10_000):
-    print("a line that fills what a pipe holds", k, flush=k % 2 == 0)
+    print("a line that fills the buffer of a pipe", k, flush=k % 2 == 0)
 print("done", lost_text(), file=sys.stderr)
 """
 
@@ -71,7 +71,7 @@ print("done", lost_text(), file=sys.stderr)
 @pytest.mark.process
 @pytest.mark.smoke
 def test_a_command_goes_on_where_nobody_takes_its_text(where: str) -> None:
-    """A run must not be lost with the reader of its summary."""
+    """A run is kept although the reader of its summary has closed the pipe."""
     if where == "pipe":
         reader, writer = os.pipe()
         os.close(reader)

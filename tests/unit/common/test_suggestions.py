@@ -20,7 +20,7 @@ def test_the_nearest_name_is_suggested() -> None:
 
 
 def test_an_unknown_argument_is_named_with_the_nearest_one() -> None:
-    """Of the controller, and of what is made of it; their signatures stay."""
+    """On the controller and the objects it returns; their signatures are unchanged."""
     told = "Controller: ... 'nullspace_gain' ... 'null_space_gain' ... robot, tasks"
     with pytest.raises(TypeError, match=wording(told)):
         hsp.Controller(nullspace_gain=3)  # type: ignore[call-arg]

@@ -1,4 +1,4 @@
-"""Check overrides, and where errors that are raised later are located."""
+"""Overrides, and the location of errors that are raised after reading."""
 
 import pickle
 import re

@@ -14,7 +14,7 @@ from typing_extensions import TypeAliasType
 from wording import wording
 
 TASK = "robot: panda\ntasks:\n  hand:\n    frame: hand\n"
-"""Four lines, after which a test adds a key to the task."""
+"""Four lines; tests append a key of the task."""
 
 INVALID = [
     # keys
@@ -110,7 +110,7 @@ Chosen = Annotated[
 
 
 class Lenient(BaseModel):
-    """Types that the scenario above does not use, converted where pydantic can."""
+    """Types that the scenario above does not use; pydantic converts where it can."""
 
     pair: tuple[float, float] = (0.0, 0.0)
     pairs: list[tuple[float, float]] = []

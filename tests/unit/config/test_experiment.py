@@ -81,7 +81,7 @@ def test_a_configuration_becomes_the_objects_it_names() -> None:
     positions = experiment.robot.joint_positions(experiment.q0)
     assert positions[3] == -2.0  # given by name
     assert positions[1] == experiment.robot.joint_positions(experiment.robot.home())[1]
-    # The blend starts where the robot does, so that the run starts without error.
+    # The blend begins at the robot's pose, so the run starts without error.
     assert len(experiment.run()) == 3
     np.testing.assert_allclose(experiment.run()["task.pen.error"][0], 0.0, atol=1e-12)
 

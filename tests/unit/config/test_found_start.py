@@ -1,4 +1,4 @@
-"""A start that is found: recorded, repeated, refused with numbers, offered by check."""
+"""A searched start: logged, repeated, refused with numbers, suggested by check."""
 
 from pathlib import Path
 from typing import Any

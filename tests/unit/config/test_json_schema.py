@@ -122,7 +122,7 @@ NAMED = {**TASK, "name": "elbow"}
     ("tasks", "added", "good"),
     [
         (TASK, TASK, True),
-        (TASK, NAMED, True),  # in a list of changes, no key is its name
+        (TASK, NAMED, True),  # changes are a list: none has a key as its name
         (NAMED, NAMED, False),
         (TASK, {**NAMED, "frme": "hand"}, False),
     ],

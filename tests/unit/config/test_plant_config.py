@@ -43,7 +43,7 @@ def panda(plant: Any) -> dict[str, Any]:
 
 @pytest.mark.parametrize("kind", ["rigid_body", "mujoco"])
 def test_everything_at_once(kind: str, tmp_path: Path) -> None:
-    """It runs on both engines, and its log is enough to run it again."""
+    """It runs on both engines, and its log alone suffices to repeat the run."""
     if kind == "mujoco":
         pytest.importorskip("hsp_control.companions.mujoco")
     experiment = load_experiment(panda({**EVERYTHING, "type": kind}))

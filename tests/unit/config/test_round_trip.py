@@ -1,4 +1,4 @@
-"""A configuration as plain data has the same meaning: logs keep it like this."""
+"""A configuration as plain data, as logs store it, has the same meaning."""
 
 import json
 from dataclasses import fields
@@ -96,7 +96,7 @@ def test_a_configuration_equals_what_it_becomes_as_data(
     scenario = scenario_of(name)
     data = plain_data(scenario, defaults=defaults)
     assert validate(Document(data, {}, name), Scenario) == scenario
-    # JSON and YAML change nothing either.
+    # Neither does a way through JSON or YAML change it.
     assert json.loads(json.dumps(data, allow_nan=False)) == data
     again = Document.parse(yaml.safe_dump(data), name)
     assert validate(again, Scenario) == scenario
@@ -154,7 +154,7 @@ def test_an_experiment_of_parts_goes_to_yaml_and_back(tmp_path: Path) -> None:
     first, second = made.run(), again.run()
     np.testing.assert_array_equal(first.tau, second.tau)
     assert not list(validator().iter_errors(yaml.safe_load(made.to_yaml())))
-    # A log has the same, and its run can be repeated.
+    # A log stores the same, and its run can be repeated.
     log = load_experiment(first.save(tmp_path / "run.npz"))
     np.testing.assert_array_equal(log.run().tau, first.tau)
 
@@ -174,7 +174,8 @@ def test_a_wrong_setting_is_named(settings: dict[str, Any], message: str) -> Non
 
 
 def test_obstacles_that_parts_hold_are_in_the_scene() -> None:
-    """YAML names obstacles; what holds one in Python is written with its name."""
+    """YAML names obstacles; a part that holds one in Python is written with its
+    name."""
     ball = Obstacle("ball", Sphere(0.1), Hold([0.6, 0.4, 0.6]))
     field = JointCentering() + 20.0 * ObstacleClearance([ball])
     limits = Limits(barriers=[ObstacleDistance(obstacles=[ball])])

@@ -1,4 +1,4 @@
-"""Times that cannot be those of a loop are reported once."""
+"""Implausible times of a loop are reported once."""
 
 import re
 import warnings
@@ -24,7 +24,7 @@ def told(times: Sequence[float], period: float = H) -> list[str]:
         for t in times:
             output = controller.compute(t, robot.home(), np.zeros(7))
             controller.applied(output.tau, period)
-            controller.applied(output.tau, period)  # what was sent in its place
+            controller.applied(output.tau, period)  # the effort that was sent instead
     return [str(each.message) for each in caught if each.category is ClockWarning]
 
 
@@ -50,7 +50,7 @@ def test_a_clock_of_something_else_is_said_once(
 
 
 def test_a_state_with_the_time_of_a_clock_is_said() -> None:
-    """Its time is measured from the first step already."""
+    """Times count from the first step."""
     robot = hsp.Robot.load("panda")
     controller = hsp.Controller(robot, [hsp.FramePosition()])
     state = robot.state(1.76e9, robot.home(), np.zeros(7))
@@ -59,7 +59,7 @@ def test_a_state_with_the_time_of_a_clock_is_said() -> None:
 
 
 def test_a_change_at_the_time_of_a_clock_is_said() -> None:
-    """It would never begin; a state at rest for a day is no clock."""
+    """The change would never begin; a robot at rest for a day is no clock error."""
     robot = hsp.Robot.load("panda")
     controller = hsp.Controller(robot, [hsp.FramePosition(name="hand")])
     controller.compute(1.76e9, robot.home(), np.zeros(7))
@@ -73,7 +73,7 @@ def test_a_change_at_the_time_of_a_clock_is_said() -> None:
 
 
 def test_what_happens_to_a_loop_is_no_wrong_clock() -> None:
-    """Steps that are late, made twice, or after a pause; and a start at any time."""
+    """Late or repeated steps, steps after a pause, and any start time are accepted."""
     rng = np.random.default_rng(0)
     late = STEPS + H * rng.uniform(-0.4, 0.4, STEPS.size)
     twice = np.repeat(STEPS, 2)
@@ -85,7 +85,7 @@ def test_what_happens_to_a_loop_is_no_wrong_clock() -> None:
 
 
 def test_the_integrators_stages_are_no_clock() -> None:
-    """They go back and forth, and nothing is held."""
+    """Times go back and forth; no effort is held."""
     robot = hsp.Robot.load("panda")
     controller = hsp.Controller(robot, [hsp.FramePosition()])
     with warnings.catch_warnings():
@@ -127,7 +127,7 @@ def test_a_robot_that_rests_shows_no_unit() -> None:
 
 
 def test_a_target_after_a_long_rest_shows_the_unit() -> None:
-    """While it rests nothing is looked at, so that a step costs nothing."""
+    """At rest the check is skipped, so that it costs no time."""
     robot = hsp.Robot.load("panda")
     controller = hsp.Controller(robot, [hsp.FramePosition(name="hand")])
     clock, v = controller._memory.clock, np.full(7, 0.2)

@@ -1,4 +1,4 @@
-"""The loop of a robot that carries what its controller does not know of."""
+"""The closed loop with an unmodelled load."""
 
 import re
 from typing import Any
@@ -54,7 +54,7 @@ def whole(made: hsp.Controller, parts: Compensation, delay: int) -> LoadedLoop:
 
 
 def boundary(loop: LoadedLoop) -> float:
-    """Return the part of the load at which the loop begins to grow."""
+    """Return the fraction of the load at which the loop becomes unstable."""
     low, high = 0.01, 20.0
     assert loop.with_part(low).radius() < 1.0 < loop.with_part(high).radius()
     for _ in range(30):
@@ -110,7 +110,7 @@ def test_the_robot_grows_and_decays_at_the_rate_of_the_linear_loop(case: str) ->
         error = np.linalg.norm(log["task.hand.error"], axis=1)
         windows = [error[k : k + 100].max() for k in (200, 300, 400, 500)]
         assert bool(windows[-1] > windows[0]) is grows
-        if grows:  # the growing mode leaves all others behind
+        if grows:  # the growing mode dominates all others
             rate = np.log(loop.with_part(times).radius()) / H
             found = np.polyfit([0.0, 1.0, 2.0, 3.0], np.log(windows), 1)[0]
             assert found == pytest.approx(rate, rel=0.1, abs=0.05)
@@ -150,9 +150,9 @@ def test_what_is_told_is_the_boundary_and_the_advice_works() -> None:
 
 
 def test_configurations_with_a_payload_are_warned_of_it() -> None:
-    """2 kg are borne at a rate of 5 1/s; 3 kg, which the arm carries, are not at 7.
+    """Stable with 2 kg at a rate of 5 1/s; unstable with 3 kg, its payload, at 7.
 
-    Without weight; with it, self-motion that nothing holds runs away with any load.
+    Without gravity; with it, uncontrolled self-motion diverges with any load.
     """
     document: dict[str, Any] = {
         "robot": {"name": "panda", "gravity": [0.0, 0.0, 0.0]},
@@ -178,7 +178,7 @@ def test_configurations_with_a_payload_are_warned_of_it() -> None:
 
 
 def test_weight_that_nothing_holds_is_told_and_an_observer_holds_it() -> None:
-    """The arm does as predicted: its posture runs away, or stays where it is."""
+    """As predicted, the posture diverges or stays."""
     arm = hsp.Robot.load("panda")
     hand = hsp.FramePosition("panda_tcp", gains=hsp.Gains(natural_frequency=20.0))
     true = changed(arm, [Payload(frame="panda_hand", mass=1.0)])

@@ -1,4 +1,4 @@
-"""Gains that a loop's rate permits: in theory, in the chain's links, on the robot."""
+"""Gains that a loop's rate permits: closed forms, the chain's parts, the robot."""
 
 import re
 from itertools import pairwise
@@ -85,7 +85,7 @@ def rate(gain: float, **options: Any) -> LinearLoop:
             ),
             1.0,
         ),
-        # K_N h + α h < 2 for a field as stiff as the gain.
+        # K_N h + α h < 2 for a field whose slope equals the gain.
         (lambda x: LinearLoop(x * x * ONE, 2.0 * x * ONE, ZERO, H), 1.0),
     ],
 )  # fmt: skip
@@ -123,7 +123,7 @@ def test_the_limits_of_theory(make: Any, limit: float) -> None:
 def test_the_linear_loop_is_the_chain_link_by_link(
     delays: tuple[int, int], compensation: dict[str, Any], heavy: float, tmp_path: Path
 ) -> None:
-    """A carriage on a rail *is* the linear mode, also one heavier than its model."""
+    """A carriage on a rail is the linear mode, also with a wrong mass."""
     robot = carriage(tmp_path)
     h, frequency = 0.01, 12.0
     task = JointPosture(np.zeros(1), gains=Gains(natural_frequency=frequency))
@@ -150,9 +150,8 @@ def test_the_linear_loop_is_the_chain_link_by_link(
 def test_a_lag_of_the_drives_is_in_the_linear_loop(
     lag: float, observer: MomentumObserver | None, tmp_path: Path
 ) -> None:
-    """Beside a drive that holds the mean of each period; x differs within one.
-
-    x(t) moves under the mean as if it acted from the period's begin: second order in h.
+    """Against a drive that holds the mean of each period; x differs within one. Under
+    the mean x(t) moves as if it acted from the period's start: second order in h.
     """
     robot, h = carriage(tmp_path), 0.002
     task = JointPosture(np.zeros(1), gains=Gains(natural_frequency=12.0))
@@ -179,7 +178,7 @@ def test_a_lag_of_the_drives_is_in_the_linear_loop(
 
 @pytest.mark.slow
 def test_integral_action_that_a_heavier_robot_does_not_bear_is_told() -> None:
-    """The weightless arm agrees: 10 % beside the prediction it decays or grows."""
+    """Without gravity the arm agrees: 10 % off the prediction it decays or grows."""
     robot = Robot.load("panda", gravity=[0.0, 0.0, 0.0])
     task = JointPosture(Q0, gains=Gains(natural_frequency=20.0))
     made = Controller(robot, [task], limits=None)
@@ -246,7 +245,7 @@ def holding(
 def test_the_robot_grows_just_above_and_dies_just_below(
     gains: Any, limit: float, delay: int
 ) -> None:
-    """3 % to either side of the limit."""
+    """Stable 3 % below the limit, unstable 3 % above."""
     for side in (-1.0, 1.0):
         made = holding(**gains((1.0 + 0.03 * side) * limit / H))
         engine = IntegratedPlant(RigidBodyPlant(PANDA), Rk4(H))
@@ -362,7 +361,7 @@ def test_a_field_s_slope_is_taken_in_the_null_space_and_the_metric() -> None:
     np.testing.assert_allclose(K, 100.0 * np.eye(4), atol=1e-9)
     M = state.mass_matrix
     J = state.frame("panda_tcp").jacobian[:3]
-    # At the field's own minimum but for 1e-3 rad: 3 Zᵀ M⁻¹ Z', in M's own coordinates.
+    # 1e-3 rad from the field's minimum: 3 Zᵀ M⁻¹ Z', in coordinates in which M = I.
     L = np.linalg.cholesky(M)
     Z = np.linalg.svd(np.linalg.solve(L, J.T).T)[2][3:].T
     slope = 3.0 * Z.T @ np.linalg.inv(L) @ np.linalg.inv(L).T @ Z
@@ -456,14 +455,14 @@ def test_the_command_line_says_what_is_close(
 def test_a_simulation_refuses_what_a_run_refuses(
     gains: dict[str, float], delay: int, message: str
 ) -> None:
-    """With the delays of its plant; and its advice is followed."""
+    """With the plant's delays; a run with the advised gains is stable."""
     how: dict[str, Any] = {"duration": 0.01, "integrator": Rk4(0.1 * H)}
     if delay:
         engine = IntegratedPlant(RigidBodyPlant(PANDA), Rk4(H))
         how["plant"] = ImperfectPlant(engine, [SensorDelay(0)], [EffortDelay(delay)])
     with pytest.raises(hsp.errors.UnstableRateError, match=message):
         simulate(holding(**gains), Q0, control_period=H, **how)
-    if not delay:  # nothing is held
+    if not delay:  # no effort is held
         simulate(holding(**gains), Q0, **how)
     (name,) = gains
     mended = {name: 100.0 if delay else 200.0}

@@ -1,4 +1,4 @@
-"""Mistakes, in Python and in YAML: each message speaks the language that was typed."""
+"""Mistakes in Python and in YAML: a message uses the syntax of the input."""
 
 import re
 from collections.abc import Callable

@@ -95,7 +95,7 @@ class Rod(Gadget, type="rod"):
 
 
 class Bag(Gadget, type="bag"):
-    """One with others in it."""
+    """A part with other parts in it."""
 
     first: Gadget
     """What is in it."""
@@ -218,7 +218,7 @@ def test_a_type_is_declared_once() -> None:
     class One(Local, type="one"):  # type: ignore[no-redef]
         a: Number = 5.0
 
-    # Run again, as a cell of a notebook is.
+    # Defined again, as by rerunning a notebook's cell.
     assert first is not One
     assert Local.family.members == {"one": One}
     assert type(validated.validate_python({"type": "one"})) is One

@@ -1,4 +1,4 @@
-"""No number that a user gives is so large or small that products of it overflow."""
+"""Numbers from users are bounded, so that their products do not overflow."""
 
 from typing import Any
 
@@ -62,7 +62,7 @@ def panda() -> hsp.Robot:
 
 
 def test_the_largest_that_is_allowed_gives_an_effort(panda: hsp.Robot) -> None:
-    """Without a warning of NumPy's: pytest makes errors of them."""
+    """Without a NumPy warning: pytest raises warnings as errors."""
     q, v, gains = panda.home(), np.zeros(7), hsp.Gains(natural_frequency=1e3)
     for target in ([LARGEST, 0.0, 0.0], [-LARGEST, LARGEST, LARGEST]):
         task = hsp.FramePosition("panda_tcp", target, gains=gains)

@@ -1,4 +1,4 @@
-"""The acceleration a step approaches where a limit binds, beside plain formulas."""
+"""The acceleration that a step approaches at an active limit, against formulas."""
 
 from typing import NamedTuple
 
@@ -22,7 +22,7 @@ seeds = st.integers(0, 2**32 - 1)
 
 
 class Asked(NamedTuple):
-    """Commanded accelerations, and those that limits permit."""
+    """Commanded accelerations, and the bounds of limits."""
 
     M: Array
     a: Array
@@ -34,7 +34,7 @@ class Asked(NamedTuple):
 
 
 def drawn(seed: int, size: float, bound: float) -> Asked:
-    """Return a random request: accelerations are of a size, bounds as far as bound."""
+    """Return a random request with given sizes of accelerations and bounds."""
     rng = np.random.default_rng(seed)
     root = rng.normal(size=(NV, NV))
     M = root @ root.T + np.eye(NV)
@@ -50,7 +50,7 @@ def drawn(seed: int, size: float, bound: float) -> Asked:
 
 
 def excess(given: Asked, change: Array) -> float:
-    """Return by how much a + change is beyond limits, relative to what they permit."""
+    """Return the excess of a + change over its limits, relative to their range."""
     a, effort = given.a + change, given.effort + given.M @ change
     beyond = np.maximum(a - given.bounds.upper, given.bounds.lower - a)
     found = [0.0, *(np.abs(effort) / given.permitted.effort - 1.0)]
@@ -62,14 +62,14 @@ def excess(given: Asked, change: Array) -> float:
 
 
 def times_permitted(given: Asked, x: Array) -> float:
-    """Return how many times what limits permit an acceleration is."""
+    """Return the ratio of an acceleration to its bound."""
     efforts = np.abs(given.M @ x) / given.permitted.effort
     motions = np.abs(x) / given.permitted.acceleration
     return float(max(1.0, efforts.max(), motions.max()))
 
 
 def called(given: Asked) -> Asked:
-    """Return what the call makes of it."""
+    """Return the result of the call for a request."""
     a, effort, lower = given.a.copy(), given.effort.copy(), given.barred.lower.copy()
     made = given._replace(a=a, effort=effort, barred=Barred(given.barred.A, lower))
     planned([limited_target(*made)]).run(0.0)
@@ -78,7 +78,8 @@ def called(given: Asked) -> Asked:
 
 @given(seeds, st.floats(0.1, 1e4))
 def test_it_is_the_plain_formula(seed: int, size: float) -> None:
-    """E_t/2 of the step is the damped law's, of a field 1/min(1 + E, r) is left."""
+    """E_t/2 of the step is the damped law's; a factor 1/min(1 + E, r) of a field
+    remains."""
     asked = drawn(seed, size, 10.0)
     law, damped, own, own_damped, braking, braking_damped = asked.parts
     beyond = min(excess(asked, -own), excess(asked, np.zeros(NV)))
@@ -101,7 +102,7 @@ def test_it_is_the_plain_formula(seed: int, size: float) -> None:
 
 @given(seeds)
 def test_within_limits_nothing_changes(seed: int) -> None:
-    """Whatever the damped law and a field demand."""
+    """For any demand of the damped law and of a field."""
     asked = drawn(seed, 1e4, 10.0)
     asked.a[:] = 0.0
     asked.effort[:] = 0.0
@@ -110,14 +111,12 @@ def test_within_limits_nothing_changes(seed: int) -> None:
 
 @given(seeds, st.floats(1e-6, 3.0))
 def test_no_more_is_lost_than_is_beyond(seed: int, beyond: float) -> None:
-    """Of a field's demand against tasks E/(1 + E) is lost where a is E beyond.
-
-    What loses more where it begins to violate a limit swings from one side of it to the
-    other.
+    """A field's demand against tasks loses E/(1 + E) where a exceeds its limit by E. A
+    larger loss at the onset of a violation makes the step oscillate about the limit.
     """
     asked = drawn(seed, 1.0, 10.0)
     most = times_permitted(asked, 1e6 * asked.a) / 1e6
-    permitted = asked.a / most  # as much as the limits permit
+    permitted = asked.a / most  # at the limits
     a, field = (1.0 + beyond) * permitted, (5.0 + beyond) * permitted
     zero = np.zeros(NV)
     opposed = asked._replace(
@@ -132,7 +131,7 @@ def test_no_more_is_lost_than_is_beyond(seed: int, beyond: float) -> None:
 
 
 def test_an_excess_without_end_leaves_finite_numbers() -> None:
-    """A joint without a range permits no acceleration: it is 0, or beyond wholly."""
+    """A joint of range 0 permits no acceleration: a is 0, or entirely beyond."""
     asked = drawn(0, 1.0, 10.0)
     asked.permitted.acceleration[0] = 0.0
     asked.bounds.upper[0] = asked.a[0] - 1.0

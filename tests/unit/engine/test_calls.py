@@ -1,4 +1,4 @@
-"""Kinds, calls and plans of the engine: what is checked, what is kept, what is made."""
+"""Kinds, calls and plans of the engine: checks, lifetimes, and construction."""
 
 import copy
 import gc

@@ -1,4 +1,4 @@
-"""Which library the engine is: the installed one, or the one that HSP_ENGINE names."""
+"""The engine's library: the installed one, or that of HSP_ENGINE."""
 
 import os
 import shutil

@@ -1,6 +1,5 @@
-"""Misuse of the engine from Python: it is refused, or harmless, and never memory.
-
-Calls that may end a process are tried in another one.
+"""Misuse of the engine from Python is refused or harmless, never a memory error. Calls
+that may end a process run in another one.
 """
 
 import gc
@@ -113,7 +112,7 @@ def try_kinds(trace: Path, rounds: int) -> None:
     done = 0
     for kind in kinds:
         if kind.name in ("EqualSteps", "Periods"):
-            continue  # they repeat as often as their numbers require
+            continue  # their arguments determine how often they repeat
         for seed in range(rounds):
             trace.write_text(f"{kind.name} with the seed {seed}")
             try:
@@ -146,7 +145,7 @@ def alone(
 
 @pytest.mark.process
 def test_no_sizes_and_no_indices_reach_memory_of_something_else(tmp_path: Path) -> None:
-    """With Eigen's assertions each wrong index ends it; without, many of them do."""
+    """With Eigen's assertions every wrong index ends the process; without, many do."""
     trace = tmp_path / "trace"
     ran = alone(
         """

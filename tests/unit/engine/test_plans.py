@@ -1,4 +1,4 @@
-"""Plans of parts' calls: their arguments by name, and what supplies these."""
+"""Plans of parts' calls: arguments by name, and the calls that write them."""
 
 import numpy as np
 import pytest

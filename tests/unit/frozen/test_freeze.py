@@ -198,7 +198,7 @@ def test_a_kind_of_ones_own_is_found_in_its_library(
 def test_rows_of_barriers_and_of_static_efforts(
     static: Any, replay: Path, tmp_path: Path
 ) -> None:
-    """Rows that Python's step writes when they are needed have their room here."""
+    """Rows that Python writes on demand have memory in the file."""
     robot = hsp.Robot.load("panda")
     q = robot.home()
     wrist = robot.state(0.0, q, np.zeros(7)).position("panda_link6")
@@ -223,7 +223,7 @@ def test_rows_of_barriers_and_of_static_efforts(
 
 @pytest.mark.process
 def test_every_bundled_configuration(replay: Path, tmp_path: Path) -> None:
-    """Those that are frozen give the same bits; the others are refused with a key."""
+    """Configurations that can be frozen give the same bits; others name the key."""
     refused = {}
     for name in bundled_configs():
         experiment = hsp.load_experiment(name)
@@ -241,7 +241,7 @@ def test_every_bundled_configuration(replay: Path, tmp_path: Path) -> None:
             np.testing.assert_array_equal(
                 replayed(replay, frozen, states), computed(controller, states), name
             )
-    # what presses, walks, or changes while it runs
+    # those that press, walk, or change at run time
     folders = {name.split("/")[0] for name in refused}
     assert folders == {"compliance", "forces", "walking", "whole_body"}
     assert len(refused) == 10

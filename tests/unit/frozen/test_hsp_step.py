@@ -120,7 +120,7 @@ def test_what_is_wrong_behind_a_right_checksum_is_no_crash(
 def test_a_changed_file_that_opens_steps_and_stops(
     frozen: Path, q: np.ndarray, tmp_path: Path
 ) -> None:
-    """Numbers may be any behind a right checksum: a status reports it, and no crash."""
+    """Random numbers with a valid checksum: a status is returned, no crash."""
     content, other = frozen.read_bytes(), tmp_path / "other.hsp"
     rng = np.random.default_rng(SEED)
     stepped = 0
@@ -155,7 +155,7 @@ def test_a_number_has_one_type(frozen: Path, tmp_path: Path) -> None:
 def test_a_step_repeats_nothing_as_often_as_a_file_says(
     frozen: Path, tmp_path: Path
 ) -> None:
-    """Kinds that do so are those of simulations, which no file may have."""
+    """Kinds that may loop forever are those of simulations, not permitted in files."""
     content, other = frozen.read_bytes(), tmp_path / "other.hsp"
     for kind in (b"EqualSteps", b"Periods"):
         named = len(kind).to_bytes(4, "little") + kind
@@ -226,7 +226,7 @@ def test_a_wrong_state_is_refused_with_the_last_effort(
 ) -> None:
     v = np.zeros(7)
     assert opened.step(0.0, np.full(7, np.nan), v) == WRONG_STATE
-    np.testing.assert_array_equal(opened.tau, np.zeros(7))  # there was none yet
+    np.testing.assert_array_equal(opened.tau, np.zeros(7))  # there was no effort yet
     assert opened.step(0.0, q, v) == OK
     assert opened.error == ""
     last = opened.tau.copy()
@@ -327,7 +327,7 @@ def test_two_handles_do_not_know_of_each_other(frozen: Path, q: np.ndarray) -> N
 
 
 def test_two_threads_in_one_handle_are_told(opened: Opened, q: np.ndarray) -> None:
-    """A step is refused or whole: ctypes lets both threads run at once."""
+    """A concurrent step is refused or complete: ctypes releases the GIL."""
     found: list[int] = []
 
     def steps() -> None:

@@ -36,7 +36,7 @@ def run(
     steps: range,
     changes: dict[int, Callable[[float], object]],
 ) -> None:
-    """Step both, and compare; changes are made after a step, with its time."""
+    """Step both and compare; changes are made after a step, at its time."""
     q = controller._declared.start
     assert q is not None
     for k in steps:
@@ -80,7 +80,7 @@ def test_gains_and_the_null_space_gain(ramp: float, tmp_path: Path) -> None:
 @pytest.mark.parametrize("ramp", [0.0, 0.02])
 @pytest.mark.parametrize("fields", [1, 2])
 def test_weights_of_fields(fields: int, ramp: float, tmp_path: Path) -> None:
-    """Also while one that goes on is not over, to nothing, and of one field alone."""
+    """Also during an earlier change, to zero, and for a single field."""
     robot = hsp.Robot.load("panda")
     reach = hsp.Manipulability("panda_tcp")
     field = hsp.JointCentering() + 0.3 * reach if fields == 2 else hsp.JointCentering()
@@ -214,7 +214,7 @@ def test_payloads_are_taken_up_and_put_down(
     heavy = carry(2.0, [0.01, -0.02, 0.1], [0.01, 0.012, 0.009])
     light = carry(0.3, [0.0, 0.01, 0.05], [0.0, 0.0, 0.0])
     nothing = carry(0.0, [0.0, 0.0, 0.0], [0.0, 0.0, 0.0])
-    # also while another is taken up, twice the same, and none after none
+    # also during another change, the same one twice, and none after none
     changes = {
         3: heavy,
         8: light,
@@ -229,7 +229,7 @@ def test_payloads_are_taken_up_and_put_down(
 
 
 def test_an_observer_has_the_model_of_the_step(tmp_path: Path) -> None:
-    """Its own evaluation comes before the law's, in Python as without it."""
+    """The model is evaluated before the law, in Python as without it."""
     experiment = hsp.load_experiment("panda_limits")
     observer = hsp.compensation.MomentumObserver(30.0)
     observed = hsp.compensation.Compensation(momentum_observer=observer)
@@ -270,7 +270,7 @@ def test_gravity(ramp: float, tmp_path: Path) -> None:
 
     changes = {4: tilt([1.0, 0.5, -9.6]), 15: tilt([0.0, 0.0, -1.62])}
     run(controller, opened, range(60), changes)
-    assert LIB.hsp_restart(opened.handle) == OK  # the model is that of the file, too
+    assert LIB.hsp_restart(opened.handle) == OK  # the file's model is used, too
     other = hsp.load_experiment("panda_limits").controller.preview()
     run(other, opened, range(5), {})
 
@@ -279,7 +279,7 @@ def test_a_new_run_carries_nothing(tmp_path: Path) -> None:
     controller, opened = pair("panda_limits", tmp_path)
     body = said(1.0, [0.0, 0.0, 0.1], [0.0, 0.0, 0.0])
     frame = next(at for at in opened.ports if at.endswith(".payload"))
-    assert opened.set(frame, body) == OK  # before the first step: from the beginning
+    assert opened.set(frame, body) == OK  # before the first step: active from the start
     controller.at(-1.0).ramp(0.0).payload(frame.split(".")[0], 1.0, [0.0, 0.0, 0.1])
     run(controller, opened, range(5), {})
     assert LIB.hsp_restart(opened.handle) == OK
@@ -293,7 +293,7 @@ def test_a_new_run_carries_nothing(tmp_path: Path) -> None:
         (-1.0, [0.0, 0.0, 0.0]),
         (np.nan, [0.0, 0.0, 0.0]),
         (1e300, [0.0, 0.0, 0.0]),
-        (1.0, [0.1, 0.1, 0.3]),  # more about one axis than about both others
+        (1.0, [0.1, 0.1, 0.3]),  # one moment exceeds the sum of the others
         (1.0, [-0.1, 0.1, 0.1]),
         (0.0, [0.1, 0.1, 0.1]),  # without mass
     ],
