@@ -1,4 +1,4 @@
-"""Mutants are made of any code, and their runner reports the outcomes truly."""
+"""Mutants of any code, and the outcomes that their runner reports."""
 
 from pathlib import Path
 
@@ -82,7 +82,7 @@ def test_an_edit_is_of_the_text_that_it_was_made_for() -> None:
     ],
 )
 def test_the_tests_of_a_room_are_asked_first(file: str, first: str) -> None:
-    if (ROOT / first).is_dir():  # companions may have been taken away
+    if (ROOT / first).is_dir():  # companions may have been removed
         assert mutants.tests_of(file)[0] == first
 
 
@@ -112,7 +112,7 @@ def mutant(old: str, new: str, tests: str) -> Mutant:
 
 @pytest.fixture
 def checkout(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """Return a folder with one function and one test, which is the fast one, too."""
+    """Return a folder with one function and one test, also listed as the fast one."""
     (tmp_path / "code_under_test.py").write_text(CODE)
     (tmp_path / "test_area.py").write_text(TESTS)
     monkeypatch.setattr(mutants, "FAST", ("test_area.py",))
@@ -124,7 +124,7 @@ def checkout(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 def test_the_runner_tells_who_was_caught(
     number: int, checkout: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """Each is tried alone, and the code is afterwards what it was."""
+    """Mutants are tried one at a time; the code is restored afterwards."""
     tests = "test_area.py"
     tried = [
         mutant("a * b", "0.5 * a * b", tests),

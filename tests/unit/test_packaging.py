@@ -31,7 +31,7 @@ IN_CONDA = {
     "cmeel-eigen": "eigen",
     "cmeel-boost": "libboost-headers",
 }
-"""Names in conda-forge of packages that have another one on PyPI."""
+"""Names in conda-forge of packages that are named differently on PyPI."""
 
 
 def conda_form(text: str) -> str:
@@ -58,7 +58,7 @@ def test_conda_requires_what_pip_does() -> None:
         for pattern in PROJECT["project"]["license-files"]
         for file in ROOT.glob(pattern)
     }
-    told = recipe["about"]["license_file"]  # also of companions that were taken away
+    told = recipe["about"]["license_file"]  # also of removed companions
     assert {each for each in told if (ROOT / each).parents[1].is_dir()} == licenses
 
 

@@ -112,10 +112,10 @@ MISTAKES: dict[str, tuple[Callable[..., None], str]] = {
 
 @pytest.mark.parametrize("mistake", MISTAKES)
 def test_a_wrong_task_is_named(mistake: str) -> None:
-    task_class, words = MISTAKES[mistake]
+    wrong, words = MISTAKES[mistake]
     first_step(Height(right))
     with pytest.raises(RateError) as caught:
-        first_step(Height(mistake))
+        first_step(Height(wrong))
     message = str(caught.value)
     assert message.startswith("tasks.Height: task 'Height': ")
     assert words in message

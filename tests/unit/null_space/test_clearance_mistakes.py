@@ -1,4 +1,4 @@
-"""Check that wrong shapes, obstacles and starts in contact are refused by name."""
+"""Wrong shapes, obstacles and starts in contact are refused by name."""
 
 import json
 import re
@@ -29,7 +29,7 @@ BALL = Obstacle("ball", Sphere(0.1), Hold([0.5, 0.3, 0.5]))
 
 
 def on(robot: Robot, field: NullSpaceField) -> NullSpaceField:
-    """Place a field on a robot at rest at home, beside the ball."""
+    """Place a field on a robot at rest at home, near the ball."""
     return placed(field, still(robot), [BALL])
 
 
@@ -97,7 +97,7 @@ TOUCHING = {
 
 
 def test_a_start_in_contact_is_refused_where_the_configuration_says_so() -> None:
-    """A barrier cannot push out what is inside already; pair and depth are named."""
+    """A barrier cannot resolve an initial contact; pair and depth are named."""
     with pytest.raises(SceneError) as caught:
         load_experiment(TOUCHING)
     robot = load("panda")

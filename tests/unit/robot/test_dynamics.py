@@ -1,4 +1,4 @@
-"""The engine's dynamics beside Pinocchio's own bindings, for robots of every kind.
+"""The engine's dynamics against Pinocchio's bindings, for robots of every kind.
 
 Both run the same algorithms, compiled with other flags: they agree to rounding.
 """
@@ -44,7 +44,7 @@ def chain_with(joint: object) -> pin.Model:
 
 
 def compare(model: pin.Model, q: Array, v: Array, a: Array) -> None:
-    """Check every call of the engine at a state; Pinocchio's own data are new."""
+    """Check every call of the engine at a state, with new Pinocchio data."""
     nv, x = model.nv, model.nvExtended
     own, data = dynamics_of(model), model.createData()
     near = {"rtol": 1e-11, "atol": 1e-11 * max(1.0, float(np.abs(v).max())) ** 2}
@@ -159,7 +159,7 @@ def test_numbers_that_are_no_robot_are_refused() -> None:
 
 
 def test_dynamics_are_those_of_the_model_as_it_is_now() -> None:
-    """Whose numbers are read once, and again after each change."""
+    """The model's numbers are read once, and again after a change."""
     robot = Robot.load("panda")
     q, zero = robot.home(), np.zeros(7)
 

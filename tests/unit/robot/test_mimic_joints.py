@@ -1,4 +1,4 @@
-"""Followers of all kinds load; what bounds and brakes them does so their leaders."""
+"""Mimic joints of all kinds; their limits and friction apply to their leaders."""
 
 import itertools
 import logging
@@ -101,7 +101,7 @@ def test_what_is_wider_than_the_leaders_limits_does_not_count(
 def test_limits_that_contradict_are_named(
     write: Write, caplog: pytest.LogCaptureFixture
 ) -> None:
-    """Such grippers exist, and their leaders move."""
+    """Such grippers exist; their leaders move within their own limits."""
     limits = 'lower="4" upper="5" effort="9" velocity="9"'
     with caplog.at_level(logging.WARNING):
         robot = Robot.load(write(pair(1.0, limits)))
@@ -133,7 +133,7 @@ def test_a_chain_is_bounded_by_all_of_it(write: Write) -> None:
 
 
 def test_a_leader_that_comes_late_keeps_its_name(write: Write) -> None:
-    """Its angle is q; it has its limits, and its frame is where it is."""
+    """q is its angle; limits and frame are its own."""
     path = write(TEXTS["follower first"])
     robot, free = Robot.load(path), Robot.load(path, mimic=False)
     assert robot.joint_names == ("shoulder", "elbow", "wrist")
@@ -165,7 +165,8 @@ def test_a_leader_that_comes_late_keeps_its_name(write: Write) -> None:
 def test_what_gravity_takes_of_a_leader_counts_its_followers(
     kinds: tuple[str, str], multiplier: float, write: Write
 ) -> None:
-    """The limit on it: its bound holds, and its rows are G'' along the motion."""
+    """A limit on the follower: its bound holds, and its rows are G'' along the
+    motion."""
     leader, follower = kinds
     path = write(
         chain(
@@ -191,6 +192,6 @@ def test_what_gravity_takes_of_a_leader_counts_its_followers(
     rate = (room(h) - room(-h)) / (2.0 * h)
     second = (room(h) - 2.0 * room(0.0) + room(-h)) / h**2
     barrier = second + 2.0 * alpha * rate + alpha**2 * room(0.0)
-    # Differences of differences, of numbers about 2: rounding and truncation.
+    # Second differences of numbers near 2: rounding and truncation.
     expected = barrier[gravity > 1e-3]
     np.testing.assert_allclose(A @ a - b, expected, rtol=0.0, atol=1e-3)

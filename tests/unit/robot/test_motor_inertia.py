@@ -1,4 +1,4 @@
-"""Rotors in the model: given, bundled or from a URDF, and what keeps them."""
+"""Rotor inertia in the model: given, bundled or from a URDF, and kept in copies."""
 
 from pathlib import Path
 from typing import Any

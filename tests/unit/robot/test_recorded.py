@@ -64,7 +64,7 @@ def all_joints() -> hsp.Robot:
 
 
 def followers() -> hsp.Robot:
-    """Followers of each kind of joint, of a leader that turns often, and a whole."""
+    """Followers of every joint type, of a multi-turn leader, and of a free joint."""
     rng = np.random.default_rng(2)
     kinds = [
         (pin.JointModelRX(), None),
@@ -92,7 +92,7 @@ def followers() -> hsp.Robot:
 
 
 def one_of_many() -> hsp.Robot:
-    """A joint of three slides, one after the other, beside one that turns."""
+    """A joint of three slides in series, next to a revolute one."""
     table = pin.JointModelComposite()
     pose = pin.exp6(pin.Motion(0.2 * np.arange(6.0)))
     for kind in (pin.JointModelPX(), pin.JointModelPY(), pin.JointModelPZ()):
@@ -107,7 +107,7 @@ def one_of_many() -> hsp.Robot:
 
 
 def tilted() -> hsp.Robot:
-    """A joint that turns often about its own axis, and one that it leads."""
+    """A multi-turn joint about a general axis, and its follower."""
     joints = "".join(
         f'<joint name="j{k}" type="continuous"><parent link="l{k}"/>'
         f'<child link="l{k + 1}"/><axis xyz="{axis}"/>'
@@ -138,7 +138,7 @@ ROBOTS = {
 
 
 def equal(one: hsp.Robot, other: hsp.Robot) -> None:
-    """The same motion of the same frames, to the last bit."""
+    """The same motion of the same frames, bit for bit."""
     assert one.frame_names == other.frame_names
     assert one.dof_names == other.dof_names
     assert one.end_effector == other.end_effector
@@ -164,7 +164,7 @@ def test_a_record_is_the_robot(kind: str) -> None:
 
 
 def copied(folder: Path) -> Path:
-    """Return a URDF of one's own: a bundled one in another folder."""
+    """Return a user's URDF: a bundled one in another folder."""
     source = hsp.Robot.load("planar3r").source.urdf
     folder.mkdir(exist_ok=True)
     return Path(shutil.copy(source, folder / "mine.urdf"))
@@ -288,7 +288,7 @@ def vertices(robot: hsp.Robot) -> list[Array]:
 
 
 def test_a_log_contains_the_meshes_of_somebodys_robot(tmp_path: Path) -> None:
-    """Its shapes are drawn, and distances measured, where its files are not."""
+    """Without its files, its shapes are drawn and distances measured."""
     urdf = with_meshes(tmp_path)
     robot = hsp.Robot.load(urdf)
     record = json.loads(json.dumps(robot_record(robot)))
@@ -299,7 +299,7 @@ def test_a_log_contains_the_meshes_of_somebodys_robot(tmp_path: Path) -> None:
     assert len(before) == 2
     np.testing.assert_array_equal(vertices(again), before)
     assert not any(visual.missing for visual in read_visuals(again))
-    # And a log of what was replayed contains them, too.
+    # A log of the replayed run contains them, too.
     assert robot_record(again)["parts"][0]["meshes"] == record["parts"][0]["meshes"]
 
 
@@ -342,7 +342,7 @@ RED = bytes.fromhex(
 
 
 def test_a_mesh_is_recorded_with_the_files_that_are_drawn_of_it(tmp_path: Path) -> None:
-    """A Collada file's picture and a glTF file's buffer are files of their own."""
+    """A Collada file's texture and a glTF file's buffer are separate files."""
     urdf = with_meshes(tmp_path)
     folder = urdf.parent / "meshes"
     (urdf.parent / "pictures").mkdir()
@@ -376,7 +376,7 @@ def test_a_mesh_is_recorded_with_the_files_that_are_drawn_of_it(tmp_path: Path) 
     assert seen[1].mesh is not None
     np.testing.assert_array_equal(gltf_again.mesh[0], seen[1].mesh[0])
     np.testing.assert_array_equal(vertices(again), felt)
-    # And a log of what was replayed is the same.
+    # A log of the replayed run is the same.
     assert robot_record(again)["parts"][0] == record["parts"][0]
 
 

@@ -1,4 +1,4 @@
-"""Xacro files: expanded where xacro is installed, else an exact message."""
+"""Xacro files: expanded if xacro is installed, otherwise an exact message."""
 
 import sys
 from pathlib import Path
@@ -28,7 +28,7 @@ class ArgumentMissingError(Exception):
 
 @pytest.fixture
 def xacro(monkeypatch: pytest.MonkeyPatch) -> ModuleType:
-    """A stand-in for xacro: it knows arguments and $(find), and nothing else."""
+    """A stand-in for xacro, with arguments and $(find) only."""
     package, args = ModuleType("xacro"), ModuleType("xacro.substitution_args")
 
     def process_file(name: str, mappings: dict[str, str]) -> minidom.Document:

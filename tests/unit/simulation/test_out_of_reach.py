@@ -1,4 +1,4 @@
-"""Rows of a log in which a target is far away, or out of reach, are found."""
+"""Rows of a log with a distant or unreachable target are detected."""
 
 from typing import Any
 
@@ -32,7 +32,7 @@ def found(columns: dict[str, Any]) -> Unreached:
 
 
 def test_an_error_that_stays_is_out_of_reach() -> None:
-    """From when it has rested so long: a step begins at rest, too."""
+    """From the time at which it has rested long enough: a step begins at rest, too."""
     task = found(log())
     assert not task.out[:STAY].any()
     assert (task.out[STAY + 1 :] == 0.31).all()
@@ -55,7 +55,7 @@ def test_what_moves_is_on_its_way() -> None:
     assert far.words(0) == ""
     assert far.words(-1) == "target far away"
     pushed = np.zeros((len(T), 6))
-    pushed[50] = 1.0  # it has to rest again
+    pushed[50] = 1.0  # it must rest anew
     out = found(log(task__hand__error_rate=pushed)).out
     assert out[49] == out[-1] == 0.31
     assert not out[50 : 50 + STAY].any()

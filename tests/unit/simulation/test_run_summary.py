@@ -1,4 +1,4 @@
-"""Sentences of a run's table, for invented numbers."""
+"""Sentences of a run's table, for given numbers."""
 
 from typing import Any
 
@@ -81,7 +81,7 @@ def test_a_task_that_goes_is_summarised_by_the_rows_in_which_it_was_there() -> N
     assert found["tracking.elbow.rms"].value == pytest.approx(rms)
     assert found["tracking.elbow.end"].value == active[-1]
     assert f"at the end {active[-1]:.3g} m" in text
-    # Determinants of one task and of two do not compare; singular values do.
+    # Determinants of one task and of two are not comparable; singular values are.
     assert np.isnan(found["manipulability.min"].value)
     least = np.nanmin(run["singular_values"])
     assert found["singular_value.min"].value == least
@@ -126,7 +126,7 @@ def test_an_own_barrier_is_logged_by_its_type() -> None:
     assert run["barrier.Height_0"] == pytest.approx(height, abs=1e-12)
     assert run.meta["columns"]["barrier.Height_1"]["minimum"] == 0.2
     fresh = hsp.Controller(panda, [hsp.FramePosition("panda_tcp")], limits=limits)
-    for row in (0, 1):  # the second is bound: one call of the engine
+    for row in (0, 1):  # the second step is bound: one call of the engine
         output = fresh.compute(run.t[row], run.q[row], run.v[row])
         now = pytest.approx(height[row], abs=1e-12)
         assert output.distances == {"Height_0": now, "Height_1": now}

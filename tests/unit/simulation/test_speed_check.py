@@ -1,4 +1,4 @@
-"""Whether joints are fast enough for references: the least share of their speeds."""
+"""Joint speeds that references require, as fractions of the joints' limits."""
 
 import numpy as np
 import pytest
@@ -12,7 +12,8 @@ from hsp_control.trajectories import Along
 
 @pytest.mark.parametrize("seed", range(5))
 def test_the_least_share_is_that_of_the_best_self_motion(seed: int) -> None:
-    """A Panda's hand leaves one free direction, along which the shares are scanned."""
+    """A Panda's hand pose leaves one self-motion, over which fractions are
+    minimised."""
     robot, rng = hsp.Robot.load("panda"), np.random.default_rng(seed)
     q = robot.home() + rng.normal(size=7) * 0.2
     limit, rate = rng.uniform(1.0, 3.0, 7), 3.0 * rng.normal(size=6)
@@ -43,7 +44,7 @@ def test_what_is_too_fast_is_said_with_place_joint_and_speed(rows: str) -> None:
     (found,) = said(4.0, rows)
     assert found.share > 1.01
     assert found.unit == "m/s"
-    assert found.speed == pytest.approx(4.0)  # constant, but for its rise
+    assert found.speed == pytest.approx(4.0)  # constant, except for the ramp
     assert f"moves at 4 m/s at t = {found.t:.3g} s, for which 'panda_joint" in (
         found.message
     )

@@ -1,4 +1,4 @@
-"""Placing: what a task leaves to the robot and its start becomes numbers and names."""
+"""Placing: omitted fields of a task are completed from the robot and its start."""
 
 from collections.abc import Callable
 from typing import Any
@@ -110,7 +110,7 @@ TASKS: dict[str, Task] = {
      "pointing, turning", "relative, blended"],
 )  # fmt: skip
 def test_what_is_omitted_is_where_the_robot_starts(name: str) -> None:
-    """The error is zero there, or as large as the circle that has not yet blended."""
+    """The error is zero there, or the circle's radius before its blend."""
     here = state()
     placed = place(TASKS[name], here)
     error = placed.evaluate(here).error
@@ -152,7 +152,7 @@ def test_a_point_trajectory_of_a_pose_holds_the_orientation() -> None:
     world = Circle(0.1, 2.0, POINT)
     placed = place(FramePose(trajectory=world), here)
     assert placed.trajectory == ComposedPose(world, HoldOrientation(R))
-    # As the same with a pose; for a relative pose, in the reference's axes.
+    # The same as with a pose; for a relative pose, in the reference's axes.
     said = FramePose(trajectory=ComposedPose(position=world))
     assert place(said, here) == placed
     relative = seen(here, TCP, "panda_link2")
@@ -160,7 +160,7 @@ def test_a_point_trajectory_of_a_pose_holds_the_orientation() -> None:
     assert placed.trajectory == ComposedPose(
         Circle(0.1, 2.0, relative.translation), HoldOrientation(relative.rotation)
     )
-    # Its six rows obey what those of the composed pose do.
+    # Its six rows obey the same equation as those of the composed pose.
     for t in (0.0, 0.4):
         at = panda().state(t, here.q, here.v)
         sample = placed.evaluate(at)
@@ -258,7 +258,7 @@ def test_postures_are_given_in_four_ways(name: str, root: Any) -> None:
 
 
 def test_the_first_state_is_the_start_unless_one_is_given() -> None:
-    """Until then the robot's home stands for it; `restart` begins anew."""
+    """Before that the robot's home replaces it; `restart` begins anew."""
     robot, first, second = panda(), state(seed=1), state(seed=2)
     at_home = robot.state(0.0, robot.home(), np.zeros(7))
     free = Controller(robot, [FramePosition()])
@@ -320,7 +320,7 @@ def test_too_many_rows_are_told_with_the_robot() -> None:
 
 
 class Doubled(FramePosition):
-    """A user's task that overrides `evaluate` and calls the one that it replaces."""
+    """A user's task that overrides `evaluate` and calls the base class's."""
 
     def evaluate(
         self, state: RobotState, out: TaskSample | None = None, feedback: Any = None
@@ -332,7 +332,7 @@ class Doubled(FramePosition):
 
 
 def test_a_subclass_may_call_the_evaluate_that_it_overrides() -> None:
-    """At the same state as the task that it derives from, and in a controller."""
+    """Equal to its base class at the same state, and in a controller."""
     here = state()
     plain, doubled = (
         place(FramePosition(TCP, Hold(POINT))),

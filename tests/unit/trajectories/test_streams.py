@@ -37,7 +37,7 @@ POLICIES = ("latest", "interpolate", "extrapolate")
 def sampled(
     stream: Any, duration: float, feed: Callable[[float], object] = lambda t: None
 ) -> list[Any]:
-    """Return the samples of a run, in which ``feed`` sends what comes at each time."""
+    """Return the samples of a run; ``feed`` sends the messages of every time."""
     samples = []
     for k in range(round(duration / H) + 1):
         feed(k * H)
@@ -168,7 +168,7 @@ def test_the_reference_passes_waypoints_at_their_time(policy: Any) -> None:
     x, _, acceleration = columns(sampled(stream, 2.0, feed))
     for t in times[10:-6]:  # after it has caught up
         k = round((t + 0.15) / H)
-        # A message is taken at the first sample after it came: the clocks differ by it.
+        # A message is read at the first sample after its arrival: the clocks' offset.
         assert np.abs(x[k] - circle(t)).max() < 3 * H * 0.2
     assert np.abs(acceleration[1000:3500]).max() < 0.6  # a circle's is 0.4
 
@@ -179,7 +179,7 @@ def test_lost_and_jittered_waypoints_in_any_order_change_little() -> None:
     events = []
     for t in np.arange(0.05, 2.0, 0.05):
         if rng.random() > 0.05:
-            late = t + rng.uniform(0.0, 0.07)  # later than the next one, at times
+            late = t + rng.uniform(0.0, 0.07)  # sometimes after the next one
             events.append((late, lambda t=t: stream.run.send(circle(t), t=t)))
     x, _, _ = columns(sampled(stream, 2.0, at_times(*events)))
     t = H * np.arange(len(x))
@@ -233,7 +233,7 @@ def test_a_twist_turns_the_hand_about_a_fixed_axis_until_it_is_silent() -> None:
     samples = sampled(stream, 1.5, feed)
     moving, still = samples[round(0.8 / H)], samples[-1]
     assert np.allclose(moving.position.velocity, twist[:3], atol=1e-9)
-    # Each change of velocity aims at ω to second order; the next message completes it.
+    # A change of velocity reaches ω to second order; the next message completes it.
     assert np.allclose(moving.orientation.angular_velocity, twist[3:], atol=1e-5)
     assert not still.position.velocity.any()
     assert not still.orientation.angular_velocity.any()
@@ -245,7 +245,7 @@ def test_a_chunk_replaces_the_rest_of_the_one_before() -> None:
     feed = at_times(
         (0.1, lambda: stream.run.send_chunk((0.2 * times)[:, None], times, t=0.1)),
         (0.2, lambda: stream.run.send_chunk((-0.1 * times)[:, None], times, t=0.2)),
-        # An old chunk that arrives late does not count.
+        # An old chunk that arrives late is ignored.
         (0.25, lambda: stream.run.send_chunk((9.0 + times)[:, None], times, t=0.15)),
     )
     x, _, _ = columns(sampled(stream, 1.0, feed))
@@ -271,7 +271,7 @@ def test_silence_holds_and_then_stops_with_the_time() -> None:
 
 
 def test_the_sender_s_clock_is_found_and_may_start_again() -> None:
-    """Waypoints are passed when they were meant to be, after the delay."""
+    """Waypoints are passed at their times plus the delay."""
     bounds = {"speed": 1e3, "acceleration": 1e4, "jerk": 1e6}
     stream = Stream([0.0], delay=2.0, **bounds).anchored(None)
     # The fastest message takes 0.01 s; the first arrives before that is known.
@@ -290,7 +290,8 @@ def test_the_sender_s_clock_is_found_and_may_start_again() -> None:
 
 @pytest.mark.parametrize("policy", POLICIES)
 def test_room_is_made_for_all_waypoints(policy: str) -> None:
-    """Those of large chunks and of many messages, beside a stream that has it."""
+    """Memory grows for large chunks and many messages; the reference has enough of
+    it."""
     rng = np.random.default_rng(59)
     streams = [Stream([0.0, 0.0], policy=policy, delay=1.0).anchored(None)]
     streams.append(copy.deepcopy(streams[0]))
@@ -314,7 +315,8 @@ def test_room_is_made_for_all_waypoints(policy: str) -> None:
 
 
 def test_earlier_times_are_known_while_a_step_begins_many_pieces() -> None:
-    """Of more pieces than a step can keep, the last are, and the others are named."""
+    """If a step has more pieces than it can store, the last are kept, others
+    reported."""
     stream = Stream([0.0]).anchored(None)
     stream.sample(0.0)
     times = 0.02 * (1 + np.arange(25))
@@ -360,7 +362,7 @@ def test_a_new_run_begins_anew_and_hears_only_what_is_new() -> None:
     x, _, _ = columns(sampled(second, 1.0))
     assert not x.any()
     assert not second.run.record
-    first.run.send([0.2])  # nobody has taken it
+    first.run.send([0.2])  # not read yet
     third = stream.anchored(None)
     third.run.follow(second.run)
     x, _, _ = columns(sampled(third, 1.0))
@@ -446,7 +448,7 @@ def state_of(stream: Any, t: float) -> bytes:
 
 
 def test_a_pickle_brakes_where_its_original_does() -> None:
-    """A motion to a goal that moves ends before Ruckig's does, if no message comes."""
+    """Without messages, a motion to a moving goal ends before Ruckig's does."""
     stream = Stream([0.0], policy="extrapolate", jerk=2.0, speed=5.0).anchored(None)
     feed = at_times(
         *(
@@ -467,7 +469,7 @@ def test_a_pickle_takes_what_waits_and_not_what_was_taken() -> None:
     again, copied = pickle.loads(pickle.dumps(stream)), copy.deepcopy(stream)
     for t in np.arange(0.11, 1.0, 0.01):
         stream.sample(t)
-    # The original has taken it meanwhile; this copy has not yet.
+    # The original has read it already; this copy has not.
     behind = pickle.loads(pickle.dumps(copied))
     for each in (again, behind):
         each.sample(0.2)
