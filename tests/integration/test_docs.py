@@ -40,7 +40,7 @@ def test_the_readme_s_python_is_short() -> None:
 
 
 def commands(text: str) -> list[list[str]]:
-    """Return the words behind `hsp` of each command in a page's shell blocks."""
+    """Return the words after `hsp` of the commands in a page's shell blocks."""
     shell = "".join(blocks(text, "sh") + blocks(text, "text")).replace("\\\n", " ")
     found = (
         re.match(r"(?:\$ |\.venv/bin/)?hsp ((?:\S[#>&|]|[^#>&|])*)", line.strip())

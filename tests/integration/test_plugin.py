@@ -14,14 +14,14 @@ EXAMPLE = ROOT / "examples" / "plugin"
 
 @pytest.fixture(scope="module")
 def installed(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Return the folder in which the example is installed, and nothing else."""
+    """Return a folder with only the installed example."""
     folder = tmp_path_factory.mktemp("installed")
     source = tmp_path_factory.mktemp("source") / "plugin"
     copy = ["cp", "-r", str(EXAMPLE), str(source)]  # a build leaves files behind
     subprocess.run(copy, check=True)
     offline = ["--no-deps", "--no-index", "--no-build-isolation", "--quiet"]
     pip = [sys.executable, "-m", "pip", "install", *offline]
-    # pip refuses constraints for a build that uses what is there.
+    # pip refuses constraints for a build without isolation.
     own = {k: v for k, v in os.environ.items() if k != "PIP_BUILD_CONSTRAINT"}
     subprocess.run([*pip, "--target", str(folder), str(source)], check=True, env=own)
     return folder
@@ -69,7 +69,7 @@ def test_it_runs_plots_and_exports(installed: Path, tmp_path: Path) -> None:
 
 @pytest.mark.process
 @pytest.mark.slow
-@pytest.mark.parametrize("workers", further(1))  # a worker finds types as any process
+@pytest.mark.parametrize("workers", further(1))  # a worker finds types like any process
 def test_it_sweeps(workers: int, installed: Path, tmp_path: Path) -> None:
     over = "--over plant.damping=0:2:2 --out s.parquet"
     line = f"sweep {DEMO} {over} --workers {workers}"

@@ -1,4 +1,4 @@
-"""A push unknown to the model moves joints beyond their limits: it is reported."""
+"""An unmodelled push moves joints beyond their limits: this is reported."""
 
 import numpy as np
 import pytest
@@ -62,7 +62,7 @@ def test_a_joint_beyond_its_limit_is_told(case, tmp_path, capsys):
         every["joint_positions"] - limits.upper, limits.lower - every["joint_positions"]
     )
     outside = np.maximum(outside, 0.0)
-    # The push is stronger than the motors, and the status shows when.
+    # The push exceeds the motors' efforts; the status shows when.
     worst, dof = np.unravel_index(outside.argmax(), outside.shape)
     assert outside[worst, dof] > 0.03
     fast = np.abs(every.v) > (1.0 + BEYOND_SPEED) * limits.velocity
@@ -78,7 +78,7 @@ def test_a_joint_beyond_its_limit_is_told(case, tmp_path, capsys):
     assert measures(run)["position_excess.max"].value == told.max()
     run.save(tmp_path / "run.npz")
     assert Rollout.load(tmp_path / "run.npz")["position_excess"].max() == told.max()
-    # The summary names it, and when.
+    # The summary has the joint and the time.
     name = experiment.robot.dof_names[dof]
     if isinstance(config, str):
         words = [each for setting in brief for each in ("--set", setting)]

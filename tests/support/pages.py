@@ -1,4 +1,4 @@
-"""A page as the server sees it, without a browser; for tests."""
+"""A page as seen by the server, without a browser."""
 
 import asyncio
 import json
@@ -20,7 +20,7 @@ def scene_request(url: str, **headers: str) -> HTTPRequest:
 
 
 class Page(threading.Thread):
-    """A browser's part: connect, receive commands, answer when it has drawn."""
+    """Acts as a browser: connects, receives commands, and confirms drawing."""
 
     def __init__(self, url: str, pause: float = 0.0) -> None:
         super().__init__(daemon=True)
@@ -52,7 +52,7 @@ class Page(threading.Thread):
             pass
         finally:
             page.close()
-            # The event loop ends here, before the other side could confirm.
+            # The event loop ends here, before the other side can confirm.
             if protocol is not None and protocol.stream is not None:
                 protocol.stream.close()
 

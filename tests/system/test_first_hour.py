@@ -1,4 +1,4 @@
-"""A newcomer's errands, with the commands of README, tutorial and recipes."""
+"""A newcomer's first steps, with the commands of README, tutorial and recipes."""
 
 import re
 import shlex
@@ -25,19 +25,19 @@ def page(name: str, language: str) -> list[str]:
 
 
 def command(name: str, begins: str) -> str:
-    """Return the first command of a page that begins so, as it is typed."""
+    """Return the first command of a page with the given beginning."""
     lines = "".join(page(name, "sh")).replace("\\\n", " ").splitlines()
     return next(line for line in lines if line.startswith(begins)).split("#")[0]
 
 
 def hsp(line: str, capsys: Capture) -> str:
-    """Type a command, and return what it prints."""
+    """Run a command, and return its output."""
     assert main(shlex.split(line.removeprefix("hsp "))) == 0, line
     return capsys.readouterr().out
 
 
 def kept(printed: str, name: str) -> Rollout:
-    """Rename the log that a run has written, and read it."""
+    """Rename the log of a run, and read it."""
     (path,) = re.findall(r"^Log: (.+)$", printed, re.MULTILINE)
     return Rollout.load(Path(path).rename(name))
 
@@ -105,4 +105,4 @@ def test_another_metric_and_no_limits(capsys: Capture) -> None:
     hsp("hsp run metric.yaml", capsys)
     free = kept(hsp("hsp run mine.yaml --set limits=none", capsys), "free.npz")
     limited = kept(hsp("hsp run mine.yaml", capsys), "limited.npz")
-    np.testing.assert_array_equal(free.q, limited.q)  # none of them binds
+    np.testing.assert_array_equal(free.q, limited.q)  # none of them is active

@@ -1,6 +1,7 @@
-"""Documents of this checkout link only to files that exist. Links between pages of the
-site are checked when it is built, those to other sites by `make links`; this covers
-README, notebooks and other documents outside of docs.
+"""Documents of this checkout link only to files that exist.
+
+Links between pages of the site are checked when it is built, those to other sites by
+`make links`; this covers README, notebooks and other documents outside of docs.
 """
 
 import json

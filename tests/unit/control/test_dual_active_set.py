@@ -222,8 +222,9 @@ def test_sizes_that_do_not_fit_are_refused() -> None:
 
 
 def test_active_constraints_span_no_more_than_there_is() -> None:
-    """Where active rows span the space, the residual of another one is rounding. From
-    contradicting effort limits of a Talos: one row more than the solver's memory.
+    """Where active rows span the space, the residual of another one is rounding.
+
+    From contradicting effort limits of a Talos: one row more than the solver's memory.
     """
     with np.load(Path(__file__).parent / "data/full_active_set.npz") as arrays:
         given: Any = {name: arrays[name] for name in arrays.files}

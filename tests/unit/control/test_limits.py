@@ -115,8 +115,9 @@ def test_position_bounds_are_the_barriers_of_both_limits(seed: int) -> None:
 def test_the_drift_is_made_up_for_where_it_leads_beyond_a_limit(
     seed: int, drift: float
 ) -> None:
-    """The acceleration with the drift satisfies the barrier. A drift that has ended
-    widens no bound; a present one widens that of the other side.
+    """The acceleration with the drift satisfies the barrier.
+
+    A drift that has ended widens no bound; a present one widens that of the other side.
     """
     robot, rng = panda(), np.random.default_rng(seed)
     limits = of(robot, velocity=None)
@@ -269,8 +270,9 @@ def test_a_load_that_the_model_lacks_drives_no_joint_beyond_its_limit(
 def test_a_wrist_with_an_unknown_tool_stays_within_its_range(
     angle: float, side: float
 ) -> None:
-    """1 kg off the flange, friction, 2 ms of delay and noise, driven to the limit. (116
-    and 86 mrad beyond it when the bounds used the mean over 0.1 s.)
+    """1 kg off the flange, friction, 2 ms of delay and noise, driven to the limit.
+
+    (116 and 86 mrad beyond it when the bounds used the mean over 0.1 s.)
     """
     robot = hsp.Robot.load("iiwa14")
     _, upper = robot.position_limits()

@@ -150,8 +150,9 @@ def test_the_linear_loop_is_the_chain_link_by_link(
 def test_a_lag_of_the_drives_is_in_the_linear_loop(
     lag: float, observer: MomentumObserver | None, tmp_path: Path
 ) -> None:
-    """Against a drive that holds the mean of each period; x differs within one. Under
-    the mean x(t) moves as if it acted from the period's start: second order in h.
+    """Against a drive that holds the mean of each period; x differs within one.
+
+    Under the mean x(t) moves as if it acted from the period's start: second order in h.
     """
     robot, h = carriage(tmp_path), 0.002
     task = JointPosture(np.zeros(1), gains=Gains(natural_frequency=12.0))

@@ -111,8 +111,9 @@ def test_within_limits_nothing_changes(seed: int) -> None:
 
 @given(seeds, st.floats(1e-6, 3.0))
 def test_no_more_is_lost_than_is_beyond(seed: int, beyond: float) -> None:
-    """A field's demand against tasks loses E/(1 + E) where a exceeds its limit by E. A
-    larger loss at the onset of a violation makes the step oscillate about the limit.
+    """A field's demand against tasks loses E/(1 + E) where a exceeds its limit by E.
+
+    A larger loss at the onset of a violation makes the step oscillate about the limit.
     """
     asked = drawn(seed, 1.0, 10.0)
     most = times_permitted(asked, 1e6 * asked.a) / 1e6

@@ -1,5 +1,6 @@
-"""Misuse of the engine from Python is refused or harmless, never a memory error. Calls
-that may end a process run in another one.
+"""Misuse of the engine from Python is refused or harmless, never a memory error.
+
+Calls that may end a process run in another one.
 """
 
 import gc

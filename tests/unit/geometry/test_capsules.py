@@ -39,8 +39,9 @@ def volume(first: Array, second: Array, radius: float) -> float:
 def test_capsule_holds_every_point_and_is_no_larger_than_a_ball(
     cloud: Array, scale: float
 ) -> None:
-    """For any cloud: one point, equal ones, on a line, in a plane. The ball is centred
-    at the points' mean.
+    """For any cloud: one point, equal ones, on a line, in a plane.
+
+    The ball is centred at the points' mean.
     """
     points = scale * cloud
     first, second, radius = enclosing_capsule(points)

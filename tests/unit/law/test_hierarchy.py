@@ -60,8 +60,10 @@ def test_compatible_levels_are_one_stack(
 @forms
 @given(seeds, st.lists(st.integers(1, 3), min_size=2, max_size=4))
 def test_recursion_is_the_stacked_law(form: int, seed: int, levels: list[int]) -> None:
-    """The recursion itself, triggered by a redundant singular direction. The last level
-    repeats a row of the first, which already fulfils it: nothing changes.
+    """The recursion itself, triggered by a redundant singular direction.
+
+    The last level repeats a row of the first, which already fulfils it: nothing
+    changes.
     """
     m = sum(levels)
     x = numbers(seed, m, 13, form)

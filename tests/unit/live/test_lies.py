@@ -126,9 +126,10 @@ SEEN_AT_REST = [kind for kind in USUAL if is_seen_at_rest(LIES[kind])]
     + [(kind, AT_REST) for kind in SEEN_AT_REST[:: 1 if THOROUGH else 4]],
 )
 def test_no_lie_accelerates_a_joint(kind: str, begin: int) -> None:
-    """Faults of one joint (a different one per kind) and of all joints. Unless
-    thorough, every second of the usual kinds, alternately of one and of all joints, and
-    every fourth at rest.
+    """Faults of one joint (a different one per kind) and of all joints.
+
+    Unless thorough, every second of the usual kinds, alternately of one and of all
+    joints, and every fourth at rest.
     """
     one = crc32(kind.encode()) % 7
     both = [one], ALL
@@ -740,7 +741,9 @@ def test_a_momentum_that_nothing_changes_is_measured_wrong(
     kind: str, joints: list[int]
 ) -> None:
     """Neither efforts nor contacts explain the momentum; before, only the stop found
-    some. For wrong factors the shoulder is too slow, 0.25 rad/s.
+    some.
+
+    For wrong factors the shoulder is too slow, 0.25 rad/s.
     """
     usual = honest_speeds(IN_MOTION)[IN_MOTION - 1 : IN_MOTION + WATCHED].max(axis=0)
     robot, report = run(IN_MOTION, AGREEING[kind], joints)

@@ -138,8 +138,10 @@ class Lossy(Rig):
 def test_lost_efforts_do_not_add_up_where_the_robot_says_what_it_has(
     reports: bool, compensates: bool
 ) -> None:
-    """An effort that always changes at its rate limit, over a lossy line. If the loop
-    knows only the sent efforts, after five losses it sends six steps at once.
+    """An effort that always changes at its rate limit, over a lossy line.
+
+    If the loop knows only the sent efforts, after five losses it sends six steps at
+    once.
     """
     settings = LiveSettings(
         effort_rate=RATE, compensates_gravity=compensates, velocity_margin=9.0

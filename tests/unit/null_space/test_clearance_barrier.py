@@ -68,9 +68,10 @@ def evaluate(field: Cost, state: Any) -> FieldSample:
 
 
 def test_the_rate_is_zero_however_quick_the_obstacle() -> None:
-    """Out of influence g is zero in a neighbourhood, so g' is exactly zero. At 20 m/s a
-    ball moves 4 cm within a difference step of 2 ms: differences would reach into the
-    influence and give a wrong rate.
+    """Out of influence g is zero in a neighbourhood, so g' is exactly zero.
+
+    At 20 m/s a ball moves 4 cm within a difference step of 2 ms: differences would
+    reach into the influence and give a wrong rate.
     """
     robot = load("panda")
     start = np.array([0.5, 0.5, 0.5])
@@ -105,8 +106,9 @@ def calls(monkeypatch: pytest.MonkeyPatch) -> list[int]:
 
 
 def test_distances_are_measured_once_per_state(calls: list[int]) -> None:
-    """For any number of requests; and four times more along the flow, for g'. This
-    applies to Coal; distances in closed form have an exact rate.
+    """For any number of requests; and four times more along the flow, for g'.
+
+    This applies to Coal; distances in closed form have an exact rate.
     """
     robot = load("panda")
     ball = Obstacle("ball", Sphere(0.1), AIR)

@@ -1,6 +1,7 @@
-"""Gradient and rate of the clearance fields on whole robots and in the loop. The closed
-loop is decisive: ‖e_N‖ follows exp(-K_N t) only if the field's rate includes every
-motion.
+"""Gradient and rate of the clearance fields on whole robots and in the loop.
+
+The closed loop is decisive: ‖e_N‖ follows exp(-K_N t) only if the field's rate includes
+every motion.
 """
 
 from collections.abc import Callable

@@ -34,6 +34,7 @@ def test_value(name: str, which: str) -> None:
 )
 def test_field_and_its_rate(case: tuple[str, str], metric_name: str) -> None:
     """g = -W⁻¹∇f (or the vector itself), and g' its total derivative along the flow.
+
     Differences of eighth order give the gradient to 1e-13 of f, those of the package
     (`differences.gradient`) to 1e-12; W⁻¹ of a mass matrix amplifies both by 1e2.
     """

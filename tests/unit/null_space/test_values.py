@@ -1,5 +1,7 @@
-"""All fields and metrics are values; the classes are found by reflection. A value has
-no robot and no memory, so that one field serves many states, robots and threads.
+"""All fields and metrics are values; the classes are found by reflection.
+
+A value has no robot and no memory, so that one field serves many states, robots and
+threads.
 """
 
 import copy
@@ -112,8 +114,9 @@ def test_members_are_values(name: str) -> None:
 
 @every_member
 def test_placing_needs_a_robot_and_nothing_else(name: str) -> None:
-    """Placing a placed value gives an equal one; placing and use leave no trace. The
-    attributes of a part are its declared fields, before and after.
+    """Placing a placed value gives an equal one; placing and use leave no trace.
+
+    The attributes of a part are its declared fields, before and after.
     """
     robot = load("panda")
     state = robot.state(0.0, robot.home(), np.linspace(-1.0, 1.0, 7))

@@ -87,8 +87,9 @@ weights = st.floats(0.0, 5.0)
 def test_ramp_and_its_rate(
     t: float, a: float, b: float, start: float, duration: float
 ) -> None:
-    """The quintic between the ends, constant outside; the rate is its derivative. The
-    only error of fourth-order differences of s⁵ is h⁴ f⁽⁵⁾/30.
+    """The quintic between the ends, constant outside; the rate is its derivative.
+
+    The only error of fourth-order differences of s⁵ is h⁴ f⁽⁵⁾/30.
     """
     state = at(t)
     w, w_dot = Ramp(initial=a, final=b, start=start, duration=duration).sample(state)

@@ -1,6 +1,7 @@
-"""No result depends on an earlier state, for robots of every kind. Pinocchio's
-algorithms store intermediate results in their data. The n-th result of one robot is
-compared with the first one of another, bit for bit.
+"""No result depends on an earlier state, for robots of every kind.
+
+Pinocchio's algorithms store intermediate results in their data. The n-th result of one
+robot is compared with the first one of another, bit for bit.
 """
 
 from collections.abc import Iterator
@@ -87,8 +88,10 @@ def test_the_nth_state_is_a_fresh_one(kind: str, tmp_path: Path) -> None:
 def test_forward_dynamics_are_the_inverse_of_inverse_dynamics(
     kind: str, tmp_path: Path
 ) -> None:
-    """M disagrees with RNEA. Pinocchio's CRBA omits the coupling of a multi-DOF joint
-    between a leader and its follower.
+    """M disagrees with RNEA.
+
+    Pinocchio's CRBA omits the coupling of a multi-DOF joint between a leader and its
+    follower.
     """
     robot, rng = KINDS[kind](tmp_path), np.random.default_rng(8)
     for _ in range(5):

@@ -272,8 +272,9 @@ CHANGES: dict[str, Callable[[Changes], object]] = {
 
 @pytest.mark.parametrize("change", ["task", "limits", *further("gain", "field")])
 def test_a_change_is_made_where_it_begins(change: str, counted: Counted) -> None:
-    """Changes run in Python; a second after their end the native loop continues. It
-    continues with the parameters in force at that time.
+    """Changes run in Python; a second after their end the native loop continues.
+
+    It continues with the parameters in force at that time.
     """
 
     def run() -> Rollout:
@@ -308,7 +309,9 @@ def test_a_motion_that_diverges_stops_the_same_way(
     log_period: float, counted: Counted
 ) -> None:
     """K_N times the period is 20: joints diverge in the native loop; their speed is
-    reported. Within a row of 1 s the effort becomes NaN.
+    reported.
+
+    Within a row of 1 s the effort becomes NaN.
     """
     task, q0 = panda_controller().tasks[0], load("panda").home()
     controller = Controller(
