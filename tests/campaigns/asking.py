@@ -1,4 +1,4 @@
-"""Run the command line in this process, and judge its result."""
+"""Run the command line in this process, and classify its result."""
 
 import io
 import signal
@@ -12,7 +12,7 @@ from hsp_control.cli import commands, consoles, main
 from hsp_control.cli.interrupts import DeferredInterrupt
 
 LONGEST = 2000
-"""Characters of a message: what is longer is no clear error."""
+"""Length of a message above which it is no clear error [characters]."""
 
 
 def ask(arguments: Sequence[str], *, stop_after: float | None = None) -> list[str]:
@@ -20,8 +20,8 @@ def ask(arguments: Sequence[str], *, stop_after: float | None = None) -> list[st
 
     Args:
         arguments: The command line.
-        stop_after: Press Ctrl-C after this many seconds, as a person would who has
-            made a long run; it must then end by itself.
+        stop_after: Press Ctrl-C after this many seconds, as a user would in a long run;
+        it must then end by itself.
     """
     out, errors = io.StringIO(), io.StringIO()
     try:
@@ -35,7 +35,7 @@ def ask(arguments: Sequence[str], *, stop_after: float | None = None) -> list[st
 
 
 def judge(status: int, errors: str) -> list[str]:
-    """Return [kind, text] for an exit status and what was written to stderr."""
+    """Return [kind, text] for an exit status and the output on stderr."""
     if "Traceback" in errors:
         return ["traceback", errors]
     if status == 0:
@@ -87,4 +87,4 @@ def _ctrl_c(after: float | None) -> Iterator[None]:
         signal.signal(signal.SIGINT, handler)
 
 
-assert commands  # imported here: the first case need not wait for it
+assert commands  # imported now, so that the first case need not wait for it

@@ -1,4 +1,4 @@
-"""The plugin's client, which needs Python alone, beside a loop: part of `make test`."""
+"""The plugin's client, in pure Python, with a loop: part of `make test`."""
 
 import json
 import socket
@@ -141,7 +141,7 @@ def test_rotation_vectors_are_pinocchio_s_and_go_on_at_half_a_turn() -> None:
             pin.exp3(np.array(rotation_vector_of(q))), pin.exp3(turn), atol=1e-12
         )
     last, steps = None, []
-    for angle in np.linspace(pi - 0.4, pi + 3.0, 200):  # a hand that points downwards
+    for angle in np.linspace(pi - 0.4, pi + 3.0, 200):  # a hand pointing down
         new = rotation_vector_of(quaternion_of([angle, 1e-3, 0.0]), last)
         steps.append(
             0.0 if last is None else float(np.linalg.norm(np.subtract(new, last)))

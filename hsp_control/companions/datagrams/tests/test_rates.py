@@ -1,4 +1,4 @@
-"""States are published at the rate that is set."""
+"""States are published at the configured rate."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""Targets by datagrams: a port, who sends there, and streams that share it."""
+"""Targets by datagrams: ports, senders, and streams that share a port."""
 
 import json
 import re
@@ -47,7 +47,7 @@ def wait_until(done: Callable[[], bool]) -> None:
 
 def listening(port: int, part: str = "") -> FollowedPoint:
     stream = Stream([0.0], source=f"udp://127.0.0.1:{port}{part}").anchored(None)
-    stream.sample(0.0)  # it listens from here on
+    stream.sample(0.0)  # listens from now on
     return stream
 
 
@@ -84,7 +84,7 @@ def test_a_second_sender_is_refused_until_the_first_is_silent(
         return inbox.count > before
 
     assert taken("a:1", 0.0)
-    assert taken("b:2", 0.1)  # one goal of each: nobody streams yet
+    assert taken("b:2", 0.1)  # one goal per stream: no stream is active yet
     for k in range(9):
         assert taken("a:1", 0.2 + 0.05 * k)
         assert not taken("b:2", 0.22 + 0.05 * k)
@@ -173,14 +173,14 @@ def test_one_stream_of_two_poses_or_two_senders_lead_two_hands(
     other = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
     sides = {"left": 0.33, "right": -0.33}
     parts = {
-        each: {"name": "panda", "position": [0, y, 0]} for each, y in sides.items()
+        side: {"name": "panda", "position": [0, y, 0]} for side, y in sides.items()
     }
     source = f"udp://127.0.0.1:{port}"
     tasks = {
-        each: {
+        side: {
             "type": "frame_pose",
-            "frame": f"{each}_panda_tcp",
-            "trajectory": {"type": "stream", "source": f"{source}/{each}"},
+            "frame": f"{side}_panda_tcp",
+            "trajectory": {"type": "stream", "source": f"{source}/{side}"},
         }
         for each in sides
     }
@@ -204,7 +204,7 @@ def test_one_stream_of_two_poses_or_two_senders_lead_two_hands(
                 data = json.dumps({"t": 7.0, **text}).encode()
                 one.sendto(data, ("127.0.0.1", port))
         wait_until(lambda: all(each.run.inbox.count == 2 for each in streams))
-        if senders == 2:  # each keeps to its own hand
+        if senders == 2:  # every stream moves its own hand
             sender.sendto(data, ("127.0.0.1", port))
             wait_until(lambda: all(each.run.inbox.rejected for each in streams))
             assert re.match(r"right: \S+ is ignored: ", streams[0].run.last_rejection)
@@ -221,7 +221,7 @@ def test_one_stream_of_two_poses_or_two_senders_lead_two_hands(
 
 
 @pytest.mark.parametrize(
-    ("clock", "said"),
+    ("clock", "warned"),
     [
         (lambda k: 0.05 * k, []),
         (lambda k: 0.05 * k - 1e-3 * (k % 2) - 0.9 * (k == 7), []),  # late ones
@@ -232,16 +232,16 @@ def test_one_stream_of_two_poses_or_two_senders_lead_two_hands(
 )
 def test_a_clock_that_jumps_is_said_once(
     clock: Callable[[int], float | None],
-    said: list[str],
+    warned: list[str],
     caplog: pytest.LogCaptureFixture,
 ) -> None:
     inbox = Inbox(Space(1, False), "ros2://goal")
     for k in range(12):
         inbox.receive("one", 100.0 + 0.05 * k, {"value": [0.0], "t": clock(k)})
-    for k in range(2):  # a policy that starts again has another clock
+    for k in range(2):  # a restarted policy has another clock
         inbox.receive("two", 110.0 + 0.05 * k, {"value": [0.0], "t": 0.05 * k})
     assert [each.removeprefix("ros2://goal: the sender's clock ")
-            for each in caplog.messages] == said  # fmt: skip
+            for each in caplog.messages] == warned  # fmt: skip
 
 
 def test_a_joystick_s_velocities_name_their_axes(
@@ -259,7 +259,7 @@ def test_a_joystick_s_velocities_name_their_axes(
     wait_until(lambda: inbox.count + inbox.rejected == 2)
     assert inbox.reason == "axes is 'hand'; needs 'world' or 'tool'"
     stream.sample(0.01)
-    found = stream.sample(0.11)  # it was taken 0.1 s ago
+    found = stream.sample(0.11)  # it was read 0.1 s ago
     assert found.orientation.rotation.T @ found.position.velocity == pytest.approx(
         twist[:3], abs=1e-9
     )

@@ -1,4 +1,4 @@
-"""States that a live loop publishes, received by plain sockets, in Python and C."""
+"""States published by a live loop, received by plain sockets in Python and C."""
 
 import json
 import math
@@ -105,7 +105,7 @@ def test_the_page_s_client_hears_and_answers(capsys: pytest.CaptureFixture) -> N
         told = publish(f"127.0.0.1:{port}?rate=10", source)
         source.effort(0.0, start(), np.zeros(7), 0.001)
         goals.settimeout(0.05)
-        for k in range(1000):  # it may not listen yet
+        for k in range(1000):  # it may not be listening yet
             told(0.1 * k)
             with suppress(TimeoutError):
                 goal = json.loads(goals.recv(65536))
@@ -184,7 +184,7 @@ def test_what_cannot_be_sent_is_said_once_and_hinders_nothing(
     caplog: pytest.LogCaptureFixture,
 ) -> None:
     source = command()
-    told = publish("255.255.255.255:5006", source)  # which a plain socket may not
+    told = publish("255.255.255.255:5006", source)  # forbidden for a plain socket
     source.effort(0.0, start(), np.zeros(7), 0.001)
     told(0.0)
     told(1.0)

@@ -1,4 +1,4 @@
-"""Films: their moments, refusals, and messages where something is missing."""
+"""Films: their frames, refusals, and messages about missing packages."""
 
 import re
 import sys
@@ -66,7 +66,7 @@ def test_what_is_missing_for_a_film_is_said_and_the_rest_goes_on(
     said = capsys.readouterr()
     assert "page.html" in said.out
     assert page.is_file()
-    assert said.err.count("hsp: ") == 1  # once, not once a film
+    assert said.err.count("hsp: ") == 1  # once, not once per film
     assert re.search(
         r"no-such-browser is not an executable; .*apt-get install chr", said.err
     )

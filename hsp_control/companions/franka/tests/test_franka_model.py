@@ -1,4 +1,4 @@
-"""The arm's own model as a URDF, and how it is compared with the controller's."""
+"""The arm's own model as a URDF, and its comparison with the controller's."""
 
 from pathlib import Path
 from typing import Any
@@ -25,7 +25,7 @@ def said(body: pin.Inertia = CARRIED) -> dict[str, Any]:
 
 
 def arm_alone() -> str:
-    """Return a description as the control box has it: the arm to its flange.
+    """Return a URDF as from the control box: the arm up to its flange.
 
     Its masses are a third larger than the bundled ones.
     """

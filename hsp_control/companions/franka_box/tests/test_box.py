@@ -28,12 +28,12 @@ TORQUE = ControllerMode.EXTERNAL, MotionGenerator.NONE
 
 
 class Talking(ControlBox):
-    """A box whose lines are kept."""
+    """A box that keeps its messages."""
 
     def __init__(self, simulated: Any = None, q: Any = None) -> None:
-        self.said: list[str] = []
+        self.messages: list[str] = []
         start = home() if q is None else q
-        super().__init__(panda(), simulated or plant(), start, self.said.append)
+        super().__init__(panda(), simulated or plant(), start, self.messages.append)
 
 
 def state(box: ControlBox) -> Any:
@@ -56,7 +56,7 @@ def ask(box: Talking, kind: FrankaCommand, number: int = 5, **fields: Any) -> li
     for name, value in fields.items():
         payload[name] = value  # type: ignore[index]
     data = payload if isinstance(payload, bytes) else payload.tobytes()
-    Requests(box, box.said.append).answer(kind, number, data)
+    Requests(box, box.messages.append).answer(kind, number, data)
     return answers(box)
 
 
@@ -164,7 +164,7 @@ def test_an_arm_that_folds_into_itself_stops() -> None:
         box.step(command(dq_c=[0, -ramp, 0, -ramp * 0.6, 0, -ramp, 0]))
     told = state(box)
     names = {Error(int(k)) for k in np.flatnonzero(told["errors"])}
-    assert names == {Error.SELF_COLLISION_AVOIDANCE_VIOLATION}, box.said
+    assert names == {Error.SELF_COLLISION_AVOIDANCE_VIOLATION}, box.messages
 
 
 def test_what_a_client_may_not_do_while_the_arm_moves() -> None:
@@ -251,7 +251,7 @@ def test_invalid_arguments_are_refused(
     assert ask(box, kind, **fields) == [
         (kind, 5, FrankaStatus.INVALID_ARGUMENT_REJECTED)
     ]
-    (line,) = box.said
+    (line,) = box.messages
     assert line.startswith("refused: set ")
 
 
@@ -284,7 +284,7 @@ def test_contacts_and_collisions_follow_the_thresholds() -> None:
 def test_an_unknown_payload_stretches_the_springs_that_are_set(
     controller: ControllerMode, kind: FrankaCommand, stiffness: list[float]
 ) -> None:
-    """At rest the joints yield by tau / K, or the hand by its weight over K."""
+    """At rest the joints deflect by tau / K, or the hand by its weight over K."""
     box = Talking(plant(payload=Payload("panda_tcp", 1.0)))
     field = "K_theta" if kind is FrankaCommand.SET_JOINT_IMPEDANCE else "K_x"
     assert ask(box, kind, **{field: stiffness})[0][2] == FrankaStatus.SUCCESS

@@ -1,4 +1,4 @@
-"""Motion generators of the hand: the joints follow it, and its limits are watched."""
+"""Motion generators of the hand: the joints follow, and limits are monitored."""
 
 from typing import Any
 
@@ -34,7 +34,7 @@ def follow(generator: Generator, told: Any, *, first: bool = False) -> list[Erro
 
 
 def way(step: int) -> tuple[Any, Any]:
-    """Return displacement and twist of a smooth way out and back, in base's axes."""
+    """Return displacement and twist of a smooth motion out and back, in base axes."""
     t = 2.0 * np.pi * step / STEPS
     most = np.array([0.05, -0.04, 0.06, 0.1, -0.1, 0.2]) / 2.0
     speed = 2.0 * np.pi / (STEPS * PERIOD)
@@ -139,7 +139,7 @@ def test_a_hand_starts_where_it_is_and_its_pose_is_one() -> None:
 
 
 def test_a_twist_is_that_of_the_poses_it_makes() -> None:
-    """In the base's axes, however the hand is turned."""
+    """In base axes, for any orientation of the hand."""
     pose = pin.SE3(pin.rpy.rpyToMatrix(0.3, -0.8, 1.2), np.array([0.3, 0.1, 0.5]))
     before, twist = hand.at_rest(pose), np.array([0.1, -0.2, 0.3, 0.5, -0.4, 0.3])
     made = hand.to_twist(twist, before)
@@ -147,7 +147,7 @@ def test_a_twist_is_that_of_the_poses_it_makes() -> None:
 
 
 def test_a_lost_command_keeps_the_acceleration_of_the_hand() -> None:
-    """Of a constant angular acceleration about one axis, and a straight line."""
+    """A constant angular acceleration about one axis, and a straight line."""
     a = np.array([0.4, 0.0, 0.2, 0.0, 0.0, 0.8])
     motion = hand.at_rest(pin.SE3.Identity())
     for k in range(1, 6):

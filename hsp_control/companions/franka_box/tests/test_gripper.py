@@ -1,4 +1,4 @@
-"""The box's gripper answers whatever comes, and nobody keeps it from the next one."""
+"""The box's gripper answers any request, and no client blocks the next one."""
 
 import socket
 import struct
@@ -67,7 +67,7 @@ def test_who_says_nothing_or_nonsense_makes_room(served: Gripper, sent: bytes) -
 
 
 def test_who_leaves_during_a_motion_makes_room(served: Gripper) -> None:
-    """It would last two minutes."""
+    """The full motion would last two minutes."""
     with closing(client()) as first:
         assert asked(first, CONNECT, struct.pack("<HH", 3, 0)) == 0
         assert asked(first, MOVE, struct.pack("<2d", 0.08, 10.0)) == 0

@@ -92,7 +92,7 @@ def test_a_constant_acceleration_is_no_jerk() -> None:
 
 
 def test_a_lost_command_keeps_the_acceleration() -> None:
-    """q(t) = a t²/2 sampled backwards: velocity and acceleration are as they were."""
+    """q(t) = a t²/2 by backward differences: velocity and acceleration are exact."""
     a, motion = unit(3, 2.0), Reference(home(), REST, REST)
     for k in range(1, 6):
         motion = reference.to_velocity(k * PERIOD * a, motion)

@@ -1,4 +1,4 @@
-"""Implausible values are reported, and so is how files are read, and ignored parts."""
+"""Implausible values, the interpretation of files, and ignored parts are reported."""
 
 import re
 from collections.abc import Callable
@@ -18,7 +18,7 @@ Look = Callable[[str], dict[str, list[Finding]]]
 
 @pytest.fixture
 def look(tmp_path: Path) -> Look:
-    """Return what is found in a text, by check."""
+    """Return the findings in a text, by check."""
 
     def look_at(text: str) -> dict[str, list[Finding]]:
         path = tmp_path / "arm.urdf"
@@ -32,7 +32,7 @@ def look(tmp_path: Path) -> Look:
 
 
 def arm(mass: float = 2.0, moment: float = 0.02, away: float = 0.1) -> str:
-    """Return an arm of links of half a metre."""
+    """Return an arm with links of half a metre."""
     inertia = (
         f'<inertial><origin xyz="{away} 0 0"/><mass value="{mass}"/><inertia '
         f'ixx="{moment}" iyy="{moment}" izz="{moment}" ixy="0" ixz="0" iyz="0"/>'
@@ -48,7 +48,7 @@ def arm(mass: float = 2.0, moment: float = 0.02, away: float = 0.1) -> str:
     (arm(moment=2e4), "with a radius of gyration of 122 m, but it ends"),  # kg mm²
     (arm(mass=2000.0), "denser than any metal"),  # g
     (arm(moment=2e-8), "denser than any metal"),
-    (arm(moment=0.0), ""),  # points
+    (arm(moment=0.0), ""),  # point masses
 ])  # fmt: skip
 def test_what_a_body_cannot_be_is_named(text: str, message: str, look: Look) -> None:
     found = [f for f in look(text).get("units", []) if f.element.startswith("link")]
@@ -93,7 +93,7 @@ def test_lengths_in_another_unit(
 
 
 def test_masses_in_grams(look: Look) -> None:
-    """With inertias in g·m²: each link is a body, but what an arm?"""
+    """Inertias in g·m²: every link is possible, but the arm is implausible."""
     (found,) = look(arm(mass=2000.0, moment=20.0))["units"]
     assert found.element == "all links"
     assert "4000 kg move, on a chain of 0.548 m" in found.message

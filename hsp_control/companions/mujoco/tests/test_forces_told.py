@@ -11,7 +11,7 @@ from hsp_control.cli.main import main
 
 
 def forced(config: str, contact: str, newtons: object) -> list[str]:
-    """Return the options of a configuration that presses with another force."""
+    """Return the options of a configuration with another commanded force."""
     ramp = f"{{type: force, contact: {contact}, at: 0, ramp: 0.5, force: {{value: "
     return [f"forces/{config}", "--set", f"changes=[{ramp}{newtons}}}}}]"]
 
@@ -29,7 +29,7 @@ def test_a_wipe_that_loses_contact_is_told_before_and_after_it(
     assert re.search(r"\n +\d+ rows: contact lost", told.out)
     (log,) = tmp_path.glob("*.npz")
     planned = hsp.Rollout.load(log)["contact.wiper.force"]
-    # also in the step in which the change of the force is over
+    # also in the step in which the change of the force ends
     assert np.linalg.norm(planned[1:], axis=1).min() > 0.0
 
 
@@ -39,7 +39,7 @@ def test_a_wipe_that_loses_contact_is_told_before_and_after_it(
 def test_check_tells_of_a_force_that_soles_cannot_balance(
     newtons: float, had: str | None, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """Before the centre of mass leans forward; a run of 150 N ends with 114."""
+    """With the centre of mass as at the start; a run at 150 N ends with 114 N."""
     command = forced("talos_wall", "hand", f"[0, 0, {newtons}]")
     assert main(["check", *command]) == 0
     warned = capsys.readouterr().err

@@ -61,7 +61,7 @@ def test_a_configuration_runs_in_its_scene(
     rollout = experiment.run()
     assert rollout.meta["plant"]["motors"] == ["j1", "j2", "j3", "j4"]
     assert "plant.contact.ball.force" in rollout.columns
-    # The log has enough to repeat the run.
+    # The log suffices to repeat the run.
     path = folder / "run.npz"
     rollout.save(path)
     again = load_experiment(path).run()
@@ -73,7 +73,7 @@ def test_a_configuration_runs_in_its_scene(
 
 
 def test_the_plant_may_be_another_mjcf_or_no_mjcf(folder: Path) -> None:
-    """It has the controller's root, joints and keyframe; a URDF has neither."""
+    """It takes the controller's root, joints and keyframe; a URDF has none of them."""
     (folder / "heavy.xml").write_text(CELL.replace('mass="1"', 'mass="1.5"'))
     scene = "{type: mujoco_scene, contacts: [ball]}"
     other = f"{{type: rigid_body, robot: {{mjcf: {folder}/heavy.xml}}}}"
@@ -180,7 +180,7 @@ def test_a_scene_may_be_too_large(folder: Path) -> None:
         Robot.load(RobotDescription(mjcf=path))
 
 
-# --- files of strangers --------------------------------------------------------------
+# --- untrusted files -----------------------------------------------------------------
 
 MESH = (
     "<mujoco>{}<asset><mesh name='m' {}/></asset><worldbody><body><joint/>"

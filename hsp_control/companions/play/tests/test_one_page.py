@@ -1,4 +1,4 @@
-"""This play as one page: a process writes it, and reports the outcome."""
+"""A play as one page: a process writes it and reports the outcome."""
 
 from pathlib import Path
 

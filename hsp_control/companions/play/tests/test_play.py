@@ -37,7 +37,7 @@ def session(experiment: hsp.Experiment) -> Session:
 
 @pytest.fixture
 def still() -> Session:
-    """A hand that holds its pose, beside a ball that rests."""
+    """A hand that holds its pose, next to a ball at rest."""
     return Session(playable("panda"))
 
 
@@ -56,7 +56,7 @@ def test_what_is_dragged_is_reached_and_the_log_repeats_it(
 ) -> None:
     go(session, 0.5)
     wanted = pose_of(session)
-    for k in range(20):  # a drag, picture by picture
+    for k in range(20):  # a drag, frame by frame
         wanted[:3] += [0.002, -0.004, 0.005]
         session.receive({"do": "move", "target": "hand", "pose": wanted.tolist()})
         session.receive(
@@ -75,7 +75,7 @@ def test_what_is_dragged_is_reached_and_the_log_repeats_it(
     np.testing.assert_allclose(ball, [0.1, 0.3, 0.605], atol=1e-9)
     assert session.handles.values["frequency.hand"] == 15.0
     log = session.rollout()
-    # The error of the law is that of a held effort, however the hand was dragged.
+    # The law's error is that of held efforts, for any drag.
     assert np.abs(log["task.hand.error"][log.t > 0.5]).max() < 1e-3
     log.save(tmp_path / "played.npz")
     again = hsp.load_experiment(tmp_path / "played.npz").run()
@@ -107,7 +107,7 @@ def test_its_own_path_comes_back(session: Session) -> None:
 
 
 def test_the_elbow_of_the_posture_leads_the_null_space(tmp_path: Path) -> None:
-    """The elbow follows as in the theorem, the hand is undisturbed; and back."""
+    """The elbow follows as in the theorem, the hand is undisturbed; and it returns."""
     session = Session(playable("panda"))
     go(session, 0.3)
     start = pose_of(session, "posture")
@@ -117,7 +117,8 @@ def test_the_elbow_of_the_posture_leads_the_null_space(tmp_path: Path) -> None:
         session.receive({"do": "move", "target": "posture", "pose": wanted.tolist()})
         go(session, 0.03)
     go(session, 2.0)
-    # The elbow stays at its distance from the shoulder: not quite there.
+    # The elbow stays at its distance from the shoulder: it cannot reach the target
+    # exactly.
     np.testing.assert_allclose(pose_of(session, "posture")[1], wanted[1], atol=0.01)
     moved = session.controller.state.data.oMi[3].translation - elbow.translation
     assert moved[1] > 0.05
@@ -134,7 +135,7 @@ def test_the_elbow_of_the_posture_leads_the_null_space(tmp_path: Path) -> None:
 
 
 def test_a_return_is_no_jolt(still: Session) -> None:
-    """A target and an obstacle that were led far away return at a bearable speed."""
+    """A target and an obstacle dragged far away return at a limited speed."""
     go(still, 0.1)
     targets, obstacles = still.handles.places()
     far = np.add(targets["hand"], [0.0, 0.3, 0.0, 0.0, 0.0, 0.0, 0.0])
@@ -191,7 +192,7 @@ def test_nonsense_is_answered_and_moves_nothing(
 
 
 class Told:
-    """Keeps the gains that a knob sets."""
+    """Records the gains set by a knob."""
 
     def gains(self, name: str, gains: hsp.Gains) -> None:
         self.made = gains.matrices(6)
@@ -206,7 +207,7 @@ def test_knobs_keep_damping_ratios() -> None:
     np.testing.assert_allclose(told.made[1], 2.0 * 0.7 * 20.0 * np.eye(6))
     softer = _scaled(hsp.Impedance(100.0, damping=30.0), 0.25)
     assert (softer.stiffness, softer.damping) == (25.0, 15.0)
-    # Up to ten times the rate, or to a fifth per period; never below what it is.
+    # Up to ten times the gain, or a fifth per period; at least its present value.
     for period, high in ((0.001, 50.0), (0.02, 10.0), (1.0, 5.0)):
         knob = knobs_of(controller, period)["frequency.hand"]
         assert (knob.low, knob.high) == pytest.approx((0.5, high))
@@ -269,7 +270,7 @@ def test_a_pull_follows_the_hand_up_to_its_largest_force(session: Session) -> No
 def test_who_lets_go_leaves_or_begins_anew_pulls_no_more(
     message: str, session: Session
 ) -> None:
-    """A page that is closed is ``left``: else its last pull would never end."""
+    """A closed page is ``left``: otherwise its last pull would never end."""
     go(session, 0.1)
     point = list(map(float, session.controller.state.data.oMi[4].translation))
     session.receive(
@@ -317,7 +318,7 @@ def test_what_goes_wrong_ends_the_run_and_not_the_session(
 
 @pytest.mark.parametrize("law", ["operational-space law", *further("no field")])
 def test_another_law_goes_beside_it(law: str) -> None:
-    """From the same state, with the same hand; the play itself does not notice."""
+    """From the same state, with the same hand; without an effect on the play."""
     both = [Session(playable("panda_obstacle")) for _ in range(2)]
     for session in both:
         go(session, 0.5)
@@ -355,7 +356,7 @@ def test_another_law_goes_beside_it(law: str) -> None:
 
 
 def test_a_plain_impedance_goes_beside_it() -> None:
-    """Equal where it begins; then its stiffness is constant, and its hand lags."""
+    """Equal at the start; then its stiffness is constant, and its hand lags."""
     session = Session(playable("panda_obstacle", "null_space.fields.0.weight=0"))
     go(session, 2.0)  # on the circle
     state, active = session.controller.state, session.controller.active_stack
@@ -369,7 +370,7 @@ def test_a_plain_impedance_goes_beside_it() -> None:
     go(session, 1.0)
     feed_forward = active.rows.acceleration[:3] - feedback_of(state, active)[:3]
     left = other.controller.active_stack.rows.error[:3]
-    # Kp⁻¹ x_d'', but for the inertia, which is not that of the start any more
+    # Kp⁻¹ x_d'', up to the change of inertia since the start
     np.testing.assert_allclose(left, feed_forward / 10.0**2, atol=6e-4)
     assert np.linalg.norm(left) > 1e-3
     with_spring = Session(playable("panda", "tasks.hand.impedance={stiffness: 300}"))
@@ -440,7 +441,8 @@ def test_the_picture_follows_what_is_dragged(session: Session) -> None:
     )
     targets = told(recorder, "/play", "targets")
     np.testing.assert_allclose(targets["poses"]["hand"], pose_of(session))
-    # In a pause it is where it is wanted, and goes there afterwards.
+    # In a pause the target is drawn where it is commanded; the hand moves there
+    # afterwards.
     session.receive({"do": "obstacle", "name": "ball", "position": [0.2, 0.5, 0.5]})
     assert session.handles.places()[1]["ball"] == [0.2, 0.5, 0.5]
     session.advance()
@@ -458,7 +460,7 @@ def test_the_picture_follows_what_is_dragged(session: Session) -> None:
 
 
 def test_a_target_out_of_reach_is_said_and_by_how_much(still: Session) -> None:
-    """Half a metre too high; within reach again there is no message."""
+    """Half a metre too high; within reach again the message is gone."""
     recorder = Recorder()
     picture = Picture(still, Viewer(still.experiment.robot, transport=recorder))
 
@@ -512,7 +514,7 @@ def test_the_loop_does_what_the_page_says_about_time(session: Session) -> None:
     assert session.t > 0.05
 
 
-# --- what can be played with ---------------------------------------------------------
+# --- sources of a play ---------------------------------------------------------------
 
 
 def test_any_fixed_robot_is_a_playground() -> None:
@@ -539,7 +541,7 @@ def test_what_cannot_be_played_with_is_said(source: str, message: str) -> None:
 def test_the_operational_space_law_keeps_the_tasks_and_not_the_field(
     experiment: hsp.Experiment,
 ) -> None:
-    """Both laws meet the tasks; the moving field is followed by the exact one alone."""
+    """Both laws fulfil the tasks; only the exact one follows the moving field."""
     logs = []
     for operational in (False, True):
         session = Session(experiment)
@@ -550,7 +552,7 @@ def test_the_operational_space_law_keeps_the_tasks_and_not_the_field(
     for log in logs:
         assert np.abs(log["task.hand.error"]).max() < 2e-3
     late = exact.t > 1.5
-    # The exact one deviates because the effort is held for a millisecond.
+    # The exact one deviates since efforts are held for a millisecond.
     assert exact["null_space_norm"][late].max() < 0.02
     assert compared["null_space_norm"][late].max() > 0.3
     assert "operational" in compared.meta["changes_lost"]
@@ -558,7 +560,7 @@ def test_the_operational_space_law_keeps_the_tasks_and_not_the_field(
 
 
 def test_a_robot_that_walks_can_be_pulled_but_not_led(tmp_path: Path) -> None:
-    """The feet and the trunk are the plan's; its run is that of `simulate`."""
+    """Feet and trunk are controlled by the plan; the run equals that of `simulate`."""
     session = Session(playable("walking/talos_walk"))
     assert [*session.handles.targets] == ["posture"]
     plan = session.recorder.plan  # whose streams are recorded

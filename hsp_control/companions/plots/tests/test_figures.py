@@ -1,4 +1,4 @@
-"""Figures: short logs, files, and that they can be read."""
+"""Figures: short logs, files, and legibility."""
 
 import itertools
 import subprocess
@@ -15,7 +15,7 @@ from hsp_control import Rollout
 from hsp_control.cli import main
 from hsp_control.common.exceptions import PlotError
 
-# --- logs at the edge ----------------------------------------------------------------
+# --- short logs ----------------------------------------------------------------------
 
 
 @pytest.mark.slow
@@ -38,14 +38,14 @@ def test_a_log_without_rows_says_so() -> None:
         plots.paper_figure(whole, times=[])
 
 
-# --- files, and what drawing leaves behind -------------------------------------------
+# --- files, and side effects of drawing ----------------------------------------------
 
 
 @pytest.mark.slow
 @pytest.mark.system
 def test_figures_are_written_in_every_format(tmp_path: Path) -> None:
     log, folder = changed(planar(PAPER["rest"]), slice(20)), tmp_path / "new" / "folder"
-    formats = "svg", *further("pdf")  # which an example writes
+    formats = "svg", *further("pdf")  # written by an example
     files = plots.save_figures(log, folder, "run", formats)
     kinds = itertools.product(("paper", "diagnostics"), formats)
     assert files == [folder / f"run-{name}.{suffix}" for name, suffix in kinds]
@@ -168,6 +168,6 @@ def test_nothing_is_clipped_and_nothing_overlaps(shown: list[Figure]) -> None:
             assert inside == (True, True), what
         for (one, here), (other, there) in itertools.combinations(panels + headings, 2):
             if one in getattr(other, "child_axes", []):
-                continue  # the scale of time stands in its panel
+                continue  # the time axis is in its panel
             overlap = here.intersection(here, there)
             assert overlap is None or min(overlap.size) < 3.0, (one, other)

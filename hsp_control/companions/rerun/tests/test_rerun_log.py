@@ -1,4 +1,4 @@
-"""A run in Rerun's file, read back: the same names and numbers as in our view."""
+"""A run in a Rerun file, read back: the same names and numbers as in our view."""
 
 import builtins
 from collections.abc import Mapping
@@ -42,7 +42,7 @@ def log(experiment: hsp.Experiment) -> hsp.Rollout:
 def written(
     log: hsp.Rollout, tmp_path_factory: pytest.TempPathFactory
 ) -> Mapping[str, Any]:
-    """The file's chunks by their paths: those with rows, else those that stay."""
+    """The file's chunks by path: those with rows, otherwise static ones."""
     path = tmp_path_factory.mktemp("rerun") / "run.rrd"
     log_to_rerun(log, path=path)
     chunks = sorted(RrdReader(path).stream(), key=lambda chunk: not chunk.is_static)
@@ -197,7 +197,7 @@ def test_what_is_turned_is_turned_the_same_way(log: hsp.Rollout) -> None:
             sent[path] = columns
 
     class Rerun:
-        """Keeps what it is given."""
+        """Records its arguments."""
 
         class Transform3D(dict[str, Any]):
             @staticmethod

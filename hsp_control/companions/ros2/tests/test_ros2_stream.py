@@ -1,4 +1,4 @@
-"""Poses of ROS 2 as targets: what of a pose a stream takes, and what it refuses."""
+"""ROS 2 poses as targets: the part of a pose that a stream uses, and refusals."""
 
 import re
 from collections.abc import Callable

@@ -26,7 +26,7 @@ def test_watchers_hear_state_effort_and_poses() -> None:
     watched = publish(f"ros2:/{prefix}?domain={DOMAIN}&rate=100", command)
     joints = Node(DOMAIN).subscription(states, JointState)
     actual, reference = (
-        heard(f"{prefix}/tip/{what}") for what in ("actual", "reference")
+        heard(f"{prefix}/tip/{kind}") for kind in ("actual", "reference")
     )
     q, v = start(), 0.1 * np.ones(7)
     for t in (0.0, 0.004, 0.010):  # the second is too early for 100 Hz

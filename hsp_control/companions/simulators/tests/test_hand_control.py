@@ -1,4 +1,4 @@
-"""A hand whose targets come step by step, without any simulator."""
+"""A hand with one target per step, without a simulator."""
 
 from pathlib import Path
 from typing import Any
@@ -44,7 +44,7 @@ def test_between_jumps_the_error_equation_holds(
 ) -> None:
     hand = HandControl(robot, "panda_tcp", LAW, gains=GAINS, axes=axes)
     q, v = moving(robot)
-    v *= 0.01  # and near: then the threshold is the least, and the law exact
+    v *= 0.01  # and near: then the threshold is smallest, and the law exact
     hand.begin(0.0, q, v)
     goal = hand.pose(q)
     goal.translation = goal.translation + np.array([2e-3, -1e-3, 4e-4])

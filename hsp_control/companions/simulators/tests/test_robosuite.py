@@ -31,7 +31,7 @@ ARMS = ["Panda", "Sawyer", "IIWA", "Jaco", "Kinova3", "UR5e", "XArm7"]
 def made(
     robot: str = "Panda", kind: str = "HSP_POSE", frequency: int = 20, **arm: Any
 ) -> Iterator[Any]:
-    """Make Lift with one arm, changed settings of which are given."""
+    """Make Lift with one arm, with the given settings changed."""
     config = robosuite.load_composite_controller_config(robot=robot)
     config["type"] = "HSP"
     config["body_parts"]["right"] |= {"type": kind, **arm}
@@ -93,7 +93,8 @@ def test_every_arm_goes_where_it_is_told(name: str) -> None:
 
 
 def test_the_model_is_the_simulation_s() -> None:
-    """Without what it leaves out, MuJoCo's acceleration is the law's: 7 of 9 joints."""
+    """Without the effects that it omits, MuJoCo's acceleration is the law's: 7 of 9
+    joints."""
     with made(hsp=LAW) as env:
         arm, model, data = arm_of(env), env.sim.model._model, env.sim.data._data
         for _ in range(5):
@@ -114,10 +115,10 @@ def test_the_model_is_the_simulation_s() -> None:
 
 @pytest.mark.parametrize("frame", ["base", "world"])
 def test_an_action_means_what_it_means_to_osc_pose(frame: str) -> None:
-    """The goals of both are the same; if goals jump, so is the motion, roughly.
+    """Both have the same goals and, with steps of the goal, similar motions.
 
-    Where the wrist's motors do not reach their limits: OSC_POSE leaves out how rotation
-    and translation are coupled, and so demands less.
+    As long as the wrist's motors are within their limits: OSC_POSE neglects the
+    coupling of rotation and translation, and so demands less.
     """
     actions = np.random.default_rng(0).uniform(-0.5, 0.5, (10, 7))
     actions[:, 3:6] *= 0.1

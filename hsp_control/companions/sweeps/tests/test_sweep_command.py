@@ -1,4 +1,4 @@
-"""Check the sweep command: its mistakes, its output, and its figures."""
+"""The sweep command: mistakes, output, and figures."""
 
 import sys
 from pathlib import Path
@@ -76,7 +76,7 @@ def test_the_command_tells_and_draws_what_it_found(
 def test_reasons_that_differ_in_numbers_alone_are_told_once(
     tmp_path: Path, scheduler: str, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    # Not refused for their rate: the motion decides.
+    # Not refused for their rate: the motion diverges.
     settings = [*QUICK, "simulation.control_period=0.01", "simulation.check_rate=false"]
     options = [word for setting in settings for word in ("--set", setting)]
     over = ["--over", "null_space.gain=10,900,1100,-1,-2.5"]

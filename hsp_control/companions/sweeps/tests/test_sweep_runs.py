@@ -1,4 +1,4 @@
-"""Check that sweeps give the same bits however computed, lost or done twice."""
+"""Sweeps give the same bits in any order, and after lost or repeated runs."""
 
 import json
 import os
@@ -35,7 +35,7 @@ RUNS = 8
 
 
 def same(one: Sweep, other: Sweep) -> None:
-    """Assert that two sweeps have the same bits, but for how long runs took."""
+    """Assert that two sweeps have the same bits, except for the runs' durations."""
     assert list(one.columns) == list(other.columns)
     assert one.meta == other.meta
     for name, column in one.columns.items():
@@ -63,7 +63,7 @@ def whole(scheduler: str) -> Sweep:
     return hsp.sweeps.sweep(MOVING, GAINS, overrides=SLOWER, scheduler=scheduler)
 
 
-# --- what is in it -------------------------------------------------------------------
+# --- contents ------------------------------------------------------------------------
 
 
 @pytest.mark.process
@@ -150,7 +150,7 @@ def test_neither_workers_nor_a_cluster_change_a_bit(
     same(hsp.sweeps.sweep(MOVING, OVER, overrides=QUICK, scheduler=scheduler), swept)
     with Client(scheduler, set_as_default=False) as client:
         same(hsp.sweeps.sweep(MOVING, OVER, overrides=QUICK, scheduler=client), swept)
-        assert client.status == "running"  # whose it is closes it
+        assert client.status == "running"  # its owner closes it
 
 
 def sweep_command(out: Path) -> list[str]:
@@ -169,7 +169,7 @@ raise SystemExit(main())
 
 
 def started(out: Path, rows: int) -> "subprocess.Popen[bytes]":
-    """Start a sweep and return when it has written some rows, and some are left."""
+    """Start a sweep and return when it has written some, but not all rows."""
     process = subprocess.Popen(
         sweep_command(out), stdout=subprocess.PIPE, stderr=subprocess.PIPE
     )
@@ -186,7 +186,7 @@ def until(condition: Callable[[], bool], patience: float = 120.0) -> None:
 
 
 def finish(out: Path, kept: Sweep, whole: Sweep, scheduler: str) -> None:
-    """The same command computes what is left, and only that."""
+    """The same command computes only the missing runs."""
     assert 2 <= len(kept) < RUNS
     assert not kept.complete
     ended = hsp.sweeps.sweep(
@@ -209,11 +209,11 @@ def test_a_killed_sweep_goes_on_where_it_was(
     assert len(workers) >= 2  # the nanny and its worker
     process.kill()
     process.communicate()
-    # They do not outlive it, though one was in the middle of a run.
+    # They do not outlive it, though one was busy with a run.
     _, alive = psutil.wait_procs(workers, timeout=100)
     assert not alive
     kept = Sweep.load(out)
-    (out / ".rows-000099.parquet.part").write_bytes(b"PAR1")  # killed while it wrote
+    (out / ".rows-000099.parquet.part").write_bytes(b"PAR1")  # killed while writing
     finish(out, kept, whole, scheduler)
 
 
@@ -229,7 +229,7 @@ def test_ctrl_c_keeps_the_rows_and_the_same_command_ends_it(
     assert process.returncode == 130, errors.decode()
     assert b"stopped by the user" in errors
     assert b"Traceback" not in errors
-    assert len(list(out.iterdir())) == 1  # few files replace the many
+    assert len(list(out.iterdir())) == 1  # few files replace many
     finish(out, Sweep.load(out), whole, scheduler)
 
 
@@ -264,10 +264,10 @@ def test_a_dead_scheduler_keeps_the_rows_and_the_same_command_ends_it(
 
 
 def running(word: str, parent: psutil.Process) -> list[psutil.Process]:
-    """Return the children that were called with a word; not those that have ended."""
+    """Return the running child processes with a word in their command."""
     found = []
     for child in parent.children():
-        with suppress(psutil.NoSuchProcess):  # also nobody has read how it ended
+        with suppress(psutil.NoSuchProcess):  # zombies are excluded
             if word in " ".join(child.cmdline()):
                 found.append(child)
     return found
@@ -280,7 +280,7 @@ def test_a_killed_worker_is_replaced(after: tuple[int, int], whole: Sweep) -> No
     killed: list[int] = []
 
     def kill(done: int, total: int, failures: int) -> None:
-        """After the first rows, the process that computes."""
+        """Kill the worker after the first rows."""
         if done in after:
             (nanny,) = running("--nworkers", psutil.Process())
             each = running("spawn_main", nanny)
@@ -332,7 +332,7 @@ def test_a_run_that_kills_three_workers_is_a_row_and_tried_again_another_time(
     assert found["status"].tolist() == 3 * ["completed"]
 
 
-# --- what travels --------------------------------------------------------------------
+# --- transfer to workers -------------------------------------------------------------
 
 SCRIPT = """
 import hsp_control as hsp
@@ -368,7 +368,7 @@ def test_a_script_needs_no_guard_and_its_types_travel(tmp_path: Path) -> None:
 @pytest.mark.process
 @pytest.mark.slow
 def test_files_travel_where_no_worker_has_them(tmp_path: Path, scheduler: str) -> None:
-    """Those of the configuration are in a folder that is gone when runs begin."""
+    """The configuration's files are in a folder that is removed before the runs."""
     folder = tmp_path / "mine"
     folder.mkdir()
     urdf = hsp.Robot.load("planar3r").source.urdf.read_text()
@@ -425,7 +425,7 @@ def test_a_computer_that_is_not_fit_ends_the_sweep() -> None:
         computed(unfit, 0, (), None)
 
 
-# --- what ends no sweep --------------------------------------------------------------
+# --- faults that end no sweep --------------------------------------------------------
 
 
 @pytest.mark.process
@@ -461,7 +461,7 @@ def test_a_time_limit_is_positive(limit: float) -> None:
 
 
 def test_a_row_that_has_arrived_stays_whatever_becomes_of_its_worker() -> None:
-    """Which the next run may kill before anybody looks at the future."""
+    """The next run may kill its worker before the result is read."""
     row = Row(2, "completed", "")
     assert sweep_runs._row(SimpleNamespace(status="cancelled"), row) is row
     with pytest.raises(SweepError, match="the scheduler does not answer"):
@@ -503,7 +503,7 @@ def test_a_scheduler_that_does_not_answer_is_an_error(
         )
 
 
-# --- files of others -----------------------------------------------------------------
+# --- untrusted files -----------------------------------------------------------------
 
 
 @pytest.mark.process

@@ -1,4 +1,4 @@
-"""An exported page holds what the log has, within its bounds, in few bytes."""
+"""An exported page contains the log within tolerances, in few bytes."""
 
 import base64
 import gzip
@@ -78,7 +78,7 @@ def panda() -> Rollout:
 
 
 def unpacked(entry: dict[str, Any]) -> np.ndarray:
-    """The other half of packing.py, as unpack.js has it."""
+    """The inverse of packing.py, as in unpack.js."""
     data = entry["bytes"]
     data = np.frombuffer(getattr(data, "data", data), np.uint8)
     rows, columns, width = entry["rows"], entry["columns"], entry["width"]
@@ -251,7 +251,7 @@ def test_a_mesh_that_cannot_be_read_is_named(monkeypatch: pytest.MonkeyPatch) ->
 
 
 def content_of(page: Path) -> dict[str, Any]:
-    """The content of a page, with its arrays in their places."""
+    """The content of a page, with its arrays inserted."""
     text = page.read_text(encoding="utf-8")
     block = re.search(r'id="content">([^<]*)<', text)
     assert block is not None
@@ -308,7 +308,7 @@ def test_every_joint_is_where_the_log_has_it(panda: Rollout, tmp_path: Path) -> 
 
 
 def rows_at(times: np.ndarray, values: np.ndarray, t: np.ndarray) -> Any:
-    """The rows of a track at the times of a log; one that stays has one row."""
+    """The rows of a track at the times of a log; a constant one has one row."""
     rows = np.abs(times[:, None] - t).argmin(axis=0)
     assert len(times) == 1 or np.abs(times[rows] - t).max() <= 1e-6
     return values[rows]

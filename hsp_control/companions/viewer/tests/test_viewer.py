@@ -1,4 +1,4 @@
-"""Check that the view shows what there is where it is, and plays logs."""
+"""The view shows all objects at their poses, and plays logs."""
 
 import re
 from pathlib import Path
@@ -201,7 +201,7 @@ def test_coarse_logs_play_smoothly_and_fine_ones_are_thinned(
     assert (times[0], times[-1]) == (coarse.t[0], coarse.t[-1])
     assert np.diff(times).max() < 0.034
     assert np.isin(coarse.t, times).all()
-    # Between two rows the links keep their lengths: joints turn, nothing is cut short.
+    # Between two rows the links keep their lengths: joints rotate along arcs.
     for t in times:
         places = [clip.value(f"/robot/joint{k}", "position", t) for k in (1, 2, 3)]
         lengths = np.linalg.norm(np.diff(places, axis=0), axis=1)
@@ -285,7 +285,7 @@ def test_a_log_whose_robot_is_gone_says_so(run: Rollout) -> None:
 
 
 def from_files(command: dict[str, Any]) -> list[dict[str, Any]]:
-    """Return what of an object is drawn from mesh files."""
+    """Return the parts of an object that are drawn from mesh files."""
     if command["type"] != "set_object":
         return []
     thing = command["object"]
@@ -310,7 +310,7 @@ def test_a_mesh_file_comes_once_and_before_what_is_drawn_from_it() -> None:
     other = [unpack(packed) for *_, packed in one.scene.items()]
     files = {each["file"] for each in other if each["type"] == "mesh_file"}
     assert known == files
-    # An export has them where their names were.
+    # An export has them in place of their names.
     shown = [*with_files(commands)]
     assert not any(command["type"] == "mesh_file" for command in shown)
     drawn = [each for command in shown for each in from_files(command)]

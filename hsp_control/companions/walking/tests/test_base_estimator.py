@@ -1,4 +1,4 @@
-"""The base of a whole robot: against the truth, and what is refused."""
+"""The base of a whole robot: against the truth, and refusals."""
 
 from functools import cache
 
@@ -32,7 +32,7 @@ EXACT = Imu(
 
 
 class Listening(RunningPlan):
-    """Keeps its measurements."""
+    """Records its measurements."""
 
     def __init__(self):
         super().__init__(Listens())
@@ -50,7 +50,7 @@ class Listening(RunningPlan):
 
 
 class Listens(MotionPlan):
-    """A plan that only listens."""
+    """A plan that only receives measurements."""
 
     def parts(self, robot, tasks, contacts):
         raise NotImplementedError
@@ -64,7 +64,7 @@ LISTENING = Listening()
 
 @cache
 def swaying():
-    """Return a robot that sways on two rigid feet, and what is measured of it."""
+    """Return a robot that sways on two rigid feet, and its measurements."""
     experiment = load_experiment(
         "whole_body/talos_circle", "tasks.center_of_mass.blend=0.3"
     )
@@ -116,7 +116,7 @@ def test_without_noise_it_converges_to_the_truth():
     assert velocity < 1e-3
     assert estimate.v[3:6] == pytest.approx(true.v[3:6], abs=0.05)  # half a period late
     assert estimate.q[7:] == pytest.approx(true.q[7:])
-    # The soles stand still.
+    # The soles are at rest.
     P = running.filter.covariance
     assert np.sqrt(np.diag(P)[ROTATION][:2]).max() < 2e-4
 

@@ -1,4 +1,4 @@
-"""References and schedules that are fed while a robot moves."""
+"""References and schedules that are set while a robot moves."""
 
 import pickle
 from copy import deepcopy

@@ -1,4 +1,4 @@
-"""A trot is a value, as is a crawl; mistakes are refused before a foot swings."""
+"""Trots and crawls are values; mistakes are refused before a foot swings."""
 
 from dataclasses import replace
 
@@ -75,7 +75,7 @@ def test_a_leg_needs_three_joints(solo):
 
 
 def test_barriers_let_legs_swing():
-    """A given value stays, also through later changes."""
+    """A given value is kept, also through later changes."""
     controller = load_experiment(TROT).controller
     assert controller.limits.bandwidth == BANDWIDTH
     controller.at(0.1).ramp(0.0).limits(Limits(velocity=0.5))
