@@ -40,14 +40,14 @@ def judge(status: int, errors: str) -> list[str]:
         return ["traceback", errors]
     if status == 0:
         return ["fine", ""]
-    told = [line for line in errors.splitlines() if line.startswith("hsp: ")]
+    reported = [line for line in errors.splitlines() if line.startswith("hsp: ")]
     stopped = status == 130 and "hsp: stopped by the user" in errors
     refused = status == 2 or stopped
-    if not refused or not told or not errors.startswith("hsp: "):
+    if not refused or not reported or not errors.startswith("hsp: "):
         return ["unclear", f"status {status}: {errors}"]
-    if len(errors) > LONGEST or len(told) > 2:
+    if len(errors) > LONGEST or len(reported) > 2:
         return ["unclear", f"{len(errors)} characters: {errors[:LONGEST]}"]
-    return ["refused", told[0].removeprefix("hsp: ")]
+    return ["refused", reported[0].removeprefix("hsp: ")]
 
 
 @contextmanager

@@ -83,10 +83,10 @@ def full_disk(rollout: Rollout, size: int, random: Random, folder: Path) -> Faul
     if child == 0:
         _save_and_leave(rollout, path, room, message)
     os.waitpid(child, 0)
-    said = message.read_text() if message.exists() else ""
+    reported = message.read_text() if message.exists() else ""
     problem = ""
-    if not said.startswith(f"{path}: cannot write the log: "):
-        problem = f"printed {said!r}"
+    if not reported.startswith(f"{path}: cannot write the log: "):
+        problem = f"printed {reported!r}"
     elif not same(Rollout.load(path), before) or len(Rollout.load(path)) != 2:
         problem = "the older log was damaged"
     left = {"log.npz", "message"}

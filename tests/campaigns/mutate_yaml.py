@@ -19,7 +19,7 @@ TEXTS: list[Any] = [
     "", " ", "nan", "inf", "1e3", "yes", "null", "0x10", "start", "home", "panda",
     "world",
     "panda_hand", "../../../../etc/passwd", "/etc/passwd", "/dev/zero", "/", ".",
-    "~nobody",
+    "~unknown",
     "no.urdf", "x" * 300 + ".urdf", "a\0b.urdf", "file:///etc/passwd", LONG,
     "\u202e", "é",
     "%s%n", "{0}", "[bold]x[/]", "$(id)", "`id`",

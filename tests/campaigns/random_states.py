@@ -63,10 +63,10 @@ class Tally:
     examples: list[str] = field(default_factory=list)
     seconds: float = 0.0
 
-    def note(self, where: str, what: str) -> None:
+    def note(self, where: str, problem: str) -> None:
         """Keep an example of a failure."""
         if len(self.examples) < 20:
-            self.examples.append(f"{where}: {what[:200]}")
+            self.examples.append(f"{where}: {problem[:200]}")
 
     @property
     def good(self) -> bool:

@@ -40,10 +40,10 @@ DEMO = str(EXAMPLE / "demo.yaml")
 
 @pytest.mark.process
 def test_its_types_work_in_a_configuration(installed: Path, tmp_path: Path) -> None:
-    said = hsp(installed, f"check {DEMO}", tmp_path)
-    assert "FrameHeight, 1 rows" in said
-    assert "elbow_height" in said
-    assert "DampedPlant" in said or "damped" in said.lower()
+    reported = hsp(installed, f"check {DEMO}", tmp_path)
+    assert "FrameHeight, 1 rows" in reported
+    assert "elbow_height" in reported
+    assert "DampedPlant" in reported or "damped" in reported.lower()
 
 
 @pytest.mark.process
@@ -81,5 +81,5 @@ def test_it_sweeps(workers: int, installed: Path, tmp_path: Path) -> None:
 def test_its_robot_is_reached_by_name(installed: Path, tmp_path: Path) -> None:
     live = f"live {DEMO} --robot"
     hsp(installed, f"{live} example://anywhere --duration 0.2", tmp_path)
-    said = hsp(installed, f"{live} exmaple://x", tmp_path, status=2)
-    assert "did you mean example://ADDRESS?" in said
+    reported = hsp(installed, f"{live} exmaple://x", tmp_path, status=2)
+    assert "did you mean example://ADDRESS?" in reported

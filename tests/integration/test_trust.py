@@ -112,11 +112,13 @@ def test_a_robot_elsewhere_is_refused_and_allowed(
     load_experiment(config)
     load_experiment(config, strict=True, allow=[outside])
     assert main(["check", str(config), "--strict"]) == 2
-    told = capsys.readouterr().err
-    assert told.startswith(f"hsp: {config}:1: robot.name: robot '{outside}/arm.urdf'")
-    assert told.count("\n") == 1
+    reported = capsys.readouterr().err
+    assert reported.startswith(
+        f"hsp: {config}:1: robot.name: robot '{outside}/arm.urdf'"
+    )
+    assert reported.count("\n") == 1
     assert main(["live", str(config), "--strict"]) == 2
-    assert capsys.readouterr().err == told
+    assert capsys.readouterr().err == reported
     assert main(["check", str(config), "--allow", str(outside)]) == 0
     assert main(["check", str(config)]) == 0
 

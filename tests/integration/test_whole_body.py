@@ -31,11 +31,11 @@ def check_forces(rollout: Rollout) -> None:
     for name in names:
         assert (rollout[f"contact.{name}.force"][:, 2] >= 0.0).all()
         assert np.nanmax(rollout[f"contact.{name}.friction_used"]) <= 1.0 + 1e-6
-    asked = sum(rollout[f"contact.{name}.force"][:, 2] for name in names)
+    requested = sum(rollout[f"contact.{name}.force"][:, 2] for name in names)
     engine = [c for c in rollout.columns if c.startswith("plant.contact.")]
     answered = sum(rollout[c][:, 2] for c in engine if c.endswith(".force"))
     settled = rollout.t > 0.3
-    np.testing.assert_allclose(answered[settled], asked[settled], rtol=0.05)
+    np.testing.assert_allclose(answered[settled], requested[settled], rtol=0.05)
 
 
 def test_talos_on_two_feet() -> None:

@@ -38,9 +38,9 @@ def opened(
     page.on("pageerror", lambda error: wrong.append(str(error)))
     page.on(
         "console",
-        lambda said: (
-            wrong.append(said.text)
-            if said.type in {"error", "warning"} and HARMLESS not in said.text
+        lambda reported: (
+            wrong.append(reported.text)
+            if reported.type in {"error", "warning"} and HARMLESS not in reported.text
             else None
         ),
     )

@@ -51,14 +51,14 @@ class Sensors:
         if self.reads < self.begin:
             return found
         self.first = self.first or found
-        told = lie(self, found)
+        reported = lie(self, found)
         mine = self.joints
-        applied = told.applied
+        applied = reported.applied
         if applied is not None and found.applied is not None:
             applied = np.where(mine, applied, found.applied)
-        return told._replace(
-            q=np.where(mine, told.q, found.q),
-            v=np.where(mine, told.v, found.v),
+        return reported._replace(
+            q=np.where(mine, reported.q, found.q),
+            v=np.where(mine, reported.v, found.v),
             applied=applied,
         )
 
@@ -200,9 +200,9 @@ def is_seen_at_rest(lie: Lie) -> bool:
     q, tau = 0.1 * np.arange(7), np.arange(7.0)
     for k in range(4):
         true = Measurement(k, k * PERIOD, q, np.zeros(7), applied=tau)
-        told = sensors(true, lie)
+        reported = sensors(true, lie)
         names = ("t", "q", "v", "applied")
-        if any(np.any(getattr(told, n) != getattr(true, n)) for n in names):
+        if any(np.any(getattr(reported, n) != getattr(true, n)) for n in names):
             return True
     return False
 

@@ -37,7 +37,7 @@ class Page(threading.Thread):
 
     async def look(self) -> None:
         page = await websocket_connect(scene_request(self.url))
-        protocol = page.protocol  # `leave` takes it from the page
+        protocol = page.protocol  # `leave` detaches it from the page
         self.loop, self.socket = asyncio.get_running_loop(), page
         try:
             while (message := await page.read_message()) is not None:
@@ -77,5 +77,5 @@ class Steering(Page):
         asyncio.run_coroutine_threadsafe(write(), self.loop).result(10.0)
 
     def drives(self) -> tuple[bool, bool] | None:
-        said = [c for c in self.commands if c["type"] == "play_drive"]
-        return (said[-1]["mine"], said[-1]["taken"]) if said else None
+        reported = [c for c in self.commands if c["type"] == "play_drive"]
+        return (reported[-1]["mine"], reported[-1]["taken"]) if reported else None

@@ -94,8 +94,8 @@ def serve() -> None:
             child.start()
             child.join()
             printed.seek(0)
-            said = printed.read().decode()
-        print(json.dumps([child.exitcode, said]), file=answers, flush=True)
+            reported = printed.read().decode()
+        print(json.dumps([child.exitcode, reported]), file=answers, flush=True)
 
 
 def _become(request: dict[str, Any], output: int) -> None:

@@ -50,9 +50,9 @@ def played(command: list[str], folder: Path) -> str:
         while begun.is_running() and begun.cpu_times().user < enough:
             time.sleep(0.05)
         play.send_signal(signal.SIGINT)
-        said = begin + play.communicate(timeout=250)[0]
-    assert play.returncode == 0, said
-    return said
+        reported = begin + play.communicate(timeout=250)[0]
+    assert play.returncode == 0, reported
+    return reported
 
 
 def without_display() -> dict[str, str]:

@@ -91,16 +91,16 @@ def test_a_bad_line_is_seen_counted_and_survived(tmp_path: Path) -> None:
             settings=SETTINGS,
             log=logs[0],
         )
-        told = robot.wait(60.0)
+        reported = robot.wait(60.0)
         pid = robot.process.pid if robot.process else 0
     assert gone(pid)
     assert report.ended == "completed", report.reason
     assert (report.phase, report.silent) == (Phase.HOLDING, False)
-    assert told is not None
-    assert told["reason"] == "the loop closed the connection"
+    assert reported is not None
+    assert reported["reason"] == "the loop closed the connection"
     link = robot.hardware.link
-    ends = (link.counts, link.lost, told["injected"]), (
-        told["link"], told["link"]["lost"], link.injected
+    ends = (link.counts, link.lost, reported["injected"]), (
+        reported["link"], reported["link"]["lost"], link.injected
     )  # fmt: skip
     for counts, lost, injected in ends:
         assert min(injected.values()) > 10
@@ -280,9 +280,9 @@ def test_what_feet_feel_comes_over_the_wire(tmp_path: Path) -> None:
             log=logs[0],
             log_period=0.001,
         )
-        told = robot.wait(60.0)
+        reported = robot.wait(60.0)
     assert report.ended == "completed", report.reason
-    assert told is not None
+    assert reported is not None
     loop, true = (Rollout.load(log) for log in logs)
     rows = {round(1000.0 * t): k for k, t in enumerate(true.t)}
     running = loop["live.phase"] == Phase.RUNNING

@@ -69,9 +69,9 @@ def test_the_quick_tests_pass(core: Path) -> None:
     chosen = "not slow and not process and not browser"
     rooms = ["tests/unit"] if THOROUGH else [f"tests/unit/{room}" for room in ROOMS]
     named = () if THOROUGH else ("-k", f"not ({THE_SAME})")
-    told = run(core, "pytest", *rooms, "-m", chosen, *named)
-    assert " passed" in told
-    assert "failed" not in told
+    reported = run(core, "pytest", *rooms, "-m", chosen, *named)
+    assert " passed" in reported
+    assert "failed" not in reported
 
 
 @pytest.mark.parametrize("name", ["paper/4_moving_obstacle", "panda_obstacle"])
@@ -85,7 +85,7 @@ def test_the_demo_runs_as_before(core: Path, name: str) -> None:
 
 
 def test_what_is_gone_is_not_known(core: Path) -> None:
-    told = run(core, "hsp_control", "--help")
-    assert "check" in told
-    assert not {"sweep", "franka-box", "view", "play", "export"} & set(told.split())
+    reported = run(core, "hsp_control", "--help")
+    assert "check" in reported
+    assert not {"sweep", "franka-box", "view", "play", "export"} & set(reported.split())
     assert "--view" not in run(core, "hsp_control", "run", "--help")

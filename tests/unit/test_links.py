@@ -67,6 +67,6 @@ def test_a_missing_file_is_told(tmp_path: Path) -> None:
     text = (
         "[a](there.md#part) [b](gone.md) ![c](gone.png) [d](#here) [x](https://a.b/c)\n"
         "`[code](no.md)`\n\n```\n[fenced](no.md)\n```\n\n"
-        "[e]: other.md\nthe clock [s]: when it is told\n"
+        "[e]: other.md\nthe clock [s]: at its first step\n"
     )
     assert missing(text, tmp_path) == ["gone.md", "gone.png", "other.md"]

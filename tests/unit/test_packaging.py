@@ -58,8 +58,8 @@ def test_conda_requires_what_pip_does() -> None:
         for pattern in PROJECT["project"]["license-files"]
         for file in ROOT.glob(pattern)
     }
-    told = recipe["about"]["license_file"]  # also of removed companions
-    assert {each for each in told if (ROOT / each).parents[1].is_dir()} == licenses
+    reported = recipe["about"]["license_file"]  # also of removed companions
+    assert {each for each in reported if (ROOT / each).parents[1].is_dir()} == licenses
 
 
 def test_every_file_has_the_package_s_version() -> None:
@@ -74,7 +74,7 @@ def test_every_file_has_the_package_s_version() -> None:
 
 
 def included() -> set[str]:
-    """Return what the source distribution has, at the top."""
+    """Return the top-level content of the source distribution."""
     listed = PROJECT["tool"]["hatch"]["build"]["targets"]["sdist"]["include"]
     always = {"LICENSE", "pyproject.toml"}
     return {name.lstrip("/") for name in listed} | always

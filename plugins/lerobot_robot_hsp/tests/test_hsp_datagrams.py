@@ -98,8 +98,8 @@ def test_what_is_old_or_no_state_is_not_heard(
 ) -> None:
     judged, is_newer = [], loop._is_newer
 
-    def noted(heard: dict) -> bool:
-        judged.append((heard["number"], is_newer(heard)))
+    def noted(received: dict) -> bool:
+        judged.append((received["number"], is_newer(received)))
         return judged[-1][1]
 
     monkeypatch.setattr(loop, "_is_newer", noted)

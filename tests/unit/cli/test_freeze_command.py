@@ -42,8 +42,8 @@ def test_what_cannot_be_frozen_is_refused_with_its_place(
     if config not in bundled_configs():
         pytest.skip("it belongs to a companion that is not there")
     assert main(["freeze", config, "--out", str(tmp_path)]) == 2
-    said = " ".join(capsys.readouterr().err.split())
-    assert re.search(message, said), said
+    reported = " ".join(capsys.readouterr().err.split())
+    assert re.search(message, reported), reported
     assert not list(tmp_path.iterdir())
 
 
@@ -65,8 +65,10 @@ def test_a_task_that_comes_and_goes(
     capsys.readouterr()
     for option, known in (("--presence", "; did you mean 'elbow'?"), ("--payload", "")):
         assert main([*command, option, "elbwo"]) == 2
-        said = " ".join(capsys.readouterr().err.split())
-        assert re.search(rf"two\.yaml:1: {option}: .*'elbwo'{re.escape(known)}", said)
+        reported = " ".join(capsys.readouterr().err.split())
+        assert re.search(
+            rf"two\.yaml:1: {option}: .*'elbwo'{re.escape(known)}", reported
+        )
 
 
 @pytest.mark.parametrize(

@@ -60,9 +60,9 @@ def test_a_run_says_how_much_nobody_explained() -> None:
     assert row.endswith(" N·m that the model does not explain, on panda_joint4")
     beside = {**LOAD, "payload": {**LOAD["payload"], "center": [0.15, 0.0, 0.0]}}
     log = load_experiment(CONFIG | {"plant": beside}).run()
-    _, told, remedy = unexplained_rows(log)
-    assert told.startswith("the model does not describe the robot: that is ")
-    assert "of the effort limit of panda_joint" in told
+    _, reported, remedy = unexplained_rows(log)
+    assert reported.startswith("the model does not describe the robot: that is ")
+    assert "of the effort limit of panda_joint" in reported
     assert remedy == "the model has no rotors: robot: motor_inertia adds them"
     size = np.abs(log["observer.disturbance"]) / log.meta["limits"]["effort"]
     np.testing.assert_allclose(log["observer.share"], size.max(axis=1), rtol=1e-12)

@@ -95,8 +95,8 @@ def test_the_status_tells_whether_all_was_written(where: str, status: int) -> No
     with Path(where).open("w") as file:
         command = [sys.executable, "-m", "hsp_control", "robots", "panda"]
         done = subprocess.run(command, stdout=file, stderr=subprocess.PIPE, text=True)
-    said = "hsp: standard output: No space left on device" if status else ""
-    assert (done.returncode, done.stderr.strip()) == (status, said)
+    reported = "hsp: standard output: No space left on device" if status else ""
+    assert (done.returncode, done.stderr.strip()) == (status, reported)
 
 
 @pytest.mark.process

@@ -201,5 +201,5 @@ def test_several_mistakes_are_listed_in_the_order_of_the_file() -> None:
         "panda.yaml:5: fields.0.middel: ... 'middle'",
         "panda.yaml:6: fields.1.weight: 'b' ... number",
     )
-    for told, line in zip(expected, [first, *lines], strict=True):
-        assert re.search(wording(told), line.strip())
+    for reported, line in zip(expected, [first, *lines], strict=True):
+        assert re.search(wording(reported), line.strip())

@@ -39,7 +39,7 @@ FOOT = "contacts.front_left"
 TWICE = {"intervals": [[0, 2], [1, 3]]}
 REMOVED = object()
 
-# Each row: the robot, what is changed, the class of the error, and its message.
+# Each row: the robot, the changed value, the class of the error, and its message.
 MISTAKES: list[tuple[dict[str, Any], str, Any, str, str]] = [
     (SOLO, f"{FOOT}.frame", "FL_FOT", "FrameNotFoundError",
      f"{FOOT}.frame: no ... 'FL_FOT' ... 'FL_FOOT'"),

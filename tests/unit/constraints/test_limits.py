@@ -90,8 +90,8 @@ def test_by_default_gravity_may_overload_no_motor_of_an_arm() -> None:
     """The gain is limited where it could demand more than a motor's effort."""
     robot, rng, rest = panda(), np.random.default_rng(1), np.zeros(7)
     for _ in range(2000):
-        asked = robot.inverse_dynamics(robot.random_configuration(rng), rest, rest)
-        assert (np.abs(asked) < robot.largest_gravity).all()
+        requested = robot.inverse_dynamics(robot.random_configuration(rng), rest, rest)
+        assert (np.abs(requested) < robot.largest_gravity).all()
     for none in ({}, {"effort": "none"}, {"effort": 1.0, "static_effort": "none"}):
         assert of(robot, **none).static_effort is None
     assert of(fingers(), effort=1.0).static_effort is not None
@@ -274,12 +274,12 @@ def test_distance_rows_are_its_second_derivative(kind: str) -> None:
     close = near + 0.5 * np.minimum(rate, 0.0) < 0.2
     # speeds that distant pairs permit, and speeds that they do not
     for wanted in (a, 1e3 * a):
-        asked = second(wanted) - second(rest)
-        chosen = close | (asked < 0.5 * least)
+        requested = second(wanted) - second(rest)
+        chosen = close | (requested < 0.5 * least)
         A, b = limit.rows(state, 10.0, wanted)
         assert len(A) == chosen.sum() > 0
         scale = 1e-2 * np.linalg.norm(wanted)
-        np.testing.assert_allclose(A @ wanted, asked[chosen], rtol=0, atol=scale)
+        np.testing.assert_allclose(A @ wanted, requested[chosen], rtol=0, atol=scale)
         np.testing.assert_allclose(b, least[chosen], rtol=0, atol=2e-2)
 
 

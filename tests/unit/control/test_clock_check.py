@@ -15,7 +15,7 @@ from hsp_control.control.clock_check import ClockWarning
 H = 0.002
 
 
-def told(times: Sequence[float], period: float = H) -> list[str]:
+def reported(times: Sequence[float], period: float = H) -> list[str]:
     """Return the messages about the clock of a loop."""
     robot = hsp.Robot.load("panda")
     controller = hsp.Controller(robot, [hsp.FramePosition()])
@@ -45,7 +45,7 @@ STEPS = H * np.arange(40)
 def test_a_clock_of_something_else_is_said_once(
     times: Sequence[float], period: float, message: str
 ) -> None:
-    (found,) = told(times, period)
+    (found,) = reported(times, period)
     assert re.search(wording(message), found)
 
 
@@ -81,7 +81,7 @@ def test_what_happens_to_a_loop_is_no_wrong_clock() -> None:
     slow = np.cumsum(rng.choice([H, 30 * H], STEPS.size))
     rehearsed = np.concatenate([np.zeros(50), STEPS])
     for times in (STEPS, rehearsed, late, twice, pause, slow, 1.76e9 + STEPS):
-        assert told(times) == []
+        assert reported(times) == []
 
 
 def test_the_integrators_stages_are_no_clock() -> None:

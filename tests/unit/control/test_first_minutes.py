@@ -121,8 +121,8 @@ def test_a_target_of_another_kind_is_refused(
 
 def test_errors_by_name_and_what_is_printed() -> None:
     law = holding(null_space_gain=8.0)
-    told = "Controller of panda: 'panda_tcp' ... field rest, K_N = 8 ... no limits"
-    assert re.search(wording(told), repr(law))
+    reported = "Controller of panda: 'panda_tcp' ... field rest, K_N = 8 ... no limits"
+    assert re.search(wording(reported), repr(law))
     out = law.compute(0.0, panda().home(), REST)
     np.testing.assert_array_equal(out.error("panda_tcp"), out.task.error)
     np.testing.assert_array_equal(out.error_rate("panda_tcp"), out.task.error_rate)

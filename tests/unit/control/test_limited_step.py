@@ -209,8 +209,8 @@ def test_contacts_are_relaxed_less_than_distances() -> None:
     stack = made._active
     rise = stack.law.problem.task.jacobian[2]
     a = stack.law.acceleration
-    asked = row(rise, float(rise @ a) + 4.0)
-    _, found, _, status, _ = repeated(made, {"barriers": asked})
+    requested = row(rise, float(rise @ a) + 4.0)
+    _, found, _, status, _ = repeated(made, {"barriers": requested})
     assert status == Status.RELAXED
     moved = float(rise @ (found - a))
     assert moved / (4.0 - moved) == pytest.approx(30.0 / 1e3, rel=0.05)

@@ -122,21 +122,21 @@ def test_what_is_told_is_the_boundary_and_the_advice_works() -> None:
     (found,) = check_rate(made, Q0, H, strong, plant=loaded())
     assert found.path == ("compensation", "integral_action")
     assert not found.unstable
-    told = re.fullmatch(
+    reported = re.fullmatch(
         r"the plant's bodies .* is (.*) times as heavy .* differ (.*) times as much; "
         r".* 1\.5 .* Ki of at most (.*) times this or .*observer",
         found.message,
     )
-    assert told is not None, found.message
+    assert reported is not None, found.message
     state, true = ARM.state(0.0, Q0, np.zeros(7)), loaded()
     J = state.frame("panda_tcp").jacobian[:3]
     # For the identity metric J# = Jᵀ (J Jᵀ)⁻¹: β from the two mass matrices.
     M, heavy = state.mass_matrix, true.state(0.0, Q0, np.zeros(7)).mass_matrix
     performed = J @ np.linalg.solve(heavy, M @ np.linalg.pinv(J))
     beta = np.linalg.eigvals(performed).real.min()
-    assert float(told[1]) == pytest.approx(1.0 / beta, rel=5e-3)
-    assert float(told[2]) == pytest.approx(edge, rel=5e-3)
-    weaker = IntegralAction(7.0 * float(told[3]))
+    assert float(reported[1]) == pytest.approx(1.0 / beta, rel=5e-3)
+    assert float(reported[2]) == pytest.approx(edge, rel=5e-3)
+    weaker = IntegralAction(7.0 * float(reported[3]))
     assert not check_rate(made, Q0, H, only(integral_action=weaker), plant=loaded())
     observed = Compensation(
         integral_action=IntegralAction(7.0), momentum_observer=MomentumObserver(50.0)

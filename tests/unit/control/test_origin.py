@@ -108,7 +108,7 @@ def test_an_origin_that_is_given_counts() -> None:
     with pytest.raises(NonFiniteError, match="origin is inf; needs a finite number"):
         made.restart(origin=np.inf)
     made.compute(1e3, *posture(0))
-    assert made.state.t == 900.0  # what was refused has changed nothing
+    assert made.state.t == 900.0  # refused calls have no effect
 
 
 def test_a_state_has_the_time_since_the_first_step() -> None:

@@ -190,14 +190,14 @@ def test_integral_action_that_a_heavier_robot_does_not_bear_is_told() -> None:
         (found,) = check_rate(made, Q0, 1e-3, strong)
         assert found.path == ("compensation", "integral_action")
         assert not found.unstable
-        told = re.fullmatch(
+        reported = re.fullmatch(
             r"if the robot is (.*) times as heavy at task 'posture' .* factor of 5: .*"
             r"Ki of at most (.*) times this, or a (faster )?momentum .*",
             found.message,
         )
-        assert told is not None
-        assert (told[3] is None) is (observer is None)
-        times, scale = float(told[1]), float(told[2])
+        assert reported is not None
+        assert (reported[3] is None) is (observer is None)
+        times, scale = float(reported[1]), float(reported[2])
         if observer is None:
             assert times == pytest.approx(40.0 / 12.0, rel=0.02)  # Kv Kp/Ki
         for factor, grows in ((0.9 * times, False), (1.1 * times, True)):
@@ -313,8 +313,8 @@ def test_the_advice_on_a_compensator_works(
 ) -> None:
     made = holding(frequency=40.0, gain=20.0)
     found = check_rate(made, Q0, H, make(wrong), effort_delay=delay, strict=False)
-    told = [re.search(advice, each.message) for each in found if each.unstable]
-    numbers = [float(match[1]) for match in told if match]
+    reported = [re.search(advice, each.message) for each in found if each.unstable]
+    numbers = [float(match[1]) for match in reported if match]
     best = min(numbers) if "most" in advice else max(numbers)
     check_rate(made, Q0, H, make(best), effort_delay=delay)
 
@@ -432,8 +432,8 @@ def test_the_command_line_says_what_is_close(
     file.write_text(yaml.safe_dump(config(null_space={"gain": 500})))
     for command in (["check", str(file)], ["run", str(file), "--out", str(tmp_path)]):
         assert main(command) == 0
-        said = capsys.readouterr().err
-        assert re.search(wording("...hsp: null_space.gain: ... 0.5 ... 0.2"), said)
+        output = capsys.readouterr().err
+        assert re.search(wording("...hsp: null_space.gain: ... 0.5 ... 0.2"), output)
     assert main(["check", str(file), "--set", "null_space.gain=2500"]) == 2
     assert "unstable at this rate" in capsys.readouterr().err
 
@@ -476,11 +476,11 @@ def test_a_delay_that_is_not_borne_is_told_with_the_one_that_is() -> None:
     made = Controller(robot, [task], limits=None)
     with pytest.raises(UnstableRateError) as caught:
         check_rate(made, Q0, H, Compensation(), effort_delay=30)
-    told = re.search(
+    reported = re.search(
         r"a delay of the efforts of at most (\d+) period", str(caught.value)
     )
-    assert told is not None, caught.value
-    most = int(told[1])
+    assert reported is not None, caught.value
+    most = int(reported[1])
     check_rate(made, Q0, H, Compensation(), effort_delay=most)
     with pytest.raises(UnstableRateError):
         check_rate(made, Q0, H, Compensation(), effort_delay=most + 1)

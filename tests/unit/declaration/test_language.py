@@ -104,9 +104,9 @@ def test_a_message_speaks_the_language_that_was_typed(
     file = tmp_path / "mine.yaml"
     file.write_text(YAML)
     assert main(["check", str(file), "--set", override]) == 2
-    said = capsys.readouterr().err
-    assert re.search(wording(f"... {yaml}"), said)
-    assert said.count("hsp: ") == 1
+    reported = capsys.readouterr().err
+    assert re.search(wording(f"... {yaml}"), reported)
+    assert reported.count("hsp: ") == 1
 
 
 def test_a_command_says_which_one_was_meant(capsys: pytest.CaptureFixture[str]) -> None:

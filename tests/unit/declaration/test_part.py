@@ -46,7 +46,7 @@ from hsp_control.trajectories.pose import PoseTrajectory
 
 
 class GadgetError(HspControlError, ValueError):
-    """What is wrong with a gadget."""
+    """An error of a gadget."""
 
 
 class Gadget(Part, ABC, family="gadgets", error=GadgetError):
@@ -57,7 +57,7 @@ class Gadget(Part, ABC, family="gadgets", error=GadgetError):
 
     _: KW_ONLY
     label: str = "gadget"
-    """What it is called,
+    """The name of it,
     on one line [-]."""
 
     @property
@@ -98,9 +98,9 @@ class Bag(Gadget, type="bag"):
     """A part with other parts in it."""
 
     first: Gadget
-    """What is in it."""
+    """Its content."""
     spare: Gadget | None = None
-    """What may be in it."""
+    """Its optional content."""
     grid: Matrix = ((1.0, 0.0), (0.0, 1.0))
     """Two rows [-]."""
     counts: dict[str, Vector] = dataclasses.field(default_factory=dict)
@@ -386,7 +386,7 @@ def test_the_schema_says_what_each_field_is() -> None:
     ball = by_type["ball"]["properties"]
     assert by_type["ball"]["required"] == ["type", "radius"]
     assert ball["type"]["description"] == "ball: A round one."
-    assert ball["label"]["description"] == "What it is called, on one line [-]."
+    assert ball["label"]["description"] == "The name of it, on one line [-]."
     assert ball["radius"]["type"] == "number"
     assert ball["radius"]["exclusiveMinimum"] == 0
     assert ball["center"]["minItems"] == ball["center"]["maxItems"] == 3
@@ -423,7 +423,7 @@ def test_what_python_shows_of_a_part() -> None:
     )
     assert Ball.__doc__ == (
         "A round one.\n\nArgs:\n    radius: Radius [m].\n    center: Center [m].\n"
-        "    label: What it is called, on one line [-]."
+        "    label: The name of it, on one line [-]."
     )
     assert TypeAdapter(Ball).json_schema()["description"] == "A round one."
     assert len(str(inspect.signature(StreamPose))) < 650
@@ -431,7 +431,7 @@ def test_what_python_shows_of_a_part() -> None:
 
 
 def test_docstrings_of_fields_are_inherited() -> None:
-    label = "What it is called, on one line [-]."
+    label = "The name of it, on one line [-]."
     assert Ball.documentation == {
         "label": label, "radius": "Radius [m].", "center": "Center [m]."
     }  # fmt: skip

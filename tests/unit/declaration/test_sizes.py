@@ -72,8 +72,8 @@ def test_the_largest_that_is_allowed_gives_an_effort(panda: hsp.Robot) -> None:
 
 
 def test_the_message_says_where_and_what_would_be_right(panda: hsp.Robot) -> None:
-    told = wording("Hold: point.1: 1e+150 ... 1e+30")
-    with pytest.raises(HspControlError, match=told):
+    reported = wording("Hold: point.1: 1e+150 ... 1e+30")
+    with pytest.raises(HspControlError, match=reported):
         hsp.FramePosition("panda_tcp", [0.4, 1e150, 0.4])
 
 

@@ -112,10 +112,10 @@ def costs(given: dict[str, Any]) -> list[float]:
 def test_it_is_the_plain_formula(seed: int, size: float) -> None:
     """Levels' accelerations beyond a limit, less the share that lower ones can
     absorb."""
-    asked = drawn(seed, size)
-    call, held = held_levels(**asked)
+    requested = drawn(seed, size)
+    call, held = held_levels(**requested)
     planned([call]).run(0.0)
-    np.testing.assert_allclose(held, costs(asked), rtol=1e-9, atol=1e-12 * size)
+    np.testing.assert_allclose(held, costs(requested), rtol=1e-9, atol=1e-12 * size)
 
 
 @given(seeds)
@@ -123,9 +123,9 @@ def test_the_identity_is_a_metric_as_others(seed: int) -> None:
     """The identity metric as a constant and as a matrix give the same."""
     found = []
     for form in (IDENTITY, CONSTANT):
-        asked = drawn(seed, 1e5, np.eye(NV))
-        asked["law"] = asked["law"]._replace(form=form)
-        call, held = held_levels(**asked)
+        requested = drawn(seed, 1e5, np.eye(NV))
+        requested["law"] = requested["law"]._replace(form=form)
+        call, held = held_levels(**requested)
         planned([call]).run(0.0)
         found.append(held)
     np.testing.assert_allclose(found[0], found[1], rtol=1e-12)

@@ -80,33 +80,35 @@ def called(given: Asked) -> Asked:
 def test_it_is_the_plain_formula(seed: int, size: float) -> None:
     """E_t/2 of the step is the damped law's; a factor 1/min(1 + E, r) of a field
     remains."""
-    asked = drawn(seed, size, 10.0)
-    law, damped, own, own_damped, braking, braking_damped = asked.parts
-    beyond = min(excess(asked, -own), excess(asked, np.zeros(NV)))
+    requested = drawn(seed, size, 10.0)
+    law, damped, own, own_damped, braking, braking_damped = requested.parts
+    beyond = min(excess(requested, -own), excess(requested, np.zeros(NV)))
     exact = 1.0 - min(beyond / LARGE, 1.0)
     to_damped = (1.0 - exact) * (damped - law)
     field = exact * (own + braking) + (1.0 - exact) * (own_damped + braking_damped)
-    times = min(1.0 + excess(asked, to_damped), times_permitted(asked, field))
+    times = min(1.0 + excess(requested, to_damped), times_permitted(requested, field))
     change = to_damped - (1.0 - 1.0 / times) * field
 
-    found = called(asked)
+    found = called(requested)
     scale = 1e-12 * (1.0 + size)  # rounding of some 50 operations
-    np.testing.assert_allclose(found.a, asked.a + change, atol=scale)
+    np.testing.assert_allclose(found.a, requested.a + change, atol=scale)
     np.testing.assert_allclose(
-        found.effort, asked.effort + asked.M @ change, atol=100.0 * scale
+        found.effort, requested.effort + requested.M @ change, atol=100.0 * scale
     )
     np.testing.assert_allclose(
-        found.barred.lower, asked.barred.lower - asked.barred.A @ change, atol=scale
+        found.barred.lower,
+        requested.barred.lower - requested.barred.A @ change,
+        atol=scale,
     )
 
 
 @given(seeds)
 def test_within_limits_nothing_changes(seed: int) -> None:
     """For any demand of the damped law and of a field."""
-    asked = drawn(seed, 1e4, 10.0)
-    asked.a[:] = 0.0
-    asked.effort[:] = 0.0
-    np.testing.assert_array_equal(called(asked).a, asked.a)
+    requested = drawn(seed, 1e4, 10.0)
+    requested.a[:] = 0.0
+    requested.effort[:] = 0.0
+    np.testing.assert_array_equal(called(requested).a, requested.a)
 
 
 @given(seeds, st.floats(1e-6, 3.0))
@@ -115,17 +117,19 @@ def test_no_more_is_lost_than_is_beyond(seed: int, beyond: float) -> None:
 
     A larger loss at the onset of a violation makes the step oscillate about the limit.
     """
-    asked = drawn(seed, 1.0, 10.0)
-    most = times_permitted(asked, 1e6 * asked.a) / 1e6
-    permitted = asked.a / most  # at the limits
+    requested = drawn(seed, 1.0, 10.0)
+    most = times_permitted(requested, 1e6 * requested.a) / 1e6
+    permitted = requested.a / most  # at the limits
     a, field = (1.0 + beyond) * permitted, (5.0 + beyond) * permitted
     zero = np.zeros(NV)
-    opposed = asked._replace(
+    opposed = requested._replace(
         a=a,
-        effort=asked.M @ a,
+        effort=requested.M @ a,
         parts=Parts(a, a, field, field, zero, zero),
-        bounds=Within(-asked.permitted.acceleration, asked.permitted.acceleration),
-        barred=Barred(asked.barred.A, np.full(2, -1e9)),
+        bounds=Within(
+            -requested.permitted.acceleration, requested.permitted.acceleration
+        ),
+        barred=Barred(requested.barred.A, np.full(2, -1e9)),
     )
     lost = np.linalg.norm(a - called(opposed).a) / np.linalg.norm(field)
     assert lost <= beyond / (1.0 + beyond) * (1.0 + 1e-6) + 1e-12
@@ -133,8 +137,8 @@ def test_no_more_is_lost_than_is_beyond(seed: int, beyond: float) -> None:
 
 def test_an_excess_without_end_leaves_finite_numbers() -> None:
     """A joint of range 0 permits no acceleration: a is 0, or entirely beyond."""
-    asked = drawn(0, 1.0, 10.0)
-    asked.permitted.acceleration[0] = 0.0
-    asked.bounds.upper[0] = asked.a[0] - 1.0
-    found = called(asked)
+    requested = drawn(0, 1.0, 10.0)
+    requested.permitted.acceleration[0] = 0.0
+    requested.bounds.upper[0] = requested.a[0] - 1.0
+    found = called(requested)
     assert np.isfinite(found.a).all()

@@ -139,9 +139,9 @@ def test_what_does_not_compile_says_what_the_compiler_says(source: Path) -> None
     source.write_text(wrong)
     with pytest.raises(EngineError, match="does not compile:") as raised:
         own_kinds.load(source)
-    said = str(raised.value)
-    assert re.search("z.* was not declared|undeclared", said)
-    assert "a kind needs a description: static" in said
+    reported = str(raised.value)
+    assert re.search("z.* was not declared|undeclared", reported)
+    assert "a kind needs a description: static" in reported
 
 
 @pytest.mark.slow
@@ -200,8 +200,8 @@ def test_zig_compiles_for_any_processor_as_the_engine_does(
     monkeypatch.delenv("CXX", raising=False)
     monkeypatch.setenv("PATH", "")
     monkeypatch.setitem(sys.modules, "ziglang", ModuleType("ziglang"))
-    said = own_kinds.command(source, source.with_suffix(".so"))
-    assert said[:5] == [sys.executable, "-m", "ziglang", "c++", "-mcpu=baseline"]
+    reported = own_kinds.command(source, source.with_suffix(".so"))
+    assert reported[:5] == [sys.executable, "-m", "ziglang", "c++", "-mcpu=baseline"]
 
 
 def test_no_file_and_no_compiler(source: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -27,10 +27,10 @@ def test_arguments_are_added_by_name_and_none_twice() -> None:
 
 
 def test_a_function_is_given_its_arguments_by_name_and_the_time_first() -> None:
-    told: list[tuple[float, str]] = []
+    reported: list[tuple[float, str]] = []
 
     def follow(t: float, name: str) -> None:
-        told.append((t, name))
+        reported.append((t, name))
 
     x, out = np.ones(2), np.zeros(2)
     plan = planned(
@@ -38,7 +38,7 @@ def test_a_function_is_given_its_arguments_by_name_and_the_time_first() -> None:
     )
     assert [len(plan.follow), len(plan.write)] == [1, 1]
     plan.run(0.5)
-    assert told == [(0.5, "a")]
+    assert reported == [(0.5, "a")]
     np.testing.assert_array_equal(out, 3.0)
 
 

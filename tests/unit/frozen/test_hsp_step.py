@@ -134,9 +134,9 @@ def test_a_changed_file_that_opens_steps_and_stops(
         except RuntimeError:
             continue
         if len(opened.tau) == len(q):
-            said = [opened.step(0.001 * k, q, 0.0 * q) for k in range(3)]
-            said += [opened.stop(0.001 * k, q, 0.0 * q) for k in range(3, 6)]
-            assert all(opened.error for status in said if status < 0)
+            reported = [opened.step(0.001 * k, q, 0.0 * q) for k in range(3)]
+            reported += [opened.stop(0.001 * k, q, 0.0 * q) for k in range(3, 6)]
+            assert all(opened.error for status in reported if status < 0)
             stepped += 1
     assert stepped > 20
 

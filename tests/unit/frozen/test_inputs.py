@@ -187,7 +187,7 @@ def test_too_many_ramps_at_a_time(tmp_path: Path) -> None:
     assert opened.ramp("hand.Kv", 30.0 * np.eye(3), 0.01) == OK
 
 
-def said(mass: float, center: list[float], moments: list[float]) -> np.ndarray:
+def reported(mass: float, center: list[float], moments: list[float]) -> np.ndarray:
     """Return a payload as a program sets it, of moments about the frame's axes."""
     a, b, c = moments
     return np.array([mass, *center, a, 0.0, 0.0, b, 0.0, c])
@@ -206,7 +206,7 @@ def test_payloads_are_taken_up_and_put_down(
     ) -> Callable[[float], None]:
         def change(t: float) -> None:
             controller.at(t).ramp(ramp).payload(frame, mass, center, moments)
-            body = said(mass, center, moments)
+            body = reported(mass, center, moments)
             assert opened.ramp(f"{frame}.payload", body, ramp) == OK
 
         return change
@@ -240,7 +240,7 @@ def test_an_observer_has_the_model_of_the_step(tmp_path: Path) -> None:
     command = hsp.compensation.CompensatedController(controller, observed)
     command.restart(origin=0.0)
     place = next(at for at in opened.ports if at.endswith(".payload"))
-    body = said(1.0, [0.0, 0.0, 0.1], [0.0, 0.0, 0.0])
+    body = reported(1.0, [0.0, 0.0, 0.1], [0.0, 0.0, 0.0])
     for k in range(60):
         t = k * H
         q = experiment.q0 + 0.02 * np.sin(0.1 * k)
@@ -277,7 +277,7 @@ def test_gravity(ramp: float, tmp_path: Path) -> None:
 
 def test_a_new_run_carries_nothing(tmp_path: Path) -> None:
     controller, opened = pair("panda_limits", tmp_path)
-    body = said(1.0, [0.0, 0.0, 0.1], [0.0, 0.0, 0.0])
+    body = reported(1.0, [0.0, 0.0, 0.1], [0.0, 0.0, 0.0])
     frame = next(at for at in opened.ports if at.endswith(".payload"))
     assert opened.set(frame, body) == OK  # before the first step: active from the start
     controller.at(-1.0).ramp(0.0).payload(frame.split(".")[0], 1.0, [0.0, 0.0, 0.1])
@@ -303,7 +303,7 @@ def test_what_is_no_body_is_refused(
 ) -> None:
     _, opened = pair("panda_limits", tmp_path)
     frame = next(at for at in opened.ports if at.endswith(".payload"))
-    body = said(mass, [0.0, 0.0, 0.1], moments)
+    body = reported(mass, [0.0, 0.0, 0.1], moments)
     assert opened.set(frame, body) == WRONG_VALUE
     assert opened.set("gravity", [0.0, 0.0, -981.0]) == WRONG_VALUE
 
@@ -318,7 +318,7 @@ def test_only_what_moves_carries(tmp_path: Path) -> None:
 def test_too_many_payloads_at_a_time(tmp_path: Path) -> None:
     controller, opened = pair("panda_limits", tmp_path)
     frame = next(at for at in opened.ports if at.endswith(".payload"))
-    body = said(1.0, [0.0, 0.0, 0.1], [0.0, 0.0, 0.0])
+    body = reported(1.0, [0.0, 0.0, 0.1], [0.0, 0.0, 0.0])
     run(controller, opened, range(1), {})
     for _ in range(8):
         assert opened.ramp(frame, body, 0.1) == OK

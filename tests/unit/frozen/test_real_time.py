@@ -105,4 +105,4 @@ def check_quiet(
     assert 0 < within < steps
     assert allocations == locks == 0
     if "without system calls" not in done.stdout:
-        pytest.skip("allocations and locks counted; seccomp is not allowed here")
+        pytest.skip("allocations and locks were checked; seccomp is not allowed here")

@@ -161,8 +161,8 @@ def test_a_wrong_velocity_is_named_and_braked_with_the_slope(kind: str) -> None:
 
 @pytest.mark.parametrize("kind", ["drifting", "mirrored", *further("stuck")])
 def test_a_wrong_position_is_braked_with_the_velocity(kind: str) -> None:
-    what = "both" if kind == "mirrored" else "position"
-    _, report = run(IN_MOTION, LIES[f"{what}: {kind}"], [3])
+    signal = "both" if kind == "mirrored" else "position"
+    _, report = run(IN_MOTION, LIES[f"{signal}: {kind}"], [3])
     assert report.ended == "fault"
     assert "panda_joint4" in report.reason
     assert not report.silent

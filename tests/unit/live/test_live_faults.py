@@ -601,9 +601,9 @@ def test_completed_means_at_rest(standstill: float) -> None:
     assert 0.15 < report.speed < 1.5
     assert report.speed == pytest.approx(speeds[-1], rel=0.02)
     assert report.at_rest is (standstill > 1.5)
-    told = (report.ended, report.reason)
+    reported = (report.ended, report.reason)
     if report.at_rest:
-        assert told == ("completed", "the duration is over")
+        assert reported == ("completed", "the duration is over")
     else:
         moved = f"then the robot still moved at {report.speed:.3g}"
-        assert told == ("fault", f"the duration is over; {moved}")
+        assert reported == ("fault", f"the duration is over; {moved}")

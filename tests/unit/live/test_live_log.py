@@ -97,13 +97,13 @@ def test_its_end_has_the_counts_of_the_report(
     logged: tuple[Told, LoopReport, hsp.Rollout],
 ) -> None:
     robot, report, run = logged
-    said = run.meta["live"]
+    reported = run.meta["live"]
     late = sum(spent == LATE for _, spent in robot.answers.values())
-    assert said["missed"] == report.deadlines.missed == late
-    assert said["silent_periods"] == robot.skipped == len(LOST)
-    assert said["unseen"] == report.deadlines.skipped_states == len(LOST) + 1
-    assert said["periods"] == report.deadlines.periods
-    assert said["response"][-1] == pytest.approx(LATE)
+    assert reported["missed"] == report.deadlines.missed == late
+    assert reported["silent_periods"] == robot.skipped == len(LOST)
+    assert reported["unseen"] == report.deadlines.skipped_states == len(LOST) + 1
+    assert reported["periods"] == report.deadlines.periods
+    assert reported["response"][-1] == pytest.approx(LATE)
 
 
 def test_no_time_has_two_rows() -> None:

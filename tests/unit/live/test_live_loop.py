@@ -319,7 +319,7 @@ def test_a_row_is_due_at_each_tenth_state_also_where_times_are_rounded(
 
 def test_schedules_of_feet_are_asked_at_the_controllers_time() -> None:
     """A run's time may differ from the robot's clock."""
-    asked: list[float] = []
+    requested: list[float] = []
     measured = Measurement(1, 0.2, start(), np.zeros(7))
     run: Any = SimpleNamespace(
         reader=SimpleNamespace(
@@ -327,8 +327,8 @@ def test_schedules_of_feet_are_asked_at_the_controllers_time() -> None:
         ),
         detector=SimpleNamespace(check=lambda state: None),
         safe_stop=SimpleNamespace(
-            feet=SimpleNamespace(update=lambda each: asked.append(each.t))
+            feet=SimpleNamespace(update=lambda each: requested.append(each.t))
         ),
     )
     LiveRun.feel_ground(run)
-    assert asked == [7.2]
+    assert requested == [7.2]

@@ -265,8 +265,8 @@ def test_a_lost_effort_corrects_the_momentum_observer() -> None:
 
         def effort(self, t: float, q: Array, v: Array, period: float) -> Array:
             tau = super().effort(t, q, v, period)
-            told = self.log_channels()["observer.disturbance"].value
-            estimated = float(np.abs(told).max())
+            reported = self.log_channels()["observer.disturbance"].value
+            estimated = float(np.abs(reported).max())
             self.largest = max(self.largest, estimated if t > 0.02 else 0.0)
             tau[:4] += 6.0 if int(t / 0.02) % 2 else -6.0
             return tau

@@ -418,8 +418,8 @@ def test_whatever_is_raised_around_a_served_robot_stops_it(
         raise raised("why")
 
     after: list[float] = []
-    told = [row, lambda t, *_: after.append(t)]
-    serve(robot, link, stop_reason=pilot, on_rows=told)  # type: ignore[arg-type]
+    reported = [row, lambda t, *_: after.append(t)]
+    serve(robot, link, stop_reason=pilot, on_rows=reported)  # type: ignore[arg-type]
     assert robot.reason.endswith(f": {raised.__name__}: why")
     assert robot.done
     if source == "row":

@@ -95,8 +95,8 @@ class Motion:
         self.q[6] += moves * self.period
         v[6] = says
         passed = self.period if self.count > 1 else 0.0
-        told = Measurement(self.count, self.count * self.period, self.q, v)
-        self.trusted.update(told, passed, np.zeros(7, dtype=bool))
+        reported = Measurement(self.count, self.count * self.period, self.q, v)
+        self.trusted.update(reported, passed, np.zeros(7, dtype=bool))
         self.trusted.applied(self.q, np.zeros(7), gravity(self.q))
         return self.trusted.fault
 

@@ -105,8 +105,8 @@ def test_a_start_in_contact_is_refused_where_the_configuration_says_so() -> None
     state = still(robot)
     d, pair = ObstacleClearance([ball]).proximity(state).nearest(state)
     assert d < 0.0
-    told = f"... null_space.fields.0: ... {pair}, {-d:.3g} m deep ... start: auto"
-    assert re.search(wording(told), str(caught.value))
+    reported = f"... null_space.fields.0: ... {pair}, {-d:.3g} m deep ... start: auto"
+    assert re.search(wording(reported), str(caught.value))
     assert "to ball" in pair
     apart = json.loads(
         json.dumps(TOUCHING).replace("[0.2, 0.0, 0.7]", "[0.2, 0.3, 0.7]")

@@ -199,8 +199,10 @@ def test_frames_beyond_a_joint_that_mimics() -> None:
     robot = Robot.load("panda", locked={})
     assert robot.mimics
     at_home = robot.state(0.0, robot.home(), np.zeros(robot.nv))
-    told = "frame: ... 'panda_rightfinger' ... 'panda_finger_joint2' ... mimic: false"
-    with pytest.raises(FieldError, match=wording(told)):
+    reported = (
+        "frame: ... 'panda_rightfinger' ... 'panda_finger_joint2' ... mimic: false"
+    )
+    with pytest.raises(FieldError, match=wording(reported)):
         placed(Manipulability("panda_rightfinger"), at_home)
     free = Robot.load("panda", locked={}, mimic=False)
     q = free.random_configuration(np.random.default_rng(9))

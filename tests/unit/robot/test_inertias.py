@@ -95,12 +95,12 @@ def test_links_are_named_with_the_reason() -> None:
 
 def test_a_robot_is_loaded_with_projected_inertias(tmp_path: Path) -> None:
     path = write(tmp_path, HEAVY)
-    asked, not_asked = Robot.load(path, project_inertias=True), Robot.load(path)
-    changed, given = asked.model.inertias[1], not_asked.model.inertias[1]
+    requested, not_asked = Robot.load(path, project_inertias=True), Robot.load(path)
+    changed, given = requested.model.inertias[1], not_asked.model.inertias[1]
     assert changed.mass == given.mass == 2.0
     np.testing.assert_array_equal(changed.lever, given.lever)
     np.testing.assert_allclose(given.inertia, np.diag([0.1, 0.1, 0.5]))
     np.testing.assert_allclose(
         changed.inertia, nearest_possible(np.diag([0.1, 0.1, 0.5])), rtol=1e-14
     )
-    assert asked.model.inertias[2] == not_asked.model.inertias[2]
+    assert requested.model.inertias[2] == not_asked.model.inertias[2]

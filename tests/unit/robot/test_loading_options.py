@@ -100,8 +100,8 @@ def test_followers_may_be_named_if_they_agree_with_their_leader(
     locks = {"shoulder": 0.4, "follower": -1.5 * 0.4 + 0.3}
     assert Robot.load(path, locked=locks).joint_names == ("elbow",)
     assert Robot.load(path, locked=locks, mimic=False).joint_names == ("elbow",)
-    told = "... lock 'follower' at 0.4: ... 'shoulder' ... -0.3"
-    with pytest.raises(ModelError, match=wording(told)):
+    reported = "... lock 'follower' at 0.4: ... 'shoulder' ... -0.3"
+    with pytest.raises(ModelError, match=wording(reported)):
         Robot.load(path, locked={"shoulder": 0.4, "follower": 0.4})
     with pytest.raises(ModelError, match="it mimics 'shoulder'; lock 'shoulder'"):
         Robot.load(path, locked={"follower": 0.4})

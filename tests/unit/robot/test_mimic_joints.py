@@ -106,8 +106,10 @@ def test_limits_that_contradict_are_named(
     with caplog.at_level(logging.WARNING):
         robot = Robot.load(write(pair(1.0, limits)))
     assert robot.position_limits()[1][0] == 3.0
-    told = "... joint 'follower': ... 'leader' ... 3.9 to 4.9 ... -3 to 3 ... ignored"
-    assert re.search(wording(told), caplog.text)
+    reported = (
+        "... joint 'follower': ... 'leader' ... 3.9 to 4.9 ... -3 to 3 ... ignored"
+    )
+    assert re.search(wording(reported), caplog.text)
 
 
 def test_a_follower_brakes_its_leader(write: Write) -> None:

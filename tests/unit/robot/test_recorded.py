@@ -315,10 +315,10 @@ def test_packages_are_no_part_of_a_log_and_large_meshes_are_named(
     monkeypatch.setattr(recorded_meshes, "MOST", room)
     (part,) = robot_record(robot)["parts"]
     assert [*part["meshes"]] == felt
-    (said,) = messages(caplog, "no room")
+    (reported,) = messages(caplog, "no room")
     left_out = [name for name in whole["meshes"] if name not in felt]
     for name in left_out:
-        assert f"{name} (0.0 MB)" in said
+        assert f"{name} (0.0 MB)" in reported
     assert part["left_out"] == dict.fromkeys(left_out, "0.0 MB")
     caplog.clear()
     record = robot_record(robot)
@@ -326,8 +326,8 @@ def test_packages_are_no_part_of_a_log_and_large_meshes_are_named(
     assert not caplog.records  # the files are there
     shutil.rmtree(robot.source.urdf.parent)
     recorded_robot(record)
-    (said,) = messages(caplog, "does not contain")
-    assert all(name in said for name in left_out)
+    (reported,) = messages(caplog, "does not contain")
+    assert all(name in reported for name in left_out)
 
 
 def messages(caplog: pytest.LogCaptureFixture, what: str) -> list[str]:
@@ -408,9 +408,9 @@ def test_a_mesh_that_was_edited_since_is_named(
     file = urdf.parent / "meshes" / "b.obj"
     file.write_text(PYRAMID.replace("0.3", "0.6"))
     again = recorded_robot(record)
-    (said,) = messages(caplog, "have changed")
-    assert "meshes/b.obj" in said
-    assert "a.obj" not in said
+    (reported,) = messages(caplog, "have changed")
+    assert "meshes/b.obj" in reported
+    assert "a.obj" not in reported
     np.testing.assert_array_equal(vertices(again), before)
 
 

@@ -60,8 +60,8 @@ def wrench(plant: ContactPlant, frame: str, at: Any) -> tuple[Array, Array]:
     """Return the force and the moment on a frame at (t, q, v, tau), as logged."""
     channels = plant.log_channels(*at)
     force, moment = (
-        np.asarray(channels[f"plant.contact.{frame}.{what}"].value)
-        for what in ("force", "moment")
+        np.asarray(channels[f"plant.contact.{frame}.{part}"].value)
+        for part in ("force", "moment")
     )
     return force, moment
 

@@ -223,14 +223,14 @@ def shown(
 def test_a_differenced_velocity_is_that_of_two_positions(name: str) -> None:
     """Passed through: the first velocity, one at an equal time, and a root's."""
     robot = load(name)
-    (q, v), told = some_state(robot), np.ones(robot.nv)
+    (q, v), reported = some_state(robot), np.ones(robot.nv)
     sense = DifferencedVelocity().begin(robot, q, v, np.random.default_rng(0))
-    np.testing.assert_array_equal(sense(1.0, q, told)[1], told)
-    np.testing.assert_array_equal(sense(1.0, q, told)[1], told)
+    np.testing.assert_array_equal(sense(1.0, q, reported)[1], reported)
+    np.testing.assert_array_equal(sense(1.0, q, reported)[1], reported)
     later = robot.integrate(q, 0.01 * v)
-    expected = np.where(robot.is_single_dof(), v, told)
-    np.testing.assert_allclose(sense(1.01, later, told)[1], expected, atol=1e-9)
-    assert (expected == told).sum() == (6 if name == "go2" else 0)
+    expected = np.where(robot.is_single_dof(), v, reported)
+    np.testing.assert_allclose(sense(1.01, later, reported)[1], expected, atol=1e-9)
+    assert (expected == reported).sum() == (6 if name == "go2" else 0)
 
 
 @pytest.mark.parametrize("name", ROBOTS)

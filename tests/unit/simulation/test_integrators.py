@@ -193,7 +193,7 @@ def test_native_steps_are_those_that_are_made_one_by_one(method: Any) -> None:
         assert ours[0].tobytes() == theirs[0].tobytes()
         assert ours[1].tobytes() == theirs[1].tobytes()
     copy = pickle.loads(pickle.dumps(native.take))
-    copy()  # it owns what it reads
+    copy()  # it owns its input
     assert native.h[0] == pytest.approx(0.0025)
 
 

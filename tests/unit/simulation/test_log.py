@@ -135,8 +135,8 @@ def test_round_trip(planar_run: Rollout, tmp_path: Path) -> None:
 def test_a_column_that_is_not_there(planar_run: Rollout) -> None:
     assert "task.tip.error" in planar_run
     assert "task.tip.eror" not in planar_run
-    told = "the log ... 'task.tip.eror' ... 'task.tip.error' ... t, q, v, tau"
-    with pytest.raises(LogError, match=wording(told)):
+    reported = "the log ... 'task.tip.eror' ... 'task.tip.error' ... t, q, v, tau"
+    with pytest.raises(LogError, match=wording(reported)):
         planar_run["task.tip.eror"]
 
 
@@ -318,9 +318,11 @@ def test_the_log_says_how_far_the_robot_is_beyond_its_limits(
     assert (beyond > np.maximum(np.abs(rollout.v) - limits.velocity, 0.0) + 0.01).any()
     assert beyond.max() > 0.1
     row, dof = np.unravel_index(beyond.argmax(), beyond.shape)
-    said = " ".join(capsys.readouterr().out.split())
-    assert f"panda_joint{dof + 1} is {beyond.max():.3g} rad/s beyond its speed" in said
-    assert f"at {rollout.t[row]:g} s" in said
+    printed = " ".join(capsys.readouterr().out.split())
+    assert (
+        f"panda_joint{dof + 1} is {beyond.max():.3g} rad/s beyond its speed" in printed
+    )
+    assert f"at {rollout.t[row]:g} s" in printed
 
 
 def test_the_most_beyond_a_limit_is_kept_until_it_is_collected() -> None:

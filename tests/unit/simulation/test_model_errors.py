@@ -123,8 +123,8 @@ def test_no_mode_grows_by_default_and_it_takes_no_time(name: str) -> None:
     assert found.delay >= 0.005
     assert found.lag >= 0.005
     alone, *_ = borne(name, ALONE)
-    told = lines(alone)["masses ±20 %"]
-    assert told.startswith(f"{alone.growing} of 8 grow") is (alone.growing > 0)
+    reported = lines(alone)["masses ±20 %"]
+    assert reported.startswith(f"{alone.growing} of 8 grow") is (alone.growing > 0)
     if name == "iiwa14":
         assert alone.growing > 0
     light = "rotors" in lines(found)

@@ -134,9 +134,9 @@ def test_a_step_is_free_whose_law_is_finite_within_limits(
 ) -> None:
     """Also with a bounded inverse; except for a refused state."""
     law, limits = LawOutcome.allocate(), LimitsOutcome.allocate()
-    told = law._asdict() | limits._asdict()
+    reported = law._asdict() | limits._asdict()
     for name, value in ({"finite": 1} | outcome).items():
-        told[name][0] = value
+        reported[name][0] = value
     move = Move(
         calls=Plan(),
         origin=np.zeros(1),
@@ -317,7 +317,7 @@ def test_a_motion_that_diverges_stops_the_same_way(
     controller = Controller(
         load("panda"), [task], TargetPosture(q0), null_space_gain=2000.0, limits=None
     )
-    told: list[str] = []
+    reported: list[str] = []
 
     def run() -> Rollout:
         refused = pytest.raises(SimulationError, match=r"^the simulation stopped: ")
@@ -332,13 +332,13 @@ def test_a_motion_that_diverges_stops_the_same_way(
                 integrator=SemiImplicitEuler(0.01),
                 check_rate=False,
             )
-        told.append(str(caught.value))
+        reported.append(str(caught.value))
         rollout = caught.value.rollout
         assert isinstance(rollout, Rollout)
         return rollout
 
     theirs = counted.alone(run)
     assert_same(run(), theirs)
-    assert told[0] == told[1]
-    assert ("diverged" if log_period == 0.05 else "not finite") in told[0]
+    assert reported[0] == reported[1]
+    assert ("diverged" if log_period == 0.05 else "not finite") in reported[0]
     assert max(counted.many) > 1

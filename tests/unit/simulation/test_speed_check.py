@@ -28,20 +28,20 @@ def test_the_least_share_is_that_of_the_best_self_motion(seed: int) -> None:
     assert abs(best[joint]) == pytest.approx(share, rel=1e-3)
 
 
-def said(speed: float, rows: str) -> list[TooFast]:
+def reported(speed: float, rows: str) -> list[TooFast]:
     robot = hsp.Robot.load("panda")
     circle = Along(hsp.Circle(0.1, 1.0), speed, acceleration=200.0)
     task = hsp.FramePose("panda_tcp", circle)
     if rows != "pose":
         task = hsp.FramePosition("panda_tcp", circle)
     law = hsp.Controller(robot, [task], limits=hsp.Limits())
-    asked = robot, law.tasks, robot.home(), 2.0, (), law.limits
-    return [each for each in not_followed(*asked) if isinstance(each, TooFast)]
+    requested = robot, law.tasks, robot.home(), 2.0, (), law.limits
+    return [each for each in not_followed(*requested) if isinstance(each, TooFast)]
 
 
 @pytest.mark.parametrize("rows", ["pose", *further("position")])
 def test_what_is_too_fast_is_said_with_place_joint_and_speed(rows: str) -> None:
-    (found,) = said(4.0, rows)
+    (found,) = reported(4.0, rows)
     assert found.share > 1.01
     assert found.unit == "m/s"
     assert found.speed == pytest.approx(4.0)  # constant, except for the ramp
@@ -49,8 +49,8 @@ def test_what_is_too_fast_is_said_with_place_joint_and_speed(rows: str) -> None:
         found.message
     )
     assert f"; {4.0 / found.share:.3g} m/s would do there" in found.message
-    assert said(0.5 * 4.0 / found.share, rows) == []
-    assert said(0.2, rows) == []
+    assert reported(0.5 * 4.0 / found.share, rows) == []
+    assert reported(0.2, rows) == []
 
 
 def test_the_worst_time_is_said() -> None:
@@ -69,5 +69,5 @@ def test_without_limits_nothing_is_said() -> None:
     robot = hsp.Robot.load("panda")
     task = hsp.FramePose("panda_tcp", Along(hsp.Circle(0.1, 1.0), 9.0))
     law = hsp.Controller(robot, [task])
-    asked = robot, law.tasks, robot.home(), 2.0, (), None
-    assert list(not_followed(*asked)) == []
+    requested = robot, law.tasks, robot.home(), 2.0, (), None
+    assert list(not_followed(*requested)) == []

@@ -153,8 +153,8 @@ def test_a_point_trajectory_of_a_pose_holds_the_orientation() -> None:
     placed = place(FramePose(trajectory=world), here)
     assert placed.trajectory == ComposedPose(world, HoldOrientation(R))
     # The same as with a pose; for a relative pose, in the reference's axes.
-    said = FramePose(trajectory=ComposedPose(position=world))
-    assert place(said, here) == placed
+    reported = FramePose(trajectory=ComposedPose(position=world))
+    assert place(reported, here) == placed
     relative = seen(here, TCP, "panda_link2")
     placed = place(RelativePose(reference="panda_link2", trajectory=circle), here)
     assert placed.trajectory == ComposedPose(

@@ -67,24 +67,24 @@ def test_a_picture_shows_the_scene_as_it_is_then(
     plant = cell.plant
     assert isinstance(plant, hsp.mujoco.MujocoScenePlant)
     plant.reset(0.0, cell.q0, cell.v0)
-    told = show(address, plant)
+    reported = show(address, plant)
     t, ball = seen(address, "above.png?width=64&height=48")
     assert (t, ball.shape) == (0.0, (48, 64, 3))
     _, again = seen(address, "above.jpg?width=64&height=48")
     assert np.abs(again - ball).mean() < 3.0
     plant.data.joint("ball").qpos[0] += 0.3
     plant.data.time = 1.5
-    told()
+    reported()
     t, floor = seen(address, "above.png?width=64&height=48")
     assert t == 1.5
     assert np.abs(floor - ball)[16:32, 24:40].mean() > 5.0
-    for wrong, said in (
+    for wrong, output in (
         ("abov.png", "no /abov.png; did you mean 'above'? (there is /above.jpg)"),
         ("above.png?width=9999", "width=9999; needs width and height, each 1 to 2048"),
     ):
         with pytest.raises(HTTPError) as caught:
             seen(address, wrong)
-        assert said in caught.value.read().decode()
+        assert output in caught.value.read().decode()
     with pytest.raises(
         HardwareError, match=r"pictures can be drawn: .*Address already"
     ):
@@ -119,13 +119,13 @@ def test_where_nothing_is_drawn_any_more_the_robot_stops(
     assert isinstance(plant, hsp.mujoco.MujocoScenePlant)
     plant.reset(0.0, cell.q0, cell.v0)
     before = set(multiprocessing.active_children())
-    told = show(address, plant)
+    reported = show(address, plant)
     (drawing,) = set(multiprocessing.active_children()) - before
-    told()
+    reported()
     drawing.kill()
     drawing.join()
     with pytest.raises(HardwareError, match="that draws its pictures has ended"):
-        told()
+        reported()
 
 
 HANGING = """
@@ -159,10 +159,10 @@ def test_who_draws_and_hangs_is_noticed_and_ended(
     scenario.write_text(yaml.safe_dump(cell.config))
     script.write_text(HANGING)
     command = [sys.executable, str(script), str(scenario), address]
-    said = subprocess.run(
+    output = subprocess.run(
         command, capture_output=True, text=True, timeout=120.0, check=True
     )
-    text, _, number = said.stdout.strip().rpartition(" ")
+    text, _, number = output.stdout.strip().rpartition(" ")
     assert text.endswith("draws its pictures has not responded for 1 s")
     with pytest.raises(ProcessLookupError):
         os.kill(int(number), 0)

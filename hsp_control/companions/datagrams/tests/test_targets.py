@@ -182,7 +182,7 @@ def test_one_stream_of_two_poses_or_two_senders_lead_two_hands(
             "frame": f"{side}_panda_tcp",
             "trajectory": {"type": "stream", "source": f"{source}/{side}"},
         }
-        for each in sides
+        for side in sides
     }
     simulation = {"duration": 1.0, "control_period": 0.002, "log_period": 0.002}
     experiment = hsp.load_experiment(
@@ -197,8 +197,12 @@ def test_one_stream_of_two_poses_or_two_senders_lead_two_hands(
         for task in controller.tasks:
             goals[task.name] = task.measure(controller.state)[1].tolist()
             goals[task.name][2] += 0.05
-        said = {name: {"value": each} for name, each in goals.items()}
-        texts = [said] if senders == 1 else [{name: said[name]} for name in said]
+        reported = {name: {"value": each} for name, each in goals.items()}
+        texts = (
+            [reported]
+            if senders == 1
+            else [{name: reported[name]} for name in reported]
+        )
         for _ in range(2):
             for one, text in zip((sender, other), texts, strict=False):
                 data = json.dumps({"t": 7.0, **text}).encode()

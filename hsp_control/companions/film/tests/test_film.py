@@ -63,12 +63,12 @@ def test_what_is_missing_for_a_film_is_said_and_the_rest_goes_on(
 
     monkeypatch.setenv("HSP_BROWSER", "no-such-browser")
     assert main(command) == 2
-    said = capsys.readouterr()
-    assert "page.html" in said.out
+    reported = capsys.readouterr()
+    assert "page.html" in reported.out
     assert page.is_file()
-    assert said.err.count("hsp: ") == 1  # once, not once per film
+    assert reported.err.count("hsp: ") == 1  # once, not once per film
     assert re.search(
-        r"no-such-browser is not an executable; .*apt-get install chr", said.err
+        r"no-such-browser is not an executable; .*apt-get install chr", reported.err
     )
 
     monkeypatch.setitem(sys.modules, "playwright.sync_api", None)
@@ -106,6 +106,6 @@ def test_the_command_says_what_it_wants(
         main(["export", log, "--gif=a.gif", "--size=800"])
     assert "'800' is not WIDTHxHEIGHT" in capsys.readouterr().err
     assert main(["export", log, log, "--gif", str(tmp_path / "a.gif")]) == 2
-    said = capsys.readouterr().err
-    assert re.search(wording("hsp: ... one run ... 2 logs ... --html"), said)
+    reported = capsys.readouterr().err
+    assert re.search(wording("hsp: ... one run ... 2 logs ... --html"), reported)
     assert not (tmp_path / "a.gif").exists()

@@ -74,9 +74,9 @@ def test_an_exception_is_told_with_its_names() -> None:
         '["joint_reflex", "power_limit_violation"]\n'
         "control_command_success_rate: 0.97 packets lost in a row in the last sample: 2"
     )
-    told = explained("ControlException", text)
+    reported = explained("ControlException", text)
     parts = "joint_reflex: ", "collision_torque", "power_limit_violation: ", "0.97"
-    assert all(part in told for part in parts)
+    assert all(part in reported for part in parts)
     stopped = "libfranka: Move command aborted: User Stop pressed!"
     assert "stop button was pressed" in explained("ControlException", stopped)
     other = explained("ValueError", "something new\nand more")

@@ -65,14 +65,14 @@ def test_its_own_answers_that_come_back_are_no_orders() -> None:
         serving = threading.Thread(target=made.serve, args=(link,))
         serving.start()
 
-        def told(message: Any) -> bytes:
+        def reported(message: Any) -> bytes:
             policy.sendto(json.dumps(message).encode(), made.inbox.getsockname())
             return policy.recv(999)
 
-        answer = told({"value": [0.04]})
+        answer = reported({"value": [0.04]})
         for _ in range(3):
             policy.sendto(answer, made.inbox.getsockname())
-        assert told({}) == answer
+        assert reported({}) == answer
         policy.settimeout(0.0)
         with pytest.raises(BlockingIOError):  # none of the three was answered
             policy.recv(999)
@@ -93,8 +93,8 @@ def test_whoever_drives_the_fingers_says_that_it_lives(
     with closing(loop), closing(link):
         for now in (0.0, 0.1, 0.4, 0.5, 0.9, 1.1):  # noqa: B007 (its clock)
             made.beat(link)
-        said = [loop.recv(9, socket.MSG_DONTWAIT) for _ in range(3)]
-        assert said == 3 * [client.ALIVE]
+        output = [loop.recv(9, socket.MSG_DONTWAIT) for _ in range(3)]
+        assert output == 3 * [client.ALIVE]
         with pytest.raises(BlockingIOError):
             loop.recv(9, socket.MSG_DONTWAIT)
         for k in range(2000):  # more than fits

@@ -248,19 +248,22 @@ def test_the_gripper_goes_where_openings_say_and_tells_where_it_is() -> None:
         other.close()
         with closing(connect(settings, circle().robot, PERIOD)):
 
-            def told(message: Any, sender: socket.socket) -> Any:
+            def printed(message: Any, sender: socket.socket) -> Any:
                 sender.sendto(json.dumps(message).encode(), (box.host, port))
                 return json.loads(sender.recv(999))
 
-            assert told({}, policy) == {"value": [0.04], "grasped": False}
+            assert printed({}, policy) == {"value": [0.04], "grasped": False}
             for odd in ([], "x", 3, None, {"value": 3}, {"value": []}, {"values": []},
                         {"value": [{}]}, {"value": "x"}, [[[]]]):  # fmt: skip
-                assert told(odd, policy) == {"value": [0.04], "grasped": False}
-            assert told({"value": [0.0]}, policy) == {"value": [0.015], "grasped": True}
-            assert told({"value": [np.nan]}, policy)["grasped"]
+                assert printed(odd, policy) == {"value": [0.04], "grasped": False}
+            assert printed({"value": [0.0]}, policy) == {
+                "value": [0.015],
+                "grasped": True,
+            }
+            assert printed({"value": [np.nan]}, policy)["grasped"]
             with closing(udp()) as second:
-                assert told({"value": [0.04]}, second)["grasped"]
-            opened = told({"values": [[0.0], [0.03]]}, policy)
+                assert printed({"value": [0.04]}, second)["grasped"]
+            opened = printed({"values": [[0.0], [0.03]]}, policy)
             assert opened == {"value": [0.03], "grasped": False}
     assert messages == [
         "the gripper grasps with 30 N to 0 mm", "the gripper goes to 60 mm"
@@ -326,12 +329,12 @@ def test_the_command_line_drives_the_arm(
     options = ["live", str(file), "--out", str(tmp_path), "--robot"]
     with serving(experiment) as box:
         assert main([*options, f"franka://{box.address}", "--duration", "0.15"]) == 0
-        told = capsys.readouterr().out
+        printed = capsys.readouterr().out
         run = Rollout.load(tmp_path / "circle-live.npz")
         assert np.abs(run["task.hand.error"][run.t < 0.1]).max() < 1e-3
-        assert "end effector 0.76 kg (Desk)" in told
-        assert "differs from the robot's by" in told
-        assert "The loop: the duration is over" in told
+        assert "end effector 0.76 kg (Desk)" in printed
+        assert "differs from the robot's by" in printed
+        assert "The loop: the duration is over" in printed
         box.wait_alone()
         assert main([*options, f"franka://{box.address}", "--duration", "1"]) == 2
         assert "_reflex: " in capsys.readouterr().err
@@ -339,9 +342,9 @@ def test_the_command_line_drives_the_arm(
         away = ["--set", "start={joints: {panda_joint2: -0.3}}"]
         recover = f"franka://{box.address}&recover=true"
         assert main([*options, recover, *away]) == 2
-        told = capsys.readouterr().err
-        assert "from the configuration's start; 0.2 is allowed" in told
-        assert "begin where it is" in told
+        printed = capsys.readouterr().err
+        assert "from the configuration's start; 0.2 is allowed" in printed
+        assert "begin where it is" in printed
     assert main([*options, "franka://a?realtme=ignore"]) == 2
     assert "did you mean 'realtime'" in capsys.readouterr().err
 
@@ -349,12 +352,12 @@ def test_the_command_line_drives_the_arm(
 @pytest.mark.process
 def test_the_page_is_true(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     text = (ROOT / "hsp_control/companions/franka/page.md").read_text(encoding="utf-8")
-    told = dict(re.findall(r"^\| `(\w+)` \|.*\| ([^|]*)\|$", text, re.MULTILINE))
+    printed = dict(re.findall(r"^\| `(\w+)` \|.*\| ([^|]*)\|$", text, re.MULTILINE))
     fields = FrankaSettings("a").all_fields()
-    assert set(told) == set(fields)
+    assert set(printed) == set(fields)
     for name in ("collision_torque", "collision_force"):
         wanted = ", ".join(f"{each:g}" for each in fields[name])
-        assert told[name].strip() == wanted
+        assert printed[name].strip() == wanted
     (document,) = re.findall(r"```yaml\n(.*?)```", text, re.DOTALL)
     (tmp_path / "lab.yaml").write_text(document)
     load = Load(0.4, center=[0.0, 0.0, 0.1])

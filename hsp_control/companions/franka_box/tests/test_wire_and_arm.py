@@ -51,21 +51,21 @@ def test_the_layouts_have_the_sizes_of_the_packed_structures() -> None:
 def test_what_clients_are_told_has_the_same_dynamics(name: str) -> None:
     robot = Robot.load(name)
     arm = Arm(robot)
-    told = pin.buildModelFromXML(arm.urdf)
-    told.inertias[7] += arm.flange.act(arm.end_effector)
+    reported = pin.buildModelFromXML(arm.urdf)
+    reported.inertias[7] += arm.flange.act(arm.end_effector)
     random = np.random.default_rng(1)
     for _ in range(20):
         q, v, a = random.normal(size=(3, 7))
         np.testing.assert_allclose(
-            pin.rnea(told, told.createData(), q, v, a),
+            pin.rnea(reported, reported.createData(), q, v, a),
             robot.inverse_dynamics(q, v, a),
             atol=1e-12,
         )
     for mine, theirs in (
-        (told.lowerPositionLimit, robot.model.lowerPositionLimit),
-        (told.upperPositionLimit, robot.model.upperPositionLimit),
-        (told.upperVelocityLimit, robot.model.upperVelocityLimit),
-        (told.upperEffortLimit, robot.model.upperEffortLimit),
+        (reported.lowerPositionLimit, robot.model.lowerPositionLimit),
+        (reported.upperPositionLimit, robot.model.upperPositionLimit),
+        (reported.upperVelocityLimit, robot.model.upperVelocityLimit),
+        (reported.upperEffortLimit, robot.model.upperEffortLimit),
     ):
         assert mine.tolist() == theirs.tolist()
 

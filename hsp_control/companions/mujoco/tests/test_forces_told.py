@@ -23,10 +23,12 @@ def test_a_wipe_that_loses_contact_is_told_before_and_after_it(
     short = ["--set", "simulation.duration=2", "--out", str(tmp_path)]
     short += ["--set", "simulation.log_period=0.001"]
     assert main(["run", *forced("panda_wipe", "wiper", 5), *fast, *short]) == 0
-    told = capsys.readouterr()
-    assert "it slides at 0.34 m/s, and the plant's surface pushes it off b" in told.err
-    assert re.search(r"force wiper .* N at the end, missed by [2-9]\.", told.out)
-    assert re.search(r"\n +\d+ rows: contact lost", told.out)
+    reported = capsys.readouterr()
+    assert (
+        "it slides at 0.34 m/s, and the plant's surface pushes it off b" in reported.err
+    )
+    assert re.search(r"force wiper .* N at the end, missed by [2-9]\.", reported.out)
+    assert re.search(r"\n +\d+ rows: contact lost", reported.out)
     (log,) = tmp_path.glob("*.npz")
     planned = hsp.Rollout.load(log)["contact.wiper.force"]
     # also in the step in which the change of the force ends

@@ -208,7 +208,7 @@ def test_a_robot_that_overlaps_itself_is_told_once(
           <joint name="turn"/><geom size="0.1"/>
         </body>
       </body></worldbody></mujoco>"""
-    for height, told in ((0.15, ["stand and arm (50 mm)"]), (0.2001, [])):
+    for height, reported in ((0.15, ["stand and arm (50 mm)"]), (0.2001, [])):
         model = mujoco.MjModel.from_xml_string(scene.format(height=height))
         robot = Robot.from_mujoco(model, "stand", ["turn"])
         plant = MujocoScenePlant(robot, model, mujoco.MjData(model))
@@ -216,8 +216,8 @@ def test_a_robot_that_overlaps_itself_is_told_once(
         for _ in range(2):
             plant.reset(0.0, np.zeros(1), np.zeros(1))
         found = [each.getMessage() for each in caplog.records]
-        assert len(found) == len(told)
-        assert all(pair in line for pair, line in zip(told, found, strict=True))
+        assert len(found) == len(reported)
+        assert all(pair in line for pair, line in zip(reported, found, strict=True))
 
 
 def test_mistakes() -> None:

@@ -16,10 +16,10 @@ def written(tmp_path: Path, page: Path) -> str:
     one = OnePage(lambda: run.save(tmp_path / "mine.npz"), page)
     assert one.done() == ""
     assert one.begin() == one.begin() == f"writing {page} …"  # one at a time
-    told: list[str] = []
-    wait_until(lambda: bool(told.append(one.done()) or told[-1]))
+    reported: list[str] = []
+    wait_until(lambda: bool(reported.append(one.done()) or reported[-1]))
     one.close()
-    return told[-1]
+    return reported[-1]
 
 
 @pytest.mark.process

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from clips import Recorder, told
+from clips import Recorder, reported
 from places import further
 from wording import wording
 
@@ -200,11 +200,11 @@ class Told:
 
 def test_knobs_keep_damping_ratios() -> None:
     own = "tasks.hand.gains={natural_frequency: 5, damping_ratio: 0.7}"
-    controller, told = hsp.load_experiment(PANDA, own).controller, Told()
+    controller, reported = hsp.load_experiment(PANDA, own).controller, Told()
     knob = knobs_of(controller, 0.001)["frequency.hand"]
-    knob.turn(told, 20.0)  # type: ignore[arg-type]
-    np.testing.assert_allclose(told.made[0], 20.0**2 * np.eye(6))
-    np.testing.assert_allclose(told.made[1], 2.0 * 0.7 * 20.0 * np.eye(6))
+    knob.turn(reported, 20.0)  # type: ignore[arg-type]
+    np.testing.assert_allclose(reported.made[0], 20.0**2 * np.eye(6))
+    np.testing.assert_allclose(reported.made[1], 2.0 * 0.7 * 20.0 * np.eye(6))
     softer = _scaled(hsp.Impedance(100.0, damping=30.0), 0.25)
     assert (softer.stiffness, softer.damping) == (25.0, 15.0)
     # Up to ten times the gain, or a fifth per period; at least its present value.
@@ -409,7 +409,7 @@ def test_the_picture_follows_what_is_dragged(session: Session) -> None:
     picture = Picture(session, viewer)
     recorder = viewer.transport
     assert isinstance(recorder, Recorder)
-    setup = told(recorder, "/play", "setup")
+    setup = reported(recorder, "/play", "setup")
     assert [each["name"] for each in setup["targets"]] == ["hand", "posture"]
     assert [each["name"] for each in setup["obstacles"]] == ["ball"]
     assert [each["title"] for each in setup["plots"]] == [
@@ -431,7 +431,7 @@ def test_the_picture_follows_what_is_dragged(session: Session) -> None:
     session.receive({"do": "obstacle", "name": "ball", "position": [0.2, 0.4, 0.5]})
     go(session, 1.5)
     picture.draw(running=True, rate=1.0)
-    pose = told(recorder, "/play", "pose")
+    pose = reported(recorder, "/play", "pose")
     shown = {(t["path"], t["property"]): t["values"] for t in pose["tracks"]}
     for path in ("/obstacles/ball", "/influence/ball"):
         np.testing.assert_allclose(shown[path, "position"], [0.2, 0.4, 0.5], atol=1e-6)
@@ -439,7 +439,7 @@ def test_the_picture_follows_what_is_dragged(session: Session) -> None:
     np.testing.assert_allclose(
         shown["/robot/panda_joint4", "position"], elbow, atol=1e-6
     )
-    targets = told(recorder, "/play", "targets")
+    targets = reported(recorder, "/play", "targets")
     np.testing.assert_allclose(targets["poses"]["hand"], pose_of(session))
     # In a pause the target is drawn where it is commanded; the hand moves there
     # afterwards.
@@ -447,7 +447,7 @@ def test_the_picture_follows_what_is_dragged(session: Session) -> None:
     assert session.handles.places()[1]["ball"] == [0.2, 0.5, 0.5]
     session.advance()
     assert session.handles.places()[1]["ball"][1] < 0.41
-    samples = told(recorder, "/play", "samples 2")
+    samples = reported(recorder, "/play", "samples 2")
     assert len(samples["times"]) == 150
     session.receive({"do": "set", "id": "field", "value": False})
     go(session, 0.25)  # past the ramp: its zone is no longer one
@@ -466,21 +466,21 @@ def test_a_target_out_of_reach_is_said_and_by_how_much(still: Session) -> None:
 
     def said() -> str:
         picture.draw(running=True, rate=1.0)
-        return str(told(recorder, "/play", "targets")["away"].get("hand", ""))
+        return str(reported(recorder, "/play", "targets")["away"].get("hand", ""))
 
     wanted = pose_of(still)
     assert said() == ""
     wanted[2] += 1.0
     still.receive({"do": "move", "target": "hand", "pose": wanted.tolist()})
-    heard = []
+    received = []
     for _ in range(130):
         go(still, 0.03)
-        heard.append(said())
+        received.append(said())
     away = np.linalg.norm(still.rollout()["task.hand.error"][-1, :3])
-    first, then, *last = dict.fromkeys(heard)
+    first, then, *last = dict.fromkeys(received)
     assert (first, then) == ("", "target far away")
     assert all(each.startswith("target out of reach") for each in last)
-    assert heard[-1] == f"target out of reach, {away:.2f} m"
+    assert received[-1] == f"target out of reach, {away:.2f} m"
     still.receive({"do": "resume", "target": "hand"})
     go(still, 3.0)
     assert said() == ""

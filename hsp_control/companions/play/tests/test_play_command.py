@@ -104,6 +104,6 @@ def test_mistakes_are_said_in_a_line(
 ) -> None:
     """Also if the page's process notices it first."""
     assert main(["play", "--no-browser", *arguments, "--out", str(tmp_path)]) == 2
-    said = capfd.readouterr()
-    assert message in said.err
-    assert "Traceback" not in said.out + said.err
+    reported = capfd.readouterr()
+    assert message in reported.err
+    assert "Traceback" not in reported.out + reported.err

@@ -113,6 +113,6 @@ def test_a_mistake_in_the_file_is_told_with_its_line(
 
 
 def test_a_stream_from_another_process_cannot_be_swept() -> None:
-    heard = "tasks.tip.trajectory={type: stream, source: 'udp://127.0.0.1:5005'}"
+    received = "tasks.tip.trajectory={type: stream, source: 'udp://127.0.0.1:5005'}"
     with pytest.raises(SweepError, match=r"listens to udp:.*, which only one"):
-        hsp.sweeps.sweep(MOVING, OVER, overrides=[*QUICK, heard])
+        hsp.sweeps.sweep(MOVING, OVER, overrides=[*QUICK, received])

@@ -359,10 +359,10 @@ def test_a_script_needs_no_guard_and_its_types_travel(tmp_path: Path) -> None:
     script = tmp_path / "mine.py"
     script.write_text(SCRIPT.format(configuration=MOVING, more=QUICK))
     (tmp_path / "beside.py").write_text("TWICE = 2.0\n")
-    told = subprocess.run(
+    reported = subprocess.run(
         [sys.executable, str(script)], capture_output=True, text=True, check=False
     )
-    assert told.stdout == "['completed', 'completed'] ['', '']\n", told.stderr
+    assert reported.stdout == "['completed', 'completed'] ['', '']\n", reported.stderr
 
 
 @pytest.mark.process

@@ -59,8 +59,8 @@ def test_bands_are_the_logs_columns(obstacle: tuple[Experiment, Rollout]) -> Non
         "inside an influence zone": [pytest.approx((run.t[30], run.t[40]))],
         "collision": [pytest.approx((run.t[35], run.t[38]))],
     }
-    told = [band.caption for band in bands_of(run, experiment.controller)]
-    assert "collision, up to 4.2 cm deep" in told
+    reported = [band.caption for band in bands_of(run, experiment.controller)]
+    assert "collision, up to 4.2 cm deep" in reported
     without = "null_space.fields.0.weight=0", *FAST
     weightless = load_experiment("panda_obstacle", *without).controller
     bands = [band.name for band in bands_of(run, weightless)]

@@ -509,15 +509,15 @@ def test_films_from_the_command_line(
     assert [line.partition(": ")[2] for line in capsys.readouterr().out.split("\n")][
         :-1
     ] == [str(film) for film in films]
-    told = subprocess.run(
+    reported = subprocess.run(
         [find_ffmpeg(), "-hide_banner", "-i", str(films[0]), "-f", "null", "-"],
         capture_output=True,
         text=True,
         check=True,
     ).stderr
-    assert "Video: h264" in told
-    assert "302x200" in told  # H.264 requires even sizes
-    assert "Duration: 00:00:01.25" in told
+    assert "Video: h264" in reported
+    assert "302x200" in reported  # H.264 requires even sizes
+    assert "Duration: 00:00:01.25" in reported
     with Image.open(films[1]) as film:
         assert (film.format, film.size) == ("WEBP", (301, 200))
         assert film.n_frames == 5

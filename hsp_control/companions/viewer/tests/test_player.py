@@ -213,7 +213,7 @@ def test_the_time_line_has_bands_and_they_say_what_they_are(
     bands.nth(0).blur()
     assert name.is_hidden()
 
-    for moment, said in (
+    for moment, reported in (
         (1.05, []),
         (1.4, ["a limit is active"]),
         (2.15, ["a limit is active", "the law is damped"]),
@@ -221,7 +221,7 @@ def test_the_time_line_has_bands_and_they_say_what_they_are(
         (3.0, []),
     ):
         page.evaluate("(t) => player.seek(t)", moment)
-        assert moments(page) == said
+        assert moments(page) == reported
 
 
 @pytest.mark.browser

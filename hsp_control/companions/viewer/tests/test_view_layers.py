@@ -6,7 +6,7 @@ import coal
 import numpy as np
 import pinocchio as pin
 import pytest
-from clips import Clip, Recorder, told
+from clips import Clip, Recorder, reported
 
 from hsp_control import Experiment, Robot, Rollout, load_experiment
 from hsp_control.companions.plots.analysis import (
@@ -497,8 +497,8 @@ def test_a_run_is_shown_while_it_is_computed(monkeypatch: pytest.MonkeyPatch) ->
     clips = [command for command in transport.sent if command["type"] == "clip"]
     assert [clip["begins"] for clip in clips] == [True] + [False] * (len(clips) - 1)
     assert all(clip["open"] and clip["horizon"] == 0.5 for clip in clips[:-1])
-    said = [c["text"] for c in transport.sent if c["type"] == "status"]
-    assert any("× real time" in text for text in said)
+    printed = [c["text"] for c in transport.sent if c["type"] == "status"]
+    assert any("× real time" in text for text in printed)
     times = np.concatenate([clip["clocks"][0] for clip in clips])
     # every piece begins at the end of the previous one
     assert (np.diff(times) >= 0.0).all()
@@ -516,7 +516,7 @@ def test_a_run_is_shown_while_it_is_computed(monkeypatch: pytest.MonkeyPatch) ->
         state = experiment.robot.state(0.0, rollout.q[row], rollout.v[row])
         expected = pin.SE3ToXYZQUAT(state.data.oMi[1])[3:]
         assert abs(quaternion @ expected) == pytest.approx(1.0, abs=1e-6)
-    trail = told(transport, "/paths/tip/actual", "object")["points"]
+    trail = reported(transport, "/paths/tip/actual", "object")["points"]
     assert len(trail) == 3 * len(np.unique(times))
 
     view.finish(rollout)

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import pinocchio as pin
 import pytest
-from clips import Clip, Recorder, told
+from clips import Clip, Recorder, reported
 
 from hsp_control import Obstacle, Robot, Rollout, load_experiment
 from hsp_control.common.exceptions import ViewerError
@@ -23,7 +23,7 @@ from hsp_control.trajectories import Hold
 
 
 def children(recorder: Recorder, path: str) -> list[dict[str, Any]]:
-    command = told(recorder, path, "object")
+    command = reported(recorder, path, "object")
     return list(command["object"]["object"]["children"])
 
 
@@ -65,7 +65,7 @@ def test_every_visual_stands_where_pinocchio_puts_it(name: str) -> None:
 
 
 def geometries(recorder: Recorder, path: str) -> list[dict[str, Any]]:
-    command = told(recorder, path, "object")
+    command = reported(recorder, path, "object")
     return list(command["object"]["geometries"])
 
 
@@ -93,7 +93,7 @@ def test_paths_target_and_obstacle_follow_the_log(
     assert recorder.paths("/obstacles/") == ["/obstacles/disk"]
     (disk,) = geometries(recorder, "/obstacles/disk")
     assert (disk["type"], disk["radius"]) == ("SphereGeometry", 0.2)
-    desired = told(recorder, "/paths/tip/desired", "object")
+    desired = reported(recorder, "/paths/tip/desired", "object")
     points = np.reshape(desired["points"], (-1, 3))[:, :2]
     np.testing.assert_allclose(points, run["task.tip.reference"], atol=1e-6)
 
@@ -112,7 +112,7 @@ def test_paths_target_and_obstacle_follow_the_log(
             shown = clip.pose(f"/robot/joint{joint}", t)
             expected = data.oMi[joint].homogeneous
             np.testing.assert_allclose(shown, expected, atol=1e-6)
-    caption = told(recorder, CAPTION, "caption")
+    caption = reported(recorder, CAPTION, "caption")
     assert caption["title"] == run.meta["title"]
     assert [entry["name"] for entry in caption["legend"]] == [
         "desired path", "actual path", "target", "obstacle disk", "manipulability",
@@ -133,14 +133,14 @@ def test_a_state_is_shown_with_what_the_run_did_then(
     viewer.draw_scene(run)
     q = arm.integrate(run.q[37], np.full(3, 0.1))
     viewer.show(arm.state(run.t[37], q, run.v[37]))
-    sought = told(recorder, CLIP, "seek")
+    sought = reported(recorder, CLIP, "seek")
     assert sought["time"] == run.t[37]
     expected = arm.state(0.0, q, np.zeros(3)).data.oMi[3].homogeneous
     np.testing.assert_array_equal(recorder.transform("/robot/joint3"), expected)
     viewer.draw_scene(Scene())
     assert recorder.command(CLIP, "begin") == {"type": "still", "path": CLIP}
     viewer.show(arm.state(0.25, q, run.v[37]))
-    clock = told(recorder, CAPTION, "time")
+    clock = reported(recorder, CAPTION, "time")
     assert clock["text"] == "t = 0.25 s"
 
 
@@ -245,11 +245,11 @@ def test_a_log_is_viewed_as_its_configuration_says(
     assert (robot.name, robot.nq) == ("planar3r", 6)
     assert not robot.model.gravity.linear.any()  # as configured
     viewer = view_logs([path], transport=recorder)
-    camera = told(recorder, CAMERA, "camera")
+    camera = reported(recorder, CAMERA, "camera")
     assert camera["eye"] == [0.0, 0.0, 9.0]
-    begin = told(recorder, CLIP, "begin")
+    begin = reported(recorder, CLIP, "begin")
     assert begin["speed"] == 20.0
-    hidden = told(recorder, "/paths/tip/actual", "visible")
+    hidden = reported(recorder, "/paths/tip/actual", "visible")
     assert hidden["value"] is False
     assert recorder.command("/targets", "visible") is None
     tip = Clip(recorder).pose("/robot/joint3", run.t[-1]) @ [1.0, 0.0, 0.0, 1.0]

@@ -285,8 +285,8 @@ def test_a_page_that_lost_its_program_keeps_its_key(
     address, _, query = steered.url.partition("?")
     key, question = query.removeprefix("key="), "a1b2"
     with urllib.request.urlopen(f"{address}alive?question={question}") as answer:
-        told = answer.read().decode()
-    assert told == hmac.new(key.encode(), question.encode(), "sha256").hexdigest()
+        reported = answer.read().decode()
+    assert reported == hmac.new(key.encode(), question.encode(), "sha256").hexdigest()
     script = (Path(transport.__file__).parent / "page" / "scene.js").read_text()
     asks = script[
         script.index("async function lookForNext") : script.index("// From Pin")
@@ -525,12 +525,12 @@ def test_the_newest_word_counts_and_order_is_kept() -> None:
     kept = LatestCommands()
     for path, word in (("/a", b"1"), ("/a/b", b"2"), ("/ab", b"3"), ("/a", b"4")):
         kept.keep([PageCommand(path, key_of(path, "object"), word)])
-    told, gone = kept.copy(), PageCommand("/a", key_of("/a", "delete"), b"5", True)
+    reported, gone = kept.copy(), PageCommand("/a", key_of("/a", "delete"), b"5", True)
     assert kept.copy().pop_all() == [b"2", b"3", b"4"]
     kept.keep([gone])
     assert [item[0] for item in kept.items()] == ["/ab"]
-    told.keep([gone], deletions=True)
-    assert told.pop_all() == [b"3", b"5"]
+    reported.keep([gone], deletions=True)
+    assert reported.pop_all() == [b"3", b"5"]
 
 
 @pytest.mark.process

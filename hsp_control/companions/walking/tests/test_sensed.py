@@ -17,7 +17,7 @@ SWING, FOOT = "whole_body/solo12_swing", "FL_FOOT"
 UNSCHEDULED = ("contacts.front_left.schedule=null", "tasks.foot.schedule=null")
 
 
-def told(rule, *overrides):
+def reported(rule, *overrides):
     """Return the experiment of a foot with a sensed contact, and its run."""
     plan = f"plan={{type: sensed, contacts: {{front_left: {rule}}}}}"
     experiment = load_experiment(SWING, *UNSCHEDULED, plan, *overrides)
@@ -35,7 +35,7 @@ def feel(experiment, running, t, force):
 
 
 def test_it_bears_when_it_is_pressed_and_its_force_rises():
-    experiment, running = told("{force: 3, task: foot, ramp: 0.2}")
+    experiment, running = reported("{force: 3, task: foot, ramp: 0.2}")
     contact, task = feel(experiment, running, 0.0, 0.0)
     assert isinstance(contact, Switch)
     assert not contact.is_on
@@ -54,7 +54,9 @@ def test_it_bears_when_it_is_pressed_and_its_force_rises():
 
 
 def test_it_ends_when_the_ground_is_gone_but_not_at_once():
-    experiment, running = told("{force: 4, patience: 0.02, task: foot, starts: true}")
+    experiment, running = reported(
+        "{force: 4, patience: 0.02, task: foot, starts: true}"
+    )
     contact, task = feel(experiment, running, 0.0, 0.0)  # nothing is measured yet
     assert contact.is_on
     assert not task.is_on
@@ -77,7 +79,7 @@ def test_it_ends_when_the_ground_is_gone_but_not_at_once():
     [(0.02, 2.9, False), (0.01, 3.0, False), (0.02, 3.0, True)],
 )
 def test_with_height_and_force_both_must_be_felt(height, force, carries):
-    experiment, running = told(f"{{force: 3, height: {height}}}")
+    experiment, running = reported(f"{{force: 3, height: {height}}}")
     contact, _ = feel(experiment, running, 0.0, force)  # standing height: 0.0165 m
     assert contact.is_on == carries
 
@@ -91,7 +93,7 @@ def test_with_height_and_force_both_must_be_felt(height, force, carries):
 ])  # fmt: skip
 def test_what_does_not_fit_is_said(rule, message):
     with pytest.raises(HspControlError, match=message):
-        told(rule)
+        reported(rule)
 
 
 def test_schedules_and_unknown_contacts_are_refused():
@@ -107,7 +109,7 @@ def test_schedules_and_unknown_contacts_are_refused():
 
 def stood(plant, *overrides, duration):
     """Return a run of Solo on rigid contacts; that of the front left foot is sensed."""
-    experiment, _ = told("{force: 2, starts: true, ramp: 0.05}", *overrides)
+    experiment, _ = reported("{force: 2, starts: true, ramp: 0.05}", *overrides)
     return simulate(
         experiment.controller, experiment.q0, duration=duration,
         control_period=0.002, log_period=0.002, integrator=Rk4(step=0.002),

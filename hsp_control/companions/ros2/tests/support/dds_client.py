@@ -174,10 +174,10 @@ def robot(
                 [],
             )
         )
-        heard = client.next(reader, GIVE_UP if step else 1e-3)
-        if heard is not None:
+        received = client.next(reader, GIVE_UP if step else 1e-3)
+        if received is not None:
             step += 1
-            log.append([stamp, q, v, list(heard.data)])
+            log.append([stamp, q, v, list(received.data)])
     return log
 
 

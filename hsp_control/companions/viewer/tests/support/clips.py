@@ -37,7 +37,7 @@ class Recorder(SceneRecorder):
         return total
 
 
-def told(recorder: Recorder, path: str, kind: str) -> dict[str, Any]:
+def reported(recorder: Recorder, path: str, kind: str) -> dict[str, Any]:
     """Return the last command of a kind at a path; there is one."""
     command = recorder.command(path, kind)
     assert command is not None
