@@ -124,7 +124,7 @@ def inertia(q: Array, rows: int) -> Array:
 @pytest.mark.parametrize(
     "metric", [MassMatrixMetric(), *further(IdentityMetric())], ids=repr
 )
-def test_the_energy_is_what_came_in_less_what_was_damped(metric: Metric) -> None:
+def test_the_energy_is_the_input_less_the_dissipation(metric: Metric) -> None:
     """E' = fᵀv - e'ᵀDe' + ½ eᵀK'e, E = ½ e'ᵀΛe' + ½ eᵀKe: passive at the hand.
 
     The last term is the work of a growing stiffness.
@@ -230,7 +230,7 @@ def cartesian() -> Rollout:
     return hsp.load_experiment(CARTESIAN).run()
 
 
-def test_limits_that_an_observer_tells_are_not_bound_by_a_push() -> None:
+def test_limits_with_an_observer_stay_inactive_under_a_push() -> None:
     """The robot's own limits are not reached: they include the push."""
     log = cartesian()
     early = log.t < 2.5

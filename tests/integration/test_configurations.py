@@ -178,7 +178,7 @@ def test_a_configuration_makes_its_point(name: str) -> None:
 @pytest.mark.parametrize(
     "name", [*bundled_configs(), str(ROOT / "examples" / "stream" / "panda.yaml")]
 )
-def test_the_first_effort_is_what_gravity_asks(name: str) -> None:
+def test_the_first_effort_is_that_of_gravity(name: str) -> None:
     """Within a tenth of every limit, for runs that begin at rest."""
     experiment = load_experiment(name)
     robot, law, q = experiment.robot, experiment.controller, experiment.q0

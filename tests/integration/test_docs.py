@@ -144,7 +144,7 @@ def test_every_public_name_is_documented_and_importable() -> None:
             assert not name.startswith("_")
 
 
-def test_the_page_of_one_s_own_robot_is_true() -> None:
+def test_the_page_on_a_user_s_robot_is_true() -> None:
     text = (ROOT / "docs" / "own_robot.md").read_text(encoding="utf-8")
     (configuration,) = blocks(text, "yaml")
     lines = [yaml.safe_load(line) for line in configuration.splitlines()]

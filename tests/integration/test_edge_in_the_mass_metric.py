@@ -56,7 +56,7 @@ def test_a_hand_above_an_orientation_rests(
 
 
 @pytest.mark.slow
-def test_a_task_that_asks_a_joint_beyond_its_limit_forever_rests() -> None:
+def test_a_task_that_demands_a_joint_beyond_its_limit_rests() -> None:
     """A centre of mass out of reach keeps joint 4 of an iiwa at its limit.
 
     It demands 11 rad/s² there, which the null space provided with the wrist. That

@@ -32,7 +32,7 @@ def rests_at(name: str, q0: Array, away: Array, *below: hsp.Task) -> float:
 
 
 @pytest.mark.parametrize("name", ["ur5", *further("panda")])
-def test_the_hand_is_as_near_as_it_can_be_whatever_is_asked_below(name: str) -> None:
+def test_the_hand_is_as_near_as_possible_for_any_lower_demand(name: str) -> None:
     """A position half a metre out of reach, above an orientation, above a posture."""
     robot, q0 = load(name), load(name).home()
     start = robot.state(0.0, q0, np.zeros(robot.nv)).frame(FRAMES[name])
@@ -45,7 +45,7 @@ def test_the_hand_is_as_near_as_it_can_be_whatever_is_asked_below(name: str) -> 
         assert rests_at(name, q0, away, *below) - alone <= SHORT
 
 
-def test_an_orientation_that_is_met_gives_way_too() -> None:
+def test_an_orientation_without_error_yields_too() -> None:
     """It demands nothing, but would oppose the motion of the position above it."""
     q0 = np.array([-0.019, -1.491, 1.837, -2.484, -1.32, -0.043])
     away = np.array([-1.993, -0.799, 0.043])
@@ -126,7 +126,7 @@ def test_a_field_does_not_shake_an_arm_that_a_spring_holds_stretched() -> None:
     assert np.abs(run.v[-1]).max() < 1e-6
 
 
-def test_no_joint_does_at_any_speed_what_the_others_cannot() -> None:
+def test_no_joint_compensates_for_others_at_any_speed() -> None:
     """Three joints without limits in the URDF, with motors overloaded by gravity."""
     robot = hsp.Robot.load("bravo7_no_ee")  # it was 1e18 rad/s after 30 ms
     made = hsp.Controller(robot, [hsp.FramePose(robot.end_effector)])

@@ -69,7 +69,7 @@ def test_a_field_that_pushes_into_limits_leaves_the_task(name: str, field: str) 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("name", ["panda", "xarm7"])
-def test_a_step_within_reach_is_made_whatever_a_field_asks_for(name: str) -> None:
+def test_a_reachable_step_is_made_for_any_field(name: str) -> None:
     """The first accelerations exceed the motors' limits, so that the law is damped.
 
     When a field's demand was treated as the tasks', the hand ended 0.6 and 0.8 m away.
@@ -99,7 +99,7 @@ def test_a_step_within_reach_is_made_whatever_a_field_asks_for(name: str) -> Non
 
 @pytest.mark.slow
 @pytest.mark.parametrize("period", [0.002, 0.01])
-def test_a_pushed_hand_comes_back_whatever_a_field_asks_for(period: float) -> None:
+def test_a_pushed_hand_returns_for_any_field(period: float) -> None:
     """With full damping at a tenth beyond a limit it stayed 86 mm away."""
     robot, rng = hsp.Robot.load("xarm7"), np.random.default_rng([0, 3, 23])
     q0 = np.array(ARMS["xarm7"])

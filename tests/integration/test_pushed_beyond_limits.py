@@ -43,7 +43,7 @@ USUAL = [each for each in CASES if THOROUGH or each != "talos on mujoco"]
 
 @pytest.mark.slow
 @pytest.mark.parametrize("case", USUAL)
-def test_a_joint_beyond_its_limit_is_told(case, tmp_path, capsys):
+def test_a_joint_beyond_its_limit_is_reported(case, tmp_path, capsys):
     config, plant = CASES[case]
     if case.startswith("talos"):
         pytest.importorskip("example_robot_data")

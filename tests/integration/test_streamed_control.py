@@ -131,7 +131,7 @@ def test_a_clutch_that_closes_elsewhere_makes_no_jump() -> None:
     assert np.ptp(run["task.panda_tcp.actual"][:, 1]) > 0.2
 
 
-def test_a_preview_takes_nothing_from_the_run() -> None:
+def test_a_preview_does_not_affect_the_run() -> None:
     stream = hsp.StreamPose()
     controller = hsp.Controller(PANDA, [hsp.FramePose("panda_tcp", stream)])
     hand = controller.stream("panda_tcp")
@@ -227,7 +227,7 @@ def test_mistakes_name_their_place(
         hsp.load_experiment(write(tmp_path, {"type": "stream", **trajectory}))
 
 
-def test_a_log_that_does_not_hold_all_that_was_heard_is_not_repeated(
+def test_a_log_without_all_messages_is_not_repeated(
     tmp_path: Path,
 ) -> None:
     goals(tmp_path, PANDA)

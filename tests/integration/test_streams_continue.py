@@ -126,9 +126,7 @@ def test_a_pickle_goes_on_elsewhere_to_the_last_bit(
 
 
 @every_case
-def test_copies_go_on_and_what_looks_ahead_moves_nothing(
-    kind: str, policy: str
-) -> None:
+def test_copies_continue_and_previews_move_nothing(kind: str, policy: str) -> None:
     """An onlooker receives the original's messages; all are called in turn."""
     expected = steps(amid(kind, policy), kind, range(FIRST, LAST))
     controller = amid(kind, policy)

@@ -169,7 +169,9 @@ def test_an_obstacle_s_mesh_elsewhere_is_refused(home: Path) -> None:
 
 
 @pytest.mark.parametrize(("suffix", "text"), [("obj", OBJ), ("dae", DAE.encode())])
-def test_what_a_mesh_names_is_judged_too(home: Path, suffix: str, text: bytes) -> None:
+def test_files_named_in_a_mesh_are_checked_too(
+    home: Path, suffix: str, text: bytes
+) -> None:
     """OBJ names material libraries, Collada pictures."""
     (home / f"thing.{suffix}").write_bytes(text)
     (home / "arm.urdf").write_text(ARM.replace("good.stl", f"thing.{suffix}"))
@@ -312,7 +314,7 @@ def run() -> Rollout:
     return load_experiment("paper/4_moving_obstacle", "simulation.duration=0.05").run()
 
 
-def test_logs_that_say_little_are_drawn(run: Rollout, tmp_path: Path) -> None:
+def test_sparse_logs_are_drawn(run: Rollout, tmp_path: Path) -> None:
     """Without tasks, field, gain and metric; with an obstacle of its own type."""
     path = run.save(tmp_path / "log.npz")
     log = Rollout.load(path)

@@ -102,7 +102,7 @@ FAR = (
 
 
 @pytest.mark.slow
-def test_talos_stands_while_a_hand_reaches_for_what_is_too_far() -> None:
+def test_talos_stands_while_a_hand_target_is_out_of_reach() -> None:
     """0.9 m ahead: with all tasks at one priority it falls within two seconds."""
     experiment = hsp.load_experiment(
         "whole_body/talos_circle", FAR, "simulation.duration=2"

@@ -68,7 +68,7 @@ def test_a_gain_is_changed_and_the_runs_are_compared(capsys: Capture) -> None:
     assert Path("both.html").stat().st_size > 100_000
 
 
-def test_a_urdf_of_one_s_own(capsys: Capture) -> None:
+def test_a_user_s_urdf(capsys: Capture) -> None:
     urdf = bundled_robots()["planar3r"] / "planar3r.urdf"
     Path("arm.urdf").write_text(urdf.read_text())
     printed = hsp(command("docs/own_robot.md", "hsp inspect arm.urdf"), capsys)
@@ -80,7 +80,7 @@ def test_a_urdf_of_one_s_own(capsys: Capture) -> None:
     assert np.abs(kept(hsp("hsp run mine.yaml", capsys), "arm.npz").q).max() > 0.0
 
 
-def test_a_cost_of_one_s_own_from_python_and_from_yaml(capsys: Capture) -> None:
+def test_a_user_s_cost_from_python_and_from_yaml(capsys: Capture) -> None:
     recipe = "docs/how_to/own_cost.md"
     python = page(recipe, "python")[0]
     space: dict = {}

@@ -202,7 +202,7 @@ def test_the_loop_s_process_is_killed(tmp_path: Path) -> None:
 
 
 @pytest.mark.smoke
-def test_a_robot_that_cannot_start_says_so(tmp_path: Path) -> None:
+def test_a_robot_that_cannot_start_is_reported(tmp_path: Path) -> None:
     experiment = hsp.load_experiment(CONFIG)
     robot = RobotProcess(experiment, log=tmp_path / "none" / "file")
     (tmp_path / "none").write_text("")
@@ -257,7 +257,7 @@ def test_options_that_are_none(
     assert message in capsys.readouterr().err
 
 
-def test_what_feet_feel_comes_over_the_wire(tmp_path: Path) -> None:
+def test_forces_at_feet_are_sent_over_the_wire(tmp_path: Path) -> None:
     """Solo stands; a plan measures a foot on which the other process presses."""
     pytest.importorskip("mujoco")
     pytest.importorskip("example_robot_data")

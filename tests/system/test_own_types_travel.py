@@ -113,7 +113,7 @@ def test_a_module_of_a_package_is_found_on_the_path(
     assert WITHOUT_CONTROLLER not in hsp(WITH_LOG["view"], tmp_path)
 
 
-def test_what_was_edited_is_not_run_again(tmp_path: Path) -> None:
+def test_an_edited_file_is_not_run_again(tmp_path: Path) -> None:
     parts = tmp_path / "parts.py"
     parts.write_text(PARTS)
     (tmp_path / "mine.yaml").write_text(f"{CONFIG}imports: [parts.py]\n")

@@ -84,7 +84,7 @@ def test_the_demo_runs_as_before(core: Path, name: str) -> None:
     assert (there.tau == here.tau).all()
 
 
-def test_what_is_gone_is_not_known(core: Path) -> None:
+def test_removed_parts_are_unknown(core: Path) -> None:
     reported = run(core, "hsp_control", "--help")
     assert "check" in reported
     assert not {"sweep", "franka-box", "view", "play", "export"} & set(reported.split())

@@ -85,7 +85,9 @@ def deleted(checkout: Path, names: set[str]) -> Iterator[None]:
 @pytest.mark.timeout(TIME_LIMIT)
 @pytest.mark.parametrize("check", CHECKS)
 @pytest.mark.parametrize("companion", further(*COMPANIONS))
-def test_what_remains_is_whole(companion: str, check: str, checkout: Path) -> None:
+def test_the_remaining_checkout_is_complete(
+    companion: str, check: str, checkout: Path
+) -> None:
     with deleted(checkout, built_on(companion)):
         done = subprocess.run(
             [sys.executable, "-c", f"{CHECKS[check]}; run()"],

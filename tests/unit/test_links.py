@@ -62,7 +62,7 @@ def test_no_document_links_to_a_file_that_is_not_there(file: Path) -> None:
     assert missing(text, file.parent) == []
 
 
-def test_a_missing_file_is_told(tmp_path: Path) -> None:
+def test_a_missing_file_is_reported(tmp_path: Path) -> None:
     (tmp_path / "there.md").touch()
     text = (
         "[a](there.md#part) [b](gone.md) ![c](gone.png) [d](#here) [x](https://a.b/c)\n"

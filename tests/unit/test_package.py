@@ -82,7 +82,7 @@ def test_few_names_are_at_the_top() -> None:
 
 
 @pytest.mark.parametrize("namespace", hsp_control._NAMESPACES)
-def test_each_namespace_has_names_of_its_own(namespace: str) -> None:
+def test_each_namespace_has_its_own_names(namespace: str) -> None:
     module = getattr(hsp_control, namespace)
     assert module is import_module(f"hsp_control.{hsp_control._NAMESPACES[namespace]}")
     assert [name for name in vars(module) if name[0].isupper()]

@@ -42,7 +42,7 @@ def hear_all(loop: Loop) -> None:
         last = loop.state(last)["number"]
 
 
-def test_it_hears_the_loop_and_moves_its_hand(states: str, loop: Loop) -> None:
+def test_it_receives_states_and_moves_the_hand(states: str, loop: Loop) -> None:
     targets = f"127.0.0.1:{free_port()}"
     stream = hsp.StreamPose(source=f"udp://{targets}", delay=0.02)
     task = hsp.FramePose("panda_tcp", stream, name="hand")
@@ -93,7 +93,7 @@ def tell(states: str) -> Iterator[Told]:
         yield told
 
 
-def test_what_is_old_or_no_state_is_not_heard(
+def test_old_or_invalid_states_are_ignored(
     loop: Loop, tell: Told, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     judged, is_newer = [], loop._is_newer

@@ -87,14 +87,14 @@ def test_actions_may_be_joint_positions(arm: Running) -> None:
         ({"frame": "wrist"}, "publishes no pose of 'wrist'"),
     ],
 )
-def test_what_the_loop_lacks_is_named(
+def test_missing_parts_of_the_loop_are_named(
     arm: Running, changes: dict, message: str
 ) -> None:
     with pytest.raises(LoopError, match=message):
         HspRobot(config(arm, **changes)).connect()
 
 
-def test_without_a_loop_it_says_how_to_start_one() -> None:
+def test_without_a_loop_the_message_has_the_command() -> None:
     states = f"127.0.0.1:{free_port()}"
     robot = HspRobot(HspRobotConfig(states=states, timeout=0.1))
     with pytest.raises(LoopError, match=f"hsp live CONFIG .* udp://{states}"):

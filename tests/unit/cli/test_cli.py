@@ -40,7 +40,7 @@ def test_run_leaves_a_log_that_numpy_alone_reads(
     assert meta["columns"]["tau"]["unit"] == "N·m"
 
 
-def test_run_tells_a_program_what_it_did(
+def test_run_reports_its_result_as_json(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     """The columns are named as in a sweep; the output agrees with the log."""
@@ -75,7 +75,7 @@ def test_an_exit_of_a_users_code_is_a_failure(
     assert "SystemExit(0)" in capsys.readouterr().err
 
 
-def test_check_tells_a_program_what_a_configuration_is(
+def test_check_describes_a_configuration_as_json(
     capsys: pytest.CaptureFixture[str],
 ) -> None:
     assert main(["check", MOVING, "--json"]) == 0
@@ -125,7 +125,7 @@ def test_a_log_is_not_replaced_by_its_repetition(
     ([MOVING, "--set", "start.coordinates=[0, 0, 0]"], 3 - 1),  # stretched
     ([MOVING, "--set", "tasks.tip.schedule={intervals: [[1, null]]}"], 3),
 ])  # fmt: skip
-def test_check_counts_what_contacts_and_tasks_leave(
+def test_check_reports_the_freedom_that_contacts_and_tasks_leave(
     config: list[str], freedom: int, capsys: pytest.CaptureFixture[str]
 ) -> None:
     assert main(["check", "--json", *config]) == 0
@@ -133,7 +133,7 @@ def test_check_counts_what_contacts_and_tasks_leave(
     assert report["null_space"]["degrees_of_freedom"] == freedom
 
 
-def test_the_summary_tells_of_a_target_out_of_reach(
+def test_the_summary_reports_a_target_out_of_reach(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     """A planar arm of 3 m, and a target at 4 m."""
@@ -175,7 +175,7 @@ def test_the_summary_tells_of_a_target_out_of_reach(
         None,
     ),
 ])  # fmt: skip
-def test_check_tells_before_the_run_what_is_out_of_reach(
+def test_check_reports_targets_out_of_reach_before_the_run(
     hand: str, report: str | None, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     """The report has distance and time, or says that only the orientation fails."""
@@ -193,7 +193,7 @@ def test_check_tells_before_the_run_what_is_out_of_reach(
     )
 
 
-def test_check_tells_what_is_too_fast_for_joints(
+def test_check_reports_references_too_fast_for_joints(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     config = tmp_path / "fast.yaml"
@@ -236,7 +236,7 @@ def test_check_tells_what_is_too_fast_for_joints(
         marks=ON_MUJOCO,
     ),
 ])  # fmt: skip
-def test_check_tells_of_targets_along_some_axes_and_of_hands_on_legs(
+def test_check_reports_targets_along_some_axes_and_of_hands_on_legs(
     config: str, tasks: str, report: str | None, capsys: pytest.CaptureFixture[str]
 ) -> None:
     options = ["--set", f"tasks={tasks}", "--set", "simulation.duration=2"]
@@ -264,7 +264,7 @@ def test_check_warns_of_motors_that_cannot_hold_the_robot(
 
 
 @pytest.mark.slow
-def test_robots_lists_what_can_be_loaded(
+def test_robots_lists_loadable_robots(
     capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     every = tuple(robot_table.rows())  # loads all of them, once
@@ -283,7 +283,7 @@ def test_robots_lists_what_can_be_loaded(
     assert "iiwa_joint_7" in capsys.readouterr().out
 
 
-def test_doctor_says_what_this_machine_lacks(
+def test_doctor_lists_missing_parts_of_this_machine(
     capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.delenv("OPENBLAS_NUM_THREADS", raising=False)
@@ -301,7 +301,7 @@ def test_doctor_says_what_this_machine_lacks(
     assert "not set" not in text
 
 
-def test_doctor_tells_an_installation_of_another_version(
+def test_doctor_reports_an_installation_of_another_version(
     capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     version = metadata.version
@@ -342,7 +342,7 @@ def versions_without(package: str) -> Callable[[str], str]:
     # Not parsed as --strict.
     (["run", MOVING, "--st", "a=1"], "no '--st' here; did you mean '--set'?"),
 ])  # fmt: skip
-def test_what_was_mistyped_is_guessed(
+def test_typing_errors_get_a_suggestion(
     typed: list[str], message: str, capsys: pytest.CaptureFixture[str]
 ) -> None:
     with pytest.raises(SystemExit) as ended:
@@ -408,7 +408,7 @@ def test_a_diverging_run_keeps_its_log(
         assert json.loads(str(columns["meta"]))["status"] == "diverged"
 
 
-def test_ctrl_c_keeps_what_was_computed(
+def test_ctrl_c_keeps_computed_rows(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     check, rows = DeferredInterrupt.check, iter(range(1000))

@@ -9,7 +9,7 @@ from hsp_control.cli import consoles
 
 
 @pytest.mark.parametrize("terminal", [True, False])
-def test_only_a_terminal_shows_what_is_being_done(
+def test_only_a_terminal_shows_progress(
     terminal: bool, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     text = io.StringIO()

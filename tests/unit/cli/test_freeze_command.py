@@ -36,7 +36,7 @@ def test_a_configuration_is_frozen(
         ("compliance/panda_cartesian_impedance", r"\.yaml:\d+: changes: "),
     ],
 )
-def test_what_cannot_be_frozen_is_refused_with_its_place(
+def test_parts_that_cannot_be_frozen_are_refused_with_their_place(
     config: str, message: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     if config not in bundled_configs():

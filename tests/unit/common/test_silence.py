@@ -5,7 +5,7 @@ import pytest
 from hsp_control.common.silence import Silence
 
 
-def test_a_step_that_takes_long_is_no_silence() -> None:
+def test_a_long_step_is_no_silence() -> None:
     """Time in which this process itself was stopped is no silence of the other."""
     silence = Silence(-900.0)
     for k in range(10):

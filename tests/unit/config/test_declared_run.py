@@ -104,7 +104,7 @@ def test_a_live_loop_repeats_as_a_simulation_until_its_stop(tmp_path: Path) -> N
     ({}, {"plant": hsp.plants.RigidBodyPlant(heavier())},
      "its plant is a RigidBodyPlant that was built in Python; give a PlantPart"),
 ])  # fmt: skip
-def test_what_cannot_be_repeated_says_why(
+def test_an_unrepeatable_run_gives_the_reason(
     made: dict[str, Any], given: dict[str, Any], why: str, tmp_path: Path
 ) -> None:
     log = hsp.simulate(law(**made), Q0, **RUN | given).save(tmp_path / "run.npz")

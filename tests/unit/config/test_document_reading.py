@@ -103,7 +103,7 @@ UNREADABLE = [
 
 
 @pytest.mark.parametrize(("text", "expected"), UNREADABLE)
-def test_what_cannot_be_read(text: str, expected: str) -> None:
+def test_unreadable_input(text: str, expected: str) -> None:
     assert re.search(wording(f"panda.yaml:{expected}"), message(text))
 
 

@@ -88,7 +88,7 @@ INVALID = [
 
 
 @pytest.mark.parametrize(("text", "expected"), INVALID)
-def test_what_does_not_follow_the_schema(text: str, expected: str) -> None:
+def test_texts_that_do_not_follow_the_schema(text: str, expected: str) -> None:
     assert re.search(wording(f"panda.yaml:{expected}"), message(text))
 
 

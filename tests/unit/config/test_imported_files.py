@@ -53,7 +53,7 @@ def costs(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
     hsp.Barrier.family.members.pop("above_of_a_test", None)
 
 
-def test_yaml_names_what_a_file_has(
+def test_yaml_lists_the_content_of_a_file(
     costs: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     assert main(["run", "x.yaml"]) == 2

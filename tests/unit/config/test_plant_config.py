@@ -148,7 +148,7 @@ def test_plants_that_are_none(plant: Any, message: str) -> None:
     ["mujoco", {"type": "rigid_body", "friction": "urdf"},
      {"type": "rigid_body", "drives": {"delay": 1}}],
 )  # fmt: skip
-def test_what_moves_by_itself_needs_a_control_period(plant: Any) -> None:
+def test_sampled_plants_need_a_control_period(plant: Any) -> None:
     if plant == "mujoco":
         pytest.importorskip("hsp_control.companions.mujoco")
     config = panda(plant)

@@ -79,7 +79,7 @@ def test_a_recorder_that_begins_later_repeats_its_part(tmp_path: Path) -> None:
     np.testing.assert_allclose(again.q, log.q, atol=2e-3)
 
 
-def test_what_was_sent_is_recorded_and_for_how_long_it_was_held(
+def test_sent_efforts_and_their_durations_are_recorded(
     tmp_path: Path,
 ) -> None:
     """A row every five periods; the robot received half of each effort."""
@@ -116,7 +116,7 @@ def test_how_long_efforts_were_held_is_logged_where_rows_have_whole_periods(
     assert config["simulation"]["control_period"] == (held and pytest.approx(held))
 
 
-def test_what_cannot_be_repeated_says_why_and_an_error_ends_the_log(
+def test_an_unrepeatable_run_gives_the_reason_and_an_error_ends_the_log(
     tmp_path: Path,
 ) -> None:
     path, controller = tmp_path / "mine.npz", law(hsp.FunctionCost(lambda s: s.q[0]))
@@ -149,7 +149,7 @@ def test_what_cannot_be_repeated_says_why_and_an_error_ends_the_log(
         type(error).__name__ if isinstance(error, BaseException) else None
     ),
 )  # fmt: skip
-def test_whatever_is_raised_the_next_recorder_can_write(
+def test_after_any_exception_the_next_recorder_can_write(
     error: BaseException, rows: int, tmp_path: Path
 ) -> None:
     path, controller = tmp_path / "mine.npz", law(hsp.JointCentering())
@@ -173,7 +173,7 @@ def test_whatever_is_raised_the_next_recorder_can_write(
         assert first.rollout.status == "stopped"
 
 
-def test_a_recorder_that_nobody_closed_is_named_until_it_is_forgotten(
+def test_an_unclosed_recorder_is_named_until_it_is_freed(
     tmp_path: Path,
 ) -> None:
     path, controller = tmp_path / "mine.npz", law(hsp.JointCentering())

@@ -90,9 +90,7 @@ def scenario_of(name: str) -> Scenario:
 
 
 @pytest.mark.parametrize(("name", "defaults"), covering(NAMES, [False, True]))
-def test_a_configuration_equals_what_it_becomes_as_data(
-    name: str, defaults: bool
-) -> None:
+def test_a_configuration_equals_its_plain_data(name: str, defaults: bool) -> None:
     scenario = scenario_of(name)
     data = plain_data(scenario, defaults=defaults)
     assert validate(Document(data, {}, name), Scenario) == scenario
@@ -116,7 +114,7 @@ def test_with_defaults_no_key_is_missing() -> None:
     assert plain_data(empty, defaults=True)["contacts"] == {}
 
 
-def test_what_only_python_can_say_is_named() -> None:
+def test_options_of_python_alone_are_named() -> None:
     cost = FunctionCost(lambda q, t: 0.0)
     model = NullSpaceSettings(fields=[cost])
     with pytest.raises(ConfigError, match=r"^fields\.0.function: YAML cannot express"):

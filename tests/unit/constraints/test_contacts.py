@@ -90,7 +90,7 @@ CONTACTS: dict[str, tuple[Callable[[], hsp.Robot], hsp.contacts.Contact]] = {
 @pytest.mark.parametrize("kind", CONTACTS)
 @given(seeds)
 @settings(max_examples=10)
-def test_rows_are_the_velocity_of_what_touches(kind: str, seed: int) -> None:
+def test_rows_are_the_velocity_at_the_contact(kind: str, seed: int) -> None:
     load, contact = CONTACTS[kind]
     robot = load()
     state = random_state(robot, seed)
@@ -130,7 +130,7 @@ def test_rows_are_the_velocity_of_what_touches(kind: str, seed: int) -> None:
 
 @given(seeds)
 @settings(max_examples=10)
-def test_unactuated_rows_ask_for_no_effort(seed: int) -> None:
+def test_unactuated_rows_demand_no_effort(seed: int) -> None:
     """Two point feet: Uᵀ(M a + N) = 0 is a row of the law, and J' is its derivative."""
     robot = solo()
     base = np.array(robot.unactuated)
@@ -263,7 +263,7 @@ def test_forces_are_permitted_up_to_the_friction_cone() -> None:
     assert not support.permits()
 
 
-def test_the_log_says_how_much_friction_is_used() -> None:
+def test_the_log_has_the_used_friction() -> None:
     """The largest ‖f_t‖/(μ f_n) of a sole's corners, each sole with its own μ."""
     robot, frictions = talos(), (0.4, 0.9)
     contacts = [

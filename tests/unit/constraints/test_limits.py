@@ -198,7 +198,7 @@ MISFITS: list[tuple[Any, dict[str, Any], type[HspControlError], str, str]] = [
 
 
 @pytest.mark.parametrize(("robot", "options", "error", "path", "message"), MISFITS)
-def test_what_does_not_fit_the_robot(
+def test_parts_that_do_not_fit_the_robot(
     robot: Any,
     options: dict[str, Any],
     error: type[HspControlError],

@@ -99,11 +99,11 @@ def test_they_are_values(part: Part) -> None:
         ),
     ],
 )
-def test_as_yaml_says_it(family: type[Part], data: dict[str, Any], part: Part) -> None:
+def test_as_in_yaml(family: type[Part], data: dict[str, Any], part: Part) -> None:
     assert TypeAdapter(family).validate_python(data) == part
 
 
-def test_limits_as_yaml_says_them() -> None:
+def test_limits_from_yaml() -> None:
     data: dict[str, Any] = {
         "effort": {"scale": {"a": 0.5}},
         "velocity": {"joints": {"a": 2}},

@@ -70,7 +70,7 @@ def test_it_is_on_at_a_rate_that_suits_the_period(period: float, rate: float) ->
         )
 
 
-def test_it_says_why_it_is_off() -> None:
+def test_it_reports_why_it_is_inactive() -> None:
     stiff = controller()
     spring = controller(impedance=hsp.Impedance(stiffness=600.0, damping=30.0))
     walker = hsp.Robot.load("talos")
@@ -248,7 +248,7 @@ def test_a_held_pose_stays_where_it_belongs(case: str) -> None:
     assert (np.max(found, axis=0) < (5.0, 2.0, 5.0)).all()
 
 
-def test_an_arm_with_its_rotors_bears_a_load_on_its_light_wrist() -> None:
+def test_an_arm_with_rotors_tolerates_a_load_on_its_light_wrist() -> None:
     arm = WrongArm("xarm7", 0, load=1.0, motor_inertia=0.05)
     log = held(arm, Compensation(), duration=2.0)
     assert 1e3 * np.linalg.norm(log["task.hand.error"][-1, :3]) < 1.0

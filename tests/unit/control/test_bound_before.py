@@ -92,7 +92,7 @@ def test_changes_that_go_on_are_forgotten(monkeypatch: pytest.MonkeyPatch) -> No
 
 
 @pytest.mark.parametrize("kind", CHANGES)
-def test_what_is_over_is_forgotten(kind: str) -> None:
+def test_past_changes_are_forgotten(kind: str) -> None:
     """Many changes leave no more in memory than the first few."""
 
     def kept(number: int) -> tuple[int, str, int]:

@@ -58,7 +58,7 @@ def test_no_part_is_delivered_by_python(
 
 
 @pytest.mark.parametrize(("kind", "speed"), covering(CHANGES, [0.31, None]))
-def test_it_delivers_what_its_parts_do(kind: str, speed: float | None) -> None:
+def test_it_delivers_the_result_of_its_parts(kind: str, speed: float | None) -> None:
     """Equal to the step part by part, which a modifier (here an idle one) requires."""
     whole, parts = controller(kind, speed), controller(kind, speed)
     statuses = set()
@@ -77,7 +77,7 @@ def test_it_delivers_what_its_parts_do(kind: str, speed: float | None) -> None:
 
 
 @pytest.mark.parametrize("scheduled", [False, True])
-def test_it_delivers_what_its_parts_do_on_feet(scheduled: bool) -> None:
+def test_it_delivers_the_result_of_its_parts_on_feet(scheduled: bool) -> None:
     """A foot is lifted by a change or a schedule, while another one pushes less."""
     pytest.importorskip("example_robot_data")
     robot = hsp.Robot.load("solo12")

@@ -97,7 +97,7 @@ def g_at(
 
 
 @given(t=st.floats(-0.5, 2.0), seed=st.integers(0, 2**32 - 1))
-def test_the_rate_of_what_is_in_between_is_exact(t: float, seed: int) -> None:
+def test_the_rate_in_between_is_exact(t: float, seed: int) -> None:
     """A field fades to another one, and before that ends to a third."""
     # At the begin and end of a change it is C² only.
     assume(all(abs(t - edge) > 0.01 for edge in (0.0, 0.6, 1.0, 1.4)))

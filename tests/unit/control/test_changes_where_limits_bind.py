@@ -277,7 +277,7 @@ def test_a_mixture_keeps_the_limits(name: str, seed: int) -> None:
         assert (out.acceleration <= bounds.a_upper + 1e-6).all()
 
 
-def test_what_opposes_friction_fades_with_the_tasks() -> None:
+def test_friction_compensation_fades_with_the_tasks() -> None:
     """Friction opposes the velocity that each set of tasks commands."""
     case = Case("panda", 0)
     controller = a_task_is_added(case)

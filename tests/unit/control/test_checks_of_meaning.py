@@ -41,7 +41,7 @@ def warnings_of(target: object, **options: object) -> list[str]:
         (hsp.Circle(radius=0.1, angular_rate=1.0), {}, ""),  # relative to the start
     ],
 )
-def test_a_target_far_beyond_the_reach_is_said_once(
+def test_a_target_far_out_of_reach_is_reported_once(
     target: object, options: dict[str, object], warning: str
 ) -> None:
     found = warnings_of(target, **options)
@@ -59,7 +59,7 @@ def test_a_target_that_is_set_is_looked_at_too() -> None:
 
 
 @pytest.mark.filterwarnings("error")
-def test_a_run_that_is_damped_most_of_the_time_says_so() -> None:
+def test_a_mostly_damped_run_is_reported() -> None:
     out = hsp.FramePosition("panda_tcp", [1.5, 0.0, 0.5], blend=1.0, name="hand")
     controller = hsp.Controller(PANDA, [out])
     options = {"duration": 4.0, "control_period": 0.005}
@@ -102,7 +102,7 @@ def test_a_recorded_loop_whose_times_are_milliseconds_is_warned_of() -> None:
     recorder.close()
 
 
-def test_the_command_line_says_the_same(capsys: pytest.CaptureFixture[str]) -> None:
+def test_the_command_line_prints_the_same(capsys: pytest.CaptureFixture[str]) -> None:
     far = "tasks.hand.trajectory={type: hold, point: [400, 200, 500]}"
     kind = "tasks.hand.type=frame_position"
     code = main(["check", "panda_limits", "--set", kind, "--set", far])

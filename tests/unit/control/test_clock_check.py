@@ -42,14 +42,14 @@ STEPS = H * np.arange(40)
         (np.append(STEPS, STEPS), H, "... runs back: t = 0 s ... -0.078 s"),
     ],
 )
-def test_a_clock_of_something_else_is_said_once(
+def test_a_clock_of_something_else_is_reported_once(
     times: Sequence[float], period: float, message: str
 ) -> None:
     (found,) = reported(times, period)
     assert re.search(wording(message), found)
 
 
-def test_a_state_with_the_time_of_a_clock_is_said() -> None:
+def test_a_state_with_an_absolute_clock_time_is_reported() -> None:
     """Times count from the first step."""
     robot = hsp.Robot.load("panda")
     controller = hsp.Controller(robot, [hsp.FramePosition()])
@@ -58,7 +58,7 @@ def test_a_state_with_the_time_of_a_clock_is_said() -> None:
         controller.compute(state)
 
 
-def test_a_change_at_the_time_of_a_clock_is_said() -> None:
+def test_a_change_at_an_absolute_clock_time_is_reported() -> None:
     """The change would never begin; a robot at rest for a day is no clock error."""
     robot = hsp.Robot.load("panda")
     controller = hsp.Controller(robot, [hsp.FramePosition(name="hand")])
@@ -72,7 +72,7 @@ def test_a_change_at_the_time_of_a_clock_is_said() -> None:
     assert caught[0].filename == __file__
 
 
-def test_what_happens_to_a_loop_is_no_wrong_clock() -> None:
+def test_ordinary_delays_of_a_loop_are_no_clock_error() -> None:
     """Late or repeated steps, steps after a pause, and any start time are accepted."""
     rng = np.random.default_rng(0)
     late = STEPS + H * rng.uniform(-0.4, 0.4, STEPS.size)
@@ -113,7 +113,7 @@ def moved(unit: float, noise: float = 0.0, *, kind: str = "numbers") -> list[str
 
 
 @pytest.mark.parametrize("kind", ["numbers", "state"])
-def test_times_in_milliseconds_are_said_once_where_only_compute_is_called(
+def test_times_in_milliseconds_are_reported_once_by_compute_alone(
     kind: str,
 ) -> None:
     (found,) = moved(1000.0, kind=kind)

@@ -113,7 +113,7 @@ def test_the_closed_form_is_the_optimum(without_support: int, seed: int) -> None
 # --- the law is unchanged ------------------------------------------------------------
 
 
-def test_a_force_that_nothing_can_balance_gives_way_before_the_law() -> None:
+def test_an_unbalanced_force_is_reduced_before_the_law() -> None:
     """60 N with soles on ice: the hand presses less, the acceleration is the law's."""
     state = talos().state(0.0, talos().home(), np.zeros(talos().nv))
     controller = leaning(wall(CommandedForce([0.0, 0.0, 60.0])), friction=0.2)
@@ -141,7 +141,7 @@ def pressing(contact: Contact, **options: Any) -> hsp.Controller:
     )
 
 
-def test_a_fixed_base_presses_with_what_is_commanded() -> None:
+def test_a_fixed_base_presses_as_commanded() -> None:
     """tau = M a + N - Jᵀλ: in motion a rigid contact reacts with λ, to rounding."""
 
     def command(t: float) -> Array:
@@ -301,7 +301,7 @@ TIPPING = SurfaceContact(
         ),
     ],
 )
-def test_what_cannot_be_commanded(make: Any, message: str) -> None:
+def test_impossible_commands(make: Any, message: str) -> None:
     with pytest.raises(hsp.HspControlError, match=wording(message)):
         make()
 

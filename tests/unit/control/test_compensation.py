@@ -139,7 +139,7 @@ def test_compensators_need_a_control_period() -> None:
 @pytest.mark.parametrize(
     ("name", "rate"), covering(["panda", "iiwa14", "planar3r"], [20.0, 200.0])
 )
-def test_the_observer_is_a_low_pass_on_what_pushes(name: str, rate: float) -> None:
+def test_the_observer_is_a_low_pass_of_the_push(name: str, rate: float) -> None:
     """r = d (1 - exp(-K_O t)) for a constant d, while the robot falls.
 
     The mean of Cᵀv - G over a period is good to h²/12 of its second derivative: 1e-4.
@@ -158,7 +158,7 @@ def test_the_observer_is_a_low_pass_on_what_pushes(name: str, rate: float) -> No
         q, v = plant.advance(k * H, (k + 1) * H, tau + d)
 
 
-def test_what_is_cancelled_is_clipped() -> None:
+def test_the_compensation_is_clipped() -> None:
     """Beyond the bound the arm yields as without an observer."""
     heavy = changed(PANDA, [Inertias(1.5)])
     plant = hsp.plants.RigidBodyPlant(heavy)
@@ -364,9 +364,7 @@ def test_half_of_the_power_passes_at_the_cut_off(order: int) -> None:
 @pytest.mark.parametrize(
     ("efforts", "sensors"), [(2, 0), (1, 2), *further((1, 0), (0, 1))]
 )
-def test_the_predictor_knows_where_the_robot_will_be(
-    efforts: int, sensors: int
-) -> None:
+def test_the_predictor_returns_the_later_state(efforts: int, sensors: int) -> None:
     """The law uses the predicted state at which its effort acts, to Rk4's error."""
     plant = hsp.plants.ImperfectPlant(
         hsp.plants.IntegratedPlant(hsp.plants.RigidBodyPlant(PANDA), Rk4(H)),

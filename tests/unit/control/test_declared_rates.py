@@ -390,7 +390,7 @@ def test_a_right_or_undefined_rate_is_not_named(variant: str) -> None:
     first_step(QUIET[variant])
 
 
-def test_it_is_looked_at_once_and_on_a_state_of_its_own() -> None:
+def test_it_is_checked_once_and_on_a_separate_state() -> None:
     seen: list[tuple[float, Any]] = []
 
     def watched(s: hsp.RobotState) -> Array:
@@ -450,7 +450,7 @@ null_space:
 """
 
 
-def test_a_configuration_is_told_the_line(
+def test_errors_of_a_configuration_have_the_line(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(imported, "_functions", {})

@@ -35,7 +35,7 @@ def holding(**options: Any) -> hsp.Controller:
 # --- degrees ------------------------------------------------------------------------
 
 
-def test_degrees_are_asked_about_at_the_first_state_and_after_a_restart() -> None:
+def test_degrees_are_reported_at_the_first_state_and_after_a_restart() -> None:
     home = panda().home()
     degrees = np.rad2deg(home)
     message = wording("joint 'panda_joint2' ... -45 rad ... 1.7628 rad: degrees?")
@@ -119,7 +119,7 @@ def test_a_target_of_another_kind_is_refused(
         hsp.Controller(panda(), tasks).set_target(name, value)
 
 
-def test_errors_by_name_and_what_is_printed() -> None:
+def test_errors_by_name_and_their_text() -> None:
     law = holding(null_space_gain=8.0)
     reported = "Controller of panda: 'panda_tcp' ... field rest, K_N = 8 ... no limits"
     assert re.search(wording(reported), repr(law))
@@ -162,7 +162,7 @@ FIRST_EFFORT = wording(
 )
 
 
-def test_a_loop_of_ones_own_is_told_once_when_it_sends() -> None:
+def test_a_user_s_loop_is_warned_once_when_it_sends() -> None:
     """`compute` alone moves no robot; after a restart the check runs again."""
     circle = hsp.Circle(radius=0.1, angular_rate=2.0)
     hand = hsp.FramePose("panda_tcp", circle)
@@ -221,7 +221,7 @@ CALLS = wording("... calls the same controller ... controller.preview()")
         lambda law, s: law.at(1.0).null_space_gain(3.0),
     ],
 )
-def test_a_field_that_calls_its_own_controller_is_told(call: Any) -> None:
+def test_a_field_that_calls_its_controller_raises(call: Any) -> None:
     armed = False
 
     def cost(state: Any) -> float:

@@ -191,7 +191,7 @@ def test_distances_are_relaxed_less_than_motion_and_motion_less_than_holding() -
     assert (a[5] + 5.0) / (5.0 - a[5]) == pytest.approx(300.0, rel=1e-2)
 
 
-def test_a_violation_does_not_depend_on_how_far_what_is_wanted_is() -> None:
+def test_a_violation_does_not_depend_on_the_distance_of_the_target() -> None:
     """All other unknowns cost 1e-6, which fades out: it would shift a by 0.01."""
     made, far = arm(), -1e4
     made.compute(0.0, panda().home(), np.zeros(7))

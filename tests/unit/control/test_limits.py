@@ -132,7 +132,7 @@ def test_the_drift_is_made_up_for_where_it_leads_beyond_a_limit(
     np.testing.assert_allclose(a_lower + drift, plain[0], rtol=0, atol=1e-11)
 
 
-def test_what_lasts_is_made_up_for_by_what_a_light_joint_can_do() -> None:
+def test_lasting_errors_are_compensated_within_a_light_joint_s_effort() -> None:
     """Past drift widens by at most a tenth of the range; present drift by more."""
     robot = panda()
     limits = of(robot, velocity=None)
@@ -303,7 +303,7 @@ def test_a_wrist_with_an_unknown_tool_stays_within_its_range(
     assert run["joint_positions"][:, 6].max() > upper[6] - 0.06
 
 
-def test_the_error_of_the_acceleration_is_what_is_observed() -> None:
+def test_the_error_of_the_acceleration_is_the_observed_one() -> None:
     robot = hsp.Robot.load("planar3r")
     state, q = robot.state(0.0, robot.home(), np.zeros(3)), robot.home()
     v, a = np.array([0.1, 0.2, 0.0]), np.array([1.0, -1.0, 0.0])
@@ -348,7 +348,7 @@ def test_the_error_of_the_acceleration_is_what_is_observed() -> None:
     np.testing.assert_allclose(held.error, [8.0, 8.0, 8.0], rtol=1e-9)
 
 
-def test_contradiction_is_relaxed_and_told() -> None:
+def test_contradiction_is_relaxed_and_reported() -> None:
     """A joint that cannot brake before its limit: the smallest possible violation."""
     robot = panda()
     q, v = robot.home(), np.zeros(7)
@@ -375,7 +375,7 @@ def status_of(
 
 
 @pytest.mark.parametrize("dof", [0, 3, 6])
-def test_what_is_measured_beyond_a_limit_is_told_in_that_step(dof: int) -> None:
+def test_a_measured_excess_is_reported_in_that_step(dof: int) -> None:
     """With any delivered step, also an unconstrained one on the way back."""
     law = hsp.Controller(panda(), [hsp.FramePosition("panda_tcp")])
     for _ in range(3):  # the first steps, and the later ones of a single call
@@ -394,7 +394,7 @@ def test_what_is_measured_beyond_a_limit_is_told_in_that_step(dof: int) -> None:
         assert status_of(free, dof, away=1.1e-3) < Status.BEYOND
 
 
-def test_effort_rate_needs_to_know_what_went_out() -> None:
+def test_effort_rate_needs_the_sent_effort() -> None:
     robot = panda()
     limits = hsp.Limits(effort_rate=1000.0)
     controller = hsp.Controller(robot, [hand()], limits=limits)

@@ -116,7 +116,7 @@ def test_the_robot_grows_and_decays_at_the_rate_of_the_linear_loop(case: str) ->
             assert found == pytest.approx(rate, rel=0.1, abs=0.05)
 
 
-def test_what_is_told_is_the_boundary_and_the_advice_works() -> None:
+def test_the_reported_limit_is_the_boundary_and_the_advice_works() -> None:
     made, strong = holding(), only(integral_action=IntegralAction(7.0))
     edge = boundary(whole(made, strong, 0))
     (found,) = check_rate(made, Q0, H, strong, plant=loaded())
@@ -177,7 +177,7 @@ def test_configurations_with_a_payload_are_warned_of_it() -> None:
     assert not hsp.load_experiment(driven, "plant.payload.mass=3").rate_findings
 
 
-def test_weight_that_nothing_holds_is_told_and_an_observer_holds_it() -> None:
+def test_an_unbalanced_weight_is_reported_and_an_observer_holds_it() -> None:
     """As predicted, the posture diverges or stays."""
     arm = hsp.Robot.load("panda")
     hand = hsp.FramePosition("panda_tcp", gains=hsp.Gains(natural_frequency=20.0))

@@ -66,7 +66,7 @@ def test_a_copy_goes_on_to_the_last_bit(kind: str, between: bool) -> None:
 
 
 @pytest.mark.parametrize("kind", COPIES)
-def test_a_copy_says_nothing_that_was_said(kind: str) -> None:
+def test_a_copy_does_not_repeat_reports(kind: str) -> None:
     """No memory of the first effort, nor of a stopped clock, remains."""
     made = controller()
     with warnings.catch_warnings(record=True) as said:

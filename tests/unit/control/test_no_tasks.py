@@ -45,7 +45,7 @@ def test_tasks_come_and_go() -> None:
     assert change < 0.2 < 0.01 * np.abs(run.tau).max()
 
 
-def test_a_configuration_says_it(
+def test_a_configuration_declares_it(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     led = tmp_path / "led.yaml"

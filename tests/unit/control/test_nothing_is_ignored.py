@@ -79,7 +79,7 @@ def test_no_attribute_can_be_assigned() -> None:
         (None, np.zeros(7), np.zeros(7), "time t is None"),
     ],
 )
-def test_what_is_no_state_gives_one_exact_error(
+def test_an_invalid_state_gives_one_exact_error(
     t: Any, q: Any, v: Any, message: str
 ) -> None:
     with pytest.raises(hsp.HspControlError, match=message):

@@ -61,7 +61,7 @@ def smallest_rates(W: Array, K_N: Array) -> Array:
 
 
 @pytest.mark.parametrize("name", ROBOTS)
-def test_what_is_accepted_decays_at_every_configuration(name: str) -> None:
+def test_accepted_gains_decay_at_every_configuration(name: str) -> None:
     """Over the mass matrix; some positive definite K_N must be refused, too."""
     robot, rng = load(name), np.random.default_rng(41)
     accepted, refused = [], []
@@ -79,7 +79,7 @@ def test_what_is_accepted_decays_at_every_configuration(name: str) -> None:
 
 
 @pytest.mark.parametrize("name", ROBOTS)
-def test_in_a_constant_metric_what_decays_is_accepted_and_nothing_else(
+def test_in_a_constant_metric_exactly_decaying_gains_are_accepted(
     name: str,
 ) -> None:
     robot, rng = load(name), np.random.default_rng(42)

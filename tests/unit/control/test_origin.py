@@ -96,7 +96,7 @@ def test_any_thread_may_make_the_first_step() -> None:
     np.testing.assert_array_equal(np.vstack(found), USUAL)
 
 
-def test_an_origin_that_is_given_counts() -> None:
+def test_a_given_origin_is_used() -> None:
     """Set to a clock's time before the first step; None resets it."""
     made, later = controller(), STEPS[20:]
     made.restart(origin=100.0)

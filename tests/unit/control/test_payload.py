@@ -155,7 +155,7 @@ def test_an_observer_does_not_take_it_for_a_disturbance() -> None:
     assert np.abs(run["observer.disturbance"]).max() < 0.1
 
 
-def test_a_plant_that_is_nobody_of_ours_is_named() -> None:
+def test_an_unknown_plant_is_named() -> None:
     class Own(RigidBodyPlant):
         dynamics = None  # type: ignore[assignment]
 
@@ -182,7 +182,7 @@ def test_a_copy_and_a_pickle_carry_it_on() -> None:
             np.testing.assert_array_equal(other.compute(t, q, v).tau, tau)
 
 
-def test_what_is_over_is_forgotten() -> None:
+def test_past_changes_are_forgotten() -> None:
     made, q, v = controller(), start(panda()), np.zeros(7)
     made.compute(0.0, q, v)
     for k in range(300):
@@ -210,7 +210,7 @@ def test_gravity_changes_with_the_base() -> None:
         made.at(6.0).gravity([0.0, 0.0, -981.0])
 
 
-def test_what_static_effort_looks_at_counts_it() -> None:
+def test_a_payload_is_part_of_static_effort() -> None:
     made, q = controller(), start(panda())
     made.compute(0.0, q, np.zeros(7))
     gravity = Gravity(panda().model, made.state.dynamics, made.state.world)
@@ -233,7 +233,7 @@ def test_what_static_effort_looks_at_counts_it() -> None:
         (("panda_hand", 0.0, [0, 0, 0], 0.1), "inertia: is not 0, but the mass is"),
     ],
 )
-def test_what_is_no_payload_is_refused(change: Any, message: str) -> None:
+def test_invalid_payloads_are_refused(change: Any, message: str) -> None:
     made = hsp.Controller(panda(), [hsp.FramePosition()])
     with pytest.raises(HspControlError, match=message):
         made.at(0.0).payload(*change)
@@ -283,7 +283,7 @@ def balance(robot: hsp.Robot, t: float, q: Array, v: Array) -> tuple[Array, Arra
 
 @pytest.mark.parametrize("t", [0.2, 0.45, 0.55, 0.65, 0.8, 5.0])
 @pytest.mark.parametrize("name", LEGGED)
-def test_the_centre_of_mass_moves_with_what_comes_and_goes(name: str, t: float) -> None:
+def test_the_centre_of_mass_includes_payloads_that_fade(name: str, t: float) -> None:
     """c', c'' and the rate of A v/m along a motion, by differences of fourth order."""
     made = carrying(name, hsp.tasks.CenterOfMass())
     robot, rng = made.robot, np.random.default_rng(7)
@@ -358,7 +358,7 @@ def test_a_robot_on_feet_takes_up_a_payload() -> None:
     assert up == pytest.approx(0.5 * 9.81, abs=0.05 + 10.0 * np.abs(acceleration).max())
 
 
-def test_a_configuration_says_it(tmp_path: Path) -> None:
+def test_a_configuration_declares_it(tmp_path: Path) -> None:
     text = (
         "robot: {name: panda}\ntasks: {hand: {type: frame_pose}}\n"
         "changes: [{type: payload, frame: panda_hand, mass: 2, center: [0, 0, 0.06],\n"

@@ -178,7 +178,7 @@ def test_a_lag_of_the_drives_is_in_the_linear_loop(
 
 
 @pytest.mark.slow
-def test_integral_action_that_a_heavier_robot_does_not_bear_is_told() -> None:
+def test_integral_action_unstable_for_a_heavier_robot_is_reported() -> None:
     """Without gravity the arm agrees: 10 % off the prediction it decays or grows."""
     robot = Robot.load("panda", gravity=[0.0, 0.0, 0.0])
     task = JointPosture(Q0, gains=Gains(natural_frequency=20.0))
@@ -320,7 +320,7 @@ def test_the_advice_on_a_compensator_works(
 
 
 @pytest.mark.parametrize("which", ["effort_delay", "sensor_delay"])
-def test_a_delay_that_the_loop_does_not_bear_is_told_with_one_that_it_bears(
+def test_an_excessive_delay_is_reported_with_the_tolerated_one(
     which: str,
 ) -> None:
     """For ω0 = 20: the phase margin over the crossover, less half a period's hold."""
@@ -418,14 +418,14 @@ LATE = {"type": "rigid_body", "sensors": {"delay": 1}}
         ),
     ],
 )
-def test_mistakes_are_told_where_they_stand(
+def test_mistakes_are_reported_with_their_place(
     sections: dict[str, Any], message: str
 ) -> None:
     with pytest.raises(hsp.HspControlError, match=wording(message)):
         load_experiment(config(**sections))
 
 
-def test_the_command_line_says_what_is_close(
+def test_the_command_line_suggests_close_names(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     file = tmp_path / "close.yaml"
@@ -453,7 +453,7 @@ def test_the_command_line_says_what_is_close(
         ),
     ],
 )
-def test_a_simulation_refuses_what_a_run_refuses(
+def test_a_simulation_has_the_refusals_of_a_run(
     gains: dict[str, float], delay: int, message: str
 ) -> None:
     """With the plant's delays; a run with the advised gains is stable."""
@@ -470,7 +470,7 @@ def test_a_simulation_refuses_what_a_run_refuses(
     simulate(holding(**mended), Q0, control_period=H, **how)
 
 
-def test_a_delay_that_is_not_borne_is_told_with_the_one_that_is() -> None:
+def test_an_excessive_delay_is_named_with_the_tolerated_one() -> None:
     robot = Robot.load("panda")
     task = JointPosture(Q0, gains=Gains(natural_frequency=40.0))
     made = Controller(robot, [task], limits=None)

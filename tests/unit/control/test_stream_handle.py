@@ -30,7 +30,7 @@ def run(made: hsp.Controller, seconds: float) -> np.ndarray:
     return reference
 
 
-def test_what_is_sent_before_the_first_step_is_heard_in_it() -> None:
+def test_messages_before_the_first_step_are_read_in_it() -> None:
     made = controller(hsp.trajectories.Stream())
     stream = made.stream("hand")
     stream.send(TARGET)

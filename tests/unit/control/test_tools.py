@@ -165,7 +165,7 @@ def test_a_tip_stays_where_it_is_to_be_while_it_is_exchanged() -> None:
     assert np.linalg.norm(moved) == pytest.approx(0.1, abs=1e-6)
 
 
-def test_a_target_counts_from_the_tool_there_is() -> None:
+def test_a_target_is_relative_to_the_present_tool() -> None:
     """Relative values of a change refer to the tip, and so does a copy of the run."""
     made = hsp.Controller(ROBOT, [hsp.FramePosition(FRAME, name="hand")])
     q, v = ROBOT.home(), np.zeros(7)
@@ -187,7 +187,7 @@ def test_a_target_counts_from_the_tool_there_is() -> None:
     np.testing.assert_array_equal(made.state.position(FRAME), home.position(FRAME))
 
 
-def test_nobody_else_moves_the_frames_of_a_controller() -> None:
+def test_only_the_controller_moves_its_frames() -> None:
     """Neither holders of the state nor user code can write it; a snapshot is a copy."""
     made = controller(TASKS["position"]())
     made.compute(0.0, *motion(0))

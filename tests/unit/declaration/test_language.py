@@ -109,6 +109,6 @@ def test_a_message_speaks_the_language_that_was_typed(
     assert reported.count("hsp: ") == 1
 
 
-def test_a_command_says_which_one_was_meant(capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_command_suggests_the_likely_one(capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["run", "panda"]) == 2
     assert re.search("'panda' is a robot.* hsp play panda", capsys.readouterr().err)

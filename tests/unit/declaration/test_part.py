@@ -372,7 +372,7 @@ def test_errors_are_those_of_the_class_that_was_called() -> None:
 # --- schemas --------------------------------------------------------------------------
 
 
-def test_the_schema_says_what_each_field_is() -> None:
+def test_the_schema_describes_every_field() -> None:
     schema = TypeAdapter(Gadget).json_schema()
     assert schema["discriminator"] == {"propertyName": "type"}
     assert len(schema["oneOf"]) == 3
@@ -412,7 +412,7 @@ def test_every_property_has_a_description(base: type[Part]) -> None:
             assert "default" not in about or "oneOf" not in about
 
 
-def test_what_python_shows_of_a_part() -> None:
+def test_signature_and_help_of_a_part() -> None:
     """A signature without pydantic's words, and the docstrings of the fields."""
     assert str(inspect.signature(Ball)) == (
         "(radius: float, center: ArrayLike = (0.0, 0.0, 0.0), *, label: str = 'gadget')"

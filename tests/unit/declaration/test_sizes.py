@@ -36,7 +36,7 @@ def with_last(value: Any, number: float) -> Any:
 
 
 @pytest.mark.parametrize("kind", [*NUMBERS, *ARRAYS])
-def test_what_is_huge_is_refused(kind: Any) -> None:
+def test_huge_numbers_are_refused(kind: Any) -> None:
     adapter, value = TypeAdapter(kind), ARRAYS.get(kind, 1.0)
     adapter.validate_python(with_last(value, LARGEST))
     for huge in (1.01e30, 1e150, 1.7e308):
@@ -49,7 +49,7 @@ def test_what_is_huge_is_refused(kind: Any) -> None:
 
 
 @pytest.mark.parametrize("kind", [quantities.Positive, quantities.PositiveNumbers])
-def test_what_is_positive_is_not_nearly_0(kind: Any) -> None:
+def test_positive_numbers_are_not_nearly_0(kind: Any) -> None:
     TypeAdapter(kind).validate_python(1e-30)
     for tiny in (1e-31, 1e-300, 5e-324):
         with pytest.raises(ValidationError, match="absurdly small; must be 1e-30"):
@@ -71,7 +71,7 @@ def test_the_largest_that_is_allowed_gives_an_effort(panda: hsp.Robot) -> None:
         assert np.isfinite(tau).all()
 
 
-def test_the_message_says_where_and_what_would_be_right(panda: hsp.Robot) -> None:
+def test_the_message_has_the_place_and_the_right_value(panda: hsp.Robot) -> None:
     reported = wording("Hold: point.1: 1e+150 ... 1e+30")
     with pytest.raises(HspControlError, match=reported):
         hsp.FramePosition("panda_tcp", [0.4, 1e150, 0.4])

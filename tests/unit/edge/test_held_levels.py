@@ -135,7 +135,7 @@ def test_the_identity_is_a_metric_as_others(seed: int) -> None:
 @pytest.mark.parametrize("metric", ["identity", "mass"])
 @given(seeds)
 @settings(max_examples=10, deadline=None)
-def test_what_a_level_asks_for_does_not_know_those_below(
+def test_the_demand_of_a_level_does_not_depend_on_lower_ones(
     metric: str, far: bool, seed: int
 ) -> None:
     """The first level's part of a is the law of a controller without the others.
@@ -168,7 +168,7 @@ def test_what_a_level_asks_for_does_not_know_those_below(
 
 
 @given(st.floats(0.0, 2.0 * np.pi), st.floats(-3.0, 5.0))
-def test_a_deviation_turns_no_faster_than_a_period_bears(
+def test_a_deviation_rotates_slowly_enough_for_a_period(
     angle: float, exponent: float
 ) -> None:
     """A task along one direction of a plane moves one joint x beyond its limit.

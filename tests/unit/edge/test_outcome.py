@@ -10,7 +10,7 @@ from hsp_control.law.outcome import DAMPED, EXACT, NOT_FINITE, LawOutcome
 
 
 @pytest.mark.parametrize(("away", "damped"), [(0.0, ""), (0.2, ""), (2.0, "panda_tcp")])
-def test_in_the_middle_the_exact_law_counts_alone(away: float, damped: str) -> None:
+def test_in_the_interior_only_the_exact_law_acts(away: float, damped: str) -> None:
     """The threshold, and with it the damped law, depends on the error."""
     robot = load("panda")
     q = robot.home() + np.array([0.08, -0.3, 0.4, -0.1, -0.3, 0.2, 0.5])

@@ -92,7 +92,7 @@ def threshold_below(
 
 
 @given(seeds, st.floats(-3.0, 6.0), st.floats(0.1, 10.0))
-def test_it_bounds_what_the_feedback_asks_for_over_its_square(
+def test_it_bounds_the_feedback_over_its_square(
     seed: int, size: float, scale: float
 ) -> None:
     """‖f‖/ε² ≤ L + f_0/ε_0² for each level, and ε = ε_0 for small f.
@@ -120,7 +120,7 @@ def test_it_bounds_what_the_feedback_asks_for_over_its_square(
 
 
 @given(seeds, st.floats(0.0, 1.0))
-def test_a_level_below_a_held_one_asks_for_less_than_draws_that_one(
+def test_a_level_below_a_saturated_one_demands_less_than_that_one(
     seed: int, lacks: float
 ) -> None:
     """Along s it receives at most 2 s ‖f‖/ε²; when permanently saturated, 2 L s/40."""
@@ -157,7 +157,7 @@ def test_a_level_below_follows_as_slowly_as_those_above_turn(
 
 
 @given(seeds, st.floats(0.01, 2.0))
-def test_springs_need_what_a_field_needs_as_far_as_they_pull(
+def test_springs_have_the_demand_of_a_field_in_proportion_to_force(
     seed: int, pull: float
 ) -> None:
     rng, following = np.random.default_rng(seed), SLOW

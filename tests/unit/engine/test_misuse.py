@@ -331,7 +331,7 @@ def test_plans_as_deep_as_they_may_be_are_run() -> None:
 @pytest.mark.parametrize(
     "value", [np.str_("a"), np.datetime64("2020-01-01"), np.complex128(1j), "a", None]
 )
-def test_what_is_no_number_does_not_count(value: object) -> None:
+def test_nan_is_ignored(value: object) -> None:
     assert PythonCall(lambda: value)() == 0.0
 
 

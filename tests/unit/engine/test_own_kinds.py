@@ -133,7 +133,7 @@ def test_a_library_beside_its_file_needs_no_compiler(
 
 
 @pytest.mark.slow
-def test_what_does_not_compile_says_what_the_compiler_says(source: Path) -> None:
+def test_compile_errors_have_the_compiler_s_message(source: Path) -> None:
     """Errors in the code are reported, and a kind needs a description."""
     wrong = SOURCE.replace("2.0 * x;", "2.0 * z;").replace("doc =", "words =")
     source.write_text(wrong)
@@ -157,7 +157,9 @@ def test_files_with_one_name_for_a_kind_do_not_get_each_others(source: Path) -> 
 
 
 @pytest.mark.slow
-def test_copies_and_pickles_of_calls_have_the_own_kind(others: SimpleNamespace) -> None:
+def test_copies_and_pickles_of_calls_have_the_user_s_kind(
+    others: SimpleNamespace,
+) -> None:
     """A user's kind, not the engine's of the same name."""
     call = others.Copy(x=np.ones(1), y=np.zeros(1))
     for same in (

@@ -58,7 +58,7 @@ class Motion:
         return self.value, [PartCall(engine.Copy, x=self.source, out=self.value)]
 
 
-def test_what_supplies_arguments_is_called_before_also_for_members_of_a_group() -> None:
+def test_calls_that_write_arguments_come_first_also_for_groups() -> None:
     offset, doubled = (
         Motion(),
         CallOutput(PartCall(add, x=Motion(), y=Motion()), junk()),

@@ -154,7 +154,7 @@ METRICS = {
 # -- states and samples ---------------------------------------------------------------
 
 
-def test_what_is_bound_to_one_state_or_sample_is_not_given_to_another() -> None:
+def test_calls_bound_to_a_state_or_sample_are_not_shared() -> None:
     """Alternating, as in finite differences, and with samples created and freed."""
     robot, frame = Robot.load("panda"), "panda_tcp"
     first, second = RobotState(robot), RobotState(robot)

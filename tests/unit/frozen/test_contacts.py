@@ -226,7 +226,7 @@ def test_the_force_of_a_sliding_contact(tmp_path: Path) -> None:
     assert opened.set("wiper.force", 0.0) == OK
 
 
-def test_what_nothing_carries_is_not_stopped(tmp_path: Path) -> None:
+def test_an_unsupported_robot_is_not_stopped(tmp_path: Path) -> None:
     controller = solo(contacts=(), base="driven")
     opened = Opened(hsp.freeze(controller, tmp_path / "frozen.hsp"))
     q, v = controller.setup.start.state.q, np.zeros(18)

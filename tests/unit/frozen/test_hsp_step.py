@@ -100,7 +100,7 @@ def test_another_version_or_processor(
         Opened(other)
 
 
-def test_what_is_wrong_behind_a_right_checksum_is_no_crash(
+def test_corrupt_data_with_a_valid_checksum_causes_no_crash(
     frozen: Path, tmp_path: Path
 ) -> None:
     content, other = frozen.read_bytes(), tmp_path / "other.hsp"
@@ -152,9 +152,7 @@ def test_a_number_has_one_type(frozen: Path, tmp_path: Path) -> None:
         Opened(other)
 
 
-def test_a_step_repeats_nothing_as_often_as_a_file_says(
-    frozen: Path, tmp_path: Path
-) -> None:
+def test_a_file_s_numbers_do_not_make_a_step_loop(frozen: Path, tmp_path: Path) -> None:
     """Kinds that may loop forever are those of simulations, not permitted in files."""
     content, other = frozen.read_bytes(), tmp_path / "other.hsp"
     for kind in (b"EqualSteps", b"Periods"):
@@ -261,7 +259,7 @@ def test_a_clock_that_jumps_is_refused_until_a_restart(
     np.testing.assert_array_equal(opened.tau, first)
 
 
-def test_times_count_from_the_first_step(
+def test_times_are_relative_to_the_first_step(
     opened: Opened, controller: hsp.Controller, q: np.ndarray
 ) -> None:
     own, begin = controller.preview(), 1.76e9
@@ -326,7 +324,7 @@ def test_two_handles_do_not_know_of_each_other(frozen: Path, q: np.ndarray) -> N
         np.testing.assert_array_equal(one.tau, alone.tau)
 
 
-def test_two_threads_in_one_handle_are_told(opened: Opened, q: np.ndarray) -> None:
+def test_two_threads_in_one_handle_are_reported(opened: Opened, q: np.ndarray) -> None:
     """A concurrent step is refused or complete: ctypes releases the GIL."""
     found: list[int] = []
 

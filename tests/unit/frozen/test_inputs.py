@@ -298,7 +298,7 @@ def test_a_new_run_carries_nothing(tmp_path: Path) -> None:
         (0.0, [0.1, 0.1, 0.1]),  # without mass
     ],
 )
-def test_what_is_no_body_is_refused(
+def test_impossible_bodies_are_refused(
     mass: float, moments: list[float], tmp_path: Path
 ) -> None:
     _, opened = pair("panda_limits", tmp_path)
@@ -308,7 +308,7 @@ def test_what_is_no_body_is_refused(
     assert opened.set("gravity", [0.0, 0.0, -981.0]) == WRONG_VALUE
 
 
-def test_only_what_moves_carries(tmp_path: Path) -> None:
+def test_only_moving_links_carry(tmp_path: Path) -> None:
     controller, opened = pair("panda_limits", tmp_path)
     assert "panda_tcp.payload" in opened.ports
     with pytest.raises(FreezeError, match=r"^payloads: .* is fixed to the world"):

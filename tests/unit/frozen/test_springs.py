@@ -81,7 +81,7 @@ def test_it_waits_where_it_would_add_energy(tmp_path: Path) -> None:
     np.testing.assert_allclose(both.stiffness, np.diag(STIFF).ravel(), rtol=1e-12)
 
 
-def test_what_is_set_is_so_at_once(tmp_path: Path) -> None:
+def test_settings_are_effective_at_once(tmp_path: Path) -> None:
     both = Both(*pair(hsp.Impedance(SOFT), tmp_path))
     both.step(0.0, away=0.1)
     both.change(hsp.Impedance(STIFF), 0.0, stiffness=np.diag(STIFF))
@@ -144,7 +144,7 @@ def test_before_the_first_step_it_is_so_from_the_beginning(tmp_path: Path) -> No
         1e300 * np.eye(3),
     ],
 )
-def test_what_is_no_stiffness_is_refused(stiffness: Any, tmp_path: Path) -> None:
+def test_invalid_stiffness_is_refused(stiffness: Any, tmp_path: Path) -> None:
     both = Both(*pair(hsp.Impedance(SOFT), tmp_path))
     assert both.opened.set("hand.stiffness", stiffness) == WRONG_VALUE
     assert "stiff" in both.opened.error

@@ -123,7 +123,7 @@ def test_joints_without_ends_are_held_too(tmp_path: Path) -> None:
     assert np.abs(v).max() < 1e-3
 
 
-def test_after_a_refused_step_it_brakes_whatever_the_clock_says(opened: Opened) -> None:
+def test_after_a_refused_step_it_brakes_at_any_clock_time(opened: Opened) -> None:
     q, v = hsp.load_experiment("panda_limits").q0, 0.1 * np.ones(7)
     assert opened.step(5.0, q, v) >= OK
     last = opened.tau.copy()
@@ -142,7 +142,7 @@ def test_after_a_refused_step_it_brakes_whatever_the_clock_says(opened: Opened) 
     np.testing.assert_array_equal(opened.tau, last)
 
 
-def test_it_can_be_the_first_that_is_asked(opened: Opened) -> None:
+def test_it_can_be_the_first_call(opened: Opened) -> None:
     q = hsp.load_experiment("panda_limits").q0
     assert opened.stop(100.0, q, np.zeros(7)) == HOLDING
     rest = hsp.Robot.load("panda").inverse_dynamics(q, np.zeros(7), np.zeros(7))

@@ -285,7 +285,7 @@ def test_a_target_that_no_motion_reaches(tmp_path: Path) -> None:
         (StreamPose(messages=[], **HOW), "messages"),
     ],
 )
-def test_what_a_program_cannot_feed_is_refused(
+def test_inputs_that_a_program_cannot_give_are_refused(
     stream: Any, key: str, tmp_path: Path
 ) -> None:
     hand = hsp.FramePose("panda_tcp", stream, name="hand")

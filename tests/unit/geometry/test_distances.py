@@ -191,7 +191,7 @@ def test_two_links_of_one_robot_push_each_other() -> None:
             assert not either.gradient(state, np.zeros(1)).any()
 
 
-def test_pairs_of_all_kinds_at_once_are_what_each_is_alone() -> None:
+def test_pairs_of_all_kinds_together_equal_single_ones() -> None:
     """Spheres and other solids are computed separately; the order of pairs is kept."""
     robot, rng = load("panda"), np.random.default_rng(9)
     links = [LinkShape("own", 7, random_place(rng, 0.1), Sphere(0.05).geometry())]

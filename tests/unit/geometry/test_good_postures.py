@@ -72,7 +72,7 @@ def test_a_pose_is_reached_in_a_good_posture() -> None:
     assert sigma(robot, found.q) > LEAST
 
 
-def test_what_cannot_be_found_is_said_with_numbers() -> None:
+def test_a_failed_search_is_reported_with_numbers() -> None:
     robot = Robot.load("planar3r")
     search = PostureSearch(robot, [("tip", (0, 1))])
     far = Target("tip", pin.SE3(np.eye(3), np.array([9.0, 0.0, 0.0])), 3)

@@ -74,7 +74,7 @@ def test_a_unit_that_is_none_is_named(
         link_shapes(odd_robot(tmp_path, collision(f'<mesh filename="{file.name}"/>')))
 
 
-def test_only_the_files_own_asset_counts(tmp_path: Path) -> None:
+def test_only_the_file_s_own_asset_is_used(tmp_path: Path) -> None:
     """A later geometry may have another unit."""
     file = tetrahedron(tmp_path / "mesh.dae", "0.01", "Z_UP")
     other = '<asset><unit meter="7"/><up_axis>Y_UP</up_axis></asset><mesh>'

@@ -98,7 +98,7 @@ VALID: dict[type[Part], dict[str, Any]] = {
 
 
 @pytest.mark.parametrize("value", VALUES, ids=lambda value: type(value).__name__)
-def test_what_is_equal(value: Any) -> None:
+def test_equality(value: Any) -> None:
     assert_is_a_value(value, globals())
 
 

@@ -45,7 +45,7 @@ def test_law_equals_its_short_form(form: int, seed: int, m: int) -> None:
 @pytest.mark.slow
 @forms
 @given(seeds, rows)
-def test_task_is_met_whatever_the_field_asks(form: int, seed: int, m: int) -> None:
+def test_task_is_met_for_any_field(form: int, seed: int, m: int) -> None:
     """J φ_N = 0, J a + J'v = a_x, J e_N = 0: no effect of the null space on the
     task."""
     x = numbers(seed, m, 7, form)

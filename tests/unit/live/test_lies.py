@@ -197,7 +197,7 @@ def test_a_sensor_that_is_dead_from_the_start_is_found(kind: str, joint: int) ->
 
 
 @pytest.mark.parametrize("kind", ["both: stuck, with +1", "both: stands"])
-def test_what_replaces_a_lie_may_die_as_well(kind: str) -> None:
+def test_the_replacement_of_a_false_signal_may_fail_too(kind: str) -> None:
     """The arm accelerates; the positions that replace the wrong velocity are frozen."""
     robot = Liar(LIES[kind], [1, 3], 30)
     report = run_loop(
@@ -312,7 +312,7 @@ class Noisy(Rig):
     ],
 )
 @pytest.mark.parametrize("encoder", [1.5e-3, *further(0.0)])
-def test_what_real_sensors_do_is_no_lie(
+def test_imperfections_of_real_sensors_are_no_fault(
     noise: float, delay: float, frequency: float, encoder: float
 ) -> None:
     if encoder and not np.isfinite(frequency):
@@ -542,7 +542,7 @@ def test_no_friction_stops_several_joints_in_one_period(
     assert check.dead.sum() == (joints if dead else 0)
 
 
-def test_what_the_reaction_does_not_explain_is_something_else() -> None:
+def test_motion_that_the_reaction_does_not_explain_is_no_reaction() -> None:
     """Momentum as if the frozen joint moved, and more in another joint."""
     inertia = np.array([[2.0, 0.5, 0.0], [0.5, 1.0, 0.0], [0.0, 0.0, 1.0]])
     for beside, felt in ((0.0, True), (3.0, False)):
@@ -668,7 +668,7 @@ def test_an_encoder_on_the_edge_of_a_step_is_not_dead_beside_it() -> None:
     assert not found.dead.any()
 
 
-def test_noise_in_motion_says_nothing_of_rest() -> None:
+def test_noise_in_motion_is_not_used_at_rest() -> None:
     """A driver with a velocity dead band: the joint has stopped indeed."""
     rng = np.random.default_rng(0)
     v = (1.0 + rng.normal(0.0, 0.05, 2000)).tolist()

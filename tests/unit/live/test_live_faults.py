@@ -137,7 +137,7 @@ ODD_RESULTS = st.one_of(
 @pytest.mark.slow
 @settings(max_examples=100 if THOROUGH else 5)
 @given(odd=ODD_RESULTS, count=st.sampled_from([1, 30, 20_000]))
-def test_whatever_read_returns(odd: Trick, count: int) -> None:
+def test_any_result_of_read(odd: Trick, count: int) -> None:
     robot = rig(always(odd, BEGIN, count))
     report = run(robot)
     assert_safe(robot, report)
@@ -391,7 +391,7 @@ class Failing(Rig):
     error=ERRORS,
     times=st.sampled_from([1, 3, 20_000]),
 )
-def test_whatever_is_raised(method: str, error: BaseException, times: int) -> None:
+def test_any_exception(method: str, error: BaseException, times: int) -> None:
     first = 1 if method in {"close", "on_period", "change"} else BEGIN
     robot, requests = Failing(method, error, first, times), OperatorRequests()
 
@@ -414,8 +414,8 @@ def test_whatever_is_raised(method: str, error: BaseException, times: int) -> No
     ids=repr,
 )
 @pytest.mark.parametrize("where", ["read", "write", "close", "on_period", "change"])
-def test_what_is_no_exception_is_a_fault(where: str, error: BaseException) -> None:
-    test_whatever_is_raised.hypothesis.inner_test(where, error, 1)  # type: ignore[attr-defined]
+def test_a_base_exception_is_a_fault(where: str, error: BaseException) -> None:
+    test_any_exception.hypothesis.inner_test(where, error, 1)  # type: ignore[attr-defined]
 
 
 @pytest.mark.parametrize(
@@ -430,7 +430,7 @@ def test_what_is_no_exception_is_a_fault(where: str, error: BaseException) -> No
     ),
     ids=repr,
 )
-def test_what_a_field_raises_ends_in_the_safe_stop(
+def test_an_exception_of_a_field_ends_in_the_safe_stop(
     error: BaseException, once: bool, tmp_path: Path
 ) -> None:
     """The files are closed: the next run in this process writes the same log."""
@@ -502,7 +502,7 @@ ODD_EFFORTS = [np.zeros(3), np.full(7, np.nan), "tau"]
         *further(*itertools.product(["applied", "log_channels"], ODD_EFFORTS)),
     ],
 )
-def test_whatever_an_effort_source_does(case: str, given_: Any, tmp_path: Path) -> None:
+def test_any_fault_of_an_effort_source(case: str, given_: Any, tmp_path: Path) -> None:
     class Mine(CompensatedController):
         calls = 0
 

@@ -71,7 +71,7 @@ def logged(
     return robot, report, hsp.Rollout.load(report.log)
 
 
-def test_each_row_has_what_the_robot_said_and_was_sent(
+def test_each_row_has_the_received_state_and_the_sent_effort(
     logged: tuple[Told, LoopReport, hsp.Rollout],
 ) -> None:
     robot, _, run = logged
@@ -93,7 +93,7 @@ def test_each_row_has_what_the_robot_said_and_was_sent(
     assert set(run["live.phase"]) == {Phase.RUNNING, Phase.DAMPING, Phase.HOLDING}
 
 
-def test_its_end_has_the_counts_of_the_report(
+def test_its_end_has_the_numbers_of_the_report(
     logged: tuple[Told, LoopReport, hsp.Rollout],
 ) -> None:
     robot, report, run = logged
@@ -172,7 +172,7 @@ def test_efforts_follow_limits_that_fall_in_a_run() -> None:
     assert efforts[90:150].max() == EFFORT[0]
 
 
-def test_after_an_effort_that_was_not_sent_the_rate_counts_from_the_last_one() -> None:
+def test_after_an_unsent_effort_the_rate_is_relative_to_the_last_one() -> None:
     class Fails(Rig):
         """Does not report its effort, so that the loop has to know it."""
 

@@ -317,7 +317,7 @@ def test_a_row_is_due_at_each_tenth_state_also_where_times_are_rounded(
     assert rows == [*range(0, 500, 10)]
 
 
-def test_schedules_of_feet_are_asked_at_the_controllers_time() -> None:
+def test_schedules_of_feet_use_the_controller_s_time() -> None:
     """A run's time may differ from the robot's clock."""
     requested: list[float] = []
     measured = Measurement(1, 0.2, start(), np.zeros(7))

@@ -135,7 +135,7 @@ class Lossy(Rig):
 @pytest.mark.parametrize(
     ("compensates", "reports"), covering([False, True], [True, False])
 )
-def test_lost_efforts_do_not_add_up_where_the_robot_says_what_it_has(
+def test_lost_efforts_do_not_add_up_if_the_robot_reports_its_effort(
     reports: bool, compensates: bool
 ) -> None:
     """An effort that always changes at its rate limit, over a lossy line.

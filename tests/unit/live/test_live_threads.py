@@ -58,7 +58,7 @@ def streamed(kind: FailingKind, monkeypatch: pytest.MonkeyPatch) -> hsp.Controll
     ],
     ids=lambda error: type(error).__name__,
 )
-def test_what_a_streams_thread_raises_ends_in_the_safe_stop(
+def test_an_exception_of_a_stream_s_thread_ends_in_the_safe_stop(
     error: BaseException, monkeypatch: pytest.MonkeyPatch
 ) -> None:
 

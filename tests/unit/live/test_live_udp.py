@@ -82,7 +82,7 @@ def test_other_versions_kinds_and_lengths_are_refused() -> None:
 
 
 @given(seed=st.integers(0, 1000), delay=st.integers(1, 5))
-def test_each_fault_does_what_it_says_and_is_counted(seed: int, delay: int) -> None:
+def test_each_fault_has_its_effect_and_is_counted(seed: int, delay: int) -> None:
     faults = Faults(0.2, 0.2, 0.2, 0.2, delay=delay, seed=seed)
     injector = FaultInjector(faults)
     came: list[int | None] = []
@@ -134,7 +134,7 @@ def links() -> Iterator[tuple[Link, Link]]:
     receiver.close()
 
 
-def test_a_link_sorts_what_comes(links: tuple[Link, Link]) -> None:
+def test_a_link_sorts_its_packets(links: tuple[Link, Link]) -> None:
     sender, receiver = links
     raw = sender._socket
     foreign = encode(packet(1)._replace(session=8))
@@ -154,7 +154,7 @@ def test_a_link_sorts_what_comes(links: tuple[Link, Link]) -> None:
     assert receiver.receive(0.0) == []
 
 
-def test_nobody_to_send_to_and_nowhere_to_listen() -> None:
+def test_no_peer_and_no_free_address() -> None:
     link = Link(7)
     with pytest.raises(HardwareError, match="no packet of the robot has arrived yet"):
         link.send(PacketKind.EFFORT)
@@ -171,7 +171,7 @@ def test_nobody_to_send_to_and_nowhere_to_listen() -> None:
     drift=st.floats(-1e-5, 1e-5),
     delays=st.lists(st.floats(0.0, 0.1), min_size=200, max_size=200),
 )
-def test_age_is_what_a_packet_waited_longer_than_the_quickest(
+def test_age_is_the_delay_beyond_that_of_the_fastest_packet(
     offset: float, drift: float, delays: list[float]
 ) -> None:
     ages = AgeEstimator(window=1.0)
@@ -187,7 +187,7 @@ def test_age_is_what_a_packet_waited_longer_than_the_quickest(
 
 
 @pytest.mark.slow
-def test_a_served_robot_runs_stops_and_says_why() -> None:
+def test_a_served_robot_runs_stops_and_gives_the_reason() -> None:
     hardware = UdpHardware(panda(), PERIOD)
     assert isinstance(hardware, Hardware)
     robot = watched()
@@ -216,7 +216,7 @@ def test_a_served_robot_runs_stops_and_says_why() -> None:
 
 
 @pytest.mark.slow
-def test_efforts_that_answer_old_states_are_nobody_s() -> None:
+def test_efforts_that_answer_old_states_are_ignored() -> None:
     """Efforts that all arrive in order, but too late, are silence."""
     receiver, robot = Link(7), watched(LiveSettings(watchdog=10))
     link = Link(7, peer=receiver.address)
@@ -263,7 +263,7 @@ def test_an_effort_may_answer_a_state_as_old_as_the_watchdog_waits(
 
 
 @pytest.mark.slow
-def test_a_robot_that_nobody_wants_or_whose_parent_dies_ends() -> None:
+def test_a_robot_without_a_client_or_parent_ends() -> None:
     hardware = UdpHardware(panda(), PERIOD)
     link = Link(hardware.session, peer=hardware.address)
     robot = watched()
@@ -286,7 +286,7 @@ def test_a_robot_that_nobody_wants_or_whose_parent_dies_ends() -> None:
     link.close()
 
 
-def test_a_turn_ends_where_the_other_end_says_so() -> None:
+def test_a_turn_ends_when_the_other_end_says_bye() -> None:
     """Despite lost packets, and messages from other senders."""
     here, there = Link(7), Link(7, peer=None, faults=Faults(lost=1.0))
     stranger = Link(7, peer=here.address)
@@ -365,7 +365,7 @@ def test_in_lockstep_a_robot_whose_loop_is_silent_stops(
     link.close()
 
 
-def test_a_robot_that_is_held_up_says_for_how_long(
+def test_a_stalled_robot_reports_the_duration(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     now, periods = [0.0], iter(range(1000))
@@ -393,7 +393,7 @@ def test_a_robot_that_is_held_up_says_for_how_long(
         [OddError, MemoryError, SystemExit, GeneratorExit], ["row", "receive", "send"]
     ),
 )
-def test_whatever_is_raised_around_a_served_robot_stops_it(
+def test_any_exception_around_a_served_robot_stops_it(
     source: str, raised: type[BaseException], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Errors of cameras, log or line: it brakes, holds, and then ends."""
@@ -429,7 +429,7 @@ def test_whatever_is_raised_around_a_served_robot_stops_it(
     link.close()
 
 
-def test_our_own_packets_that_come_back_are_foreign() -> None:
+def test_our_returned_packets_are_foreign() -> None:
     """A mirroring switch or a second socket: states are still accepted."""
     robot = Link(7, receives=PacketKind.EFFORT)
     loop = Link(7, peer=robot.address, receives=PacketKind.STATE)

@@ -89,7 +89,7 @@ def test_a_wrong_velocity_leaves_a_bounded_load() -> None:
     assert (np.abs(safe.load) < 0.1 * RATE * np.abs(momentum).max()).all()
 
 
-def test_what_a_dead_sensor_hides_is_no_load() -> None:
+def test_the_effect_of_a_dead_sensor_is_no_load() -> None:
     """The joint appears to be held against the effort that accelerates it."""
     safe, silent = stop(), NONE.copy()
     silent[3] = True

@@ -50,7 +50,7 @@ def test_it_is_the_exact_minimum(seed: int) -> None:
     assert (found <= center + width).all()
 
 
-def test_within_the_bounds_it_is_what_is_wanted() -> None:
+def test_within_the_bounds_it_is_the_desired_effort() -> None:
     wanted, far = np.array([1.0, -2.0]), np.array([np.inf, np.inf])
     found = nearest_effort(wanted, -far, far, np.eye(2))
     np.testing.assert_array_equal(found, wanted)

@@ -60,7 +60,7 @@ def felt(share: float) -> bool:
     return check.felt
 
 
-def test_what_moves_by_much_more_than_the_reaction_moves_for_another_reason() -> None:
+def test_motion_beyond_the_reaction_has_another_cause() -> None:
     assert [felt(share) for share in (0.3, 1.0, 2.0)] == [False, True, False]
 
 

@@ -27,7 +27,7 @@ def at_random(seed: int) -> tuple[Array, Array]:
 
 
 @given(seed=seeds, limited=st.booleans())
-def test_damping_takes_energy_whatever_the_inertia(seed: int, limited: bool) -> None:
+def test_damping_dissipates_energy_for_any_inertia(seed: int, limited: bool) -> None:
     q, v = at_random(seed)
     most = LIMITED if limited else FREE
     stop = SafeStop(panda(), StopSettings(damping=8.0), most, PERIOD)
@@ -126,7 +126,7 @@ def test_reckoning_is_the_model_s_motion() -> None:
 # --- the robot's watchdog ------------------------------------------------------------
 
 
-def test_its_watchdog_counts_and_forgives() -> None:
+def test_its_watchdog_counts_and_resets() -> None:
     robot = watched(LiveSettings(watchdog=5))
     tau = gravity(start()) + 0.3
     for _ in range(3):

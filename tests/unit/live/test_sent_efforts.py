@@ -50,7 +50,7 @@ def test_a_robot_may_have_an_old_effort_for_as_long_as_its_watchdog_waits(
         assert limiter.contradiction(old, halted=False) is None
 
 
-def test_a_robot_that_halted_may_have_what_its_own_stop_needs() -> None:
+def test_a_halted_robot_may_have_the_effort_of_its_own_stop() -> None:
     """1.5 times its limits, less the gravity that it compensates itself."""
     settings = LiveSettings(compensates_gravity=True)
     limiter, q = EffortLimiter(panda(), settings, PERIOD), start()

@@ -31,7 +31,7 @@ def test_the_quickest_packet_has_no_age_and_others_are_older_than_it() -> None:
     np.testing.assert_allclose(ages_of(delays), [0, 0, 0.006, 0, 0.002], atol=1e-9)
 
 
-def test_a_quick_packet_counts_through_the_next_window() -> None:
+def test_a_fast_packet_is_used_through_the_next_window() -> None:
     """For at least one window, for any arrival time, and for at most two."""
     for quick in range(12):
         delays = np.full(60, 0.008)
@@ -97,7 +97,7 @@ def test_states_of_a_robot_have_the_age_of_the_newest_packet(
         hardware.drain()
 
 
-def test_a_robot_of_whatever_phase_of_its_stop_has_stopped_by_itself(
+def test_a_robot_in_any_phase_of_its_stop_has_stopped_by_itself(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     hardware = UdpHardware(panda(), PERIOD)

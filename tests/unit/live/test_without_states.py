@@ -69,7 +69,7 @@ def test_after_a_stall_each_missing_state_is_waited_for_as_before() -> None:
     np.testing.assert_allclose(hardware.waits[2:], PERIOD, rtol=1e-9)
 
 
-def test_the_speed_of_a_robot_that_says_nothing_is_that_of_the_model() -> None:
+def test_the_speed_of_a_silent_robot_is_that_of_the_model() -> None:
     v = np.full(7, 0.01)
     hardware = Silent(v)
     reader = reader_of(hardware)
@@ -82,7 +82,7 @@ def test_the_speed_of_a_robot_that_says_nothing_is_that_of_the_model() -> None:
     assert reader.speed == pytest.approx(0.01 + 20 * PERIOD * 20.0, rel=0.2)
 
 
-def test_what_was_predicted_before_a_state_came_does_not_count() -> None:
+def test_predictions_before_a_late_state_are_discarded() -> None:
     """Every second state is lost, ten times as many as may be lost in a row."""
     lost = dict.fromkeys(range(41, 20_000, 2), missing)
     settings = LiveSettings(prediction_time=0.02, stop=StopSettings(hold=0.2))

@@ -25,7 +25,7 @@ CORE = 0.02  # for smaller s it is a parabola
 
 
 @given(s=st.floats(-2.0, 1.5), influence=st.floats(0.01, 10.0))
-def test_barrier_is_its_formula_and_its_own_derivatives(
+def test_barrier_is_its_formula_with_exact_derivatives(
     s: float, influence: float
 ) -> None:
     """-(1 - s)² ln s above the core, a parabola with the same tangent below.

@@ -96,7 +96,7 @@ TOUCHING = {
 }  # fmt: skip
 
 
-def test_a_start_in_contact_is_refused_where_the_configuration_says_so() -> None:
+def test_a_start_in_contact_is_refused_with_its_place() -> None:
     """A barrier cannot resolve an initial contact; pair and depth are named."""
     with pytest.raises(SceneError) as caught:
         load_experiment(TOUCHING)

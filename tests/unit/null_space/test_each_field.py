@@ -167,7 +167,7 @@ class _HalfAsClear(ObstacleClearance):
 @pytest.mark.parametrize(
     "own", [_HalfAsFast(), _HalfAsSteep(), _HalfAsClear([OBSTACLE], influence=2)]
 )
-def test_a_step_calls_what_a_subclass_overrides(own: NullSpaceField) -> None:
+def test_a_step_calls_methods_that_a_subclass_overrides(own: NullSpaceField) -> None:
     """Although the base class has kernels, which a step prefers."""
     of_package = type(own).__mro__[1](**own.all_fields())
     robot, found = load("panda"), []

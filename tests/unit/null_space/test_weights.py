@@ -207,7 +207,7 @@ def test_each_terms_share_is_kept_and_they_add_up() -> None:
     assert not samples[-1].g.any()  # of weight 0
 
 
-def test_the_log_tells_who_moves_the_arm() -> None:
+def test_the_log_has_the_share_of_every_term() -> None:
     """Columns ``field.<name>.g`` add up to ``field.g`` in every row of a run."""
     robot = load("panda")
     ramp = Ramp(initial=0.0, final=1.0, start=0.02, duration=0.1)
@@ -281,7 +281,7 @@ def test_every_mistake_is_named(make: Callable[[], Any], message: str) -> None:
     assert re.search(wording(message), str(caught.value))
 
 
-def test_what_is_no_weight_and_no_field() -> None:
+def test_invalid_weights_and_fields() -> None:
     field = Rest()
     with pytest.raises(TypeError):
         "2" * field  # type: ignore[operator]

@@ -146,7 +146,7 @@ def test_lists_will_do() -> None:
 
 
 @pytest.mark.parametrize("wrong", [[0.1], np.zeros(8), "left", None])
-def test_integrate_and_difference_say_what_does_not_fit(wrong: object) -> None:
+def test_integrate_and_difference_name_wrong_shapes(wrong: object) -> None:
     robot = load("panda")
     with pytest.raises(ShapeError, match=r"^displacement (has shape|.*; needs 7 n)"):
         robot.integrate(robot.home(), wrong)

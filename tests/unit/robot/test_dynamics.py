@@ -117,7 +117,7 @@ def test_gravity_has_the_slope_and_the_drift_of_its_differences(case: str) -> No
     assert_allclose(gravity.drift, expected, rtol=0, atol=1e-7 * scale)
 
 
-def test_a_copy_computes_in_memory_of_its_own() -> None:
+def test_a_copy_computes_in_separate_memory() -> None:
     robot, q, v, rng = draw("panda", seed=22)
     a, effort = rng.standard_normal(7), np.zeros(7)
     at = {"dynamics": robot.dynamics(), "q": q, "v": v}

@@ -39,7 +39,7 @@ def example(name: str) -> Robot:
 @pytest.mark.parametrize(
     ("name", "mimic"), covering(sorted(example_robots()), [True, False])
 )
-def test_every_example_robot_loads_or_says_why_not(name: str, mimic: bool) -> None:
+def test_every_example_robot_loads_or_gives_the_reason(name: str, mimic: bool) -> None:
     """Only ModelError is raised, for exactly the listed robots."""
     reason = REFUSED.get(name)
     if not mimic and reason in {NO_HAND_MASS, NO_LEADER}:

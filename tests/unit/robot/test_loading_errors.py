@@ -151,7 +151,9 @@ def test_hint_to_lock_joints_that_move_no_mass_helps(
     assert not set(hint["locked"]) & set(robot.joint_names)
 
 
-def test_what_the_parser_leaves_out_is_an_error(write: Callable[..., Path]) -> None:
+def test_elements_that_the_parser_skips_are_an_error(
+    write: Callable[..., Path],
+) -> None:
     text = ARM.replace('ixy="0"', "", 1)
     with pytest.raises(ModelError, match=r"leaves out a part of the model: .*upper\]"):
         Robot.load(write(text))

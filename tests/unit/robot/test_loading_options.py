@@ -68,7 +68,7 @@ def test_follower_is_at_multiplier_times_leader_plus_offset(
     ("planar3r", {"joint1": -1.5, "joint3": 4.0}),  # beyond half a turn
     ("kinova", {"j2s6s200_joint_1": -2.0, "j2s6s200_joint_3": 1.0}),
 ])  # fmt: skip
-def test_locked_joint_stands_where_it_is_told(
+def test_locked_joint_is_at_its_given_position(
     name: str, locks: dict[str, float]
 ) -> None:
     """Poses are those of the whole robot, and M is the submatrix of its M."""
@@ -240,7 +240,7 @@ def test_the_hand(parts: list[str], expected: str, write: Callable[..., Path]) -
          "ends with 'a-b', where fingers branch off"),
     ],
 )  # fmt: skip
-def test_it_is_said_why_a_link_is_the_hand(
+def test_the_reason_for_the_choice_of_hand_is_reported(
     parts: list[str], why: str, write: Callable[..., Path]
 ) -> None:
     text = robot_xml(link("base", ""), chain("base", "z", "a", "b"), *parts)
@@ -282,7 +282,7 @@ def test_a_robot_of_a_pinocchio_model_is_that_of_its_urdf() -> None:
     np.testing.assert_allclose(tau[1], tau[0], atol=1e-9)
 
 
-def test_what_is_no_pinocchio_model_is_refused() -> None:
+def test_objects_that_are_no_pinocchio_model_are_refused() -> None:
     _, (model, collision, visual) = of_panda()
     less = pin.buildReducedModel(model, [8, 9], pin.neutral(model))
     for arguments, message in (

@@ -88,7 +88,7 @@ def test_a_follower_bounds_its_leader(
     'lower="-3" upper="3" effort="9" velocity="9"',  # wider than the leader's
     'lower="0" upper="0" effort="0" velocity="0"',  # none
 ])  # fmt: skip
-def test_what_is_wider_than_the_leaders_limits_does_not_count(
+def test_limits_wider_than_the_leader_s_have_no_effect(
     limits: str, write: Write
 ) -> None:
     robot = Robot.load(write(pair(-0.9, limits)))
@@ -164,7 +164,7 @@ def test_a_leader_that_comes_late_keeps_its_name(write: Write) -> None:
 
 @pytest.mark.parametrize("multiplier", [1.0, 2.5, -1.5, 0.0])
 @pytest.mark.parametrize("kinds", [*itertools.product(TYPES, TYPES)])
-def test_what_gravity_takes_of_a_leader_counts_its_followers(
+def test_static_efforts_of_a_leader_include_its_followers(
     kinds: tuple[str, str], multiplier: float, write: Write
 ) -> None:
     """A limit on the follower: its bound holds, and its rows are G'' along the

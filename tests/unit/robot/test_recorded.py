@@ -178,7 +178,7 @@ def log_of(robot: hsp.Robot, path: Path) -> hsp.Rollout:
     return run
 
 
-def test_an_edited_urdf_is_named_and_the_log_s_own_counts(
+def test_an_edited_urdf_is_named_and_the_log_s_robot_is_used(
     tmp_path: Path, caplog: pytest.LogCaptureFixture
 ) -> None:
     urdf = copied(tmp_path / "robots")
@@ -287,7 +287,7 @@ def vertices(robot: hsp.Robot) -> list[Array]:
     return [np.array(shape.geometry.vertices()) for shape in shapes]
 
 
-def test_a_log_contains_the_meshes_of_somebodys_robot(tmp_path: Path) -> None:
+def test_a_log_contains_the_meshes_of_a_user_s_robot(tmp_path: Path) -> None:
     """Without its files, its shapes are drawn and distances measured."""
     urdf = with_meshes(tmp_path)
     robot = hsp.Robot.load(urdf)
@@ -433,7 +433,7 @@ def test_damaged_meshes_are_named(meshes: object, tmp_path: Path) -> None:
      {f"{sha256(b'x').hexdigest()[:32]}.sh": packed(b"x")}],
     ids=lambda beside: str(beside)[:20],
 )  # fmt: skip
-def test_files_beside_recorded_meshes_are_what_their_names_say(
+def test_files_beside_recorded_meshes_match_their_names(
     beside: object, tmp_path: Path
 ) -> None:
     record = robot_record(hsp.Robot.load(with_meshes(tmp_path)))

@@ -78,7 +78,7 @@ def test_update_moves_all_of_it_and_shows_the_memory_itself(
 @pytest.mark.parametrize(
     "make", [copy.copy, copy.deepcopy, lambda s: pickle.loads(pickle.dumps(s))]
 )
-def test_a_copy_is_a_state_of_its_own(make: Callable[[Any], Any]) -> None:
+def test_a_copy_is_an_independent_state(make: Callable[[Any], Any]) -> None:
     law = controller()
     t, q, v = states(1)[0]
     law.compute(t, q, v)
@@ -106,7 +106,7 @@ def test_unknown_frame() -> None:
 
 
 @pytest.mark.parametrize("name", [3, ["panda_hand"], None])
-def test_what_is_no_name_is_no_frame_and_no_joint(name: Any) -> None:
+def test_objects_that_are_no_names_are_refused(name: Any) -> None:
     robot = draw("panda", seed=22)[0]
     with pytest.raises(FrameNotFoundError, match=re.escape(f"no frame {name!r} (")):
         robot.frame_id(name)

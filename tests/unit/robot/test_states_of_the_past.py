@@ -172,7 +172,7 @@ def test_mimic_joints_move_as_free_ones_that_are_moved_so(tmp_path: Path) -> Non
 
 
 @kinds
-def test_a_mass_matrix_does_not_depend_on_what_was_computed_before(
+def test_a_mass_matrix_does_not_depend_on_earlier_results(
     kind: str, tmp_path: Path
 ) -> None:
     """After any earlier use of the dynamics' memory."""

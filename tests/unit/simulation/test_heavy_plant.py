@@ -61,7 +61,7 @@ def test_the_number_in_the_message_would_do_and_a_larger_one_would_not(
     assert reported(robot, **of(1.02 * most)) != []
 
 
-def test_what_a_robot_can_move_is_not_told() -> None:
+def test_a_movable_plant_is_not_reported() -> None:
     assert reported() == []
     assert reported(**payload(3.0), **scaled(mass_factor=1.2, random_mass=0.2)) == []
     assert reported(motor_inertia=0.3) == []
@@ -77,7 +77,7 @@ def test_what_a_robot_can_move_is_not_told() -> None:
     ]
 
 
-def test_a_simulation_and_the_command_line_say_it(
+def test_a_simulation_and_the_command_line_report_it(
     capsys: pytest.CaptureFixture[str],
 ) -> None:
     controller = hsp.Controller(ROBOT, [hsp.FramePosition("panda_tcp")], start=HOME)

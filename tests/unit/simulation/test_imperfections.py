@@ -376,7 +376,7 @@ def test_an_effort_later_than_its_period_begins_the_next() -> None:
 
 
 @pytest.mark.parametrize("kind", ["ideal", "sticking", "mujoco"])
-def test_a_push_gives_its_impulse_whatever_the_plant(kind: str) -> None:
+def test_a_push_gives_its_impulse_to_any_plant(kind: str) -> None:
     """3 N for 0.5 s on 2 kg: 0.75 m/s, and along the rail alone."""
     robot = cart()
     robot.model.addFrame(
@@ -437,7 +437,7 @@ def ideal() -> Rollout:
     return run()
 
 
-def test_the_log_has_the_truth_beside_what_was_measured_and_what_acted() -> None:
+def test_the_log_has_true_and_measured_states_and_the_acting_effort() -> None:
     rollout, again = (
         run(
             sensors=[Encoder(1e-3), VelocityNoise(0.02)],

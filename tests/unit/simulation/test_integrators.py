@@ -216,7 +216,7 @@ def test_trials_that_fail_are_shortened(failure: type[Exception]) -> None:
     np.testing.assert_allclose(q, expected, rtol=0, atol=1e-10)
 
 
-def test_dynamics_that_fail_for_good_say_why() -> None:
+def test_dynamics_that_fail_permanently_give_the_reason() -> None:
     robot = load("planar3r")
 
     def fails_with(failure: Exception) -> Callable[[float, Array, Array], Array]:
@@ -240,7 +240,7 @@ def test_dynamics_that_fail_for_good_say_why() -> None:
         run(KeyError("yours"))
 
 
-def test_held_efforts_move_rigid_bodies_by_rk4_unless_it_is_said() -> None:
+def test_held_efforts_move_rigid_bodies_by_rk4_by_default() -> None:
     """The difference to a tight DOP853 is below the resolution of any figure."""
     robot = load("panda")
     for plant in (None, RigidBody(), RigidBodyPlant(robot)):

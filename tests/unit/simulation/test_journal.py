@@ -168,7 +168,7 @@ def test_continuous_joints_are_unwound(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("share", [0.3, 0.5, 0.8])
-def test_a_damaged_row_is_said(
+def test_a_damaged_row_is_reported(
     share: float, run: tuple[Rollout, bytes], tmp_path: Path
 ) -> None:
     rollout, data = run
@@ -188,7 +188,7 @@ def test_a_damaged_row_is_said(
     assert set(read.t) < set(rollout.t)
 
 
-def test_a_damaged_end_is_said_and_an_unfinished_row_is_not(
+def test_a_damaged_end_is_reported_but_not_an_unfinished_row(
     run: tuple[Rollout, bytes], tmp_path: Path
 ) -> None:
     rollout, data = run
@@ -257,7 +257,9 @@ def test_a_folder_that_is_deleted_meanwhile_comes_back(tmp_path: Path) -> None:
     assert (reader.read(), reader.ended) == (2, True)
 
 
-def test_what_is_no_journal_is_said(run: tuple[Rollout, bytes], tmp_path: Path) -> None:
+def test_an_invalid_journal_is_reported(
+    run: tuple[Rollout, bytes], tmp_path: Path
+) -> None:
     empty = tmp_path / "empty.journal"
     empty.write_bytes(MAGIC)
     with pytest.raises(LogError, match="ends before its first heading"):
@@ -428,7 +430,7 @@ def test_ctrl_c_within_a_row_loses_none(
 
 @pytest.mark.system
 @pytest.mark.slow
-def test_what_a_killed_hsp_run_leaves_is_a_log_for_all_commands(
+def test_the_journal_of_a_killed_run_is_a_log_for_all_commands(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     options = ["--out", str(tmp_path), "--set", "simulation.duration=1000"]

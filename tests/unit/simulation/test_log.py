@@ -288,7 +288,7 @@ def test_places_where_nothing_can_be_written(
     assert not list(path.parent.glob(".*.part"))
 
 
-def test_the_log_says_how_far_the_robot_is_beyond_its_limits(
+def test_the_log_has_the_excess_over_limits(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     """With an unmodelled push; without it no limit is exceeded."""

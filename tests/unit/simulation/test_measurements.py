@@ -98,7 +98,7 @@ def test_rigid_contacts_measure_them_too():
     momentum_balance(IntegratedPlant(plant, rk4), 2e-3)
 
 
-def test_a_fall_is_said_and_stops_the_run():
+def test_a_fall_is_reported_and_stops_the_run():
     experiment = load_experiment("paper/2_rest")
     given = (experiment.controller, experiment.q0)
     run = simulate(*given, duration=0.1, control_period=0.001, plan=Falls())

@@ -43,7 +43,7 @@ def growth(
 
 
 @pytest.mark.parametrize("name", ["panda", *further("iiwa14", "xarm7")])
-def test_rotors_that_are_told_are_borne_and_larger_ones_are_not(name: str) -> None:
+def test_reported_rotors_are_tolerated_and_larger_ones_are_not(name: str) -> None:
     found, made, q = borne(name, Compensation())
     for times, grows in ((0.6, False), (1.6, True)):
         rotors = changed(made.robot, [MotorInertia(times * found.rotor)])
@@ -54,7 +54,7 @@ def test_rotors_that_are_told_are_borne_and_larger_ones_are_not(name: str) -> No
 
 
 @pytest.mark.parametrize("name", ["panda", *further("ur5")])
-def test_a_delay_that_is_told_is_borne_and_a_longer_one_is_not(name: str) -> None:
+def test_a_reported_delay_is_tolerated_and_a_longer_one_is_not(name: str) -> None:
     found, made, q = borne(name, Compensation())
     periods = round(found.delay / H)
     for late, grows in ((periods - 3, False), (periods + 3, True)):
@@ -92,7 +92,7 @@ class Pushed(RigidBodyPlant):
 
 
 @pytest.mark.parametrize("joint", [3, *further(0, 5)])
-def test_an_unknown_effort_moves_the_hand_as_far_as_is_told(joint: int) -> None:
+def test_an_unknown_effort_moves_the_hand_as_reported(joint: int) -> None:
     """0.01 N·m moves it by a hundredth of the value reported for 1 N·m."""
     small = 0.01
     for compensation in (*further(ALONE), Compensation()):
@@ -115,7 +115,7 @@ def test_an_unknown_effort_moves_the_hand_as_far_as_is_told(joint: int) -> None:
 
 
 @pytest.mark.parametrize("name", ARMS)
-def test_no_mode_grows_by_default_and_it_takes_no_time(name: str) -> None:
+def test_by_default_no_mode_grows_and_the_check_is_fast(name: str) -> None:
     """A loop without an observer is reported as such, also in the text."""
     found, made, q = borne(name, Compensation())
     assert (found.growing, found.growth) == (0, 0.0)

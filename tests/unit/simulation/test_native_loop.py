@@ -205,7 +205,7 @@ def test_periods_in_which_a_limit_binds_are_made_alone(counted: Counted) -> None
     assert ((made > 0) & (made < 8)).sum() >= 2
 
 
-def test_what_a_held_effort_teaches_is_the_same(counted: Counted) -> None:
+def test_prediction_errors_of_held_efforts_are_the_same(counted: Counted) -> None:
     """Past prediction errors widen the margin of a later active speed limit."""
     slow = "panda_obstacle", "limits.velocity={scale: 0.3}"
     theirs = counted.alone(short(*slow, duration=2.0).run)

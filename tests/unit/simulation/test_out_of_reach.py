@@ -47,7 +47,7 @@ def test_a_limit_is_a_reason_and_friction_is_none() -> None:
     assert found(limited).out.any()
 
 
-def test_what_moves_is_on_its_way() -> None:
+def test_a_moving_hand_is_on_its_way() -> None:
     rate = np.full((len(T), 6), RESTING * 0.31)
     bounded = np.where(T > 0.5, 0.4, 0.0)
     far = found(log(task__hand__error_rate=rate, task__hand__bounded=bounded))
@@ -61,7 +61,7 @@ def test_what_moves_is_on_its_way() -> None:
     assert not out[50 : 50 + STAY].any()
 
 
-def test_a_task_that_is_off_and_a_log_that_says_little_say_nothing() -> None:
+def test_an_inactive_task_and_a_sparse_log_report_nothing() -> None:
     columns = log(task__hand__error=np.full((len(T), 6), np.nan))
     for name in ("damped", "status", "task.hand.bounded"):
         del columns[name]

@@ -74,7 +74,7 @@ def simulate_until_interrupted(*arguments: Any, **options: Any) -> Rollout:
 
 
 @pytest.mark.parametrize("row", [0, 1, 17, 50])
-def test_ctrl_c_keeps_what_was_computed(row: int, planar_run: Rollout) -> None:
+def test_ctrl_c_keeps_computed_rows(row: int, planar_run: Rollout) -> None:
     """Interrupted at row k: k + 1 rows, the same as the whole run's."""
 
     def interrupt(fraction: float) -> None:

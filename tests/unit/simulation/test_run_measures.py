@@ -34,7 +34,7 @@ def changed_run() -> hsp.Rollout:
     return run
 
 
-def test_what_is_held_away_by_a_hand_is_not_out_of_reach() -> None:
+def test_a_target_that_a_pull_prevents_is_not_out_of_reach() -> None:
     t = np.arange(0.0, 1.0, 0.01)
     error = np.tile([0.3, 0.0, 0.0], (len(t), 1))
     columns = {"t": t, "task.hand.error": error, "damped": np.ones(len(t))}
@@ -77,7 +77,7 @@ def expected(run: hsp.Rollout) -> dict[str, float]:
     }
 
 
-def test_measures_are_what_they_mean() -> None:
+def test_measures_equal_their_definitions() -> None:
     run = changed_run()
     found = measures(run)
     for name, value in expected(run).items():

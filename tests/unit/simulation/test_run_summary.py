@@ -22,7 +22,7 @@ class Log:
         return self.columns[name]
 
 
-def test_the_worst_joint_its_unit_and_its_time_are_said() -> None:
+def test_the_worst_joint_its_unit_and_its_time_are_reported() -> None:
     t = np.array([0.0, 0.5, 1.0, 1.5])
     position, velocity = np.zeros((2, 4, 3))
     position[1, 2], position[2, 1], velocity[2, 0] = 0.04, 0.02, 0.7
@@ -33,7 +33,7 @@ def test_the_worst_joint_its_unit_and_its_time_are_said() -> None:
     assert second.startswith("a is 0.7 rad/s beyond its speed limit at 1 s (1 rows)")
 
 
-def test_what_became_of_a_force_is_its_root_mean_square(
+def test_the_force_s_error_is_its_root_mean_square(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     wanted = np.full(4, 10.0)
@@ -61,7 +61,7 @@ def damped_run() -> hsp.Rollout:
     return hsp.simulate(controller, panda.home(), duration=0.4, control_period=0.01)
 
 
-def test_printing_a_run_shows_what_hsp_run_prints() -> None:
+def test_printing_a_run_shows_the_table_of_hsp_run() -> None:
     run = damped_run()
     text, rows = str(run), [*run_summary.summary_rows(run)]
     assert [line.split("  ")[0] for line in text.splitlines()] == [n for n, _ in rows]
@@ -110,7 +110,7 @@ def test_distances_of_barriers_are_in_log_output_and_summary() -> None:
     )
 
 
-def test_an_own_barrier_is_logged_by_its_type() -> None:
+def test_a_user_s_barrier_is_logged_by_its_type() -> None:
     class Height(hsp.limits.Barrier):
         """A frame stays above a height."""
 

@@ -73,7 +73,7 @@ def test_a_sampled_plant_is_reset_once_then_measured_and_moved_every_period() ->
         np.testing.assert_array_equal(run[name], same[name], err_msg=name)
 
 
-def test_the_log_has_the_truth_and_the_effort_of_what_was_shown() -> None:
+def test_the_log_has_the_truth_and_the_effort_at_the_measured_state() -> None:
     """The logged effort is that at the measured v + 1; logged q, v are true."""
     controller = planar_controller()
     plant = Sampled(controller.robot, 1.0)

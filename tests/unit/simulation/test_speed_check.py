@@ -40,7 +40,7 @@ def reported(speed: float, rows: str) -> list[TooFast]:
 
 
 @pytest.mark.parametrize("rows", ["pose", *further("position")])
-def test_what_is_too_fast_is_said_with_place_joint_and_speed(rows: str) -> None:
+def test_a_reference_too_fast_is_reported_with_place_joint_and_speed(rows: str) -> None:
     (found,) = reported(4.0, rows)
     assert found.share > 1.01
     assert found.unit == "m/s"
@@ -53,7 +53,7 @@ def test_what_is_too_fast_is_said_with_place_joint_and_speed(rows: str) -> None:
     assert reported(0.2, rows) == []
 
 
-def test_the_worst_time_is_said() -> None:
+def test_the_worst_time_is_reported() -> None:
     """A line is fastest in its middle: 1.875 times its mean speed."""
     robot = hsp.Robot.load("panda")
     line = hsp.Line([5.0, 0.0, 0.0], 1.0, start=[0.0, 0.0, 0.0])
@@ -65,7 +65,7 @@ def test_the_worst_time_is_said() -> None:
     assert found.speed == pytest.approx(1.875 * 5.0)
 
 
-def test_without_limits_nothing_is_said() -> None:
+def test_without_limits_nothing_is_reported() -> None:
     robot = hsp.Robot.load("panda")
     task = hsp.FramePose("panda_tcp", Along(hsp.Circle(0.1, 1.0), 9.0))
     law = hsp.Controller(robot, [task])

@@ -19,7 +19,7 @@ from hsp_control.common.exceptions import GainError
 
 @pytest.mark.slow
 @every_task
-def test_an_error_up_to_the_largest_counts_in_full(case: Case) -> None:
+def test_an_error_up_to_the_largest_is_fed_back_linearly(case: Case) -> None:
     """Bit for bit; and just beyond the bound the task's acceleration is continuous.
 
     A direction's coordinates are bounded by definition.

@@ -130,9 +130,7 @@ def inverse_inertias(task: Any, motion: Motion) -> Callable[[float], Array]:
     covering(CASES, ["ratio", "matrices", "led", "led, damped", "bounded"]),
     ids=str,
 )
-def test_the_equation_holds_whatever_the_force_and_the_metric(
-    case: Case, kind: str
-) -> None:
+def test_the_equation_holds_for_any_force_and_metric(case: Case, kind: str) -> None:
     """Λ e'' + (½ Λ' + D) e' + s(e) = -f along the motion that follows from f."""
     rng = np.random.default_rng(3)
     metrics: list[tuple[int, Metric]]
@@ -338,7 +336,7 @@ REFUSED: dict[str, tuple[Callable[[], Any], type[Exception], str]] = {
 
 
 @pytest.mark.parametrize("name", REFUSED)
-def test_what_is_refused(name: str) -> None:
+def test_refusals(name: str) -> None:
     make, error, message = REFUSED[name]
     with pytest.raises(error, match=wording(message)):
         make()

@@ -109,7 +109,7 @@ TASKS: dict[str, Task] = {
      "orientation, blended", "pose of a point", "pose of a screw", "position on axes",
      "pointing, turning", "relative, blended"],
 )  # fmt: skip
-def test_what_is_omitted_is_where_the_robot_starts(name: str) -> None:
+def test_omitted_targets_are_at_the_robot_s_start(name: str) -> None:
     """The error is zero there, or the circle's radius before its blend."""
     here = state()
     placed = place(TASKS[name], here)
@@ -118,7 +118,7 @@ def test_what_is_omitted_is_where_the_robot_starts(name: str) -> None:
     np.testing.assert_allclose(error, 0.0, rtol=0, atol=1e-14)
 
 
-def test_relative_points_count_from_the_start() -> None:
+def test_relative_points_are_relative_to_the_start() -> None:
     here = state()
     x = here.position(TCP).copy()
     level = place(FramePosition(trajectory=Circle(0.1, 2.0)), here)
@@ -311,7 +311,7 @@ def test_the_message_has_the_key_path(which: str) -> None:
     assert running.changes == ()
 
 
-def test_too_many_rows_are_told_with_the_robot() -> None:
+def test_too_many_rows_are_reported_with_the_robot() -> None:
     with pytest.raises(TaskError, match=r"^tasks.hand: the task has 6 rows; planar3r"):
         Controller(planar(), [FramePose(name="hand")])
 

@@ -102,7 +102,7 @@ def test_rates_are_the_slopes_of_the_motion(seed: int) -> None:
 
 @quick
 @given(seeds)
-def test_speed_is_the_trapezoid_whatever_the_curve(seed: int) -> None:
+def test_speed_is_the_trapezoid_for_any_curve(seed: int) -> None:
     """|x'| is s', and the part of x'' along the path s'', to rounding."""
     rng = np.random.default_rng(seed)
     motion = gentle(some_curve(rng), *rng.uniform(0.3, 2.0, 2))
@@ -174,7 +174,7 @@ def test_a_circle_at_a_speed_is_the_circle_at_its_rate(rate: float) -> None:
             np.testing.assert_allclose(a, b, rtol=0, atol=1e-12)
 
 
-def test_what_goes_on_for_ever_rises_only() -> None:
+def test_an_endless_motion_only_accelerates() -> None:
     line = Along(UniformLine([3.0, 4.0], [1.0, 1.0]), 2.0, 1.5)
     for t, s in ((-1.0, 0.0), (0.0, 0.0), (2.0, 2.0), (1e3, 2.0 * (1e3 - 1.0))):
         expected = np.array([1.0, 1.0]) + s * np.array([0.6, 0.8])
@@ -296,7 +296,7 @@ def test_poses_pass_their_waypoints_in_their_orientations() -> None:
             np.testing.assert_array_equal(a, b)
 
 
-def test_waypoints_count_from_where_the_robot_starts() -> None:
+def test_waypoints_are_relative_to_the_start() -> None:
     here = hsp.trajectories.HoldPose([1.0, 2.0, 3.0], R1)
     motion = PolylinePose(CORNER, 1.0, 5.0, 0.3, origin="start")
     with pytest.raises(TrajectoryError, match="depends on where the robot starts"):
@@ -360,7 +360,7 @@ REFUSED: dict[str, Callable[[], Any]] = {
 
 
 @pytest.mark.parametrize("message", REFUSED)
-def test_refusals_say_where_and_what_would_do(message: str) -> None:
+def test_refusals_have_the_place_and_a_remedy(message: str) -> None:
     with pytest.raises(TrajectoryError, match=wording(message)):
         REFUSED[message]()
 
@@ -418,7 +418,9 @@ def test_no_step_calls_python() -> None:
         "[0.1, 0.1, 0]], blend_radius: 0.03, speed: 0.1, acceleration: 0.5}",
     ],
 )
-def test_a_robot_follows_what_yaml_says(trajectory: str, tmp_path: Path) -> None:
+def test_a_robot_follows_a_trajectory_from_yaml(
+    trajectory: str, tmp_path: Path
+) -> None:
     file = tmp_path / "path.yaml"
     file.write_text(
         "robot: {name: panda}\ntasks:\n  hand: {type: frame_pose, frame: panda_tcp, "

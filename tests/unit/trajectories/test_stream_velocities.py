@@ -104,7 +104,7 @@ def test_a_stick_that_is_held_moves_the_hand_at_its_velocity(axes: Any) -> None:
 
 
 @pytest.mark.parametrize("axes", AXES)
-def test_the_pose_is_the_integral_of_what_is_commanded(axes: Any) -> None:
+def test_the_pose_is_the_integral_of_the_commanded_twist(axes: Any) -> None:
     rng = np.random.default_rng(5)
     stream = StreamPose(axes=axes, delay=0.05).anchored(START)
     run(
@@ -158,7 +158,7 @@ def test_a_stick_that_is_let_go_of_in_a_long_change_stops_the_hand_as_soon() -> 
     assert samples[1530].position.velocity[0] == pytest.approx(0.5, abs=1e-12)
 
 
-def test_what_is_repeated_is_not_begun_again() -> None:
+def test_a_repeated_velocity_does_not_restart_the_motion() -> None:
     """The rate at which a velocity is repeated does not change the motion by a bit."""
     found = []
     for every in (5, 20, 90):
@@ -269,7 +269,7 @@ def test_targets_and_velocities_in_both_axes_follow_each_other(
     assert np.linalg.norm(speed, axis=1).max() <= np.sqrt(3) * bounds.speed + 1e-9
 
 
-def test_an_orientation_turns_about_axes_of_its_own() -> None:
+def test_an_orientation_rotates_about_its_own_axes() -> None:
     stream = StreamOrientation(START.rotation, axes="tool").anchored(START.rotation)
     last = run(stream, 0.6, held(stream, TWIST[3:], 10, 600))[-1]
     assert np.abs(last.rotation.T @ last.angular_velocity - TWIST[3:]).max() < 1e-12

@@ -107,7 +107,7 @@ def hostile(rng: np.random.Generator, stream: Any, n: int) -> Callable[[float], 
 
 @settings(max_examples=25 if THOROUGH else 5)
 @given(st.integers(0, 2**32 - 1), st.sampled_from(POLICIES), st.floats(0.0, 0.3))
-def test_points_keep_their_bounds_whatever_is_sent(
+def test_points_keep_their_bounds_for_any_messages(
     seed: int, policy: Any, delay: float
 ) -> None:
     rng = np.random.default_rng(seed)
@@ -126,7 +126,7 @@ def test_points_keep_their_bounds_whatever_is_sent(
 
 @settings(max_examples=25 if THOROUGH else 5)
 @given(st.integers(0, 2**32 - 1), st.sampled_from(POLICIES), st.floats(0.0, 0.3))
-def test_poses_keep_their_bounds_whatever_is_sent(
+def test_poses_keep_their_bounds_for_any_messages(
     seed: int, policy: Any, delay: float
 ) -> None:
     rng = np.random.default_rng(seed)
@@ -338,7 +338,7 @@ def test_earlier_times_are_known_while_a_step_begins_many_pieces() -> None:
     assert 10 < known < 50
 
 
-def test_what_a_rehearsal_raises_leaves_nothing() -> None:
+def test_an_exception_in_a_rehearsal_leaves_nothing() -> None:
     stream = Stream([0.0]).anchored(None)
     stream.sample(0.0)
     stream.run.send([0.1])
@@ -350,7 +350,7 @@ def test_what_a_rehearsal_raises_leaves_nothing() -> None:
     assert pickle.dumps(stream.run) == before
 
 
-def test_a_new_run_begins_anew_and_hears_only_what_is_new() -> None:
+def test_a_new_run_begins_anew_and_reads_new_messages_only() -> None:
     stream = Stream([0.0])
     first = stream.anchored(None)
     feed = at_times((0.1, lambda: first.run.send([0.1])))
@@ -369,7 +369,7 @@ def test_a_new_run_begins_anew_and_hears_only_what_is_new() -> None:
     assert x[-1, 0] == pytest.approx(0.2)
 
 
-def test_what_was_recorded_gives_the_same_bits() -> None:
+def test_recorded_messages_give_the_same_bits() -> None:
     rng = np.random.default_rng(3)
     stream = StreamPose(policy="extrapolate").anchored(pin.SE3.Identity())
     first = sampled(stream, 1.0, hostile(rng, stream, 3))
@@ -383,7 +383,7 @@ def test_what_was_recorded_gives_the_same_bits() -> None:
     assert json.loads(json.dumps(again.run.record)) == messages
 
 
-def test_a_record_that_is_full_says_how_much_it_lost(monkeypatch: Any) -> None:
+def test_a_full_record_reports_its_losses(monkeypatch: Any) -> None:
     monkeypatch.setattr(inbox, "MOST", 7)  # a value and its time each
     stream = Stream([0.0]).anchored(None)
     feed = at_times(*((0.1, lambda: stream.run.send([0.1])) for _ in range(5)))
@@ -392,7 +392,7 @@ def test_a_record_that_is_full_says_how_much_it_lost(monkeypatch: Any) -> None:
     assert stream.run.counts()["taken"] == 5
 
 
-def test_little_is_recorded_where_nobody_writes_a_log(monkeypatch: Any) -> None:
+def test_little_is_recorded_without_a_log(monkeypatch: Any) -> None:
     monkeypatch.setattr(inbox, "BRIEF", 7)
     for logged, kept in ((False, 3), (True, 5)):
         stream = Stream([0.0]).anchored(None)
@@ -462,7 +462,7 @@ def test_a_pickle_brakes_where_its_original_does() -> None:
         assert state_of(again, t) == state_of(stream, t)
 
 
-def test_a_pickle_takes_what_waits_and_not_what_was_taken() -> None:
+def test_a_pickle_has_waiting_messages_and_no_read_ones() -> None:
     stream = Stream([0.0]).anchored(None)
     sampled(stream, 0.1, at_times((0.05, lambda: stream.run.send([0.1]))))
     stream.run.send([0.2])
@@ -558,7 +558,7 @@ def test_bounds_that_contradict_each_other_are_refused() -> None:
 
 
 @pytest.mark.parametrize("kind", [Stream, StreamOrientation, StreamPose])
-def test_a_declaration_moves_nothing_and_says_who_does(kind: Any) -> None:
+def test_a_declaration_moves_nothing_and_names_the_run(kind: Any) -> None:
     message = f"this {kind.__name__} is declared, .* controller.stream\\('hand'\\)"
     with pytest.raises(StreamError, match=message):
         kind().sample(0.0)
@@ -568,7 +568,7 @@ def test_a_declaration_moves_nothing_and_says_who_does(kind: Any) -> None:
     assert hash(kind()) == hash(kind())
 
 
-def test_a_stream_that_hears_something_else_cannot_be_sent_to() -> None:
+def test_a_stream_with_an_address_cannot_be_sent_to() -> None:
     with pytest.raises(StreamError, match=r"receives from goals\.jsonl"):
         Stream([0.0], source="goals.jsonl").anchored(None).run.send([0.0])
 

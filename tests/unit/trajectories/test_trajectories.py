@@ -177,7 +177,7 @@ def test_orientations_have_three_notations(seed: int) -> None:
 
 
 @pytest.mark.parametrize(("rate", "tolerance"), [(1.0, 1e-10), (10.0, 5e-9)])
-def test_callable_is_as_accurate_as_it_says(rate: float, tolerance: float) -> None:
+def test_callable_is_as_accurate_as_documented(rate: float, tolerance: float) -> None:
     circle = Circle(1, rate, [1, 1])
     numerical = CallableTrajectory(lambda t: circle.sample(t).position, 2)
     for t in np.linspace(0, 3, 30):
@@ -227,7 +227,7 @@ def test_screw_is_pinocchios(seed: int) -> None:
         np.testing.assert_array_equal(orientation.rotation, held.rotation)
 
 
-def test_orientation_path_takes_the_shortest_turns() -> None:
+def test_orientation_path_uses_the_shortest_rotations() -> None:
     path = OrientationPath([R1, R2, R3], [0.0, 1.0, 3.0])
     for t, R in ((0.0, R1), (1.0, R2), (3.0, R3)):
         sample = path.sample(t)
@@ -239,7 +239,7 @@ def test_orientation_path_takes_the_shortest_turns() -> None:
     )
 
 
-def test_a_trajectory_of_ones_own() -> None:
+def test_a_user_defined_trajectory() -> None:
     class Fall(Trajectory):
         height: Number
 

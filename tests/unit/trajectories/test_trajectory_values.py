@@ -302,7 +302,9 @@ def test_a_blend_begins_and_ends_about_the_start() -> None:
     CallableTrajectory(swinging, 3, origin="start"),
     PiecewisePolynomial([0, 1], [[[1, 2, 3]]], origin="start"),
 ])  # fmt: skip
-def test_what_has_no_points_cannot_be_counted_from_the_start(trajectory: Any) -> None:
+def test_trajectories_without_points_cannot_be_relative_to_the_start(
+    trajectory: Any,
+) -> None:
     assert_relative(trajectory, TrajectorySample.allocate(3))
     with pytest.raises(TrajectoryError, match="origin: start cannot move a"):
         trajectory.anchored(START)

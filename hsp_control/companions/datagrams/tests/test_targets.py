@@ -51,7 +51,7 @@ def listening(port: int, part: str = "") -> FollowedPoint:
     return stream
 
 
-def test_datagrams_arrive_and_bad_ones_are_counted_and_said_once(
+def test_datagrams_arrive_and_bad_ones_are_counted_and_reported_once(
     port: int, sender: socket.socket, caplog: pytest.LogCaptureFixture
 ) -> None:
     stream = listening(port)
@@ -101,12 +101,14 @@ def test_a_wrong_address_is_named(source: str) -> None:
         Stream(source=source)
 
 
-def test_a_name_that_no_computer_can_have_is_told() -> None:
+def test_an_invalid_host_name_is_reported() -> None:
     with pytest.raises(StreamError, match="cannot listen there: not a host name"):
         opened(f"udp://{70 * 'ö'}:5005", Space(3, False))
 
 
-def test_a_port_in_use_is_told_and_streams_of_one_process_share_it(port: int) -> None:
+def test_a_port_in_use_is_reported_and_streams_of_one_process_share_it(
+    port: int,
+) -> None:
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as other:
         other.bind(("127.0.0.1", port))
         with pytest.raises(StreamError, match="cannot listen there: Address already"):
@@ -141,7 +143,7 @@ def test_a_robot_alone_leaves_the_port_to_its_loop(port: int) -> None:
     assert isinstance(experiment.controller.tasks[0].trajectory, FollowedPose)
 
 
-def test_each_stream_of_a_port_hears_its_part_or_nobody_does(
+def test_each_stream_of_a_port_receives_its_part_or_none_does(
     port: int, sender: socket.socket
 ) -> None:
     left, right = listening(port, "/left"), listening(port, "/right")
@@ -234,7 +236,7 @@ def test_one_stream_of_two_poses_or_two_senders_lead_two_hands(
         (lambda k: None, []),
     ],
 )
-def test_a_clock_that_jumps_is_said_once(
+def test_a_clock_that_jumps_is_reported_once(
     clock: Callable[[int], float | None],
     warned: list[str],
     caplog: pytest.LogCaptureFixture,

@@ -46,7 +46,7 @@ def command() -> CompensatedController:
     return CompensatedController(controller, observer)
 
 
-def test_it_tells_what_a_policy_needs(states: socket.socket) -> None:
+def test_it_publishes_the_input_of_a_policy(states: socket.socket) -> None:
     source = command()
     reported = publish(f"127.0.0.1:{states.getsockname()[1]}?rate=100", source)
     truth = []
@@ -88,7 +88,7 @@ def test_it_tells_what_a_policy_needs(states: socket.socket) -> None:
     )  # fmt: skip
 
 
-def test_the_page_s_client_hears_and_answers(capsys: pytest.CaptureFixture) -> None:
+def test_the_page_s_client_receives_and_answers(capsys: pytest.CaptureFixture) -> None:
     page = (Path(__file__).parents[1] / "policies.md").read_text(encoding="utf-8")
     (client,) = re.findall(r"^```python\n(.*?)^```", page, re.MULTILINE | re.DOTALL)
     assert len(client.splitlines()) <= 12
@@ -136,7 +136,7 @@ states.bind(0, "127.0.0.1", () => console.log(states.address().port))
 
 @pytest.mark.process
 @pytest.mark.skipif(shutil.which("node") is None, reason="needs Node.js")
-def test_a_client_in_another_language_hears_the_same_numbers() -> None:
+def test_a_client_in_another_language_receives_the_same_numbers() -> None:
     source = command()
     node = ["node", "-e", OTHER_LANGUAGE]
     with subprocess.Popen(node, stdout=subprocess.PIPE, text=True) as client:
@@ -151,7 +151,7 @@ def test_a_client_in_another_language_hears_the_same_numbers() -> None:
     assert heard == [q.tolist(), actual.tolist(), "fault"]
 
 
-def test_what_is_no_number_is_null(states: socket.socket) -> None:
+def test_nan_is_null(states: socket.socket) -> None:
     source = command()
     reported = publish(f"127.0.0.1:{states.getsockname()[1]}", source)
     source.effort(0.0, start(), np.zeros(7), 0.001)
@@ -180,7 +180,7 @@ def test_mistakes_are_named(address: str, message: str) -> None:
         publish(address, command())
 
 
-def test_what_cannot_be_sent_is_said_once_and_hinders_nothing(
+def test_a_send_error_is_reported_once_and_has_no_other_effect(
     caplog: pytest.LogCaptureFixture,
 ) -> None:
     source = command()

@@ -50,7 +50,7 @@ def test_a_film_that_cannot_be_is_refused(
 
 
 @pytest.mark.slow
-def test_what_is_missing_for_a_film_is_said_and_the_rest_goes_on(
+def test_missing_programs_for_films_are_reported_and_the_rest_continues(
     planar: Rollout,
     tmp_path: Path,
     monkeypatch: pytest.MonkeyPatch,
@@ -82,7 +82,7 @@ def test_what_is_missing_for_a_film_is_said_and_the_rest_goes_on(
     assert sorted(file.name for file in tmp_path.iterdir()) == ["page.html", "run.npz"]
 
 
-def test_ffmpegs_own_words_are_passed_on(
+def test_ffmpeg_s_message_is_passed_on(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     film = tmp_path / "film.mp4"
@@ -96,7 +96,7 @@ def test_ffmpegs_own_words_are_passed_on(
     assert not list(tmp_path.iterdir())
 
 
-def test_the_command_says_what_it_wants(
+def test_the_command_names_missing_arguments(
     planar: Rollout, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     log = str(planar.save(tmp_path / "run.npz"))

@@ -145,7 +145,7 @@ def test_states_are_numbered_by_the_arm_s_time() -> None:
         assert state(hardware).sequence == k
 
 
-def test_at_the_end_the_arm_says_why_it_did_not_answer() -> None:
+def test_at_the_end_the_arm_s_reason_is_reported() -> None:
     hardware, answers = arm()
     state(hardware)
     state(hardware)
@@ -195,7 +195,7 @@ def test_a_gripper_s_process_that_hangs_is_noticed(
         assert not process.trouble()
 
 
-def test_both_processes_end_whatever_is_raised() -> None:
+def test_both_processes_end_after_any_exception() -> None:
     class Fails(Answers):
         def close(self) -> None:
             super().close()

@@ -44,7 +44,7 @@ def test_nothing_else_moves_the_fingers(message: Any) -> None:
         gripper().read(message, SENDER, 0.01)
 
 
-def test_its_own_answers_that_come_back_are_no_orders() -> None:
+def test_its_returned_answers_are_no_commands() -> None:
     """A policy that echoes messages: they answered each other forever."""
     made, openings = gripper(), []
     state = SimpleNamespace(width=0.03, is_grasped=True)
@@ -81,7 +81,7 @@ def test_its_own_answers_that_come_back_are_no_orders() -> None:
     assert openings == [0.08]
 
 
-def test_whoever_drives_the_fingers_says_that_it_lives(
+def test_the_gripper_s_process_sends_heartbeats(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     """Also under a flood of datagrams, and without waiting for a listener."""

@@ -167,7 +167,7 @@ def test_an_arm_that_folds_into_itself_stops() -> None:
     assert names == {Error.SELF_COLLISION_AVOIDANCE_VIOLATION}, box.messages
 
 
-def test_what_a_client_may_not_do_while_the_arm_moves() -> None:
+def test_calls_that_are_refused_while_the_arm_moves() -> None:
     box = Talking()
     box.begin(1, *TORQUE)
     answers(box)

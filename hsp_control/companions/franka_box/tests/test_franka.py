@@ -93,7 +93,7 @@ def test_the_arm_moves_as_the_simulated_robot(tmp_path: Path) -> None:
 
 
 @pytest.mark.process
-def test_a_reflex_is_told_and_reset_only_when_asked(tmp_path: Path) -> None:
+def test_a_reflex_is_reported_and_reset_only_on_request(tmp_path: Path) -> None:
     experiment = circle(plant={"type": "rigid_body", "pushes": [PUSH]})
     with serving(experiment) as box:
         arm = connect(box.address, experiment.robot, PERIOD)
@@ -161,7 +161,7 @@ def test_a_killed_box_ends_the_loop() -> None:
 
 @pytest.mark.process
 @pytest.mark.smoke
-def test_a_client_that_dies_is_told() -> None:
+def test_a_dead_client_is_reported() -> None:
     experiment = circle()
     with serving(experiment) as box:
         arm = connect(box.address, experiment.robot, PERIOD)
@@ -235,7 +235,7 @@ def test_the_load_is_in_both_models(tmp_path: Path) -> None:
 
 
 @pytest.mark.process
-def test_the_gripper_goes_where_openings_say_and_tells_where_it_is() -> None:
+def test_the_gripper_follows_openings_and_reports_its_own() -> None:
     messages: list[str] = []
     with serving(circle()) as box, closing(udp()) as policy, closing(udp()) as other:
         gripper = Gripper(messages.append, box.host)

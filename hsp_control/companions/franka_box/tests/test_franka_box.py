@@ -139,7 +139,7 @@ print(json.dumps([worst, moved, str(robot.read_once().robot_mode)]))
 
 
 @pytest.mark.process
-def test_what_is_not_served_is_refused_by_the_protocol() -> None:
+def test_unsupported_requests_are_refused_by_the_protocol() -> None:
     with served() as rig:
         report = rig.run("""
 handler = franka.AsyncPositionControlHandler

@@ -66,7 +66,7 @@ def test_the_hand_is_a_spring_along_its_own_axes() -> None:
     )
 
 
-def test_an_external_wrench_is_told_in_axes_of_the_base_and_of_the_frame() -> None:
+def test_an_external_wrench_is_reported_in_base_and_frame_axes() -> None:
     model, in_K = at(home() + 0.2), np.array([3.0, -2.0, 1.0, 0.2, 0.1, -0.3])
     model.EE_T_K = pin.SE3(pin.utils.rotate("y", 0.7), np.array([0.0, 0.02, 0.05]))
     effort = model.gravity + model.stiffness_jacobian().T @ in_K

@@ -55,7 +55,7 @@ def test_each_limit_of_the_measured_state_is_watched(joint: int, sign: int) -> N
             assert all(f"joint {joint + 1} at" in v.reason for v in violations)
 
 
-def test_effort_rates_are_taken_from_what_the_client_was_told() -> None:
+def test_effort_rates_are_relative_to_reported_efforts() -> None:
     before = np.full(7, 40.0 / 3.0).astype(np.float32).astype(float)
     step = np.full(7, 1.0 - 1e-6)
     assert not list(reflexes.effort_rate(before + step, before))

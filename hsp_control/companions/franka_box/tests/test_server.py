@@ -82,7 +82,7 @@ def serves(rig: Rig) -> bool:
         return good.connect() == b"\0\x0a\0" and int(good.state()["message_id"]) > 0
 
 
-def test_another_version_is_told_ours() -> None:
+def test_a_client_of_another_version_receives_ours() -> None:
     with served() as rig:
         with client(rig) as old:
             assert old.connect(version=9) == b"\1\x0a\0"
@@ -219,7 +219,7 @@ def test_addresses_beyond_loopback_and_taken_ones_are_refused() -> None:
         Server(box, print, host=rig.host)
 
 
-def test_a_client_that_says_nothing_makes_room_for_the_next_one(
+def test_a_silent_client_makes_room_for_the_next_one(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     monkeypatch.setattr(connection, "_PATIENCE", 0.0)

@@ -48,7 +48,7 @@ def test_the_layouts_have_the_sizes_of_the_packed_structures() -> None:
 
 
 @pytest.mark.parametrize("name", ["panda", "iiwa14"])
-def test_what_clients_are_told_has_the_same_dynamics(name: str) -> None:
+def test_the_model_sent_to_clients_has_the_same_dynamics(name: str) -> None:
     robot = Robot.load(name)
     arm = Arm(robot)
     reported = pin.buildModelFromXML(arm.urdf)

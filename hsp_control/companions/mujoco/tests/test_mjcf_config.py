@@ -165,7 +165,7 @@ def test_a_scene_needs_an_mjcf(folder: Path) -> None:
         ("<!DOCTYPE x><mujoco/>", r"cell\.xml:1: a document type"),
     ],
 )
-def test_what_is_no_mjcf(text: str, message: str, folder: Path) -> None:
+def test_invalid_mjcf(text: str, message: str, folder: Path) -> None:
     path = folder / "cell.xml"
     path.write_text(text)
     with pytest.raises(ModelError, match=message):
@@ -231,7 +231,7 @@ def test_strict_reading_loads_no_plugins_and_ends(folder: Path) -> None:
         Robot.load(RobotDescription(mjcf=path), access=elsewhere)
 
 
-def test_check_takes_a_robot_of_a_mujoco_model(
+def test_check_accepts_a_robot_of_a_mujoco_model(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     (tmp_path / "cell.xml").write_text(CELL)

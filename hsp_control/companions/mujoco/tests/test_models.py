@@ -151,9 +151,7 @@ MOTORS = [
 
 
 @pytest.mark.parametrize(("actuators", "limit"), MOTORS)
-def test_effort_limits_are_what_the_actuators_give(
-    actuators: str, limit: float
-) -> None:
+def test_effort_limits_are_those_of_the_actuators(actuators: str, limit: float) -> None:
     model = compiled(body(rest=f"<actuator>{actuators}</actuator>"))
     robot = Robot.from_mujoco(model)
     assert robot.model.upperEffortLimit[0] == limit
@@ -233,7 +231,7 @@ def _nothing_said() -> None:
 
 @pytest.mark.usefixtures("_nothing_said")
 @pytest.mark.parametrize(("text", "sentence"), OMISSIONS)
-def test_what_the_robot_lacks_is_named(
+def test_missing_features_of_the_robot_are_named(
     text: str, sentence: str, caplog: pytest.LogCaptureFixture
 ) -> None:
     robot = Robot.from_mujoco(compiled(text))
@@ -262,7 +260,7 @@ def test_a_servo_of_an_orientation_acts_on_its_ball_joint() -> None:
         assert kind in sentence
 
 
-def test_what_does_not_touch_the_robot_is_not_named() -> None:
+def test_parts_without_an_effect_on_the_robot_are_not_named() -> None:
     text = CELL.replace(
         "</mujoco>", "<equality><weld body1='ball' active='false'/></equality></mujoco>"
     )

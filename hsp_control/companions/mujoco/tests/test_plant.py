@@ -355,7 +355,7 @@ def test_a_motion_that_diverges_is_an_error(
     assert not list(tmp_path.iterdir())
 
 
-def test_mujoco_carries_what_a_time_line_puts_into_the_hand() -> None:
+def test_mujoco_carries_the_payload_of_a_time_line() -> None:
     """Mass matrix and gravity for the present fraction; the hand does not sag."""
     robot = load("panda")
     q, rest = robot.home(), np.zeros(7)

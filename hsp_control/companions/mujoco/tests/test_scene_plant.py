@@ -198,7 +198,7 @@ def test_every_kind_of_servo_can_be_switched_off(servo: str) -> None:
     assert data.qfrc_actuator[3] == 0.0
 
 
-def test_a_robot_that_overlaps_itself_is_told_once(
+def test_a_robot_in_self_collision_is_reported_once(
     caplog: pytest.LogCaptureFixture,
 ) -> None:
     """MuJoCo enables collisions of parent and child if the parent is static."""

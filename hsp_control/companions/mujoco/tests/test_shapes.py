@@ -95,7 +95,7 @@ def scene(geoms: str, rest: str = "") -> Robot:
     return Robot.from_mujoco(mujoco.MjModel.from_xml_string(text))
 
 
-def test_contype_and_group_decide_what_collides_and_what_is_seen() -> None:
+def test_contype_and_group_determine_collisions_and_visuals() -> None:
     shown = "<geom size='.1' contype='0' conaffinity='0' group='{}' rgba='1 0 0 {}'/>"
     hull = "<geom size='.2' group='3'/>"
     both = scene(shown.format(2, 1) + hull)

@@ -39,7 +39,7 @@ def test_stairs_are_copies() -> None:
         np.testing.assert_allclose(geom.quat, [np.cos(0.05), 0, 0, np.sin(0.05)])
 
 
-def test_what_is_loose_falls_onto_what_is_fixed() -> None:
+def test_free_solids_fall_onto_fixed_ones() -> None:
     """In addition to a robot, whose coordinates are unchanged; with the given mass."""
     table = Solid("table", Box([0.4, 0.4, 0.1]), [2.0, 0.0, 0.5])
     ball = Solid("ball", Sphere(0.05), [2.0, 0.0, 0.7], mass=3.0)
@@ -77,7 +77,7 @@ def test_a_plant_pushes_off_as_its_slowest_solid_does() -> None:
      "3 copies have the spacing"),
     (lambda: Solid("floor", HalfSpace()), "shape: plane is not possible here"),
 ])  # fmt: skip
-def test_what_no_solid_can_be(make: Any, message: str) -> None:
+def test_impossible_solids(make: Any, message: str) -> None:
     with pytest.raises(SimulationError) as raised:
         make()
     assert message in str(raised.value)

@@ -30,6 +30,6 @@ def test_a_play_is_written_as_one_page(tmp_path: Path) -> None:
 
 
 @pytest.mark.system
-def test_what_cannot_be_written_says_why(tmp_path: Path) -> None:
+def test_an_unwritable_file_gives_the_reason(tmp_path: Path) -> None:
     (tmp_path / "file").write_text("")
     assert "hsp: " in written(tmp_path, tmp_path / "file" / "mine.html")

@@ -84,7 +84,7 @@ def experiment() -> hsp.Experiment:
     return playable("planar3r")
 
 
-def test_a_page_that_says_nothing_ends_the_wait(
+def test_a_silent_page_ends_the_wait(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     silent = tmp_path / "python"

@@ -51,7 +51,7 @@ def pose_of(session: Session, name: str = "hand") -> Array:
     return np.array(session.handles.targets[name].where(session.controller.state))
 
 
-def test_what_is_dragged_is_reached_and_the_log_repeats_it(
+def test_a_dragged_target_is_reached_and_the_log_repeats_it(
     session: Session, tmp_path: Path
 ) -> None:
     go(session, 0.5)
@@ -222,7 +222,7 @@ def test_a_slider_that_is_dragged_makes_few_changes(session: Session) -> None:
     assert len(session.controller.changes) <= 12
 
 
-def test_somebody_pulls_at_the_elbow_and_the_hand_goes_on(
+def test_the_hand_continues_during_a_pull_at_the_elbow(
     session: Session, tmp_path: Path
 ) -> None:
     go(session, 0.2)
@@ -300,7 +300,7 @@ def test_it_begins_anew(session: Session) -> None:
     np.testing.assert_array_equal(session.rollout().q, first)
 
 
-def test_what_goes_wrong_ends_the_run_and_not_the_session(
+def test_an_error_ends_the_run_and_not_the_session(
     experiment: hsp.Experiment,
 ) -> None:
     push = "{type: rigid_body, pushes: [{frame: panda_tcp, force: [1.0e9, 0, 0]}]}"
@@ -377,7 +377,7 @@ def test_a_plain_impedance_goes_beside_it() -> None:
     assert with_spring.laws == ["no field", "operational-space law"]
 
 
-def test_what_fails_beside_a_play_ends_alone(
+def test_a_failure_beside_a_play_ends_alone(
     session: Session, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     go(session, 0.1)
@@ -404,7 +404,7 @@ def test_the_log_has_an_end(session: Session, monkeypatch: pytest.MonkeyPatch) -
 # --- the picture and the loop --------------------------------------------------------
 
 
-def test_the_picture_follows_what_is_dragged(session: Session) -> None:
+def test_the_picture_follows_the_dragged_object(session: Session) -> None:
     viewer = Viewer(session.experiment.robot, transport=Recorder())
     picture = Picture(session, viewer)
     recorder = viewer.transport
@@ -459,7 +459,7 @@ def test_the_picture_follows_what_is_dragged(session: Session) -> None:
     assert recorder.paths("/influence")
 
 
-def test_a_target_out_of_reach_is_said_and_by_how_much(still: Session) -> None:
+def test_a_target_out_of_reach_is_reported_with_its_distance(still: Session) -> None:
     """Half a metre too high; within reach again the message is gone."""
     recorder = Recorder()
     picture = Picture(still, Viewer(still.experiment.robot, transport=recorder))
@@ -486,7 +486,7 @@ def test_a_target_out_of_reach_is_said_and_by_how_much(still: Session) -> None:
     assert said() == ""
 
 
-def test_the_loop_does_what_the_page_says_about_time(session: Session) -> None:
+def test_the_loop_follows_the_page_s_time_controls(session: Session) -> None:
     viewer = Viewer(session.experiment.robot, transport=Recorder())
     said: list[list[dict[str, Any]]] = [
         [{"do": "pause"}],
@@ -533,7 +533,7 @@ def test_any_fixed_robot_is_a_playground() -> None:
         ("pandaa", "no configuration 'pandaa'"),
     ],
 )  # fmt: skip
-def test_what_cannot_be_played_with_is_said(source: str, message: str) -> None:
+def test_unplayable_sources_are_reported(source: str, message: str) -> None:
     with pytest.raises(ConfigError, match=wording(message)):
         playable(source)
 
@@ -577,7 +577,7 @@ def test_a_robot_that_walks_can_be_pulled_but_not_led(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     "error", [ValueError("mine"), CancelledError(), GeneratorExit(), MemoryError()]
 )
-def test_whatever_a_field_raises_ends_the_run_and_not_the_session(
+def test_any_exception_of_a_field_ends_the_run_and_not_the_session(
     error: BaseException, session: Session, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     go(session, 0.05)
@@ -598,7 +598,7 @@ def test_whatever_a_field_raises_ends_the_run_and_not_the_session(
 @pytest.mark.parametrize(
     "error", [RuntimeError("mine"), CancelledError(), GeneratorExit(), MemoryError()]
 )
-def test_whatever_a_change_of_a_page_raises_ends_the_run_and_not_the_session(
+def test_any_exception_of_a_page_s_change_ends_the_run_and_not_the_session(
     error: BaseException, session: Session, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     def fail(*_: object, **__: object) -> None:

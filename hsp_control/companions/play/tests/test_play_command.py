@@ -96,7 +96,7 @@ def test_a_page_that_stalls_or_leaves_holds_nothing_up(
     (["panda", "--host", "192.0.2.1"], "cannot listen on 192.0.2.1"),
     (["panda", "--set", "null_space.gain=-1"], "null_space.gain"),
 ])  # fmt: skip
-def test_mistakes_are_said_in_a_line(
+def test_mistakes_are_one_line(
     arguments: list[str],
     message: str,
     tmp_path: Path,

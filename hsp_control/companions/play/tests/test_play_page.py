@@ -508,7 +508,7 @@ def test_a_target_and_an_obstacle_return_to_their_paths(page: Any) -> None:
 
 
 @pytest.mark.browser
-def test_a_target_out_of_reach_is_told_at_its_handle(page: Any) -> None:
+def test_a_target_out_of_reach_is_reported_at_its_handle(page: Any) -> None:
     state = {"t": 2.0, "running": True, "rate": 1.0, "level": "info"}
     words = {"hand": "target out of reach, 0.31 m", "elbow": "target far away"}
     tell(page, "play_state", message="saved", **state)
@@ -651,7 +651,7 @@ def test_the_name_of_a_line_covers_no_curve(page: Any) -> None:
 
 
 @pytest.mark.browser
-def test_a_picture_is_a_file_of_what_is_seen(page: Any) -> None:
+def test_a_picture_is_saved_as_displayed(page: Any) -> None:
     page.evaluate(
         "(() => { window.saved = null; PlayCamera.prototype.save = (blob, ending) => "
         "{ window.saved = [blob.size, ending]; }; })()"
@@ -686,7 +686,7 @@ def test_a_target_that_moves_out_of_the_picture_stays_in_sight(page: Any) -> Non
 
 
 @pytest.mark.browser
-def test_without_a_graphics_card_it_draws_lightly_and_says_so(page: Any) -> None:
+def test_without_a_gpu_it_draws_lightly_and_reports_it(page: Any) -> None:
     if not page.evaluate("isSoftware()"):
         pytest.skip("this browser has a graphics card")
     assert not page.evaluate("viewer.renderer.shadowMap.enabled")
@@ -764,7 +764,7 @@ def test_it_fits_a_phone(browser: Any, viewer: Viewer) -> None:
 
 
 @pytest.mark.browser
-def test_a_browser_that_cannot_draw_is_told_so(browser: Any, viewer: Viewer) -> None:
+def test_a_browser_without_webgl_shows_a_message(browser: Any, viewer: Viewer) -> None:
     page = browser.new_page()
     page.add_init_script("HTMLCanvasElement.prototype.getContext = () => null")
     page.goto(str(viewer.url))

@@ -130,7 +130,7 @@ def test_it_fails_if_its_page_dies(arguments: list[str]) -> None:
     (["--steer", "--robot=arm://x"], "use --steer hardware"),
     (["--port=7100"], "need --steer"),
 ])  # fmt: skip
-def test_what_makes_no_sense_is_refused(
+def test_nonsensical_input_is_refused(
     arguments: list[str], message: str, capsys: pytest.CaptureFixture[str]
 ) -> None:
     assert main(["live", "panda_obstacle", *arguments]) == 2

@@ -90,7 +90,7 @@ def keyed(tmp_path: Path) -> Iterator[Steered]:
     steered.close()
 
 
-def test_what_is_dragged_is_reached(steered: Steered) -> None:
+def test_a_dragged_target_is_reached(steered: Steered) -> None:
     targets, obstacles = steered.loop.handles.places()
     pose = np.array(targets["hand"])
     pose[:3] += [0.02, -0.05, 0.06]
@@ -136,7 +136,7 @@ def test_it_stops_at_once(keyed: Steered, message: dict[str, Any], reason: str) 
     assert stopped == pytest.approx(0.1, abs=0.003)
 
 
-def test_what_a_page_says_after_the_stop_changes_nothing(steered: Steered) -> None:
+def test_messages_after_the_stop_have_no_effect(steered: Steered) -> None:
     for x, said in ((0.5, {"do": "nothing"}), (0.6, {"do": "stop"})):
         steered.page.send(said)
         steered.page.send({"do": "obstacle", "name": "ball", "position": [x, 0.0, 1.0]})
@@ -145,7 +145,7 @@ def test_what_a_page_says_after_the_stop_changes_nothing(steered: Steered) -> No
     assert steered.requests.reason == "stopped from the page"
 
 
-def test_a_word_that_is_too_much_is_dropped_and_nobody_waits() -> None:
+def test_an_excess_message_is_dropped_without_waiting() -> None:
     here, there = channel_pair()
     other = Channel(there)
     for _ in range(10_000):

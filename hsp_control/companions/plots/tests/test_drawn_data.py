@@ -124,7 +124,7 @@ def test_metres_and_radians_of_a_pose_are_apart(logs: dict[str, Rollout]) -> Non
 
 
 @pytest.mark.slow
-def test_a_task_of_a_user_s_own_says_itself_what_is_drawn() -> None:
+def test_a_user_s_task_determines_its_figure() -> None:
     class Tool(FramePosition):
         @property
         def error_parts(self) -> tuple[ErrorPart, ...]:
@@ -152,7 +152,7 @@ def test_a_task_of_a_user_s_own_says_itself_what_is_drawn() -> None:
 
 
 @pytest.mark.slow
-def test_frames_are_even_in_time_or_where_they_are_asked_for(
+def test_frames_are_equidistant_in_time_or_at_given_times(
     logs: dict[str, Rollout],
 ) -> None:
     log = logs["rest"]

@@ -28,7 +28,7 @@ def test_one_row_is_drawn(logs: dict[str, Rollout], name: str) -> None:
 
 
 @pytest.mark.slow
-def test_a_log_without_rows_says_so() -> None:
+def test_a_log_without_rows_is_refused() -> None:
     whole = planar(PAPER["rest"])
     empty = changed(whole, slice(0), status="diverged")
     for draw in (plots.paper_figure, plots.diagnostics_figure):
@@ -53,7 +53,7 @@ def test_figures_are_written_in_every_format(tmp_path: Path) -> None:
 
 
 @pytest.mark.slow
-def test_what_cannot_be_written_says_why(tmp_path: Path) -> None:
+def test_an_unwritable_file_gives_the_reason(tmp_path: Path) -> None:
     log = planar(PAPER["rest"])
     with pytest.raises(PlotError, match="no picture format 'pgn'; did you mean 'png'"):
         plots.save_figures(log, tmp_path, "run", ("pgn",))
@@ -63,7 +63,7 @@ def test_what_cannot_be_written_says_why(tmp_path: Path) -> None:
 
 
 @pytest.mark.slow
-def test_plot_draws_beside_a_log_and_says_what_is_none(
+def test_plot_draws_beside_a_log_and_names_files_that_are_none(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     log = planar(4).save(tmp_path / "run.npz")

@@ -137,7 +137,7 @@ def test_the_command_writes_it(
     assert "a file of Rerun shows one run" in capsys.readouterr().err
 
 
-def test_what_is_missing_is_said(
+def test_missing_parts_are_reported(
     log: hsp.Rollout, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     with pytest.raises(ExportError, match="either a recording or a path"):
@@ -156,7 +156,7 @@ def test_what_is_missing_is_said(
         log_to_rerun(log)
 
 
-def test_every_kind_of_geom_is_drawn_as_what_it_is() -> None:
+def test_every_kind_of_geom_is_drawn() -> None:
     sizes = {
         "sphere": ".1",
         "capsule": ".05 .1",
@@ -184,7 +184,7 @@ def test_every_kind_of_geom_is_drawn_as_what_it_is() -> None:
     ]
 
 
-def test_what_is_turned_is_turned_the_same_way(log: hsp.Rollout) -> None:
+def test_rotations_are_the_same(log: hsp.Rollout) -> None:
     """A link's shape in its joint, and the target of an orientation."""
     robot = hsp.Robot.load("panda")
     sent: dict[str, Any] = {}

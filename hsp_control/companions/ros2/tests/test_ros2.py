@@ -70,7 +70,7 @@ def test_a_client_drives_the_simulated_robot(
 
 
 @pytest.mark.process
-def test_the_status_of_a_robot_that_a_fault_stopped_says_so(
+def test_the_status_of_a_robot_after_a_fault_reports_it(
     capsys: pytest.CaptureFixture[str], tmp_path: Path
 ) -> None:
     controller, states, address = fresh()

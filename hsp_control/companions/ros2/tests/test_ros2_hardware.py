@@ -71,7 +71,7 @@ def test_joints_are_found_by_name_in_any_order() -> None:
         assert np.array_equal(state, (q, v))
 
 
-def test_a_message_is_what_the_joints_read() -> None:
+def test_a_message_becomes_the_joints_measurement() -> None:
     for robot in (panda(), load("planar3r")):
         rng, joints = np.random.default_rng(1), Joints(robot)
         q, v = robot.random_configuration(rng), rng.standard_normal(robot.nv)
@@ -106,7 +106,7 @@ def test_a_message_has_every_joint_once(names: tuple[str, ...], message: str) ->
 # --- reading and writing -------------------------------------------------------------
 
 
-def test_the_newest_of_many_counts_and_old_ones_do_not(
+def test_the_newest_of_many_is_used_and_old_ones_are_not(
     rig: tuple[Rig, Ros2Hardware],
 ) -> None:
     made, hardware = rig
@@ -233,7 +233,7 @@ def test_the_loop_stops_safely(
     assert hardware.writes > 150  # later valid states are used by the safe stop
 
 
-def test_nobody_listens_any_more(rig: tuple[Rig, Ros2Hardware]) -> None:
+def test_a_topic_without_subscribers(rig: tuple[Rig, Ros2Hardware]) -> None:
     made, hardware = rig
     del made.efforts
     with pytest.raises(HardwareError, match=r"no subscriber of /.*/commands is left"):

@@ -147,7 +147,7 @@ def test_stamps_go_on_where_the_process_did_not(
     ("function", "raised"),
     covering(["efforts", "send"], [OddError, MemoryError, GeneratorExit]),
 )
-def test_whatever_a_topic_raises_stops_the_robot(
+def test_any_exception_of_a_topic_stops_the_robot(
     served: Served,
     function: str,
     raised: type[BaseException],
@@ -166,7 +166,7 @@ def test_whatever_a_topic_raises_stops_the_robot(
     assert served.robot.phase == Phase.HOLDING
 
 
-def test_a_robot_that_nobody_commands_ends_when_it_is_told(served: Served) -> None:
+def test_an_uncommanded_robot_ends_on_request(served: Served) -> None:
     served.stop.set()
     assert served.ended() == ""
     assert served.robot.phase == Phase.WAITING

@@ -37,7 +37,7 @@ def test_a_step_is_the_nearest_number_of_periods_and_at_least_one(
     assert stamps.sequence == states
 
 
-def test_what_is_not_later_is_no_state_and_changes_nothing() -> None:
+def test_states_with_old_stamps_are_ignored() -> None:
     stamps = Stamps(PERIOD)
     assert stamps.last is None
     assert stamps.t == 0.0

@@ -45,7 +45,7 @@ def action_of(pose: pin.SE3, finger: float = 0.0) -> Any:
     return np.concatenate([pose.translation, pin.log3(pose.rotation), [finger]])
 
 
-def test_the_engine_does_what_the_law_wants(arm: ArmEnv) -> None:
+def test_the_engine_accelerates_as_the_law_commands(arm: ArmEnv) -> None:
     """With the finger held, MuJoCo's acceleration is that of e'' + Kv e' + Kp e = 0."""
     env = HandTargets(arm, "hand", FREE, absolute=True)
     env.reset(seed=0)
@@ -124,7 +124,7 @@ def test_it_is_an_environment_like_others() -> None:
     assert data.body("tips_arm").xpos[1] - before[1] > 0.2
 
 
-def test_what_does_not_fit_is_refused(tmp_path: Path, arm: ArmEnv) -> None:
+def test_unsuitable_input_is_refused(tmp_path: Path, arm: ArmEnv) -> None:
     with pytest.raises(
         ControllerError, match=r"CartPoleEnv is none of .* has no model"
     ):
@@ -144,7 +144,7 @@ def test_what_does_not_fit_is_refused(tmp_path: Path, arm: ArmEnv) -> None:
         env.step(np.full(7, np.nan))
 
 
-def test_what_the_page_shows_runs() -> None:
+def test_the_page_s_code_runs() -> None:
     text = (Path(__file__).parents[1] / "page.md").read_text(encoding="utf-8")
     _, snippet = re.findall(r"^```python\n(.*?)^```", text, re.MULTILINE | re.DOTALL)
     space: dict[str, Any] = {}

@@ -80,7 +80,7 @@ def error_of(env: Any, pose: pin.SE3) -> tuple[float, float]:
 
 
 @pytest.mark.parametrize("name", ARMS)
-def test_every_arm_goes_where_it_is_told(name: str) -> None:
+def test_every_arm_reaches_its_goal(name: str) -> None:
     absolute = {"input_type": "absolute", "input_ref_frame": "world"}
     settings = {"stream": {"delay": 0.3}}
     with made(name, hsp=settings, **absolute) as env:
@@ -114,7 +114,7 @@ def test_the_model_is_the_simulation_s() -> None:
 
 
 @pytest.mark.parametrize("frame", ["base", "world"])
-def test_an_action_means_what_it_means_to_osc_pose(frame: str) -> None:
+def test_an_action_has_the_meaning_of_osc_pose(frame: str) -> None:
     """Both have the same goals and, with steps of the goal, similar motions.
 
     As long as the wrist's motors are within their limits: OSC_POSE neglects the
@@ -148,12 +148,14 @@ def test_an_action_means_what_it_means_to_osc_pose(frame: str) -> None:
     ({"hsp": {"limit": "none"}}, ConfigError, "limit"),
     ({"hsp": "nowhere.yaml"}, ConfigError, "nowhere.yaml"),
 ])  # fmt: skip
-def test_what_it_cannot_do_is_refused(settings: Any, error: Any, message: str) -> None:
+def test_unsupported_settings_are_refused(
+    settings: Any, error: Any, message: str
+) -> None:
     with pytest.raises(error, match=message), made(**settings):
         pass
 
 
-def test_what_the_page_shows_runs() -> None:
+def test_the_page_s_code_runs() -> None:
     page = Path(__file__).parents[1] / "page.md"
     text = page.read_text(encoding="utf-8")
     snippet, _ = re.findall(r"^```python\n(.*?)^```", text, re.MULTILINE | re.DOTALL)

@@ -69,7 +69,7 @@ def test_distributions_as_they_are_spelled(text: str, name: str) -> None:
     ("integers:3:1", "no integers from 3 to 1"),
     ("integers:0:1.5", "'1.5' is not an integer"), ("[1, 2", "not a list"),
 ])  # fmt: skip
-def test_what_is_no_range_is_refused(text: str, message: str) -> None:
+def test_invalid_ranges_are_refused(text: str, message: str) -> None:
     with pytest.raises(SweepError, match=message.replace("?", r"\?")):
         parsed(text)
 
@@ -180,7 +180,7 @@ def test_a_file_is_in_the_order_of_the_plan(tmp_path: Path) -> None:
     assert one == other
 
 
-def test_what_was_lost_is_computed_again_and_nothing_else(tmp_path: Path) -> None:
+def test_only_lost_rows_are_computed_again(tmp_path: Path) -> None:
     ended = "completed", "diverged", "refused", "failed"
     plan, folder = plan_of({"a": "10:60:6"}), tmp_path / "a.parquet"
     files = RowFiles(plan, {}, folder, fresh=False)
@@ -312,7 +312,7 @@ def test_a_configuration_is_that_of_the_run_wherever_its_row_is() -> None:
         part.configuration(3)
 
 
-def test_what_cannot_be_told_is_not_told() -> None:
+def test_undecidable_influences_are_not_reported() -> None:
     with pytest.raises(SweepError, match="5 runs were completed"):
         sweeps.sensitivity(invented(10))
     with pytest.raises(SweepError, match=r"did you mean 'effort.max'\?"):

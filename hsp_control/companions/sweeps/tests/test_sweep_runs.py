@@ -69,7 +69,7 @@ def whole(scheduler: str) -> Sweep:
 @pytest.mark.process
 @pytest.mark.slow
 @pytest.mark.smoke
-def test_a_row_is_what_a_single_run_gives(swept: Sweep) -> None:
+def test_a_row_equals_a_single_run(swept: Sweep) -> None:
     row = 7
     keys = {name: swept[name][row] for name in swept.parameters}
     settings = [f"{key}={float(value)!r}" for key, value in keys.items()]
@@ -430,7 +430,7 @@ def test_a_computer_that_is_not_fit_ends_the_sweep() -> None:
 
 @pytest.mark.process
 @pytest.mark.slow
-def test_a_run_that_takes_too_long_is_a_row_and_tried_again_another_time(
+def test_a_run_with_a_timeout_is_a_row_and_tried_again_later(
     tmp_path: Path, scheduler: str
 ) -> None:
     endless = [  # a quarter of an hour
@@ -460,7 +460,7 @@ def test_a_time_limit_is_positive(limit: float) -> None:
         hsp.sweeps.sweep(MOVING, {"null_space.gain": [1, 2]}, time_limit=limit)
 
 
-def test_a_row_that_has_arrived_stays_whatever_becomes_of_its_worker() -> None:
+def test_a_received_row_is_kept_after_its_worker_dies() -> None:
     """The next run may kill its worker before the result is read."""
     row = Row(2, "completed", "")
     assert sweep_runs._row(SimpleNamespace(status="cancelled"), row) is row
@@ -468,7 +468,7 @@ def test_a_row_that_has_arrived_stays_whatever_becomes_of_its_worker() -> None:
         sweep_runs._row(SimpleNamespace(status="cancelled"), None)
 
 
-def test_what_is_no_exception_is_a_row() -> None:
+def test_a_base_exception_is_a_row() -> None:
     for error in (GeneratorExit("x"), SystemExit(3)):
 
         def fail(_: object, error: BaseException = error) -> None:
@@ -584,7 +584,7 @@ def test_another_program_s_parquet_is_refused(tmp_path: Path) -> None:
         Sweep.load(tmp_path / "b.parquet")
 
 
-def test_a_bad_key_is_found_before_any_worker_is_asked() -> None:
+def test_a_bad_key_is_found_before_any_worker_starts() -> None:
     with pytest.raises(ConfigError, match=r"null_space.gian"):
         hsp.sweeps.sweep(MOVING, {"null_space.gian": [1]})
     with pytest.raises(HspControlError, match="'x': needs the form key=value"):
@@ -593,7 +593,7 @@ def test_a_bad_key_is_found_before_any_worker_is_asked() -> None:
 
 @pytest.mark.process
 @pytest.mark.slow
-def test_whatever_raises_in_the_parent_leaves_the_folder_free(
+def test_any_exception_in_the_parent_leaves_the_folder_free(
     tmp_path: Path, scheduler: str
 ) -> None:
     out = tmp_path / "x.parquet"
@@ -610,7 +610,7 @@ def test_whatever_raises_in_the_parent_leaves_the_folder_free(
 
 
 @pytest.mark.parametrize("kind", ["fifo", "device"])
-def test_what_never_ends_is_no_table(kind: str, tmp_path: Path) -> None:
+def test_endless_input_is_no_table(kind: str, tmp_path: Path) -> None:
     path = tmp_path / "a.parquet"
     if kind == "fifo":
         os.mkfifo(path)

@@ -75,7 +75,7 @@ def test_bands_are_the_logs_columns(obstacle: tuple[Experiment, Rollout]) -> Non
     assert [band.name for band in bands_of(run, None)] == ["limit active"]
 
 
-def test_a_target_out_of_reach_is_told_with_its_distance(
+def test_a_target_out_of_reach_is_reported_with_its_distance(
     obstacle: tuple[Experiment, Rollout],
 ) -> None:
     """After 0.3 s at rest; before, it is far away."""

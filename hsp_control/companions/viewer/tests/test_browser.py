@@ -371,7 +371,7 @@ def orange(watched: Watched) -> int:
 
 @pytest.mark.slow
 @pytest.mark.browser
-def test_a_row_of_the_legend_switches_what_it_names(
+def test_a_row_of_the_legend_switches_its_objects(
     planar_page: Path, watch: Callable[..., Watched]
 ) -> None:
     watched = exported(watch, planar_page, at="#t=1")

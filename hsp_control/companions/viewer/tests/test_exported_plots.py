@@ -38,7 +38,7 @@ def held() -> ComparedRun:
 
 
 @pytest.mark.parametrize("name", ["panda_obstacle", *further(PLANAR)])
-def test_the_floor_is_what_is_measured_and_falls_with_the_period(name: str) -> None:
+def test_the_floor_is_the_measured_one_and_falls_with_the_period(name: str) -> None:
     periods, sizes = (*further(0.001), 0.002, 0.005), []
     for period in periods:
         settings = [f"simulation.control_period={period}", "simulation.duration=6"]
@@ -115,7 +115,7 @@ def test_a_distance_to_a_centre_says_so_and_has_the_radius_as_its_line(
 # -- several runs ---------------------------------------------------------------------
 
 
-def test_what_cannot_be_compared_is_said(planar: ComparedRun, tmp_path: Path) -> None:
+def test_incomparable_logs_are_reported(planar: ComparedRun, tmp_path: Path) -> None:
     path = tmp_path / "page.html"
     with pytest.raises(ExportError, match="there is no run"):
         export_html([], path)

@@ -59,7 +59,7 @@ def test_a_mesh_is_drawn_where_it_is(
     assert max(away.min(axis=0).max(), away.min(axis=1).max()) < 1e-6
 
 
-def test_what_is_there_but_no_mesh_is_said(
+def test_files_that_are_no_meshes_are_reported(
     tmp_path: Path, caplog: pytest.LogCaptureFixture
 ) -> None:
     (tmp_path / "mesh.ply").write_text("no mesh")

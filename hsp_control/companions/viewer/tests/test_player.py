@@ -187,9 +187,7 @@ def moments(page: Any) -> list[str]:
 
 
 @pytest.mark.browser
-def test_the_time_line_has_bands_and_they_say_what_they_are(
-    page: Any, viewer: Viewer
-) -> None:
+def test_the_time_line_has_labelled_bands(page: Any, viewer: Viewer) -> None:
     tell(viewer, set_clip(clip()._replace(bands=BANDS)))
     bands, name = page.locator(".bands button"), page.locator(".band-name")
     assert bands.count() == 3
@@ -225,7 +223,7 @@ def test_the_time_line_has_bands_and_they_say_what_they_are(
 
 
 @pytest.mark.browser
-def test_presenting_leaves_the_scene_its_title_and_what_happens(
+def test_presenting_leaves_the_scene_its_title_and_events(
     page: Any, viewer: Viewer
 ) -> None:
     tell(viewer, set_clip(clip()._replace(bands=BANDS)))

@@ -13,7 +13,7 @@ def turn(quaternion: Array) -> Array:
     return np.asarray(pin.Quaternion(w, x, y, z).normalized().matrix())
 
 
-def test_what_is_drawn_between_two_rows_is_on_the_way_from_one_to_the_other(
+def test_frames_between_rows_are_on_the_geodesic(
     arm: Robot,
 ) -> None:
     """Joints rotate, positions move straight, orientations rotate about one axis."""

@@ -76,7 +76,7 @@ def test_view_prints_its_address_and_keeps_no_script_waiting(
 
 @pytest.mark.process
 @pytest.mark.smoke
-def test_run_shows_what_it_computes_and_keeps_its_log(
+def test_run_shows_its_progress_and_keeps_its_log(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     assert main(["run", MOVING, "--view", "--out", str(tmp_path), *SHORT]) == 0
@@ -113,7 +113,7 @@ def test_the_page_of_a_run_opens_once_and_shows_its_robot(
 
 
 @pytest.mark.process
-def test_a_port_in_use_is_said_and_the_run_goes_on(
+def test_a_port_in_use_is_reported_and_the_run_continues(
     tmp_path: Path, log: Path, taken: int, capsys: pytest.CaptureFixture[str]
 ) -> None:
     port = ["--port", str(taken)]
@@ -128,7 +128,7 @@ def test_a_port_in_use_is_said_and_the_run_goes_on(
     assert len(Rollout.load(next(tmp_path.glob("*.npz")))) == 21
 
 
-def test_what_makes_no_sense_is_refused(
+def test_nonsensical_input_is_refused(
     log: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     assert main(["view", str(log), "--speed", "0"]) == 2

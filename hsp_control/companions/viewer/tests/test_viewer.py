@@ -126,7 +126,7 @@ def test_paths_target_and_obstacle_follow_the_log(
     ]  # fmt: skip
 
 
-def test_a_state_is_shown_with_what_the_run_did_then(
+def test_a_state_is_shown_with_its_row_of_the_run(
     arm: Robot, run: Rollout, recorder: Recorder
 ) -> None:
     viewer = Viewer(arm, transport=recorder)
@@ -218,7 +218,7 @@ def resampled(run: Rollout, rows: int) -> Rollout:
     return Rollout({k: v[near] for k, v in run.columns.items()} | {"t": t}, run.meta)
 
 
-def test_what_cannot_be_played_is_refused(arm: Robot, run: Rollout) -> None:
+def test_unplayable_sources_are_refused(arm: Robot, run: Rollout) -> None:
     viewer = Viewer(arm, transport=Recorder())
     with pytest.raises(ViewerError, match="speed -1 must be positive"):
         viewer.play(run, speed=-1)
@@ -234,7 +234,7 @@ def test_what_cannot_be_played_is_refused(arm: Robot, run: Rollout) -> None:
         other.draw_scene(run)
 
 
-def test_a_log_is_viewed_as_its_configuration_says(
+def test_a_log_is_viewed_as_configured(
     tmp_path: Path, run: Rollout, recorder: Recorder
 ) -> None:
     look = {"camera": [0, 0, 9], "speed": 20.0, "show": {"paths": False}}
@@ -257,7 +257,7 @@ def test_a_log_is_viewed_as_its_configuration_says(
     viewer.close()
 
 
-def test_a_log_whose_controller_is_gone_shows_what_its_columns_tell(
+def test_a_log_without_its_controller_is_drawn_from_columns(
     tmp_path: Path, run: Rollout, recorder: Recorder, caplog: pytest.LogCaptureFixture
 ) -> None:
     config = {**(run.config or {})}
@@ -272,7 +272,7 @@ def test_a_log_whose_controller_is_gone_shows_what_its_columns_tell(
     assert not recorder.paths("/distances")
 
 
-def test_a_log_whose_robot_is_gone_says_so(run: Rollout) -> None:
+def test_a_log_without_its_robot_is_refused(run: Rollout) -> None:
     robot = {k: v for k, v in run.meta["robot"].items() if k != "record"}
     meta = {**run.meta, "robot": robot}
     anonymous = Rollout(run.columns, {k: v for k, v in meta.items() if k != "config"})
@@ -294,7 +294,7 @@ def from_files(command: dict[str, Any]) -> list[dict[str, Any]]:
     return [each for each in things if "file" in each]
 
 
-def test_a_mesh_file_comes_once_and_before_what_is_drawn_from_it() -> None:
+def test_a_mesh_file_is_sent_once_and_before_its_objects() -> None:
     robot, recorder = load_experiment("dual_panda").robot, SceneRecorder()
     Viewer(robot, transport=recorder)
     one = SceneRecorder()

@@ -122,7 +122,7 @@ def test_without_a_browser_nothing_waits(
         assert not viewer.wait_for_browser(0.0)
 
 
-def test_a_notebook_holds_what_is_shown(arm: Robot, recorder: SceneRecorder) -> None:
+def test_a_notebook_contains_its_output(arm: Robot, recorder: SceneRecorder) -> None:
     with Viewer(arm) as viewer:
         shown = viewer._repr_html_()
     assert shown.startswith("<iframe srcdoc=")
@@ -130,7 +130,7 @@ def test_a_notebook_holds_what_is_shown(arm: Robot, recorder: SceneRecorder) -> 
     assert "127.0.0.1" not in Viewer(arm, transport=recorder)._repr_html_()
 
 
-def test_without_what_reads_meshes_a_notebook_shows_the_live_page(
+def test_without_a_mesh_reader_a_notebook_shows_the_live_page(
     arm: Robot, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     def fail(*_: object) -> None:
@@ -295,7 +295,7 @@ def test_a_page_that_lost_its_program_keeps_its_key(
     assert "fetch(location" not in asks
 
 
-def test_meshes_come_compressed_to_pages_that_say_so(steered: PageServer) -> None:
+def test_meshes_are_compressed_for_pages_that_accept_it(steered: PageServer) -> None:
     text = " ".join(map(str, range(100_000)))
     steered.send([page_command("nothing", "/mesh", "object", text=text)])
     assert steered.url is not None
@@ -390,7 +390,7 @@ def test_a_flood_is_no_more_than_its_newest_words(steered: PageServer) -> None:
 
 
 @pytest.mark.parametrize("raised", [SystemExit, KeyboardInterrupt])
-def test_a_server_that_ends_by_itself_says_so_and_leaves_nothing(
+def test_a_server_that_ends_by_itself_is_reported_and_leaves_nothing(
     raised: type[BaseException], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Its thread ends at these two; asyncio and Tornado catch all others.
@@ -477,13 +477,13 @@ def test_where_a_page_cannot_be_removed_the_server_ends(
         steered.messages()
 
 
-def test_it_is_said_what_to_install(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_missing_package_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(transport.importlib.util, "find_spec", lambda name: None)
     with pytest.raises(ViewerError, match="pip install meshcat"):
         PageServer()
 
 
-def test_a_server_that_cannot_start_says_why(
+def test_a_server_that_cannot_start_gives_the_reason(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(transport, "meshcat_page", lambda: tmp_path)
@@ -491,7 +491,7 @@ def test_a_server_that_cannot_start_says_why(
         PageServer()
 
 
-def test_a_port_that_is_taken_is_said(started: PageServer) -> None:
+def test_a_port_in_use_is_reported(started: PageServer) -> None:
     with pytest.raises(ViewerError, match=r"cannot start: cannot listen on 127\.0"):
         PageServer(port_of(started.url))
 
@@ -521,7 +521,7 @@ def test_a_browser_is_opened_only_where_there_is_one(
 # --- its parts -----------------------------------------------------------------------
 
 
-def test_the_newest_word_counts_and_order_is_kept() -> None:
+def test_the_newest_message_is_used_and_order_is_kept() -> None:
     kept = LatestCommands()
     for path, word in (("/a", b"1"), ("/a/b", b"2"), ("/ab", b"3"), ("/a", b"4")):
         kept.keep([PageCommand(path, key_of(path, "object"), word)])
@@ -548,7 +548,7 @@ def test_importing_the_package_pulls_in_no_viewer_and_that_no_meshcat() -> None:
     assert not {"meshcat", "tornado", "zmq", "IPython", "matplotlib"} & viewer
 
 
-def test_a_host_that_nobody_knows_is_named() -> None:
+def test_an_unknown_host_is_named() -> None:
     with pytest.raises(ViewerError, match=r"on no\.such\.host\.invalid: no computer"):
         PageServer(host="no.such.host.invalid")
     with pytest.raises(

@@ -62,7 +62,7 @@ def followed(follower: Follower) -> dict[str, Array]:
     return reader.rows(reader.count - 1)
 
 
-def test_a_row_is_what_the_loop_computed() -> None:
+def test_a_row_equals_the_loop_s_results() -> None:
     """The copy begins at the loop's start, though it is made later."""
     loop = Loop(controller_of())
     follower = Follower(loop.controller)
@@ -175,7 +175,7 @@ def test_a_loop_with_a_function_of_its_own_is_shown_by_its_columns(
     assert not any(path.startswith("/distances") for path in paths)
 
 
-def test_what_fails_is_said_and_does_not_reach_the_loop() -> None:
+def test_failures_are_reported_and_do_not_reach_the_loop() -> None:
     fails: BaseException | None = None
 
     def cost(state: hsp.RobotState) -> float:
@@ -204,7 +204,7 @@ def test_what_fails_is_said_and_does_not_reach_the_loop() -> None:
     assert not follower.journal.exists()
 
 
-def test_watch_refuses_what_is_no_loop() -> None:
+def test_watch_accepts_loops_only() -> None:
     with pytest.raises(ViewerError, match="a Controller or a Recorder; got Robot"):
         hsp.viewer.watch(hsp.Robot.load("panda"))
     with pytest.raises(ViewerError, match="backgroun"):

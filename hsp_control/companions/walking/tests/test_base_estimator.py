@@ -139,7 +139,7 @@ def test_from_the_truth_it_stays_there():
 
 
 @pytest.mark.parametrize("share", [0.0, 0.09])
-def test_a_foot_counts_while_it_is_pressed(share):
+def test_a_foot_is_in_contact_while_it_is_pressed(share):
     """With a tenth of the robot's weight."""
     experiment, heard = swaying()
     mass = sum(inertia.mass for inertia in experiment.robot.model.inertias)
@@ -155,7 +155,7 @@ def test_a_foot_counts_while_it_is_pressed(share):
     assert len(running.filter.names) == 8
 
 
-def test_only_the_named_contacts_count():
+def test_only_the_named_contacts_are_used():
     experiment, heard = swaying()
     own = BaseEstimator(contacts=["left_foot"])
     running = own.begin(experiment.controller, heard[0].inertial)
@@ -167,14 +167,14 @@ def test_only_the_named_contacts_count():
         wrong.begin(experiment.controller, heard[0].inertial)
 
 
-def test_without_a_force_the_controller_says_which_foot_bears():
+def test_without_a_force_the_controller_determines_the_stance_foot():
     experiment, heard = swaying()
     running = BaseEstimator().begin(experiment.controller, heard[0].inertial)
     running.update(heard[0]._replace(wrenches={}))
     assert len(running.filter.names) == 8
 
 
-def test_what_does_not_fit_is_said():
+def test_unsuitable_input_is_reported():
     arm = load_experiment("paper/2_rest").controller
     reading = Inertial("base_link", np.zeros(3), np.zeros(3))
     with pytest.raises(EstimationError, match=r"has no free-flyer root at its beg"):

@@ -39,7 +39,7 @@ def standing(name):
 
 
 @pytest.mark.parametrize("name", CASES)
-def test_estimates_are_what_rigid_contacts_exert(name):
+def test_estimates_equal_forces_of_rigid_contacts(name):
     run = standing(name)
     weight = 9.81 * sum(
         inertia.mass for inertia in load_experiment(name).robot.model.inertias
@@ -95,7 +95,7 @@ def test_a_wrench_that_moves_nothing_is_zero():
 
 
 @pytest.mark.parametrize("instead", [True, False])
-def test_measured_wrenches_are_replaced_if_asked_for(instead):
+def test_measured_wrenches_are_replaced_on_request(instead):
     experiment = load_experiment("whole_body/solo12_trunk")
     q, rest = experiment.q0, np.zeros(experiment.robot.nv)
     frames = [each.frame for each in experiment.controller.contacts]

@@ -216,7 +216,7 @@ def test_the_covariance_stays_one(seed):
 START = np.repeat([0.05, 0.1, 0.02, 0.01, 0.1], 3)
 
 
-def test_without_noise_what_can_be_observed_converges():
+def test_without_noise_observable_states_converge():
     """Tilt, velocity and biases, from a wrong start; the heading keeps its error."""
     start = START.copy()
     start[9:] = [*3 * [0.02], *3 * [0.05]]

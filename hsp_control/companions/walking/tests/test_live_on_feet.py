@@ -86,7 +86,7 @@ def live(
 
 @pytest.mark.system
 @pytest.mark.slow
-def test_a_live_plan_does_what_the_simulation_does(tmp_path: Path) -> None:
+def test_a_live_plan_equals_the_simulated_one(tmp_path: Path) -> None:
     """The estimator's errors, the plan's phases and the efforts are those of a run."""
     brief = ("estimators.base=true", "simulation.duration=0.6", *BRIEF)
     experiment = trotting(*brief)
@@ -155,7 +155,7 @@ def test_a_walk_that_is_stopped_brings_its_feet_together(plan: str) -> None:
 
 @pytest.mark.system
 @pytest.mark.slow
-def test_a_fall_is_found_said_and_ends_with_damped_joints() -> None:
+def test_a_fall_is_detected_reported_and_ends_with_damped_joints() -> None:
     push = "{frame: base_link, moment: [6, 0, 0], start: 0.3, duration: 0.3}"
     shove = f"plant.pushes=[{push}]"
     for plan in ("plan.speed=0.3", "plan=null"):
@@ -180,7 +180,7 @@ def test_a_fall_is_found_said_and_ends_with_damped_joints() -> None:
 
 
 @pytest.mark.system
-def test_what_a_plan_or_an_estimator_misses_is_said_before_the_run() -> None:
+def test_missing_input_of_a_plan_or_estimator_is_reported_before_the_run() -> None:
     felt = "plan={type: sensed, contacts: {front_left: {force: 1}}}"
     tasks = "tasks={trunk: {type: frame_orientation, frame: base_link}}"
 

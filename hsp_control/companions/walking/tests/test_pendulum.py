@@ -82,7 +82,7 @@ def test_the_error_that_bounded_feedback_leaves(error, t):
         assert abs(error_after(error, t, W, gain, reach)) <= abs(error)
 
 
-def test_a_phase_takes_as_long_as_the_component_needs():
+def test_a_phase_lasts_as_long_as_the_component_needs():
     """A foot that lands 30 ms early or late changes the duration of the weight
     shift."""
     phase = DcmPhase(0.15, np.array([0.48, -0.08]), np.array([0.74, 0.08]))

@@ -34,7 +34,7 @@ def feel(experiment, running, t, force):
     return contacts["front_left"].schedule, tasks["foot"].schedule
 
 
-def test_it_bears_when_it_is_pressed_and_its_force_rises():
+def test_it_carries_when_pressed_and_its_force_rises():
     experiment, running = reported("{force: 3, task: foot, ramp: 0.2}")
     contact, task = feel(experiment, running, 0.0, 0.0)
     assert isinstance(contact, Switch)
@@ -91,7 +91,7 @@ def test_with_height_and_force_both_must_be_felt(height, force, carries):
     ("{force: 2, wanted: [[2, 1]]}", "the interval from 2 to 1 s is empty"),
     ("{force: 2, task: fot}", "no task 'fot'; did you mean 'foot'"),
 ])  # fmt: skip
-def test_what_does_not_fit_is_said(rule, message):
+def test_unsuitable_input_is_reported(rule, message):
     with pytest.raises(HspControlError, match=message):
         reported(rule)
 
@@ -117,7 +117,7 @@ def stood(plant, *overrides, duration):
     )  # fmt: skip
 
 
-def test_on_rigid_contacts_it_follows_what_the_plant_does():
+def test_on_rigid_contacts_it_tracks_the_plant():
     """The plant's contact is lost and regained; the controller detects both."""
     feet = ("FL_FOOT", "FR_FOOT", "HL_FOOT", "HR_FOOT")
     plant = RigidContacts(

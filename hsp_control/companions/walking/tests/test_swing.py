@@ -141,7 +141,7 @@ def test_a_step_keeps_away_from_the_other_foot_and_within_reach():
     assert place.local(far.point) == pytest.approx([0.6, -0.4])
 
 
-def test_full_turns_do_not_count_between_feet():
+def test_full_turns_between_feet_are_ignored():
     a, b = Footstep(0.0, 0.0, 3.1), Footstep(0.0, 0.2, -3.1)
     assert between(a, b).yaw == pytest.approx(np.pi)
     assert near(0.1, 4 * np.pi) == pytest.approx(0.1 + 4 * np.pi)

@@ -51,7 +51,7 @@ def test_it_returns_to_its_line_after_a_push():
 
 @pytest.mark.slow
 @pytest.mark.parametrize("degrees", further(10.0))
-def test_down_a_ramp_a_foot_bears_while_the_other_one_looks_for_ground(degrees):
+def test_down_a_ramp_a_foot_carries_while_the_other_seeks_ground(degrees):
     """A hind foot is on the platform, the diagonal one above missing ground."""
     until = "plan.until=2", "simulation.duration=4"
     run = load_experiment("walking/solo12_trot", *ramp(degrees, 0.4), *until).run()

@@ -91,7 +91,7 @@ def test_it_adds_what_it_needs_and_keeps_what_is_given(talos):
         (Walk(trunk="base_lnk"), [], FEET, "plan.trunk: no ... 'base_lnk'"),
     ],
 )  # fmt: skip
-def test_what_does_not_fit_is_said(talos, walk, tasks, contacts, message):
+def test_unsuitable_input_is_reported(talos, walk, tasks, contacts, message):
     with pytest.raises(HspControlError, match=wording(message)):
         walk.parts(talos, tasks, contacts)
 
@@ -132,7 +132,7 @@ def test_a_velocity_is_given_once_and_has_three_numbers():
     (["contacts.left_foot.width=0.2", "contacts.right_foot.width=0.2"],
      "... plan: ... 'left_foot' and 'right_foot' ... 0.17 m ... 0.2 m"),
 ])  # fmt: skip
-def test_what_the_robot_cannot_do_is_said_before_it_runs(overrides, message):
+def test_infeasible_parts_are_reported_before_the_run(overrides, message):
     with pytest.raises(HspControlError) as caught:
         load_experiment(WALK, *overrides)
     assert re.search(wording(message), str(caught.value))
@@ -212,6 +212,6 @@ def test_footsteps_are_taken_from_the_middle_between_the_feet():
     ("[[0.2, 0.085]]", "... footsteps"),
     ("[[0.2, 0.085, 0]], speed: 0.2", "... either footsteps or speed"),
 ])  # fmt: skip
-def test_footsteps_that_legs_do_not_reach_are_said(rows, message):
+def test_footsteps_out_of_reach_are_reported(rows, message):
     with pytest.raises(HspControlError, match=wording(message)):
         load_experiment(WALK, GIVEN % rows)

@@ -105,7 +105,7 @@ def test_the_null_space_error_decays_within_each_phase():
 
 @pytest.mark.slow
 @pytest.mark.system
-def test_a_push_that_fells_is_said():
+def test_a_push_that_causes_a_fall_is_reported():
     push = "{frame: torso_2_link, force: [0, 900, 0], start: 0.1, duration: 0.3}"
     settings = (f"plant.pushes=[{push}]", "simulation.duration=3")
     run = load_experiment("walking/talos_walk", *settings).run()

@@ -343,7 +343,7 @@ def test_a_modifier_cannot_write_the_stack() -> None:
 
 
 @pytest.mark.parametrize("by", ["a modifier", "the controller"])
-def test_nobody_steps_the_active_stack(by: str) -> None:
+def test_the_active_stack_cannot_be_stepped(by: str) -> None:
     panda = hsp.Robot.load("panda")
     own = hsp.Controller(panda, [hsp.FramePosition(FRAME)])
     q, v = panda.home(), np.zeros(NV)
@@ -502,7 +502,7 @@ def test_a_fork_while_a_thread_computes_is_one_error() -> None:
 
 
 @pytest.mark.parametrize("copied", [copy.copy, copy.deepcopy, pickle.dumps])
-def test_what_a_step_writes_is_not_copied(copied: Callable[[object], object]) -> None:
+def test_results_of_a_step_are_not_copied(copied: Callable[[object], object]) -> None:
     """A stack belongs to its controller; `stack_at` returns an independent one."""
     made = hsp.Controller(hsp.Robot.load("panda"), [hsp.FramePosition(name="hand")])
     made.compute(0.0, made.robot.home(), np.zeros(NV))

@@ -16,7 +16,7 @@ def forced(config: str, contact: str, newtons: object) -> list[str]:
     return [f"forces/{config}", "--set", f"changes=[{ramp}{newtons}}}}}]"]
 
 
-def test_a_wipe_that_loses_contact_is_told_before_and_after_it(
+def test_a_wipe_that_loses_contact_is_reported_before_and_after_it(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     fast = ["--set", "tasks.path.trajectory.angular_rate=3"]
@@ -38,7 +38,7 @@ def test_a_wipe_that_loses_contact_is_told_before_and_after_it(
 @pytest.mark.parametrize(
     ("newtons", "had"), [(60, None), (150, r"at most 85\.\d of 150 N")]
 )
-def test_check_tells_of_a_force_that_soles_cannot_balance(
+def test_check_reports_a_force_that_soles_cannot_balance(
     newtons: float, had: str | None, capsys: pytest.CaptureFixture[str]
 ) -> None:
     """With the centre of mass as at the start; a run at 150 N ends with 114 N."""

@@ -36,7 +36,7 @@ def test_soft_limits_are_limits(
     assert (lower[1], upper[1]) == (-3.0, 3.0)
 
 
-def test_soft_limits_of_followers_and_of_unlimited_joints_count(write: Write) -> None:
+def test_soft_limits_of_followers_and_of_unlimited_joints_apply(write: Write) -> None:
     text = ARM.replace('lower="-3" upper="3"', "", 1)
     text = text.replace("</joint>", soft(-0.1, 0.2), 1)
     lower, upper = Robot.load(write(text)).position_limits()
