@@ -274,7 +274,7 @@ def panda_pose(robot: hsp.Robot, field: hsp.NullSpaceField) -> hsp.Controller:
 
 
 def states(robot: hsp.Robot, count: int) -> list[State]:
-    """Return random states near the robot's home or bent posture."""
+    """Return random states near the robot's home or flexed posture."""
     rng = np.random.default_rng(1)
     start = bent(robot) if robot.name.startswith("chain") else robot.home()
     return [
@@ -419,7 +419,7 @@ def main() -> None:
     parser.add_argument(
         "--draw",
         action="store_true",
-        help="only draw what the page has, measure nothing",
+        help="only redraw the page's figures, measure nothing",
     )
     options = parser.parse_args()
     if options.draw:

@@ -19,7 +19,7 @@ from shared.edge_loop import Case
 
 KINDS = ("position", "pose", "stream", "step", "circle")
 BEYOND = (0.05, 1.0)  # how far out of reach [m]
-SPREAD = 0.3  # of the starts about a bent posture [rad]
+SPREAD = 0.3  # of the starts about a flexed posture [rad]
 STEP, RADIUS, RATES = 0.5, 0.1, (2.0, 4.0)  # [m, m, rad/s]
 STARTS = 8  # of inverse kinematics
 ROOM = 0.1  # to the ends of joints along paths within reach [rad]

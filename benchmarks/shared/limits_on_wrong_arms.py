@@ -1,6 +1,6 @@
-"""How far does an arm that is not quite its model leave its limits? Random cases.
+"""Excess over limits of arms with model errors: random cases.
 
-Masses ±20 %, centres ±10 mm, friction, a load of 1 kg that nobody declared, efforts
+Masses ±20 %, centres ±10 mm, friction, an undeclared load of 1 kg, efforts
 2 ms late and then with a lag of 3 ms, a velocity with noise of 0.01 rad/s, at 1 kHz.
 Each case drives joints against their ranges: a pose, a posture, or a field that pushes.
 Without compensation, and with a momentum observer. How far the true position

@@ -14,7 +14,7 @@ from hsp_control.constraints.limits import RobotLimits
 T = TypeVar("T")
 STEP = 1e-3  # of the integrator [s]
 PERIODS = (1e-3, 2e-3, 5e-3, 10e-3)  # for which an effort is held [s]
-ROUNDING = 1e-9  # excess over a limit that is not counted as a violation
+ROUNDING = 1e-9  # excess over a limit that is not regarded as a violation
 
 
 def beyond(

@@ -28,9 +28,9 @@ def step_times(
 ) -> dict[str, Any]:
     """Return the median time of a step in each round, shape (rounds,) [s], by name.
 
-    In every round each controller gets the same block of consecutive states, one after
-    the other, in an order that rotates. What times its own steps was made for these
-    states.
+    In every round the controllers get the same block of consecutive states, one after
+    the other, in a rotating order. A controller that times its own steps was made for
+    these states.
     """
     for compute in controllers.values():
         if not isinstance(compute, Timed):

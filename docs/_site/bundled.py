@@ -1,4 +1,4 @@
-"""The pages of what has a name: configurations and robots."""
+"""The pages of bundled configurations and robots."""
 
 import yaml
 from prose import paragraphs, plain

@@ -1,4 +1,4 @@
-"""The pages of all public names; autodoc writes what is in their docstrings."""
+"""The pages of all public names; autodoc renders their docstrings."""
 
 import re
 from collections.abc import Iterable
@@ -30,7 +30,7 @@ def names_page() -> str:
     spaces = [f"hsp.{name}" for name in sorted(_SPACES)]
     tree = "\n".join(spaces)
     return (
-        "# Python\n\n`import hsp_control as hsp`. What most programs need is in "
+        "# Python\n\n`import hsp_control as hsp`. The most common names are in "
         "`hsp` itself; all others are in its namespaces.\n\n"
         "| name | |\n|---|---|\n" + "\n".join(rows) + "\n\n"
         f"```{{toctree}}\n:maxdepth: 1\n:caption: Namespaces\n\n{tree}\n```\n"

@@ -40,7 +40,7 @@ def _keys(part: dict[str, Any]) -> list[str]:
 
 
 def _values(about: dict[str, Any]) -> str:
-    """Return what a key may be, in words."""
+    """Return the permitted values of a key, in words."""
     if "$ref" in about:
         name = about["$ref"].rsplit("/", 1)[1]
         return f"[{name}](#yaml-{name})"

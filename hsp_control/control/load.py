@@ -12,7 +12,7 @@ from hsp_control.robot import RobotState
 _RATE = 3.0
 """Rate K of the low-pass [1/s]."""
 _HEAD_START = 0.05
-"""Time T₀ that is counted besides that since the first state [s]: 1/k, so that an error
+"""Time T₀ added to that since the first state [s]: 1/k, so that an error
 of a velocity in the first period moves a braked joint no faster than the error."""
 _BEFORE = 0.2
 """Age of the estimate that is used [s]: a fault is detected within this time,

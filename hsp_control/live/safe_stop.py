@@ -144,7 +144,7 @@ class SafeStop:
         load = self._bound_to(state).load
         load.permit(self._effort_limits)
         self._acts[:] = acts
-        load.changed(~silent)  # without what the last change itself is taken for
+        load.changed(~silent)  # without the apparent load of the last change itself
         self._learn()
 
     def trust(self, *, measurements: bool, dead: Flags) -> None:

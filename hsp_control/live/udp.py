@@ -83,7 +83,7 @@ class SensorLayout(NamedTuple):
 
 
 _PAUSE = 0.1
-"""Time after which it is asked again whether the other end still runs [s]."""
+"""Time after which the other end is polled again [s]."""
 _AGAIN = 0.5
 """Time between two states of a robot in lockstep that waits for an effort [s]."""
 _BYES = 3
@@ -98,7 +98,7 @@ class UdpHardware:
 
     Attributes:
         period: Time between two states [s].
-        link: The connection, with its counts of packets.
+        link: The connection, with its packet counters.
         real_time: Whether its time passes as ours does: not in lockstep.
         closed: Whether `close` was called.
     """
@@ -173,7 +173,7 @@ class UdpHardware:
         return self._last
 
     def _robot_s_turn(self) -> list[Packet]:
-        """Wait for what the robot sends in its turn; nothing once it has ended."""
+        """Wait for the robot's packets of its turn; none once it has ended."""
         self._end_turn()
         while (packets := self.link.turn(_PAUSE)) is None:
             if self._alive is not None and not self._alive():
@@ -268,7 +268,7 @@ def serve(
         lockstep: Whether to wait for the loop.
 
     Returns:
-        The counts.
+        The counters.
     """
     report, nv = ServerReport(), robot.plant.robot.nv
     sensors = SensorLayout.of(robot.measured())

@@ -283,7 +283,7 @@ class Structure:
         """
         try:
             return self._frame_ids[name]
-        except (KeyError, TypeError):  # also what is no name, such as a list
+        except (KeyError, TypeError):  # also objects that are no names, such as a list
             raise FrameNotFoundError(
                 f"no frame {name!r}{did_you_mean(name, self.frame_names)} "
                 f"(the model has {listing(self.frame_names)})"

@@ -54,7 +54,7 @@ class BipedPlan(MovingPlan):
     lift: Positive = 0.05
     """Height to which a foot is lifted [m]."""
     crouch: NonNegative = 0.04
-    """Distance by which the centre of mass is lowered, so that the knees stay bent
+    """Distance by which the centre of mass is lowered, so that the knees stay flexed
     [m]."""
     acceleration: Positive = 0.4
     """Maximum rate of change of the velocity, from step to step [m/s²]."""

@@ -117,7 +117,7 @@ class ImperfectPlant(SampledPlant):
         return self.plant.contact_wrenches(t, q, v, applied)
 
     def inertial(self) -> Inertial | None:
-        """Return the reading of its own unit, or of the plant's."""
+        """Return the reading of its IMU, or of the plant's."""
         for sense in self._sensing:
             if isinstance(sense, RunningImu):
                 return sense.reading

@@ -179,7 +179,7 @@ class Taken(NamedTuple):
     """A message in a record."""
 
     message: Message
-    t: float  # when the step was that took it [s]
+    t: float  # time of the step that read it [s]
 
 
 class Reader:

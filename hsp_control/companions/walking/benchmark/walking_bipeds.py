@@ -4,9 +4,9 @@ r"""Other bipeds walk by the same plan, with its defaults: how fast, and how wel
         [--unitree FOLDER] [part of a name]
 
 Prints one line for each robot and speed: six steps on MuJoCo at 1 kHz, and a second of
-standing. Nothing is tuned: a robot has its joints bent a little, soles as large as its
-meshes or an estimate of them, and ``plan: {type: walk, speed: ...}``. ``--unitree`` is
-the folder ``robots`` of github.com/unitreerobotics/unitree_ros, whose robots
+standing. Nothing is tuned: a robot has its joints slightly flexed, soles as large as
+its meshes or an estimate of them, and ``plan: {type: walk, speed: ...}``. ``--unitree``
+is the folder ``robots`` of github.com/unitreerobotics/unitree_ros, whose robots
 example-robot-data has not.
 """
 
@@ -35,7 +35,7 @@ ROMEO_HANDS = [
 
 @dataclass(frozen=True)
 class Biped:
-    """A biped: its feet, and how its knees are bent.
+    """A biped: its feet, and its knees' flexion.
 
     Attributes:
         robot: The robot, as in a configuration.
