@@ -56,7 +56,7 @@ def pytest_collection_finish() -> None:
     gc.enable()
     frozen = gc.get_freeze_count()
 
-    # Counting half a million objects takes 50 ms, which each loop does as it begins.
+    # Counting half a million objects takes 50 ms, at the start of every loop.
     @wraps(gc.get_freeze_count)
     def known() -> int:
         return frozen

@@ -1,4 +1,4 @@
-"""The effect of each constant of the edge: the same cases with half, twice or none.
+"""The effect of the edge's constants: the same cases with half, twice or none.
 
     .venv/bin/python benchmarks/ablation.py [--cases N] [--robots ROBOT ...] [NAME ...]
 

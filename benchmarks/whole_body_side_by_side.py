@@ -91,7 +91,7 @@ class Run:
 
 
 def close_loop(case: Standing, engine: Engine, made: Made, duration: float) -> Run:
-    """Run a controller on a plant, with its effort held each period."""
+    """Run a controller on a plant, with its effort held every period."""
     run, rows = Run(), []
     compute, statuses = made
     q, v = case.q0.copy(), np.zeros(case.robot.nv)

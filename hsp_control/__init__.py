@@ -117,7 +117,7 @@ _NAMES = {
     "config": "Experiment Recorder load_experiment",
     "common.exceptions": "HspControlError",
 }
-"""The public names, by the room from which each is imported at its first use."""
+"""The public names, by the module from which they are imported at first use."""
 
 _NAMESPACES = {
     "changes": "control.changes",
@@ -139,7 +139,7 @@ _NAMESPACES = {
     "tasks": "tasks",
     "trajectories": "trajectories",
 }
-"""The public namespaces, and the room that each stands for."""
+"""The public namespaces, and the modules that they stand for."""
 
 _HOMES = {name: room for room, names in _NAMES.items() for name in names.split()}
 

@@ -35,7 +35,7 @@ def columns_of(path: Path) -> dict[str, Array]:
 
 
 def differences(kept: dict[str, Array], now: dict[str, Array]) -> list[str]:
-    """Return a line for each column that is not the same, or that is missing.
+    """Return a line per column that is not the same, or that is missing.
 
     Columns that are new are no difference.
     """

@@ -87,7 +87,7 @@ def _of_python(text: str) -> Iterator[Edit]:
 
 
 def _changed(tree: ast.AST) -> Iterator[tuple[ast.expr | ast.stmt, str]]:
-    """Return each node that an edit replaces, and the text instead of it."""
+    """Return the nodes that an edit replaces, and the replacement texts."""
     for node in _told(tree):
         match node:
             case ast.BinOp(op=op) if type(op) in OPERATORS:

@@ -164,7 +164,7 @@ def case(arm: Arm, kind: str, rng: np.random.Generator) -> Case:
 
 
 def cases(robots: list[str], count: int) -> list[Case]:
-    """Return ``count`` cases of each kind for each robot; the same in every call."""
+    """Return ``count`` cases of each kind for every robot; the same in every call."""
     found = []
     for name in robots:
         arm = Arm(name)

@@ -25,7 +25,7 @@ class Measured(NamedTuple):
         violated: Number of steps beyond the limits of effort, its rate, speed and
             position, shape (4,).
         excess: Largest excess of a position [rad or m]; negative: the remaining range.
-        changes: Largest change of an effort in each millisecond, as a part of its
+        changes: Largest change of an effort in every millisecond, as a part of its
             limit; empty where periods are longer, or the rate is limited.
     """
 

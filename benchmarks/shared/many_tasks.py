@@ -27,8 +27,8 @@ class Poses:
         name: Name in the table.
         robot: The robot.
         q0: Start configuration, shape (nq,) = (nv,).
-        frames: Names of the frames; six task rows each.
-        trajectories: One pose trajectory for each frame.
+        frames: Names of the frames, with six task rows per frame.
+        trajectories: One pose trajectory per frame.
     """
 
     name: str

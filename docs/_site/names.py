@@ -21,7 +21,7 @@ _SPACES = {
 
 
 def names_page() -> str:
-    """Return the page of the names at the top, each a link to its namespace's page."""
+    """Return the page of the top-level names, with links to their namespaces' pages."""
     rows, homes = [], _homes()
     for name, room in hsp_control._HOMES.items():
         value = getattr(hsp_control, name)
@@ -45,7 +45,7 @@ def _summary(value: Any) -> str:
 
 
 def namespace_pages() -> Iterable[tuple[str, str]]:
-    """Return the page of each namespace, with its name."""
+    """Return the pages of namespaces, with their names."""
     homes = _homes()
     for name, room in _SPACES.items():
         module = import_module(f"hsp_control.{room}")
@@ -53,7 +53,7 @@ def namespace_pages() -> Iterable[tuple[str, str]]:
 
 
 def _homes() -> dict[str, str]:
-    """Return under which name each class and function is described, once."""
+    """Return the names under which classes and functions are described, once."""
     found: dict[str, str] = {}
     for room in _SPACES.values():
         module = import_module(f"hsp_control.{room}")

@@ -7,7 +7,7 @@ from prose import paragraphs, plain
 
 
 def yaml_page(schema: dict[str, Any]) -> str:
-    """Return the page of all keys: those of a file, then those of each part."""
+    """Return the page of all keys: those of a file, then those of the parts."""
     lines = ["# YAML keys", "", plain(schema["description"]), ""]
     lines += [
         "`hsp schema` writes the same as JSON schema, for completion in editors.",

@@ -131,7 +131,7 @@ def _exact(controller: Controller) -> dict[str, Any] | None:
 
 
 def _rates(controller: Controller) -> list[float | None]:
-    """Return the bound on each effort's rate [N·m/s or N/s]; None without one."""
+    """Return the bound on every effort's rate [N·m/s or N/s]; None without one."""
     if controller.limits is None:
         return [None] * controller.robot.nv
     rates = controller.limits.effort_rate.tolist()

@@ -1,4 +1,4 @@
-"""Additions to the core, each for one kind of user.
+"""Additions to the core, by type of user.
 
 The core imports nothing from here. It finds a companion's additions by the entry points
 in pyproject.toml: types of a configuration, commands of `hsp`, robots, formats. A

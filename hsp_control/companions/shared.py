@@ -14,7 +14,7 @@ def at_first_use(
 
     Args:
         package: Its ``__name__``.
-        names: Its modules, each with the public names that it has, between spaces.
+        names: Its modules with their public names, between spaces.
     """
     homes = {name: module for module, there in names.items() for name in there.split()}
 

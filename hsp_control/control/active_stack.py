@@ -210,7 +210,7 @@ class ActiveStack:
 
     @cached_property
     def calls(self) -> list[Callable[[float], Any]]:
-        """The calls of `resolve`, each of the time [s]; bound when first read."""
+        """The calls of `resolve`, functions of the time [s]; bound when first read."""
         state, metric, field = self._state, self._metric, self._field
         problem = self.law.problem
         calls = [*self._calls]

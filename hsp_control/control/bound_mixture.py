@@ -27,7 +27,7 @@ Shares = Sequence[tuple[float, ActiveStack]]
 class Choice(NamedTuple):
     """Which sets of contacts and tasks a step resolves; see `Mixture`."""
 
-    # which tasks and contacts fade, and which of them each stack has
+    # the fading tasks and contacts, and those that a stack has
     fading: Sequence[PlannedTask | PlannedContact]
     members: Mapping[ActiveStack, Sequence[bool]]
     at: Callable[[float], Shares]  # the same, chosen in Python
@@ -74,7 +74,8 @@ class BoundMixture:
             evolving: The calls that write changing values, at a time.
         """
         self.state, self._choice = state, choice
-        # in this order those with a share follow one another, each with one more part
+        # in this order active ones are consecutive, with one more part from one to the
+        # next
         self._stacks = sorted(choice.members, key=_size)
         self._places = {each: k for k, each in enumerate(self._stacks)}
         count, many = len(self._stacks), len(limits.all)
@@ -199,7 +200,7 @@ class _Placed:
     """The forces of the contacts of several stacks, one after another."""
 
     def __init__(self, supports: Sequence[Support]) -> None:
-        """Give each contact its place."""
+        """Assign indices to contacts."""
         self._places: dict[int, slice] = {}  # by the contact's identity
         self._columns: dict[Support, Indices] = {}
         self.size = 0

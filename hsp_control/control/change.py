@@ -1,4 +1,4 @@
-"""Changes of a controller while it runs: the base class, and each kind of change."""
+"""Changes of a controller while it runs: the base class, and the kinds of changes."""
 
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
@@ -43,7 +43,7 @@ class Change(Part, ABC, family="changes", error=ControllerError):
     """A change that begins at a time and takes a while; efforts stay continuous.
 
     Changes apply in the order of their times, whatever the order in which they are
-    made. Each continues from the values then in force, so that several may overlap. A
+    made. They continue from the values then in force, so that several may overlap. A
     subclass implements `apply`, and `Controller.change` makes it. With a ramp it is an
     `Evolution` of the `Setup`: ``gain``, ``gravity``, and each task's ``gains`` and
     ``presence``; ``setup.gain.then(self.at, self.ramp, target)`` is the next one. All

@@ -69,7 +69,7 @@ __all__ = [
 class Changes:
     """Makes changes that begin at one time: the result of `Controller.at`.
 
-    Each method makes one change and returns the object, so that calls can be chained::
+    A method makes one change and returns the object, so that calls can be chained::
 
         controller.at(1.0).ramp(0.5).gains("hand", stiffer).remove("posture")
     """
@@ -180,7 +180,7 @@ class Changes:
 
 @dataclass(frozen=True)
 class TimeLine:
-    """The setup in force at each time."""
+    """The setup in force at every time."""
 
     start: Start  # where the parts were placed
     declared: tuple[Change, ...]  # those of every run, as they were given
@@ -207,7 +207,7 @@ class TimeLine:
         return tuple(sorted((*self.declared, *self.made), key=lambda each: each.at))
 
     def streams(self) -> Iterator[StreamRun]:
-        """Yield the streams that something follows, or will, each once."""
+        """Yield the streams that are in use, now or later, once."""
         setup = self.setup
         tasks = [each.task for each in setup.tasks]
         fields = [each.field for each in setup.terms]

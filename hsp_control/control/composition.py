@@ -160,7 +160,7 @@ class Composition:
 
     @property
     def planned_levels(self) -> tuple[tuple[PlannedTask, ...], ...]:
-        """The same tasks as they are planned, each with its key."""
+        """The same tasks as they are planned, with their keys."""
         now = self._in_force.latest
         levels = [
             tuple(each for each in level if each.presence.at(now) > 0.0)

@@ -233,7 +233,7 @@ class Controller(Commanded):
 
     def _while_free(self, advance: Callable[[FreeStep], int]) -> int:
         """Let the engine's loop make steps that are free; return how many it made."""
-        # Each is a `compute` that finds no limit violated, and an `applied` for the
+        # A step is a `compute` that finds no limit violated, and an `applied` for the
         # period of the last one. There are none where something changes, is streamed,
         # is no native call, or the last effort was not the law's own.
         with self._lock:
@@ -470,7 +470,7 @@ class Controller(Commanded):
 
     @property
     def task_rows(self) -> Mapping[str, slice]:
-        """The rows of each task in the last output's stack, by name."""
+        """The tasks' rows in the last output's stack, by name."""
         return self._active.task_rows
 
     def diagnose(self) -> Diagnostics:

@@ -56,7 +56,7 @@ class DeclaredController:
         scene: Scene | Iterable[Obstacle],
         start: ArrayLike | None,
     ) -> None:
-        """Check each part by itself; `Controller` documents the arguments."""
+        """Check the parts separately; `Controller` documents the arguments."""
         if isinstance(robot, str | Path):
             raise ControllerError(f"robot is {robot!r}; needs Robot.load({robot!r})")
         if isinstance(robot, pin.Model):

@@ -38,7 +38,7 @@ class FollowedImpedance:
 
         Args:
             in_force: Of the task.
-            ends: Where each part of its error ends, shape (parts,).
+            ends: Ends of the parts of its error, shape (parts,).
         """
         self.numbers = in_force.numbers
         rows = self.numbers.shape[1]

@@ -138,7 +138,7 @@ class GainsInForce:
 
     @property
     def stiffening(self) -> bool:
-        """Whether impedances change, or wait; then `delay` belongs to each step."""
+        """Whether impedances change, or wait; then `delay` belongs to every step."""
         return self._changing or bool(self._waiting)
 
     def delay(self, active: ActiveStack, t: float, period: float) -> None:

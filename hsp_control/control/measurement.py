@@ -62,7 +62,7 @@ class Measurement(NamedTuple):
             `Hardware.write` (libfranka's ``tau_J_d``), shape (nv,), where the hardware
             knows it; None: the effort sent last is used.
         fault: Why the robot must be stopped safely, if hardware knows a reason.
-        wrenches: The wrench of the world on the robot at each contact, by the name of
+        wrenches: The wrench of the world on the robot at every contact, by the name of
             its frame: force and moment about the frame's origin, world axes, shape (6,)
             [N, N·m]; of the period that ends now. Frames without one are missing.
         estimated: The frames whose wrench was not measured, but estimated.

@@ -32,7 +32,7 @@ AccelerationModifier = Callable[
 ]
 """How compensators act between the law and the limits: a function of (state, active
 stack, a). It returns the acceleration to deliver, shape (nv,), and an additional effort
-besides M a + N, shape (nv,), or None. While tasks fade it is called for each set of
+besides M a + N, shape (nv,), or None. While tasks fade it is called for every set of
 them, weighted by the stack's `share`. State and stack are read-only; a is a copy."""
 
 
@@ -120,7 +120,7 @@ class Mixture:
             if stack in alive and id(limits.limits) in sets
         }
         self._active: dict[tuple[tuple[int, ...], Set[int]], ActiveStack] = {}
-        # the stacks that were bound ahead, and which of the fading parts each has
+        # the stacks that were bound ahead, and the fading parts that they have
         self._prepared: dict[ActiveStack, list[bool]] = {}
         self._fading = [each for each in setup.tasks if not each.always]
         self._moving = [each for each in setup.contacts if not each.always]

@@ -36,7 +36,7 @@ class _Docstring:
 
 
 class ValueClass(ABCMeta):
-    """Makes each part a value class, and registers it with its family."""
+    """Makes parts value classes, and registers them with their families."""
 
     def __new__(
         mcs,

@@ -1,4 +1,4 @@
-"""Tasks that come and go: a step of each set of them, and the mean of some.
+"""Tasks that fade: a step per set of them, and the mean of some.
 
 A frozen plan has the calls of every set of the tasks whose presence is an input; a step
 makes those of the sets that have a share, as `Mixture` does.
@@ -64,7 +64,7 @@ class TaskSets:
 
     Attributes:
         names: The tasks that come and go.
-        presences: How far each of them is present, in [0, 1], shape (k,).
+        presences: Their presences, in [0, 1], shape (k,).
         reported: The reports of a step on all tasks.
     """
 

@@ -184,7 +184,7 @@ class PostureSearch:
     ) -> tuple[list[Reached], list[Judgement]]:
         """Return where inverse kinematics end, and those postures that are there.
 
-        ``starts``: where each begins, and the posture that attracts it, shapes (nv,).
+        ``starts``: initial postures, and those that attract them, shapes (nv,).
         """
         bounds = self._lower, self._upper
         found = [
@@ -229,7 +229,7 @@ class PostureSearch:
         return np.asarray(lower + share * (upper - lower))
 
     def _assembled(self, least: float) -> Iterator[Array]:
-        """Yield displacements in which each arm is good by itself, shape (nv,).
+        """Yield displacements in which the arms are good separately, shape (nv,).
 
         Where one posture in five is good for an arm, one in 25 is for two of them, but
         they hardly depend on one another. All else is at home.

@@ -271,7 +271,7 @@ class Link:
 
     @property
     def injected(self) -> dict[str, int]:
-        """Number of faults of each kind that were injected into packets sent."""
+        """Number of faults injected into sent packets, by kind."""
         return dict(self._faults.injected)
 
     @property

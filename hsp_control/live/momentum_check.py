@@ -84,14 +84,14 @@ class MomentumCheck:
     """Compares changes of momentum, M Δv, with the impulse of the efforts.
 
     In a time w a joint's momentum changes by the integral of tau - h, and by other
-    effects: friction, an error of the masses, contacts. Each of them is bounded
+    effects: friction, an error of the masses, contacts. They are bounded
     (`LiveSettings.friction`, `LiveSettings.contact`), so a larger residual is a hard
     collision, or position and velocity are wrong in the same way. A joint may follow
     its effort by less, because of a rotor that the model lacks.
 
     Attributes:
         beyond: Joints whose momentum changes by more, shape (nv,).
-        rest: The residual: other efforts on each joint, shape (nv,) [N·m or N].
+        rest: The residual: other efforts on every joint, shape (nv,) [N·m or N].
     """
 
     def __init__(

@@ -13,7 +13,7 @@ load."""
 _START_PERIODS = 5
 """Number of periods for which its own effort may last after that."""
 _FADES = 0.99
-"""Factor by which an excess beyond all sent efforts must decrease each period: a
+"""Factor by which an excess beyond all sent efforts must decrease every period: a
 filter of 1.6 Hz at 1 kHz."""
 
 

@@ -1,4 +1,4 @@
-"""Reads the robot's state each period, checks it, and predicts missing ones."""
+"""Reads the robot's state every period, checks it, and predicts missing ones."""
 
 from collections.abc import Callable
 from contextlib import nullcontext

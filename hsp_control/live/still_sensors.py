@@ -37,7 +37,7 @@ class StillSensors:
 
     Attributes:
         dead: Joints whose sensor is dead, shape (nv,).
-        beyond: Each joint's effort beyond its holding effort, shape (nv,) [N·m].
+        beyond: The joints' efforts beyond their holding efforts, shape (nv,) [N·m].
     """
 
     def __init__(

@@ -44,7 +44,7 @@ class ExpectedMotion:
     """The velocity of a joint expected by the model, from each of its sources.
 
     The sources are the rows of all arrays: the measured velocity, the slope of the
-    positions, and the mean of the trusted ones of these. Each expectation is integrated
+    positions, and the mean of the trusted ones of these. An expectation is integrated
     with the model under the efforts applied, and follows its source by a limited step,
     so that a jump of a sensor is not followed at once; a second state estimates the
     acceleration that the model lacks.
@@ -98,7 +98,7 @@ class ExpectedMotion:
 
         Args:
             measured: The velocity, and the slope of the positions, shape (2, nv).
-            trusted: Whether each is trusted, shape (2, nv). A joint without a trusted
+            trusted: Whether they are trusted, shape (2, nv). A joint without a trusted
                 one continues as expected.
             passed: Time since the last ones [s].
             braked: Whether the joints are braked, and must follow their efforts.

@@ -245,7 +245,7 @@ def serve(
 ) -> ServerReport:
     """Run a robot in real time, until it has stopped and was held.
 
-    Each period: receive efforts, advance the plant, send the state. An effort that
+    In a period: receive efforts, advance the plant, send the state. An effort that
     arrives within the period of its state acts from that state on, as if it had been
     computed instantly; a later one acts from the next period on.
 
@@ -287,7 +287,7 @@ def serve(
                 return []
             if monotonic() > end:
                 robot.halt(f"the loop did not answer for {start_timeout:g} s")
-                alone = True  # else each period of the stop would wait as long
+                alone = True  # else every period of the stop would wait as long
                 return []
         return packets
 

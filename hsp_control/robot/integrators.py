@@ -124,7 +124,7 @@ class Integrator(Part, ABC, family="integrators", error=SimulationError):
 
 
 def bound(dynamics: Dynamics) -> Bind:
-    """Return dynamics as integrators call them: of the same arrays each time."""
+    """Return dynamics as integrators call them: of the same arrays every time."""
 
     def bind_dynamics(q: Array, v: Array) -> Term:
         value = np.zeros_like(v)
@@ -151,7 +151,7 @@ class FixedStep(Integrator):
 
 
 class Rk4(FixedStep, type="rk4"):
-    """The classical fourth-order Runge-Kutta step, with a new chart in each step."""
+    """The classical fourth-order Runge-Kutta step, with a new chart in every step."""
 
     def begin(self, robot: Robot, bind_dynamics: Bind) -> "Steps":
         """Return the running integrator; see `Integrator.begin`."""

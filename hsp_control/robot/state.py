@@ -1,4 +1,4 @@
-"""The robot at one time: kinematic and dynamic terms, each computed once per state.
+"""The robot at one time: kinematic and dynamic terms, computed once per state.
 
 The controller gets its kinematics and dynamics from `RobotState`, by calls of the
 engine, which has Pinocchio's algorithms. Other modules call Pinocchio's bindings only

@@ -51,7 +51,8 @@ class LogWriter:
     """Writes the log of a run; an incomplete row is never written.
 
     Attributes:
-        path: The journal that gets each row at once; None: rows stay in memory only.
+        path: The journal, to which rows are written at once; None: rows stay in memory
+        only.
         plan: The plan that the robot follows; its streams are recorded. None: no plan.
     """
 
@@ -232,7 +233,7 @@ class LogWriter:
     def _find_sources(
         self, active: ActiveStack, law: StepRecord
     ) -> list[tuple[str, Array]]:
-        """Return the law's array for each column."""
+        """Return the law's arrays of the columns."""
         return [
             ("acceleration", law.acceleration),
             ("field.g", law.field.g),
@@ -426,9 +427,9 @@ def _installed() -> dict[str, str]:
 def _skeleton(
     robot: Robot, controller: Controller
 ) -> tuple[list[tuple[int, str]], list[int]]:
-    """Return which of the points to draw are frames, and the parent of each point.
+    """Return which of the drawn points are frames, and the points' parents.
 
-    A point for each joint in order, then for each frame of a task (index and name); a
+    A point per joint in order, then for every frame of a task (index and name); a
     parent is the index of another point, -1 for none.
     """
     named: list[tuple[int, str]] = []

@@ -48,7 +48,7 @@ def task_errors(rollout: Log) -> list[LoggedErrorPart]:
 
 
 def position_units(rollout: Log) -> list[str]:
-    """Return the unit of each dof's position: ``rad`` or ``m``."""
+    """Return the units of the dofs' positions: ``rad`` or ``m``."""
     return list(map(str, rollout.meta["robot"]["units"]))
 
 
@@ -64,7 +64,7 @@ def rate_unit(rollout: Log) -> str:
 
 
 def effort_units(rollout: Log) -> list[str]:
-    """Return the unit of each dof's effort: ``N·m`` or ``N``."""
+    """Return the units of the dofs' efforts: ``N·m`` or ``N``."""
     return [_EFFORT_UNITS.get(unit, "–") for unit in position_units(rollout)]
 
 

@@ -65,7 +65,7 @@ class Moved(NamedTuple):
     task: str
     part: str  # such as ``position``
     unit: str  # m or rad
-    resting: Array  # in the end, without an observer, for each joint, shape (nv,)
+    resting: Array  # in the end, without an observer, for every joint, shape (nv,)
     peak: Array  # at most, with the compensators that there are, shape (nv,)
 
 
@@ -239,7 +239,7 @@ def _last_stable(
 def _moved(
     controller: Controller, state: RobotState, whole: WholeLoop
 ) -> tuple[Moved, ...]:
-    """Return how far the tasks move for one unit of effort on each joint."""
+    """Return how far the tasks move for one unit of effort on every joint."""
     loop, T, to_error, rows = whole
     m, nv = len(to_error), len(T)
     # Each column is the acceleration of one unit of effort, in the loop's coordinates.

@@ -266,7 +266,7 @@ def _streams(part: Crossfade | CrossfadeOrientation) -> tuple[FollowedStream, ..
 
 
 def _mixed(part: Crossfade | CrossfadeOrientation, out: Any) -> dict[str, Any]:
-    """Return the arguments of a change of streams: each of the two is a plan."""
+    """Return the arguments of a change of streams: both are plans."""
     before: Any = part.before
     after: Any = part.after
     (sample_before, calls_before), (sample_after, calls_after) = (

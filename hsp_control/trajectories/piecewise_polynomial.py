@@ -139,7 +139,7 @@ class Line(PolynomialTrajectory, type="line"):
 class Stops(PolynomialTrajectory, type="stops"):
     """x(t) = x_i + s (x_{i+1} - x_i) from t_i to t_{i+1}, s the `smooth_step`.
 
-    Straight lines with rest at each waypoint, C² everywhere.
+    Straight lines with rest at every waypoint, C² everywhere.
     """
 
     points: ClassVar[tuple[str, ...]] = ("waypoints",)

@@ -1,6 +1,6 @@
 """Pictures of a simulated robot's MuJoCo scene by HTTP: ``/CAMERA.jpg``.
 
-A separate process draws each picture on request, in the scene's state at that time; the
+A separate process draws pictures on request, in the scene's state at that time; the
 simulation only copies its state. Without a graphics card Mesa draws.
 """
 

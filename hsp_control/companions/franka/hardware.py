@@ -29,7 +29,7 @@ _LAST_WORDS = 1.5
 
 
 class FrankaHardware:
-    """`Hardware`: seven joints that take tau - g(q) each millisecond.
+    """`Hardware`: seven joints that take tau - g(q) every millisecond.
 
     The second `read` starts the torque control and waits for it: the first states
     arrive without it, while the loop prepares. A reflex, the stop button and a lost
@@ -38,7 +38,7 @@ class FrankaHardware:
     Attributes:
         period: Time between two states [s].
         q: Configuration when it was connected, shape (7,) [rad].
-        lines: Findings and settings of the connection, one sentence each.
+        lines: Sentences on findings and settings of the connection.
         real_time: Whether its time passes as ours does: not in lockstep.
     """
 

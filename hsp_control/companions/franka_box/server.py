@@ -58,7 +58,7 @@ class Server:
 
         Args:
             box: The box.
-            say: Called with a line for each event.
+            say: Called with a line per event.
             host: A loopback address; the port is always `PORT`.
             lockstep: Whether to wait for commands, instead of real time.
             deadline: Of a command in real time, after its state [s].
@@ -93,7 +93,7 @@ class Server:
         """Serve clients.
 
         Args:
-            on_period: Called before each period; false ends the service.
+            on_period: Called before every period; false ends the service.
         """
         advance = self._in_lockstep if self._lockstep else self._in_real_time
         # An overflow is refused, or a reflex; NumPy need not warn.

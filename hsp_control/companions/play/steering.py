@@ -137,7 +137,7 @@ class SteeringPage(NamedTuple):
     def let_steer(
         self, experiment: Experiment, requests: OperatorRequests, journal: Path
     ) -> Callable[[float], object]:
-        """Return the function that the loop calls each period for the page."""
+        """Return the function that the loop calls every period for the page."""
         # With a dead-man's key it returns when the key is held for the first time, or
         # when the operator stops.
         controller, period = experiment.controller, live_period(experiment)

@@ -76,7 +76,7 @@ def joint_positions(rollout: Rollout, *, absolute: bool = True) -> tuple[Array, 
 
 
 def decay_power(rollout: Rollout) -> Array | None:
-    """Return e_NᵀW K_N e_N at each row, shape (N,); None if K_N or W is not known."""
+    """Return e_NᵀW K_N e_N at every row, shape (N,); None if K_N or W is not known."""
     gain = rollout.meta.get("null_space_gain")
     if gain is None or not rollout.meta.get("controls_null_space", True):
         return None

@@ -2,7 +2,7 @@
 
 It contains the configuration with the files that it names, the robot unless an
 installed package has it, and the Python files that declare the user's types. Dask
-passes it to each worker when it joins, also to one that replaces another.
+passes it to every worker when it joins, also to one that replaces another.
 """
 
 import json

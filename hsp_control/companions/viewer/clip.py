@@ -62,7 +62,7 @@ def bands_of(
 def _activities(
     rollout: Rollout, controller: Controller | None
 ) -> Iterator[tuple[Band, NDArray[np.bool_]]]:
-    """Yield the bands without intervals, and in which rows each is active."""
+    """Yield the bands without intervals, and the rows in which they are active."""
     if "status" in rollout:
         limit = Band("limit active", "a limit is active", palette.DESIRED, [])
         yield limit, rollout["status"] >= LIMITED

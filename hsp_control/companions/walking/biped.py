@@ -26,7 +26,7 @@ from hsp_control.tasks import CenterOfMass, FrameOrientation, FramePose, Gains, 
 from hsp_control.tasks.frame_task import TrackingTask
 
 BODY, TRUNK = "center_of_mass", "trunk"
-"""Names of the tasks of every walk, besides one for each foot."""
+"""Names of the tasks of every walk, besides one per foot."""
 _SIX = 6
 """Degrees of freedom of a sole."""
 

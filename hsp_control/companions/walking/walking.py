@@ -69,7 +69,7 @@ class Walk(BipedPlan, type="walk"):
     in place and in time (`step_adjustment.py`). A swing foot becomes a contact at
     touchdown, early or late.
 
-    It has the tasks ``center_of_mass`` and ``trunk``, and one for each foot with the
+    It has the tasks ``center_of_mass`` and ``trunk``, and one per foot with the
     name of its contact.
     """
 

@@ -151,7 +151,7 @@ class Contact(Part, ABC, family="contacts", error=ContactError):
 
     Its rows keep it still, J a + J'v = -Kd J v: damping without stiffness, since
     stiffness would oppose the small slip of a real contact. Forces act at its points.
-    Each force lies within a friction pyramid inscribed in the Coulomb friction cone, so
+    Forces lie within a friction pyramid inscribed in the Coulomb friction cone, so
     it pushes and never pulls.
 
     A subclass declares its parameters as fields (see `Part`), sets `rows`, and
@@ -265,7 +265,7 @@ class Contact(Part, ABC, family="contacts", error=ContactError):
         """
 
     def calls(self, state: RobotState, out: TaskSample) -> PartCalls:
-        """Return the calls that write the rows of each step."""
+        """Return the calls that write the rows in a step."""
         return [self.call(state).given(v=state.v, damping=self.damping, out=out)]
 
     def evaluate(self, state: RobotState, out: TaskSample) -> TaskSample:

@@ -31,7 +31,7 @@ class Support:
         base: Sequence[int] = (),
         force_offset: Callable[[str], Array] = lambda _: np.zeros(1),
     ) -> None:
-        """Bind contacts; each reads its ``force_offset``, by name, in each step."""
+        """Bind contacts, which read their ``force_offset``, by name, in every step."""
         robot, nv = state.robot, state.robot.nv
         self._state = state
         # degrees of freedom without a motor

@@ -40,8 +40,8 @@ from hsp_control.tasks.compliant_task import impedance_of
 class Compensation(Part, error=CompensationError):
     """Compensators for the differences between the robot and its model.
 
-    Each is off unless it is given, but for the momentum observer, which is on where it
-    makes sense; None turns it off. They have no memory: the stages are made by a
+    All are inactive unless given, except the momentum observer, which is active where
+    it makes sense; None turns it off. They have no memory: the stages are made by a
     `CompensatedController`, so one set serves many controllers, runs and threads.
     """
 
@@ -191,4 +191,4 @@ STAGES: dict[str, Callable[[Any, Controller], Stage | None]] = {
     "force_feedback": RunningForceFeedback,
     "integral_action": RunningIntegral,
 }
-"""The stage of each compensator in a run, in the order of the chain."""
+"""The compensators' stages in a run, in the order of the chain."""

@@ -82,7 +82,7 @@ class RunningForceFeedback(Stage):
             if contact.force is not None
             and (declared.contacts is None or contact.name in declared.contacts)
         ]
-        self.integrals = dict.fromkeys(names, 0.0)  # addition to each command [N]
+        self.integrals = dict.fromkeys(names, 0.0)  # addition to every command [N]
         self.actual = dict.fromkeys(
             names, np.nan
         )  # λ_m by contact, at the last step [N]

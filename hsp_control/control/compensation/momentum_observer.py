@@ -199,7 +199,7 @@ class RunningObserver(Stage):
         run.effort = run.effort - self.cancelled
 
     def log_channels(self, run: Run) -> Mapping[str, LogChannel]:
-        """Return r, and the force at each task of a frame that explains it."""
+        """Return r, and the force at every task of a frame that explains it."""
         r, meaning = self.disturbance, "estimated disturbance r"
         found = {"observer.disturbance": LogChannel(r, "N·m or N", meaning)}
         limit = run.controller.robot.model.effortLimit

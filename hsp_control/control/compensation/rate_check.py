@@ -77,7 +77,7 @@ def check_rate(
     plant: Robot | None = None,
     strict: bool = True,
 ) -> list[RateFinding]:
-    """Return the problems of each task and of the null space at a control rate.
+    """Return the problems of the tasks and of the null space at a control rate.
 
     Args:
         controller: The controller.
@@ -384,7 +384,7 @@ def _finding(
 def _stabilising_changes(
     loop: LinearLoop, speed: _Speed, rule: float, null_space: tuple[Array, Array] | None
 ) -> tuple[list[str], list[str]]:
-    """Return changes of single settings, each of which makes the loop stable."""
+    """Return changes of single settings, any of which makes the loop stable."""
 
     def gains(s: float) -> LinearLoop:
         if null_space is None:

@@ -42,7 +42,7 @@ class Run:
         self.disturbance: Array = self.none
         self.friction: Array = self.none
         self.friction_sent: Array = self.none  # of the last effort
-        # the efforts on the model, less friction: one for each period from the last
+        # the efforts on the model, less friction: one per period from the last
         # measurement to the period that begins now
         self.under_way: deque[Array] = deque(maxlen=1 + ahead)
 
@@ -54,7 +54,7 @@ class Alone(NamedTuple):
     v: Array  # the velocity, at first as it was measured
     a: Array  # acceleration to deliver, at first the law's, shape (nv,)
     effort: Array  # effort besides M a + N, at first 0, shape (nv,)
-    period: Array  # how long each effort is held, shape (1,) [s]
+    period: Array  # time for which an effort is held, shape (1,) [s]
     acted: Array  # the effort on the model since the last measurement, (nv,)
     disturbance: Array  # acceleration that something else causes, (nv,)
     starting: Indices  # whether the law is not yet fully active, shape (1,)
@@ -87,7 +87,7 @@ class Stage:
         """Change the time and the state for which the law is evaluated."""
 
     def act(self, run: Run, state: RobotState, active: ActiveStack) -> None:
-        """Change the acceleration or the effort; while tasks fade, for each set."""
+        """Change the acceleration or the effort; while tasks fade, for every set."""
 
     def finish(self, run: Run) -> None:
         """Go on for the period for which the effort of `Run.output` is held."""

@@ -1,6 +1,6 @@
 """A plant with imperfect sensors and drives.
 
-Each part has its own random numbers: adding one does not change those of the others.
+Parts have independent random numbers: adding one does not change those of the others.
 """
 
 from collections.abc import Mapping, Sequence

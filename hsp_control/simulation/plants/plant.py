@@ -311,7 +311,7 @@ def to_json_data(value: Any) -> Any:
 
 
 def contact_channels(wrenches: Mapping[str, Array]) -> dict[str, LogChannel]:
-    """Return ``plant.contact.<name>.force`` and ``.moment`` for each contact.
+    """Return ``plant.contact.<name>.force`` and ``.moment`` for every contact.
 
     A wrench (6,) of the world on the robot is force and moment in world axes, about the
     origin of the contact's frame.

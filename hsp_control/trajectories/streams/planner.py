@@ -59,7 +59,7 @@ class Room(NamedTuple):
 
     @classmethod
     def without_python(cls, policy: Policy, period: float) -> "Room":
-        """Return the room for a message each period [s], which no call extends."""
+        """Return the room for a message every period [s], which no call extends."""
         arrivals = ceil(1.1 * _CLOCK / period) + 2  # periods are not exactly equal
         most = 1
         if policy.name != "latest":

@@ -34,7 +34,7 @@ WINDOW, ROUNDS = 5.0, 3  # each condition is measured so long, so often [s]
 
 
 class Timed(Session):
-    """A session that notes when it computes each row, and for how long."""
+    """A session that records begin and duration of the computation of rows."""
 
     def advance(self) -> None:
         """Go on to the next row."""

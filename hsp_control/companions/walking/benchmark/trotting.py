@@ -3,7 +3,7 @@ r"""Eight quadrupeds trot and crawl on MuJoCo, with one set of parameters.
     python hsp_control/companions/walking/benchmark/trotting.py \
         [--estimated] [--case WORD] [robot ...]
 
-Prints one line for each robot and case: whether it stood at the end, how far it came,
+Prints one line per robot and case: whether it stood at the end, how far it came,
 its mean speed while it trotted at full speed, the share of steps that a limit changed,
 and the CPU time of a period as a share of real time, median: of the whole loop, with
 plan, estimator, controller, MuJoCo and log. ``--estimated``: with an estimated base,

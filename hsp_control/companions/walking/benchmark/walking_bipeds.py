@@ -3,7 +3,7 @@ r"""Other bipeds walk by the same plan, with its defaults: how fast, and how wel
     python hsp_control/companions/walking/benchmark/walking_bipeds.py \
         [--unitree FOLDER] [part of a name]
 
-Prints one line for each robot and speed: six steps on MuJoCo at 1 kHz, and a second of
+Prints one line per robot and speed: six steps on MuJoCo at 1 kHz, and a second of
 standing. Nothing is tuned: a robot has its joints slightly flexed, soles as large as
 its meshes or an estimate of them, and ``plan: {type: walk, speed: ...}``. ``--unitree``
 is the folder ``robots`` of github.com/unitreerobotics/unitree_ros, whose robots
@@ -167,7 +167,7 @@ def unitree(folder: Path) -> dict[str, Biped]:
 
 
 def lines(words: list[str], bipeds: dict[str, Biped]) -> Iterator[str]:
-    """Yield a line for each robot and speed, until one falls."""
+    """Yield a line per robot and speed, until one falls."""
     for name, biped in bipeds.items():
         if words and not any(word in name for word in words):
             continue

@@ -314,7 +314,7 @@ of a foot that comes or goes fade alike; neither has joint limits. TSID 1.10 has
 as constraints that are added and removed, centre of mass, trunk and swing foot with
 weight 1, and a posture (Kp = 6, Kd = 7: K_N = 6 and g = -(q - q_start)). Status of this
 law: 0 exact, 1 forces redistributed, 2 limited, 3 limits relaxed; of TSID: 0 solved,
-otherwise its last effort is held. *Slipped*: how far a sole moved while it carried full load.
+otherwise its last effort is held. *Slipped*: the motion of a sole under full load.
 
 """
 
