@@ -176,7 +176,7 @@ def _room(name: str) -> ModuleType:
 def _hint(name: str) -> str:
     """Return where a name is that a namespace has, for the message."""
     if name.startswith("_") or (Path(__file__).parent / name).is_dir():
-        return ""  # a room: its import from here looks it up here first
+        return ""  # a layer: importing it from here looks it up here first
     for namespace, room in _NAMESPACES.items():
         value = getattr(import_module(f"{__name__}.{room}"), name, None)
         if getattr(value, "__module__", "").startswith(f"{__name__}.{room}"):

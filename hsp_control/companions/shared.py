@@ -62,7 +62,7 @@ class Rate:
         if t < self._next - 1e-9:
             return False
         following = self._next + self._every
-        # Missed times are not made up for.
+        # Missed times are skipped.
         self._next = following if following > t else t + self._every
         return True
 

@@ -46,7 +46,7 @@ class StackedTask(NamedTuple):
     """A task in a stack."""
 
     planned: PlannedTask
-    name: str  # the task's own; while a newer one of the same name fades in, another
+    name: str  # the task's name; another one while a newer task of this name fades in
     rows: slice
     in_force: FeedbackInForce
 
@@ -72,7 +72,8 @@ class ActiveStack:
         gain: Array,
         threshold: float,
     ) -> None:
-        robot: Robot = state.robot  # from its state: which base motions contacts permit
+        # from its state: the base motions that contacts permit
+        robot: Robot = state.robot
         self.support, base = support, support.base  # contacts' forces, their bounds
         self.contacts = support.contacts
         planned = [level for level in levels if level]
@@ -142,12 +143,12 @@ class ActiveStack:
                 parts = each.task.error_parts
                 yields = [part.yields for part in parts for _ in range(part.size)]
                 self.law.problem.yields[here] = yields
-            # A falling robot needs its balance at any cost.
+            # The demand of balance tasks is not bounded: the robot would fall.
             balances = robot.unactuated and each.task.keeps_balance(robot)
             follows = each.key in below or len(in_force.feedback.largest)
-            draws = spring and below  # from those below it
+            draws = spring and below  # with levels below it
             if (follows or draws) and not balances:
-                # at rest, so that damping is kept at any speed
+                # at zero velocity, so that damping is kept at any speed
                 stretched = self.law.problem.stretched[here]
                 call = PartCall(
                     engine.DemandAtRest,

@@ -86,7 +86,7 @@ class BoundMixture:
         mean = np.zeros(parts.shape[1])
         which, statuses = np.zeros((2, count * many), dtype=np.int64)
         self._worst = np.zeros(1, dtype=np.int64)
-        within = np.ones(many, dtype=np.int64)  # which sets of limits are in force
+        within = np.ones(many, dtype=np.int64)  # the sets of limits in force
         begin: list[PartCall] = []
         if many > 1:
             begin.append(PartCall(engine.HasShare, shares=limits.shares, on=within))
@@ -154,7 +154,7 @@ class BoundMixture:
         self._on[:], self._shares[:] = 0, 0.0
         for share, stack in self._choice.at(t):
             place = self._places.get(stack)
-            if place is None:  # Python has to make the step
+            if place is None:  # the step is made in Python
                 self._on[:], self._shares[:] = 0, 0.0
                 return
             self._on[place], self._shares[place] = 1, share

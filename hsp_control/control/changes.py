@@ -182,12 +182,12 @@ class Changes:
 class TimeLine:
     """The setup in force at every time."""
 
-    start: Start  # where the parts were placed
-    declared: tuple[Change, ...]  # those of every run, as they were given
+    start: Start  # the start at which parts were placed
+    declared: tuple[Change, ...]  # changes of every run, as given
     settled: Setup  # setup with all changes that are over
-    open: tuple[Change, ...]  # changes that are not, placed, in order of time
+    open: tuple[Change, ...]  # changes that are not over, placed, in order of time
     made: tuple[Change, ...] = ()  # those of `open` that were made during the run
-    count: int = 0  # how many were
+    count: int = 0  # their number
 
     @classmethod
     def of(cls, setup: Setup, made: Sequence[Change]) -> "TimeLine":

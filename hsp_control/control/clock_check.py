@@ -39,7 +39,7 @@ class ClockCheck:
         self._period, self._stamp = 0.0, -1
         self._kind, self._count = "", 0
         self._told = False
-        self.undecided = True  # whether `moved` has to look at another step
+        self.undecided = True  # whether `moved` has to check another step
         self._before: tuple[float, Array, Array] | None = None
         self._milli = self._same = self._looks = 0
 

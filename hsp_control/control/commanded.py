@@ -67,7 +67,8 @@ class Commanded(Composition):
         """
         followed = self._followed(task)
         value = target_of(followed, target, lambda: self._here().state)
-        if not np.abs(value).max() < self._declared.robot.size:  # else it is in reach
+        # otherwise it is in reach
+        if not np.abs(value).max() < self._declared.robot.size:
             warn_of_far_target(self._here().state, followed, value)
         self._memory.clock.look_again()
         return self._sent(task, value=value)
@@ -169,7 +170,7 @@ class Commanded(Composition):
         """
         with self._lock:
             self._change(change)
-            if self._memory.begun:  # when all that the change used is freed
+            if self._memory.begun:  # when the objects of the change are freed
                 self._rehearse(_REHEARSALS)
 
     def _change(self, change: Change) -> None:

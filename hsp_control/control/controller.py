@@ -99,7 +99,7 @@ class Controller(Commanded):
         step = now.step
         if step is None or modifier is not None or q is None or v is None:
             self._observe(t, q, v)  # the state
-            self._advance()  # to the values in force at its time
+            self._advance()  # values in force at its time
         else:
             delivered = step.make(t, q, v)  # type: ignore[arg-type]
             stack, damped = step.active, step.damped
@@ -125,7 +125,7 @@ class Controller(Commanded):
         memory, now, state = self._memory, self._in_force, self._state
         origin, q, v = memory.origin.item(), state.q.copy(), state.v.copy()
         active, damped = now.mixture.active, now.mixture.damped
-        # An error here is raised in a step as well, or its cause is not there yet.
+        # An error here is also raised in a step, if its cause exists by then.
         with memory.kept(), suppress(Exception):
             for _ in range(times):
                 now.mixture.rehearse()

@@ -117,8 +117,8 @@ def warn_of_jump(
 
 def warn_of_slow_efforts(robot: Robot, q: Array, limits: RobotLimits | None) -> None:
     """Warn if gravity may change a joint's effort faster than its rate permits."""
-    # A joint alone, that turns at its speed limit from where the robot starts, feels a
-    # sine of gravity. A floating base is not looked at.
+    # A single joint rotating at its speed limit from the start has a sinusoidal gravity
+    # effort. Floating bases are not checked.
     if limits is None or robot.unactuated:
         return
     rest, turn = np.zeros(robot.nv), 0.5 * np.pi * np.eye(robot.nv)

@@ -19,7 +19,7 @@ class Waiting(NamedTuple):
     """An impedance that is not the planned one."""
 
     numbers: Array  # in force; see `Impedance.numbers`
-    ramp: float  # how long the change takes for which it waits [s]
+    ramp: float  # duration of the change for which it waits [s]
 
 
 @dataclass
@@ -39,7 +39,7 @@ class RunMemory:
     counts: bool = False
     begun: bool = False  # whether there was a step
     now: float = -np.inf  # latest time of a step [s]
-    # changes as they were given that no step has seen, and the time of the last one
+    # changes, as given, that no step has processed, and the time of the last one
     unseen: tuple[float, tuple[Change, ...]] = (-np.inf, ())
     # of tasks, by key: an impedance that waits, and the compensators' addition
     waiting: dict[int, Waiting] = field(default_factory=dict)

@@ -193,8 +193,8 @@ class Mixture:
 
     def _deliver(self, modifier: AccelerationModifier | None) -> Delivered:
         """Return the result for the law that was resolved last."""
-        # While one set of limits follows another, it is the mixture of the steps within
-        # each of them.
+        # During a transition between sets of limits: the mixture of the steps within
+        # both.
         sets = self._limits.sets
         single = len(self._parts) == len(sets) == 1
         shares: list[float] = []

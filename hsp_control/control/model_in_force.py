@@ -44,7 +44,8 @@ class ModelInForce:
         self._shares = np.zeros((3, 0))  # of each payload, with two derivatives
         self._gravity = Evolution(np.array(robot.model.gravity.linear))
         self._own = self._gravity.initial
-        self._change = np.zeros(3)  # from it: a plant may have another one
+        # from the controller's: a plant may have another one
+        self._change = np.zeros(3)
         self._dynamics = [*dynamics]
         self._constant = False
         self._bind()

@@ -28,7 +28,7 @@ from hsp_control.trajectories.crossfade import settled
 class PlannedTask:
     """A task, when it is active, and its gains."""
 
-    key: int  # distinguishes it from all others, also of the same name
+    key: int  # unique, also among tasks of the same name
     task: Task  # placed
     presence: Evolution[float]  # 1 while it is part of the controller, 0 while not
     # numbers of its feedback: Kp and Kv, shape (2, m, m) [1/s², 1/s], or those of an

@@ -14,7 +14,7 @@ class StepLock:
     __slots__ = ("__weakref__", "_lock", "_taken")
 
     def __init__(self) -> None:
-        self._lock, self._taken = RLock(), ""  # why it cannot be had, if so
+        self._lock, self._taken = RLock(), ""  # why it cannot be acquired, if so
         _locks.add(self)
 
     def __enter__(self) -> None:

@@ -64,14 +64,14 @@ class Following(NamedTuple):
     """Parameters of the thresholds, and of the range of the exact law."""
 
     size: float  # the robot's [m]; 0: they do not
-    # L [rad/s² for each unit of a singular value]; inf: it does not follow
+    # L [rad/s² per unit of a singular value]; inf: it does not follow
     steepest: float
     modest: float  # f_0 [m/s² or rad/s²]; 0 on a fixed base
     below: float  # factor of L below an unmet level
     turning: float  # ε per rad/s of a field while a spring is saturated
-    quickest: float  # the largest part of a field that is used [rad/s]
+    quickest: float  # the largest used size of a field [rad/s]
     near: float  # σ_x: the exact law applies fully above
-    far: float  # part of the largest error up to which it applies fully
+    far: float  # fraction of the largest error up to which it applies fully
 
     @classmethod
     def of(cls, size: float, *, on_legs: bool) -> Self:

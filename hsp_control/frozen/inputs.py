@@ -78,7 +78,7 @@ def inputs_of(
         if impedance is not None:
             yield from _springs(task, impedance, bound, held, reports)
             continue
-        # A scalar error is unstable from these on, whatever the other one is.
+        # A scalar error is unstable from these on, for any value of the other.
         Kp, Kv, *_ = own.feedback(task.name)
         if task.order == 1:
             meaning, most = "rate of the error", 2.0 / period

@@ -169,7 +169,7 @@ class PostureSearch:
         if not reached:
             raise ConfigurationError(_too_far(found, target))
         good, _ = self._qualified(reached, least)
-        if not good:  # then the others stay in their good posture
+        if not good:  # the others keep their good postures
             starts = [(x, x) for x in self._assembled(least)]
             good, _ = self._qualified(self._reached(target, starts)[1], least)
         if not good:

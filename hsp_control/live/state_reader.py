@@ -337,7 +337,7 @@ class RobotClock:
         self._gained = 0.0  # by the clock, relative to the number of states [s]
         self._lead = self._lead_before = -inf  # the greatest lead relative to ours [s]
         self._window_end = -inf
-        self.right = True  # whether it was never wrong
+        self.right = True  # whether it has always been right
 
     def time(self, measurement: Measurement) -> float:
         """Return the controller's time of the last measurement [s]."""

@@ -298,8 +298,8 @@ class TrustedMotion:
         if (self._sensors.dead | self._pushed).any():  # its speed is unknown
             self.unknown_for = max(self.unknown_for, self._soon)
         unknown = ~(self._positions | self._velocities)
-        # Beside a joint that is only expected, one that stands, and should move, may be
-        # dead, too.
+        # If one joint's sensors are dead, another one that rests although it should
+        # move may be dead, too.
         stands = check.stands & (np.abs(expected.v[2]) > _MOVES)
         if self._useless or (unknown.any() and stands.any()):
             self.unknown_for = inf
@@ -348,7 +348,7 @@ class TrustedMotion:
         check = self._check
         dead = check.dead | self._sensors.dead
         contrary = self._response.contrary
-        # Motion hidden by a dead sensor seems to push the other joints, too.
+        # Motion hidden by a dead sensor appears as a push on the other joints, too.
         pushed = self._momentum.beyond & ~check.halted.any()
         wrong = check.contradicted | jumps
         runs = self._left(v) if self.stopping else np.zeros(v.size, dtype=bool)
@@ -376,7 +376,8 @@ class TrustedMotion:
             self._pushed |= pushed & both & ~(wrong | dead)
             lost |= (contrary | pushed) & both
         lost |= runs | self._left(v) & (self._positions ^ self._velocities)
-        # Efforts are harmful if a joint moves against them: only the robot can brake.
+        # If a joint moves against its efforts they are harmful: only the robot can
+        # brake.
         self._useless |= bool(runs.any() or self._contrary.any())
         self._positions &= ~lost
         self._velocities &= ~lost
@@ -393,7 +394,7 @@ class TrustedMotion:
         sensor drives it, so that it is faster, or moves in the other direction.
         """
         slope, by_v, by_q = self._check.slope, self._expected.v[0], self._expected.v[1]
-        # Of a velocity, less the largest effect of its noise alone.
+        # Of a velocity, less the largest effect of noise.
         used = np.where(self._velocities, smaller(v, self._check.mean), slope)
         expected = np.where(self._velocities, by_v, by_q)
         least, most = np.minimum(expected, 0.0), np.maximum(expected, 0.0)

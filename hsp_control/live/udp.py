@@ -161,7 +161,7 @@ class UdpHardware:
         for packet in states:
             age = self._age_estimator.age(monotonic(), 1e-9 * packet.stamp)
         if not states:
-            # A robot in lockstep that waits for its first effort is where it was.
+            # A robot in lockstep rests while it waits for its first effort.
             return None if in_turn or self.real_time else self._last
         measured = self._sensors.unpack(packet.payload, self._robot)
         self._last = measured._replace(
@@ -273,7 +273,7 @@ def serve(
     report, nv = ServerReport(), robot.plant.robot.nv
     sensors = SensorLayout.of(robot.measured())
     state_sequence = 0
-    alone = False  # whether no loop is there any more
+    alone = False  # whether the loop has ended
 
     def received() -> list[Packet]:
         nonlocal alone
@@ -287,7 +287,7 @@ def serve(
                 return []
             if monotonic() > end:
                 robot.halt(f"the loop did not answer for {start_timeout:g} s")
-                alone = True  # else every period of the stop would wait as long
+                alone = True  # otherwise every period of the stop would wait as long
                 return []
         return packets
 

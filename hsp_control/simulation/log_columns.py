@@ -134,7 +134,8 @@ class TaskColumns:
         self._controller, self._columns = controller, columns
         # all tasks that there have been, by their names in the log
         self.logged: dict[str, Task] = {}
-        # the streams of each as it came, as declared; those of changes are the changes'
+        # the tasks' streams at their first appearance, as declared; those of changes
+        # are theirs
         self.streamed: dict[str, list[Streamed]] = {}
         self._levels: dict[str, int] = {}
         self._streams: dict[str, list[tuple[str, StreamRun]]] = {}
@@ -183,7 +184,7 @@ class TaskColumns:
         column(f"{prefix}.error", (m,), unit, f"error e: {what}")
         column(f"{prefix}.error_rate", (m,), rate_unit, "error rate e'")
         column(f"{prefix}.bounded", (), unit, "length of an error that is bounded")
-        # To search for streams in every row would cost more than the row.
+        # A search for streams in every row would cost more than the row.
         self._streams[name] = list(_streams_of(task, name))
         for stream, _ in self._streams[name]:
             for what, meaning in STREAM_CHANNELS.items():

@@ -86,7 +86,7 @@ class LogWriter:
         self._columns = columns = LogColumns(rows)
         self._settled: object = None
         self._made: dict[int, Change] = {}  # all changes of the run, by identity
-        # the latest run of each stream that there was, by its declaration's identity
+        # the latest runs of streams, by their declarations' identities
         self._streams: dict[int, StreamRun] = {}
         self._law: StepRecord | None = None  # of the present row
         self._active: ActiveStack | None = None  # the stack of `_sources`
@@ -165,7 +165,7 @@ class LogWriter:
             self._settled = settled
             self._tasks.update()
             self._terms.update()
-            if settled is not None:  # while one fades into another, both keep
+            if settled is not None:  # both are kept during a transition
                 self._barriers.update()
             self._keep_messages()
             columns.lay_out()
@@ -189,7 +189,7 @@ class LogWriter:
             row[f"obstacle.{obstacle.name}.quaternion"][:] = placement[3:]
         if output is not None:
             self._fill_law(state, output)
-        if VELOCITY not in log_channels:  # the state was seen in this row alone
+        if VELOCITY not in log_channels:  # not recorded by the loop: this row alone
             self._excess.record(controller.limits, state.q, state.v)
             log_channels = {**self._excess.collect(controller.limits), **log_channels}
         write_channels(columns, log_channels)
@@ -264,7 +264,7 @@ class LogWriter:
             return
         try:
             self._journal.write_end(status, message, **self._came_during_run(), **meta)
-        except KeyboardInterrupt:  # after which it may be called again
+        except KeyboardInterrupt:  # it may be called again afterwards
             raise
         except BaseException:
             self._journal.close()
@@ -322,7 +322,7 @@ class LogWriter:
             **({"obstacle_meshes": self._meshes} if self._meshes else {}),
             "versions": versions(),
             **(given := {**self._meta, **meta}),
-            # A reader of the log runs this code only if it is the same.
+            # A reader of the log runs this code only if it is unchanged.
             "imported": fingerprints((given.get("config") or {}).get("imports") or ()),
         }
 

@@ -76,7 +76,7 @@ class ModelErrors(NamedTuple):
     joints: tuple[str, ...]  # the degrees of freedom
     delay: float  # longest delay without a growing mode, besides known delays [s]
     lag: float  # longest lag of the drives without one, besides known lags [s]
-    growing: int  # number of the `tried` robots of other masses with a growing mode
+    growing: int  # number of robots of other masses with a growing mode, of `tried`
     tried: int
     growth: float  # the fastest rate at which one grows; 0: none grows [1/s]
     # largest inertia that each rotor may have beyond the model [kg·m²]; inf: any that

@@ -56,7 +56,7 @@ def summary_rows(rollout: Log) -> Iterator[tuple[str, str]]:
         least = found["manipulability.min"].value
         if np.isfinite(least):
             yield "det(J W⁻¹ Jᵀ)", f"minimum {least:.4g}, {smallest}"
-        else:  # determinants of different sizes do not compare
+        else:  # determinants of different sizes are not comparable
             yield "J L⁻ᵀ", smallest
     for name in distances(rollout):
         text = f"minimum {found[f'distance.{name}.min'].value:.3g} m"

@@ -149,7 +149,7 @@ class CrossfadeOrientation(OrientationTrajectory, type="crossfade"):
         end = self.start_time + self.duration
         if t >= end:  # a stream may have dropped R_0
             return self.after.sample(t, out)
-        if self._follows_streams:  # for copies, whose blend is another one
+        if self._follows_streams:  # for copies, which have another blend
             self.keep_start(end)
         if t < self.start_time:
             return self.before.sample(t, out)

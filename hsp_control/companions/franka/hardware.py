@@ -114,7 +114,7 @@ class FrankaHardware:
                 raise HardwareError(f"torque control did not start in {_START:g} s")
             return None
         _, t, *numbers = client.STATE.unpack(answer)
-        if not self._running:  # time stands still while the loop prepares
+        if not self._running:  # time is stopped while the loop prepares
             self._origin = t
         self._running = self._reads > 0
         self._reads += 1

@@ -121,7 +121,7 @@ class Server:
         """
         now = monotonic()
         late = now - self._due
-        if late > PERIOD:  # it is not made up for: the clock is shifted
+        if late > PERIOD:  # it is not caught up: the clock is shifted
             self.overrun += late
             self._due = now
         self._due += PERIOD
@@ -165,7 +165,8 @@ class Server:
                     sockets.append(client.udp)
             ready, _, _ = select(sockets, [], [], max(until - monotonic(), 0.0))
             if client is not None and client.tcp in ready:
-                self._serve_requests(client)  # it may leave, and another one connect
+                # it may disconnect, and another one connect
+                self._serve_requests(client)
             if self._listener in ready:
                 self._accept()
             if client is not None and client.udp in ready:

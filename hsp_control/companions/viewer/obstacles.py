@@ -65,7 +65,7 @@ def obstacle(
         surface |= {"side": 2}
     thing = threejs.mesh(solid, surface, pose)
     thing["object"]["receiveShadow"] = False  # shadows on it would show through
-    # The drawn square ends, the half-space does not.
+    # The drawn square is finite, the half-space is not.
     thing["object"]["castShadow"] = not isinstance(shape, shapes.HalfSpace)
     return threejs.group([thing])
 

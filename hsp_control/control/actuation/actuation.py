@@ -63,12 +63,12 @@ class Actuation:
             state, limits, wanted.acceleration, self._qp_outcome
         )
         self.outcome, self._rows = checks.outcome, checks.rows
-        # Whether M a + N is the effort wherever it is within the bounds, and so is a.
+        # Whether the effort is M a + N if it and a are within the bounds.
         self.direct = checks.compiled and not base.size and not support.size
         # the result there for the law's own acceleration
         self.own = Delivered(state.effort, law.acceleration, np.zeros(0), EXACT, 0.0)
         self.nearest = self.own
-        # whether `nearest` is delivered, and its status stands, shape (1,)
+        # whether `nearest` is delivered with its status, shape (1,)
         self.is_nearest: Indices = np.zeros(1, dtype=np.int64)
         self._checks: PartCalls = [
             state.rnea(wanted.acceleration),
@@ -84,7 +84,7 @@ class Actuation:
             self._qp = self._limited_step(0 if holding is None else len(holding.least))
             # the result where the QP was solved at once
             self.nearest = Delivered(*self._qp.result, LIMITED, 0.0)
-        # the calls' results where contacts carry; None: Python has to
+        # the calls' results with active contacts; None: Python computes them
         self.carried: CarriedStep | None = None
         if support.size:
             support.bind(law)
@@ -117,7 +117,7 @@ class Actuation:
             found = self._finding_forces(carried)
             last = self._delivering_forces(carried, carried.delivered, carried.forces)
             return self._state.plan([*calls, *found, last]).steps()
-        # Of distances there may be hundreds, and each row costs time, used or not.
+        # There may be hundreds of distances, and unused rows cost time, too.
         if self._qp is not None and self.direct and "barriers" not in self._rows:
             keep = PartCall(engine.Copy, x=self._state.effort, out=wanted.effort)
             given = self.outcome.violated, [keep], self._rows
@@ -172,7 +172,7 @@ class Actuation:
         if not self.direct:
             return self._calls_with_forces(delivered)
         qp, calls = self._qp, list[AnyCall]()
-        if "barriers" in self._rows:  # which `calls` leaves to Python
+        if "barriers" in self._rows:  # not among the native calls
             keep = PartCall(engine.Copy, x=self._state.effort, out=self._wanted.effort)
             qp, calls = self._whole_step([keep])
         own = self._law.acceleration, self._state.effort
@@ -181,7 +181,7 @@ class Actuation:
     def _calls_with_forces(self, delivered: DeliveredAlone) -> PartCalls:
         """Return those of `calls_alone` where contacts carry."""
         carried, calls = self.carried, list[AnyCall]()
-        if carried is None:  # `calls` leaves it to Python
+        if carried is None:  # not among the native calls
             rows = self._limit_checks.count
             carried = CarriedStep(self._limited_step(rows))
             calls = self._finding_forces(carried)

@@ -42,8 +42,8 @@ class DeliveredAlone(NamedTuple):
 class Kept(NamedTuple):
     """Which part of a mixture was kept, shapes (1,)."""
 
-    which: Indices  # 0: none, Python has to look
-    status: Indices  # the `Status` where contacts carry
+    which: Indices  # 0: none, Python decides
+    status: Indices  # the `Status` with active contacts
 
 
 class CarriedStep:

@@ -97,7 +97,7 @@ class LimitChecks:
             return {}
         found, nv = {}, state.robot.nv
         rooms = [each.room(state) for each in limits.barriers]
-        if rooms and all(rooms):  # else Python has to compute some
+        if rooms and all(rooms):  # otherwise Python computes some of them
             found["barriers"] = BarrierRows.allocate(sum(rooms), nv)
         if limits.static_effort is not None:
             found["holding"] = BarrierRows.allocate(limits.static_effort.room(), nv)

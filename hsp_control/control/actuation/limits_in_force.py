@@ -233,8 +233,8 @@ def _mean(
     sets: Sequence[tuple[RobotLimits | None, float]], robot: Robot
 ) -> RobotLimits | None:
     """Return the limits that a mixture keeps: the weighted mean of the numbers."""
-    # The bounds on efforts and accelerations are linear in them. Where one of them is
-    # inf, so is the mean. Barriers are those of all sets.
+    # Bounds on efforts and accelerations are weighted means; inf if one of them is.
+    # Barriers are those of all sets.
     if len(sets) == 1:
         return sets[0][0]
     numbers = np.sum([w * _numbers(each, robot.nv) for each, w in sets], axis=0)

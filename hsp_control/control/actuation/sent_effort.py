@@ -14,27 +14,27 @@ from hsp_control.robot import RobotState
 class Held(NamedTuple):
     """Observed effects of held efforts, as calls read them."""
 
-    # when the period ends, NaN once that was looked at, and its length [s]
+    # end of the period, NaN once it was processed, and its length [s]
     timing: Array
-    expected: Array  # velocity that is expected then, shape (nv,) [rad/s or m/s]
-    stray: Array  # differences from it, summed over about 10 ms
-    error: Array  # largest error of late [rad/s² or m/s²]
-    drift: Array  # mean error of late
+    expected: Array  # velocity expected then, shape (nv,) [rad/s or m/s]
+    stray: Array  # prediction errors, summed over about 10 ms
+    error: Array  # largest recent error [rad/s² or m/s²]
+    drift: Array  # recent mean error
     quick: Array  # mean error of the last 30 ms
-    least: Array  # the lowest that mean was of late, 0 or less
-    most: Array  # the highest, 0 or more
+    least: Array  # recent minimum of that mean, at most 0
+    most: Array  # recent maximum, at least 0
     lasting: Array  # common part of it and the mean of the last hundredth of a second
     # common part of the mean error and that of the last hundredth of a second: a
     # force that has ended is not included
     steady: Array
-    disturbance: Array  # acceleration that something else than the effort causes
+    disturbance: Array  # acceleration with causes other than the effort
 
 
 @dataclass
 class SentMemory:
     """Memory of the sent efforts; calls read and write the arrays."""
 
-    # the last effort, and how long it is held [s], inf: not known; shape (nv + 1,)
+    # the last effort, and the time for which it is held [s], inf: unknown; (nv + 1,)
     last: Array
     held: Held
     period: float = 0.0  # of the last effort [s]; 0: there was none in this run

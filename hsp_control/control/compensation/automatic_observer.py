@@ -45,7 +45,7 @@ class Choice(NamedTuple):
     """The observer that is on by itself, or why there is none."""
 
     observer: MomentumObserver | None
-    reason: str  # why it is off, empty if it is on
+    reason: str  # the reason why it is inactive, empty if active
 
 
 def automatic_observer(
@@ -93,7 +93,7 @@ class AutomaticObserver(RunningObserver):
         clip = largest_cancelled(controller.robot)
         super().__init__(BANDWIDTH, clip, 2, most_per_period=MOST_PER_PERIOD)
         self._tasks, self._forbidden = controller.planned_tasks, False
-        self._weight = 1.0  # part of the estimate that is cancelled
+        self._weight = 1.0  # fraction of the estimate that is cancelled
 
     def measure(self, run: Run) -> None:
         """Learn from the effort that acted; see `Stage.measure`."""

@@ -27,8 +27,8 @@ class ElasticJoint:
     """
 
     link: float  # λ, the link's inertia over that of the model [-]
-    # μ, the motor's inertia over that of the model [-]; a model that is right but for
-    # the spring has λ + μ = 1
+    # μ, the motor's inertia over that of the model [-]; λ + μ = 1 if only the spring is
+    # unmodelled
     motor: float
     stiffness: float  # κ, the spring's stiffness over the model's inertia [1/s²]
     damping: float = 0.0  # δ, its damping over the model's inertia [1/s]
@@ -77,8 +77,8 @@ class LinearLoop:
     compensation: Compensation = field(
         default_factory=lambda: Compensation(momentum_observer=None)
     )
-    # part of u that the robot performs: below 1 where it is heavier than its model; a
-    # matrix, shape (m, m), where that differs with the direction
+    # fraction of u that the robot performs: below 1 if it is heavier than its model; a
+    # matrix, shape (m, m), if it depends on the direction
     share: float | Array = 1.0
     # elastic joint that performs u; None: a rigid one
     joint: ElasticJoint | None = None
@@ -110,7 +110,7 @@ class LinearLoop:
         between = np.abs(gains - gains * np.eye(len(self.kp))).max()
         alone = between <= _NOTHING * np.abs(gains).max()
         if len(self.kp) > 1 and np.ndim(self.share) == 0 and alone:
-            # Rows that do not depend on one another are as many small loops.
+            # Decoupled rows are separate small loops.
             rows = gains.diagonal(axis1=1, axis2=2).T
             same = np.round(rows / (_NOTHING + np.abs(gains).max()), 12)
             rows = rows[np.unique(same, axis=0, return_index=True)[1]]

@@ -182,7 +182,7 @@ def _findings_of(
             speed = _of_impedance(of, frequency, damped)
     late = delays.effort_delay + delays.sensor_delay > 0
     delayed = late and delays.compensation.predictor is None
-    if since > -np.inf:  # a change makes them; the message names it and its time
+    if since > -np.inf:  # of a change; the message names it and its time
         path = ("changes",)
     found = [_finding(path, loop, speed, RULE_DELAYED if delayed else RULE, "")]
     if Ki.any():
@@ -193,9 +193,9 @@ def _findings_of(
 class _Speed(NamedTuple):
     """The bandwidth of a loop, and the way to reduce it."""
 
-    what: str  # setting that decides
+    what: str  # the decisive setting
     rate: float  # its rate [1/s]
-    # which settings make the rate another one: a function of this [1/s]
+    # settings for another rate, as a function of it [1/s]
     at_most: Callable[[float], str]
 
 

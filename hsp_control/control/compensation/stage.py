@@ -34,11 +34,11 @@ class Run:
         self.controller = controller
         self.measured = measured  # the last measurement, where an observer needs it
         self.wrenches: Mapping[str, Array] = NO_WRENCHES  # see `Measurement`
-        # how long the effort is held that comes next, and the last one: 0 at first [s]
+        # time for which the next effort is held, and the last one: 0 at first [s]
         self.period = self.last_period = 0.0
         self.starting = False  # whether the law is not yet fully active
         self.none = np.zeros(controller.robot.nv)
-        # effort that the model does not explain, and that friction consumes, (nv,)
+        # unexplained effort, and that against friction, (nv,)
         self.disturbance: Array = self.none
         self.friction: Array = self.none
         self.friction_sent: Array = self.none  # of the last effort
@@ -56,7 +56,7 @@ class Alone(NamedTuple):
     effort: Array  # effort besides M a + N, at first 0, shape (nv,)
     period: Array  # time for which an effort is held, shape (1,) [s]
     acted: Array  # the effort on the model since the last measurement, (nv,)
-    disturbance: Array  # acceleration that something else causes, (nv,)
+    disturbance: Array  # acceleration from other causes, (nv,)
     starting: Indices  # whether the law is not yet fully active, shape (1,)
     damped: Indices  # the first level with a bounded inverse, or 0, shape (1,)
     status: Indices  # the `Status` of the delivered effort, shape (1,)

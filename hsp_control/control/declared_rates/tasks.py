@@ -49,7 +49,7 @@ def check_task(task: Task, state: RobotState) -> None:
     else:
         written = [declared_by(task, _WRITTEN_BY)] * 3
     if task.remembers:
-        task = deepcopy(task)  # a look ahead takes no messages
+        task = deepcopy(task)  # previews read no messages
     error_rate, jacobian_rate, jacobian = written
     if error_rate and task.order == 2:  # an error of first order depends on v
         _check_rate(task, error_rate, "error", state)
@@ -105,7 +105,7 @@ def _check_equation(task: Task, by: str, state: RobotState) -> None:
     """Check that the error equation follows from J a + J'v = a_x."""
     v, _ = velocities(state)
     there, robot = RobotState(state.robot), state.robot
-    # of the whole error: a task may shorten it in other coordinates
+    # of the unbounded error: a task may bound it in other coordinates
     feedback = task.feedback_at(state)
     largest = feedback.largest * [1.0, 1.0, np.inf]
     feedback = feedback._replace(largest=largest)

@@ -54,7 +54,7 @@ class ImpossibleInertia(NamedTuple):
         low, middle, high = self.moments
         if self.negative:
             return f"a principal moment is {low:.3g} kg·m²; must not be negative"
-        low, middle = max(low, 0.0), max(middle, 0.0)  # but for rounding
+        low, middle = max(low, 0.0), max(middle, 0.0)  # except for rounding
         return (
             f"the principal moment {high:.3g} exceeds the sum of the other two, "
             f"{low:.3g} + {middle:.3g} = {low + middle:.3g} kg·m²"

@@ -24,7 +24,7 @@ from hsp_control.trajectories.streams.bounds import MotionBounds
 from hsp_control.trajectories.streams.chart import Chart, State
 from hsp_control.trajectories.streams.message import Axes, Message
 
-SOON = 1e-3  # when a rehearsed step would be [s]
+SOON = 1e-3  # time of a rehearsed step [s]
 KEPT = 1.0
 """How long the reference is known after a time [s]."""
 MOST = 4096  # maximum number of stored waypoints
@@ -54,8 +54,8 @@ class Room(NamedTuple):
 
     messages: int = 4  # rows of the queue: messages, and waypoints of a chunk
     waypoints: int = 16
-    pieces: int = 8  # those that may begin in one step, and stay known
-    arrivals: int = 512  # of messages, by which the sender's clock is known
+    pieces: int = 8  # pieces that may begin in one step and are stored
+    arrivals: int = 512  # of messages, for the estimate of the sender's clock
 
     @classmethod
     def without_python(cls, policy: Policy, period: float) -> "Room":
@@ -170,7 +170,8 @@ class Planner:
         moves = self.call(t)
         self.now = float(t)
         begun = self._piece.item() - self._number
-        # A step with messages does most: the next one will do, unless it has some, too.
+        # A step with messages does most of the work: it is left to the next one, unless
+        # that has some, too.
         if not messages or begun > self._room.pieces // 2:
             if begun:
                 self._remember()
@@ -191,7 +192,7 @@ class Planner:
     def _remember(self) -> None:
         """Keep the pieces that are followed by others now."""
         number, last, room = self._number, self._piece.item(), len(self._pieces)
-        if last - number >= room:  # those between are not known any more
+        if last - number >= room:  # those in between are no longer stored
             number = last - room + 1
             self._past.clear()
             self._starts.clear()
@@ -310,7 +311,7 @@ class Planner:
                 messages = [Message.of(None, value[None], None)]
             t = self.now + SOON
             self.advance(t, messages)
-            self.advance(t + SOON, ())  # the step after it keeps the plan before
+            self.advance(t + SOON, ())  # the next step keeps the previous plan
 
     @contextmanager
     def _taken_back(self) -> Iterator[None]:

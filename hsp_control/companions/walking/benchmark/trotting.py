@@ -118,7 +118,7 @@ def said(robot: str, case: dict[str, Any], *, estimated: bool) -> str:
     if run.status != "completed":
         return str(run.meta["message"])
     fast = (run.t > 2.0) & (run.t < UNTIL)
-    points = run.q[fast][::30, :2]  # of whole cycles, so that swaying does not count
+    points = run.q[fast][::30, :2]  # of whole cycles, so that swaying averages out
     ways = np.diff(points if case["plan"].get("turn") else points[[0, -1]], axis=0)
     mean = np.hypot(*ways.T).sum() / (0.3 * (len(points) - 1))
     stands = run["plan.phase"][-1] == 0 and np.abs(run.v[-1]).max() < 0.3
