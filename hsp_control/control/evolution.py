@@ -21,7 +21,7 @@ class Transition(Generic[Value]):
     """A smooth change to a value."""
 
     start: float  # when it begins [s]
-    ramp: float  # how long it takes [s]; 0 is a jump
+    ramp: float  # its duration [s]; 0 is a jump
     target: Value  # new value
 
     @property

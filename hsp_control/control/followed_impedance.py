@@ -28,7 +28,7 @@ class FollowedImpedance:
         error: The task's error e, shape (m,).
         rate: e', shape (m,).
         period: [s], shape (1,).
-        ramp: How long the change takes, shape (1,) [s].
+        ramp: Duration of the change, shape (1,) [s].
         waits: Whether the numbers in force are not those that are planned, shape (1,).
         call: Lets the numbers in force be those of the next period.
     """

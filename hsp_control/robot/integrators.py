@@ -172,7 +172,7 @@ def number_of_steps(duration: float, step: float) -> int:
 
 
 class Steps(ABC):
-    """Takes steps of equal length: the memory of a `FixedStep`, called as `Advance`.
+    """Makes steps of equal length: the memory of a `FixedStep`, called as `Advance`.
 
     Attributes:
         q: Configuration where v' is computed, shape (nq,).
@@ -291,7 +291,7 @@ class Dop853(Integrator, type="dop853"):
     def _advance(
         self, robot: Robot, dynamics: Dynamics, t: float, end: float, q: Array, v: Array
     ) -> tuple[Array, Array]:
-        from scipy.integrate import DOP853  # here: SciPy takes long to import
+        from scipy.integrate import DOP853  # here: importing SciPy is slow
 
         while t < end:
             chart = TangentChart(robot, q)

@@ -258,7 +258,7 @@ def _share(controller: Controller, support: Support, t: float) -> float:
 
     A linear programme in the forces at the points and that share.
     """
-    from scipy.optimize import linprog  # here: SciPy takes long to import
+    from scipy.optimize import linprog  # here: importing SciPy is slow
 
     state, robot, n = controller.state, controller.robot, support.size
     equal: list[Array] = []

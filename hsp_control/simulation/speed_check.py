@@ -94,7 +94,7 @@ def _share(
         return 0.0, 0  # singular: reported elsewhere
     if np.abs(least).max() <= _FAST:
         return float(np.abs(least).max()), int(np.abs(least).argmax())
-    from scipy.optimize import linprog  # here: SciPy takes long to import
+    from scipy.optimize import linprog  # here: importing SciPy is slow
 
     n = robot.nv
     sides = np.vstack([np.eye(n), -np.eye(n)])

@@ -237,7 +237,7 @@ class Spline(PolynomialTrajectory, type="spline"):
     """Degree of the polynomials [-]."""
 
     def _pieces(self) -> Pieces:
-        # This import takes 0.2 s, so only splines import it.
+        # This import takes 0.2 s, so only splines make it.
         from scipy.interpolate import make_interp_spline
 
         x, degree = np.asarray(self.waypoints), self.degree

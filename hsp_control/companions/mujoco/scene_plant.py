@@ -262,7 +262,7 @@ class MujocoScene(PlantPart, type="mujoco_scene"):
     """The MuJoCo scene in which the robot is declared, with all its objects.
 
     The timestep, the integrator, friction and contacts are the scene's own. In Python,
-    `MujocoScenePlant` takes any model and its data.
+    `MujocoScenePlant` accepts any model and its data.
     """
 
     _: KW_ONLY

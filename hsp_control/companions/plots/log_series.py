@@ -240,7 +240,7 @@ def predicted_decay(rollout: Rollout) -> Decay:
         why = "no prediction: $K_N$ is a matrix, $W$ not in the log"
         return Decay(None, None, (0.0, 0.0), why)
     power = 0.5 * (W @ K_N + (W @ K_N).T)
-    from scipy.linalg import eigh  # here: SciPy takes long to import
+    from scipy.linalg import eigh  # here: importing SciPy is slow
 
     rates = eigh(power, W, eigvals_only=True)
     slowest, fastest = float(rates[0]), float(rates[-1])

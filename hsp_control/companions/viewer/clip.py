@@ -165,7 +165,7 @@ def extend_clip(clip: Clip, number: int) -> PageCommand:
 
 
 def track_fields(track: Track) -> Json:
-    """Return a track as the page takes it, without its times."""
+    """Return a track in the page's form, without its times."""
     values = typed_array(track.values, np.float32)
     return {"path": track.path, "property": track.property, "values": values}
 

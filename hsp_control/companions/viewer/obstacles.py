@@ -126,7 +126,7 @@ def triangles_of(geometry: Any) -> tuple[Array, Indices]:
 
 def _rounded(points: Array, distance: float) -> Json:
     """Return the convex hull of balls around points; points (K, 3) [m]."""
-    from scipy.spatial import ConvexHull  # here: SciPy takes long to import
+    from scipy.spatial import ConvexHull  # here: importing SciPy is slow
 
     cloud = hull_corners(points)[:, None, :] + distance * _unit_sphere()
     hull = ConvexHull(cloud.reshape(-1, 3))

@@ -40,7 +40,7 @@ class ElasticJoint:
 
         The acceleration u is held: the state becomes Φ s + Γ u.
         """
-        from scipy.linalg import expm  # here: SciPy takes long to import
+        from scipy.linalg import expm  # here: importing SciPy is slow
 
         spring = np.array(
             [-self.stiffness, -self.damping, self.stiffness, self.damping]

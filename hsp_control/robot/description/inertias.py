@@ -100,7 +100,7 @@ def nearest_possible(tensor: Array) -> Array:
     """
     if is_possible(tensor):
         return tensor
-    from scipy.optimize import nnls  # here: SciPy takes long to import
+    from scipy.optimize import nnls  # here: importing SciPy is slow
 
     moments, axes = np.linalg.eigh(tensor)
     basis = np.eye(3) + FLOOR / (1.0 - 3.0 * FLOOR)

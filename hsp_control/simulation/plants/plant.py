@@ -195,7 +195,7 @@ class IntegratedPlant(SampledPlant):
         return self._advance
 
     def native_steps(self) -> Steps | None:
-        """Return the steps that `advance` takes, if they are native.
+        """Return the steps of `advance`, if they are native.
 
         A caller begins with `hold`, and ends with `moved`.
         """

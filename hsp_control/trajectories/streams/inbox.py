@@ -183,7 +183,7 @@ class Taken(NamedTuple):
 
 
 class Reader:
-    """Takes messages for one run, and records them; it begins with the untaken ones.
+    """Reads messages for one run, and records them; it begins with the unread ones.
 
     Attributes:
         inbox: The queue.
