@@ -178,7 +178,7 @@ class ActiveStack:
 
     @cached_property
     def shown(self) -> "ActiveStack":
-        """This stack as others than its step get it: nothing in it can be changed."""
+        """A read-only view of this stack, for code outside of its step."""
         return shown_stack(self)
 
     @property
@@ -252,7 +252,7 @@ class ActiveStack:
         return self._state.plan([call]).call(), triangle, length
 
     def flow(self) -> Array:
-        """Return J# x_d' + P g, shape (nv,), where it was resolved, at rest."""
+        """Return J# x_d' + P g, shape (nv,), at the resolved state, at rest."""
         law, state = self.law, self._state
         # At rest, without drift and with unit gain the law's acceleration is the flow.
         nv, form = state.robot.nv, min(self._metric.form, CONSTANT)
@@ -273,7 +273,7 @@ class ActiveStack:
             self.raise_not_finite()
 
     def raise_not_finite(self) -> NoReturn:
-        """Raise for the part that made a step's effort NaN or infinite."""
+        """Raise an error for the part that made a step's effort NaN or infinite."""
         state, problem = self._state, self.law.problem
         for part, sample in self._parts:
             if not all(np.isfinite(array).all() for array in sample):
@@ -298,7 +298,7 @@ class ActiveStack:
 def _stacked(
     tasks: Sequence[PlannedTask], start: int, feedback: Mapping[int, FeedbackInForce]
 ) -> list[StackedTask]:
-    """Return tasks one below the other, from a row on."""
+    """Return the tasks of a stack, one below the other from a row on."""
     stacked, row = list[StackedTask](), start
     for each in tasks:
         name = each.task.name

@@ -160,7 +160,7 @@ class BoundMixture:
             self._on[place], self._shares[place] = 1, share
 
     def make(self, t: float, q: ArrayLike, v: ArrayLike) -> Delivered | None:
-        """Move to a state; return the delivered effort; None: Python has to."""
+        """Move to a state; return the delivered effort; None: the step needs Python."""
         mixed = self._move(t, q, v)
         if mixed is None:  # refused: lists, for example, or invalid values
             mixed = self.state.advance(self.move, t, q, v)
@@ -191,7 +191,7 @@ class BoundMixture:
         )
 
     def rehearse(self, t: float) -> None:
-        """Make the calls of all parts, whether or not they have a share."""
+        """Run the calls of all parts, active or not."""
         for each in self.rehearsed:
             each(t)
 
@@ -216,7 +216,7 @@ class _Placed:
             self._columns[each] = np.array([*chain(*columns)], dtype=np.int64)
 
     def columns(self, own: Support) -> Indices:
-        """Return where the forces of some contacts are among those of all."""
+        """Return the indices of some contacts' forces among those of all."""
         return self._columns[own]
 
     def placing(self, own: Support, forces: Array, out: Array) -> list[PartCall]:

@@ -155,7 +155,7 @@ class Changes:
         position: ArrayLike = (0.0, 0.0, 0.0),
         rotation: ArrayLike = (0.0, 0.0, 0.0),
     ) -> Self:
-        """Let a frame be another tool's, or as in the model again; see `ChangeTool`."""
+        """Move a frame to a tool's tip, or back to the model's; see `ChangeTool`."""
         at, ramp = self._at, self._ramp
         return self._do(ChangeTool(frame, position, rotation, at=at, ramp=ramp))
 
@@ -166,7 +166,7 @@ class Changes:
     if not TYPE_CHECKING:
 
         def __getattr__(self, name: str) -> None:
-            """Raise for a kind of change that there is not."""
+            """Raise for an unknown kind of change."""
             known = [each for each in vars(type(self)) if not each.startswith("_")]
             raise AttributeError(
                 f"at(t) has no {name!r}{did_you_mean(name, known)}; a change of a "
@@ -203,7 +203,7 @@ class TimeLine:
 
     @property
     def known(self) -> tuple[Change, ...]:
-        """Those of every run, and those made during this one that are not over."""
+        """Changes of every run, and those made during this one that are not over."""
         return tuple(sorted((*self.declared, *self.made), key=lambda each: each.at))
 
     def streams(self) -> Iterator[StreamRun]:

@@ -1,4 +1,4 @@
-"""An impedance that follows the planned one, and waits where that would add energy.
+"""An impedance that follows the planned one, and waits instead of adding energy.
 
 With E = ½ e'ᵀΛe' + U(e), U the energy of the spring, and an external force f,
 
@@ -62,7 +62,7 @@ class FollowedImpedance:
     def move(
         self, planned: Array, then: Array, error: Array, rate: Array, period: float
     ) -> bool:
-        """Go on to the next period; return whether the numbers in force wait."""
+        """Advance to the next period; return whether the numbers in force wait."""
         self.planned[:], self.then[:] = planned, then
         self.error[:], self.rate[:], self.period[0] = error, rate, period
         self.call()

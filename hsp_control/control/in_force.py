@@ -52,7 +52,7 @@ class InForce:
         self._over: tuple[object, ...] | None = None  # no longer followed
 
     def begin(self, time_line: TimeLine) -> None:
-        """Make all that computes, and follow a time line."""
+        """Make the objects that compute, and follow a time line."""
         state, own, setup = self._state, self._declared, time_line.setup
         base = () if own.base == "driven" else own.robot.unactuated
         self.limits = LimitsInForce(state, setup.limits, self._memory.sent)
@@ -78,7 +78,7 @@ class InForce:
         self._go_on(step)
 
     def go_over_to(self, time_line: TimeLine) -> None:
-        """Follow another time line; if it cannot be bound, nothing of it stays."""
+        """Follow another time line; if it cannot be bound, the previous one is kept."""
         before = self.time_line
         try:
             self.follow(time_line)
@@ -115,7 +115,7 @@ class InForce:
         self._memory.now = max(self._memory.now, t)
 
     def passed(self, t: float) -> None:
-        """Go on without the changes, if they are over at the time of a step [s]."""
+        """Drop the changes if they are over at the time of a step [s]."""
         memory, later = self._memory, self.later
         memory.now = max(memory.now, t)
         if later is None or memory.now <= later.at:

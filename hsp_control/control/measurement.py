@@ -7,7 +7,7 @@ from hsp_control.common.arrays import Array
 
 
 class _NoWrenches(Mapping[str, Array]):
-    """A mapping without items, which no one can add to, and which can be pickled."""
+    """An empty, immutable mapping that can be pickled."""
 
     def __getitem__(self, key: str) -> Array:
         raise KeyError(key)
@@ -23,7 +23,7 @@ class _NoWrenches(Mapping[str, Array]):
 
 
 NO_WRENCHES: Mapping[str, Array] = _NoWrenches()
-"""Of a robot that measures no contact."""
+"""Wrenches of a robot without contact sensors."""
 
 
 class Inertial(NamedTuple):
@@ -82,7 +82,7 @@ class Measurement(NamedTuple):
     inertial: Inertial | None = None
 
     def normal_force(self, frame: str, normal: Array) -> float | None:
-        """Return how hard the world pushes on a frame along a normal [N].
+        """Return the normal force of the world on a frame [N].
 
         None if the frame has no sensor.
         """

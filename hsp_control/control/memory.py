@@ -52,7 +52,7 @@ class RunMemory:
 
     @classmethod
     def of(cls, nv: int) -> "RunMemory":
-        """Return that of a controller before its first run."""
+        """Return the memory of a controller before its first run."""
         return cls(np.zeros(nv), SentMemory.of(nv))
 
     def clear(self) -> None:
@@ -113,7 +113,7 @@ class RunMemory:
         return self.forces.setdefault(contact, np.zeros(1))
 
     def made(self, now: float, change: Change) -> None:
-        """Note a change that is made after a step at a time [s]."""
+        """Record a change that is made after a step at a time [s]."""
         before = self.unseen[1] if self.unseen[0] == now else ()
         self.unseen = now, (*before, change)
 

@@ -37,7 +37,7 @@ them, weighted by the stack's `share`. State and stack are read-only; a is a cop
 
 
 def _checked(found: object, robot: Robot) -> tuple[Array, Array | None]:
-    """Return a modifier's result, if it is as in `AccelerationModifier`."""
+    """Return a modifier's result, checked as in `AccelerationModifier`."""
     if not isinstance(found, tuple) or len(found) != 2:
         raise ControllerError(
             f"modifier returned {type(found).__name__}; needs (acceleration, effort or "
@@ -226,7 +226,7 @@ class Mixture:
     def bound_step(
         self, origin: Array, evolving: Sequence[Step]
     ) -> BoundStep | BoundMixture | None:
-        """Return the step as one call; None: Python has to make some of it.
+        """Return the step as one call; None: a part of it needs Python.
 
         Args:
             origin: Reading of its calls' clock at time 0, shape (1,) [s].
@@ -278,7 +278,7 @@ class Mixture:
                     ]
 
     def rehearse(self) -> None:
-        """Solve the QPs where the last step has left them; nothing of it is used."""
+        """Solve the QPs again, to fill caches; the results are unused."""
         for each in self._actuations.values():
             each.rehearse()
 
@@ -309,7 +309,7 @@ class Mixture:
     def _stack(
         self, standing: Sequence[PlannedContact], off: Collection[int]
     ) -> ActiveStack:
-        """Return the stack of some contacts and of the tasks that are not off."""
+        """Return the stack of some contacts and of the active tasks."""
         known = tuple(map(id, standing)), frozenset(off)
         found = self._active.get(known)
         if found is None:
@@ -341,7 +341,7 @@ def _weight(pair: tuple[float, object]) -> float:
 
 
 def _mean(shares: Sequence[float], parts: Sequence[Array]) -> Array:
-    """Return the weighted mean; not even by rounding does it leave their range."""
+    """Return the weighted mean, within their range also up to rounding."""
     x = np.array(parts)
     # in this order, as the engine's
     mean = sum(share * each for share, each in zip(shares, parts, strict=True))
@@ -350,7 +350,7 @@ def _mean(shares: Sequence[float], parts: Sequence[Array]) -> Array:
 
 
 def _placed(forces: Array, support: Support, whole: Support) -> Array:
-    """Return forces of some contacts at their places among those of all."""
+    """Return forces of some contacts at their indices among those of all."""
     if support is whole or support.contacts == whole.contacts:
         return forces
     placed = np.zeros((whole.size // 3, 3))

@@ -25,4 +25,4 @@ NEAR = 0.1
 singular one, for any command."""
 
 FAR = 0.85
-"""Part of ℓ up to which the share of large errors is 0."""
+"""Fraction of ℓ up to which the share of large errors is 0."""

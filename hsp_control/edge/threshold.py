@@ -45,7 +45,7 @@ posture by a spring of at most 2 L |∂s/∂q| ≤ 100 1/s² times its inertia, 
 relative to periods of up to 10 ms and to the motors' efforts, and damped by a
 null-space gain of 10 1/s."""
 WHOLE = 3
-"""Number of components of an error with all of L; with m < 3 components it is L/(4 -
+"""Number of components of an error with the full L; with m < 3 components it is L/(4 -
 m)."""
 BELOW = 40.0
 """Factor of L below an unmet level: its feedback then accelerates a joint by at most
@@ -75,7 +75,7 @@ class Following(NamedTuple):
 
     @classmethod
     def of(cls, size: float, *, on_legs: bool) -> Self:
-        """Return it for a robot of a size [m]; for 0 no threshold follows commands."""
+        """Return the parameters for a robot's size [m]; 0: constant thresholds."""
         modest = size * MODEST_ON_LEGS if on_legs else 0.0
         steepest = STIFFNESS / size if size else np.inf
         return cls(
@@ -95,5 +95,5 @@ class Thresholds(NamedTuple):
 
     @classmethod
     def allocate(cls, levels: int) -> Self:
-        """Return those of a number of levels."""
+        """Return the thresholds of a number of levels."""
         return cls(*np.zeros((3, levels)))

@@ -325,7 +325,7 @@ class Link:
         return accepted
 
     def end_turn(self) -> None:
-        """Say that it is the other end's turn, in lockstep; always arrives."""
+        """Pass the turn to the other end, in lockstep; always arrives."""
         if self.peer is not None:
             with suppress(OSError):
                 self._socket.sendto(_END_OF_TURN, self.peer)

@@ -38,7 +38,7 @@ def smaller(a: Array, b: Array) -> Array:
 
 
 class _Window:
-    """Changes of momentum in one time, and the impulses of efforts in such times."""
+    """Changes of momentum over an interval, and the impulses of efforts."""
 
     def __init__(self, states: int, lag: int, nv: int) -> None:
         self.states = states
@@ -76,7 +76,7 @@ class _Window:
         return smaller(*(v - self._velocities[(k + 1) % (self.states + 1)]))
 
     def bounds(self) -> tuple[Array, Array]:
-        """Return the least and greatest impulse of such a time, shapes (nv,)."""
+        """Return the smallest and largest impulse over the interval, (nv,)."""
         return np.minimum.reduce(self._impulses), np.maximum.reduce(self._impulses)
 
 
@@ -122,7 +122,7 @@ class MomentumCheck:
         self.rest: Array = np.zeros(self._none.size)
 
     def update(self, now: Array, means: Array, driving: Driving, passed: float) -> None:
-        """Judge a new state.
+        """Check a new state.
 
         Args:
             now: Measured velocity, and slope of the positions since the last state,

@@ -18,7 +18,7 @@ filter of 1.6 Hz at 1 kHz."""
 
 
 class SentEfforts:
-    """The efforts of the last periods, and whether the robot can have a given one.
+    """The efforts of the last periods, and whether a given one may be in force.
 
     It has one of these, or a mean of some if it filters.
     """

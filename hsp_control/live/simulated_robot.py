@@ -70,7 +70,7 @@ class EffortCheck:
         return None
 
     def too_fast(self, v: Array) -> str | None:
-        """Return which joint exceeds its speed limit, or None."""
+        """Return the joint that exceeds its speed limit, or None."""
         i = int((np.abs(v) - self._speed).argmax())
         if abs(v[i]) <= self._speed[i]:
             return None

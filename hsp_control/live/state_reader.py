@@ -303,7 +303,7 @@ class MeasurementMonitor:
 
 
 class RobotClock:
-    """Converts the robot's time to the controller's, and judges its steps.
+    """Converts the robot's time to the controller's, and checks its steps.
 
     Between two measurements the robot's clock may advance by the periods given by their
     sequence numbers, or by the tolerated number of missing states. It may stand still

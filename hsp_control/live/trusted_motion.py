@@ -21,8 +21,8 @@ _ALONE = 3.0
 """The rate if the other source was wrong: a braked joint must follow its effort
 [1/s]."""
 _MEMORY = 0.5
-"""Time constant with which a surprise is forgotten [s]: that of the sum of small
-differences, which may reveal one so much later."""
+"""Time constant with which surprises decay [s]: that of the sum of small differences,
+which may detect a fault that much later."""
 _CLEARLY = 0.5
 """Ratio of surprises below which one source is right, and the other wrong."""
 _LEAP = 0.03
@@ -128,7 +128,7 @@ class ExpectedMotion:
 
 
 class TrustedMotion:
-    """Judges measured positions and velocities, and selects those to use.
+    """Checks measured positions and velocities, and selects those to use.
 
     If they contradict each other, the one that deviates from the model's expectation is
     wrong. If that is not clear, both are wrong if they differ much, otherwise the
@@ -214,7 +214,7 @@ class TrustedMotion:
 
     @property
     def ambiguous(self) -> bool:
-        """Whether a joint was pushed hard or is measured wrong, which is undecided."""
+        """Whether it is undecided if a joint was pushed hard or is measured wrong."""
         return bool(self._pushed.any())
 
     @property
@@ -328,7 +328,7 @@ class TrustedMotion:
         return smaller(v, slope)
 
     def _leave(self, v: Array, before: Flags) -> None:
-        """Expect the motion of joints whose trusted sources, shape (2, nv), are fewer.
+        """Expect the motion of joints with fewer trusted sources, shape (2, nv).
 
         A sensor that has died reports the velocity of that time.
         """

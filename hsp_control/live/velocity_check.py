@@ -125,7 +125,7 @@ class VelocityCheck:
     def update(
         self, way: Array, v: Array, passed: float, acceleration: Array | float = 0.0
     ) -> None:
-        """Judge a new measurement.
+        """Check a new measurement.
 
         Args:
             way: Displacement since the last one, shape (nv,) [rad or m].

@@ -179,7 +179,7 @@ class Actuation:
         return [*calls, self._delivering(qp, *own, delivered)]
 
     def _calls_with_forces(self, delivered: DeliveredAlone) -> PartCalls:
-        """Return those of `calls_alone` where contacts carry."""
+        """Return the calls of `calls_alone` with active contacts."""
         carried, calls = self.carried, list[AnyCall]()
         if carried is None:  # not among the native calls
             rows = self._limit_checks.count
@@ -188,7 +188,7 @@ class Actuation:
         return [*calls, self._delivering_forces(carried, delivered, carried.forces)]
 
     def _finding_forces(self, carried: CarriedStep) -> list[AnyCall]:
-        """Return the calls that find the forces of contacts, or the nearest step."""
+        """Return the calls that compute the contact forces, or the nearest step."""
         wanted, support, bounds = self._wanted, self._support, self._limits.bounds
         keep = PartCall(engine.Copy, x=self._state.effort, out=wanted.effort)
         decide = PartCall(
@@ -211,7 +211,7 @@ class Actuation:
     def _delivering_forces(
         self, carried: CarriedStep, delivered: DeliveredAlone, forces: Array
     ) -> PartCall:
-        """Return the call that chooses the delivered effort where contacts carry."""
+        """Return the call that selects the delivered effort with active contacts."""
         bounds, result = self._limits.bounds, carried.qp.result
         return PartCall(
             engine.DeliverWithForces,
@@ -315,7 +315,7 @@ class Actuation:
 
     @property
     def relaxation(self) -> float:
-        """The largest violation of a relaxed limit, where contacts carry."""
+        """The largest violation of a relaxed limit, with active contacts."""
         if self.carried is None:
             return 0.0
         return self.carried.relaxation(self._qp_outcome)
@@ -360,7 +360,7 @@ class Actuation:
         return self._nearest(a, motion_ok, barriers)
 
     def rehearse(self) -> None:
-        """Solve the QP where the last step has left it; nothing of it is used."""
+        """Solve the QP again, to fill caches; the result is unused."""
         if self._qp is not None:
             self._qp.solve(False, {})
 
@@ -381,7 +381,7 @@ class Actuation:
         return Delivered(tau, acceleration, forces, status, relaxation)
 
     def _limited_step(self, count: int) -> LimitedStep:
-        """Return the QP, with room for so many rows of barriers."""
+        """Return the QP, with memory for a number of rows of barriers."""
         limits, nv = self._limits.limits, self._state.robot.nv
         some = np.zeros(nv, dtype=bool)
         if limits is not None:

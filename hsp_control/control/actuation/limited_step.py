@@ -82,7 +82,7 @@ class QPOutcome(NamedTuple):
 
     @classmethod
     def allocate(cls) -> Self:
-        """Return that of a QP that was not solved yet."""
+        """Return the outcome of a QP before its solution."""
         return cls(np.ones(1, dtype=np.int64), np.zeros(1, dtype=np.int64))
 
 
@@ -96,7 +96,7 @@ class Wanted(NamedTuple):
 
 
 class Forces(NamedTuple):
-    """The contact forces f that are possible, see `Support`; size 0: none."""
+    """The permitted contact forces f, see `Support`; size 0: none."""
 
     map: Array  # F, shape (nv, p)
     first: Array  # forces nearest to the commanded ones, shape (p,) [N]
@@ -107,7 +107,7 @@ class Forces(NamedTuple):
 
 
 class Places(NamedTuple):
-    """The places of the rows."""
+    """The indices of the rows."""
 
     # degrees of freedom of the first rows: those without a motor, then those with a
     # limit on their effort

@@ -41,7 +41,7 @@ class SentMemory:
 
     @classmethod
     def of(cls, nv: int) -> "SentMemory":
-        """Return that of a robot to which nothing was sent."""
+        """Return the memory before any effort was sent."""
         held = Held(np.zeros(2), *(np.zeros(nv) for _ in range(10)))
         memory = cls(np.zeros(nv + 1), held)
         memory.clear()
@@ -55,7 +55,7 @@ class SentMemory:
         self.held.timing[0] = self.last[-1] = np.inf
 
     def become(self, other: "SentMemory") -> None:
-        """Hold the numbers of another memory."""
+        """Copy the values of another memory."""
         self.period = other.period
         given = other.last, *other.held
         for each, number in zip((self.last, *self.held), given, strict=True):
@@ -83,12 +83,12 @@ class SentEffort:
         self._expect = state.plan([self.expecting(self._acceleration)]).call()
 
     def record(self, tau: Array, acceleration: Array, period: float) -> None:
-        """Record an effort, the acceleration it is to give, and how long it is held."""
+        """Record an effort, its intended acceleration, and its duration."""
         self.last[:-1], self.last[-1] = tau, period
         self.record_acceleration(acceleration, period)
 
     def record_acceleration(self, acceleration: Array, period: float) -> None:
-        """Record the acceleration that an effort is to give, and not the effort."""
+        """Record the intended acceleration of an effort, not the effort."""
         self._acceleration[:] = acceleration
         self.held.timing[1] = period
         self._expect()

@@ -18,7 +18,7 @@ from hsp_control.robot.state import as_given
 
 @dataclass(frozen=True)
 class ElasticJoint:
-    """An elastic joint whose model is rigid: a motor moves a link through a spring.
+    """An elastic joint with a rigid model: a motor moves a link through a spring.
 
     M. W. Spong, "Modeling and control of elastic joint robots", J. Dyn. Sys. Meas.
     Control 109 (1987), for one joint. With the inertias relative to the model's,
@@ -54,7 +54,7 @@ class ElasticJoint:
 
 
 _NOTHING = 1e-12
-"""A coupling of two rows below this part of the gains is rounding."""
+"""Coupling of two rows, relative to the gains, below which it is rounding."""
 
 
 @dataclass(frozen=True)
@@ -186,7 +186,7 @@ class LinearLoop:
         return [*(moved + effect[:, None, None] * u)]
 
     def _performed(self, u: Array) -> Array:
-        """Return the acceleration that the robot performs where u is commanded."""
+        """Return the robot's acceleration under the command u."""
         share = np.asarray(self.share)
         return share @ u if share.ndim else share * u
 
@@ -255,7 +255,7 @@ def field_slope(controller: Controller, state: RobotState) -> Array:
 
 
 NO_GAINS = (np.zeros((0, 0)),) * 3
-"""Kp, Kv and Ki of a loop that stands for its chain."""
+"""Kp, Kv and Ki of a loop that represents its chain."""
 
 
 class LoadedLoop(NamedTuple):
@@ -285,7 +285,7 @@ class LoadedLoop(NamedTuple):
     slope: Array
 
     def largest_part(self, wanted: float) -> float:
-        """Return this part, or less: a lighter robot must keep a tenth of its mass."""
+        """Return this fraction, bounded so that a tenth of the mass remains."""
         lightest = float(np.linalg.eigvals(self.difference).real.min())
         return wanted if lightest >= 0.0 else min(wanted, -0.9 / lightest)
 

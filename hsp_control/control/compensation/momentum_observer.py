@@ -40,8 +40,8 @@ from hsp_control.tasks import Task
 from hsp_control.tasks.compliant_task import CompliantTask
 
 LARGE_SHARE = 0.25
-"""Share of an effort limit from which on unexplained effort is no error of masses: the
-robot does not move as its model does [-]."""
+"""Unexplained effort relative to its limit above which mass errors cannot be the cause:
+the robot does not move like its model [-]."""
 
 
 class MomentumObserver(Part, error=CompensationError):

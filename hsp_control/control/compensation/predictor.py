@@ -42,7 +42,7 @@ class Predictor(Part, error=CompensationError):
 
 
 class RunningPredictor(Stage):
-    """Integrates the model under the efforts that are under way."""
+    """Integrates the model under the efforts that have not acted yet."""
 
     def __init__(self, declared: Predictor, robot: Robot) -> None:
         self._declared = declared

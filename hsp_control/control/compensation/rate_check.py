@@ -34,11 +34,11 @@ to the law."""
 RULE_DELAYED = 0.1
 """Recommended maximum of ω0 h with a delay and no predictor."""
 RULE_LOADED = 1.5
-"""A known plant must stay stable if it differs from the model this many times as much,
-as it may elsewhere on its way."""
+"""A known plant must be stable with its difference from the model scaled by this
+factor: it may be that large at other states."""
 RULE_HEAVY = 5.0
-"""Integral action must stay stable for a robot up to this many times as heavy, at a
-task, as its model. Without other compensators this is a rate of Kv/5."""
+"""Integral action must be stable for a robot up to this many times as heavy at a task
+as its model. Without other compensators this is a rate of Kv/5."""
 SLOWEST_GROWTH = 0.02
 """Rate of growth that is reported [1/s]: slower ones need a minute to be seen."""
 _LONG = 50
@@ -446,7 +446,7 @@ def _stabilising_changes(
 
 
 def _borne(loop: LinearLoop) -> int | None:
-    """Return the most periods of delay with which a loop is stable.
+    """Return the largest delay in periods with which a loop is stable.
 
     None if it is stable with the delay that it has, or unstable without any.
     """

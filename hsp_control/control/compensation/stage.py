@@ -30,7 +30,7 @@ class Run:
     def __init__(
         self, controller: Controller, measured: RobotState, ahead: int
     ) -> None:
-        """Begin; ``ahead`` is the number of efforts on their way, besides the last."""
+        """Begin; ``ahead`` is the number of delayed efforts besides the last one."""
         self.controller = controller
         self.measured = measured  # the last measurement, where an observer needs it
         self.wrenches: Mapping[str, Array] = NO_WRENCHES  # see `Measurement`
@@ -90,10 +90,10 @@ class Stage:
         """Change the acceleration or the effort; while tasks fade, for every set."""
 
     def finish(self, run: Run) -> None:
-        """Go on for the period for which the effort of `Run.output` is held."""
+        """Advance by the period for which the effort of `Run.output` is held."""
 
     def alone(self, shared: Alone) -> AloneCalls | None:
-        """Return the calls that do all of the above; None where it takes Python."""
+        """Return the calls equivalent to all of the above; None if they need Python."""
         return None
 
     def log_channels(self, run: Run) -> Mapping[str, LogChannel]:

@@ -31,7 +31,7 @@ class StartUpRamp(Part, error=CompensationError):
 
 
 class RunningRamp(Stage):
-    """A start-up ramp in one run: it knows when and where it began."""
+    """A start-up ramp in one run, with its start time and state."""
 
     _bound: tuple[Array, Callable[[], object]] | None = None
 
@@ -58,7 +58,7 @@ class RunningRamp(Stage):
         run.a, run.starting = own.copy(), bool(self._starting[0])
 
     def _act_on_manifold(self, run: Run, state: RobotState) -> None:
-        """Blend with the difference that Pinocchio knows of any joint."""
+        """Blend with Pinocchio's difference, for any joint."""
         if self._begun is None:
             self._begun = state.t, state.q.copy()
         begin, q0 = self._begun

@@ -30,7 +30,7 @@ from hsp_control.tasks.compliant_task import impedance_of
 _WRITTEN_BY = ("call", "calls", "evaluate")
 _FUNCTIONS = "rate_function", "jacobian_rate_function", "jacobian_function"
 _SOLVED = 1e-6
-"""Part of a_x - J'v that may be left of it [-]: more is a singular posture."""
+"""Tolerated residual relative to a_x - J'v [-]: more is a singular posture."""
 _DAMPED = "A task is damped by Kv of its gains"
 
 
