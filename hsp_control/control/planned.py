@@ -169,8 +169,7 @@ class PlannedContact:
         return x * (3.0 - x * (3.0 - x))
 
     def edge(self, t: float) -> float:
-        """Return the time near t at which its schedule lifts it, or lifted it last
-        [s]."""
+        """Return the time near t of a lift, or of the last one, by its schedule [s]."""
         schedule = self.contact.schedule
         return t if schedule is None else schedule.edge(t)
 

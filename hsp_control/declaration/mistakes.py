@@ -43,7 +43,7 @@ _KINDS = {
 
 
 class CheckedSource(Protocol):
-    """Where the checked data come from."""
+    """The source of the checked data."""
 
     def __contains__(self, path: KeyPath) -> bool:
         """Return whether there is a value at the key path."""

@@ -36,8 +36,8 @@ def plain(value: Any) -> Any:
 
 
 LARGEST = 1e30
-"""No length, time, mass or gain is larger, in whatever units: products of some such
-numbers are still doubles, and so are those of the inverses of positive ones."""
+"""Bound on lengths, times, masses and gains in any unit: products of some such numbers,
+and of inverses of positive ones, do not overflow."""
 
 
 def _not_huge(value: float) -> float:

@@ -26,7 +26,7 @@ from hsp_control.engine.plans import AnyCall, PartCall, Step
 from hsp_control.tasks.compliant_task import impedance_of
 
 MOST = 4
-"""Of how many tasks the presence may be an input: the file has 2^MOST sets of them."""
+"""Largest number of tasks whose presence is an input: the file has 2^MOST sets."""
 
 
 Delivering = Callable[[ActiveStack, Actuation, DeliveredAlone], list[Step]]

@@ -32,7 +32,7 @@ _WIDE = 8.0 * np.pi
 _GAP = 0.02
 """Least distance from an obstacle [m]; links only must not overlap."""
 _SHARE = 0.5
-"""Least singular value, as a share of the best that was seen."""
+"""Smallest accepted singular value, relative to the best one found."""
 _ARM = 3
 """Fewest joints of an arm; fingers have fewer."""
 _EACH, _TOGETHER = 12, 60
@@ -62,7 +62,7 @@ _eccentricity = attrgetter("eccentricity")
 
 
 class PostureSearch:
-    """Judges postures of one robot, and finds a good one."""
+    """Evaluates postures of one robot, and finds a good one."""
 
     def __init__(
         self, robot: Robot, rows: Sequence[Rows], obstacles: Sequence[Obstacle] = ()

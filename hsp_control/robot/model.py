@@ -83,7 +83,7 @@ class RobotModel(Structure):
         return most
 
     def _followed(self, joint: int) -> tuple[bool, float]:
-        """Return whether a follower turns, and how fast, relative to its leader."""
+        """Return whether a follower rotates, and its speed relative to its leader's."""
         model, data = self.model, self.model.createData()
         v = np.zeros(self.nv)
         v[model.joints[joint].idx_v] = 1.0

@@ -156,7 +156,7 @@ def name_a_changed_scene(robot: Robot, record: Mapping[str, Any]) -> None:
 
 
 class OtherRobotWarning(UserWarning):
-    """A robot that is given for a log is not the one in it."""
+    """The robot given for a log differs from the one in it."""
 
 
 def warn_of_another_robot(robot: Robot, meta: Mapping[str, Any]) -> None:

@@ -1,4 +1,4 @@
-"""The journal of a log: rows appended as they come, so that a killed run loses none.
+"""The journal of a log: rows are appended at once, so that a killed run loses none.
 
 An ``.npz`` has all rows of a column in one place and its directory at the end, so it
 can only be written when a run is over. Until then the rows are in a file that is only
@@ -175,7 +175,7 @@ class JournalReader:
         self._parts: list[tuple[Shapes, list[Array]]] = []
 
     def read(self) -> int:
-        """Read the new frames; return how many rows they have.
+        """Read the new frames; return their number of rows.
 
         Raises:
             LogError: If the file is no journal, or cannot be read.
@@ -223,7 +223,7 @@ class JournalReader:
             self.meta, self.ended = {**self.meta, **json.loads(payload)}, True
 
     def whole(self) -> int:
-        """Read the new bytes; return how many of all bytes are in whole frames."""
+        """Read the new bytes; return the number of bytes in complete frames."""
         self.read()
         begun = self.path.is_file() and self.path.stat().st_size >= len(MAGIC)
         return self._at if begun else 0
@@ -317,7 +317,7 @@ def is_journal(path: Path) -> bool:
 
 
 def width(shapes: Shapes) -> int:
-    """Return how many numbers a row has."""
+    """Return the number of values in a row."""
     return sum(map(math.prod, shapes.values()))
 
 

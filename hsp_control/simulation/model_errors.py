@@ -239,7 +239,7 @@ def _last_stable(
 def _moved(
     controller: Controller, state: RobotState, whole: WholeLoop
 ) -> tuple[Moved, ...]:
-    """Return how far the tasks move for one unit of effort on every joint."""
+    """Return the tasks' displacements per unit of effort on the joints."""
     loop, T, to_error, rows = whole
     m, nv = len(to_error), len(T)
     # Each column is the acceleration of one unit of effort, in the loop's coordinates.

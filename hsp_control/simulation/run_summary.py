@@ -80,7 +80,7 @@ def summary_rows(rollout: Log) -> Iterator[tuple[str, str]]:
 
 
 def damped_rows(rollout: Log) -> int:
-    """Return in how many rows the law was damped at a singularity."""
+    """Return the number of rows in which the law was damped at a singularity."""
     known = rollout.columns.get("damped")
     return 0 if known is None else int((known > 0.0).sum())
 

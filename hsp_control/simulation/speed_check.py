@@ -1,4 +1,4 @@
-"""Whether joints are fast enough for references, as known before a run."""
+"""Joint speeds that references require, checked before a run."""
 
 from collections.abc import Sequence
 from typing import NamedTuple
@@ -15,7 +15,7 @@ _FAST = 1.01
 
 
 class Passed(NamedTuple):
-    """A posture in which a target is reached, or the nearest one that was found."""
+    """A posture in which a target is reached, or the nearest one found."""
 
     t: float  # the time [s]
     q: Array  # the configuration, shape (nq,)

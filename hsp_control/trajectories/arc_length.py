@@ -50,7 +50,7 @@ class Path(NamedTuple):
 
     @property
     def length(self) -> float:
-        """Length of the path; infinite if it goes on for ever."""
+        """Length of the path; infinite if it is endless."""
         return inf if self.arc.repeats else float(self.arc.lengths[-1])
 
 

@@ -113,7 +113,7 @@ class CrossfadeOrientation(OrientationTrajectory, type="crossfade"):
     """Duration of the change [s]; 0 is a jump."""
 
     def __post_init__(self) -> None:
-        """Check how many changes overlap."""
+        """Check the number of overlapping changes."""
         _check_overlapping(self)
 
     @property
@@ -168,7 +168,7 @@ class CrossfadeOrientation(OrientationTrajectory, type="crossfade"):
         return [PartCall(engine.CrossfadeOrientationOfStreams, **given, t=TIME)]
 
     def keep_start(self, until: float) -> None:
-        """Let streams know until a time how it was where the change began."""
+        """Let streams keep the state at the start of the change until a time."""
         for stream in _streams(self):
             stream.run.keep(self.start_time, until)
         for earlier in parts_within(self.before, CrossfadeOrientation):

@@ -94,7 +94,7 @@ def rounded_lines(waypoints: Array, radius: float) -> RoundedLines:
 
 
 def _angles(directions: Array) -> Array:
-    """Return the angles [rad] by which lines turn at the waypoints; 0 at both ends."""
+    """Return the angles [rad] between lines at the waypoints; 0 at both ends."""
     cosines = np.einsum("ij,ij->i", directions[1:], directions[:-1])
     sines = np.linalg.norm(directions[1:] - cosines[:, None] * directions[:-1], axis=1)
     return np.concatenate([[0.0], np.arctan2(sines, cosines), [0.0]])

@@ -203,7 +203,7 @@ class Contact(Part, ABC, family="contacts", error=ContactError):
         return self
 
     def _check_command(self, force: CommandedForce, state: RobotState) -> None:
-        """Check that the commanded force is possible, as it is at the start."""
+        """Check that the commanded force is possible, by its value at the start."""
         if force.dimension == WRENCH and len(self.points) < 3:
             raise ContactError(
                 f"it has 6 coordinates; a contact of type {self.yaml_type} exerts no "
@@ -330,7 +330,7 @@ class UnactuatedRows:
 
 
 def unactuated_count(jacobian: Array, base: Indices) -> int:
-    """Return how many base motions the contacts' stacked rows (m, nv) permit."""
+    """Return the number of base motions permitted by stacked rows (m, nv)."""
     if not len(jacobian):
         return len(base)
     values = np.linalg.svd(jacobian[:, base], compute_uv=False)

@@ -25,8 +25,8 @@ from hsp_control.common.arrays import Array
 ROUNDING = 1e-6
 """A second moment may be negative by this share of their sum: files are rounded."""
 NEGLIGIBLE = 1e-9
-"""It may also be negative by this share of the robot's mass [m²], as if all of that lay
-within 30 µm: nothing in motion shows so little. Zeros that were rounded are below it
+"""It may also be negative by this fraction of the robot's mass [m²], the moment of all
+of it within 30 µm, which has no observable effect. Zeros that were rounded are below it
 (-5e-20 kg·m²), and so are links of 1e-8 kg that stand for a frame.
 """
 FLOOR = 1e-3

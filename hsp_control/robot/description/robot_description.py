@@ -88,7 +88,7 @@ class OneRobot(Part, error=ModelError):
     ``<transmission>`` elements of the URDF."""
 
     def find(self, access: Access = ANYWHERE) -> RobotSource:
-        """Return where it comes from; see `find_robot` and `find_description`.
+        """Return its source; see `find_robot` and `find_description`.
 
         Raises:
             ModelError: If it is several robots.

@@ -77,7 +77,7 @@ class DroppedPeriods(Drive, type="dropped"):
 
 
 class EffortDelay(Drive, type="delay"):
-    """The effort commanded some periods ago; the first effort until there is one."""
+    """The effort commanded some periods ago; at first the first effort."""
 
     stage: ClassVar[float] = 20.0
     strength: ClassVar[str] = "periods"

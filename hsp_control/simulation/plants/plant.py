@@ -251,7 +251,7 @@ class Imperfection(Part, ABC, error=SimulationError):
 
     @property
     def periods(self) -> int:
-        """By how many control periods it delays, for the rate check."""
+        """Its delay in control periods, for the rate check."""
         return 0
 
 

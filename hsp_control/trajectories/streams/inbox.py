@@ -228,7 +228,7 @@ class Reader:
         return other
 
     def _add(self, message: Message, t: float) -> None:
-        """Record a message that is taken at a time [s], as long as there is room."""
+        """Record a message that is read at a time [s], if memory is left."""
         most = MOST if self.logged else min(BRIEF, MOST)
         if self._recorded + message.size <= most:
             self.record.append(Taken(message, t))

@@ -26,7 +26,7 @@ from hsp_control.trajectories.streams.message import Axes, Message
 
 SOON = 1e-3  # time of a rehearsed step [s]
 KEPT = 1.0
-"""How long the reference is known after a time [s]."""
+"""Time for which the reference is known after a time [s]."""
 MOST = 4096  # maximum number of stored waypoints
 _AT_ONCE = 256  # maximum number of simultaneous messages; the oldest others are ignored
 _CONSIDERED = 256  # waypoints before and after a time: see `KnownWaypoints`
@@ -271,7 +271,7 @@ class Planner:
         return self.now - float(max(self._received.item(), self._begun.item()))
 
     def count(self, of: str) -> int:
-        """Return how many messages were ``taken``, ``late`` or ``refused``."""
+        """Return the numbers of ``taken``, ``late`` and ``refused`` messages."""
         return int(self._memory[of].item())
 
     # -- copies -----------------------------------------------------------------------
@@ -329,7 +329,7 @@ class Planner:
     # -- without Python ---------------------------------------------------------------
 
     def calls(self, out: Any) -> PartCalls:
-        """Return the calls that take a program's messages, and write a sample."""
+        """Return the calls that read a program's messages, and write a sample."""
         advance = PartCall(engine.Stream, t=TIME, **self._arguments)
         return [advance, *self.chart.calls(self.state, out)]
 

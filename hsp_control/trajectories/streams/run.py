@@ -237,7 +237,7 @@ class StreamRun:
 
     @property
     def shared(self) -> dict[int, Any]:
-        """The memo of `deepcopy` for a copy that looks on: the queue itself."""
+        """The memo of `deepcopy` for a copy that only reads: the queue itself."""
         return {id(self._inbox): self._inbox}
 
     def leave_python(self, period: float) -> None:
