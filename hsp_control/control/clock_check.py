@@ -23,8 +23,8 @@ _SURE = 20
 """Moving steps in a row after which the unit is known: noise has any sign."""
 
 _LOOKS = 300
-"""Steps that are checked for it, after the first one and after a new target: later ones
-cost nothing."""
+"""Steps that are checked for it, after the first one and after a change or a message of
+a stream: later ones cost nothing."""
 
 
 class ClockWarning(UserWarning):

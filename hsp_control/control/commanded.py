@@ -70,7 +70,6 @@ class Commanded(Composition):
         # otherwise it is in reach
         if not np.abs(value).max() < self._declared.robot.size:
             warn_of_far_target(self._here().state, followed, value)
-        self._memory.clock.look_again()
         return self._sent(task, value=value)
 
     def stream(self, of: str | Streamed) -> StreamHandle:
@@ -86,7 +85,10 @@ class Commanded(Composition):
                 nothing follows the given one.
         """
         self._run_of(of)
-        return StreamHandle(lambda: self._run_of(of))
+        return StreamHandle(
+            lambda: self._run_of(of),
+            on_send=lambda: self._memory.clock.look_again(),  # it will move
+        )
 
     def _run_of(self, of: str | Streamed) -> StreamRun:
         """Return the stream of a task, or of a declaration, in the present run."""

@@ -17,9 +17,14 @@ class StreamHandle:
     Counters and the record are those of the present run.
     """
 
-    def __init__(self, find: Callable[[], StreamRun]) -> None:
-        """Set the function that returns the stream of the present run."""
-        self._find = find
+    def __init__(
+        self, find: Callable[[], StreamRun], on_send: Callable[[], None]
+    ) -> None:
+        """Set the function that returns the stream of the present run.
+
+        ``on_send`` is called with each message.
+        """
+        self._find, self._on_send = find, on_send
 
     def send(
         self,
@@ -31,6 +36,7 @@ class StreamHandle:
     ) -> None:
         """Send a target, or a velocity; see `StreamRun.send`."""
         self._find().send(value, velocity=velocity, axes=axes, t=t)
+        self._on_send()
 
     def send_chunk(
         self,
@@ -42,6 +48,7 @@ class StreamHandle:
     ) -> None:
         """Send waypoints; see `StreamRun.send_chunk`."""
         self._find().send_chunk(values, times, velocities=velocities, t=t)
+        self._on_send()
 
     def counts(self) -> dict[str, float]:
         """Return the time since the last message [s], and the number of messages."""

@@ -1,13 +1,14 @@
 """The trusted part of a joint's measured motion: velocity, positions, or neither."""
 
-from math import exp, inf
+from math import inf
 
 import numpy as np
 
 from hsp_control.common.arrays import Array, Flags
-from hsp_control.common.exceptions import HspControlError
 from hsp_control.control.measurement import Measurement
 from hsp_control.engine import Dynamics
+from hsp_control.live.expected_motion import ExpectedMotion
+from hsp_control.live.fault_isolation import FaultIsolation
 from hsp_control.live.momentum_check import Driving, MomentumCheck, smaller
 from hsp_control.live.response_check import ResponseCheck
 from hsp_control.live.settings import LiveSettings
@@ -15,16 +16,6 @@ from hsp_control.live.still_sensors import StillSensors
 from hsp_control.live.velocity_check import VelocityCheck
 from hsp_control.robot import Robot
 
-_BANDWIDTH = 30.0
-"""Rate at which an expected velocity follows a source [1/s]."""
-_ALONE = 3.0
-"""The rate if the other source was wrong: a braked joint must follow its effort
-[1/s]."""
-_MEMORY = 0.5
-"""Time constant with which surprises decay [s]: that of the sum of small differences,
-which may detect a fault that much later."""
-_CLEARLY = 0.5
-"""Ratio of surprises below which one source is right, and the other wrong."""
 _LEAP = 0.03
 """Change of a velocity that is none, besides twice the largest recent surprise [rad/s
 or m/s]."""
@@ -40,100 +31,13 @@ _MOVES = 0.2
 _EFFORT = {"rad": "N·m", "m": "N"}
 
 
-class ExpectedMotion:
-    """The velocity of a joint expected by the model, from each of its sources.
-
-    The sources are the rows of all arrays: the measured velocity, the slope of the
-    positions, and the mean of the trusted ones of these. An expectation is integrated
-    with the model under the efforts applied, and follows its source by a limited step,
-    so that a jump of a sensor is not followed at once; a second state estimates the
-    acceleration that the model lacks.
-
-    Attributes:
-        v: The expected velocities, shape (3, nv) [rad/s or m/s].
-        before: Those before the last sources were followed, shape (3, nv).
-        surprise: The largest recent differences, shape (3, nv).
-        usual: Those before the last one, shape (3, nv).
-        acceleration: The acceleration by the applied efforts and the model, shape
-        (nv,).
-    """
-
-    def __init__(
-        self, robot: Robot, error: float, period: float, dynamics: Dynamics
-    ) -> None:
-        self._robot, self._error, self._dynamics = robot, error, dynamics
-        self._rate = min(_BANDWIDTH, 0.3 / period)
-        self._rates = np.array([0.0, _ALONE, self._rate])
-        self._sources = np.zeros((3, robot.nv))
-        self.begin(np.zeros(robot.nv))
-
-    def begin(self, v: Array) -> None:
-        """Begin at a velocity, shape (nv,), for all sources."""
-        self.v: Array = np.tile(v, (3, 1))
-        self.before = self.v
-        self.surprise: Array = np.zeros((3, v.size))
-        self.usual = self.surprise
-        self._missed = np.zeros((3, v.size))
-        self.acceleration: Array = np.zeros(v.size)
-
-    def apply(self, q: Array, v: Array, tau: Array) -> None:
-        """Record the effort that acts from now on, shape (nv,), at a state."""
-        if self._robot.unactuated:  # the forces at the feet are unknown
-            return
-        try:
-            acceleration = self._robot.forward_dynamics(q, v, tau, self._dynamics)
-        except HspControlError:
-            return
-        if np.isfinite(acceleration).all():
-            self.acceleration = acceleration
-
-    def advance(self, passed: float) -> None:
-        """Advance by a time [s]."""
-        self.v = self.v + passed * (self.acceleration + self._missed)
-
-    def follow(
-        self, measured: Array, trusted: Flags, passed: float, *, braked: bool
-    ) -> None:
-        """Compare with the sources, and follow them.
-
-        Args:
-            measured: The velocity, and the slope of the positions, shape (2, nv).
-            trusted: Whether they are trusted, shape (2, nv). A joint without a trusted
-                one continues as expected.
-            passed: Time since the last ones [s].
-            braked: Whether the joints are braked, and must follow their efforts.
-        """
-        sources, known = self._sources, trusted.sum(axis=0)
-        sources[:2] = measured
-        sources[2] = (trusted * measured).sum(axis=0) / np.maximum(known, 1)
-        if braked:
-            known = np.minimum(known, 1)
-        difference = sources - self.v
-        self.before, self.usual = self.v, exp(-passed / _MEMORY) * self.surprise
-        self.surprise = np.maximum(self.usual, np.abs(difference))
-        step = np.minimum(np.maximum(difference, -self._error), self._error)
-        rate = self._rates[known]
-        self.v = self.v + np.minimum(2.0 * rate * passed, 1.0) * step
-        gain = min(self._rate**2 * passed, self._rate)
-        self._missed = (self._missed + gain * step) * (known == 2)
-
-    def leave(self, wrong: Flags, trusted: Flags) -> None:
-        """Take back the last step of joints of which a source is wrong, shape (nv,).
-
-        They follow the one that is trusted still, shape (2, nv), or none.
-        """
-        by_v, by_q, neither = self.before
-        kept = np.where(trusted[0], by_v, np.where(trusted[1], by_q, neither))
-        self.v[2] = np.where(wrong, kept, self.v[2])
-
-
 class TrustedMotion:
     """Checks measured positions and velocities, and selects those to use.
 
     If they contradict each other, the one that deviates from the model's expectation is
-    wrong. If that is not clear, both are wrong if they differ much, otherwise the
-    velocity. If both are wrong, or the sensor is dead, the expectation is used. A
-    source that was wrong is not used again.
+    wrong (`FaultIsolation`). If that is not clear, both are wrong if they differ much,
+    otherwise the velocity. If both are wrong, or the sensor is dead, the expectation is
+    used. A source that was wrong is not used again.
 
     If both agree and are wrong, the efforts reveal it: a joint whose readings do not
     change though it is pushed (`StillSensors`), one that moves against its effort
@@ -184,6 +88,7 @@ class TrustedMotion:
         self._response.restart()
         self._momentum.restart()
         self._contrary = np.zeros(self._robot.nv, dtype=bool)
+        self._isolation = FaultIsolation(self._robot.nv)
         self.dead: Flags = np.zeros(self._robot.nv, dtype=bool)
         self._pushed = np.zeros(self._robot.nv, dtype=bool)
         self.last: Measurement | None = None
@@ -356,26 +261,14 @@ class TrustedMotion:
             return
         both = self._positions & self._velocities
         wrong &= both
-        by_v, by_q, _ = self._expected.surprise
-        greatest = np.maximum(by_v, by_q)
-        good_v = by_v < _CLEARLY * greatest
-        small = check.difference < _SMALL * self._error
-        good_q = by_q < _CLEARLY * greatest
-        frozen = wrong & ~good_q & (check.stands | (check.unmoved & ~good_v))
-        good_q |= ~good_v & small
-        good_q &= ~jumps
-        self._positions &= ~wrong | good_q
-        # Where velocities jump as well as positions, the whole message is wrong.
-        leaps = np.abs(v - self._expected.before[0])
-        leaps -= np.minimum(_LEAP + 2.0 * self._expected.usual[0], 0.5 * self._error)
-        smooth = (leaps[jumps] < 0.0).all()
-        self._velocities &= ~wrong | (good_v & ~jumps) | (jumps & smooth)
+        frozen = self._isolate(wrong, jumps, v)
         lost = (dead | frozen) & (self._positions | self._velocities)
         if self.complete:
             self._contrary |= contrary & both
             self._pushed |= pushed & both & ~(wrong | dead)
             lost |= (contrary | pushed) & both
         lost |= runs | self._left(v) & (self._positions ^ self._velocities)
+        self._isolation.undecided &= ~(dead | jumps)
         # If a joint moves against its efforts they are harmful: only the robot can
         # brake.
         self._useless |= bool(runs.any() or self._contrary.any())
@@ -386,6 +279,29 @@ class TrustedMotion:
         if (wrong | lost).any():
             i = int(np.flatnonzero(wrong | lost)[0])
             self.fault = self._described(i, v, runs=bool(runs[i]))
+
+    def _isolate(self, wrong: Flags, jumps: Flags, v: Array) -> Flags:
+        """Trust the right sources of joints of which one is wrong, shape (nv,).
+
+        Returns the joints whose sensors do not move, shape (nv,).
+        """
+        check, expected, isolation = self._check, self._expected, self._isolation
+        right_v, right_q = isolation.isolate(wrong & ~jumps, expected.surprise[:2])
+        decided = isolation.undecided & (right_v ^ right_q)
+        expected.begin_again(decided, np.where(right_v, v, check.slope))
+        small = check.difference < _SMALL * self._error
+        frozen = wrong & ~right_q & (check.stands | (check.unmoved & ~right_v))
+        right_q |= wrong & ~right_v & small
+        right_q &= ~jumps
+        # Where velocities jump as well as positions, the whole message is wrong.
+        leaps = np.abs(v - expected.before[0])
+        leaps -= np.minimum(_LEAP + 2.0 * expected.usual[0], 0.5 * self._error)
+        right_v = np.where(jumps, (leaps[jumps] < 0.0).all(), right_v)
+        self._positions = np.where(wrong | decided, right_q, self._positions)
+        self._velocities = np.where(wrong | decided, right_v, self._velocities)
+        undecided = wrong & ~(right_v | right_q | frozen | jumps)
+        isolation.undecided = (isolation.undecided & ~decided) | undecided
+        return frozen
 
     def _left(self, v: Array) -> Flags:
         """Return the joints that deviate from the expectation by a trusted source.

@@ -100,6 +100,7 @@ class VelocityCheck:
         """Forget all positions."""
         nv = self._judged.size
         self._count = 0
+        self._ranges[:] = 0.0  # before its first state a robot is at rest
         self._sum, self._fastest, self._doubts, self._beyond = np.zeros((4, nv))
         self._still = np.zeros(nv, dtype=np.int64)
         self._step = np.full(nv, inf)  # the smallest change of a position
@@ -140,7 +141,7 @@ class VelocityCheck:
         self._slopes[k], self._velocities[k] = slope, v
         self._ranges[:, k] = np.minimum(slope, at_end), np.maximum(slope, at_end)
         self._count += 1
-        lower, upper = self._ranges[:, : self._count]
+        lower, upper = self._ranges
         few, end = min(self._count, self._few), self._count % len(self._slopes)
         latest = self._latest[end] if few == self._few else slice(0, few)
         self.slope = np.add.reduce(self._slopes[latest]) / few

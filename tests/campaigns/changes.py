@@ -20,7 +20,7 @@ import hsp_control as hsp
 from campaigns.results import keep
 
 NUMBER, FEW = 100_000, 20
-RECORDED = 7000
+RECORDED = 10_000
 """Messages after which a stream without a log stops recording: the reference for later
 ones."""
 RAMP = 2e-3

@@ -38,10 +38,16 @@ def law(
 
 
 def watched(
-    settings: LiveSettings | None = None, period: float = PERIOD
+    settings: LiveSettings | None = None,
+    period: float = PERIOD,
+    arm: hsp.Robot | None = None,
 ) -> SimulatedRobot:
-    plant = IntegratedPlant(RigidBodyPlant(panda()), SemiImplicitEuler(period))
-    return SimulatedRobot(plant, start(), np.zeros(7), period, settings=settings)
+    """Return a simulated arm, by default a Panda, at its home."""
+    arm = arm or panda()
+    plant = IntegratedPlant(RigidBodyPlant(arm), SemiImplicitEuler(period))
+    return SimulatedRobot(
+        plant, arm.home().copy(), np.zeros(arm.nv), period, settings=settings
+    )
 
 
 Trick = Callable[[Measurement], Measurement | None]

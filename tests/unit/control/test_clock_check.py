@@ -2,7 +2,7 @@
 
 import re
 import warnings
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from itertools import pairwise
 
 import numpy as np
@@ -126,16 +126,29 @@ def test_a_robot_that_rests_shows_no_unit() -> None:
         assert moved(unit, noise=0.2) == []
 
 
-def test_a_target_after_a_long_rest_shows_the_unit() -> None:
+MOVED_BY: dict[str, Callable[[hsp.Controller, np.ndarray], object]] = {
+    "target": lambda made, x: made.set_target("hand", x),
+    "velocity": lambda made, x: made.set_velocity("hand", 0.1 * x),
+    "message": lambda made, x: made.stream("hand").send(x),
+    "chunk": lambda made, x: made.stream("hand").send_chunk([x], [0.1]),
+    "change": lambda made, x: made.at(made.state.t).reference("hand", hsp.Hold(x)),
+}
+
+
+@pytest.mark.parametrize("by", MOVED_BY)
+def test_the_unit_is_seen_when_the_robot_moves_after_a_long_rest(by: str) -> None:
     """At rest the check is skipped, so that it costs no time."""
     robot = hsp.Robot.load("panda")
-    controller = hsp.Controller(robot, [hsp.FramePosition(name="hand")])
+    task = hsp.FramePosition(name="hand")
+    if by in ("message", "chunk"):
+        task = hsp.FramePosition(trajectory=hsp.Stream(), name="hand")
+    controller = hsp.Controller(robot, [task])
     clock, v = controller._memory.clock, np.full(7, 0.2)
     for k in range(320):
         controller.compute(float(k), robot.home(), np.zeros(7))
     assert not clock.undecided
     target = robot.state(0.0, robot.home(), v).position("panda_tcp")
-    controller.set_target("hand", target)
+    MOVED_BY[by](controller, target)
     assert controller._memory.clock.undecided
 
     def move() -> None:

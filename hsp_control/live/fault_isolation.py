@@ -1,0 +1,53 @@
+"""Isolation of the wrong one of two sources: a joint's velocity or its positions."""
+
+import numpy as np
+
+from hsp_control.common.arrays import Array, Flags
+
+_CLEARLY = 0.5
+"""Ratio of surprises below which one source is right, and the other wrong."""
+_BEYOND_DOUBT = 0.3
+"""The ratio below which the same kind of source is wrong in joints in doubt, too."""
+
+
+class FaultIsolation:
+    """Isolates the wrong source of joints whose velocity contradicts their positions.
+
+    The wrong one deviates more from the model's expectation. A fault often affects the
+    sensors of several joints: once one kind of source was wrong beyond doubt, and not
+    the other kind, it is wrong in joints in doubt, too, also in those of which neither
+    was trusted. Unless a kind is known, the joints in doubt are decided together: none,
+    if one of them is undecided.
+
+    Attributes:
+        undecided: Joints of which neither source is trusted, since the wrong one is
+        unknown, shape (nv,).
+    """
+
+    def __init__(self, joints: int) -> None:
+        """``joints``: nv."""
+        self._wrong_kind = np.zeros(2, dtype=bool)  # velocities, positions
+        self.undecided: Flags = np.zeros(joints, dtype=bool)
+
+    def isolate(self, wrong: Flags, surprise: Array) -> tuple[Flags, Flags]:
+        """Return whether the velocity, and whether the positions are right, (nv,).
+
+        Args:
+            wrong: Joints of which one source is wrong, shape (nv,); those of the others
+                is not judged.
+            surprise: Of each source: the largest recent difference from the
+                expectation, shape (2, nv) [rad/s or m/s].
+        """
+        greatest = surprise.max(axis=0)
+        right = surprise < _CLEARLY * greatest
+        clear = surprise < _BEYOND_DOUBT * greatest
+        # A source is wrong beyond doubt where the other one is right.
+        self._wrong_kind |= (wrong & clear[::-1]).any(axis=1)
+        doubtful = self.undecided | ~clear.any(axis=0)
+        if self._wrong_kind[0] != self._wrong_kind[1]:
+            right = np.where(doubtful, ~self._wrong_kind[:, None], right)
+        else:
+            right = right & ~self.undecided
+            if (wrong & ~right.any(axis=0)).any():
+                right = right & clear
+        return right[0], right[1]

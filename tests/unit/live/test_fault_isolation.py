@@ -1,0 +1,66 @@
+"""The wrong source of a joint is isolated by the model, then by other joints."""
+
+import numpy as np
+import pytest
+
+from hsp_control.live.fault_isolation import FaultIsolation
+
+CLEAR, DOUBTFUL, UNDECIDED = 0.2, 0.4, 0.8  # ratios of the two surprises
+V, Q = (True, False), (False, True)
+NEITHER = (False, False)
+
+
+def isolated(
+    isolation: FaultIsolation, *surprises: tuple[float, float], wrong: str = ""
+) -> list[tuple[bool, bool]]:
+    """Return the right sources of joints with these surprises of (v, q).
+
+    ``wrong``: "1" for joints with one wrong source; all by default.
+    """
+    joints = np.array([each == "1" for each in wrong or "1" * len(surprises)])
+    by_v, by_q = isolation.isolate(joints, np.array(surprises).T)
+    return list(zip(by_v.tolist(), by_q.tolist(), strict=True))
+
+
+def test_the_source_that_deviates_less_is_right() -> None:
+    assert isolated(FaultIsolation(2), (CLEAR, 1.0), (1.0, CLEAR)) == [V, Q]
+    assert isolated(FaultIsolation(1), (DOUBTFUL, 1.0)) == [V]
+    assert isolated(FaultIsolation(1), (UNDECIDED, 1.0)) == [NEITHER]
+
+
+def test_of_joints_in_doubt_one_that_is_undecided_leaves_none_decided() -> None:
+    found = isolated(FaultIsolation(3), (1.0, DOUBTFUL), (1.0, UNDECIDED), (1.0, 0.9))
+    assert found == [NEITHER] * 3
+
+
+@pytest.mark.parametrize("wrong", [V, Q])
+def test_the_kind_that_is_wrong_elsewhere_is_wrong_in_joints_in_doubt(
+    wrong: tuple[bool, bool],
+) -> None:
+    """For any surprises of their own; also later, but not in clear cases."""
+    right = wrong[::-1]
+    clear = (1.0, CLEAR) if wrong == V else (CLEAR, 1.0)
+    isolation = FaultIsolation(3)
+    found = isolated(isolation, clear, (DOUBTFUL, 1.0), (1.0, UNDECIDED))
+    assert found == [right] * 3
+    later = isolated(isolation, (1.0, DOUBTFUL), clear[::-1], (0.5, 0.5), wrong="111")
+    assert later[1] == wrong  # that source of this joint is right
+
+
+def test_joints_that_are_not_wrong_say_nothing_of_a_kind() -> None:
+    isolation = FaultIsolation(2)
+    assert isolated(isolation, (1.0, CLEAR), (1.0, 0.9), wrong="01")[1] == NEITHER
+
+
+def test_where_both_kinds_are_wrong_somewhere_none_decides() -> None:
+    isolation = FaultIsolation(3)
+    isolated(isolation, (1.0, CLEAR), (CLEAR, 1.0), (0.0, 0.0), wrong="110")
+    assert isolated(isolation, (0, 0), (0, 0), (1.0, 0.9), wrong="001")[2] == NEITHER
+
+
+def test_an_undecided_joint_is_decided_by_others_only() -> None:
+    """Its own surprise is no longer evidence: its expectation follows no source."""
+    isolation = FaultIsolation(2)
+    isolation.undecided = np.array([True, False])
+    assert isolated(isolation, (1.0, CLEAR), (0, 0), wrong="00")[0] == NEITHER
+    assert isolated(isolation, (1.0, CLEAR), (CLEAR, 1.0), wrong="01")[0] == V
