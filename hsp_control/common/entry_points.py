@@ -21,7 +21,7 @@ def entry_points(group: str) -> dict[str, EntryPoint]:
 
 @cache
 def _installed(group: str) -> EntryPoints:
-    """Return those of all packages: to read their files takes 20 ms."""
+    """Return the entry points of all packages; reading their files takes 20 ms."""
     return metadata.entry_points(group=group)
 
 

@@ -1,4 +1,4 @@
-"""Which of two contradicting sources is wrong: a joint's velocity, or its positions."""
+"""Isolation of the wrong one of two sources: a joint's velocity or its positions."""
 
 import numpy as np
 
@@ -16,11 +16,11 @@ what is expected of the others."""
 class FaultIsolation:
     """Isolates the wrong source of joints whose velocity contradicts their positions.
 
-    The wrong one is that which deviates more from the model's expectation. What makes a
-    sensor wrong often acts on those of several joints: once one kind of source was
-    wrong beyond doubt, and not the other kind, it is wrong in joints in doubt, too,
-    also in those of which neither was trusted. Unless a kind is known, the joints in
-    doubt are decided together: none, if one of them is undecided.
+    The wrong one deviates more from the model's expectation. A fault often affects the
+    sensors of several joints: once one kind of source was wrong beyond doubt, and not
+    the other kind, it is wrong in joints in doubt, too, also in those of which neither
+    was trusted. Unless a kind is known, the joints in doubt are decided together: none,
+    if one of them is undecided.
 
     Attributes:
         undecided: Joints of which neither source is trusted, since the wrong one is

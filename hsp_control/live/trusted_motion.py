@@ -32,7 +32,7 @@ _EFFORT = {"rad": "N·m", "m": "N"}
 
 
 class TrustedMotion:
-    """Judges measured positions and velocities, and selects those to use.
+    """Checks measured positions and velocities, and selects those to use.
 
     If they contradict each other, the one that deviates from the model's expectation is
     wrong (`FaultIsolation`). If that is not clear, both are wrong if they differ much,
@@ -119,7 +119,7 @@ class TrustedMotion:
 
     @property
     def ambiguous(self) -> bool:
-        """Whether a joint was pushed hard or is measured wrong, which is undecided."""
+        """Whether it is undecided if a joint was pushed hard or is measured wrong."""
         return bool(self._pushed.any())
 
     @property
@@ -203,8 +203,8 @@ class TrustedMotion:
         if (self._sensors.dead | self._pushed).any():  # its speed is unknown
             self.unknown_for = max(self.unknown_for, self._soon)
         unknown = ~(self._positions | self._velocities)
-        # Beside a joint that is only expected, one that stands, and should move, may be
-        # dead, too.
+        # If one joint's sensors are dead, another one that rests although it should
+        # move may be dead, too.
         stands = check.stands & (np.abs(expected.v[2]) > _MOVES)
         if self._useless or (unknown.any() and stands.any()):
             self.unknown_for = inf
@@ -233,7 +233,7 @@ class TrustedMotion:
         return smaller(v, slope)
 
     def _leave(self, v: Array, before: Flags) -> None:
-        """Expect the motion of joints whose trusted sources, shape (2, nv), are fewer.
+        """Expect the motion of joints with fewer trusted sources, shape (2, nv).
 
         A sensor that has died reports the velocity of that time.
         """
@@ -253,7 +253,7 @@ class TrustedMotion:
         check = self._check
         dead = check.dead | self._sensors.dead
         contrary = self._response.contrary
-        # Motion hidden by a dead sensor seems to push the other joints, too.
+        # Motion hidden by a dead sensor appears as a push on the other joints, too.
         pushed = self._momentum.beyond & ~check.halted.any()
         wrong = check.contradicted | jumps
         runs = self._left(v) if self.stopping else np.zeros(v.size, dtype=bool)
@@ -268,7 +268,8 @@ class TrustedMotion:
             self._pushed |= pushed & both & ~(wrong | dead)
             lost |= (contrary | pushed) & both
         lost |= runs | self._left(v) & (self._positions ^ self._velocities)
-        # Efforts are harmful if a joint moves against them: only the robot can brake.
+        # If a joint moves against its efforts they are harmful: only the robot can
+        # brake.
         self._useless |= bool(runs.any() or self._contrary.any())
         self._positions &= ~lost
         self._velocities &= ~lost
@@ -308,7 +309,7 @@ class TrustedMotion:
         sensor drives it, so that it is faster, or moves in the other direction.
         """
         slope, by_v, by_q = self._check.slope, self._expected.v[0], self._expected.v[1]
-        # Of a velocity, less the largest effect of its noise alone.
+        # Of a velocity, less the largest effect of noise.
         used = np.where(self._velocities, smaller(v, self._check.mean), slope)
         expected = np.where(self._velocities, by_v, by_q)
         least, most = np.minimum(expected, 0.0), np.maximum(expected, 0.0)

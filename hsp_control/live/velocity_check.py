@@ -129,7 +129,7 @@ class VelocityCheck:
     def update(
         self, way: Array, v: Array, passed: float, acceleration: Array | float = 0.0
     ) -> None:
-        """Judge a new measurement.
+        """Check a new measurement.
 
         Args:
             way: Displacement since the last one, shape (nv,) [rad or m].
@@ -182,7 +182,7 @@ class VelocityCheck:
             np.where(self._by_v, np.abs(v), inf),
             np.where(self._by_q, np.abs(slope), inf),
         )
-        now = np.where(self._by_v | self._by_q, now, 0.0)  # of neither it is unknown
+        now = np.where(self._by_v | self._by_q, now, 0.0)  # unknown without either
         speed, self._speed = np.maximum(now, self._speed), now
         if not still.any():
             self._still[:], self.before, self.dead = 0, speed, self._none
@@ -193,7 +193,7 @@ class VelocityCheck:
         lasted = self._still * self._period
         step = np.maximum(_STEP, np.minimum(_STEPS * self._step, _COARSEST))
         far = self.before * lasted > step
-        # No encoder stands still at a speed that is reported for so long.
+        # No encoder is constant at a speed reported for so long.
         frozen = (self._still >= _STILL) & (np.abs(v) > _WENT)
         frozen &= (np.abs(v) * lasted > step) & self._by_q & self._by_v
         self.contradicted = self.contradicted | (frozen & self._judged)

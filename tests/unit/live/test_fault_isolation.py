@@ -1,4 +1,4 @@
-"""Which source of a joint is wrong is decided by the model, then by other joints."""
+"""The wrong source of a joint is isolated by the model, then by other joints."""
 
 import numpy as np
 import pytest
@@ -15,7 +15,7 @@ def isolated(
 ) -> list[tuple[bool, bool]]:
     """Return the right sources of joints with these surprises of (v, q).
 
-    ``wrong``: "1" for a joint of which one source is wrong; by default all are.
+    ``wrong``: "1" for joints with one wrong source; all by default.
     """
     joints = np.array([each == "1" for each in wrong or "1" * len(surprises)])
     by_v, by_q = isolation.isolate(joints, np.array(surprises).T)
@@ -37,7 +37,7 @@ def test_of_joints_in_doubt_one_that_is_undecided_leaves_none_decided() -> None:
 def test_the_kind_that_is_wrong_elsewhere_is_wrong_in_joints_in_doubt(
     wrong: tuple[bool, bool],
 ) -> None:
-    """Whatever their own surprises; later too, but where these are clearer still."""
+    """For any surprises of their own; also later, but where these are clearer still."""
     right = wrong[::-1]
 
     def of(ratio: float, source: tuple[bool, bool]) -> tuple[float, float]:
@@ -63,7 +63,7 @@ def test_where_both_kinds_are_wrong_somewhere_none_decides() -> None:
 
 
 def test_an_undecided_joint_is_decided_by_others_only() -> None:
-    """Its own surprise is no evidence any more: its expectation follows no source."""
+    """Its own surprise is no longer evidence: its expectation follows no source."""
     isolation = FaultIsolation(2)
     isolation.undecided = np.array([True, False])
     assert isolated(isolation, (1.0, CLEAR), (0, 0), wrong="00")[0] == NEITHER
