@@ -261,8 +261,8 @@ class TrustedMotion:
             return
         both = self._positions & self._velocities
         wrong &= both
-        frozen = self._isolate(wrong, jumps, v)
-        lost = (dead | frozen) & (self._positions | self._velocities)
+        lost = dead | self._isolate(wrong, jumps, v)
+        lost &= self._positions | self._velocities
         if self.complete:
             self._contrary |= contrary & both
             self._pushed |= pushed & both & ~(wrong | dead)
@@ -282,20 +282,27 @@ class TrustedMotion:
     def _isolate(self, wrong: Flags, jumps: Flags, v: Array) -> Flags:
         """Trust the right sources of joints of which one is wrong, shape (nv,).
 
-        Returns the joints whose sensors do not move, shape (nv,).
+        Returns the joints of which no source can be right, shape (nv,).
         """
         check, expected, isolation = self._check, self._expected, self._isolation
-        right_v, right_q = isolation.isolate(wrong & ~jumps, expected.surprise[:2])
+        slight = check.difference < self._error
+        right_v, right_q = isolation.isolate(
+            wrong & ~jumps, expected.surprise[:2], check.constant, slight
+        )
         decided = isolation.undecided & (right_v ^ right_q)
         expected.begin_again(decided, np.where(right_v, v, check.slope))
         small = check.difference < _SMALL * self._error
         frozen = wrong & ~right_q & (check.stands | (check.unmoved & ~right_v))
         right_q |= wrong & ~right_v & small
         right_q &= ~jumps
-        # Where velocities jump as well as positions, the whole message is wrong.
+        # Where velocities jump as well as positions, the message is wrong: of one joint,
+        # or of all.
         leaps = np.abs(v - expected.before[0])
         leaps -= np.minimum(_LEAP + 2.0 * expected.usual[0], 0.5 * self._error)
-        right_v = np.where(jumps, (leaps[jumps] < 0.0).all(), right_v)
+        smooth = bool((leaps[jumps] < 0.0).all())
+        right_v = np.where(jumps, smooth, right_v)
+        if not smooth and jumps.sum() > 1:
+            frozen[:] = True
         self._positions = np.where(wrong | decided, right_q, self._positions)
         self._velocities = np.where(wrong | decided, right_v, self._velocities)
         undecided = wrong & ~(right_v | right_q | frozen | jumps)

@@ -11,14 +11,22 @@ NEITHER = (False, False)
 
 
 def isolated(
-    isolation: FaultIsolation, *surprises: tuple[float, float], wrong: str = ""
+    isolation: FaultIsolation,
+    *surprises: tuple[float, float],
+    wrong: str = "",
+    constant: str = "",
+    slight: bool = True,
 ) -> list[tuple[bool, bool]]:
     """Return the right sources of joints with these surprises of (v, q).
 
     ``wrong``: "1" for joints with one wrong source; all by default.
     """
     joints = np.array([each == "1" for each in wrong or "1" * len(surprises)])
-    by_v, by_q = isolation.isolate(joints, np.array(surprises).T)
+    still = np.array([each in constant.split() for each in "vq"])[:, None]
+    still = np.tile(still, joints.size)
+    by_v, by_q = isolation.isolate(
+        joints, np.array(surprises).T, still, np.full(joints.size, slight)
+    )
     return list(zip(by_v.tolist(), by_q.tolist(), strict=True))
 
 
