@@ -295,8 +295,8 @@ class TrustedMotion:
         frozen = wrong & ~right_q & (check.stands | (check.unmoved & ~right_v))
         right_q |= wrong & ~right_v & small
         right_q &= ~jumps
-        # Where velocities jump as well as positions, the message is wrong: of one joint,
-        # or of all.
+        # Where velocities jump as well as positions, neither of the joint is right; in
+        # several joints, the whole message is wrong.
         leaps = np.abs(v - expected.before[0])
         leaps -= np.minimum(_LEAP + 2.0 * expected.usual[0], 0.5 * self._error)
         smooth = bool((leaps[jumps] < 0.0).all())
