@@ -36,7 +36,8 @@ def repeated(log: Path) -> hsp.Rollout:
 
 
 def test_a_simulation_repeats_from_where_and_when_it_began(tmp_path: Path) -> None:
-    """A log begins in mid-run: relative values are resolved, past changes left out."""
+    """Relative values refer to a configuration other than Q0; a change precedes the
+    run."""
     made = law(start=ROBOT.home())
     made.at(0.5).gains("tip", hsp.Gains(natural_frequency=3.0))
     run = hsp.simulate(made, Q0, **RUN, start_time=1.0)

@@ -225,9 +225,9 @@ RIGID = {("xarm7", "a load of 1 kg")}
 
 
 SEEDS = 3 if THOROUGH else 1
+"""Arms with model errors per case and robot."""
 USUAL = {"all": ["xarm7"], "a load of 1 kg": ["ur5"]}
-"""Arms per case, unless thorough."""
-"""Arms per case with model errors, of each kind."""
+"""Robots per case, unless thorough."""
 
 
 @pytest.mark.parametrize(

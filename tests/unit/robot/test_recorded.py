@@ -64,7 +64,7 @@ def all_joints() -> hsp.Robot:
 
 
 def followers() -> hsp.Robot:
-    """Followers of every joint type, of a multi-turn leader, and of a free joint."""
+    """A chain with mimic joints of several types, also of a multi-turn leader."""
     rng = np.random.default_rng(2)
     kinds = [
         (pin.JointModelRX(), None),

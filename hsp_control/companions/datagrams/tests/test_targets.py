@@ -84,7 +84,7 @@ def test_a_second_sender_is_refused_until_the_first_is_silent(
         return inbox.count > before
 
     assert taken("a:1", 0.0)
-    assert taken("b:2", 0.1)  # one goal per stream: no stream is active yet
+    assert taken("b:2", 0.1)  # one message per sender is no stream yet
     for k in range(9):
         assert taken("a:1", 0.2 + 0.05 * k)
         assert not taken("b:2", 0.22 + 0.05 * k)

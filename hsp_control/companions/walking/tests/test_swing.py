@@ -109,7 +109,7 @@ def test_a_redirected_swing_stays_smooth(t, end):
 
 @pytest.mark.parametrize(("width", "arm"), [(0.17, 0.1), (0.3, 0.15)])
 def test_feet_that_turn_accelerate_as_those_that_walk(width, arm):
-    """They are half a width off the middle; below 0.1 m a default is used."""
+    """They are half a width off the middle, at least 0.1 m."""
     walk = Walk(speed=0.5, turn=9.0, acceleration=0.4, swing=0.6, double_support=0.15)
     planner = StepPlanner(walk, STANCE._replace(width=width), "a biped")
     first = planner._next_velocity(Velocity(0.0, 0.0, 0.0), 0.0, 0)
