@@ -82,6 +82,7 @@ def test_it_goes_up_a_step_of_two_centimetres():
         f"plant.solids={{step: {step}}}",
         "plan.until=2.2",
         "simulation.duration=3.4",
+        "simulation.control_period=0.002",
     )
     run = load_experiment("walking/solo12_trot", *settings).run()
     assert run.status == "completed"

@@ -15,6 +15,7 @@ from hsp_control.companions.walking import Trot
 
 pytest.importorskip("example_robot_data")
 pytest.importorskip("mujoco")
+COARSE = "simulation.control_period=0.002"  # at its own period it trots in `trot`
 
 
 @cache
@@ -40,7 +41,7 @@ def test_it_returns_to_its_line_after_a_push():
     """Across it; what it loses along it, it does not make up for."""
     push = "{frame: base_link, force: [-4, 8, 0], start: 1, duration: 0.1}"
     settings = f"plant.pushes=[{push}]", "plan.until=4.4", "simulation.duration=4.8"
-    run = load_experiment("walking/solo12_trot", *settings).run()
+    run = load_experiment("walking/solo12_trot", *settings, COARSE).run()
     assert run.status == "completed"
     beside = run.q[:, 1]
     assert beside.max() > 0.12  # farther than the reference lets it go
@@ -106,7 +107,7 @@ def test_a_streamed_velocity_is_followed_and_repeated_from_the_log(tmp_path):
         limits=given.limits,
         plan=Trot(velocity=velocity),
         plant=given.plant,
-        simulation=replace(given.simulation, duration=1.5),
+        simulation=replace(given.simulation, duration=1.5, control_period=0.002),
     )
 
     def drive(recorder):
