@@ -11,6 +11,8 @@ from hsp_control.control.actuation import Status
 
 EVERY_STEP = "simulation.log_period=0.001"
 UNLIMITED = "limits=null"
+SHORTER = "simulation.duration=3.2"  # of the one at half strength
+FREE = "simulation.duration=5"  # until the other one is beyond its joint limits
 
 
 @cache
@@ -38,9 +40,8 @@ def error(rollout: Rollout) -> np.ndarray:
 
 def test_half_strength() -> None:
     """No effort beyond half; the null space pays, and the hand a little."""
-    shorter = "simulation.duration=3.2"
-    ours, limits = run("panda_half_strength", shorter)
-    free, _ = run("panda_half_strength", shorter, UNLIMITED)
+    ours, limits = run("panda_half_strength", SHORTER)
+    free, _ = run("panda_half_strength", UNLIMITED, SHORTER)
     check_limits(ours, limits)
     assert limits is not None
     assert (np.abs(free["tau"]) / limits.effort).max() > 1.05  # it is commanded
@@ -56,7 +57,7 @@ def test_half_strength() -> None:
 def test_towards_a_joint_limit() -> None:
     """At the first stop the null space has given way, at the second the hand too."""
     ours, limits = run("panda_towards_limit")
-    free, _ = run("panda_towards_limit", UNLIMITED)
+    free, _ = run("panda_towards_limit", UNLIMITED, FREE)
     check_limits(ours, limits)
     assert limits is not None
     assert free["q"][:, 3].max() > limits.upper[3] + 0.5
@@ -76,9 +77,9 @@ def test_towards_a_joint_limit() -> None:
 @pytest.mark.parametrize("name", ["panda_half_strength", "panda_towards_limit"])
 def test_the_law_until_a_limit_is_met(name: str) -> None:
     """Before the first limited step both runs are one."""
-    shorter = ("simulation.duration=3.2",) if "half" in name else ()
-    ours, _ = run(name, *shorter)
-    free, _ = run(name, *shorter, UNLIMITED)
+    half = "half" in name
+    ours, _ = run(name, *([SHORTER] if half else []))
+    free, _ = run(name, UNLIMITED, SHORTER if half else FREE)
     first = int(np.flatnonzero(ours["status"])[0])
     assert first > 500
     np.testing.assert_allclose(ours.tau[:first], free.tau[:first], rtol=0, atol=1e-9)

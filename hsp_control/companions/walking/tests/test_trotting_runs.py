@@ -20,7 +20,7 @@ COARSE = "simulation.control_period=0.002"  # at its own period it trots in `tro
 
 @cache
 def trot() -> Rollout:
-    settings = ("plan.until=1", "simulation.duration=3", "simulation.log_period=0.005")
+    settings = "plan.until=0.8", "simulation.duration=2", "simulation.log_period=0.005"
     return load_experiment("walking/solo12_trot", *settings).run()
 
 
@@ -74,7 +74,7 @@ def test_a_robot_that_is_nowhere_named_trots_within_its_limits():
         "contacts": {f: {"type": "ball", "frame": f, "radius": 0.02} for f in feet},
         "plan": {"type": "trot", "speed": 0.4},
         "null_space": {"fields": [{"type": "target_posture", "target": "start"}]},
-        "simulation": {"duration": 1.6, "control_period": 0.001},
+        "simulation": {"duration": 1.3, "control_period": 0.001},
         "plant": {"type": "mujoco", "contacts": dict.fromkeys(feet, ball)},
     }
     run = load_experiment(given).run()
