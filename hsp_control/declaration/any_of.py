@@ -56,7 +56,7 @@ class AnyOf:
         return SchemaValidator(_union(members)).validate_python(plain(value))
 
     def _validator_of(self, name: str, member: type[Declared]) -> Callable[[Any], Any]:
-        """Return the check of one member: to make those of all takes a third of a second."""
+        """Return the check of one member; those of all take a third of a second."""
         known, validator = self._validators.get(name, (None, None))
         if validator is None or known is not member:
             validator = SchemaValidator(_union({name: member}))

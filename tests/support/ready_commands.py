@@ -1,8 +1,9 @@
 """A process that has imported `hsp_control` forks one for every command or script.
 
 Each command still begins with no types, robots or logs of another one, and ends on its
-own: what is saved is the CPU of its imports and first checks, a second or two. How `hsp` itself
-starts is seen where plays and commands that need a shell run (`page_runner.py`).
+own: what is saved is the CPU of its imports and first checks, a second or two. How
+`hsp` itself starts is seen where plays and commands that need a shell run
+(`page_runner.py`).
 """
 
 import atexit
@@ -80,9 +81,10 @@ def serve() -> None:
     from multiprocessing import get_context
     from tempfile import TemporaryFile
 
-    # Each command would make the checks of these parts anew; what is installed it finds.
+    # Each command would make the checks of these parts anew.
     for name in ("panda_obstacle", "paper/4_moving_obstacle"):
         import_module("hsp_control").load_experiment(name)
+    # A command may have more packages.
     import_module("hsp_control.common.entry_points")._installed.cache_clear()
     requests, answers = os.fdopen(os.dup(0)), os.fdopen(os.dup(1), "w")
     fork = get_context("fork")

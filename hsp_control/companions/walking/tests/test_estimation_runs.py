@@ -44,7 +44,12 @@ def test_talos_takes_a_step_on_an_estimated_base():
 @pytest.mark.system
 @pytest.mark.slow
 def test_solo_trots_on_an_estimated_base_and_again_the_same(tmp_path):
-    given = ("estimators.base=true", "plan.until=0.6", "simulation.duration=1.2", COARSE)
+    given = (
+        "estimators.base=true",
+        "plan.until=0.6",
+        "simulation.duration=1.2",
+        COARSE,
+    )
     effort, sent = CompensatedController.effort, []
 
     def spy(command, t, *rest):
