@@ -3,8 +3,9 @@
 from collections.abc import Callable
 from functools import cache
 from importlib import import_module, metadata
-from importlib.metadata import EntryPoint, EntryPoints
+from importlib.metadata import EntryPoint
 from pathlib import Path
+from typing import Any
 
 _PACKAGE = Path(__file__).parents[1]
 
@@ -20,8 +21,11 @@ def entry_points(group: str) -> dict[str, EntryPoint]:
 
 
 @cache
-def _installed() -> EntryPoints:
-    """Return those of all packages and groups: to read their files takes 20 ms."""
+def _installed() -> Any:
+    """Return those of all packages and groups: to read their files takes 20 ms.
+
+    Before Python 3.12 these are no `EntryPoints`, but have `select`, too.
+    """
     return metadata.entry_points()
 
 
