@@ -1,8 +1,8 @@
-"""What all tests share: derandomised property tests, and signals that arrive.
+"""Setup of all tests: derandomised property tests, and signals that arrive.
 
-Those of the core are in `tests`, those of a companion in its folder, with what they
-share in `tests/support` there. A file of tests that needs a companion which was taken
-away is not collected.
+Tests of the core are in `tests`, those of a companion in its folder, with shared code
+in `tests/support` there. A file of tests that needs a removed companion is not
+collected.
 """
 
 import gc
@@ -42,11 +42,11 @@ COMPANIONS = ROOT / "hsp_control" / "companions"
 SUPPORT = sorted(COMPANIONS.glob("*/tests/support"))
 sys.path += map(str, SUPPORT)
 
-gc.disable()  # while tests are collected: of what they are made of nothing is garbage
+gc.disable()  # during the collection of tests, whose objects are all kept
 
 
 def pytest_collection_finish() -> None:
-    """Take what the tests are made of out of the garbage collector's sight.
+    """Exclude the tests' own objects from garbage collection.
 
     A loop collects garbage before it begins: among a million objects of 8000 tests that
     takes longer than most runs.
@@ -56,7 +56,7 @@ def pytest_collection_finish() -> None:
     gc.enable()
     frozen = gc.get_freeze_count()
 
-    # Counting half a million objects takes 50 ms, which each loop does as it begins.
+    # Counting half a million objects takes 50 ms, at the start of every loop.
     @wraps(gc.get_freeze_count)
     def known() -> int:
         return frozen
@@ -65,7 +65,7 @@ def pytest_collection_finish() -> None:
 
 
 def pytest_sessionfinish() -> None:
-    """Show the collector all of it again: what an end leaves is reported as leaked."""
+    """Include them again: objects that remain at the end are reported as leaked."""
     gc.unfreeze()
 
 
@@ -115,8 +115,8 @@ def pytest_ignore_collect(collection_path: Path, config: pytest.Config) -> bool 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     """Mark the tests of `make test-system`.
 
-    These are all of tests/system, and what starts processes or a browser elsewhere, but
-    for what is marked as smoke.
+    These are all of tests/system, and tests elsewhere that start processes or a
+    browser, except those marked as smoke.
     """
     for item in items:
         outside = SYSTEM in item.path.parents or any(

@@ -3,9 +3,9 @@
 pip runs it (the hook of the wheel, also of an editable one), and ``make`` where a
 source is newer than the library: ``python hatch_build.py``. A C++ compiler is taken
 from the variable CXX or from the path; where there is none, or CXX is ``zig``, it is
-the package ziglang. Its library runs on any Linux of the last ten years, and the
-wheel's tag says so. With Python 3.12 or newer the library keeps to Python's stable ABI,
-and one wheel serves 3.12 and all later ones.
+the package ziglang. Its library runs on any Linux of the last ten years, as the wheel's
+tag declares. With Python 3.12 or newer the library keeps to Python's stable ABI, and
+one wheel serves 3.12 and all later ones.
 """
 
 import os
@@ -30,10 +30,10 @@ except ImportError:  # `make` needs no hook
 ROOT = Path(__file__).parent
 
 ZIG_TARGETS = {"x86_64": "x86_64-linux-gnu.2.17", "aarch64": "aarch64-linux-gnu.2.17"}
-"""What zig compiles for, by machine: any processor, and glibc from 2.17 on. Without a
-target it would compile for the very processor that it runs on."""
+"""The targets of zig by machine: any processor, and glibc from 2.17 on. Without a
+target it would compile for the processor that it runs on."""
 OLD_LINUX = "manylinux_2_17"
-"""What a wheel calls that."""
+"""The name of this platform in a wheel's tag."""
 
 
 def compiler() -> str | None:
@@ -48,7 +48,7 @@ def has_cmake() -> bool:
     """Return whether the machine's own CMake will do.
 
     One before 3.26 (Debian 12, Ubuntu 22.04) does not find Python's stable ABI, which
-    there is from Python 3.12 on: what it builds works, but for one Python alone.
+    exists from Python 3.12 on: its libraries work, but for one Python version only.
     """
     if sys.version_info < (3, 12) or not shutil.which("cmake"):
         return bool(shutil.which("cmake"))
@@ -111,7 +111,7 @@ def build(kind: str = "Release", folder: Path = ROOT / "build") -> Path:
     Args:
         kind: ``Release``: it is put beside the Python of the engine; ``Debug``, with
             Eigen's assertions, and ``Sanitized`` stay where they are compiled.
-        folder: Where what is compiled stays, for each Python and each kind of build.
+        folder: Folder of compiled files, by Python version and kind of build.
     """
     by = "" if compiler() else "-zig"
     place = folder / f"{kind}-{sysconfig.get_config_var('SOABI')}{by}".lower()
@@ -122,7 +122,7 @@ def build(kind: str = "Release", folder: Path = ROOT / "build") -> Path:
 
 def _built(kind: str, place: Path) -> Path:
     """Build in a folder that is ours alone."""
-    # What was found last time may have been a build environment that is gone.
+    # The cache may refer to a build environment that was removed.
     (place / "CMakeCache.txt").unlink(missing_ok=True)
     options = [f"-DCMAKE_BUILD_TYPE={kind}", f"-DPython_EXECUTABLE={sys.executable}"]
     if compiler() is None:
@@ -164,14 +164,14 @@ def _put(library: Path, target: Path) -> Path:
 
 
 def wheel_tag(library: str) -> str:
-    """Return what a wheel with this library is for: Python, its ABI and the platform.
+    """Return the tag of a wheel with this library: Python, its ABI and the platform.
 
     Args:
         library: The library's file name, in which CMake marks whether it keeps to the
             stable ABI, which begins with Python 3.12 (nanobind needs no less).
     """
-    # This Python's tags, the best first; what a compiler links against the libraries
-    # of this very machine may not call itself manylinux.
+    # This Python's tags, the best first; a library linked against those of this machine
+    # may not be tagged manylinux.
     mine = next(
         tag for tag in sys_tags() if not tag.platform.startswith(("many", "musl"))
     )

@@ -1,4 +1,4 @@
-"""The effect of each constant of the edge: the same cases with half, twice or none.
+"""The effect of the edge's constants: the same cases with half, twice or none.
 
     .venv/bin/python benchmarks/ablation.py [--cases N] [--robots ROBOT ...] [NAME ...]
 
@@ -78,7 +78,7 @@ CONSTANTS: dict[str, dict[str, Edit]] = {
     },
     "σ_x, 0.1": constant(_SHARES, "NEAR = 0.1", half=0.05, twice=0.2),
     "0.85 of ℓ": constant(_SHARES, "FAR = 0.85", less=0.7),
-    "K of what yields": constant(
+    "K of saturated levels": constant(
         _HELD, "STIFFEST = 1000.0", half=500.0, twice=2000.0, none=1e12
     ),
     "2, excess of the tasks": constant(

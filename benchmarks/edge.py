@@ -2,8 +2,8 @@
 
     .venv-peers/bin/python benchmarks/edge.py [--old CHECKOUT] [ROBOT ...]
 
-The cases of `shared/edge_cases.py`, the same for all laws; each law in a process of its
-own, one after another (`shared/edge_loop.py`). The other laws are in
+The cases of `shared/edge_cases.py`, the same for all laws; laws run in separate
+processes, one after another (`shared/edge_loop.py`). The other laws are in
 `shared/controllers`, with the gains that their projects ship for an arm like a Panda;
 pink and TSID are their own packages, and are left out where they are not installed.
 ``--python LAW=PYTHON`` runs a law in another environment, which needs Pinocchio and the
@@ -221,7 +221,7 @@ def steers(runs: list[Run]) -> bool:
 
 
 def long_rows(name: str, runs: list[Run], robots: list[str]) -> str:
-    """Return a law's lines, one for each robot."""
+    """Return a law's lines, one per robot."""
     rows = ""
     for robot in robots:
         cells = [column(of_robots(runs, robot)) for _, column in LONG]

@@ -1,8 +1,8 @@
-"""Does every arm come to rest at its edge? Defaults only, random cases of each kind.
+"""Arms at their workspace boundary: rest and steadiness, random cases, defaults only.
 
     .venv/bin/python benchmarks/edge_rest.py [--cases N] [--keep FILE] [--mass] [ROBOT]
 
-Of each robot, kind and period: hands whose target is 5 cm to 1 m out of reach, at once,
+Per robot, kind and period: hands whose target is 5 cm to 1 m out of reach, at once,
 streamed in a line, dragged about, on springs, either above an orientation, also 5 mm
 within to 1 cm beyond the reach, and along one axis or two; a centre of mass that far
 from where it is; steps of 0.5 m within reach, turns of 170°, and pushes of 50 to 200 N
@@ -296,7 +296,7 @@ HEADER = (
 
 
 def rows(runs: list[dict[str, Any]]) -> str:
-    """Return a line for each robot and kind."""
+    """Return a line per robot and kind."""
     text = ""
     for robot, kind in dict.fromkeys((run["robot"], run["kind"]) for run in runs):
         of = [run for run in runs if (run["robot"], run["kind"]) == (robot, kind)]

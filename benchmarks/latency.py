@@ -4,7 +4,7 @@
         [--priority LEVEL]
 
 The controller of a configuration without a plan moves its own model, in the rest of
-each period. Prints the table of benchmarks/results/latency.md for this machine.
+every period. Prints the table of benchmarks/results/latency.md for this machine.
 """
 
 import argparse
@@ -20,11 +20,11 @@ from hsp_control.robot.integrators import SemiImplicitEuler
 from hsp_control.simulation.plants import IntegratedPlant, RigidBodyPlant
 
 TURN = 2.0
-"""How long each loop runs before the other one has its turn [s]: disturbances of the
+"""Time that a loop runs before the other one has its turn [s]: disturbances of the
 machine vary with time, and both loops must see the same ones."""
 
 Times = list[tuple[int, int]]
-"""Of each period its wake-up, from the period's beginning, and its step [ns]."""
+"""Wake-up time from the period's start, and duration of the step, per period [ns]."""
 
 
 class Loop:

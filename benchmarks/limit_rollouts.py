@@ -2,7 +2,7 @@
 
     .venv/bin/python benchmarks/limit_rollouts.py [--count N] [PART ...]
 
-Each part is a section of results/limits.md; without a name all run, hours. Numbers are
+A part is a section of results/limits.md; without a name all run, hours. Numbers are
 computed from the log: positions, velocities and efforts of every period, and the
 differences of efforts.
 """
@@ -51,7 +51,7 @@ class Arm(NamedTuple):
 
 @cache
 def panda() -> hsp.Robot:
-    """Return the arm, cached in each process."""
+    """Return the arm, cached per process."""
     return hsp.Robot.load("panda")
 
 
@@ -114,7 +114,7 @@ def roll_out(item: tuple[float, int]) -> Arm:
 def limit_ratios(
     rollout: hsp.Rollout, limits: RobotLimits, period: float
 ) -> tuple[Array, ...]:
-    """Return the ratio of each value to its limit; positions count from mid-range."""
+    """Return the ratios of values to their limits; positions relative to mid-range."""
     q, v, tau = rollout["q"], rollout["v"], rollout["tau"]
     middle, half = 0.5 * (limits.upper + limits.lower), limits.upper - limits.lower
     return (
@@ -126,7 +126,7 @@ def limit_ratios(
 
 
 def arm_table(runs: dict[float, list[Arm]]) -> str:
-    """Return the table of all rollouts of the arm, a row for each period."""
+    """Return the table of all rollouts of the arm, a row per period."""
     names = ", ".join(EXCESS)
     lines = (
         f"| period | steps | violations: {names} | largest excess (negative: margin) | "
@@ -153,7 +153,7 @@ def arm_table(runs: dict[float, list[Arm]]) -> str:
 
 
 def table(count: int) -> str:
-    """Run so many rollouts at each period, and return the table."""
+    """Run so many rollouts at every period, and return the table."""
     runs = {
         period: run_parallel(
             roll_out,
@@ -177,7 +177,7 @@ PARTS = {
     "pushes": (limit_pushes.table, 20),
     "wrong_arms": (limits_on_wrong_arms.table, 40),
 }
-"""The function that makes each section of the page, and its cases of a kind."""
+"""The functions of the page's sections, and their cases of a kind."""
 
 
 def main() -> None:

@@ -45,7 +45,7 @@ Compute = Callable[[float, Array, Array], Array]
 
 
 class Run(NamedTuple):
-    """A closed loop: one row for each of its N steps.
+    """A closed loop: one row per step, N rows.
 
     Attributes:
         t: Time, shape (N,) [s].
@@ -87,7 +87,7 @@ def clipped(experiment: Experiment, limits: Array) -> Compute:
 def tsid_of(experiment: Experiment, limits: RobotLimits, weight: float) -> Compute:
     """Return TSID: hand and posture tasks; bounds of efforts, positions and speeds.
 
-    The posture task has Kp = K_N α and Kv = K_N + α for each joint, for the field
+    The posture task has Kp = K_N α and Kv = K_N + α for every joint, for the field
     g = -α (q - q_0) of the configurations.
     """
     import tsid
@@ -276,7 +276,7 @@ def cost_of_two_arms() -> str:
     """Return the rows of two Pandas on circles, with a part of their efforts.
 
     They could not even hold their posture: the states are those of a run with all of
-    their efforts, and each step is limited. With the limit on static efforts, which
+    their efforts, and every step is limited. With the limit on static efforts, which
     TSID does not have, the limits contradict each other.
     """
     poses = many_tasks.two_arms()

@@ -234,7 +234,7 @@ def main() -> None:
     for arm in options.arms.split(","):
         for kind in KINDS:
             tables[kind] += rows(arm, kind, options.seeds, missing, options.ours)
-        write()  # what there is
+        write()  # the available columns
     if options.ours:
         return
     case = Case("panda", moves=False)

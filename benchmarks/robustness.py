@@ -1,4 +1,4 @@
-"""Measure each compensator on each imperfect plant: two arms, two engines.
+"""Measure all compensators on all imperfect plants: two arms, two engines.
 
     .venv/bin/python benchmarks/robustness.py [--fresh] [--tables]
 
@@ -339,7 +339,7 @@ def means() -> dict[tuple[str, ...], dict[str, float]]:
 
 
 def tables() -> str:
-    """Return the tables in Markdown, one for each arm and measure."""
+    """Return the tables in Markdown, one per arm and measure."""
     cells, lines = means(), []
     for robot in HANDS:
         for measure, heading in MEASURES.items():

@@ -2,7 +2,7 @@
 
     make bench          or          .venv-peers/bin/python benchmarks/scaling.py
 
-Each point is a median over interleaved rounds over many robot states; TSID is timed
+Points are medians over interleaved rounds over many robot states; TSID is timed
 where it is comparable. t = a + b n^p is fitted to each series. Writes
 results/speed.md and its figure. To add a series, write a function that yields
 (n, robot, controllers) and add it to SERIES.
@@ -67,7 +67,7 @@ def joints() -> Iterator[Point]:
 
 
 def tasks() -> Iterator[Point]:
-    """A chain of 40 joints: 1 to 6 positions, three rows each."""
+    """A chain of 40 joints: 1 to 6 positions of three rows."""
     robot = chain(40)
     for n in range(1, 7):
         yield n, robot, beside_tsid(robot, [f"link{40 - 6 * k}" for k in range(n)])
@@ -109,7 +109,7 @@ def obstacles() -> Iterator[Point]:
 
 
 def levels() -> Iterator[Point]:
-    """A chain of 40 joints: 1 to 5 levels with a position each; and with a conflict.
+    """A chain of 40 joints: 1 to 5 levels of one position; and with a conflict.
 
     In conflict: a task of the lowest level wants another value of the first position,
     so that the law needs its recursion over the levels.
@@ -205,7 +205,7 @@ def beside_tsid(robot: hsp.Robot, frames: list[str]) -> dict[str, Compute]:
 def tsid_positions(
     robot: hsp.Robot, frames: list[str], paths: list[hsp.Circle]
 ) -> Compute:
-    """Return TSID: a masked pose task for each frame, posture and effort bounds."""
+    """Return TSID: a masked pose task for every frame, posture and effort bounds."""
     import tsid
 
     model, nv, zero = robot.model, robot.nv, np.zeros(robot.nv)
@@ -274,7 +274,7 @@ def panda_pose(robot: hsp.Robot, field: hsp.NullSpaceField) -> hsp.Controller:
 
 
 def states(robot: hsp.Robot, count: int) -> list[State]:
-    """Return random states near the robot's home or bent posture."""
+    """Return random states near the robot's home or flexed posture."""
     rng = np.random.default_rng(1)
     start = bent(robot) if robot.name.startswith("chain") else robot.home()
     return [
@@ -360,7 +360,7 @@ def table(what: str, found: dict[str, Array]) -> str:
 
 
 def draw(everything: dict[str, dict[str, Array]]) -> None:
-    """Draw the figure with one panel for each series, of rows that begin with n, t."""
+    """Draw the figure with one panel per series, of rows that begin with n, t."""
     styles = {
         "this law": (SERIES_COLORS[0], "-", "o"),
         "TSID": (SERIES_COLORS[1], "--", "s"),
@@ -419,7 +419,7 @@ def main() -> None:
     parser.add_argument(
         "--draw",
         action="store_true",
-        help="only draw what the page has, measure nothing",
+        help="only redraw the page's figures, measure nothing",
     )
     options = parser.parse_args()
     if options.draw:

@@ -152,7 +152,7 @@ class Run:
 
 
 def close_loop(case: Case, make: Make) -> Run:
-    """Run a controller on the rigid-body plant, with its effort held each period."""
+    """Run a controller on the rigid-body plant, with its effort held every period."""
     run, rows = Run(), []
     plant, integrator = RigidBodyPlant(case.robot), Rk4(STEP)
     q, v = case.q0.copy(), np.zeros(case.robot.nv)

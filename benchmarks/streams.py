@@ -106,7 +106,7 @@ def arm_path(t: float) -> Array:
 
 
 def chunks(rng: np.random.Generator) -> Iterator[Arrival]:
-    """Yield chunks of 16 postures at 10 Hz, 30 ms apart, each up to 70 mrad off."""
+    """Yield chunks of 16 postures at 10 Hz, 30 ms apart, up to 70 mrad off."""
     times = np.arange(16) * 0.03
     for made in np.arange(0.0, DURATION, 0.1):
         seam = rng.uniform(-0.035, 0.035, size=7)

@@ -91,7 +91,7 @@ class Run:
 
 
 def close_loop(case: Standing, engine: Engine, made: Made, duration: float) -> Run:
-    """Run a controller on a plant, with its effort held each period."""
+    """Run a controller on a plant, with its effort held every period."""
     run, rows = Run(), []
     compute, statuses = made
     q, v = case.q0.copy(), np.zeros(case.robot.nv)
@@ -258,9 +258,9 @@ K_N = 6 and g = -2 (q - q_start). TSID 1.10 has contacts as constraints, forces 
 soles' corners and eiquadprog-fast; tasks have weight 1. There are no joint limits,
 neither in the controllers nor in the plants.
 
-All run on one thread. TSID's solver, built with OpenMP, took 0.12 ms a step with one
-and 11 ms with two on a machine with two busy cores. This is not a property of TSID, and
-no ratio here is measured like that.
+All run on one thread. TSID's solver, built with OpenMP, needed 0.12 ms per step with
+one and 11 ms with two on a machine with two busy cores. This is not a property of TSID,
+and no ratio here is measured like that.
 
 The *ideal contacts* provide any force, also one that a real ground could not:
 *outside the cones* is the fraction of instants with such a force. MuJoCo's contacts

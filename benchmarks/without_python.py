@@ -38,7 +38,7 @@ IDLE = 0.5
 """Load of a machine on which nothing else runs."""
 Rows = NDArray[np.float64]
 Turn = Callable[[], Rows]
-"""Makes the steps of a turn, and returns the time of each [us]."""
+"""Makes the steps of a turn, and returns their times [us]."""
 
 
 def states_of(controller: hsp.Controller, q: Rows, v: Rows) -> Rows:

@@ -1,6 +1,6 @@
 """Draw a picture of every example: `make example-pictures` (they are committed).
 
-Each example runs in a copy of its folder, and its page is photographed at a moment.
+Examples run in a copy of their folder; a picture of the page is taken at a given time.
 Give names, such as `elbow.py`, to draw only these.
 """
 

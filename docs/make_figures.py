@@ -60,7 +60,7 @@ class PaperFigure(NamedTuple):
         return paper_figure(rollout, times=self.times, width="117mm")
 
     def save(self, rollout: hsp.Rollout) -> None:
-        """Write it, with what it was drawn from."""
+        """Write it, with a record of its sources."""
         about = provenance(rollout, self.times)
         save_for_a_column(self.figure(rollout), self.file, about)
 
@@ -117,7 +117,7 @@ def column_figure(panels: int) -> tuple[Figure, list[Axes]]:
 
 
 def draw_sweep() -> None:
-    """Draw what the sweep of hsp_control/companions/sweeps/page.md finds."""
+    """Draw the results of the sweep of hsp_control/companions/sweeps/page.md."""
     found = hsp.sweeps.sweep(
         "panda_obstacle",
         {

@@ -12,7 +12,7 @@ from hsp_control.companions.franka import connect
 address = sys.argv[1] if len(sys.argv) > 1 else "172.16.0.2"
 if address.startswith("127."):
     address += "?realtime=ignore&lockstep=true"  # no real-time kernel
-robot = hsp.Robot.load("panda")  # of an arm: what `hsp franka-model` writes
+robot = hsp.Robot.load("panda")  # of an arm: written by `hsp franka-model`
 arm = connect(address, robot, 0.001)
 experiment = hsp.load_experiment(
     "panda_obstacle",

@@ -18,7 +18,7 @@ controller = hsp.Controller(
 
 
 def events(stick):
-    """Yield (axis, value from -1 to 1) for what the stick has sent meanwhile."""
+    """Yield (axis, value from -1 to 1) of the stick's messages since the last call."""
     while select.select([stick], [], [], 0)[0]:
         _, value, kind, number = struct.unpack("IhBB", stick.read(8))
         if kind & 0x02 and number < 3:

@@ -117,7 +117,7 @@ _NAMES = {
     "config": "Experiment Recorder load_experiment",
     "common.exceptions": "HspControlError",
 }
-"""The public names, by the room from which each is imported at its first use."""
+"""The public names, by the module from which they are imported at first use."""
 
 _NAMESPACES = {
     "changes": "control.changes",
@@ -139,7 +139,7 @@ _NAMESPACES = {
     "tasks": "tasks",
     "trajectories": "trajectories",
 }
-"""The public namespaces, and the room that each stands for."""
+"""The public namespaces, and the modules that they stand for."""
 
 _HOMES = {name: room for room, names in _NAMES.items() for name in names.split()}
 
@@ -176,7 +176,7 @@ def _room(name: str) -> ModuleType:
 def _hint(name: str) -> str:
     """Return where a name is that a namespace has, for the message."""
     if name.startswith("_") or (Path(__file__).parent / name).is_dir():
-        return ""  # a room: its import from here looks it up here first
+        return ""  # a layer: importing it from here looks it up here first
     for namespace, room in _NAMESPACES.items():
         value = getattr(import_module(f"{__name__}.{room}"), name, None)
         if getattr(value, "__module__", "").startswith(f"{__name__}.{room}"):

@@ -6,7 +6,7 @@
 ``keep`` writes the logs as a reference, outside of the tree. ``with`` runs the
 configurations again and names each column that differs, from which time on and by how
 much at most, and those that are missing; it exits 1 if there are any.
-A difference is no error by itself: whoever changes digits gives the reason.
+A difference is no error by itself: a change of digits needs a reason in its commit.
 """
 
 import argparse
@@ -24,7 +24,7 @@ CLOCKS = ("_time",)
 
 
 def columns_of(path: Path) -> dict[str, Array]:
-    """Return the numeric columns of a log, without what a clock wrote."""
+    """Return the numeric columns of a log, without measured times."""
     with np.load(path, allow_pickle=False) as log:
         arrays = {name: log[name] for name in log.files}
     return {
@@ -35,7 +35,7 @@ def columns_of(path: Path) -> dict[str, Array]:
 
 
 def differences(kept: dict[str, Array], now: dict[str, Array]) -> list[str]:
-    """Return a line for each column that is not the same, or that is missing.
+    """Return a line per column that is not the same, or that is missing.
 
     Columns that are new are no difference.
     """

@@ -3,7 +3,7 @@
     .venv/bin/python tools/functions_of_a_step.py [--names] [--write]
 
 Of a Panda's position task with joint centering: the first step, which places the parts
-and binds the calls, and a later one. What the engine computes is one call. Then the
+and binds the calls, and a later one. The engine's computation is one call. Then the
 classes whose objects hold a gain, Kp or K_N, after a step.
 """
 
@@ -90,7 +90,7 @@ def _is_or_has(value: object, number: float) -> bool:
 
 
 def main() -> None:
-    """Print the numbers, and with ``--names`` what a later step runs."""
+    """Print the numbers, and with ``--names`` the functions of a later step."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--names", action="store_true", help="list the functions")
     parser.add_argument("--write", action="store_true", help=f"into {PAGE.name}")

@@ -1,13 +1,13 @@
 """Break the code on purpose, and see whether a test notices: ``make mutants``.
 
 A mutant is one edit: of an operator, a number, a condition or a statement, drawn at
-random (`mutations.py`). The tests of its room run first, then the fast ones of
-all rooms. A mutant that survives is a claim that nobody checks, or an edit that changes
-nothing, such as of a bound that is never reached.
+random (`mutations.py`). The tests of its folder run first, then the fast ones of all
+folders. A mutant that survives shows a claim without a test, or an edit without an
+effect, such as of a bound that is never reached.
 
     python tools/mutants.py                          twenty, half of them in the engine
     python tools/mutants.py engine/law hsp_control/control --count 50
-    python tools/mutants.py --since main             in what changed since
+    python tools/mutants.py --since main             in the changes since
     python tools/mutants.py --seed 7                 the same again
 """
 
@@ -53,11 +53,11 @@ ROOMS = {
 
 
 class Mutant(NamedTuple):
-    """An edit of a file: what makes the code wrong, most likely.
+    """An edit of a file that most likely makes the code wrong.
 
     Attributes:
         file: The file, from the checkout's folder.
-        edit: What is replaced there.
+        edit: The replacement.
         tests: Arguments of pytest: the tests of its room.
     """
 
@@ -66,7 +66,7 @@ class Mutant(NamedTuple):
     tests: tuple[str, ...]
 
     def __str__(self) -> str:
-        """Return where it is and what it does."""
+        """Return its place and its effect."""
         return f"{self.file}:{self.edit.line}  {self.edit}"
 
 
@@ -75,7 +75,7 @@ class Verdict(NamedTuple):
 
     Attributes:
         word: ``caught``, ``SURVIVED``, ``void``: it does not compile, or no test ran.
-        detail: The first test that failed, or the end of what was printed.
+        detail: The first test that failed, or the end of the output.
     """
 
     word: str
@@ -160,7 +160,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 def tried(copy: Path, mutants: Sequence[Mutant]) -> Iterator[tuple[Mutant, Verdict]]:
-    """Try each mutant in a copy of the checkout; yield it and what became of it."""
+    """Try mutants in a copy of the checkout; yield them with their verdicts."""
     sound: dict[tuple[str, ...], Verdict] = {}
     for number, mutant in enumerate(mutants, start=1):
         start = perf_counter()
@@ -188,7 +188,7 @@ def tried(copy: Path, mutants: Sequence[Mutant]) -> Iterator[tuple[Mutant, Verdi
 def rebuilt(copy: Path, mutant: Mutant) -> bool:
     """Build the engine anew if the mutant is in it; return whether it compiles.
 
-    What the mutant before it had broken is built with it.
+    Code that the previous mutant broke is rebuilt, too.
     """
     if not mutant.file.startswith("engine/"):
         return True
@@ -216,7 +216,7 @@ def run(copy: Path, tests: Sequence[str]) -> Verdict:
     try:
         lines = started.communicate(timeout=LONGEST)[0].strip().splitlines()
     except subprocess.TimeoutExpired:
-        os.killpg(started.pid, signal.SIGKILL)  # and what it has started
+        os.killpg(started.pid, signal.SIGKILL)  # and its child processes
         started.communicate()
         return Verdict("caught", "did not end")
     if started.returncode < 0:
@@ -226,7 +226,7 @@ def run(copy: Path, tests: Sequence[str]) -> Verdict:
         return Verdict("caught", failed[0].split(" - ")[0] if failed else "")
     if started.returncode == 0:
         return Verdict("SURVIVED", lines[-1] if lines else "")
-    # Status 2: what the tests import does not run any more.
+    # Status 2: the tests' imports fail.
     word = "caught" if started.returncode == 2 else "void"
     return Verdict(word, lines[-1] if lines else "")
 

@@ -36,7 +36,7 @@ class Edit(NamedTuple):
         line: The line in which it begins, from 1.
         begin: Where the replaced text begins in the whole.
         old: The replaced text.
-        new: What replaces it.
+        new: The replacement.
     """
 
     line: int
@@ -76,7 +76,7 @@ def _of_python(text: str) -> Iterator[Edit]:
     lines = text.splitlines(keepends=True)
 
     def place(line: int, column: int) -> int:
-        """Return where a column, which counts bytes, is in the text."""
+        """Return the position in the text of a column in bytes."""
         begun = lines[line - 1].encode()[:column].decode()
         return starts[line - 1] + len(begun)
 
@@ -87,7 +87,7 @@ def _of_python(text: str) -> Iterator[Edit]:
 
 
 def _changed(tree: ast.AST) -> Iterator[tuple[ast.expr | ast.stmt, str]]:
-    """Return each node that an edit replaces, and the text instead of it."""
+    """Return the nodes that an edit replaces, and the replacement texts."""
     for node in _told(tree):
         match node:
             case ast.BinOp(op=op) if type(op) in OPERATORS:
@@ -114,7 +114,7 @@ def _changed(tree: ast.AST) -> Iterator[tuple[ast.expr | ast.stmt, str]]:
 
 
 def _told(node: ast.AST) -> Iterator[ast.AST]:
-    """Return a tree's nodes, without what only speaks: types, docstrings, messages."""
+    """Yield a tree's nodes without text: types, docstrings, messages."""
     for name, value in ast.iter_fields(node):
         if name in ("annotation", "returns", "type_params", "decorator_list"):
             continue
@@ -174,7 +174,7 @@ def _of_line(code: str, line: str) -> Iterator[tuple[int, str, str]]:
 
 
 def _closing(code: str, begin: int) -> int | None:
-    """Return what follows the parenthesis that closes one before ``begin``."""
+    """Return the text after the parenthesis that closes the one before ``begin``."""
     depth = 1
     for i, letter in enumerate(code[begin:], start=begin):
         depth += (letter == "(") - (letter == ")")

@@ -3,7 +3,7 @@
     .venv/bin/python tools/not_run.py
 
 A table in Markdown, from the comments before them: see tests/support/page_runner.
-What needs hardware, a network or an installation is tried by hand.
+Blocks that need hardware, a network or an installation are tried by hand.
 """
 
 import sys
@@ -17,7 +17,7 @@ from test_pages import WITH_BLOCKS  # noqa: E402
 
 
 def main() -> None:
-    """Print the table, ordered by what is missing."""
+    """Print the table, ordered by reason."""
     rows = [
         (block.reason, f"{page}:{block.line}", _begin(block.text))
         for page in WITH_BLOCKS

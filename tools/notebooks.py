@@ -1,8 +1,8 @@
-"""Run the notebooks and keep what they print and draw: `make notebooks`.
+"""Run the notebooks and store their output: `make notebooks`.
 
     .venv/bin/python tools/notebooks.py [NAME ...]
 
-Kept are text and small pictures, so that a notebook reads well where nobody has run it.
+Text and small pictures are stored, so that a notebook can be read without running it.
 Views, numbers of executions, paths of this machine and colours of a terminal are not.
 """
 
@@ -69,7 +69,7 @@ def executed(notebook: Any, folder: Path) -> Any:
 
 
 def keep_small(notebook: Any, folder: str) -> None:
-    """Keep of the outputs what a reader sees on any machine: text and pictures."""
+    """Keep the portable outputs: text and pictures."""
     notebook.metadata = {
         "kernelspec": {
             "display_name": "Python 3",

@@ -1,8 +1,8 @@
-"""List the versions of the site in each of them.
+"""List the versions of the site in all of them.
 
     python tools/versions.py FOLDER ADDRESS
 
-The folder contains a folder for each version, and is served at the address. Its front
+The folder contains a folder per version, and is served at the address. Its front
 page opens the newest release; ``dev``, the main branch, where there is none.
 """
 

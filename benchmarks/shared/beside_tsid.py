@@ -36,7 +36,7 @@ def row(
     """Return a row of the table of `HEADER`.
 
     Args:
-        what: Which steps.
+        what: The kind of steps.
         law: This law; with ``controller``, if its whole step is in the engine.
         peer: TSID, with ``parts``, see `CppSteps`.
         states: The states of a run.

@@ -19,7 +19,7 @@ from shared.edge_loop import Case
 
 KINDS = ("position", "pose", "stream", "step", "circle")
 BEYOND = (0.05, 1.0)  # how far out of reach [m]
-SPREAD = 0.3  # of the starts about a bent posture [rad]
+SPREAD = 0.3  # of the starts about a flexed posture [rad]
 STEP, RADIUS, RATES = 0.5, 0.1, (2.0, 4.0)  # [m, m, rad/s]
 STARTS = 8  # of inverse kinematics
 ROOM = 0.1  # to the ends of joints along paths within reach [rad]
@@ -164,7 +164,7 @@ def case(arm: Arm, kind: str, rng: np.random.Generator) -> Case:
 
 
 def cases(robots: list[str], count: int) -> list[Case]:
-    """Return ``count`` cases of each kind for each robot; the same in every call."""
+    """Return ``count`` cases of each kind for every robot; the same in every call."""
     found = []
     for name in robots:
         arm = Arm(name)

@@ -3,7 +3,7 @@
     python -m shared.edge_loop CASES LAW RESULTS    # `edge.py` calls it
 
 Rigid bodies, efforts held for 1 ms and clipped at the limits of the URDF. It needs
-NumPy and Pinocchio, and what its law needs: each law may have its own Python.
+NumPy and Pinocchio, and its law's requirements: laws may have different Pythons.
 """
 
 import json

@@ -24,8 +24,8 @@ class Measured(NamedTuple):
         status: The status of each step.
         violated: Number of steps beyond the limits of effort, its rate, speed and
             position, shape (4,).
-        excess: Largest excess of a position [rad or m]; negative: what was left.
-        changes: Largest change of an effort in each millisecond, as a part of its
+        excess: Largest excess of a position [rad or m]; negative: the remaining range.
+        changes: Largest change of an effort in every millisecond, as a part of its
             limit; empty where periods are longer, or the rate is limited.
     """
 

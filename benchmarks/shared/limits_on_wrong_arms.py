@@ -1,8 +1,8 @@
-"""How far does an arm that is not quite its model leave its limits? Random cases.
+"""Excess over limits of arms with model errors: random cases.
 
-Masses ±20 %, centres ±10 mm, friction, a load of 1 kg that nobody declared, efforts
+Masses ±20 %, centres ±10 mm, friction, an undeclared load of 1 kg, efforts
 2 ms late and then with a lag of 3 ms, a velocity with noise of 0.01 rad/s, at 1 kHz.
-Each case drives joints against their ranges: a pose, a posture, or a field that pushes.
+A case drives joints against their ranges: a pose, a posture, or a field that pushes.
 Without compensation, and with a momentum observer. How far the true position
 leaves its range, the speed its limit, and what the status reported: a part of
 `limit_rollouts.py`.
@@ -142,7 +142,7 @@ SETTINGS = [
 
 @cache
 def arm_of(robot: str, rotors: float) -> Arm:
-    """Return an arm whose model has such rotors, cached in each process."""
+    """Return an arm whose model has such rotors, cached per process."""
     arm = Arm(robot)
     if rotors:
         arm.robot = changed(arm.robot, [MotorInertia(rotors)])

@@ -27,8 +27,8 @@ class Poses:
         name: Name in the table.
         robot: The robot.
         q0: Start configuration, shape (nq,) = (nv,).
-        frames: Names of the frames; six task rows each.
-        trajectories: One pose trajectory for each frame.
+        frames: Names of the frames, with six task rows per frame.
+        trajectories: One pose trajectory per frame.
     """
 
     name: str
@@ -199,4 +199,4 @@ BENT = {
     "arm_left_1_joint": 0.25, "arm_left_2_joint": 0.2, "arm_left_4_joint": -1.2,
     "arm_right_1_joint": -0.25, "arm_right_2_joint": -0.2, "arm_right_4_joint": -1.2,
 }  # fmt: skip
-"""Elbows and a knee are bent, so that no task is singular [rad]."""
+"""Elbows and a knee are flexed, so that no task is singular [rad]."""

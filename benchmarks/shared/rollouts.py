@@ -14,13 +14,13 @@ from hsp_control.constraints.limits import RobotLimits
 T = TypeVar("T")
 STEP = 1e-3  # of the integrator [s]
 PERIODS = (1e-3, 2e-3, 5e-3, 10e-3)  # for which an effort is held [s]
-ROUNDING = 1e-9  # excess over a limit that is not counted as a violation
+ROUNDING = 1e-9  # excess over a limit that is not regarded as a violation
 
 
 def beyond(
     rollout: hsp.Rollout, limits: RobotLimits, period: float
 ) -> tuple[Array, ...]:
-    """Return by how much each limit is exceeded, step by step and joint by joint."""
+    """Return the excesses over the limits, by step and joint."""
     # Whatever is at -1: joints without a single coordinate have no limits.
     q = rollout["q"][:, limits.robot.dof_indices]
     v, tau = rollout["v"], rollout["tau"]

@@ -229,7 +229,7 @@ class Standing:
 
         Args:
             q: Configuration, shape (nq,).
-            wrenches: Force and moment on each sole, about its frame's origin, in world
+            wrenches: Force and moment on every sole, about its frame's origin, in world
                 axes, shapes (6,) [N, N·m].
         """
         state = self._state.update(0.0, q, np.zeros(self.robot.nv))
@@ -249,7 +249,7 @@ class Engine:
         self.plant, self.advance = plant, advance
 
     def wrenches(self, t: float, q: Array, v: Array, tau: Array) -> list[Array]:
-        """Return the wrench on each sole, about its frame's origin, shapes (6,)."""
+        """Return the wrench on every sole, about its frame's origin, shapes (6,)."""
         channels = self.plant.log_channels(t, q, v, tau)
         forces = [name for name in channels if name.endswith(".force")]
         return [

@@ -62,7 +62,7 @@ class StepsInCpp:
             raise RuntimeError(f"in C++ the effort is {own}, from Python {expected}")
 
     def elapsed(self, begin: int, end: int) -> Array:
-        """Take the steps from one state to another; return the time of each [ns]."""
+        """Make the steps from one state to another; return their times [ns]."""
         self._begin[0], self._end[0] = begin, end
         self._steps()
         return self._elapsed[begin:end].copy()

@@ -16,7 +16,7 @@ class Timed(Protocol):
     """Takes the steps at the states by itself, such as `tsid_in_cpp.CppSteps`."""
 
     def elapsed(self, begin: int, end: int) -> Any:
-        """Take the steps of a part of the states; return the time of each [ns]."""
+        """Make the steps of a part of the states; return their times [ns]."""
 
 
 def step_times(
@@ -26,11 +26,11 @@ def step_times(
     block: int,
     warm_up: int = 20,
 ) -> dict[str, Any]:
-    """Return the median time of a step in each round, shape (rounds,) [s], by name.
+    """Return the median time of a step in every round, shape (rounds,) [s], by name.
 
-    In every round each controller gets the same block of consecutive states, one after
-    the other, in an order that rotates. What times its own steps was made for these
-    states.
+    In every round the controllers get the same block of consecutive states, one after
+    the other, in a rotating order. A controller that times its own steps was made for
+    these states.
     """
     for compute in controllers.values():
         if not isinstance(compute, Timed):

@@ -49,7 +49,7 @@ class CppSteps:
     """The steps of a peer in C++, for states known before."""
 
     def __init__(self, peer: Compute, states: Sequence[State]) -> None:
-        """Let the peer compute each state once, and keep the references that it set.
+        """Let the peer compute every state once, and keep the references that it set.
 
         Args:
             peer: A function with ``parts``: TSID's problem, solver and tasks.
@@ -69,5 +69,5 @@ class CppSteps:
             raise RuntimeError(f"TSID in C++ computes {own}, through Python {tau}")
 
     def elapsed(self, begin: int, end: int) -> Array:
-        """Take the steps from one state to another; return the time of each [ns]."""
+        """Make the steps from one state to another; return their times [ns]."""
         return np.array(self._steps.run(begin, end))

@@ -1,4 +1,4 @@
-"""The pages of what has a name: configurations and robots."""
+"""The pages of bundled configurations and robots."""
 
 import yaml
 from prose import paragraphs, plain
@@ -24,7 +24,7 @@ def configurations_page() -> str:
     lines = [
         "# Configurations",
         "",
-        "Each is a file in `configs/`, or in a companion's folder, and runs by name.",
+        "They are files in `configs/`, or in a companion's folder, and run by name.",
         "",
     ]
     for name, file in bundled_configs().items():

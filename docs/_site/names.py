@@ -1,4 +1,4 @@
-"""The pages of all public names; autodoc writes what is in their docstrings."""
+"""The pages of all public names; autodoc renders their docstrings."""
 
 import re
 from collections.abc import Iterable
@@ -21,7 +21,7 @@ _SPACES = {
 
 
 def names_page() -> str:
-    """Return the page of the names at the top, each a link to its namespace's page."""
+    """Return the page of the top-level names, with links to their namespaces' pages."""
     rows, homes = [], _homes()
     for name, room in hsp_control._HOMES.items():
         value = getattr(hsp_control, name)
@@ -30,7 +30,7 @@ def names_page() -> str:
     spaces = [f"hsp.{name}" for name in sorted(_SPACES)]
     tree = "\n".join(spaces)
     return (
-        "# Python\n\n`import hsp_control as hsp`. What most programs need is in "
+        "# Python\n\n`import hsp_control as hsp`. The most common names are in "
         "`hsp` itself; all others are in its namespaces.\n\n"
         "| name | |\n|---|---|\n" + "\n".join(rows) + "\n\n"
         f"```{{toctree}}\n:maxdepth: 1\n:caption: Namespaces\n\n{tree}\n```\n"
@@ -45,7 +45,7 @@ def _summary(value: Any) -> str:
 
 
 def namespace_pages() -> Iterable[tuple[str, str]]:
-    """Return the page of each namespace, with its name."""
+    """Return the pages of namespaces, with their names."""
     homes = _homes()
     for name, room in _SPACES.items():
         module = import_module(f"hsp_control.{room}")
@@ -53,7 +53,7 @@ def namespace_pages() -> Iterable[tuple[str, str]]:
 
 
 def _homes() -> dict[str, str]:
-    """Return under which name each class and function is described, once."""
+    """Return the names under which classes and functions are described, once."""
     found: dict[str, str] = {}
     for room in _SPACES.values():
         module = import_module(f"hsp_control.{room}")

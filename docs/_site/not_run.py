@@ -1,4 +1,4 @@
-"""Below a block that no test runs, its page says why: the comment before the block."""
+"""Show the reason, a comment in the page, below every block that no test runs."""
 
 import re
 

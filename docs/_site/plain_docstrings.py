@@ -1,8 +1,8 @@
 """Docstrings are plain English with Google's sections, not reStructuredText.
 
 So a star is a star, and an indented block after a line is a formula or an example. This
-escapes what Sphinx would read as markup; then `napoleon` reads the sections. But not
-those of attributes: it would take ``N(q, v): efforts`` for a type.
+escapes Sphinx's markup; then `napoleon` reads the sections, except those of attributes:
+it would parse ``N(q, v): efforts`` as a type.
 """
 
 import re
@@ -41,7 +41,7 @@ def plain(
 
 
 def _starts_block(out: list[str]) -> bool:
-    """Return whether the last text is at the margin: what follows is a block."""
+    """Return whether the last text is at the margin, so that a block follows."""
     text = [line for line in out if line.strip()]
     return bool(text) and not text[-1].startswith((" ", "- ", "* "))
 

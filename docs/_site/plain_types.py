@@ -14,7 +14,7 @@ class ArrayLike:
 
 
 def plain(annotation: Any) -> Any:
-    """Return an annotation without what only pydantic reads."""
+    """Return an annotation without metadata for pydantic."""
     origin, args = get_origin(annotation), get_args(annotation)
     if origin is Annotated:
         return plain(args[0])
@@ -24,7 +24,7 @@ def plain(annotation: Any) -> Any:
         if set(args) >= _ARRAY_LIKE:
             args = (ArrayLike, *(each for each in args if each not in _ARRAY_LIKE))
         return Union[tuple(plain(each) for each in args)]  # noqa: UP007 (made at run time)
-    if isinstance(annotation, list):  # what a function takes
+    if isinstance(annotation, list):  # arguments of a function
         return [plain(each) for each in annotation]
     if origin in {tuple, list, dict, Mapping, Sequence, Callable} and args:
         return origin[tuple(plain(each) for each in args)]

@@ -1,4 +1,4 @@
-"""Plain text of docstrings as Markdown: stars, bars and brackets are what they are."""
+"""Plain text of docstrings as Markdown: stars, bars and brackets are literal."""
 
 
 def paragraphs(text: str) -> str:

@@ -40,7 +40,7 @@ def write(app: Sphinx) -> None:
         path.parent.mkdir(parents=True, exist_ok=True)
         if not path.exists() or path.read_text() != page:  # Sphinx reads it again
             path.write_text(page)
-    for old in folder.rglob("*.md"):  # of what was taken away
+    for old in folder.rglob("*.md"):  # of removed companions
         if old.relative_to(folder).with_suffix("").as_posix() not in pages:
             old.unlink()
 
@@ -83,7 +83,7 @@ def linked(text: str, folder: Path, *, from_elsewhere: bool = False) -> str:
 
 
 def _led(app: Sphinx, name: str, source: list[str]) -> None:
-    """Let the links of a page in docs lead to what is generated."""
+    """Redirect the links of a page in docs to generated pages."""
     source[0] = linked(source[0], (Path(app.srcdir) / name).parent)
 
 

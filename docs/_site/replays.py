@@ -25,7 +25,7 @@ class Replay(SphinxDirective):
     required_arguments = 1
     option_spec: ClassVar = {
         "title": directives.unchanged_required,
-        "moment": directives.unchanged,  # a time [s], and what happens then
+        "moment": directives.unchanged,  # a time [s], and the event then
     }
 
     def run(self) -> list[nodes.Node]:

@@ -7,7 +7,7 @@ from prose import paragraphs, plain
 
 
 def yaml_page(schema: dict[str, Any]) -> str:
-    """Return the page of all keys: those of a file, then those of each part."""
+    """Return the page of all keys: those of a file, then those of the parts."""
     lines = ["# YAML keys", "", plain(schema["description"]), ""]
     lines += [
         "`hsp schema` writes the same as JSON schema, for completion in editors.",
@@ -40,7 +40,7 @@ def _keys(part: dict[str, Any]) -> list[str]:
 
 
 def _values(about: dict[str, Any]) -> str:
-    """Return what a key may be, in words."""
+    """Return the permitted values of a key, in words."""
     if "$ref" in about:
         name = about["$ref"].rsplit("/", 1)[1]
         return f"[{name}](#yaml-{name})"

@@ -131,7 +131,7 @@ def _exact(controller: Controller) -> dict[str, Any] | None:
 
 
 def _rates(controller: Controller) -> list[float | None]:
-    """Return the bound on each effort's rate [N·m/s or N/s]; None without one."""
+    """Return the bound on every effort's rate [N·m/s or N/s]; None without one."""
     if controller.limits is None:
         return [None] * controller.robot.nv
     rates = controller.limits.effort_rate.tolist()
@@ -202,9 +202,10 @@ def warn_of_reach(experiment: Experiment) -> None:
     for message in heavy_plant(experiment.scenario.plant, robot, experiment.q0):
         print(f"hsp: {message}", file=sys.stderr)
     if robot.unactuated and experiment.scenario.plan is not None:
-        return  # it moves contacts and references
+        return  # a plan moves contacts and references
     settings = experiment.scenario.simulation
-    end = max(settings.end_time, settings.duration)  # also of a run from before t = 0
+    # also for a run that starts before t = 0
+    end = max(settings.end_time, settings.duration)
     asked = experiment.q0, end, law.contacts, law.limits
     messages = [each.message for each in not_followed(robot, law.tasks, *asked)]
     push_off = experiment.scenario.plant.push_off

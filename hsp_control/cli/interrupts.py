@@ -88,7 +88,7 @@ def end_quietly(_: int, __: FrameType | None) -> None:
 
 
 def end_in_order() -> None:
-    """From now on Ctrl-C raises `KeyboardInterrupt`: there is something to close."""
+    """From now on Ctrl-C raises `KeyboardInterrupt`: files must be closed."""
     if signal.getsignal(signal.SIGINT) is end_quietly:
         signal.signal(signal.SIGINT, signal.default_int_handler)
 

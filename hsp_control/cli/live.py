@@ -41,7 +41,7 @@ from hsp_control.simulation.declared_run import with_duration
 from hsp_control.simulation.run_summary import summary_rows
 
 _DRY_RUN = 0.5  # duration of the dry run, in which every call is made once [s]
-_DRY_RUN_OF_A_PLAN = 3.0  # the same with a plan, which must reach its steps [s]
+_DRY_RUN_OF_A_PLAN = 3.0  # the same with a plan, which must make its first steps [s]
 
 
 def live(options: argparse.Namespace) -> int:

@@ -22,7 +22,7 @@ def entry_points(group: str) -> dict[str, EntryPoint]:
 
 @cache
 def _installed() -> Any:
-    """Return those of all packages and groups: to read their files takes 20 ms.
+    """Return the entry points of all packages; reading their files takes 20 ms.
 
     Before Python 3.12 these are no `EntryPoints`, but have `select`, too.
     """

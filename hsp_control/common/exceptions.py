@@ -1,6 +1,6 @@
 """All errors that the package raises on purpose.
 
-They have one base class, `HspControlError`. Each also derives from the built-in
+They have one base class, `HspControlError`. They also derive from the built-in
 exception that fits, so ``except ValueError`` works as well. A message states the
 given and the valid values; if a name does not exist, it suggests the nearest one.
 """

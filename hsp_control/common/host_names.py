@@ -1,4 +1,4 @@
-"""Names of computers, which users give and sockets look up."""
+"""Host names from users, as sockets resolve them."""
 
 import socket
 

@@ -13,7 +13,7 @@ def bundled(folder: str) -> Path:
 
 
 def bundled_robots() -> dict[str, Path]:
-    """Return the folder of each bundled robot, by name, in alphabetical order."""
+    """Return the folders of bundled robots by name, in alphabetical order."""
     return {path.parent.name: path.parent for path in _urdf_files()}
 
 
@@ -26,7 +26,7 @@ def config_folders() -> list[Path]:
 
 
 def bundled_configs() -> dict[str, Path]:
-    """Return the file of each bundled configuration, by name (``paper/1_...``)."""
+    """Return the files of bundled configurations by name (``paper/1_...``)."""
     found = {
         file.relative_to(folder).with_suffix("").as_posix(): file
         for folder in config_folders()

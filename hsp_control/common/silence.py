@@ -1,7 +1,7 @@
 """The time since another process last gave a sign of life."""
 
 _LOOK = 0.1
-"""Longest time between two looks that is added [s]: this process may stand, too."""
+"""Longest time between two checks that is added [s]: this process may stall, too."""
 
 
 class Silence:

@@ -1,4 +1,4 @@
-"""Warnings that name the user's own line, however deep they are issued."""
+"""Warnings with the user's line, at any depth of the call stack."""
 
 import sys
 import warnings

@@ -1,7 +1,7 @@
-"""Additions to the core, each for one kind of user.
+"""Additions to the core, by type of user.
 
 The core imports nothing from here. It finds a companion's additions by the entry points
 in pyproject.toml: types of a configuration, commands of `hsp`, robots, formats. A
-companion that is not wanted can be deleted with its folder. In Python:
+companion that is not needed can be deleted with its folder. In Python:
 ``hsp_control.walking.Walk``.
 """

@@ -14,7 +14,7 @@ def at_first_use(
 
     Args:
         package: Its ``__name__``.
-        names: Its modules, each with the public names that it has, between spaces.
+        names: Its modules with their public names, between spaces.
     """
     homes = {name: module for module, there in names.items() for name in there.split()}
 
@@ -62,7 +62,7 @@ class Rate:
         if t < self._next - 1e-9:
             return False
         following = self._next + self._every
-        # Missed times are not made up for.
+        # Missed times are skipped.
         self._next = following if following > t else t + self._every
         return True
 

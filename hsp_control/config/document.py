@@ -1,4 +1,4 @@
-"""A configuration as plain data, from any source, with each key's line."""
+"""A configuration as plain data, from any source, with the keys' lines."""
 
 import re
 from collections.abc import Iterator, Sequence
@@ -254,7 +254,7 @@ def read_document(
     strict: bool = False,
     allow: Sequence[str | PathLike[str]] = (),
 ) -> Document:
-    """Return the configuration's data with the location of each key."""
+    """Return the configuration's data with the locations of keys."""
     document = _read(source, strict)
     if strict:
         own = [] if isinstance(source, dict) else [Path(document.name).parent]

@@ -1,6 +1,6 @@
 """The contents of a YAML configuration: the parts of an experiment.
 
-Each ``type:`` selects a class of a family. Units are SI: metres, radians, seconds.
+A ``type:`` selects a class of a family. Units are SI: metres, radians, seconds.
 """
 
 import re
@@ -93,7 +93,7 @@ Color = Annotated[str, Field(pattern=_COLOR), BeforeValidator(_color)]
 
 
 class ShownItems(Part, error=ViewerError):
-    """The layers shown at first; the rows of the page's legend switch each."""
+    """The layers shown at first; rows of the page's legend switch them."""
 
     _: KW_ONLY
     paths: Flag = True

@@ -34,7 +34,7 @@ class YamlError(Exception):
 
     def __init__(self, line: int, message: str, path: KeyPath = ()) -> None:
         super().__init__(line, message, path)
-        self.line = line  # the line of the error, counted from 1
+        self.line = line  # the line of the error, from 1
         self.message = message  # the message
         self.path = path  # the key path of the error; empty if unknown
 
@@ -91,7 +91,7 @@ MAX_DEPTH = 50
 
 
 class Mark(NamedTuple):
-    """A place in a text: line and column, counted from 1."""
+    """A place in a text: line and column, from 1."""
 
     line: int
     column: int

@@ -46,7 +46,7 @@ class StackedTask(NamedTuple):
     """A task in a stack."""
 
     planned: PlannedTask
-    name: str  # the task's own; while a newer one of the same name fades in, another
+    name: str  # the task's name; another one while a newer task of this name fades in
     rows: slice
     in_force: FeedbackInForce
 
@@ -72,7 +72,8 @@ class ActiveStack:
         gain: Array,
         threshold: float,
     ) -> None:
-        robot: Robot = state.robot  # from its state: which base motions contacts permit
+        # from its state: the base motions that contacts permit
+        robot: Robot = state.robot
         self.support, base = support, support.base  # contacts' forces, their bounds
         self.contacts = support.contacts
         planned = [level for level in levels if level]
@@ -142,12 +143,12 @@ class ActiveStack:
                 parts = each.task.error_parts
                 yields = [part.yields for part in parts for _ in range(part.size)]
                 self.law.problem.yields[here] = yields
-            # A falling robot needs its balance at any cost.
+            # The demand of balance tasks is not bounded: the robot would fall.
             balances = robot.unactuated and each.task.keeps_balance(robot)
             follows = each.key in below or len(in_force.feedback.largest)
-            draws = spring and below  # from those below it
+            draws = spring and below  # with levels below it
             if (follows or draws) and not balances:
-                # at rest, so that damping is kept at any speed
+                # at zero velocity, so that damping is kept at any speed
                 stretched = self.law.problem.stretched[here]
                 call = PartCall(
                     engine.DemandAtRest,
@@ -177,7 +178,7 @@ class ActiveStack:
 
     @cached_property
     def shown(self) -> "ActiveStack":
-        """This stack as others than its step get it: nothing in it can be changed."""
+        """A read-only view of this stack, for code outside of its step."""
         return shown_stack(self)
 
     @property
@@ -210,7 +211,7 @@ class ActiveStack:
 
     @cached_property
     def calls(self) -> list[Callable[[float], Any]]:
-        """The calls of `resolve`, each of the time [s]; bound when first read."""
+        """The calls of `resolve`, functions of the time [s]; bound when first read."""
         state, metric, field = self._state, self._metric, self._field
         problem = self.law.problem
         calls = [*self._calls]
@@ -251,7 +252,7 @@ class ActiveStack:
         return self._state.plan([call]).call(), triangle, length
 
     def flow(self) -> Array:
-        """Return J# x_d' + P g, shape (nv,), where it was resolved, at rest."""
+        """Return J# x_d' + P g, shape (nv,), at the resolved state, at rest."""
         law, state = self.law, self._state
         # At rest, without drift and with unit gain the law's acceleration is the flow.
         nv, form = state.robot.nv, min(self._metric.form, CONSTANT)
@@ -272,7 +273,7 @@ class ActiveStack:
             self.raise_not_finite()
 
     def raise_not_finite(self) -> NoReturn:
-        """Raise for the part that made a step's effort NaN or infinite."""
+        """Raise an error for the part that made a step's effort NaN or infinite."""
         state, problem = self._state, self.law.problem
         for part, sample in self._parts:
             if not all(np.isfinite(array).all() for array in sample):
@@ -297,7 +298,7 @@ class ActiveStack:
 def _stacked(
     tasks: Sequence[PlannedTask], start: int, feedback: Mapping[int, FeedbackInForce]
 ) -> list[StackedTask]:
-    """Return tasks one below the other, from a row on."""
+    """Return the tasks of a stack, one below the other from a row on."""
     stacked, row = list[StackedTask](), start
     for each in tasks:
         name = each.task.name

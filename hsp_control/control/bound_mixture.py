@@ -27,7 +27,7 @@ Shares = Sequence[tuple[float, ActiveStack]]
 class Choice(NamedTuple):
     """Which sets of contacts and tasks a step resolves; see `Mixture`."""
 
-    # which tasks and contacts fade, and which of them each stack has
+    # the fading tasks and contacts, and those that a stack has
     fading: Sequence[PlannedTask | PlannedContact]
     members: Mapping[ActiveStack, Sequence[bool]]
     at: Callable[[float], Shares]  # the same, chosen in Python
@@ -74,7 +74,8 @@ class BoundMixture:
             evolving: The calls that write changing values, at a time.
         """
         self.state, self._choice = state, choice
-        # in this order those with a share follow one another, each with one more part
+        # in this order active ones are consecutive, with one more part from one to the
+        # next
         self._stacks = sorted(choice.members, key=_size)
         self._places = {each: k for k, each in enumerate(self._stacks)}
         count, many = len(self._stacks), len(limits.all)
@@ -85,7 +86,7 @@ class BoundMixture:
         mean = np.zeros(parts.shape[1])
         which, statuses = np.zeros((2, count * many), dtype=np.int64)
         self._worst = np.zeros(1, dtype=np.int64)
-        within = np.ones(many, dtype=np.int64)  # which sets of limits are in force
+        within = np.ones(many, dtype=np.int64)  # the sets of limits in force
         begin: list[PartCall] = []
         if many > 1:
             begin.append(PartCall(engine.HasShare, shares=limits.shares, on=within))
@@ -153,13 +154,13 @@ class BoundMixture:
         self._on[:], self._shares[:] = 0, 0.0
         for share, stack in self._choice.at(t):
             place = self._places.get(stack)
-            if place is None:  # Python has to make the step
+            if place is None:  # the step is made in Python
                 self._on[:], self._shares[:] = 0, 0.0
                 return
             self._on[place], self._shares[place] = 1, share
 
     def make(self, t: float, q: ArrayLike, v: ArrayLike) -> Delivered | None:
-        """Move to a state; return the delivered effort; None: Python has to."""
+        """Move to a state; return the delivered effort; None: the step needs Python."""
         mixed = self._move(t, q, v)
         if mixed is None:  # refused: lists, for example, or invalid values
             mixed = self.state.advance(self.move, t, q, v)
@@ -190,7 +191,7 @@ class BoundMixture:
         )
 
     def rehearse(self, t: float) -> None:
-        """Make the calls of all parts, whether or not they have a share."""
+        """Run the calls of all parts, active or not."""
         for each in self.rehearsed:
             each(t)
 
@@ -199,7 +200,7 @@ class _Placed:
     """The forces of the contacts of several stacks, one after another."""
 
     def __init__(self, supports: Sequence[Support]) -> None:
-        """Give each contact its place."""
+        """Assign indices to contacts."""
         self._places: dict[int, slice] = {}  # by the contact's identity
         self._columns: dict[Support, Indices] = {}
         self.size = 0
@@ -215,7 +216,7 @@ class _Placed:
             self._columns[each] = np.array([*chain(*columns)], dtype=np.int64)
 
     def columns(self, own: Support) -> Indices:
-        """Return where the forces of some contacts are among those of all."""
+        """Return the indices of some contacts' forces among those of all."""
         return self._columns[own]
 
     def placing(self, own: Support, forces: Array, out: Array) -> list[PartCall]:

@@ -77,7 +77,7 @@ class BoundStep:
         delivered = self.actuation.delivered(active.acceleration)
         status = delivered.status
         if status is RELAXED or status is BEYOND:
-            active.check(delivered.effort)  # the engine has looked at all others
+            active.check(delivered.effort)  # the engine has checked all others
         return delivered
 
     @cached_property
@@ -98,6 +98,6 @@ class FreeStep(NamedTuple):
     law: LawOutcome
     limits: LimitsOutcome
     effort: Array  # M a + N, shape (nv,) [N·m or N]
-    # calls of the time that record that this effort is held from now on, for the period
-    # of the last `Controller.applied`
+    # calls at a time that record this effort as held from now on, for the period of the
+    # last `Controller.applied`
     sending: Sequence[Step]

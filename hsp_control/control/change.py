@@ -1,4 +1,4 @@
-"""Changes of a controller while it runs: the base class, and each kind of change."""
+"""Changes of a controller while it runs: the base class, and the kinds of changes."""
 
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
@@ -40,10 +40,10 @@ from hsp_control.trajectories.streams.streamed import Streamed
 
 
 class Change(Part, ABC, family="changes", error=ControllerError):
-    """A change that begins at a time and takes a while; efforts stay continuous.
+    """A change with a start time and a duration; efforts stay continuous.
 
     Changes apply in the order of their times, whatever the order in which they are
-    made. Each continues from the values then in force, so that several may overlap. A
+    made. They continue from the values then in force, so that several may overlap. A
     subclass implements `apply`, and `Controller.change` makes it. With a ramp it is an
     `Evolution` of the `Setup`: ``gain``, ``gravity``, and each task's ``gains`` and
     ``presence``; ``setup.gain.then(self.at, self.ramp, target)`` is the next one. All
@@ -58,7 +58,7 @@ class Change(Part, ABC, family="changes", error=ControllerError):
 
     @property
     def end(self) -> float:
-        """When it is complete [s]."""
+        """End time [s]."""
         return self.at + self.ramp
 
     @abstractmethod
@@ -204,7 +204,7 @@ class ExchangeField(Change, type="exchange_field"):
 
 
 def _find_field(setup: Setup, name: str) -> int:
-    """Return the index of the term that has a name and is to stay."""
+    """Return the index of the term with a name that is not being removed."""
     there = {
         each.field.name: k
         for k, each in enumerate(setup.terms)

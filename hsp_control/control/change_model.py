@@ -31,7 +31,7 @@ class ChangePayload(Change, type="payload"):
     """A frame takes up a payload, or puts it down; the law is that of the model.
 
     It replaces the frame's previous payload. Simulated rigid bodies carry it, too,
-    besides the errors of their own masses.
+    in addition to errors of their own masses.
     """
 
     frame: str

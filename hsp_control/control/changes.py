@@ -69,7 +69,7 @@ __all__ = [
 class Changes:
     """Makes changes that begin at one time: the result of `Controller.at`.
 
-    Each method makes one change and returns the object, so that calls can be chained::
+    A method makes one change and returns the object, so that calls can be chained::
 
         controller.at(1.0).ramp(0.5).gains("hand", stiffer).remove("posture")
     """
@@ -155,7 +155,7 @@ class Changes:
         position: ArrayLike = (0.0, 0.0, 0.0),
         rotation: ArrayLike = (0.0, 0.0, 0.0),
     ) -> Self:
-        """Let a frame be another tool's, or as in the model again; see `ChangeTool`."""
+        """Move a frame to a tool's tip, or back to the model's; see `ChangeTool`."""
         at, ramp = self._at, self._ramp
         return self._do(ChangeTool(frame, position, rotation, at=at, ramp=ramp))
 
@@ -166,7 +166,7 @@ class Changes:
     if not TYPE_CHECKING:
 
         def __getattr__(self, name: str) -> None:
-            """Raise for a kind of change that there is not."""
+            """Raise for an unknown kind of change."""
             known = [each for each in vars(type(self)) if not each.startswith("_")]
             raise AttributeError(
                 f"at(t) has no {name!r}{did_you_mean(name, known)}; a change of a "
@@ -180,14 +180,14 @@ class Changes:
 
 @dataclass(frozen=True)
 class TimeLine:
-    """The setup in force at each time."""
+    """The setup in force at every time."""
 
-    start: Start  # where the parts were placed
-    declared: tuple[Change, ...]  # those of every run, as they were given
+    start: Start  # the start at which parts were placed
+    declared: tuple[Change, ...]  # changes of every run, as given
     settled: Setup  # setup with all changes that are over
-    open: tuple[Change, ...]  # changes that are not, placed, in order of time
+    open: tuple[Change, ...]  # changes that are not over, placed, in order of time
     made: tuple[Change, ...] = ()  # those of `open` that were made during the run
-    count: int = 0  # how many were
+    count: int = 0  # their number
 
     @classmethod
     def of(cls, setup: Setup, made: Sequence[Change]) -> "TimeLine":
@@ -203,11 +203,11 @@ class TimeLine:
 
     @property
     def known(self) -> tuple[Change, ...]:
-        """Those of every run, and those made during this one that are not over."""
+        """Changes of every run, and those made during this one that are not over."""
         return tuple(sorted((*self.declared, *self.made), key=lambda each: each.at))
 
     def streams(self) -> Iterator[StreamRun]:
-        """Yield the streams that something follows, or will, each once."""
+        """Yield the streams that are in use, now or later, once."""
         setup = self.setup
         tasks = [each.task for each in setup.tasks]
         fields = [each.field for each in setup.terms]

@@ -1,16 +1,16 @@
-"""Looks whether a clock can be that of the loop: origin, unit and direction."""
+"""Checks whether a clock can be that of the loop: origin, unit and direction."""
 
 from hsp_control.common.arrays import Array
 from hsp_control.common.warned import warn
 from hsp_control.robot import RobotState
 
 _FEW = 5
-"""Steps in a row before a clock is called wrong: one may be late, or made twice. One
-that comes so many periods too early is enough."""
+"""Consecutive steps before a clock is reported: one may be late or repeated. A single
+step that is this many periods early suffices."""
 _LATE = 1e6
 """A state later than eleven days has the time of a clock, not of a run [s]."""
 _STILL = 100
-"""The same at one time: a loop may rehearse its first step."""
+"""The same for steps at equal times: a loop may rehearse its first step."""
 _UNITS = 100.0
 """Times of a step over its period from which on they have different units."""
 _MILLI = 1.0 / 3000.0, 1.0 / 300.0
@@ -23,8 +23,8 @@ _SURE = 20
 """Moving steps in a row after which the unit is known: noise has any sign."""
 
 _LOOKS = 300
-"""Steps that are looked at for it, after the first one and after a change or a message
-of a stream: later ones cost nothing."""
+"""Steps that are checked for it, after the first one and after a change or a message of
+a stream: later ones cost nothing."""
 
 
 class ClockWarning(UserWarning):
@@ -39,12 +39,12 @@ class ClockCheck:
         self._period, self._stamp = 0.0, -1
         self._kind, self._count = "", 0
         self._told = False
-        self.undecided = True  # whether `moved` has to look at another step
+        self.undecided = True  # whether `moved` has to check another step
         self._before: tuple[float, Array, Array] | None = None
         self._milli = self._same = self._looks = 0
 
     def begin(self, t: float) -> None:
-        """Look at the time of the first step [s]."""
+        """Check the time of the first step [s]."""
         if abs(t) > _LATE:
             self._tell(
                 f"the first state has t = {t:.10g} s, but trajectories, schedules and "
@@ -53,7 +53,7 @@ class ClockCheck:
             )
 
     def change(self, at: float, now: float) -> None:
-        """Look at the time of a change that is made now [s]."""
+        """Check the time of a change that is made now [s]."""
         self.look_again()
         if at - now > _LATE:
             self._tell(
@@ -63,7 +63,7 @@ class ClockCheck:
             )
 
     def look(self, t: float, period: float, stamp: int) -> None:
-        """Look at the time of a step [s], and the period for which it is held [s].
+        """Check the time of a step [s], and the period for which it is held [s].
 
         ``stamp`` is that of its state: an effort that is sent instead is no new step.
         """
@@ -94,12 +94,12 @@ class ClockCheck:
             self._tell(_MESSAGES[kind].format(t=t, passed=passed, period=held))
 
     def look_again(self) -> None:
-        """Look at the next steps, where the unit of times is not known yet."""
+        """Check the next steps, if the unit of times is not known yet."""
         self._looks = 0
         self.undecided = max(self._same, self._milli) < _SURE
 
     def moved(self, state: RobotState) -> None:
-        """Compare the way since the last step with velocity times time.
+        """Compare the displacement since the last step with velocity times time.
 
         They show the unit of times where no period is given, and are compared until
         it is known, in some first steps of the motion.

@@ -24,12 +24,12 @@ from hsp_control.trajectories.streams.run import StreamRun
 from hsp_control.trajectories.streams.streamed import Streamed
 
 _REHEARSALS = 5
-"""Of a change: the first fills the processor's caches, the others train its
-predictions."""
+"""Rehearsed steps per change: the first fills the processor's caches, the others train
+branch prediction."""
 
 
 class Commanded(Composition):
-    """A composition that is changed, and given targets, while it runs."""
+    """A composition that accepts changes and targets at run time."""
 
     def at(self, t: float) -> Changes:
         """Return an object that makes changes which begin at a time [s].
@@ -67,7 +67,8 @@ class Commanded(Composition):
         """
         followed = self._followed(task)
         value = target_of(followed, target, lambda: self._here().state)
-        if not np.abs(value).max() < self._declared.robot.size:  # else it is in reach
+        # otherwise it is in reach
+        if not np.abs(value).max() < self._declared.robot.size:
             warn_of_far_target(self._here().state, followed, value)
         return self._sent(task, value=value)
 
@@ -136,7 +137,7 @@ class Commanded(Composition):
 
     @abstractmethod
     def _rehearse(self, times: int) -> None:
-        """Make the next step's calls once, where the robot is, and move nothing."""
+        """Run the next step's calls once at the present state, without effect."""
 
     def _sent(self, task: str, **message: Any) -> StreamHandle:
         """Send a message to a task's stream, which takes over if there is none yet."""
@@ -171,7 +172,7 @@ class Commanded(Composition):
         """
         with self._lock:
             self._change(change)
-            if self._memory.begun:  # when all that the change used is freed
+            if self._memory.begun:  # when the objects of the change are freed
                 self._rehearse(_REHEARSALS)
 
     def _change(self, change: Change) -> None:

@@ -101,7 +101,7 @@ class Composition:
         self._compose(here, changes)
 
     def _bind_to(self, state: RobotState, memory: RunMemory) -> None:
-        """Compute with a state, and remember in a memory."""
+        """Bind to a state and to a memory of the run."""
         self._lock = StepLock()  # held while something is computed
         self._state, self._memory = state, memory
         self._in_force = InForce(self._declared, state, memory)
@@ -115,7 +115,7 @@ class Composition:
         self._in_force.begin(TimeLine.of(setup, changes))
 
     def _here(self) -> Start:
-        """Return where the robot was at the last step."""
+        """Return the configuration of the last step."""
         return Start(self._state.snapshot(), self.setup.start.scene)
 
     def check_derivatives(self, state: RobotState) -> None:
@@ -149,7 +149,7 @@ class Composition:
 
     @property
     def planned_tasks(self) -> tuple[Task, ...]:
-        """All tasks, placed: those that are active, have not come yet, or have gone."""
+        """All tasks, placed: present, future and past ones."""
         return tuple(each.task for each in self.setup.tasks)
 
     @property
@@ -160,7 +160,7 @@ class Composition:
 
     @property
     def planned_levels(self) -> tuple[tuple[PlannedTask, ...], ...]:
-        """The same tasks as they are planned, each with its key."""
+        """The same tasks as they are planned, with their keys."""
         now = self._in_force.latest
         levels = [
             tuple(each for each in level if each.presence.at(now) > 0.0)
@@ -333,4 +333,4 @@ _INSTEAD = {
     "active_stack": "call compute",
     "task_rows": "call compute",
 }
-"""The alternative to the assignment of an attribute."""
+"""The method to use instead of assigning an attribute."""

@@ -99,7 +99,7 @@ class Controller(Commanded):
         step = now.step
         if step is None or modifier is not None or q is None or v is None:
             self._observe(t, q, v)  # the state
-            self._advance()  # to the values in force at its time
+            self._advance()  # values in force at its time
         else:
             delivered = step.make(t, q, v)  # type: ignore[arg-type]
             stack, damped = step.active, step.damped
@@ -125,7 +125,7 @@ class Controller(Commanded):
         memory, now, state = self._memory, self._in_force, self._state
         origin, q, v = memory.origin.item(), state.q.copy(), state.v.copy()
         active, damped = now.mixture.active, now.mixture.damped
-        # An error here is raised in a step as well, or its cause is not there yet.
+        # An error here is also raised in a step, if its cause exists by then.
         with memory.kept(), suppress(Exception):
             for _ in range(times):
                 now.mixture.rehearse()
@@ -173,7 +173,7 @@ class Controller(Commanded):
             self._memory.count_from(0.0)
 
     def _begin(self) -> None:
-        """Check the first state, and without a start place relative values there."""
+        """Check the first state; without a start, place relative values there."""
         check_angles(self._declared.robot, self._state.q)
         self._memory.clock.begin(self._state.t)
         if self._declared.start is None:
@@ -232,8 +232,8 @@ class Controller(Commanded):
             now.gains.delay(self._active, self._state.t, period)
 
     def _while_free(self, advance: Callable[[FreeStep], int]) -> int:
-        """Let the engine's loop make steps that are free; return how many it made."""
-        # Each is a `compute` that finds no limit violated, and an `applied` for the
+        """Let the engine's loop make unconstrained steps; return their number."""
+        # A step is a `compute` that finds no limit violated, and an `applied` for the
         # period of the last one. There are none where something changes, is streamed,
         # is no native call, or the last effort was not the law's own.
         with self._lock:
@@ -247,7 +247,7 @@ class Controller(Commanded):
             return 0 if step.free is None else advance(step.free)
 
     def disturbed(self, acceleration: ArrayLike) -> None:
-        """Store an acceleration that something else than the efforts causes.
+        """Store an acceleration with causes other than the efforts.
 
         From now on limits on motion hold for the sum of it and the law's acceleration:
         a pushed robot may be braked harder, and not accelerated further. An
@@ -265,7 +265,7 @@ class Controller(Commanded):
         self._in_force.limits.sent.held.disturbance[:] = known
 
     def followed_by(self, dynamics: Dynamics | None) -> None:
-        """Let other dynamics follow changes of payload and gravity, as a plant's do.
+        """Let other dynamics, such as a plant's, follow changes of payload and gravity.
 
         Args:
             dynamics: Those of a robot with the same joints, instead of the last ones;
@@ -409,7 +409,7 @@ class Controller(Commanded):
         return other
 
     def step_alone(self, q: ArrayLike | None = None) -> BoundStep | None:
-        """Return a step at the beginning of a run, for who makes it without Python.
+        """Return a step at the beginning of a run, for programs without Python.
 
         Relative values are placed there. The controller is consumed: `without_python`
         makes one for this.
@@ -470,7 +470,7 @@ class Controller(Commanded):
 
     @property
     def task_rows(self) -> Mapping[str, slice]:
-        """The rows of each task in the last output's stack, by name."""
+        """The tasks' rows in the last output's stack, by name."""
         return self._active.task_rows
 
     def diagnose(self) -> Diagnostics:
@@ -491,7 +491,7 @@ class Controller(Commanded):
         return ahead._active.flow()
 
     def _ahead(self) -> "Controller":
-        """Return a copy that goes on from here, to look ahead with its own times."""
+        """Return a copy that continues from here, for previews with its own times."""
         with self._lock:
             ahead = self._copy()
         ahead._memory.count_from(0.0)
@@ -503,7 +503,7 @@ class Controller(Commanded):
             return deepcopy(self, {id(self._declared.robot): self._declared.robot})
 
     def _copy(self) -> "Controller":
-        """Return a copy that looks on, of the same robot object.
+        """Return a copy that only reads streams, of the same robot object.
 
         It also receives the messages to this one's streams, which stay there.
         """
@@ -511,7 +511,7 @@ class Controller(Commanded):
         return deepcopy(self, {id(robot): robot} | self._memory.queues)
 
     def preview(self, changes: Sequence[Change] | None = None) -> "Controller":
-        """Return a copy at the beginning of a run: to look ahead, or at a log.
+        """Return a copy at the beginning of a run, for previews or a log.
 
         It is of the same robot object, with times from 0. Messages that
         it reads from streams remain for the controller.

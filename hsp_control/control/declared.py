@@ -56,7 +56,7 @@ class DeclaredController:
         scene: Scene | Iterable[Obstacle],
         start: ArrayLike | None,
     ) -> None:
-        """Check each part by itself; `Controller` documents the arguments."""
+        """Check the parts separately; `Controller` documents the arguments."""
         if isinstance(robot, str | Path):
             raise ControllerError(f"robot is {robot!r}; needs Robot.load({robot!r})")
         if isinstance(robot, pin.Model):
@@ -132,7 +132,7 @@ class DeclaredController:
 
 
 def _refuse_streams(field: NullSpaceField) -> None:
-    """Raise for a field that a stream leads: only that of a change is logged."""
+    """Raise for a streamed field: only that of a change is logged."""
     if any(True for _ in parts_within(field, Streamed)):
         raise FieldError(
             "a stream cannot lead a field from the start; while the controller runs, "

@@ -16,7 +16,7 @@ from hsp_control.declaration.by_type import ByType
 
 
 class Estimator(Part, ABC, family="estimators", error=EstimationError):
-    """Completes or replaces a part of each measurement.
+    """Completes or replaces a part of the measurements.
 
     It acts between the sensors, and the plan and the controller. A subclass declares
     its parameters as fields (see `Part`) and implements `begin`; the memory of a

@@ -21,12 +21,12 @@ class Transition(Generic[Value]):
     """A smooth change to a value."""
 
     start: float  # when it begins [s]
-    ramp: float  # how long it takes [s]; 0 is a jump
+    ramp: float  # its duration [s]; 0 is a jump
     target: Value  # new value
 
     @property
     def end(self) -> float:
-        """When it is complete [s]."""
+        """End time [s]."""
         return self.start + self.ramp
 
     def share(self, t: float) -> tuple[float, float, float]:
@@ -146,7 +146,7 @@ class Evolution(Generic[Value]):
 
 
 class EvolvingWeight(Weight):
-    """w(t) that an `Evolution` gives."""
+    """w(t) given by an `Evolution`."""
 
     evolution: Evolution[float]
     """w(t) [-]."""
@@ -168,6 +168,6 @@ class EvolvingWeight(Weight):
 
 
 PRESENT: Evolution[float] = Evolution(1.0)
-"""Of a part that is there at all times."""
+"""Weight of a permanent part."""
 ABSENT: Evolution[float] = Evolution(0.0)
-"""Of a part that is not there; a transition adds it."""
+"""Weight of an absent part; a transition adds it."""

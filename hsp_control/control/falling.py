@@ -1,4 +1,4 @@
-"""A fall, detected while there is still time to stop."""
+"""Detection of a fall, early enough for a stop."""
 
 from math import acos, degrees
 
@@ -9,7 +9,7 @@ from hsp_control.common.exceptions import FallError
 from hsp_control.robot import RobotState
 
 MAX_TILT = np.radians(45.0)
-"""Largest tilt of the trunk from where it started [rad]."""
+"""Largest tilt of the trunk from its initial orientation [rad]."""
 MIN_HEIGHT = 0.65
 """Smallest height of the centre of mass above the feet, as a share of the first one."""
 

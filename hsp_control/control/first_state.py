@@ -17,19 +17,20 @@ from hsp_control.tasks.frame_position import axis_indices
 from hsp_control.trajectories import Blend
 
 REACHES = 2.0
-"""A target this many times the robot's reach away from its frame is a mistake."""
+"""Distance of a target from its frame, in units of the reach, above which it is a
+mistake."""
 MILLIMETRES = 100.0
-"""From this many times on it is in mm."""
+"""The same above which it is in mm."""
 JUMP = 0.1
-"""Of a joint's effort limit: by more than this the first effort should not jump."""
+"""Largest jump of the first effort relative to a joint's limit."""
 
 
 REST = 0.05
-"""A robot whose joints are all slower rests, but for noise [rad/s or m/s]."""
+"""Joint speed below which a robot is at rest, up to noise [rad/s or m/s]."""
 
 
 class StartWarning(UserWarning):
-    """A robot would begin with a jump of an effort, or with efforts too slow."""
+    """A run would begin with a jump of an effort, or with too slow efforts."""
 
 
 def check_angles(robot: Robot, q: Array) -> None:
@@ -88,7 +89,7 @@ def warn_of_far_target(state: RobotState, task: Task, target: Array) -> None:
 def warn_of_jump(
     robot: Robot, q: Array, v: Array, tau: Array, dynamics: Dynamics | None = None
 ) -> None:
-    """Warn if the first effort is far from the one that held the robot until then.
+    """Warn if the first effort is far from the one that held the robot before.
 
     A robot at rest is held against gravity, so there the effort jumps. That before a
     start in motion is unknown, and it is not checked: that of the paper's runs lies
@@ -117,8 +118,8 @@ def warn_of_jump(
 
 def warn_of_slow_efforts(robot: Robot, q: Array, limits: RobotLimits | None) -> None:
     """Warn if gravity may change a joint's effort faster than its rate permits."""
-    # A joint alone, that turns at its speed limit from where the robot starts, feels a
-    # sine of gravity. A floating base is not looked at.
+    # A single joint rotating at its speed limit from the start has a sinusoidal gravity
+    # effort. Floating bases are not checked.
     if limits is None or robot.unactuated:
         return
     rest, turn = np.zeros(robot.nv), 0.5 * np.pi * np.eye(robot.nv)

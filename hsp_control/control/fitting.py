@@ -61,8 +61,8 @@ def check_tasks(tasks: Sequence[Task], robot: Robot) -> None:
 
 def priority_of(task: Task, robot: Robot) -> int:
     """Return the priority of a placed task, 1 the highest."""
-    # If it declares none it is 1; on a floating base 1 for tasks that keep the balance,
-    # and 2 for all else, so that no hand that reaches too far makes the robot fall.
+    # The default is 1; on a floating base 1 for balance tasks and 2 for all others, so
+    # that a hand target out of reach does not make the robot fall.
     if task.priority is not None:
         return task.priority
     return 2 if robot.unactuated and not task.keeps_balance(robot) else 1

@@ -1,4 +1,4 @@
-"""An impedance that follows the planned one, and waits where that would add energy.
+"""An impedance that follows the planned one, and waits instead of adding energy.
 
 With E = ½ e'ᵀΛe' + U(e), U the energy of the spring, and an external force f,
 
@@ -28,7 +28,7 @@ class FollowedImpedance:
         error: The task's error e, shape (m,).
         rate: e', shape (m,).
         period: [s], shape (1,).
-        ramp: How long the change takes, shape (1,) [s].
+        ramp: Duration of the change, shape (1,) [s].
         waits: Whether the numbers in force are not those that are planned, shape (1,).
         call: Lets the numbers in force be those of the next period.
     """
@@ -38,7 +38,7 @@ class FollowedImpedance:
 
         Args:
             in_force: Of the task.
-            ends: Where each part of its error ends, shape (parts,).
+            ends: Ends of the parts of its error, shape (parts,).
         """
         self.numbers = in_force.numbers
         rows = self.numbers.shape[1]
@@ -62,7 +62,7 @@ class FollowedImpedance:
     def move(
         self, planned: Array, then: Array, error: Array, rate: Array, period: float
     ) -> bool:
-        """Go on to the next period; return whether the numbers in force wait."""
+        """Advance to the next period; return whether the numbers in force wait."""
         self.planned[:], self.then[:] = planned, then
         self.error[:], self.rate[:], self.period[0] = error, rate, period
         self.call()

@@ -1,4 +1,4 @@
-"""The gains in force: the arrays that every step reads, as changes make them.
+"""The gains in force: the arrays that every step reads and changes write.
 
 Changes of an impedance add no energy: they wait where they would; see
 `FollowedImpedance`.
@@ -32,9 +32,9 @@ from hsp_control.tasks.compliant_task import impedance_of
 from hsp_control.tasks.feedback import FeedbackInForce
 
 _SMALLEST = 1e-15
-"""Smallest scale of gains that is tried."""
+"""Smallest tried scale of gains."""
 _ROUNDING = 1e-7
-"""Of the radius: a double eigenvalue of 1 has an error of the root of its rounding."""
+"""Tolerance of the radius: a double eigenvalue of 1 has the error √rounding."""
 
 
 class GainsInForce:
@@ -111,7 +111,7 @@ class GainsInForce:
     def _evolving(
         self, setup: Setup, feedback: Mapping[int, FeedbackInForce]
     ) -> list[PartCall]:
-        """Return the calls of a setup that write changing values but impedances."""
+        """Return the calls of a setup that write changing values except impedances."""
         calls = list[PartCall]()
         for each in setup.tasks:
             if impedance_of(each.task) is None and not each.gains.constant:
@@ -138,11 +138,11 @@ class GainsInForce:
 
     @property
     def stiffening(self) -> bool:
-        """Whether impedances change, or wait; then `delay` belongs to each step."""
+        """Whether impedances change, or wait; then `delay` belongs to every step."""
         return self._changing or bool(self._waiting)
 
     def delay(self, active: ActiveStack, t: float, period: float) -> None:
-        """Let changes of impedances wait where they would add energy."""
+        """Delay changes of impedances that would add energy."""
         planned = {each.key: each for each in self._setup.tasks}
         for each in active.stacked:
             now = planned.get(each.planned.key)

@@ -48,11 +48,11 @@ class InForce:
         self.tools = ToolsInForce(state)
         self.step = None
         self.later = None
-        self._tried = False  # whether to bind the step was tried
+        self._tried = False  # whether binding the step was tried
         self._over: tuple[object, ...] | None = None  # no longer followed
 
     def begin(self, time_line: TimeLine) -> None:
-        """Make all that computes, and follow a time line."""
+        """Make the objects that compute, and follow a time line."""
         state, own, setup = self._state, self._declared, time_line.setup
         base = () if own.base == "driven" else own.robot.unactuated
         self.limits = LimitsInForce(state, setup.limits, self._memory.sent)
@@ -78,7 +78,7 @@ class InForce:
         self._go_on(step)
 
     def go_over_to(self, time_line: TimeLine) -> None:
-        """Follow another time line; if it cannot be bound, nothing of it stays."""
+        """Follow another time line; if it cannot be bound, the previous one is kept."""
         before = self.time_line
         try:
             self.follow(time_line)
@@ -99,7 +99,7 @@ class InForce:
         end = max(each.end for each in time_line.open)
         over = time_line.settled_at(end)
         following = mixture.following(over.setup)
-        following.active = None  # a stack of before the change, which goes now
+        following.active = None  # a stack from before the change, freed now
         following.prepare([end])
         step = following.bound_step(self._memory.origin, [])
         gains = self.gains.planned(over.setup)
@@ -115,14 +115,13 @@ class InForce:
         self._memory.now = max(self._memory.now, t)
 
     def passed(self, t: float) -> None:
-        """Go on without the changes, if they are over at the time of a step [s]."""
+        """Drop the changes if they are over at the time of a step [s]."""
         memory, later = self._memory, self.later
         memory.now = max(memory.now, t)
         if later is None or memory.now <= later.at:
             return
-        # The values in force are written. The next change binds calls of the model and
-        # the tools anew, and frees the rest here: to free it takes longer than a
-        # step.
+        # The values in force are written. The next change binds calls of model and
+        # tools anew and frees these: freeing needs longer than a step.
         over = self.time_line, self.setup, self.mixture, self.step, later
         self.time_line, self.setup = later.time_line, later.time_line.setup
         gains = self.gains.go_over_to(later.gains)

@@ -12,19 +12,19 @@ from hsp_control.robot import RobotState
 _RATE = 3.0
 """Rate K of the low-pass [1/s]."""
 _HEAD_START = 0.05
-"""Time T₀ that is counted besides that since the first state [s]: 1/k, so that an error
+"""Time T₀ added to that since the first state [s]: 1/k, so that an error
 of a velocity in the first period moves a braked joint no faster than the error."""
 _BEFORE = 0.2
 """Age of the estimate that is used [s]: a fault is detected within this time,
 or is small."""
 _CONTACT = 0.3
-"""Largest load of a joint, relative to its effort limit: as much as a contact [-]."""
+"""Largest load of a joint, relative to its effort limit: that of a contact [-]."""
 _LONGEST_GAP = 0.02
 """Time between two states across which the load is not estimated [s]."""
 
 
 class LoadEstimate:
-    """A slow momentum observer, with which a safe stop goes on.
+    """A slow momentum observer, whose estimate a safe stop compensates.
 
     With d the load, M v' = tau - N + d, so d' = K (M v' - (tau - N) - d). It is
     estimated while measurements are consistent, in a live loop also in the stop, which
@@ -60,7 +60,7 @@ class LoadEstimate:
         self._count: Indices = np.zeros(1, dtype=np.int64)
 
     def permit(self, limits: Array) -> None:
-        """Set the bound by the efforts' limits, shape (nv,); none is known where inf.
+        """Set the bound by the efforts' limits, shape (nv,); inf: unknown.
 
         Where no limit is known, no load is estimated.
         """
@@ -86,7 +86,7 @@ class LoadEstimate:
             each[:] = 0
 
     def go_on(self, before: "LoadEstimate") -> None:
-        """Go on where another estimate of the robot is."""
+        """Continue from another estimate of the robot."""
         for mine, its in zip(self._memory, before._memory, strict=True):
             mine[:] = its
 

@@ -7,7 +7,7 @@ from hsp_control.common.arrays import Array
 
 
 class _NoWrenches(Mapping[str, Array]):
-    """A mapping without items, which no one can add to, and which can be pickled."""
+    """An empty, immutable mapping that can be pickled."""
 
     def __getitem__(self, key: str) -> Array:
         raise KeyError(key)
@@ -23,7 +23,7 @@ class _NoWrenches(Mapping[str, Array]):
 
 
 NO_WRENCHES: Mapping[str, Array] = _NoWrenches()
-"""Of a robot that measures no contact."""
+"""Wrenches of a robot without contact sensors."""
 
 
 class Inertial(NamedTuple):
@@ -62,7 +62,7 @@ class Measurement(NamedTuple):
             `Hardware.write` (libfranka's ``tau_J_d``), shape (nv,), where the hardware
             knows it; None: the effort sent last is used.
         fault: Why the robot must be stopped safely, if hardware knows a reason.
-        wrenches: The wrench of the world on the robot at each contact, by the name of
+        wrenches: The wrench of the world on the robot at every contact, by the name of
             its frame: force and moment about the frame's origin, world axes, shape (6,)
             [N, N·m]; of the period that ends now. Frames without one are missing.
         estimated: The frames whose wrench was not measured, but estimated.
@@ -82,7 +82,7 @@ class Measurement(NamedTuple):
     inertial: Inertial | None = None
 
     def normal_force(self, frame: str, normal: Array) -> float | None:
-        """Return how hard the world pushes on a frame along a normal [N].
+        """Return the normal force of the world on a frame [N].
 
         None if the frame has no sensor.
         """

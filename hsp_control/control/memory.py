@@ -19,7 +19,7 @@ class Waiting(NamedTuple):
     """An impedance that is not the planned one."""
 
     numbers: Array  # in force; see `Impedance.numbers`
-    ramp: float  # how long the change takes for which it waits [s]
+    ramp: float  # duration of the change for which it waits [s]
 
 
 @dataclass
@@ -39,7 +39,7 @@ class RunMemory:
     counts: bool = False
     begun: bool = False  # whether there was a step
     now: float = -np.inf  # latest time of a step [s]
-    # changes as they were given that no step has seen, and the time of the last one
+    # changes, as given, that no step has processed, and the time of the last one
     unseen: tuple[float, tuple[Change, ...]] = (-np.inf, ())
     # of tasks, by key: an impedance that waits, and the compensators' addition
     waiting: dict[int, Waiting] = field(default_factory=dict)
@@ -52,7 +52,7 @@ class RunMemory:
 
     @classmethod
     def of(cls, nv: int) -> "RunMemory":
-        """Return that of a controller before its first run."""
+        """Return the memory of a controller before its first run."""
         return cls(np.zeros(nv), SentMemory.of(nv))
 
     def clear(self) -> None:
@@ -113,7 +113,7 @@ class RunMemory:
         return self.forces.setdefault(contact, np.zeros(1))
 
     def made(self, now: float, change: Change) -> None:
-        """Note a change that is made after a step at a time [s]."""
+        """Record a change that is made after a step at a time [s]."""
         before = self.unseen[1] if self.unseen[0] == now else ()
         self.unseen = now, (*before, change)
 

@@ -32,12 +32,12 @@ AccelerationModifier = Callable[
 ]
 """How compensators act between the law and the limits: a function of (state, active
 stack, a). It returns the acceleration to deliver, shape (nv,), and an additional effort
-besides M a + N, shape (nv,), or None. While tasks fade it is called for each set of
+besides M a + N, shape (nv,), or None. While tasks fade it is called for every set of
 them, weighted by the stack's `share`. State and stack are read-only; a is a copy."""
 
 
 def _checked(found: object, robot: Robot) -> tuple[Array, Array | None]:
-    """Return a modifier's result, if it is as in `AccelerationModifier`."""
+    """Return a modifier's result, checked as in `AccelerationModifier`."""
     if not isinstance(found, tuple) or len(found) != 2:
         raise ControllerError(
             f"modifier returned {type(found).__name__}; needs (acceleration, effort or "
@@ -120,7 +120,7 @@ class Mixture:
             if stack in alive and id(limits.limits) in sets
         }
         self._active: dict[tuple[tuple[int, ...], Set[int]], ActiveStack] = {}
-        # the stacks that were bound ahead, and which of the fading parts each has
+        # the stacks that were bound ahead, and the fading parts that they have
         self._prepared: dict[ActiveStack, list[bool]] = {}
         self._fading = [each for each in setup.tasks if not each.always]
         self._moving = [each for each in setup.contacts if not each.always]
@@ -193,8 +193,8 @@ class Mixture:
 
     def _deliver(self, modifier: AccelerationModifier | None) -> Delivered:
         """Return the result for the law that was resolved last."""
-        # While one set of limits follows another, it is the mixture of the steps within
-        # each of them.
+        # During a transition between sets of limits: the mixture of the steps within
+        # both.
         sets = self._limits.sets
         single = len(self._parts) == len(sets) == 1
         shares: list[float] = []
@@ -226,7 +226,7 @@ class Mixture:
     def bound_step(
         self, origin: Array, evolving: Sequence[Step]
     ) -> BoundStep | BoundMixture | None:
-        """Return the step as one call; None: Python has to make some of it.
+        """Return the step as one call; None: a part of it needs Python.
 
         Args:
             origin: Reading of its calls' clock at time 0, shape (1,) [s].
@@ -278,7 +278,7 @@ class Mixture:
                     ]
 
     def rehearse(self) -> None:
-        """Solve the QPs where the last step has left them; nothing of it is used."""
+        """Solve the QPs again, to fill caches; the results are unused."""
         for each in self._actuations.values():
             each.rehearse()
 
@@ -309,7 +309,7 @@ class Mixture:
     def _stack(
         self, standing: Sequence[PlannedContact], off: Collection[int]
     ) -> ActiveStack:
-        """Return the stack of some contacts and of the tasks that are not off."""
+        """Return the stack of some contacts and of the active tasks."""
         known = tuple(map(id, standing)), frozenset(off)
         found = self._active.get(known)
         if found is None:
@@ -341,7 +341,7 @@ def _weight(pair: tuple[float, object]) -> float:
 
 
 def _mean(shares: Sequence[float], parts: Sequence[Array]) -> Array:
-    """Return the weighted mean; not even by rounding does it leave their range."""
+    """Return the weighted mean, within their range also up to rounding."""
     x = np.array(parts)
     # in this order, as the engine's
     mean = sum(share * each for share, each in zip(shares, parts, strict=True))
@@ -350,7 +350,7 @@ def _mean(shares: Sequence[float], parts: Sequence[Array]) -> Array:
 
 
 def _placed(forces: Array, support: Support, whole: Support) -> Array:
-    """Return forces of some contacts at their places among those of all."""
+    """Return forces of some contacts at their indices among those of all."""
     if support is whole or support.contacts == whole.contacts:
         return forces
     placed = np.zeros((whole.size // 3, 3))

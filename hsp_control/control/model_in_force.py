@@ -29,7 +29,7 @@ class CarriedBody(NamedTuple):
 
 @dataclass(frozen=True)
 class PlannedPayload:
-    """A payload, and when it is carried."""
+    """A payload, and the times at which it is carried."""
 
     frame: str
     body: CarriedBody
@@ -44,13 +44,14 @@ class ModelInForce:
         self._shares = np.zeros((3, 0))  # of each payload, with two derivatives
         self._gravity = Evolution(np.array(robot.model.gravity.linear))
         self._own = self._gravity.initial
-        self._change = np.zeros(3)  # from it: a plant may have another one
+        # from the controller's: a plant may have another one
+        self._change = np.zeros(3)
         self._dynamics = [*dynamics]
         self._constant = False
         self._bind()
 
     def follow(self, dynamics: Dynamics | None) -> None:
-        """Let other dynamics have the same from now on, instead of the last ones."""
+        """Let other dynamics have the same model, instead of the previous ones."""
         self._dynamics[1:] = [] if dynamics is None else [dynamics]
         self._bind()
         self._write()
@@ -69,7 +70,7 @@ class ModelInForce:
         self._constant = shares and gravity.constant
 
     def write(self, t: float) -> None:
-        """Let the model be that of a time [s]."""
+        """Set the model to that of a time [s]."""
         if self._constant:  # and written
             return
         for k, each in enumerate(self._payloads):
@@ -79,7 +80,7 @@ class ModelInForce:
 
     @property
     def calls(self) -> PartCalls:
-        """The call that lets the model be that of a time, while it changes."""
+        """The call that sets the model to that of a time, while it changes."""
         return [] if self._constant else [PartCall(self.write, t=TIME)]
 
     def _bind(self) -> None:

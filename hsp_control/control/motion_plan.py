@@ -92,7 +92,7 @@ class RunningPlan(ABC):
 
     @property
     def streams(self) -> list[StreamRun]:
-        """The streams that lead the plan in this run, such as its velocity."""
+        """The plan's input streams in this run, such as its velocity."""
         return [each.run for each in parts_within(self.plan, FollowedStream)]
 
     def stop(self) -> None:
@@ -101,7 +101,7 @@ class RunningPlan(ABC):
 
     @property
     def rests(self) -> bool:
-        """Whether the robot stands where it is, as far as the plan is concerned."""
+        """Whether the plan is at rest, so that the robot stands."""
         return True
 
     @abstractmethod

@@ -52,7 +52,7 @@ class ControlOutput:
     forces: Array
     status: Status
     relaxation: float
-    # Bytes are made faster than arrays, and most are never looked at.
+    # Bytes are made faster than arrays, and most are never read.
     _acceleration: bytes | None  # None: the law's own
     _distances: Sequence[tuple[str, bytes]]  # of each barrier, of all its pairs
     _layout: Layout  # of the memory

@@ -26,9 +26,9 @@ from hsp_control.trajectories.crossfade import settled
 
 @dataclass(frozen=True)
 class PlannedTask:
-    """A task, when it is active, and its gains."""
+    """A task, its activity in time, and its gains."""
 
-    key: int  # distinguishes it from all others, also of the same name
+    key: int  # unique, also among tasks of the same name
     task: Task  # placed
     presence: Evolution[float]  # 1 while it is part of the controller, 0 while not
     # numbers of its feedback: Kp and Kv, shape (2, m, m) [1/s², 1/s], or those of an
@@ -37,7 +37,7 @@ class PlannedTask:
 
     @property
     def unscheduled(self) -> bool:
-        """Whether it comes and goes by changes alone."""
+        """Whether only changes activate it."""
         return self.task.schedule is None
 
     def share_calls(self, share: Array) -> PartCalls:
@@ -74,7 +74,7 @@ class PlannedTask:
 
 @dataclass(frozen=True)
 class PlannedTerm:
-    """A term of the field, and when it is active."""
+    """A term of the field, and its activity in time."""
 
     field: NullSpaceField  # placed, with its own weight
     presence: Evolution[float]  # factor of its weight
@@ -125,13 +125,13 @@ def planned_terms(
 
 
 HELD = 0.1
-"""A contact whose weight is this or more is kept at rest. With 1, a foot would move
-while it is active; with 0, its motion would be set free, or stopped, with a jump."""
+"""Weight from which on a contact is kept at rest. With 1, a foot would move while it is
+active; with 0, its motion would be released, or stopped, with a jump."""
 
 
 @dataclass(frozen=True)
 class PlannedContact:
-    """A contact, and when it is part of the controller."""
+    """A contact, and its activity in time."""
 
     contact: Contact
     presence: Evolution[float]  # 1 while it is active, 0 while it is lifted
@@ -143,7 +143,7 @@ class PlannedContact:
 
     @property
     def unscheduled(self) -> bool:
-        """Whether it comes and goes by changes alone."""
+        """Whether only changes activate it."""
         return self.contact.schedule is None
 
     def share_calls(self, share: Array) -> PartCalls:
@@ -157,11 +157,11 @@ class PlannedContact:
         return self.contact.active(t) and self.presence.at(t) > 0.0
 
     def weight(self, t: float) -> float:
-        """Return how active it is at time t [s], in [0, 1]."""
+        """Return its share at time t [s], in [0, 1]."""
         return self.contact.weight(t) * self.presence.at(t)
 
     def share(self, t: float) -> float:
-        """Return how much it is kept at rest at time t [s], in [0, 1]."""
+        """Return the degree to which it is kept at rest at time t [s], in [0, 1]."""
         # It is 1 - (1 - x)³ with x the weight over `HELD`: C² in time, as the weight.
         if not self.active(t):
             return 0.0
@@ -169,14 +169,14 @@ class PlannedContact:
         return x * (3.0 - x * (3.0 - x))
 
     def edge(self, t: float) -> float:
-        """Return when its schedule, near t, lifts it, or lifted it last [s]."""
+        """Return the time near t of a lift, or of the last one, by its schedule [s]."""
         schedule = self.contact.schedule
         return t if schedule is None else schedule.edge(t)
 
 
 @dataclass(frozen=True)
 class PlannedLimits:
-    """The limits of a controller: sets that follow one another.
+    """The limits of a controller: consecutive sets.
 
     While one follows another, both are active, and their results are mixed; see
     `Mixture.step`. So a limit can be removed or added smoothly.

@@ -31,11 +31,11 @@ from hsp_control.trajectories.hold import SetPoint
 from hsp_control.trajectories.schedule import Schedule
 
 _MOST = 500
-"""Events that are looked at: a schedule may repeat itself for hours."""
+"""Number of events that are considered: a schedule may repeat for hours."""
 _BETWEEN = 6
-"""Times that are looked at between two of them."""
+"""Number of sample times between two of them."""
 _AFTER = 1e-6
-"""How long after the last one is looked at, where rounding hides no end [s]."""
+"""Time after the last one that is sampled, beyond rounding of its end [s]."""
 
 
 @dataclass(frozen=True)
@@ -120,7 +120,7 @@ class Setup:
         return _found("task", name, {each.task.name: each for each in present})
 
     def present_task(self, name: str, t: float) -> PlannedTask:
-        """Return the task of a name that is active at time t [s], or is to come."""
+        """Return the task of a name that is active at time t [s], or will be."""
         for each in self.tasks:
             if each.task.name == name and each.presence.at(t) > 0.0:
                 return each
@@ -199,7 +199,7 @@ def _set_force(planned: PlannedContact) -> PlannedContact:
 
 
 def _events(presence: Evolution[float], schedule: Schedule | None) -> set[float]:
-    """Return when something begins or ends to come or go [s]."""
+    """Return the start and end times of all transitions [s]."""
     changes = {t for step in presence.transitions for t in (step.start, step.end)}
     if schedule is None:
         return changes

@@ -1,4 +1,4 @@
-"""The active stack as a user or a modifier gets it, who cannot change a step by it."""
+"""The read-only active stack for users and modifiers."""
 
 from collections.abc import Mapping
 from dataclasses import is_dataclass
@@ -19,7 +19,7 @@ from hsp_control.law import Problem
 Stack = TypeVar("Stack")  # `ActiveStack`, which makes its read-only view
 
 _READS = {"flow", "diagnose", "field_value", "points_of", "in_world"}
-"""Methods of a stack and its parts that change nothing which a step reads."""
+"""Methods of a stack and its parts without an effect on a step."""
 
 _BOUND = {"calls", "layout", "permits"}
 """Attributes that have bound calls."""
@@ -28,7 +28,7 @@ _PARTS = BoundLaw, Problem, Support, PlannedTask, Evolution, Transition
 
 
 class Shown:
-    """The public attributes of an object of a step, without the means to change it.
+    """The public attributes of an object of a step, read-only.
 
     Arrays are read-only views, so that they are always those of the present step.
     """

@@ -14,7 +14,7 @@ class StepLock:
     __slots__ = ("__weakref__", "_lock", "_taken")
 
     def __init__(self) -> None:
-        self._lock, self._taken = RLock(), ""  # why it cannot be had, if so
+        self._lock, self._taken = RLock(), ""  # why it cannot be acquired, if so
         _locks.add(self)
 
     def __enter__(self) -> None:
@@ -29,7 +29,7 @@ class StepLock:
         self._lock.release()
 
     def forked(self) -> None:
-        """Go on in a child process: a thread that has the lock is not there."""
+        """Replace the lock in a forked process, which lacks its holder's thread."""
         own: Any = self._lock
         if self._taken and not own._is_owned():
             self._lock, self._taken = RLock(), _FORKED

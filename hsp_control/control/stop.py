@@ -17,7 +17,7 @@ from hsp_control.robot import RobotState
 
 
 class StopGains(NamedTuple):
-    """How a robot is braked, and then held; see `hsp_control.live`'s settings."""
+    """Parameters of braking and of holding; see `hsp_control.live`'s settings."""
 
     damping: float = 20.0
     """k of the braking effort -k M(q) v [1/s]."""
@@ -109,13 +109,13 @@ class BoundStop:
         self.holding[:] = 0
 
     def stand_on(self, feet: Sequence[Contact]) -> None:
-        """Stand on these feet, and on no others."""
+        """Stand on exactly these feet."""
         for each, points in zip(self.feet, self._support.points, strict=True):
             on = any(each is foot for foot in feet)
             self._standing[3 * points.start : 3 * points.stop] = on
 
     def go_on(self, before: "BoundStop") -> None:
-        """Go on where a stop at another state is."""
+        """Continue from a stop at another state."""
         for mine, its in zip(self._memory, before._memory, strict=True):
             mine[:] = its
         self.load.go_on(before.load)

@@ -11,7 +11,7 @@ from hsp_control.trajectories.streams.run import StreamRun
 
 
 class StreamHandle:
-    """A stream of a controller, in whichever run it is; see `Controller.stream`.
+    """A stream of a controller, in its current run; see `Controller.stream`.
 
     `send` and `send_chunk` may be called from any thread, before the first step, too.
     Counters and the record are those of the present run.
@@ -51,7 +51,7 @@ class StreamHandle:
         self._on_send()
 
     def counts(self) -> dict[str, float]:
-        """Return the time since the last message [s], and how many there were."""
+        """Return the time since the last message [s], and the number of messages."""
         return self._find().counts()
 
     @property
@@ -61,7 +61,7 @@ class StreamHandle:
 
     @property
     def last_rejection(self) -> str:
-        """Why the last invalid message of another process was one; empty for none."""
+        """Error of the last invalid message from another process; empty for none."""
         return self._find().last_rejection
 
     def __repr__(self) -> str:

@@ -31,7 +31,7 @@ from hsp_control.trajectories.streams.streamed import Streamed
 RAMP = 0.2
 """Ramp of interactive changes [s]."""
 DEAD_MAN = 0.2
-"""Time after which an unrepeated velocity fades [s]."""
+"""Time after which an unrepeated velocity fades out [s]."""
 DELAY = 0.03
 """Time to a target, if the bounds permit [s]: about two of a page's pictures."""
 MOVING: dict[str, Any] = {"speed": 0.5, "acceleration": 3.0, "jerk": 60.0}
@@ -67,7 +67,7 @@ def followed_stream(task: Task) -> StreamRun | None:
 
 
 def target_of(task: Task, value: object, here: Callable[[], RobotState]) -> Array:
-    """Return a target as the streams take it: numbers, quaternions (x, y, z, w).
+    """Return a target in the streams' form: numbers, quaternions (x, y, z, w).
 
     Args:
         task: The task.

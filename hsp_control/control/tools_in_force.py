@@ -1,4 +1,4 @@
-"""The tools in force: where frames are in the joints that carry them.
+"""The tools in force: placements of frames in the joints that carry them.
 
 A frame that moves in its joint has a velocity and an acceleration beyond J v and
 J v' + J' v; the tasks take them into account, so that each error obeys its equation
@@ -21,14 +21,14 @@ from hsp_control.trajectories import PoseTrajectory
 
 @dataclass(frozen=True)
 class PlannedTool:
-    """Where a frame is in its link, as a function of time."""
+    """The placement of a frame in its link, as a function of time."""
 
     frame: str
     placement: PoseTrajectory  # in the axes of the frame as the model has it
 
 
 class ToolsInForce:
-    """Lets the frames of a state be where the tools are now."""
+    """Moves the frames of a state to the present tools."""
 
     def __init__(self, state: RobotState) -> None:
         self._state, self._model = state, state.robot.model
@@ -49,12 +49,12 @@ class ToolsInForce:
         self.write(t)
 
     def write(self, t: float) -> None:
-        """Let the frames be where they are at a time [s], and move as they do then."""
+        """Set the frames' placements and motions to those of a time [s]."""
         Plan(self.steps)(t)
         self.forget()
 
     def forget(self) -> None:
-        """Let the frames be computed anew at the same state."""
+        """Have the frames computed anew at the same state."""
         for each in self._tools:
             self._state.forget_frame(each.frame)
 

@@ -109,7 +109,7 @@ class _AfterType:
         self.first = next(iter(member.__pydantic_fields__), None)  # type: ignore[attr-defined]
 
     def field(self) -> Any:
-        """Return the field of a model, as `create_model` takes it."""
+        """Return the field of a model, as an argument of `create_model`."""
         summary = (self.member.__doc__ or "").partition("\n")[0]
         member: Any = self.member
         annotation = Annotated[member | None, BeforeValidator(self.expand), self]

@@ -23,7 +23,7 @@ class Declared:
             classes that only Python uses.
         error: The class of the errors about its fields.
         yaml_key: The field that YAML gives as the key of a mapping, not inside it.
-        documentation: The docstring of each field, by name.
+        documentation: The docstrings of fields, by name.
     """
 
     family: ClassVar["Family | None"] = None

@@ -134,6 +134,6 @@ def _named(value: Any) -> Any:
 
 
 NAMED = BeforeValidator(_named)
-"""For a field that is a function: YAML gives its name; beside `AS_TEXT`."""
+"""For a field that is a function: YAML gives its name; used with `AS_TEXT`."""
 AS_TEXT = WithJsonSchema({"type": "string"})
 """How the JSON schema describes such a field."""

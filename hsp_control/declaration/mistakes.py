@@ -3,7 +3,7 @@
 Pydantic reports a wrong value once for every alternative of a union, under a path that
 contains the alternatives' names. It reports a misspelt key twice, as unknown and as
 missing. This module follows errors and schema together, from the top, and finds one
-mistake of each, under the key path that the user wrote.
+mistake per value, under the key path that the user wrote.
 """
 
 import dataclasses
@@ -43,7 +43,7 @@ _KINDS = {
 
 
 class CheckedSource(Protocol):
-    """Where the checked data come from."""
+    """The source of the checked data."""
 
     def __contains__(self, path: KeyPath) -> bool:
         """Return whether there is a value at the key path."""
@@ -72,7 +72,7 @@ def findings(
     errors: Sequence[Pending],
     path: KeyPath = (),
 ) -> list[Mistake]:
-    """Return one finding for each mistake at ``path`` or below it."""
+    """Return one finding per mistake at ``path`` or below it."""
     found = [_here(path, expected, error) for ahead, error in errors if not ahead]
     below: dict[str | int, list[Pending]] = defaultdict(list)
     for ahead, error in errors:

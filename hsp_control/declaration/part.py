@@ -21,7 +21,7 @@ from hsp_control.declaration.value_class import ValueClass
 
 
 def attribute_docstrings(cls: type) -> dict[str, str]:
-    """Return the docstring of each annotated attribute, as one line, by name."""
+    """Return the docstrings of annotated attributes, as single lines, by name."""
     return _of_module(cls.__module__).get(cls.__qualname__, {})
 
 
@@ -57,7 +57,7 @@ def _of_attributes(node: ast.ClassDef) -> Iterator[tuple[str, str]]:
 
 
 class _Documentation:
-    """The docstring of each field: sources are read on request."""
+    """The docstrings of fields: sources are read on request."""
 
     def __get__(self, part: object, cls: type["Part"]) -> dict[str, str]:
         found: dict[str, str] = {}
@@ -71,7 +71,7 @@ class _Documentation:
 class Part(Declared, metaclass=ValueClass):
     """A value that declares one part of a controller, a world or a simulation.
 
-    A subclass annotates its fields; each has a docstring that gives its meaning and
+    A subclass annotates its fields, with docstrings that give their meaning and
     unit. From this one declaration come the constructor and its checks, the YAML and
     JSON schemas, the reference pages and the messages::
 

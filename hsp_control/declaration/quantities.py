@@ -36,8 +36,8 @@ def plain(value: Any) -> Any:
 
 
 LARGEST = 1e30
-"""No length, time, mass or gain is larger, in whatever units: products of some such
-numbers are still doubles, and so are those of the inverses of positive ones."""
+"""Bound on lengths, times, masses and gains in any unit: products of some such numbers,
+and of inverses of positive ones, do not overflow."""
 
 
 def _not_huge(value: float) -> float:
@@ -224,15 +224,15 @@ Tensor = Annotated[
 Gain = Annotated[
     ArrayLike, ArrayField(Positive | list[Positive] | list[list[Number]], read_only)
 ]
-"""A number, one number for each row, or a matrix."""
+"""A number, one number per row, or a matrix."""
 Semidefinite = Annotated[
     ArrayLike,
     ArrayField(NonNegative | list[NonNegative] | list[list[Number]], read_only),
 ]
-"""A number, one number for each row, or a matrix: no eigenvalue is negative."""
+"""A number, one number per row, or a matrix: no eigenvalue is negative."""
 PositiveNumbers = Annotated[ArrayLike, ArrayField(Positive | list[Positive], read_only)]
-"""One positive number, or one for each coordinate."""
+"""One positive number, or one per coordinate."""
 Weights = Annotated[ArrayLike, ArrayField(NonNegative | list[NonNegative], read_only)]
-"""One number, or one for each joint."""
+"""One number, or one per joint."""
 Periods = Annotated[int, Strict(), Field(ge=0, le=100_000), _PLAIN]
 """A number of control periods."""

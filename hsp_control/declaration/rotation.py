@@ -70,7 +70,7 @@ _ROW = _lists({"type": "number"}, 3, 4)
 _MATRIX = _lists(_lists({"type": "number"}, 3, 3), 3, 3)
 _SCHEMA = {"anyOf": [_ROW, _MATRIX]}
 
-# Their sizes are checked by `matrix_of`, whose message explains each size.
+# Their sizes are checked by `matrix_of`, whose message explains the sizes.
 Rotation = Annotated[
     ArrayLike,
     ArrayField(list[Number] | list[list[Number]], _checked),

@@ -36,7 +36,7 @@ class _Docstring:
 
 
 class ValueClass(ABCMeta):
-    """Makes each part a value class, and registers it with its family."""
+    """Makes parts value classes, and registers them with their families."""
 
     def __new__(
         mcs,
@@ -68,9 +68,9 @@ class ValueClass(ABCMeta):
             cls.__post_init__ = _completed(cls.__post_init__)
         cls._docstring = cleandoc(namespace.get("__doc__") or "")
         hidden = _hide_properties(cls)
-        # Not in __init_subclass__: ABCMeta looks at all attributes then, which would
-        # build pydantic's schema.
-        # Nor is it `frozen`, for which two functions are compiled that ours replace.
+        # Not in __init_subclass__: ABCMeta reads all attributes then, which would build
+        # pydantic's schema. Not `frozen`: that would compile two methods that ours
+        # replace.
         dataclass(cls, eq=False, repr=False, config=_CONFIG)
         cls.__doc__ = _Docstring()
         for each in hidden:

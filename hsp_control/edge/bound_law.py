@@ -24,7 +24,7 @@ class BoundLaw:
 
     Attributes:
         problem: The input, to be written before `call` is made.
-        ends: End of each level's rows in the stack.
+        ends: Ends of the levels' rows in the stack.
         form: The metric's form.
         threshold: ε_0, the singular value below which the inverse is always bounded.
         thresholds: ε of each level, of the last `call`, shape (levels,).

@@ -1,4 +1,4 @@
-"""The cost of deviations while limits keep tasks from being met, level by level.
+"""The cost of deviations while limits make tasks infeasible, level by level.
 
 While a limit is active, lower priorities deviate before a level does. The direction of
 their deviation depends on the posture: the more, the smaller their mobility along the

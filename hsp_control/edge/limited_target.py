@@ -34,8 +34,8 @@ from hsp_control.common.arrays import Array
 from hsp_control.engine.plans import PartCall
 
 LARGE = 2.0
-"""Excess of the tasks from which on the damped law applies fully: they command three
-times the permitted value."""
+"""Excess of the tasks above which the damped law applies fully: commands of three times
+the permitted value."""
 
 
 class Permitted(NamedTuple):
@@ -48,7 +48,7 @@ class Permitted(NamedTuple):
     def by(
         cls, effort: Array, span: Array, speed: Array, most: Array, bandwidth: float
     ) -> Self:
-        """Return it.
+        """Return the bounds far from all limits of a robot.
 
         Args:
             effort: Maximum efforts, shape (nv,) as all of these.

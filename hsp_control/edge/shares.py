@@ -7,7 +7,7 @@ posture the exact inverse of that changes faster than a sampled loop can follow,
 inverse of a_damped is bounded by thresholds that follow the command (`threshold.py`).
 But a threshold cannot distinguish an error that persists from a step within reach.
 Three conditions can: a singularity, a large error, or an active limit. So μ is the
-largest of three shares, each of them 0 in the interior of the workspace:
+largest of three shares, all 0 in the interior of the workspace:
 
     near    σ ≥ σ_x: 0;  σ ≤ σ_x/2: 1.    σ_x is a tenth of the robot's size
     far     |e| ≤ 0.85 ℓ: 0;  |e| ≥ ℓ: 1.      ℓ is the largest error that is fed back
@@ -25,4 +25,4 @@ NEAR = 0.1
 singular one, for any command."""
 
 FAR = 0.85
-"""Part of ℓ up to which the share of large errors is 0."""
+"""Fraction of ℓ up to which the share of large errors is 0."""

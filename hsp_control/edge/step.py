@@ -1,4 +1,4 @@
-"""The results of the law and its bounds in each step."""
+"""The results of the law and its bounds in every step."""
 
 from typing import NamedTuple, Self
 

@@ -45,7 +45,7 @@ posture by a spring of at most 2 L |∂s/∂q| ≤ 100 1/s² times its inertia, 
 relative to periods of up to 10 ms and to the motors' efforts, and damped by a
 null-space gain of 10 1/s."""
 WHOLE = 3
-"""Number of components of an error with all of L; with m < 3 components it is L/(4 -
+"""Number of components of an error with the full L; with m < 3 components it is L/(4 -
 m)."""
 BELOW = 40.0
 """Factor of L below an unmet level: its feedback then accelerates a joint by at most
@@ -64,18 +64,18 @@ class Following(NamedTuple):
     """Parameters of the thresholds, and of the range of the exact law."""
 
     size: float  # the robot's [m]; 0: they do not
-    # L [rad/s² for each unit of a singular value]; inf: it does not follow
+    # L [rad/s² per unit of a singular value]; inf: it does not follow
     steepest: float
     modest: float  # f_0 [m/s² or rad/s²]; 0 on a fixed base
     below: float  # factor of L below an unmet level
     turning: float  # ε per rad/s of a field while a spring is saturated
-    quickest: float  # the largest part of a field that is used [rad/s]
+    quickest: float  # the largest used size of a field [rad/s]
     near: float  # σ_x: the exact law applies fully above
-    far: float  # part of the largest error up to which it applies fully
+    far: float  # fraction of the largest error up to which it applies fully
 
     @classmethod
     def of(cls, size: float, *, on_legs: bool) -> Self:
-        """Return it for a robot of a size [m]; for 0 no threshold follows commands."""
+        """Return the parameters for a robot's size [m]; 0: constant thresholds."""
         modest = size * MODEST_ON_LEGS if on_legs else 0.0
         steepest = STIFFNESS / size if size else np.inf
         return cls(
@@ -95,5 +95,5 @@ class Thresholds(NamedTuple):
 
     @classmethod
     def allocate(cls, levels: int) -> Self:
-        """Return those of a number of levels."""
+        """Return the thresholds of a number of levels."""
         return cls(*np.zeros((3, levels)))

@@ -23,7 +23,7 @@ def calls(step: object) -> Iterator[Any]:
 
 
 def listing(step: object) -> str:
-    """Return the contents of a plan, a line for each call and each of its arguments.
+    """Return the contents of a plan, a line per call and each of its arguments.
 
     An array that an earlier call of the plan writes is shown with that call's number.
     """

@@ -74,7 +74,7 @@ class OnlyIf(NamedTuple):
 
 AnyCall = PartCall | Once | OnlyIf
 PartCalls = Sequence[AnyCall]
-"""The calls of a part in each step, with all their arguments, in this order."""
+"""The calls of a part in every step, with all their arguments, in this order."""
 
 
 class CallOutput(NamedTuple):
@@ -182,7 +182,7 @@ def bind(
     Args:
         function: A kind of the engine, or a function.
         arguments: By name: arrays, numbers, and records of them, which are named tuples
-            or dicts. The call reads and writes the memory of these arrays each time;
+            or dicts. The call reads and writes the memory of these arrays every time;
             numbers are constants.
         timed: Whether it also receives the time; a function has it as its first
         parameter.

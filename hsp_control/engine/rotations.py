@@ -1,4 +1,4 @@
-"""Rotations for plain Python: exp, log and their Jacobians on SO(3), each a new array.
+"""Rotations for plain Python: exp, log and their Jacobians on SO(3), as new arrays.
 
 A rotation vector y is a rotation by the angle √(y·y) about y, shape (3,) [rad]; a
 quaternion is x, y, z, w. The equations are in the engine's ``rotations.hpp``.

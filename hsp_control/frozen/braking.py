@@ -48,7 +48,7 @@ def stopping(
         own: The controller.
         bound: Its step.
         gains: How it brakes.
-        period: How long each effort is held, shape (1,) [s].
+        period: Time for which an effort is held, shape (1,) [s].
         origin: The clock's reading at time 0, shape (1,) [s].
         first: The calls that bring the model up to a time.
         acts: The effort that a step delivers, shape (nv,).

@@ -31,7 +31,7 @@ class CompensatedStep:
     """The step of a controller with the compensators of one run.
 
     Attributes:
-        stages: The calls of each.
+        stages: Their calls.
     """
 
     def __init__(
@@ -51,7 +51,7 @@ class CompensatedStep:
             bound: Its step.
             compensation: The compensators.
             delivered: The array into which the delivered effort is written.
-            period: How long each effort is held, shape (1,) [s].
+            period: Time for which an effort is held, shape (1,) [s].
             sending: The call that records the effort as sent.
             damped: Where the first level with a bounded inverse is, shape (1,).
 

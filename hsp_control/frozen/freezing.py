@@ -63,12 +63,12 @@ def freeze(
         controller: The controller.
         path: The file to write, such as ``panda.hsp``.
         compensation: Compensators of model errors; None: there are none.
-        period: How long each effort is held [s].
+        period: Time for which an effort is held [s].
         start: The configuration to which relative values refer, shape (nq,); by
             default the controller's start, or else where its run began.
-        payloads: Frames that may carry something, which is an input of each; None:
+        payloads: Frames that may carry a payload, which becomes an input; None:
             those of the tasks.
-        presences: Tasks that come and go, by inputs: the file has a step of each set of
+        presences: Tasks that fade by inputs: the file has a step of every set of
             them, 2^k for k tasks.
         stop: How ``hsp_stop`` brakes the robot, and then holds it.
 

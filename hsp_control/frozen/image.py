@@ -146,8 +146,8 @@ class _Memory:
     """Blocks of memory, one after the other, and where arrays are in them."""
 
     def __init__(self, arrays: Iterable[Any]) -> None:
-        # Those of one place and size are one; in the order in which they are met, so
-        # that the same controller gives the same file.
+        # Equal addresses and sizes are one block; in the order of discovery, so that
+        # the same controller gives the same file.
         self._arrays = {
             (each.ctypes.data, each.nbytes): each for each in arrays if each.nbytes
         }

@@ -78,7 +78,7 @@ def inputs_of(
         if impedance is not None:
             yield from _springs(task, impedance, bound, held, reports)
             continue
-        # A scalar error is unstable from these on, whatever the other one is.
+        # A scalar error is unstable from these on, for any value of the other.
         Kp, Kv, *_ = own.feedback(task.name)
         if task.order == 1:
             meaning, most = "rate of the error", 2.0 / period
@@ -161,7 +161,7 @@ def _weights(own: Controller) -> Iterator[Input]:
 
 
 def presences_of(sets: TaskSets) -> Iterator[Input]:
-    """Yield how far each of the tasks that come and go is present."""
+    """Yield the presences of the tasks that fade."""
     for k, name in enumerate(sets.names):
         x, meaning = sets.presences[k : k + 1], "how far the task is present, in [0, 1]"
         evolve = _evolving(x, 0.0, 1.0, 0)

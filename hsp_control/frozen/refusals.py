@@ -129,7 +129,7 @@ def check_parts(own: Controller) -> None:
 
 
 def _plans_of(own: Controller, state: RobotState) -> Iterator[tuple[Path, StepPlan]]:
-    """Yield the key of each part of the law, and its calls, for checks only."""
+    """Yield the keys of the law's parts, and their calls, for checks only."""
     nv, form = own.robot.nv, own.metric.form
     for task in own.tasks:
         if task.followed is not None:

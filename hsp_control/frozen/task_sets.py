@@ -1,4 +1,4 @@
-"""Tasks that come and go: a step of each set of them, and the mean of some.
+"""Tasks that fade: a step per set of them, and the mean of some.
 
 A frozen plan has the calls of every set of the tasks whose presence is an input; a step
 makes those of the sets that have a share, as `Mixture` does.
@@ -26,7 +26,7 @@ from hsp_control.engine.plans import AnyCall, PartCall, Step
 from hsp_control.tasks.compliant_task import impedance_of
 
 MOST = 4
-"""Of how many tasks the presence may be an input: the file has 2^MOST sets of them."""
+"""Largest number of tasks whose presence is an input: the file has 2^MOST sets."""
 
 
 Delivering = Callable[[ActiveStack, Actuation, DeliveredAlone], list[Step]]
@@ -64,7 +64,7 @@ class TaskSets:
 
     Attributes:
         names: The tasks that come and go.
-        presences: How far each of them is present, in [0, 1], shape (k,).
+        presences: Their presences, in [0, 1], shape (k,).
         reported: The reports of a step on all tasks.
     """
 

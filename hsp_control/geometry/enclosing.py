@@ -12,7 +12,7 @@ from hsp_control.common.arrays import Array
 
 def convex_hull(mesh: Any) -> Any:
     """Return the hull of one of Coal's meshes; None if it is flat: Coal would abort."""
-    from scipy.spatial import ConvexHull, QhullError  # here: SciPy takes long to import
+    from scipy.spatial import ConvexHull, QhullError  # here: importing SciPy is slow
 
     try:
         ConvexHull(np.array(mesh.vertices()), qhull_options="Qt")
@@ -24,7 +24,7 @@ def convex_hull(mesh: Any) -> Any:
 
 def hull_corners(points: Array) -> Array:
     """Return the points (k, 3) that are vertices of the hull; all if it is flat."""
-    from scipy.spatial import ConvexHull, QhullError  # here: SciPy takes long to import
+    from scipy.spatial import ConvexHull, QhullError  # here: importing SciPy is slow
 
     try:
         return points[ConvexHull(points, qhull_options="QJ").vertices]
@@ -46,7 +46,7 @@ def enclosing_capsule(points: Array) -> tuple[Array, Array, float]:
 @lru_cache(maxsize=512)  # of 40 robots; a kilobyte to 40 a shape
 def _enclosing(data: bytes) -> tuple[tuple[Array, Array], float]:
     """Return the ends of a capsule and its radius [m]; of points (k, 3), row by row."""
-    from scipy.optimize import minimize  # here: SciPy takes long to import
+    from scipy.optimize import minimize  # here: importing SciPy is slow
 
     points = np.frombuffer(data).reshape(-1, 3)
     center = points.mean(axis=0)

@@ -32,7 +32,7 @@ _WIDE = 8.0 * np.pi
 _GAP = 0.02
 """Least distance from an obstacle [m]; links only must not overlap."""
 _SHARE = 0.5
-"""Least singular value, as a share of the best that was seen."""
+"""Smallest accepted singular value, relative to the best one found."""
 _ARM = 3
 """Fewest joints of an arm; fingers have fewer."""
 _EACH, _TOGETHER = 12, 60
@@ -62,7 +62,7 @@ _eccentricity = attrgetter("eccentricity")
 
 
 class PostureSearch:
-    """Judges postures of one robot, and finds a good one."""
+    """Evaluates postures of one robot, and finds a good one."""
 
     def __init__(
         self, robot: Robot, rows: Sequence[Rows], obstacles: Sequence[Obstacle] = ()
@@ -169,7 +169,7 @@ class PostureSearch:
         if not reached:
             raise ConfigurationError(_too_far(found, target))
         good, _ = self._qualified(reached, least)
-        if not good:  # then the others stay in their good posture
+        if not good:  # the others keep their good postures
             starts = [(x, x) for x in self._assembled(least)]
             good, _ = self._qualified(self._reached(target, starts)[1], least)
         if not good:
@@ -184,7 +184,7 @@ class PostureSearch:
     ) -> tuple[list[Reached], list[Judgement]]:
         """Return where inverse kinematics end, and those postures that are there.
 
-        ``starts``: where each begins, and the posture that attracts it, shapes (nv,).
+        ``starts``: initial postures, and those that attract them, shapes (nv,).
         """
         bounds = self._lower, self._upper
         found = [
@@ -229,7 +229,7 @@ class PostureSearch:
         return np.asarray(lower + share * (upper - lower))
 
     def _assembled(self, least: float) -> Iterator[Array]:
-        """Yield displacements in which each arm is good by itself, shape (nv,).
+        """Yield displacements in which the arms are good separately, shape (nv,).
 
         Where one posture in five is good for an arm, one in 25 is for two of them, but
         they hardly depend on one another. All else is at home.

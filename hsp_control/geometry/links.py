@@ -242,7 +242,7 @@ def _finite(geometry: Any) -> bool:
 
 
 def _between_joints(robot: Robot, part: RobotPart) -> list[LinkShape]:
-    """Return capsules between the joints, and a sphere at each last joint."""
+    """Return capsules between the joints, and spheres at last joints."""
     model = robot.model
     joints = [
         i for i in range(1, model.njoints) if part_of(robot, model.names[i]) is part
@@ -250,7 +250,7 @@ def _between_joints(robot: Robot, part: RobotPart) -> list[LinkShape]:
     shapes = []
     for child in joints:
         parent, end = model.parents[child], model.jointPlacements[child].translation
-        # The parts share the world, so each uses its own name for it.
+        # The parts share the world, so they use different names for it.
         name = model.names[parent] if parent else f"{part.prefix}universe"
         start = np.zeros(3) if parent else part.placement.translation
         placement, length = _placement_along(start, end)
@@ -266,7 +266,7 @@ def _between_joints(robot: Robot, part: RobotPart) -> list[LinkShape]:
 
 
 def _merge_rounded_cylinders(shapes: Sequence[LinkShape]) -> list[LinkShape]:
-    """Merge each cylinder with spheres at its two ends: URDFs describe capsules so."""
+    """Merge cylinders with spheres at both ends: URDFs describe capsules so."""
     merged: list[LinkShape] = []
     used: set[int] = set()
     for i, shape in enumerate(shapes):

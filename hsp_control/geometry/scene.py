@@ -101,7 +101,7 @@ class Scene(Part, Mapping[str, Obstacle], error=SceneError):
     def __getitem__(self, name: str) -> Obstacle:
         try:
             return self._by_name[name]
-        except (KeyError, TypeError):  # also what is no name, such as a list
+        except (KeyError, TypeError):  # also objects that are no names, such as a list
             known = listing(self) or "none"
             raise SceneError(
                 f"no obstacle {name!r}{did_you_mean(name, self)} "

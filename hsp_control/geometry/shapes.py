@@ -147,7 +147,7 @@ class HeightField(Shape, type="height_field"):
     size: PositiveVector2
     """Extent along x and y, shape (2,) [m]."""
     heights: Grid
-    """Heights, one row for each y, shape (≥ 2, ≥ 2) [m]."""
+    """Heights, one row per y, shape (≥ 2, ≥ 2) [m]."""
 
     def geometry(self) -> Any:
         """Return Coal's mesh with two triangles per cell."""
@@ -238,14 +238,14 @@ class Mesh(Shape, type="mesh"):
 
 
 class PointCloud(Shape, type="point_cloud"):
-    """Measured points; each becomes a cube of the resolution (Coal's octree)."""
+    """Measured points, which become cubes of the resolution (Coal's octree)."""
 
     witness_reversed: ClassVar[bool] = True
 
     points: Points
     """The points, shape (k, 3) [m]."""
     resolution: Positive = 0.02
-    """Edge of the cube that represents each point [m]."""
+    """Edge of the cube that represents a point [m]."""
 
     def geometry(self) -> Any:
         """Return Coal's octree."""

@@ -12,7 +12,7 @@ class Outcome(IntEnum):
     """Whether the law's equations hold."""
 
     EXACT = 0
-    """They hold: all singular values are above the threshold."""
+    """The equations hold: all singular values are above the threshold."""
     DAMPED = 1
     """A singular value is below the threshold: the inverse was bounded instead."""
     NOT_FINITE = 2

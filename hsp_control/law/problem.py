@@ -83,6 +83,6 @@ class Problem:
 
     @property
     def rows(self) -> dict[str, Array | Flags]:
-        """The quantities of each row, by name."""
+        """The quantities of the rows, by name."""
         names = "demand", "yields", "pulls", "springs", "stretched"
         return {name: getattr(self, name) for name in names}

@@ -1,4 +1,4 @@
-"""Real-time control: run a controller on a robot each period, ending in a safe stop."""
+"""Real-time control: run a controller on a robot, ending in a safe stop."""
 
 from hsp_control.common.entry_points import own_names
 from hsp_control.simulation.control_chain import EffortSource as EffortSource

@@ -43,8 +43,7 @@ class EffortLimiter:
         self.gravity: Array = np.zeros(robot.nv)
         kept = max(settings.missing, settings.watchdog) + _SURE
         self._recent = SentEfforts(self._largest, kept)
-        # The least and greatest effort that the robot may have, now and before the last
-        # one.
+        # Bounds on the effort that may be in force, now and before the last one.
         self._least: Array = np.zeros(robot.nv)
         self._most: Array = np.zeros(robot.nv)
         self._before = self._least, self._most

@@ -1,4 +1,4 @@
-"""The motion that the model expects, to which each source of a velocity is compared."""
+"""The motion expected by the model, for comparison with the sources of a velocity."""
 
 from math import exp
 
@@ -15,18 +15,18 @@ _ALONE = 3.0
 """The rate if the other source was wrong: a braked joint must follow its effort
 [1/s]."""
 _SLOWLY = 10.0
-"""The maximum rate of the mean of the sources [1/s]: where neither is trusted it is all
-that is known, and until then a wrong source must not lead it far."""
+"""Maximum rate of the mean of the sources [1/s]: if neither is trusted only this mean
+remains, and before that a wrong source must not displace it far."""
 _MEMORY = 0.5
-"""Time constant with which a surprise is forgotten [s]: that of the sum of small
-differences, which may reveal one so much later."""
+"""Time constant with which surprises decay [s]: that of the sum of small differences,
+which may detect a fault that much later."""
 
 
 class ExpectedMotion:
     """The velocity of a joint expected by the model, from each of its sources.
 
     The sources are the rows of all arrays: the measured velocity, the slope of the
-    positions, and the mean of the trusted ones of these. Each expectation is integrated
+    positions, and the mean of the trusted ones of these. An expectation is integrated
     with the model under the efforts applied, and follows its source by a limited step,
     so that a jump of a sensor is not followed at once. A second state of the first two
     estimates the acceleration that the model lacks.
@@ -56,7 +56,7 @@ class ExpectedMotion:
         self.before = self.v
         self.surprise: Array = np.zeros((3, v.size))
         self.usual = self.surprise
-        self._missed = np.zeros((3, v.size))  # of the mean none
+        self._missed = np.zeros((3, v.size))  # none of the mean
         self.acceleration: Array = np.zeros(v.size)
 
     def apply(self, q: Array, v: Array, tau: Array) -> None:
@@ -81,7 +81,7 @@ class ExpectedMotion:
 
         Args:
             measured: The velocity, and the slope of the positions, shape (2, nv).
-            trusted: Whether each is trusted, shape (2, nv). A joint without a trusted
+            trusted: Whether they are trusted, shape (2, nv). A joint without a trusted
                 one continues as expected.
             passed: Time since the last ones [s].
             braked: Whether the joints are braked, and must follow their efforts.
@@ -107,7 +107,7 @@ class ExpectedMotion:
     def leave(self, wrong: Flags, trusted: Flags) -> None:
         """Take back the last step of joints of which a source is wrong, shape (nv,).
 
-        They follow the one that is trusted still, shape (2, nv), or none.
+        They follow the one that is still trusted, shape (2, nv), or none.
         """
         by_v, by_q, neither = self.before
         kept = np.where(trusted[0], by_v, np.where(trusted[1], by_q, neither))

@@ -17,7 +17,7 @@ from hsp_control.simulation.control_chain import EffortSource
 
 @runtime_checkable
 class Hardware(Protocol):
-    """A robot under effort control: implement it once for each kind of robot.
+    """A robot under effort control: implement it once per type of robot.
 
     The loop calls `read` once, and then prepares for some time. From the second `read`
     on, it calls `read` and `write` once a period, and `close` at the end. Without a

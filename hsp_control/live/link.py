@@ -271,7 +271,7 @@ class Link:
 
     @property
     def injected(self) -> dict[str, int]:
-        """Number of faults of each kind that were injected into packets sent."""
+        """Number of faults injected into sent packets, by kind."""
         return dict(self._faults.injected)
 
     @property
@@ -325,7 +325,7 @@ class Link:
         return accepted
 
     def end_turn(self) -> None:
-        """Say that it is the other end's turn, in lockstep; always arrives."""
+        """Pass the turn to the other end, in lockstep; always arrives."""
         if self.peer is not None:
             with suppress(OSError):
                 self._socket.sendto(_END_OF_TURN, self.peer)

@@ -260,7 +260,7 @@ class LiveRun:
     done: bool = False
     abandoned: bool = False
     later: str = ""  # the first fault in the safe stop, "" without one
-    consistent: bool = True  # whether nothing that was measured has been wrong
+    consistent: bool = True  # whether all measurements were valid
 
     def run(self, on_period: Callable[[float], object] | None) -> None:
         """Run period after period until the safe stop is complete."""

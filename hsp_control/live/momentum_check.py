@@ -38,7 +38,7 @@ def smaller(a: Array, b: Array) -> Array:
 
 
 class _Window:
-    """Changes of momentum in one time, and the impulses of efforts in such times."""
+    """Changes of momentum over an interval, and the impulses of efforts."""
 
     def __init__(self, states: int, lag: int, nv: int) -> None:
         self.states = states
@@ -76,7 +76,7 @@ class _Window:
         return smaller(*(v - self._velocities[(k + 1) % (self.states + 1)]))
 
     def bounds(self) -> tuple[Array, Array]:
-        """Return the least and greatest impulse of such a time, shapes (nv,)."""
+        """Return the smallest and largest impulse over the interval, (nv,)."""
         return np.minimum.reduce(self._impulses), np.maximum.reduce(self._impulses)
 
 
@@ -84,14 +84,14 @@ class MomentumCheck:
     """Compares changes of momentum, M Δv, with the impulse of the efforts.
 
     In a time w a joint's momentum changes by the integral of tau - h, and by other
-    effects: friction, an error of the masses, contacts. Each of them is bounded
+    effects: friction, an error of the masses, contacts. They are bounded
     (`LiveSettings.friction`, `LiveSettings.contact`), so a larger residual is a hard
     collision, or position and velocity are wrong in the same way. A joint may follow
     its effort by less, because of a rotor that the model lacks.
 
     Attributes:
         beyond: Joints whose momentum changes by more, shape (nv,).
-        rest: The residual: other efforts on each joint, shape (nv,) [N·m or N].
+        rest: The residual: other efforts on every joint, shape (nv,) [N·m or N].
     """
 
     def __init__(
@@ -122,7 +122,7 @@ class MomentumCheck:
         self.rest: Array = np.zeros(self._none.size)
 
     def update(self, now: Array, means: Array, driving: Driving, passed: float) -> None:
-        """Judge a new state.
+        """Check a new state.
 
         Args:
             now: Measured velocity, and slope of the positions since the last state,

@@ -1,4 +1,4 @@
-"""Detects moving joints with silent sensors, by the other joints' motion."""
+"""Detects moving joints with dead sensors, by the other joints' motion."""
 
 from math import exp
 
@@ -19,13 +19,13 @@ friction may brake the joint."""
 _EXPLAINED = 0.8
 """Share of the others' unexpected motion that the reaction must explain."""
 _LEAST = 0.1
-"""Smallest reaction that is judged, relative to the error of velocities."""
+"""Smallest reaction that is checked, relative to the error of velocities."""
 _HELD = 0.03
 """Time for which the condition must hold [s]."""
 
 
 class ReactionCheck:
-    """Compares the other joints' motion with a silent joint at rest, and in motion.
+    """Compares the others' motion with that for a joint at rest, and in motion.
 
     Some joints s report constant values to the last bit, under efforts that friction
     could hold. If they are at rest, the others o accelerate by M_oo⁻¹ (tau - h)_o; if
@@ -81,7 +81,7 @@ class ReactionCheck:
         self._free = np.where(silent, free, 0.0)
 
     def update(self, v: Array, passed: float) -> None:
-        """Judge a new state.
+        """Check a new state.
 
         Args:
             v: Mean measured velocity of some milliseconds, shape (nv,).

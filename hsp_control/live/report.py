@@ -31,7 +31,7 @@ class Quantiles(NamedTuple):
 class Deadlines:
     """Response times (state received to effort sent) and intervals between states.
 
-    Counts and worst times cover the whole run, quantiles the last `CAPACITY` periods.
+    Counters and worst times cover the whole run, quantiles the last `CAPACITY` periods.
 
     Attributes:
         period: Length of a period, the deadline of a response [s].

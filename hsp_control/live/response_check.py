@@ -16,7 +16,7 @@ a wrong sign a few hundredths; for a push to which a controller yields at least 
 _HELD = 0.03
 """Time for which the condition must hold [s]."""
 _LEAST = 0.1
-"""Smallest change of velocity that is judged, relative to the error of velocities."""
+"""Smallest change of velocity that is checked, relative to the error of velocities."""
 
 
 class ResponseCheck:
@@ -50,7 +50,7 @@ class ResponseCheck:
         self.contrary: Flags = self._none
 
     def update(self, expected: Array, v: Array, passed: float) -> None:
-        """Judge a new state.
+        """Check a new state.
 
         Args:
             expected: The acceleration that the model expects since the last one,

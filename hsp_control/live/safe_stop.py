@@ -39,7 +39,7 @@ class StandingFeet:
         return not self._floats or bool(self.contacts)
 
     def update(self, measured: Measurement) -> None:
-        """Update which contacts are active: the loaded ones."""
+        """Update the active contacts: the loaded ones."""
         if self._floats:
             self.contacts = tuple(c for c in self.all if _stands(c, measured))
 
@@ -128,7 +128,7 @@ class SafeStop:
         return np.zeros(robot.nv) if self._bound is None else self._bound.load.load
 
     def restart(self) -> None:
-        """Forget all, also the load."""
+        """Reset everything, also the load."""
         if self._bound is not None:
             self._bound.load.forget()
         self.begin()
@@ -144,7 +144,7 @@ class SafeStop:
         load = self._bound_to(state).load
         load.permit(self._effort_limits)
         self._acts[:] = acts
-        load.changed(~silent)  # without what the last change itself is taken for
+        load.changed(~silent)  # without the apparent load of the last change itself
         self._learn()
 
     def trust(self, *, measurements: bool, dead: Flags) -> None:

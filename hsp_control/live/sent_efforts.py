@@ -13,12 +13,12 @@ load."""
 _START_PERIODS = 5
 """Number of periods for which its own effort may last after that."""
 _FADES = 0.99
-"""Factor by which an excess beyond all sent efforts must decrease each period: a
+"""Factor by which an excess beyond all sent efforts must decrease every period: a
 filter of 1.6 Hz at 1 kHz."""
 
 
 class SentEfforts:
-    """The efforts of the last periods, and whether the robot can have a given one.
+    """The efforts of the last periods, and whether a given one may be in force.
 
     It has one of these, or a mean of some if it filters.
     """

@@ -70,7 +70,7 @@ class EffortCheck:
         return None
 
     def too_fast(self, v: Array) -> str | None:
-        """Return which joint exceeds its speed limit, or None."""
+        """Return the joint that exceeds its speed limit, or None."""
         i = int((np.abs(v) - self._speed).argmax())
         if abs(v[i]) <= self._speed[i]:
             return None
@@ -285,7 +285,7 @@ def sampled(plant: Plant, integrator: Integrator, period: float) -> SampledPlant
 
 
 class InProcessRobot:
-    """A `SimulatedRobot` as `Hardware`: each `read` simulates the next period.
+    """A `SimulatedRobot` as `Hardware`: a `read` simulates the next period.
 
     Before the first effort, reads return the robot waiting at its start. A run is not
     in real time and has no deadline misses; it equals `simulate` with the same plant

@@ -1,4 +1,4 @@
-"""Reads the robot's state each period, checks it, and predicts missing ones."""
+"""Reads the robot's state every period, checks it, and predicts missing ones."""
 
 from collections.abc import Callable
 from contextlib import nullcontext
@@ -303,7 +303,7 @@ class MeasurementMonitor:
 
 
 class RobotClock:
-    """Converts the robot's time to the controller's, and judges its steps.
+    """Converts the robot's time to the controller's, and checks its steps.
 
     Between two measurements the robot's clock may advance by the periods given by their
     sequence numbers, or by the tolerated number of missing states. It may stand still
@@ -337,7 +337,7 @@ class RobotClock:
         self._gained = 0.0  # by the clock, relative to the number of states [s]
         self._lead = self._lead_before = -inf  # the greatest lead relative to ours [s]
         self._window_end = -inf
-        self.right = True  # whether it was never wrong
+        self.right = True  # whether it has always been right
 
     def time(self, measurement: Measurement) -> float:
         """Return the controller's time of the last measurement [s]."""

@@ -11,8 +11,8 @@ from hsp_control.live.settings import LiveSettings
 from hsp_control.robot import Robot
 
 _QUIET, _FEWEST = 0.05, 5
-"""Time for which a reading is constant to the last bit before it is judged [s], and the
-minimum number of states."""
+"""Time for which a reading is constant to the last bit before it is checked [s], and
+the minimum number of states."""
 _REST = 0.05
 """Speed below which changes are noise [rad/s or m/s]."""
 _NOISE = 1e-9
@@ -20,13 +20,13 @@ _NOISE = 1e-9
 _MEMORY, _ALIVE = 1.0, 0.3
 """Time over which noise is detected [s], and the share of states that have it."""
 _GRAVITY = 0.2
-"""Part of a joint's gravity that the model may have wrong."""
+"""Tolerated error of a joint's modelled gravity, relative to it."""
 
 _EFFORT = {"rad": "N·m", "m": "N"}
 
 
 class StillSensors:
-    """Judges joints whose position and velocity stay the same to the last bit.
+    """Checks joints whose position and velocity stay the same to the last bit.
 
     The reading of a joint at rest may be constant for ever. Its sensor is dead if it
     had noise before: changes in both directions, of different sizes, which excludes a
@@ -37,7 +37,7 @@ class StillSensors:
 
     Attributes:
         dead: Joints whose sensor is dead, shape (nv,).
-        beyond: Each joint's effort beyond its holding effort, shape (nv,) [N·m].
+        beyond: The joints' efforts beyond their holding efforts, shape (nv,) [N·m].
     """
 
     def __init__(
@@ -92,7 +92,7 @@ class StillSensors:
     def judge(
         self, q: Array, v: Array, tau: Array, dynamics: Dynamics | None = None
     ) -> None:
-        """Find the dead ones, at a state under the effort that acts, shape (nv,).
+        """Detect dead sensors, at a state under the acting effort, shape (nv,).
 
         ``dynamics``: those of a robot that carries something.
         """
@@ -117,12 +117,12 @@ class StillSensors:
 
     @property
     def gained(self) -> Array:
-        """Velocity that dead ones have gained since, as the others show, (nv,)."""
+        """Velocity that joints with dead sensors have gained, by the others', (nv,)."""
         felt = self._reaction.felt
         return self._reaction.gained if felt else np.zeros(self._v.size)
 
     def why(self, i: int) -> str:
-        """Return why the sensor of a dead joint is dead."""
+        """Return the reason why a joint's sensor is dead."""
         if self._alive[i] > _ALIVE:
             return "its sensor's noise has vanished; it is dead"
         if self._reaction.felt:

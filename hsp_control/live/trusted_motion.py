@@ -32,7 +32,7 @@ _EFFORT = {"rad": "N·m", "m": "N"}
 
 
 class TrustedMotion:
-    """Judges measured positions and velocities, and selects those to use.
+    """Checks measured positions and velocities, and selects those to use.
 
     If they contradict each other, the one that deviates from the model's expectation is
     wrong (`FaultIsolation`). If that is not clear, both are wrong if they differ much,
@@ -119,7 +119,7 @@ class TrustedMotion:
 
     @property
     def ambiguous(self) -> bool:
-        """Whether a joint was pushed hard or is measured wrong, which is undecided."""
+        """Whether it is undecided if a joint was pushed hard or is measured wrong."""
         return bool(self._pushed.any())
 
     @property
@@ -203,8 +203,8 @@ class TrustedMotion:
         if (self._sensors.dead | self._pushed).any():  # its speed is unknown
             self.unknown_for = max(self.unknown_for, self._soon)
         unknown = ~(self._positions | self._velocities)
-        # Beside a joint that is only expected, one that stands, and should move, may be
-        # dead, too.
+        # If one joint's sensors are dead, another one that rests although it should
+        # move may be dead, too.
         stands = check.stands & (np.abs(expected.v[2]) > _MOVES)
         if self._useless or (unknown.any() and stands.any()):
             self.unknown_for = inf
@@ -233,7 +233,7 @@ class TrustedMotion:
         return smaller(v, slope)
 
     def _leave(self, v: Array, before: Flags) -> None:
-        """Expect the motion of joints whose trusted sources, shape (2, nv), are fewer.
+        """Expect the motion of joints with fewer trusted sources, shape (2, nv).
 
         A sensor that has died reports the velocity of that time.
         """
@@ -253,7 +253,7 @@ class TrustedMotion:
         check = self._check
         dead = check.dead | self._sensors.dead
         contrary = self._response.contrary
-        # Motion hidden by a dead sensor seems to push the other joints, too.
+        # Motion hidden by a dead sensor appears as a push on the other joints, too.
         pushed = self._momentum.beyond & ~check.halted.any()
         wrong = check.contradicted | jumps
         runs = self._left(v) if self.stopping else np.zeros(v.size, dtype=bool)
@@ -261,15 +261,15 @@ class TrustedMotion:
             return
         both = self._positions & self._velocities
         wrong &= both
-        frozen = self._isolate(wrong, jumps, v)
-        lost = (dead | frozen) & (self._positions | self._velocities)
+        lost = dead | self._isolate(wrong, jumps, v)
+        lost &= self._positions | self._velocities
         if self.complete:
             self._contrary |= contrary & both
             self._pushed |= pushed & both & ~(wrong | dead)
             lost |= (contrary | pushed) & both
         lost |= runs | self._left(v) & (self._positions ^ self._velocities)
-        self._isolation.undecided &= ~(dead | jumps)
-        # Efforts are harmful if a joint moves against them: only the robot can brake.
+        # If a joint moves against its efforts they are harmful: only the robot can
+        # brake.
         self._useless |= bool(runs.any() or self._contrary.any())
         self._positions &= ~lost
         self._velocities &= ~lost
@@ -282,20 +282,27 @@ class TrustedMotion:
     def _isolate(self, wrong: Flags, jumps: Flags, v: Array) -> Flags:
         """Trust the right sources of joints of which one is wrong, shape (nv,).
 
-        Returns the joints whose sensors do not move, shape (nv,).
+        Returns the joints of which no source can be right, shape (nv,).
         """
         check, expected, isolation = self._check, self._expected, self._isolation
-        right_v, right_q = isolation.isolate(wrong & ~jumps, expected.surprise[:2])
+        slight = check.difference < self._error
+        right_v, right_q = isolation.isolate(
+            wrong & ~jumps, expected.surprise[:2], check.constant, slight
+        )
         decided = isolation.undecided & (right_v ^ right_q)
         expected.begin_again(decided, np.where(right_v, v, check.slope))
         small = check.difference < _SMALL * self._error
         frozen = wrong & ~right_q & (check.stands | (check.unmoved & ~right_v))
         right_q |= wrong & ~right_v & small
         right_q &= ~jumps
-        # Where velocities jump as well as positions, the whole message is wrong.
+        # Where velocities jump as well as positions, neither of the joint is right; in
+        # several joints, the whole message is wrong.
         leaps = np.abs(v - expected.before[0])
         leaps -= np.minimum(_LEAP + 2.0 * expected.usual[0], 0.5 * self._error)
-        right_v = np.where(jumps, (leaps[jumps] < 0.0).all(), right_v)
+        smooth = bool((leaps[jumps] < 0.0).all())
+        right_v = np.where(jumps, smooth, right_v)
+        if not smooth and jumps.sum() > 1:
+            frozen[:] = True
         self._positions = np.where(wrong | decided, right_q, self._positions)
         self._velocities = np.where(wrong | decided, right_v, self._velocities)
         undecided = wrong & ~(right_v | right_q | frozen | jumps)
@@ -309,7 +316,7 @@ class TrustedMotion:
         sensor drives it, so that it is faster, or moves in the other direction.
         """
         slope, by_v, by_q = self._check.slope, self._expected.v[0], self._expected.v[1]
-        # Of a velocity, less the largest effect of its noise alone.
+        # Of a velocity, less the largest effect of noise.
         used = np.where(self._velocities, smaller(v, self._check.mean), slope)
         expected = np.where(self._velocities, by_v, by_q)
         least, most = np.minimum(expected, 0.0), np.maximum(expected, 0.0)

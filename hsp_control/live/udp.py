@@ -83,7 +83,7 @@ class SensorLayout(NamedTuple):
 
 
 _PAUSE = 0.1
-"""Time after which it is asked again whether the other end still runs [s]."""
+"""Time after which the other end is polled again [s]."""
 _AGAIN = 0.5
 """Time between two states of a robot in lockstep that waits for an effort [s]."""
 _BYES = 3
@@ -98,7 +98,7 @@ class UdpHardware:
 
     Attributes:
         period: Time between two states [s].
-        link: The connection, with its counts of packets.
+        link: The connection, with its packet counters.
         real_time: Whether its time passes as ours does: not in lockstep.
         closed: Whether `close` was called.
     """
@@ -161,7 +161,7 @@ class UdpHardware:
         for packet in states:
             age = self._age_estimator.age(monotonic(), 1e-9 * packet.stamp)
         if not states:
-            # A robot in lockstep that waits for its first effort is where it was.
+            # A robot in lockstep rests while it waits for its first effort.
             return None if in_turn or self.real_time else self._last
         measured = self._sensors.unpack(packet.payload, self._robot)
         self._last = measured._replace(
@@ -173,7 +173,7 @@ class UdpHardware:
         return self._last
 
     def _robot_s_turn(self) -> list[Packet]:
-        """Wait for what the robot sends in its turn; nothing once it has ended."""
+        """Wait for the robot's packets of its turn; none once it has ended."""
         self._end_turn()
         while (packets := self.link.turn(_PAUSE)) is None:
             if self._alive is not None and not self._alive():
@@ -245,7 +245,7 @@ def serve(
 ) -> ServerReport:
     """Run a robot in real time, until it has stopped and was held.
 
-    Each period: receive efforts, advance the plant, send the state. An effort that
+    In a period: receive efforts, advance the plant, send the state. An effort that
     arrives within the period of its state acts from that state on, as if it had been
     computed instantly; a later one acts from the next period on.
 
@@ -268,12 +268,12 @@ def serve(
         lockstep: Whether to wait for the loop.
 
     Returns:
-        The counts.
+        The counters.
     """
     report, nv = ServerReport(), robot.plant.robot.nv
     sensors = SensorLayout.of(robot.measured())
     state_sequence = 0
-    alone = False  # whether no loop is there any more
+    alone = False  # whether the loop has ended
 
     def received() -> list[Packet]:
         nonlocal alone
@@ -287,7 +287,7 @@ def serve(
                 return []
             if monotonic() > end:
                 robot.halt(f"the loop did not answer for {start_timeout:g} s")
-                alone = True  # else each period of the stop would wait as long
+                alone = True  # otherwise every period of the stop would wait as long
                 return []
         return packets
 

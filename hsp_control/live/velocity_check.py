@@ -38,6 +38,11 @@ _STOPS = 50.0
 """Maximum deceleration of a joint by friction [rad/s² or m/s²]."""
 _WENT = 0.05
 """Speed above which a joint has moved before it stopped [rad/s or m/s]."""
+_TOGETHER = 3
+"""Number of moving joints whose friction does not stop them in the same period."""
+_ALONE = 0.2
+"""The speed above which a joint does not stop at once whose other sensor is wrong
+[rad/s or m/s]."""
 _STEP = 2e-3
 """Maximum step of an encoder [rad or m], until smaller changes are observed: between
 two steps a velocity computed from them is constant, too."""
@@ -69,6 +74,8 @@ class VelocityCheck:
         contradicted: Joints whose velocity contradicts their positions, shape (nv,).
         dead: Joints whose sensor is dead, shape (nv,).
         unmoved: Joints whose positions did not change by a bit, shape (nv,).
+        constant: Whether velocity and position were the same to the last bit in some
+        states, shape (2, nv).
         stands: Joints whose trusted readings did not change by a bit, shape (nv,).
         halted: Joints that moved, and whose readings are now constant, shape (nv,).
         before: Speed of joints before their readings became constant, shape (nv,).
@@ -103,6 +110,8 @@ class VelocityCheck:
         self._ranges[:] = 0.0  # before its first state a robot is at rest
         self._sum, self._fastest, self._doubts, self._beyond = np.zeros((4, nv))
         self._still = np.zeros(nv, dtype=np.int64)
+        self._same = np.zeros((2, nv), dtype=np.int64)
+        self.constant: Flags = np.zeros((2, nv), dtype=bool)
         self._step = np.full(nv, inf)  # the smallest change of a position
         self._last_v, self._speed = np.zeros((2, nv))
         self.before: Array = np.zeros(nv)
@@ -126,7 +135,7 @@ class VelocityCheck:
     def update(
         self, way: Array, v: Array, passed: float, acceleration: Array | float = 0.0
     ) -> None:
-        """Judge a new measurement.
+        """Check a new measurement.
 
         Args:
             way: Displacement since the last one, shape (nv,) [rad or m].
@@ -165,6 +174,8 @@ class VelocityCheck:
     def _find_dead(self, way: Array, v: Array, slope: Array) -> None:
         size = np.abs(way)
         self.unmoved = size < _NO_CHANGE
+        self._same = (self._same + 1) * np.stack([v == self._last_v, self.unmoved])
+        self.constant = self._same >= _STILL
         self._step = np.where(
             size > _NO_CHANGE, np.minimum(size, self._step), self._step
         )
@@ -179,7 +190,7 @@ class VelocityCheck:
             np.where(self._by_v, np.abs(v), inf),
             np.where(self._by_q, np.abs(slope), inf),
         )
-        now = np.where(self._by_v | self._by_q, now, 0.0)  # of neither it is unknown
+        now = np.where(self._by_v | self._by_q, now, 0.0)  # unknown without either
         speed, self._speed = np.maximum(now, self._speed), now
         if not still.any():
             self._still[:], self.before, self.dead = 0, speed, self._none
@@ -190,7 +201,7 @@ class VelocityCheck:
         lasted = self._still * self._period
         step = np.maximum(_STEP, np.minimum(_STEPS * self._step, _COARSEST))
         far = self.before * lasted > step
-        # No encoder stands still at a speed that is reported for so long.
+        # No encoder is constant at a speed reported for so long.
         frozen = (self._still >= _STILL) & (np.abs(v) > _WENT)
         frozen &= (np.abs(v) * lasted > step) & self._by_q & self._by_v
         self.contradicted = self.contradicted | (frozen & self._judged)
@@ -199,4 +210,7 @@ class VelocityCheck:
         self.halted = went
         together = (went[:, None] & (self._still[:, None] == self._still)).sum(axis=0)
         fast = self.before > 2.0 * _STOPS * self._period / np.maximum(together, 1)
+        fast |= together >= _TOGETHER
+        # Where one sensor was wrong, the other one is more likely dead than the joint.
+        fast |= (self._by_q ^ self._by_v) & (self.before > _ALONE)
         self.dead = (self._still >= _STILL) & fast & far & self._judged

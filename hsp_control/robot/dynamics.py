@@ -48,7 +48,7 @@ ModelNumbers = tuple[tuple[JointNumbers, ...], tuple[float, ...], tuple[float, .
 
 
 def model_numbers(model: pin.Model) -> ModelNumbers:
-    """Return a model as `engine.Dynamics` takes it.
+    """Return a model as an argument of `engine.Dynamics`.
 
     Raises:
         ModelError: If a joint is of a type that the engine does not have.

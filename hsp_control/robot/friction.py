@@ -15,7 +15,7 @@ from hsp_control.robot.robot import Robot
 
 @dataclass(frozen=True)
 class JointFriction:
-    """Coulomb and viscous friction in each joint of one robot.
+    """Coulomb and viscous friction in every joint of one robot.
 
     Attributes:
         coulomb: Dry friction, shape (nv,) [N·m or N]; a joint at rest sticks until the
@@ -54,5 +54,5 @@ class Friction(Part, error=SimulationError):
     """Viscous friction [N·m·s/rad or N·s/m], one number or nv."""
 
     def of(self, robot: Robot) -> JointFriction:
-        """Return the friction of each joint of a robot."""
+        """Return the friction of a robot's joints."""
         return JointFriction.of(robot, self.coulomb, self.viscous)

@@ -124,7 +124,7 @@ class Integrator(Part, ABC, family="integrators", error=SimulationError):
 
 
 def bound(dynamics: Dynamics) -> Bind:
-    """Return dynamics as integrators call them: of the same arrays each time."""
+    """Return dynamics as integrators call them: of the same arrays every time."""
 
     def bind_dynamics(q: Array, v: Array) -> Term:
         value = np.zeros_like(v)
@@ -151,7 +151,7 @@ class FixedStep(Integrator):
 
 
 class Rk4(FixedStep, type="rk4"):
-    """The classical fourth-order Runge-Kutta step, with a new chart in each step."""
+    """The classical fourth-order Runge-Kutta step, with a new chart in every step."""
 
     def begin(self, robot: Robot, bind_dynamics: Bind) -> "Steps":
         """Return the running integrator; see `Integrator.begin`."""
@@ -172,7 +172,7 @@ def number_of_steps(duration: float, step: float) -> int:
 
 
 class Steps(ABC):
-    """Takes steps of equal length: the memory of a `FixedStep`, called as `Advance`.
+    """Makes steps of equal length: the memory of a `FixedStep`, called as `Advance`.
 
     Attributes:
         q: Configuration where v' is computed, shape (nq,).
@@ -291,7 +291,7 @@ class Dop853(Integrator, type="dop853"):
     def _advance(
         self, robot: Robot, dynamics: Dynamics, t: float, end: float, q: Array, v: Array
     ) -> tuple[Array, Array]:
-        from scipy.integrate import DOP853  # here: SciPy takes long to import
+        from scipy.integrate import DOP853  # here: importing SciPy is slow
 
         while t < end:
             chart = TangentChart(robot, q)

@@ -14,7 +14,7 @@ _STEPS = 200
 _LONGEST = 0.5
 """Longest step of a joint [rad or m]; the linear model does not hold farther."""
 _PULL = 0.2
-"""Share of the way to the preferred configuration in each step."""
+"""Share of the way to the preferred configuration in every step."""
 _CONVERGED = 1e-9
 """Error at which the target is reached [m and rad]."""
 _STILL = 1e-3
@@ -57,7 +57,7 @@ def reach(
 ) -> Reached:
     """Return a configuration at which a frame is at its target, or the nearest found.
 
-    Levenberg and Marquardt's method: each step solves (Jᵀ J + λ 1) δ = Jᵀ e, with the
+    Levenberg and Marquardt's method: every step solves (Jᵀ J + λ 1) δ = Jᵀ e, with the
     error e of position and rotation vector in world axes, and a λ that falls with e. In
     the null space of J it moves towards the preferred configuration. A joint at a limit
     that would go beyond it is fixed in a step. The result depends on the arguments

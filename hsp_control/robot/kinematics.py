@@ -81,7 +81,7 @@ class LocalMotion(NamedTuple):
 
     @classmethod
     def fixed(cls, placement: pin.SE3) -> "LocalMotion":
-        """Return that of a frame that does not move in its joint."""
+        """Return the motion of a frame that is fixed in its joint."""
         R = np.ascontiguousarray(placement.rotation)
         # not rows of one array: copies would be aligned otherwise to a packet
         rest = (np.zeros(3) for _ in range(4))

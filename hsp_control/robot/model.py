@@ -47,7 +47,7 @@ class RobotModel(Structure):
 
     @cached_property
     def _lengths(self) -> Array:
-        """Length of the chain from the first joint to each, shape (njoints,) [m]."""
+        """Chain lengths from the first joint to the others, shape (njoints,) [m]."""
         model, lengths = self.model, np.zeros(self.model.njoints)
         lower, upper = self.position_limits()
         for joint in range(1, model.njoints):
@@ -63,7 +63,7 @@ class RobotModel(Structure):
 
     @cached_property
     def largest_gravity(self) -> Array:
-        """Largest effort against gravity of each motor, shape (nv,) [N·m or N].
+        """Largest efforts of the motors against gravity, shape (nv,) [N·m or N].
 
         An upper bound: as if all links beyond a joint were stretched out horizontally.
         """
@@ -83,7 +83,7 @@ class RobotModel(Structure):
         return most
 
     def _followed(self, joint: int) -> tuple[bool, float]:
-        """Return whether a follower turns, and how fast, relative to its leader."""
+        """Return whether a follower rotates, and its speed relative to its leader's."""
         model, data = self.model, self.model.createData()
         v = np.zeros(self.nv)
         v[model.joints[joint].idx_v] = 1.0
@@ -97,7 +97,7 @@ class RobotModel(Structure):
     def effort_rate(self) -> Array:
         """Maximum rate of the efforts, shape (nv,) [N·m/s or N/s]; inf for none.
 
-        No URDF has one. It is 11 times the largest maximum effort each second, for all
+        No URDF has one. It is 11 times the largest maximum effort every second, for all
         joints of the same unit, a little less than a Panda permits at 87 N·m: a light
         wrist has to react to a push as quickly as a shoulder. For robots on legs the
         factor is 500.
@@ -139,7 +139,7 @@ class RobotModel(Structure):
         return moves or np.inf, 0.5 * moves * lever or np.inf
 
     def _largest_effort(self) -> Array:
-        """Return the largest effort of each motor, shape (nv,); inf for none."""
+        """Return the motors' largest efforts, shape (nv,); inf for none."""
         effort = np.array(self.model.effortLimit)
         effort[(effort <= 0.0) | (effort >= np.finfo(np.float32).max)] = np.inf
         effort[list(self.unactuated)] = np.inf

@@ -156,7 +156,7 @@ def name_a_changed_scene(robot: Robot, record: Mapping[str, Any]) -> None:
 
 
 class OtherRobotWarning(UserWarning):
-    """A robot that is given for a log is not the one in it."""
+    """The robot given for a log differs from the one in it."""
 
 
 def warn_of_another_robot(robot: Robot, meta: Mapping[str, Any]) -> None:
@@ -165,7 +165,7 @@ def warn_of_another_robot(robot: Robot, meta: Mapping[str, Any]) -> None:
     if record is None or description is None or "parts" not in record:
         return
     for part, then in zip(robot.parts, record["parts"], strict=False):
-        with suppress(ModelError, LookupError, TypeError):  # a missing file, or damage
+        with suppress(ModelError, LookupError, TypeError):  # a missing or damaged file
             if text_of(part.source) != unpacked(then["urdf"]):
                 warn(
                     f"{part.source.urdf} is not the robot of the log: it was edited "

@@ -91,7 +91,7 @@ class Robot(RobotModel):
             srdf: An SRDF whose disabled pairs of links never collide. None: the one of
                 the same name beside the URDF, if there is one.
             motor_inertia: Inertia of the rotors reflected to the joints [kg·m² or kg]:
-                one number, 0 for the bare links, one for each joint, by name, or
+                one number, 0 for the bare links, one per joint, by name, or
                 ``bundled``: those in the README of a bundled robot. None: those of the
                 URDF's transmissions.
             access: Which files may be read: a URDF given by path, and the meshes that

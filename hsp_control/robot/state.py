@@ -1,4 +1,4 @@
-"""The robot at one time: kinematic and dynamic terms, each computed once per state.
+"""The robot at one time: kinematic and dynamic terms, computed once per state.
 
 The controller gets its kinematics and dynamics from `RobotState`, by calls of the
 engine, which has Pinocchio's algorithms. Other modules call Pinocchio's bindings only
@@ -38,7 +38,7 @@ from hsp_control.robot.kinematics import (
     WorldKinematics,
 )
 
-if TYPE_CHECKING:  # a robot and its state name each other; it makes the state
+if TYPE_CHECKING:  # circular reference: a robot makes its states
     from hsp_control.robot.robot import Robot
 
 Made = TypeVar("Made")
@@ -89,7 +89,7 @@ class RobotState:
         self.v: Array = np.zeros(robot.nv)
         self.stamp_array: Indices = np.zeros(1, dtype=np.int64)
         blocks = np.array(robot.unit_blocks, dtype=np.int64).reshape(-1, 2)
-        # writable, also where `seen` binds calls
+        # writable, also for calls that `seen` binds
         self._memory: dict[str, Array | Indices] = {
             "origin": np.zeros(1),
             "time": self.time,

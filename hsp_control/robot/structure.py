@@ -43,7 +43,7 @@ class Structure:
             the order of v.
         joint_names: Their names.
         frame_names: Names of all frames.
-        dof_names: A name for each degree of freedom: that of its joint, or
+        dof_names: A name per degree of freedom: that of its joint, or
             ``root_joint.x`` if the joint has several, ``neck.roll`` if it is a ball.
         units: The unit of each degree of freedom, ``rad`` or ``m``.
         single_dof_joints: (index in v, start in q, size in q) of every joint with one
@@ -163,7 +163,7 @@ class Structure:
         """Return end ⊖ start: the displacement from start to end, shape (nv,).
 
         Raises:
-            ShapeError: If the arguments are not nq numbers each.
+            ShapeError: If an argument does not have nq numbers.
         """
         try:
             return np.asarray(pin.difference(self.model, start, end))
@@ -260,7 +260,7 @@ class Structure:
         return mask
 
     def per_dof(self, value: ArrayLike) -> Array:
-        """Return a setting for each dof (nv,); one number is for single-dof joints.
+        """Return a setting per dof (nv,); one number is for single-dof joints.
 
         Raises:
             SimulationError: If it is neither one number nor nv numbers.
@@ -283,7 +283,7 @@ class Structure:
         """
         try:
             return self._frame_ids[name]
-        except (KeyError, TypeError):  # also what is no name, such as a list
+        except (KeyError, TypeError):  # also objects that are no names, such as a list
             raise FrameNotFoundError(
                 f"no frame {name!r}{did_you_mean(name, self.frame_names)} "
                 f"(the model has {listing(self.frame_names)})"

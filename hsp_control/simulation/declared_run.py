@@ -62,7 +62,8 @@ def with_duration(
 
     Args:
         config: The configuration; None: there is none.
-        duration: None: a log of it is repeated over what it has, see `Rollout.config`.
+        duration: None: a log of it is repeated over its own duration, see
+        `Rollout.config`.
     """
     if config is None:
         return None

@@ -1,4 +1,4 @@
-"""Whether targets and commanded forces are feasible, as known before a run."""
+"""Feasibility of targets and commanded forces, checked before a run."""
 
 from collections.abc import Iterable, Iterator, Sequence
 from typing import NamedTuple
@@ -100,7 +100,7 @@ def not_followed(
 
 
 def _held(robot: Robot, contacts: Sequence[Contact], q0: Array) -> list[Target]:
-    """Return where contacts hold their frames; nothing if some move or end."""
+    """Return the poses at which contacts hold frames; nothing if some move or end."""
     state, found = robot.state(0.0, q0, np.zeros(robot.nv)), []
     for contact in contacts:
         at_origin = isinstance(contact, PointContact) and not contact.points.any()
@@ -160,7 +160,7 @@ class _Search(NamedTuple):
 def _leaves(
     task: FramePose | FramePosition, passed: Sequence[Passed]
 ) -> OutOfReach | None:
-    """Return when and by how much a target is out of reach, if so."""
+    """Return time and distance at which a target is out of reach, or None."""
     away = [each.distance for each in passed]
     if max(away) <= _REACHED:
         return None
@@ -171,7 +171,7 @@ def _leaves(
 
 
 def target_of(task: FramePose | FramePosition, t: float) -> pin.SE3:
-    """Return where a task's frame is to be at a time [s]."""
+    """Return the desired placement of a task's frame at a time [s]."""
     if isinstance(task, FramePose):
         pose = task.followed.sample(t)
         return pin.SE3(pose.orientation.rotation.copy(), pose.position.position.copy())
@@ -183,7 +183,7 @@ def target_of(task: FramePose | FramePosition, t: float) -> pin.SE3:
 
 
 def too_weak(robot: Robot, q: Array, limits: Array) -> Iterator[tuple[str, str]]:
-    """Yield the joints that cannot hold the robot at a configuration, and why."""
+    """Yield the joints that cannot hold the robot at a configuration, with reasons."""
     rest = np.zeros(robot.nv)
     static = np.abs(robot.inverse_dynamics(q, rest, rest))
     for k in np.flatnonzero(static > limits):
@@ -258,7 +258,7 @@ def _share(controller: Controller, support: Support, t: float) -> float:
 
     A linear programme in the forces at the points and that share.
     """
-    from scipy.optimize import linprog  # here: SciPy takes long to import
+    from scipy.optimize import linprog  # here: importing SciPy is slow
 
     state, robot, n = controller.state, controller.robot, support.size
     equal: list[Array] = []
@@ -300,7 +300,7 @@ def _share(controller: Controller, support: Support, t: float) -> float:
 
 
 def _center(controller: Controller, state: RobotState, t: float) -> Array:
-    """Return where the centre of mass is to be, shape (3,) [m]."""
+    """Return the desired centre of mass, shape (3,) [m]."""
     center = state.centroidal.position.copy()
     for task in controller.tasks:
         if isinstance(task, CenterOfMass) and not task.remembers:

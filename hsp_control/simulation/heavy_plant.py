@@ -21,7 +21,7 @@ def heavy_plant(plant: PlantPart, robot: Robot, q: Array) -> Iterator[str]:
     """Yield fields of a plant that are too heavy for the motors, and feasible values.
 
     Too heavy are an effort against gravity at a configuration, and an inertia with
-    which a motor takes `SLOW` to reach its speed limit. Only motors with limits are
+    which a motor needs `SLOW` to reach its speed limit. Only motors with limits are
     checked.
     """
     if robot.unactuated:
@@ -70,7 +70,7 @@ def _too_heavy(
 def _too_slow(
     plant: PlantPart, field: str, before: Robot, after: Robot, q: Array
 ) -> str:
-    """Return the joint that takes longest to reach its speed, and a feasible value."""
+    """Return the joint that is slowest to reach its limit, and a feasible value."""
     if field == "payload":
         return ""
     effort, speed = after.model.effortLimit, after.model.velocityLimit

@@ -31,7 +31,7 @@ from hsp_control.tasks.frame_task import frame_of
 
 
 class StartPose(Part, error=ConfigurationError):
-    """Where a frame shall be at the start; inverse kinematics finds the joints."""
+    """Placement of a frame at the start; inverse kinematics finds the joints."""
 
     _: KW_ONLY
     frame: Name | None = None
@@ -99,7 +99,7 @@ class InitialState(Part, error=ConfigurationError):
 
     @property
     def is_found(self) -> bool:
-        """Whether the configuration is not given, but found."""
+        """Whether the configuration is searched instead of given."""
         return self.pose is not None or isinstance(self.joints, str)
 
     def configuration_of(

@@ -1,8 +1,8 @@
-"""The journal of a log: rows appended as they come, so that a killed run loses none.
+"""The journal of a log: rows are appended at once, so that a killed run loses none.
 
 An ``.npz`` has all rows of a column in one place and its directory at the end, so it
 can only be written when a run is over. Until then the rows are in a file that is only
-appended to: the line `MAGIC`, then frames, each of
+appended to: the line `MAGIC`, then frames of
 
     kind     1 byte: H a heading, R a row, N a note, E the end
     length   4 bytes, of the payload
@@ -12,8 +12,8 @@ appended to: the line `MAGIC`, then frames, each of
 all little-endian. A heading is JSON: the log's meta data and the shape of every column;
 another one follows when columns are added or grow. A row is the columns' numbers in
 the order of the heading. The end is JSON: the status of the run and more. A note is
-JSON of another kind: a sweep's journal has one for each run.
-Each frame is one `write`. After that the operating system has it, and a killed process
+JSON of another kind: a sweep's journal has one per run.
+A frame is one `write`. After that the operating system has it, and a killed process
 loses nothing that it wrote. Reading stops at an incomplete frame at the end. A damaged
 frame is left out; if its length is damaged, the next whole frame is searched.
 """
@@ -49,7 +49,7 @@ _LARGEST_SEARCH = 1_000_000_000
 _HEADING, _ROW, _NOTE, _END = b"H", b"R", b"N", b"E"
 
 Shapes = Mapping[str, tuple[int, ...]]
-"""The shape of each column in one row."""
+"""The shapes of columns in one row."""
 
 
 _writers: "WeakSet[JournalWriter]" = WeakSet()
@@ -175,7 +175,7 @@ class JournalReader:
         self._parts: list[tuple[Shapes, list[Array]]] = []
 
     def read(self) -> int:
-        """Read the new frames; return how many rows they have.
+        """Read the new frames; return their number of rows.
 
         Raises:
             LogError: If the file is no journal, or cannot be read.
@@ -223,7 +223,7 @@ class JournalReader:
             self.meta, self.ended = {**self.meta, **json.loads(payload)}, True
 
     def whole(self) -> int:
-        """Read the new bytes; return how many of all bytes are in whole frames."""
+        """Read the new bytes; return the number of bytes in complete frames."""
         self.read()
         begun = self.path.is_file() and self.path.stat().st_size >= len(MAGIC)
         return self._at if begun else 0
@@ -317,7 +317,7 @@ def is_journal(path: Path) -> bool:
 
 
 def width(shapes: Shapes) -> int:
-    """Return how many numbers a row has."""
+    """Return the number of values in a row."""
     return sum(map(math.prod, shapes.values()))
 
 
@@ -337,7 +337,7 @@ def joined(
 ) -> dict[str, Array]:
     """Return the columns of rows that follow one another, without the first ones.
 
-    Each part has its own columns; NaN is where it lacks a number. Of one part they are
+    Parts have their own columns; NaN is where it lacks a number. Of one part they are
     views, if its rows are an array.
     """
     chosen = []

@@ -17,7 +17,7 @@ BEYOND_SPEED = "beyond the speed limit, most since the row before"
 
 
 class LimitExcess:
-    """The largest excess of each joint beyond its limits since it was last read.
+    """The joints' largest excesses over their limits since the last reading.
 
     The law keeps limits for its model, and `Status` reports that. An unknown push, or a
     plant that differs, can take a joint beyond them: only the state shows it. It is

@@ -1,4 +1,4 @@
-"""The columns of a log: values of tasks, fields and contacts in each row."""
+"""The columns of a log: values of tasks, fields and contacts in every row."""
 
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
@@ -35,11 +35,11 @@ MAX_SIZE = 2_000_000_000
 """Most bytes of all columns: an hour at 1 kHz with 70 numbers per row."""
 
 Sources = Iterator[tuple[str, Array]]
-"""Columns, each with the array that the law writes for it."""
+"""Columns, with the arrays that the law writes for them."""
 
 
 class LogColumns:
-    """The columns of a log, each declared once: the present row, and the rows before.
+    """The columns of a log, declared once: the present row, and the rows before.
 
     Attributes:
         row: The arrays of the present row, by column; values that are not
@@ -65,7 +65,7 @@ class LogColumns:
 
     @property
     def shapes(self) -> Shapes:
-        """The shape of each column of `row`."""
+        """The shapes of the columns of `row`."""
         return {name: numbers.shape for name, numbers in self.row.items()}
 
     def add(
@@ -134,7 +134,8 @@ class TaskColumns:
         self._controller, self._columns = controller, columns
         # all tasks that there have been, by their names in the log
         self.logged: dict[str, Task] = {}
-        # the streams of each as it came, as declared; those of changes are the changes'
+        # the tasks' streams at their first appearance, as declared; those of changes
+        # are theirs
         self.streamed: dict[str, list[Streamed]] = {}
         self._levels: dict[str, int] = {}
         self._streams: dict[str, list[tuple[str, StreamRun]]] = {}
@@ -186,7 +187,7 @@ class TaskColumns:
         column(f"{prefix}.error", (m,), unit, f"error e: {what}")
         column(f"{prefix}.error_rate", (m,), rate_unit, "error rate e'")
         column(f"{prefix}.bounded", (), unit, "length of an error that is bounded")
-        # To search for streams in every row would cost more than the row.
+        # A search for streams in every row would cost more than the row.
         self._streams[name] = list(_streams_of(task, name))
         for stream, _ in self._streams[name]:
             for what, meaning in STREAM_CHANNELS.items():
@@ -339,7 +340,7 @@ class BarrierColumns:
                 self._columns.add(name, (), "-", "smallest value", **least)
 
     def write(self, state: RobotState) -> None:
-        """Write the smallest value of each."""
+        """Write the smallest values."""
         row = self._columns.row
         for name, each in self._barriers.items():
             row[name][...] = np.min(each.values(state.read_only))

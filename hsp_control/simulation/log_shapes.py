@@ -20,7 +20,7 @@ _FINITE = ("t", "q", "v", "joint_positions", "skeleton")
 
 
 class WrongColumnError(LogError):
-    """A column that is no column of such a log."""
+    """An invalid column of a log."""
 
 
 def check_columns(columns: Mapping[str, Array], meta: Mapping[str, Any]) -> None:

@@ -51,7 +51,8 @@ class LogWriter:
     """Writes the log of a run; an incomplete row is never written.
 
     Attributes:
-        path: The journal that gets each row at once; None: rows stay in memory only.
+        path: The journal, to which rows are written at once; None: rows stay in memory
+        only.
         plan: The plan that the robot follows; its streams are recorded. None: no plan.
     """
 
@@ -85,7 +86,7 @@ class LogWriter:
         self._columns = columns = LogColumns(rows)
         self._settled: object = None
         self._made: dict[int, Change] = {}  # all changes of the run, by identity
-        # the latest run of each stream that there was, by its declaration's identity
+        # the latest runs of streams, by their declarations' identities
         self._streams: dict[int, StreamRun] = {}
         self._law: StepRecord | None = None  # of the present row
         self._active: ActiveStack | None = None  # the stack of `_sources`
@@ -164,7 +165,7 @@ class LogWriter:
             self._settled = settled
             self._tasks.update()
             self._terms.update()
-            if settled is not None:  # while one fades into another, both keep
+            if settled is not None:  # both are kept during a transition
                 self._barriers.update()
             self._keep_messages()
             columns.lay_out()
@@ -188,7 +189,7 @@ class LogWriter:
             row[f"obstacle.{obstacle.name}.quaternion"][:] = placement[3:]
         if output is not None:
             self._fill_law(state, output)
-        if VELOCITY not in log_channels:  # the state was seen in this row alone
+        if VELOCITY not in log_channels:  # not recorded by the loop: this row alone
             self._excess.record(controller.limits, state.q, state.v)
             log_channels = {**self._excess.collect(controller.limits), **log_channels}
         write_channels(columns, log_channels)
@@ -232,7 +233,7 @@ class LogWriter:
     def _find_sources(
         self, active: ActiveStack, law: StepRecord
     ) -> list[tuple[str, Array]]:
-        """Return the law's array for each column."""
+        """Return the law's arrays of the columns."""
         return [
             ("acceleration", law.acceleration),
             ("field.g", law.field.g),
@@ -263,7 +264,7 @@ class LogWriter:
             return
         try:
             self._journal.write_end(status, message, **self._came_during_run(), **meta)
-        except KeyboardInterrupt:  # after which it may be called again
+        except KeyboardInterrupt:  # it may be called again afterwards
             raise
         except BaseException:
             self._journal.close()
@@ -321,7 +322,7 @@ class LogWriter:
             **({"obstacle_meshes": self._meshes} if self._meshes else {}),
             "versions": versions(),
             **(given := {**self._meta, **meta}),
-            # A reader of the log runs this code only if it is the same.
+            # A reader of the log runs this code only if it is unchanged.
             "imported": fingerprints((given.get("config") or {}).get("imports") or ()),
         }
 
@@ -426,9 +427,9 @@ def _installed() -> dict[str, str]:
 def _skeleton(
     robot: Robot, controller: Controller
 ) -> tuple[list[tuple[int, str]], list[int]]:
-    """Return which of the points to draw are frames, and the parent of each point.
+    """Return which of the drawn points are frames, and the points' parents.
 
-    A point for each joint in order, then for each frame of a task (index and name); a
+    A point per joint in order, then for every frame of a task (index and name); a
     parent is the index of another point, -1 for none.
     """
     named: list[tuple[int, str]] = []

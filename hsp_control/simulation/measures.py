@@ -48,7 +48,7 @@ def task_errors(rollout: Log) -> list[LoggedErrorPart]:
 
 
 def position_units(rollout: Log) -> list[str]:
-    """Return the unit of each dof's position: ``rad`` or ``m``."""
+    """Return the units of the dofs' positions: ``rad`` or ``m``."""
     return list(map(str, rollout.meta["robot"]["units"]))
 
 
@@ -64,7 +64,7 @@ def rate_unit(rollout: Log) -> str:
 
 
 def effort_units(rollout: Log) -> list[str]:
-    """Return the unit of each dof's effort: ``N·m`` or ``N``."""
+    """Return the units of the dofs' efforts: ``N·m`` or ``N``."""
     return [_EFFORT_UNITS.get(unit, "–") for unit in position_units(rollout)]
 
 
@@ -123,8 +123,8 @@ class Unreached(NamedTuple):
     # where the error is beyond the task's `largest_error` and not out of reach, shape
     # (N,)
     far: NDArray[np.bool_]
-    # the error that stays where the target is out of reach, else 0, shape (N,) [m or
-    # rad]: the first part of the error that is not reached
+    # the remaining error where the target is out of reach, otherwise 0, shape (N,) [m
+    # or rad]: of the first part of the error that is not reached
     out: Array
     unit: NDArray[np.object_]  # of each number of ``out``, shape (N,)
 
@@ -157,7 +157,8 @@ def unreached(
     held = (columns.get("damped", none) > 0.0) | (
         columns.get("status", none) >= LIMITED
     )
-    held &= ~(columns.get(PULL_COLUMN, none) > PULLED)  # else it is held away by a hand
+    # otherwise it is held away by a hand
+    held &= ~(columns.get(PULL_COLUMN, none) > PULLED)
     for task, described in tasks.items():
         if f"task.{task}.error" not in columns:
             continue
@@ -190,7 +191,7 @@ class ForceKept(NamedTuple):
     wanted: Array  # the commanded normal force, without feedback, shape (n,) [N]
     planned: Array  # the planned one, likewise
     actual: Array  # the plant's force, or else the planned one, shape (n,) [N]
-    lost: int  # in how many rows nothing is touched any more
+    lost: int  # number of rows without touch
 
 
 def forces_kept(rollout: Log) -> Iterator[ForceKept]:
@@ -260,7 +261,7 @@ def measures(rollout: Log) -> dict[str, Measure]:
     add("null_space_error.end", e_N[-1], unit, "null-space error at the end")
     values = rollout["singular_values"]
     if values.size:
-        # Determinants of different sizes do not compare.
+        # Determinants of different sizes are not comparable.
         alike = rows_compare(rollout)
         least = _smallest(rollout["manipulability"]) if alike else np.nan
         add("manipulability.min", least, "–", "minimum det(J W⁻¹ Jᵀ)")

@@ -65,7 +65,7 @@ class Moved(NamedTuple):
     task: str
     part: str  # such as ``position``
     unit: str  # m or rad
-    resting: Array  # in the end, without an observer, for each joint, shape (nv,)
+    resting: Array  # in the end, without an observer, for every joint, shape (nv,)
     peak: Array  # at most, with the compensators that there are, shape (nv,)
 
 
@@ -76,7 +76,7 @@ class ModelErrors(NamedTuple):
     joints: tuple[str, ...]  # the degrees of freedom
     delay: float  # longest delay without a growing mode, besides known delays [s]
     lag: float  # longest lag of the drives without one, besides known lags [s]
-    growing: int  # number of the `tried` robots of other masses with a growing mode
+    growing: int  # number of robots of other masses with a growing mode, of `tried`
     tried: int
     growth: float  # the fastest rate at which one grows; 0: none grows [1/s]
     # largest inertia that each rotor may have beyond the model [kg·m²]; inf: any that
@@ -239,7 +239,7 @@ def _last_stable(
 def _moved(
     controller: Controller, state: RobotState, whole: WholeLoop
 ) -> tuple[Moved, ...]:
-    """Return how far the tasks move for one unit of effort on each joint."""
+    """Return the tasks' displacements per unit of effort on the joints."""
     loop, T, to_error, rows = whole
     m, nv = len(to_error), len(T)
     # Each column is the acceleration of one unit of effort, in the loop's coordinates.

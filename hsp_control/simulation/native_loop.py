@@ -32,7 +32,7 @@ class _Timing(NamedTuple):
     span: Array
     periods: Indices
     first: Indices  # the period that begins now
-    last: Indices  # the one that is not made any more
+    last: Indices  # the first one that is not made
 
     @classmethod
     def allocate(cls) -> Self:

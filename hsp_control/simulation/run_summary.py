@@ -56,7 +56,7 @@ def summary_rows(rollout: Log) -> Iterator[tuple[str, str]]:
         least = found["manipulability.min"].value
         if np.isfinite(least):
             yield "det(J W⁻¹ Jᵀ)", f"minimum {least:.4g}, {smallest}"
-        else:  # determinants of different sizes do not compare
+        else:  # determinants of different sizes are not comparable
             yield "J L⁻ᵀ", smallest
     for name in distances(rollout):
         text = f"minimum {found[f'distance.{name}.min'].value:.3g} m"
@@ -80,7 +80,7 @@ def summary_rows(rollout: Log) -> Iterator[tuple[str, str]]:
 
 
 def damped_rows(rollout: Log) -> int:
-    """Return in how many rows the law was damped at a singularity."""
+    """Return the number of rows in which the law was damped at a singularity."""
     known = rollout.columns.get("damped")
     return 0 if known is None else int((known > 0.0).sum())
 
@@ -105,7 +105,7 @@ def summary_text(rollout: Log) -> str:
 
 
 def _task_rows(rollout: Log, found: Mapping[str, Measure]) -> Iterator[tuple[str, str]]:
-    """Yield each task's errors, and the rows in which its target was not reached."""
+    """Yield the tasks' errors, and the rows in which their targets were not reached."""
     tasks = rollout.meta["tasks"]
     away = {each.task: each for each in unreached(rollout.columns, tasks)}
     for k, task in enumerate(tasks):
@@ -183,7 +183,7 @@ def unexplained_rows(rollout: Log) -> Iterator[str]:
 
 
 def limit_rows(rollout: Log) -> Iterator[str]:
-    """Yield one sentence each; none where no limit was active and no joint beyond."""
+    """Yield one sentence per kind; none if no limit was active and no joint beyond."""
     if POSITION not in rollout.columns:
         return
     status = rollout["status"]
@@ -202,7 +202,7 @@ def limit_rows(rollout: Log) -> Iterator[str]:
 
 
 def excess_rows(rollout: Log) -> Iterator[str]:
-    """Yield where the robot was beyond its limits, a sentence each."""
+    """Yield a sentence per kind of limit that was exceeded."""
     if POSITION not in rollout.columns:
         return
     names = rollout.meta["robot"]["dofs"]

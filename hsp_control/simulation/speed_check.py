@@ -1,4 +1,4 @@
-"""Whether joints are fast enough for references, as known before a run."""
+"""Joint speeds that references require, checked before a run."""
 
 from collections.abc import Sequence
 from typing import NamedTuple
@@ -15,7 +15,7 @@ _FAST = 1.01
 
 
 class Passed(NamedTuple):
-    """A posture in which a target is reached, or the nearest one that was found."""
+    """A posture in which a target is reached, or the nearest one found."""
 
     t: float  # the time [s]
     q: Array  # the configuration, shape (nq,)
@@ -94,7 +94,7 @@ def _share(
         return 0.0, 0  # singular: reported elsewhere
     if np.abs(least).max() <= _FAST:
         return float(np.abs(least).max()), int(np.abs(least).argmax())
-    from scipy.optimize import linprog  # here: SciPy takes long to import
+    from scipy.optimize import linprog  # here: importing SciPy is slow
 
     n = robot.nv
     sides = np.vstack([np.eye(n), -np.eye(n)])

@@ -1,4 +1,4 @@
-"""Tasks: the motions that the robot tracks, each with its linear error equation."""
+"""Tasks: the motions that the robot tracks, with linear error equations."""
 
 from hsp_control.common.entry_points import own_names
 from hsp_control.law import TaskSample as TaskSample

@@ -21,7 +21,7 @@ UNBOUNDED = np.zeros((0, 3))
 class Feedback(NamedTuple):
     """Kv e' + Kp s(e) + offset: a task's feedback, as one argument of a call.
 
-    s(e) is e with each part, such as its position, shortened to its largest length:
+    s(e) is e with its parts, such as the position, shortened to their largest lengths:
     s(e) = e if no part is longer.
 
     The controller owns these arrays and changes them in place: gains by events, the
@@ -89,7 +89,7 @@ LargestError = Annotated[
     BeforeValidator(plain),
     AfterValidator(lambda given: tuple(given) if isinstance(given, list) else given),
 ]
-"""The robot's own, none, one number, or one for each part of the error."""
+"""The robot's own, none, one number, or one per part of the error."""
 
 
 def largest_errors(
@@ -107,7 +107,7 @@ def each_part(
     own: Mapping[str, float],
     error: type[HspControlError],
 ) -> Sequence[float | None] | str:
-    """Return a bound for each part of an error, None for no bound; or "none" for all.
+    """Return a bound per part of an error, None for no bound; or "none" for all.
 
     ``own`` has the robot's bounds by the unit of the error, inf for no bound.
     """

@@ -14,7 +14,7 @@ from hsp_control.declaration.quantities import Gain
 class Gains(Part, error=GainError):
     """e'' + Kv e' + Kp e = 0: stiffness and damping, or frequency and damping ratio.
 
-    Each gain is a number, one number for each row of the task, or (not ω0 and ζ) a full
+    A gain is a number, one number per row of the task, or (not ω0 and ζ) a full
     matrix.
     """
 
@@ -101,7 +101,7 @@ def as_gain(value: ArrayLike, name: str) -> Array:
 
 
 def as_numbers(value: ArrayLike, name: str) -> Array:
-    """Return a number, one for each row, or a square matrix, as an array."""
+    """Return a number, one per row, or a square matrix, as an array."""
     try:
         if isinstance(value, str):
             raise TypeError

@@ -30,7 +30,7 @@ class Impedance(Part, error=GainError):
     """
 
     stiffness: Semidefinite
-    """K [N/m or N·m/rad]: a number, one for each row, or a symmetric matrix without
+    """K [N/m or N·m/rad]: a number, one per row, or a symmetric matrix without
     negative eigenvalues; along a direction of stiffness 0 the hand can be guided.
     Forces are along the world's axes, moments along those of the desired frame.
     """
@@ -65,7 +65,7 @@ class Impedance(Part, error=GainError):
         """Return the impedance with its largest force in numbers.
 
         Raises:
-            GainError: If there is neither one number nor one for each part.
+            GainError: If there is neither one number nor one per part.
         """
         own = dict(zip(("m", "rad"), robot.spring_force, strict=True))
         with within("largest_force"):

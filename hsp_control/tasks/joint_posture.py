@@ -23,7 +23,7 @@ from hsp_control.trajectories.crossfade import AnyReference
 class JointPosture(CompliantTask, type="joint_posture"):
     """e = q_d ⊖ q of some joints, with q_d(t) = reference ⊕ displacement(t).
 
-    Each joint has one degree of freedom, in rad or m. The error is exactly linear, and
+    The joints have one degree of freedom, in rad or m. The error is exactly linear, and
     J are rows of the identity.
     """
 
@@ -35,7 +35,7 @@ class JointPosture(CompliantTask, type="joint_posture"):
     """Names of the joints, in the order of the rows [-]; all with one degree of freedom
     by default."""
     displacement: Trajectory | None = None
-    """Motion of the joints about the reference, one number for each of the joints [rad
+    """Motion of the joints about the reference, one number per joint [rad
     or m]; none by default. To stream postures, stream the displacement from a reference
     of zeros."""
 
@@ -124,7 +124,7 @@ class JointPosture(CompliantTask, type="joint_posture"):
         return actual + robot.difference(state.q, desired)[indices], actual
 
     def _indices(self, robot: Robot) -> list[int]:
-        """Return the index of each joint in v."""
+        """Return the joints' indices in v."""
         indices = []
         for k, joint in enumerate(self._joints):
             if joint in self._joints[:k]:

@@ -15,7 +15,7 @@ def spring_force(numbers: Array, ends: Indices, e: Array) -> Array:
 
     Args:
         numbers: As of `Impedance.numbers`, shape (2 m + 2, m).
-        ends: End of each part of the error, shape (parts,).
+        ends: Ends of the parts of the error, shape (parts,).
         e: The error, shape (m,).
     """
     e = np.ascontiguousarray(e, dtype=float)

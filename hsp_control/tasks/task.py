@@ -107,7 +107,7 @@ class Task(Part, ABC, family="tasks", error=TaskError):
         return sum(part.size for part in self.error_parts)
 
     def part_ends(self) -> Indices:
-        """Return the end of each part of the error, shape (parts,)."""
+        """Return the ends of the parts of the error, shape (parts,)."""
         return np.cumsum([part.size for part in self.error_parts])
 
     @abstractmethod
@@ -227,7 +227,7 @@ class Task(Part, ABC, family="tasks", error=TaskError):
 
         With these two, a `Feedback` and a `TaskSample`, it computes the same sample as
         `evaluate`. Arguments are numbers, arrays and records of them, which may be
-        memory of the state; and values that are updated before each call:
+        memory of the state; and values that are updated before every call:
         ``state.frame(name)`` becomes a `FrameMotion`, a trajectory its sample.
 
         Args:
@@ -238,7 +238,7 @@ class Task(Part, ABC, family="tasks", error=TaskError):
     def calls(
         self, state: RobotState, feedback: Feedback, out: TaskSample
     ) -> PartCalls:
-        """Return the calls that write the sample of each step."""
+        """Return the calls that write the sample in a step."""
         if implemented_by(self, "call", "evaluate") == "call":
             return [self.call(state).given(feedback=feedback, out=out)]
         seen = state.read_only
@@ -329,7 +329,7 @@ class SecondOrderTask(Task):
     """Kp and Kv of the rows [1/s², 1/s]; critically damped at 10 rad/s by default."""
     largest_error: LargestError = "robot"
     """Error beyond which the feedback does not grow, so that the command for a target
-    far away, or out of reach, is bounded [m or rad]. One number, or one for each part
+    far away, or out of reach, is bounded [m or rad]. One number, or one per part
     of the error; "none": no bound, and near a singularity the paper's law down to the
     controller's threshold. By default 0.35 of the robot's size for a position
     (`Robot.size`), 1.25 rad for an orientation, and none for joints."""

@@ -207,7 +207,7 @@ class Along(Trajectory, type="along"):
 
 
 def course_of(pace: Pace) -> Course | None:
-    """Return the times between which a path is followed; None: for ever."""
+    """Return the times between which a path is followed; None: forever."""
     start_time, speed, ramp, length = pace.scaling
     if pace.arc.repeats:
         return None

@@ -50,7 +50,7 @@ class Path(NamedTuple):
 
     @property
     def length(self) -> float:
-        """Length of the path; infinite if it goes on for ever."""
+        """Length of the path; infinite if it is endless."""
         return inf if self.arc.repeats else float(self.arc.lengths[-1])
 
 
@@ -271,7 +271,7 @@ def _scaling(
 
 def _speeds(scaling: TimeScaling, places: Array) -> Array:
     """Return s' at lengths s, shape (k,)."""
-    if scaling.ramp == 0.0 or isinf(scaling.length):  # each place is passed eventually
+    if scaling.ramp == 0.0 or isinf(scaling.length):  # every place is passed eventually
         return np.full(len(places), scaling.speed)
     # s = v T u³ (1 - u/2) on a ramp, by bisection
     ahead = np.minimum(places, scaling.length - places)

@@ -76,7 +76,7 @@ class CallableTrajectory(Trajectory):
         return out
 
     def _rates(self, t: float) -> tuple[Array, Array]:
-        """Return f' and f'', each from the highest derivative that is given."""
+        """Return f' and f'', from the highest given derivative."""
         f, v, a = self.function, self.velocity, self.acceleration
         if v is None:
             rates = both_derivatives(

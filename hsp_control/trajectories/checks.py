@@ -1,4 +1,4 @@
-"""Checks of the arguments of trajectories; each returns a new, checked copy."""
+"""Checks of the arguments of trajectories, which return new, checked copies."""
 
 import numpy as np
 from numpy.typing import ArrayLike

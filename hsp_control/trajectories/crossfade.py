@@ -113,7 +113,7 @@ class CrossfadeOrientation(OrientationTrajectory, type="crossfade"):
     """Duration of the change [s]; 0 is a jump."""
 
     def __post_init__(self) -> None:
-        """Check how many changes overlap."""
+        """Check the number of overlapping changes."""
         _check_overlapping(self)
 
     @property
@@ -149,7 +149,7 @@ class CrossfadeOrientation(OrientationTrajectory, type="crossfade"):
         end = self.start_time + self.duration
         if t >= end:  # a stream may have dropped R_0
             return self.after.sample(t, out)
-        if self._follows_streams:  # for copies, whose blend is another one
+        if self._follows_streams:  # for copies, which have another blend
             self.keep_start(end)
         if t < self.start_time:
             return self.before.sample(t, out)
@@ -168,7 +168,7 @@ class CrossfadeOrientation(OrientationTrajectory, type="crossfade"):
         return [PartCall(engine.CrossfadeOrientationOfStreams, **given, t=TIME)]
 
     def keep_start(self, until: float) -> None:
-        """Let streams know until a time how it was where the change began."""
+        """Let streams keep the state at the start of the change until a time."""
         for stream in _streams(self):
             stream.run.keep(self.start_time, until)
         for earlier in parts_within(self.before, CrossfadeOrientation):
@@ -266,7 +266,7 @@ def _streams(part: Crossfade | CrossfadeOrientation) -> tuple[FollowedStream, ..
 
 
 def _mixed(part: Crossfade | CrossfadeOrientation, out: Any) -> dict[str, Any]:
-    """Return the arguments of a change of streams: each of the two is a plan."""
+    """Return the arguments of a change of streams: both are plans."""
     before: Any = part.before
     after: Any = part.after
     (sample_before, calls_before), (sample_after, calls_after) = (

@@ -52,7 +52,7 @@ class SetPoint(Trajectory):
     """x(t) that is written elsewhere at run time; without rates."""
 
     numbers: InstanceOf[np.ndarray]
-    """x, shape (n,), read in each step [m, or the task's unit]."""
+    """x, shape (n,), read in every step [m, or the task's unit]."""
 
     @property
     def dimension(self) -> int:

@@ -120,7 +120,7 @@ class OrientationPath(OrientationTrajectory, type="path"):
 
     a_i = R_i log(R_iᵀ R_{i+1}) is the shortest rotation to the next waypoint, in the
     world frame. For an angle of π its sense is not unique: add a waypoint in between.
-    The body rests at each waypoint, before the first and after the last; the motion is
+    The body rests at every waypoint, before the first and after the last; the motion is
     C².
     """
 

@@ -139,7 +139,7 @@ class Line(PolynomialTrajectory, type="line"):
 class Stops(PolynomialTrajectory, type="stops"):
     """x(t) = x_i + s (x_{i+1} - x_i) from t_i to t_{i+1}, s the `smooth_step`.
 
-    Straight lines with rest at each waypoint, C² everywhere.
+    Straight lines with rest at every waypoint, C² everywhere.
     """
 
     points: ClassVar[tuple[str, ...]] = ("waypoints",)
@@ -237,7 +237,7 @@ class Spline(PolynomialTrajectory, type="spline"):
     """Degree of the polynomials [-]."""
 
     def _pieces(self) -> Pieces:
-        # This import takes 0.2 s, so only splines import it.
+        # This import takes 0.2 s, so only splines make it.
         from scipy.interpolate import make_interp_spline
 
         x, degree = np.asarray(self.waypoints), self.degree

@@ -67,7 +67,7 @@ def rounded_lines(waypoints: Array, radius: float) -> RoundedLines:
             )
     directions = lines / lengths[:, np.newaxis]
     angles = _angles(directions)
-    cut = np.where(angles > STRAIGHT, radius, 0.0)  # of the lines, at each waypoint
+    cut = np.where(angles > STRAIGHT, radius, 0.0)  # of the lines, at every waypoint
     _check(angles, cut, lengths)
 
     times, passing, coefficients = [0.0], [0.0], []
@@ -94,7 +94,7 @@ def rounded_lines(waypoints: Array, radius: float) -> RoundedLines:
 
 
 def _angles(directions: Array) -> Array:
-    """Return the angles [rad] by which lines turn at the waypoints; 0 at both ends."""
+    """Return the angles [rad] between lines at the waypoints; 0 at both ends."""
     cosines = np.einsum("ij,ij->i", directions[1:], directions[:-1])
     sines = np.linalg.norm(directions[1:] - cosines[:, None] * directions[:-1], axis=1)
     return np.concatenate([[0.0], np.arctan2(sines, cosines), [0.0]])
@@ -129,7 +129,7 @@ class Polyline(Trajectory, type="polyline"):
     inner waypoint the path is rounded by a polynomial whose curvature begins and ends
     at zero; at a right angle the path passes a waypoint at 0.36 radii, and its sharpest
     bend has a radius of 0.84. The motion is C² and goes from rest to rest; see `Along`
-    for its speed. `Stops` rests at each waypoint.
+    for its speed. `Stops` rests at every waypoint.
 
     Raises:
         TrajectoryError: At a corner that is not rounded, if a blend does not fit, or if
@@ -184,7 +184,7 @@ class PolylinePose(PoseTrajectory, type="polyline_pose"):
     """Poses along a `Polyline` of the origin, at a speed of the origin.
 
     Between two waypoints the body rotates by the shortest rotation, by the
-    `smooth_step` of the distance: its angular velocity is zero at each waypoint, and
+    `smooth_step` of the distance: its angular velocity is zero at every waypoint, and
     the motion is C².
     """
 
@@ -199,7 +199,7 @@ class PolylinePose(PoseTrajectory, type="polyline_pose"):
     """Distance from a waypoint at which its rounding begins and ends [m]."""
     _: KW_ONLY
     rotations: Rotations | None = None
-    """An orientation for each waypoint, body to world: roll, pitch and yaw [rad], a
+    """An orientation per waypoint, body to world: roll, pitch and yaw [rad], a
     quaternion or a matrix [-]; held at the robot's start by default."""
     start_time: Number = 0.0
     """Time at which the motion begins [s]."""

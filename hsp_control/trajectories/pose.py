@@ -100,7 +100,7 @@ class PoseTrajectory(Part, ABC, family="poses", error=TrajectoryError):
 
 
 class ComposedPose(PoseTrajectory, type="composed"):
-    """M(t) = (R(t), x(t)), with x and R given by one trajectory each."""
+    """M(t) = (R(t), x(t)), with separate trajectories x and R."""
 
     position: Trajectory = Hold()
     """x(t) [m]; held where the robot starts by default."""

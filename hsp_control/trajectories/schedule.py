@@ -52,10 +52,10 @@ class Schedule(Part, error=ScheduleError):
     """
 
     intervals: Intervals
-    """[start, end] of each interval, in order of time [s]; None for no start or no
+    """[start, end] of the intervals, in order of time [s]; None for no start or no
     end."""
     ramp: NonNegative = 0.3
-    """Duration of each rise and each fall, inside the intervals [s]."""
+    """Duration of rises and falls, inside the intervals [s]."""
 
     def __post_init__(self) -> None:
         """Check that intervals are in order and longer than their ramps."""

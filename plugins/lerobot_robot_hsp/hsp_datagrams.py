@@ -123,7 +123,7 @@ class Loop:
                 heard = json.loads(self._in.recv(_LARGEST))
             except TimeoutError:
                 continue
-            except (OSError, ValueError):  # somebody else's datagram
+            except (OSError, ValueError):  # another sender's datagram
                 continue
             if not (isinstance(heard, dict) and {"number", "phase"} <= heard.keys()):
                 continue

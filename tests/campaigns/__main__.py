@@ -1,6 +1,6 @@
 """Run campaigns in full: ``python -m campaigns [NAME ...]`` in ``tests``, or make fuzz.
 
-Counts are kept in out/fuzz after every batch, also those of an interrupted campaign.
+Results are stored in out/fuzz after every batch, also those of an interrupted campaign.
 benchmarks/results/fuzz.md has them.
 """
 
@@ -23,7 +23,7 @@ SEED = 1989
 
 
 def states(progress: Progress, seed: int, share: float) -> bool:
-    """Drive every bundled robot, and those of some bundled configurations."""
+    """Step every bundled robot, and those of some bundled configurations."""
     good = True
     runs = [(name, STEPS, random_states.bundled) for name in bundled_robots()]
     runs += [
@@ -43,7 +43,7 @@ def states(progress: Progress, seed: int, share: float) -> bool:
 
 
 def cases(progress: Progress, seed: int, share: float, kind: str) -> bool:
-    """Answer mutated files of one kind."""
+    """Run mutated files of one kind."""
     wanted = max(1, round(share * CASES[kind]))
     bar = progress.add_task(f"mutated {kind}", total=wanted)
 
@@ -57,7 +57,7 @@ def cases(progress: Progress, seed: int, share: float, kind: str) -> bool:
 
 
 def main(arguments: Iterable[str] | None = None) -> int:
-    """Run the named campaigns, and return whether all was well."""
+    """Run the named campaigns, and return whether all succeeded."""
     stages: dict[str, Callable[[Progress, int, float], bool]] = {
         "states": states,
         **{kind: partial(cases, kind=kind) for kind in CASES},
@@ -69,7 +69,9 @@ def main(arguments: Iterable[str] | None = None) -> int:
     parser = argparse.ArgumentParser(prog="campaigns", description=__doc__)
     parser.add_argument("names", nargs="*", metavar="NAME", help=", ".join(stages))
     parser.add_argument("--seed", type=int, default=SEED)
-    parser.add_argument("--share", type=float, default=1.0, help="of the full counts")
+    parser.add_argument(
+        "--share", type=float, default=1.0, help="fraction of the cases"
+    )
     options = parser.parse_args(None if arguments is None else list(arguments))
     unknown = [name for name in options.names if name not in stages]
     if unknown:
@@ -88,7 +90,7 @@ def main(arguments: Iterable[str] | None = None) -> int:
             for name in options.names or stages:
                 good &= stages[name](progress, options.seed, options.share)
     except KeyboardInterrupt:
-        print("stopped; what was counted is kept", file=sys.stderr)
+        print("stopped; results so far are kept", file=sys.stderr)
         good = False
     return 0 if good else 1
 

@@ -1,4 +1,4 @@
-"""Run the command line in this process, and judge its result."""
+"""Run the command line in this process, and classify its result."""
 
 import io
 import signal
@@ -12,7 +12,7 @@ from hsp_control.cli import commands, consoles, main
 from hsp_control.cli.interrupts import DeferredInterrupt
 
 LONGEST = 2000
-"""Characters of a message: what is longer is no clear error."""
+"""Length of a message above which it is no clear error [characters]."""
 
 
 def ask(arguments: Sequence[str], *, stop_after: float | None = None) -> list[str]:
@@ -20,8 +20,8 @@ def ask(arguments: Sequence[str], *, stop_after: float | None = None) -> list[st
 
     Args:
         arguments: The command line.
-        stop_after: Press Ctrl-C after this many seconds, as a person would who has
-            made a long run; it must then end by itself.
+        stop_after: Press Ctrl-C after this many seconds, as a user would in a long run;
+        it must then end by itself.
     """
     out, errors = io.StringIO(), io.StringIO()
     try:
@@ -35,19 +35,19 @@ def ask(arguments: Sequence[str], *, stop_after: float | None = None) -> list[st
 
 
 def judge(status: int, errors: str) -> list[str]:
-    """Return [kind, text] for an exit status and what was written to stderr."""
+    """Return [kind, text] for an exit status and the output on stderr."""
     if "Traceback" in errors:
         return ["traceback", errors]
     if status == 0:
         return ["fine", ""]
-    told = [line for line in errors.splitlines() if line.startswith("hsp: ")]
+    reported = [line for line in errors.splitlines() if line.startswith("hsp: ")]
     stopped = status == 130 and "hsp: stopped by the user" in errors
     refused = status == 2 or stopped
-    if not refused or not told or not errors.startswith("hsp: "):
+    if not refused or not reported or not errors.startswith("hsp: "):
         return ["unclear", f"status {status}: {errors}"]
-    if len(errors) > LONGEST or len(told) > 2:
+    if len(errors) > LONGEST or len(reported) > 2:
         return ["unclear", f"{len(errors)} characters: {errors[:LONGEST]}"]
-    return ["refused", told[0].removeprefix("hsp: ")]
+    return ["refused", reported[0].removeprefix("hsp: ")]
 
 
 @contextmanager
@@ -87,4 +87,4 @@ def _ctrl_c(after: float | None) -> Iterator[None]:
         signal.signal(signal.SIGINT, handler)
 
 
-assert commands  # imported here: the first case need not wait for it
+assert commands  # imported now, so that the first case need not wait for it

@@ -1,4 +1,4 @@
-"""Count the outcomes of many mutated files."""
+"""Statistics of the outcomes of many mutated files."""
 
 import tempfile
 from collections import Counter
@@ -11,7 +11,7 @@ from hsp_control.common.resources import bundled_configs
 
 KINDS = {"yaml": "campaigns.yaml_case:case", "urdf": "campaigns.urdf_case:case"}
 TIMEOUT = 60.0
-"""A case that is not over after this is a hang [s]; loaded machines are slow."""
+"""Time after which a case is a hang [s]; loaded machines are slow."""
 
 
 @dataclass
@@ -19,10 +19,10 @@ class Count:
     """The outcome of many cases.
 
     Attributes:
-        cases: How many.
-        kinds: How many of each kind: see `worker.Answer`.
-        slowest: The slowest case [s], but for the first of a process.
-        examples: The first that went wrong.
+        cases: Number of cases.
+        kinds: Number of cases by kind: see `worker.Answer`.
+        slowest: The slowest case [s], except the first of a process.
+        examples: The first failures.
         seconds: Time in cases [s].
     """
 
@@ -34,12 +34,12 @@ class Count:
 
     @property
     def good(self) -> bool:
-        """Whether each was answered with success or one clear error."""
+        """Whether every case ended in success or one clear error."""
         return set(self.kinds) <= {"fine", "refused"}
 
 
 def warm_up() -> None:
-    """Compile the cases' needs: afterwards a case that takes a minute hangs."""
+    """Compile kernels of the cases: afterwards a case of a minute is a hang."""
     for config in bundled_configs():
         with tempfile.TemporaryDirectory() as folder:
             arguments = ["run", config, "--out", folder]

@@ -1,8 +1,8 @@
-"""Changes of each kind while a controller runs: past ones leave nothing.
+"""Changes of every kind while a controller runs: past ones leave no trace.
 
 After twenty changes of a kind (of messages, when their record is full) and after a
 hundred thousand, a controller has the same representation, the same calls in a step, a
-pickle of the same size, and the process the same number of Python's objects; and a copy
+pickle of the same size, and the process the same number of Python objects; and a copy
 makes the same step.
 """
 
@@ -21,12 +21,12 @@ from campaigns.results import keep
 
 NUMBER, FEW = 100_000, 20
 RECORDED = 10_000
-"""Messages of a stream after which it records no more without a log: those to which the
-later ones are compared."""
+"""Messages after which a stream without a log stops recording: the reference for later
+ones."""
 RAMP = 2e-3
-EVERY = 3  # steps from one change to the next; each meets the ramp of the one before
+EVERY = 3  # steps between changes, so that their ramps overlap
 OVER = 2000  # steps after which all changes are forgotten
-PICKLE = 60  # digits of times and counts [bytes]
+PICKLE = 60  # digits of times and counters [bytes]
 OBJECTS = 200
 PROCESS = 8_000_000  # as in `soak` [bytes]
 
@@ -43,7 +43,7 @@ class Kept:
     same: bool  # a pickle and a copy make the same step, to the last bit
 
     def grew_from(self, few: "Kept") -> str:
-        """Return the growth; empty: none."""
+        """Return the growth; empty if none."""
         grown = {
             "repr": self.text != few.text,
             "step": self.calls != few.calls,
@@ -56,7 +56,7 @@ class Kept:
 
 
 class Repeated:
-    """A controller that makes changes of one kind, again and again."""
+    """A controller with repeated changes of one kind."""
 
     def __init__(self, kind: str) -> None:
         self.kind, self.k = kind, 0
@@ -83,7 +83,7 @@ class Repeated:
             self._step()
 
     def kept(self) -> Kept:
-        """Return the memory when all is over."""
+        """Return the memory after all changes."""
         for _ in range(3):
             self.k += OVER
             self._step()
@@ -103,7 +103,7 @@ KINDS = (*CHANGES, "target", "twist")
 
 
 def run(kind: str, number: int) -> Iterator[tuple[int, str]]:
-    """Make changes of a kind; yield their number, and at last the growth."""
+    """Make changes of a kind; yield their number, and finally the growth."""
     repeated, some = Repeated(kind), RECORDED if kind in ("target", "twist") else FEW
     for j in range(some):
         repeated.change(j)

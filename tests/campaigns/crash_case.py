@@ -1,11 +1,11 @@
-"""Do something forbidden, by a case's number: the harness has to detect it."""
+"""Misbehave in a way given by the case's number: the harness has to detect it."""
 
 import os
 import time
 
 
 def case(seed: int, index: int) -> list[str]:
-    """Abort, hang, raise, or be fine."""
+    """Abort, hang, raise, or succeed."""
     match index:
         case 0:
             os.abort()

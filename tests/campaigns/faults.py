@@ -1,4 +1,4 @@
-"""Disks that fill, and Ctrl-C: earlier results are readable."""
+"""Full disks and Ctrl-C: earlier results remain readable."""
 
 import os
 import resource
@@ -30,7 +30,7 @@ class Faults:
     """The outcome of many faults.
 
     Attributes:
-        cases: How many.
+        cases: Number of cases.
         outcomes: Their outcomes, in words.
         wrong: Examples of wrong ones.
     """
@@ -41,11 +41,11 @@ class Faults:
 
     @property
     def good(self) -> bool:
-        """Whether nothing was lost that need not be, and nothing was unclear."""
+        """Whether no avoidable loss and no unclear message occurred."""
         return not self.wrong
 
     def add(self, outcome: str, problem: str = "") -> None:
-        """Count a case."""
+        """Add a case."""
         self.cases += 1
         self.outcomes[outcome] += 1
         if problem and len(self.wrong) < 20:
@@ -53,18 +53,18 @@ class Faults:
 
 
 def same(one: Rollout, other: Rollout) -> bool:
-    """Return whether the columns that both have are the same."""
+    """Return whether the common columns are equal."""
     return all(
         np.array_equal(one[name], other[name], equal_nan=True)
         for name in set(one.columns) & set(other.columns)
     )
 
 
-# ------------------------------------------------------------------ disks that fill
+# ----------------------------------------------------------------------- full disks
 
 
 def full_disk(rollout: Rollout, size: int, random: Random, folder: Path) -> Faults:
-    """Save over an older log where only so many bytes fit.
+    """Save over an older log with limited disk space.
 
     The child of a fork has the limit; /dev/full, which refuses the first byte, is
     reached through a link in the place of the half-written file.
@@ -83,10 +83,10 @@ def full_disk(rollout: Rollout, size: int, random: Random, folder: Path) -> Faul
     if child == 0:
         _save_and_leave(rollout, path, room, message)
     os.waitpid(child, 0)
-    said = message.read_text() if message.exists() else ""
+    reported = message.read_text() if message.exists() else ""
     problem = ""
-    if not said.startswith(f"{path}: cannot write the log: "):
-        problem = f"said {said!r}"
+    if not reported.startswith(f"{path}: cannot write the log: "):
+        problem = f"printed {reported!r}"
     elif not same(Rollout.load(path), before) or len(Rollout.load(path)) != 2:
         problem = "the older log was damaged"
     left = {"log.npz", "message"}
@@ -97,9 +97,9 @@ def full_disk(rollout: Rollout, size: int, random: Random, folder: Path) -> Faul
 
 
 def _save_and_leave(rollout: Rollout, path: Path, room: int, message: Path) -> None:
-    """Save with little room, write the messages, and end the process."""
+    """Save with limited space, write the messages, and end the process."""
     text = "nothing"
-    with message.open("w") as file:  # opened, and small, before there is no room
+    with message.open("w") as file:  # opened, and small, before the limit
         if room:
             limit = max(room, 4096)
             resource.setrlimit(resource.RLIMIT_FSIZE, (limit, limit))
@@ -168,7 +168,7 @@ def interrupted(random: Random, folder: Path, log: Path, longest: float) -> Faul
     return found
 
 
-# ---------------------------------------------------------------------- all of them
+# ---------------------------------------------------------------------- all faults
 
 
 def short_run(seconds: float = 1.0) -> Rollout:

@@ -1,9 +1,9 @@
-"""Frozen controllers beside Python's: the same bits, whatever the state.
+"""Frozen controllers against Python's: the same bits at any state.
 
-Of each bundled configuration that can be frozen: the states of a run of ten seconds,
-and states that are drawn around its start, slow ones near it and fast ones far away.
-Each is a step of both, and status and effort have to be equal. Then the same once more
-with all compensators that can be frozen with the configuration.
+For every bundled configuration that can be frozen: the states of a run of ten seconds,
+and random states around its start, slow ones near it and fast ones far away. Both make
+a step at each state; status and effort must be equal. Then the same with all
+compensators that can be frozen with the configuration.
 """
 
 import tempfile
@@ -29,25 +29,25 @@ from hsp_control.common.resources import bundled_configs
 from hsp_control.control.compensation import Compensation
 
 PERIOD = 1e-3
-"""Of a configuration whose law is evaluated at all times [s]."""
+"""Control period of configurations with a continuous law [s]."""
 DURATION = 10.0
-"""Of each run [s]."""
+"""Duration of a run [s]."""
 DRAWN = 100_000
-"""States that are drawn for each configuration."""
+"""Random states per configuration."""
 BATCH = 1000
-"""Steps of one run of drawn states."""
+"""Steps per run of random states."""
 SPREADS = (0.05, 0.05), (0.5, 0.5), (1.5, 3.0)
-"""How far from the start [rad or m], and how fast [rad/s or m/s]."""
+"""Largest distances from the start [rad or m], and speeds [rad/s or m/s]."""
 BARE = Compensation(momentum_observer=None)
 """No compensators."""
 COMPENSATORS: dict[str, Any] = {
     "velocity_filter": hsp.compensation.VelocityFilter(80.0),
-    # a clip, so that a hand which is to yield does so
+    # with a clip, so that a compliant hand still yields
     "momentum_observer": hsp.compensation.MomentumObserver(30.0, clip=5.0),
     "integral_action": hsp.compensation.IntegralAction(1.0, limit=1.0),
     "start_up_ramp": hsp.compensation.StartUpRamp(0.3),
 }
-"""All kinds that can be frozen."""
+"""All compensators that can be frozen."""
 
 
 @dataclass
@@ -55,13 +55,13 @@ class Tally:
     """The outcome of one configuration.
 
     Attributes:
-        refused: Why it cannot be frozen; empty: it can.
-        compensators: The names of those that are on.
+        refused: Why it cannot be frozen; empty if it can.
+        compensators: The names of active compensators.
         run: Steps of the run.
-        drawn: Steps at states that were drawn.
+        drawn: Steps at random states.
         different: Steps whose status or effort differs in a bit.
         status: Steps by their status.
-        raised: Steps that neither makes.
+        raised: Steps that both refuse.
     """
 
     refused: str = ""
@@ -74,7 +74,7 @@ class Tally:
 
 
 class Pair:
-    """A controller in Python, perhaps with compensators, and the same without."""
+    """A controller in Python, possibly with compensators, and its frozen copy."""
 
     def __init__(
         self,
@@ -98,14 +98,14 @@ class Pair:
         self._raised = 0
 
     def step(self, t: float, q: Array, v: Array) -> None:
-        """Make a step of both, and compare."""
+        """Make a step of both and compare."""
         status = self._opened.step(t, q, v)
         try:
             tau = self._own.effort(t, q, v, self._period)
         except HspControlError:
             self._tally.raised += 1
             self._tally.different += status >= 0
-            # A library that is refused for long stops the robot; Python goes on.
+            # After many refused steps the library stops the robot; Python continues.
             self._raised += 1
             return
         self._raised = 0
@@ -116,7 +116,7 @@ class Pair:
 
     @property
     def lost(self) -> bool:
-        """Whether so many steps in a row were refused that both have to begin anew."""
+        """Whether both must restart after too many consecutive refusals."""
         return self._raised == 5
 
 
@@ -144,11 +144,11 @@ def compared(
 
     Args:
         name: The configuration's name.
-        drawn: How many states are drawn.
-        duration: How long its run is [s].
-        seed: Of the states that are drawn.
-        compensators: Whether all that can be frozen are on; nothing is compared if that
-            is none.
+        drawn: Number of random states.
+        duration: Duration of its run [s].
+        seed: Seed of the random states.
+        compensators: Whether all that can be frozen are active; if none can be, nothing
+        is compared.
     """
     tally = Tally()
     period = hsp.load_experiment(name).scenario.simulation.control_period or PERIOD

@@ -1,4 +1,4 @@
-"""A URDF as it should not be: in its bytes, its structure, its numbers, its files."""
+"""Invalid URDFs: wrong bytes, structure, numbers and files."""
 
 import copy
 from random import Random
@@ -70,11 +70,11 @@ ARM = """<robot name="arm">
     <limit lower="-0.2" upper="0.2" effort="90" velocity="1"/></joint>
 </robot>
 """
-"""A small robot that has everything: the rest is bundled."""
+"""A small robot with every element; others are bundled."""
 
 
 def mutated(data: bytes, random: Random) -> bytes:
-    """Return a URDF with something done to it."""
+    """Return a mutated URDF."""
     trick = random.random()
     if trick < 0.2:
         return random.choice(TRICKS)(data, random)
@@ -152,7 +152,7 @@ def _number(text: str, random: Random) -> str:
 
 
 def _grow(root: Element, random: Random) -> None:
-    """Make it deep, long or wide."""
+    """Make it deeply nested, long or wide."""
     count = random.choice((50, 150, 300, 3000))
     kind = random.choice(("deep", "chain", "materials"))
     if kind == "deep":

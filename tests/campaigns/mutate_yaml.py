@@ -1,4 +1,4 @@
-"""A configuration as an absent-minded or ill-disposed person would write it."""
+"""Configurations with careless or malicious mistakes."""
 
 import copy
 from collections.abc import Iterator
@@ -19,7 +19,7 @@ TEXTS: list[Any] = [
     "", " ", "nan", "inf", "1e3", "yes", "null", "0x10", "start", "home", "panda",
     "world",
     "panda_hand", "../../../../etc/passwd", "/etc/passwd", "/dev/zero", "/", ".",
-    "~nobody",
+    "~unknown",
     "no.urdf", "x" * 300 + ".urdf", "a\0b.urdf", "file:///etc/passwd", LONG,
     "\u202e", "é",
     "%s%n", "{0}", "[bold]x[/]", "$(id)", "`id`",
@@ -38,11 +38,11 @@ TAGS = [
     "!!timestamp 2001-12-14",
     "!custom {{a: 1}}",
 ]
-"""Tags that would run code, or make objects, in a loader that is not safe."""
+"""Tags that would run code or make objects in an unsafe loader."""
 
 
 def mutated(data: bytes, random: Random, canary: str) -> bytes:
-    """Return a configuration with something done to it."""
+    """Return a mutated configuration."""
     trick = random.random()
     if trick < 0.25:
         return random.choice(TRICKS)(data, random)
@@ -60,7 +60,7 @@ def mutated(data: bytes, random: Random, canary: str) -> bytes:
 
 
 def override(data: bytes, random: Random) -> str:
-    """Return a ``--set`` for some place of a configuration, or for none."""
+    """Return a ``--set`` for an existing or missing key of a configuration."""
     places = list(_places(yaml.safe_load(data)))
     path = [*random.choice(places)]
     if random.random() < 0.3:
@@ -153,7 +153,7 @@ def _deep(levels: int, random: Random) -> Any:
 
 
 def _tagged(text: str, random: Random, canary: str) -> str:
-    """Put a tag where a value stands."""
+    """Put a tag before a value."""
     lines = text.split("\n")
     valued = [i for i, line in enumerate(lines) if ": " in line and "#" not in line]
     i = random.choice(valued)
@@ -183,7 +183,7 @@ def _expanding(text: str, random: Random) -> str:
 
 
 def _twice(text: str, random: Random) -> str:
-    """Give a key twice."""
+    """Repeat a key."""
     lines = text.split("\n")
     i = random.randrange(len(lines))
     return "\n".join([*lines[: i + 1], *lines[i:]])

@@ -1,11 +1,10 @@
-"""Random states and references through the public step: no NaN, no effort too great.
+"""Random states and references through the public step: no NaN, no excessive effort.
 
-A batch is a controller that is drawn (a position, a pose or several levels, one of many
-fields, a metric, limits) and a thousand states that nobody would choose: anywhere
-within the joints' limits, on them, beyond, stretched out; at rest or at ten times the
-greatest speed. References are near, far, fast or out of reach, since the trajectory and
-the time are drawn, too; and where the rate of efforts is limited, the last effort was
-any.
+A batch is a random controller (a position, a pose or several levels, one of many
+fields, a metric, limits) and a thousand adverse states: anywhere within the joints'
+limits, on them, beyond, stretched; at rest or at ten times the largest speed.
+References are near, far, fast or out of reach, since trajectory and time are random,
+too; with rate limits the previous effort is random.
 """
 
 from collections import Counter
@@ -24,16 +23,16 @@ from hsp_control.robot import RobotState
 
 BATCH = 1000
 PERIOD = 1e-3
-"""The control period that limited rates of effort are for [s]."""
+"""The control period of rate limits [s]."""
 ROUNDING = 1e-9
-"""Of an effort beside its limit, as a part of it."""
+"""Tolerated excess of an effort over its limit, relative to it."""
 OWN_EFFORTS = {"planar3r": (60.0, 40.0, 20.0)}
-"""For the robot whose URDF has none [N·m]: a little above and below gravity's."""
+"""Limits for a robot without any [N·m]: slightly above and below gravity's efforts."""
 OTHERS = (
     "dual_panda", "tiago_reach", "ur5_position", "whole_body/baxter_two_hands",
     "whole_body/solo12_trunk", "whole_body/talos_circle",
 )  # fmt: skip
-"""Bundled configurations whose own controllers are driven, too."""
+"""Bundled configurations whose own controllers are tried, too."""
 
 
 @dataclass
@@ -43,14 +42,14 @@ class Tally:
     Attributes:
         steps: Steps.
         not_finite: Steps whose effort or acceleration holds a NaN or an infinity.
-        beyond: Steps whose effort, or its rate, is beyond its limit.
-        worst: The largest effort as a part of its limit.
+        beyond: Steps whose effort or rate exceeds its limit.
+        worst: The largest effort relative to its limit.
         raised: Steps that were refused, by the name of the error.
         status: Steps by `ControlOutput.status`.
         damped: Steps near a singularity.
         limited: Steps with limited efforts.
-        examples: The first that went wrong: batch and step.
-        seconds: How long it took.
+        examples: The first failures: batch and step.
+        seconds: Its duration [s].
     """
 
     steps: int = 0
@@ -64,10 +63,10 @@ class Tally:
     examples: list[str] = field(default_factory=list)
     seconds: float = 0.0
 
-    def note(self, where: str, what: str) -> None:
+    def note(self, where: str, problem: str) -> None:
         """Keep an example of a failure."""
         if len(self.examples) < 20:
-            self.examples.append(f"{where}: {what[:200]}")
+            self.examples.append(f"{where}: {problem[:200]}")
 
     @property
     def good(self) -> bool:
@@ -76,13 +75,13 @@ class Tally:
 
 
 def bundled(name: str, seed: int, steps: int) -> Iterator[Tally]:
-    """Drive a bundled robot by controllers that are drawn; yield after each batch."""
+    """Step a bundled robot with random controllers; yield after every batch."""
     robot = hsp.Robot.load(name)
     yield from _drive(robot, seed, steps, lambda rng: drawn_controller(robot, rng))
 
 
 def configured(config: str, seed: int, steps: int) -> Iterator[Tally]:
-    """Drive the robot of a bundled configuration by its own controller, limited."""
+    """Step the robot of a bundled configuration with its own controller and limits."""
     experiment = hsp.load_experiment(config)
     if experiment.scenario.limits is None:
         limits = "limits={position: none, velocity: none}"
@@ -111,7 +110,7 @@ def _drive(
 
 
 class _Step:
-    """Steps of one controller, judged."""
+    """Steps of one controller, checked."""
 
     def __init__(
         self, controller: hsp.Controller, rng: np.random.Generator, tally: Tally
@@ -127,7 +126,7 @@ class _Step:
         self._slack = ROUNDING * np.clip(self._effort, 1.0, 1e6)
 
     def take(self, state: RobotState, where: str) -> None:
-        """Take a step and count its outcome."""
+        """Make a step and record its outcome."""
         tally = self._tally
         low, high = -self._effort, self._effort
         if self._rated:
@@ -161,7 +160,7 @@ class _Step:
             tally.note(where, "beyond its limit")
 
 
-# ------------------------------------------------------------------- what is drawn
+# ------------------------------------------------------------------ random choices
 
 
 def drawn_configurations(
@@ -191,7 +190,7 @@ def drawn_configurations(
 
 
 def drawn_velocities(robot: hsp.Robot, rng: np.random.Generator, count: int) -> Array:
-    """Return velocities, shape (count, nv): zero, or up to ten times the greatest."""
+    """Return velocities, shape (count, nv): zero, or up to ten times the limit."""
     greatest = robot.model.upperVelocityLimit
     known = np.isfinite(greatest) & (greatest > 0.0) & (greatest < 100.0)
     scale = 10.0 ** rng.uniform(-4.0, 1.0, count) * (rng.random(count) > 0.1)
@@ -322,7 +321,7 @@ def _ball(rng: np.random.Generator) -> hsp.Obstacle:
 
 def _limits(robot: hsp.Robot, rng: np.random.Generator) -> hsp.Limits:
     own = OWN_EFFORTS.get(robot.name)
-    bounded = bool(rng.random() < 0.3)  # a programme of many rows
+    bounded = bool(rng.random() < 0.3)  # a QP with many rows
     scale = 10.0 ** rng.uniform(-1.5, 0.0)
     return hsp.Limits(
         effort=hsp.limits.Scaled(scale) if own is None else scale * np.array(own),

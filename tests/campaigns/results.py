@@ -1,4 +1,4 @@
-"""Counts of the campaigns, kept in files."""
+"""Results of the campaigns, kept in files."""
 
 import json
 import platform
@@ -9,7 +9,7 @@ FOLDER = Path("out/fuzz")
 
 
 def keep(name: str, counts: dict[str, Any]) -> None:
-    """Write the counts of one campaign, whole or so far."""
+    """Write the results of one campaign, complete or so far."""
     FOLDER.mkdir(parents=True, exist_ok=True)
     text = json.dumps({**counts, "interpreter": platform.python_version()}, indent=1)
     part = FOLDER / f".{name}.part"

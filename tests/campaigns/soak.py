@@ -1,6 +1,6 @@
-"""Minutes of simulated time at 1 kHz, as on a robot: memory stays flat.
+"""Minutes of simulated time at 1 kHz, as on a robot: memory use is constant.
 
-The loop is that of a robot: measure, compute, apply, and nothing kept. Python's
+The loop is that of a robot: measure, compute, apply, store nothing. Python's
 allocations (tracemalloc) and the memory of the process (its resident set) are read
 every simulated half minute, after a warm-up.
 """
@@ -24,8 +24,8 @@ MINUTES = 10.0
 PYTHON_GROWTH = 100_000
 """Largest growth of Python's allocations between warm-up and end [bytes]."""
 PROCESS_GROWTH = 8_000_000
-"""Largest growth of the process [bytes]: the allocator's pages, and no leak, which at
-600000 steps would be more with 16 bytes a step."""
+"""Largest growth of the process [bytes]: pages of the allocator; a leak of 16 bytes per
+step would exceed it in 600000 steps."""
 
 
 @dataclass
@@ -46,18 +46,18 @@ class Soak:
 
     @property
     def growth(self) -> tuple[int, int]:
-        """How much more at the end than at the beginning [bytes]: Python, process."""
+        """Growth from begin to end [bytes]: Python, process."""
         return self.python[-1] - self.python[0], self.process[-1] - self.process[0]
 
     @property
     def good(self) -> bool:
-        """Whether memory stayed flat."""
+        """Whether memory use stayed constant."""
         python, process = self.growth
         return python < PYTHON_GROWTH and process < PROCESS_GROWTH
 
 
 def soak(seconds: float, log_channels: int, show: object = None) -> Soak:
-    """Run the loop for a simulated time [s], read memory so many times."""
+    """Run the loop for a simulated time [s], with that many memory readings."""
     experiment = hsp.load_experiment(CONFIG)
     controller, robot = experiment.controller, experiment.robot
     plant = IntegratedPlant(hsp.plants.RigidBodyPlant(robot), Rk4(PERIOD))
@@ -92,7 +92,7 @@ def soak(seconds: float, log_channels: int, show: object = None) -> Soak:
 
 
 def campaign(progress: Progress, seed: int, share: float) -> bool:
-    """Soak for ten minutes."""
+    """Run the soak for ten minutes."""
     seconds = share * MINUTES * 60.0
     bar = progress.add_task("soak", total=seconds / PERIOD)
     found = soak(

@@ -20,7 +20,7 @@ def flipped(data: bytes, random: Random) -> bytes:
 
 
 def cut(data: bytes, random: Random) -> bytes:
-    """Leave out the end, the beginning or a piece."""
+    """Remove the end, the beginning or a piece."""
     a, b = sorted(random.randrange(len(data) + 1) for _ in range(2))
     return random.choice((data[:a], data[b:], data[:a] + data[b:]))
 
@@ -33,7 +33,7 @@ def repeated(data: bytes, random: Random) -> bytes:
 
 
 def junked(data: bytes, random: Random) -> bytes:
-    """Put characters in that have a meaning, or none."""
+    """Insert characters with or without a meaning."""
     changed = data
     for _ in range(random.choice((1, 1, 2, 5))):
         a = random.randrange(len(changed) + 1)
@@ -43,7 +43,7 @@ def junked(data: bytes, random: Random) -> bytes:
 
 
 def lines_moved(data: bytes, random: Random) -> bytes:
-    """Leave out, repeat, exchange or indent lines."""
+    """Remove, repeat, exchange or indent lines."""
     lines = data.split(b"\n")
     for _ in range(random.choice((1, 1, 2, 4))):
         i, j = (random.randrange(len(lines)) for _ in range(2))
@@ -73,4 +73,4 @@ def recoded(data: bytes, random: Random) -> bytes:
 TRICKS: list[Callable[[bytes, Random], bytes]] = [
     flipped, cut, repeated, junked, lines_moved, recoded,
 ]  # fmt: skip
-"""All of them."""
+"""All mutations."""

@@ -1,7 +1,7 @@
 """Runs cases in another process, so that a crash or a hang is a result, too.
 
 A case is a function of (seed, index): the parent sends both, the process makes the case
-from them and answers with one line. A process that dies is replaced.
+and answers with one line. A process that dies is replaced.
 """
 
 import faulthandler
@@ -20,7 +20,7 @@ from pathlib import Path
 from typing import Any, NamedTuple, Self
 
 MEMORY = 12_000_000_000
-"""Address space of a worker [bytes]: to allocate more is a failure."""
+"""Address space of a worker [bytes]: larger allocations fail."""
 
 
 class Answer(NamedTuple):
@@ -28,10 +28,10 @@ class Answer(NamedTuple):
 
     Attributes:
         index: The case's number.
-        kind: ``fine``, ``refused`` (one clear error), or what must not be:
+        kind: ``fine``, ``refused`` (one clear error), or a failure:
             ``traceback``, ``unclear``, ``crash``, ``hang``.
-        text: The error, or what was wrong.
-        seconds: How long it took.
+        text: The error, or the failure.
+        seconds: Its duration [s].
     """
 
     index: int
@@ -41,7 +41,7 @@ class Answer(NamedTuple):
 
     @property
     def good(self) -> bool:
-        """Whether it is as it must be."""
+        """Whether the outcome is acceptable."""
         return self.kind in ("fine", "refused")
 
 
@@ -69,7 +69,7 @@ class Worker:
         self._first = False
         seconds = time.monotonic() - start
         if line is None:
-            process.send_signal(signal.SIGUSR1)  # reports where it is
+            process.send_signal(signal.SIGUSR1)  # reports its stack
             time.sleep(0.5)
             self.close()
             self._trace.seek(0)

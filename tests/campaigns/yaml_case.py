@@ -9,7 +9,7 @@ from campaigns.mutate_yaml import mutated, override
 from hsp_control.common.resources import bundled_configs
 
 STOP = 0.3
-"""When Ctrl-C ends a run that is let begin [s]."""
+"""Time after which Ctrl-C ends a started run [s]."""
 
 
 def case(seed: int, index: int) -> list[str]:

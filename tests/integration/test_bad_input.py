@@ -1,4 +1,4 @@
-"""Targets, bounds and messages that make no sense: a message, or no jump."""
+"""Invalid targets, bounds and messages: refused, or without a jump."""
 
 import math
 from collections.abc import Callable
@@ -51,7 +51,7 @@ def step(t: float, value: float) -> np.ndarray[Any, np.dtype[np.float64]]:
     return np.array([away, 0.0, 0.5])
 
 
-# --- numbers that are none ----------------------------------------------------------
+# --- NaN and infinity ---------------------------------------------------------------
 
 BOUNDS = ("effort", "effort_rate", "velocity", "acceleration", "bandwidth")
 NONE = [(0, "0 is too small"), (-1, "-1 is negative"), (NAN, "nan is not a fin")]
@@ -101,7 +101,7 @@ simulation: {duration: 0.01, control_period: 0.001}
 """
 
 
-# --- numbers that no robot can follow -----------------------------------------------
+# --- infeasible numbers -------------------------------------------------------------
 
 
 def to_reference(law: hsp.Controller, reference: Any) -> hsp.Controller:
@@ -142,10 +142,10 @@ AWAY: dict[str, Callable[[], hsp.Controller]] = {
 }
 
 
-@pytest.mark.parametrize("what", AWAY)
+@pytest.mark.parametrize("target", AWAY)
 @pytest.mark.filterwarnings("ignore::hsp_control.control.first_state.StartWarning")
-def test_what_no_robot_can_follow_makes_no_effort_jump(what: str) -> None:
-    assert_no_jump(AWAY[what]())
+def test_infeasible_targets_make_no_effort_jump(target: str) -> None:
+    assert_no_jump(AWAY[target]())
 
 
 def test_a_rate_that_gravity_outruns_is_warned_of_and_kept(

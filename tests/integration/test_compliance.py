@@ -1,4 +1,4 @@
-"""A compliant hand along whole motions: the effects of a force.
+"""A compliant hand along whole motions: the effects of an external force.
 
 The law runs in the integrator's stages, so that the comparison is one of the equations
 themselves; where efforts are held, the difference is given.
@@ -46,7 +46,7 @@ def pose_hand(**fields: Any) -> FramePose:
 def run(
     hand: hsp.Task, metric: Metric, pushes: list[Push], gain: float = 3.0, **how: Any
 ) -> Rollout:
-    """Return a run from rest, its null space off its field; it knows no pushes."""
+    """Return a run from rest with e_N ≠ 0; the controller has no model of pushes."""
     robot, q = panda(), start()
     away = robot.integrate(q, 0.4 * np.sin(1.0 + np.arange(7)))
     field = hsp.TargetPosture(away, weight=1.5)
@@ -73,7 +73,7 @@ CASES = {
 def test_an_unknown_force_at_the_hand_does_not_reach_the_null_space(name: str) -> None:
     """With W = M: e_N' = -K_N e_N - P M⁻¹J_hᵀ f, and P M⁻¹J_hᵀ = 0.
 
-    It is so for gains as for an impedance. With W = I the same force is felt.
+    The same for gains and for an impedance. With W = I the same force has an effect.
     """
     hand, push = CASES[name]
     pushed = run(hand, MassMatrixMetric(), [push])
@@ -95,7 +95,8 @@ def test_an_unknown_force_at_the_hand_does_not_reach_the_null_space(name: str) -
 def test_under_a_constant_force_the_hand_rests_where_the_spring_holds_it(
     metric: Metric,
 ) -> None:
-    """x - x_d = K⁻¹ f, for a matrix as well; a moment turns it about its own axes."""
+    """x - x_d = K⁻¹ f, for a matrix K too; a moment rotates it about the moment's
+    axis."""
     coupled = np.array([[600.0, 150.0, 0.0], [150.0, 400.0, -80.0], [0, -80.0, 500.0]])
     stiffness = np.zeros((6, 6))
     stiffness[:3, :3], stiffness[3:, 3:] = coupled, np.diag([25.0, 30.0, 20.0])
@@ -123,7 +124,7 @@ def inertia(q: Array, rows: int) -> Array:
 @pytest.mark.parametrize(
     "metric", [MassMatrixMetric(), *further(IdentityMetric())], ids=repr
 )
-def test_the_energy_is_what_came_in_less_what_was_damped(metric: Metric) -> None:
+def test_the_energy_is_the_input_less_the_dissipation(metric: Metric) -> None:
     """E' = fᵀv - e'ᵀDe' + ½ eᵀK'e, E = ½ e'ᵀΛe' + ½ eᵀKe: passive at the hand.
 
     The last term is the work of a growing stiffness.
@@ -158,7 +159,7 @@ def test_the_energy_is_what_came_in_less_what_was_damped(metric: Metric) -> None
     "damping", [{"damping_ratio": 0.7}, *further({"damping": 40.0})], ids=repr
 )
 def test_a_stiffness_that_changes_adds_no_energy(damping: dict[str, float]) -> None:
-    """Held away by a force, the hand waits; let go, it becomes stiffer as it moves.
+    """The stiffness of a displaced hand waits; after the release it grows with motion.
 
     E(t) - E(0) <= ∫ fᵀx' at all times, where efforts are held for a period.
     """
@@ -190,7 +191,7 @@ def test_a_stiffness_that_changes_adds_no_energy(damping: dict[str, float]) -> N
     came = np.concatenate([[0.0], np.cumsum(0.005 * (power[1:] + power[:-1]))])
     assert (energy <= came + 2e-3).all()  # of 1 J
     assert energy.max() > 0.9
-    # The change as a function of time alone would have added 4 J.
+    # A change as a function of time alone would add 4 J.
     moved = e[int(2.4 / 0.01)]
     assert 0.5 * (1000.0 - 200.0) * moved @ moved > 3.0
     assert np.abs(np.diff(log.tau, axis=0)).max() < 4.0  # in 10 ms; 3.5 by the force
@@ -230,8 +231,8 @@ def cartesian() -> Rollout:
     return hsp.load_experiment(CARTESIAN).run()
 
 
-def test_limits_that_an_observer_tells_are_not_bound_by_a_push() -> None:
-    """The robot's own limits, far from being reached: they know that it is pushed."""
+def test_limits_with_an_observer_stay_inactive_under_a_push() -> None:
+    """The robot's own limits are not reached: they include the push."""
     log = cartesian()
     early = log.t < 2.5
     assert not log["status"].any()
@@ -251,7 +252,7 @@ def test_limits_that_an_observer_tells_are_not_bound_by_a_push() -> None:
 
 
 def test_the_observer_finds_the_force_and_does_not_fight_it() -> None:
-    """A known wrench is found at 1 kHz, and the hand moves as without an observer."""
+    """A known wrench is estimated at 1 kHz; the hand moves as without an observer."""
     push = Push("panda_tcp", FORCE, MOMENT, duration=10.0)
     how: dict[str, Any] = {
         "duration": 1.5, "control_period": 0.001, "integrator": Rk4(0.001), "gain": 5.0,
@@ -285,7 +286,7 @@ def stiff(impedance: Impedance) -> Controller:
 def test_a_change_that_the_period_does_not_bear_is_refused_while_it_runs(
     kind: str,
 ) -> None:
-    """The advice is right: just below it a loop settles, just above it grows."""
+    """Just below the advised gain the loop converges, just above it diverges."""
     robot, q, v, h = panda(), panda().home(), np.zeros(7), 0.001
     spring = Impedance(400.0) if kind == "impedance" else None
     controller = Controller(robot, [position_hand(impedance=spring)], limits=None)
@@ -374,7 +375,7 @@ def test_the_cartesian_configuration_makes_its_point() -> None:
 
 
 def test_the_joint_configuration_makes_its_point() -> None:
-    """Efforts at the sprung joints do not reach the free one; a push at it does."""
+    """Efforts at the sprung joints do not move the free one; a push at it does."""
     experiment = hsp.load_experiment("compliance/panda_joint_impedance", COARSE)
     log = experiment.run()
     assert log.status == "completed"

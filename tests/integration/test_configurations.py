@@ -1,4 +1,4 @@
-"""The bundled configurations make their points: with the field, and not without it.
+"""The bundled configurations achieve their purpose with the field, not without it.
 
 Whole runs, but at 250 Hz and logged every 20 ms, so that all of them take seconds.
 """
@@ -23,13 +23,13 @@ COARSE = (
     "simulation.log_period=0.02",
 )
 TRACKING = 1e-3
-"""Largest error of a hand at 250 Hz [m]; the rest is the effect of the held effort."""
+"""Tolerance on a hand's error at 250 Hz [m]: the effect of held efforts."""
 
 
 def run_both(name: str) -> tuple[Experiment, Rollout, Rollout]:
     """Return a configuration, its run, and the run without its first field.
 
-    The other has no limits either, which would share the field's work.
+    The other run has no limits either, since they would act like the field.
     """
     text = bundled_configs()[name].read_text(encoding="utf-8")
     others = json.dumps(yaml.safe_load(text)["null_space"]["fields"][1:])
@@ -47,14 +47,14 @@ def errors(rollout: Rollout) -> np.ndarray:
 
 
 def limit_margin(experiment: Experiment, rollout: Rollout) -> float:
-    """Return the least distance of a joint from its limits."""
+    """Return the smallest distance of a joint from its limits."""
     lower, upper = experiment.robot.position_limits()
     q = rollout["joint_positions"]
     return float(np.minimum(q - lower, upper - q).min())
 
 
 def minimum_distance(experiment: Experiment, rollout: Rollout) -> float:
-    """Return the least distance that the configuration's first field watches [m]."""
+    """Return the smallest distance of the pairs of the first field [m]."""
     field = experiment.controller.field
     if isinstance(field, FieldSum):
         field = field.terms[0]
@@ -67,7 +67,7 @@ def least_manipulability(rollout: Rollout) -> float:
     return float(np.sqrt(rollout["manipulability"].min()))
 
 
-# Each checks its configuration's purpose, with bounds somewhat looser than it shows.
+# Checks of a configuration's purpose, with bounds somewhat looser than measured.
 
 
 def the_hand_stays_able(experiment: Experiment, ours: Rollout, other: Rollout) -> None:
@@ -178,20 +178,20 @@ def test_a_configuration_makes_its_point(name: str) -> None:
 @pytest.mark.parametrize(
     "name", [*bundled_configs(), str(ROOT / "examples" / "stream" / "panda.yaml")]
 )
-def test_the_first_effort_is_what_gravity_asks(name: str) -> None:
-    """To a tenth of each limit, of whoever begins at rest."""
+def test_the_first_effort_is_that_of_gravity(name: str) -> None:
+    """Within a tenth of every limit, for runs that begin at rest."""
     experiment = load_experiment(name)
     robot, law, q = experiment.robot, experiment.controller, experiment.q0
     assert not experiment.v0.any() or name.startswith("paper/")  # on its trajectory
     rest = np.zeros(robot.nv)
     gravity = robot.inverse_dynamics(q, rest, rest)
-    if robot.unactuated:  # a posture on its feet, and nothing else
+    if robot.unactuated:  # only a posture on its feet
         still = JointPosture(q, joints=robot.joint_names[1:])
         holding = Controller(robot, [still], limits=None, contacts=law.contacts)
         gravity = holding.compute(0.0, q, rest).tau
     first = law.compute(0.0, q, experiment.v0).tau
     limit = np.asarray(robot.model.effortLimit)
-    limited = limit > 0.0  # planar3r has no motors' limits
+    limited = limit > 0.0  # planar3r has no effort limits
     assert (np.abs(first - gravity) <= 0.1 * limit)[limited].all()
 
 

@@ -40,7 +40,7 @@ def test_the_readme_s_python_is_short() -> None:
 
 
 def commands(text: str) -> list[list[str]]:
-    """Return the words behind `hsp` of each command in a page's shell blocks."""
+    """Return the words after `hsp` of the commands in a page's shell blocks."""
     shell = "".join(blocks(text, "sh") + blocks(text, "text")).replace("\\\n", " ")
     found = (
         re.match(r"(?:\$ |\.venv/bin/)?hsp ((?:\S[#>&|]|[^#>&|])*)", line.strip())
@@ -144,7 +144,7 @@ def test_every_public_name_is_documented_and_importable() -> None:
             assert not name.startswith("_")
 
 
-def test_the_page_of_one_s_own_robot_is_true() -> None:
+def test_the_page_on_a_user_s_robot_is_true() -> None:
     text = (ROOT / "docs" / "own_robot.md").read_text(encoding="utf-8")
     (configuration,) = blocks(text, "yaml")
     lines = [yaml.safe_load(line) for line in configuration.splitlines()]

@@ -1,7 +1,7 @@
-"""Out of reach in the metric M(q): nothing shakes an arm at a limit.
+"""Out of reach in the metric M(q): no oscillation at a limit.
 
-There a field demands several times what limits permit of wrists. A step that began
-to violate a limit by a tenth had left a quarter of that: the arms swung at 4 to 8 Hz.
+There a field demands several times the wrists' limits. When a violation by a tenth
+reduced the demand to a quarter, the arms oscillated at 4 to 8 Hz.
 """
 
 import numpy as np
@@ -37,7 +37,7 @@ STILL = (
 def test_a_hand_above_an_orientation_rests(
     name: str, period: float, q0: Array, goal: Array
 ) -> None:
-    """0.3 m and 5 mm beyond the reach, with the default field."""
+    """0.3 m and 5 mm out of reach, with the default field."""
     robot = hsp.Robot.load(name)
     frame = robot.end_effector
     hand = hsp.FramePosition(frame, name="hand")
@@ -56,11 +56,11 @@ def test_a_hand_above_an_orientation_rests(
 
 
 @pytest.mark.slow
-def test_a_task_that_asks_a_joint_beyond_its_limit_forever_rests() -> None:
-    """A centre of mass out of reach holds joint 4 of an iiwa at its limit.
+def test_a_task_that_demands_a_joint_beyond_its_limit_rests() -> None:
+    """A centre of mass out of reach keeps joint 4 of an iiwa at its limit.
 
-    It demands 11 rad/s² there. The null space gave that with the wrist, whose share of
-    it turned within 4 mrad: the arm swung at 16 Hz.
+    It demands 11 rad/s² there, which the null space provided with the wrist. That
+    direction rotated within 4 mrad, and the arm oscillated at 16 Hz.
     """
     robot, period = hsp.Robot.load("iiwa14"), 0.002
     q0 = np.array([0.182, 0.407, 0.266, -1.8, 0.084, 0.928, 0.108])

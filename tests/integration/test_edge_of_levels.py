@@ -1,4 +1,4 @@
-"""Beyond the reach, levels keep their order, and the arm rests."""
+"""Out of reach, levels keep their order and the arm comes to rest."""
 
 from typing import Any
 
@@ -18,7 +18,7 @@ SHORT = 0.02  # 1 to 8 mm; without the rule of `threshold_below` 160 to 510 mm
 
 
 def rests_at(name: str, q0: Array, away: Array, *below: hsp.Task) -> float:
-    """Return how far a hand stays from where it is sent; it is at rest there."""
+    """Return the hand's distance from its target, at rest."""
     robot, frame = load(name), FRAMES[name]
     goal = robot.state(0.0, q0, np.zeros(robot.nv)).position(frame) + away
     tasks = [hsp.FramePosition(frame, hsp.Hold(goal)), *below]
@@ -32,8 +32,8 @@ def rests_at(name: str, q0: Array, away: Array, *below: hsp.Task) -> float:
 
 
 @pytest.mark.parametrize("name", ["ur5", *further("panda")])
-def test_the_hand_is_as_near_as_it_can_be_whatever_is_asked_below(name: str) -> None:
-    """A position half a metre too far, above an orientation, above a posture."""
+def test_the_hand_is_as_near_as_possible_for_any_lower_demand(name: str) -> None:
+    """A position half a metre out of reach, above an orientation, above a posture."""
     robot, q0 = load(name), load(name).home()
     start = robot.state(0.0, q0, np.zeros(robot.nv)).frame(FRAMES[name])
     away = 1.5 * np.array([0.6, 0.5, 0.6]) / np.linalg.norm([0.6, 0.5, 0.6])
@@ -45,8 +45,8 @@ def test_the_hand_is_as_near_as_it_can_be_whatever_is_asked_below(name: str) -> 
         assert rests_at(name, q0, away, *below) - alone <= SHORT
 
 
-def test_an_orientation_that_is_met_gives_way_too() -> None:
-    """It demands nothing, but would undo what the position above it draws."""
+def test_an_orientation_without_error_yields_too() -> None:
+    """It demands nothing, but would oppose the motion of the position above it."""
     q0 = np.array([-0.019, -1.491, 1.837, -2.484, -1.32, -0.043])
     away = np.array([-1.993, -0.799, 0.043])
     below = hsp.FrameOrientation(FRAMES["ur5"], priority=2)
@@ -61,7 +61,7 @@ def test_an_orientation_that_is_met_gives_way_too() -> None:
 def test_an_orientation_below_a_spring_out_of_reach_rests(
     name: str, away: list[float]
 ) -> None:
-    """A spring that slips holds its level, too."""
+    """A slipping spring saturates its level, too."""
     robot, frame = load(name), FRAMES[name]
     here = robot.state(0.0, robot.home(), np.zeros(robot.nv)).position(frame)
     spring = hsp.Impedance(600.0)
@@ -71,7 +71,7 @@ def test_an_orientation_below_a_spring_out_of_reach_rests(
 
 
 def test_a_spring_above_an_orientation_rests_where_a_joint_is_at_its_limit() -> None:
-    """It swung at 8.5 Hz with the directions that springs release from 0.4 size on."""
+    """It oscillated at 8.5 Hz with directions that springs release from 0.4 size on."""
     q0 = np.array([-0.2527, 0.469, -0.1675, -1.8041, 0.0461, 0.8357, 0.2226])
     goal, frame = [0.3359, -0.151, -0.899], load("iiwa14").end_effector
     hand = hsp.FramePosition(frame, hsp.Hold(goal), impedance=hsp.Impedance(126.8))
@@ -82,9 +82,9 @@ def test_a_spring_above_an_orientation_rests_where_a_joint_is_at_its_limit() -> 
 @pytest.mark.parametrize(
     ("q0", "goal"),
     [
-        # joints end at their limits, and the hand short of the goal
+        # joints are at their limits, and the hand does not reach the goal
         ([-0.27, -0.68, 0.26, -2.46, -0.06, 1.82, 1.04], [0.161, -0.535, -0.443]),
-        # the hand was lost to the orientation, and regained, and lost
+        # the position yielded to the orientation, recovered, and yielded again
         ([0.29, -0.99, 0.17, -2.62, 0.14, 1.37, 0.63], [0.301, 0.909, 0.327]),
     ],
     ids=["limits", "by turns"],
@@ -92,14 +92,14 @@ def test_a_spring_above_an_orientation_rests_where_a_joint_is_at_its_limit() -> 
 def test_a_hand_just_out_of_reach_rests_above_an_orientation(
     q0: list[float], goal: list[float]
 ) -> None:
-    """It demands little, and what is below it much."""
+    """It demands little, and the levels below it much."""
     hand = hsp.FramePosition("panda_tcp", hsp.Hold(goal))
     below = hsp.FrameOrientation("panda_tcp", priority=2)
     assert rests(load("panda"), np.array(q0), hand, below, period=PERIOD)
 
 
 def test_a_centre_of_mass_out_of_reach_rests() -> None:
-    """On a fixed base it keeps no balance: its threshold follows as any other's."""
+    """On a fixed base it is no balance task: its threshold adapts as any other's."""
     robot, rng = load("panda"), np.random.default_rng(0)
     q0 = robot.home() + rng.uniform(-0.3, 0.3, robot.nv)
     here = robot.state(0.0, q0, np.zeros(robot.nv)).centroidal.position
@@ -109,14 +109,14 @@ def test_a_centre_of_mass_out_of_reach_rests() -> None:
 
 @pytest.mark.parametrize("name", ["panda", *further("ur5")])
 def test_a_height_out_of_reach_rests(name: str) -> None:
-    """All joints draw the hand up, against the inertia of the whole arm."""
+    """All joints lift the hand, against the inertia of the whole arm."""
     robot = load(name)
     task = hsp.FramePosition(FRAMES[name], hsp.Hold([2.0]), axes="z")
     assert rests(robot, robot.home(), task, period=PERIOD)
 
 
 def test_a_field_does_not_shake_an_arm_that_a_spring_holds_stretched() -> None:
-    """It demands the arm's bent posture, and motors and joints have no limits."""
+    """It demands a flexed posture; there are no effort or joint limits."""
     robot = load("planar3r")  # of 3 kg and 3 m: 100 1/s² at an error of 0.9 m
     assert robot.spring_force == pytest.approx((270.0, 270.0 * 1.5 / 2.0))
     q0 = robot.integrate(robot.neutral(), np.array([0.1, 0.6, 0.6]))
@@ -127,8 +127,8 @@ def test_a_field_does_not_shake_an_arm_that_a_spring_holds_stretched() -> None:
     assert np.abs(run.v[-1]).max() < 1e-6
 
 
-def test_no_joint_does_at_any_speed_what_the_others_cannot() -> None:
-    """Three joints without limits in their URDF, and motors that gravity overloads."""
+def test_no_joint_compensates_for_others_at_any_speed() -> None:
+    """Three joints without limits in the URDF, with motors overloaded by gravity."""
     robot = hsp.Robot.load("bravo7_no_ee")  # it was 1e18 rad/s after 30 ms
     made = hsp.Controller(robot, [hsp.FramePose(robot.end_effector)])
     run = hsp.simulate(made, robot.home(), duration=1.0, control_period=1e-3)

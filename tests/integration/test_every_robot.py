@@ -1,8 +1,8 @@
-"""Every robot that is known, driven by the same few lines for a second of its time.
+"""Every known robot, controlled by the same few lines for a simulated second.
 
-Each holds a point, and where it can a pose, that it starts away from and with a speed
-of the robot, while a posture and the middle of its range draw on the null space. Errors
-are taken from the logged motion by plain Pinocchio.
+It moves from an offset and with a speed to a point, or to a pose if it can, while a
+posture and joint centering act in the null space. Errors are taken from the logged
+motion by plain Pinocchio.
 """
 
 from dataclasses import dataclass, field, replace
@@ -38,7 +38,7 @@ BUNDLED = list(bundled_robots())
 EXAMPLES = {k: v for k, v in example_robots().items() if k not in BUNDLED}
 FIXED = [name for name, source in EXAMPLES.items() if source.root == "fixed"]
 FLOATING_BASE = [name for name, source in EXAMPLES.items() if name not in FIXED]
-NO_JOINTS = {"hector", "iris"}  # a bolted-down drone has nothing to move
+NO_JOINTS = {"hector", "iris"}  # a drone with a fixed base has no joints
 MOBILE = ["tiago", "tiago_pro", "panda"]
 
 FREQUENCY = 5.0  # of the tasks [rad/s], and K_N [1/s]
@@ -49,7 +49,7 @@ TOLERANCE = 3e-8
 
 @dataclass(frozen=True)
 class Case:
-    """A robot and the options that it is loaded with."""
+    """A robot and its loading options."""
 
     name: str
     options: dict[str, Any] = field(default_factory=dict)
@@ -70,7 +70,7 @@ ALIKE = {
     *("icub", "simple_humanoid", "so100", "solo8", "talos_box", "talos_full"),
     *("talos_full_box", "talos_legs"),
 }
-"""Robots beside which there is another one with the same joints."""
+"""Robots with the same joints as another one."""
 CASES = [
     *(Case(name) for name in BUNDLED + FIXED if THOROUGH or name not in ALIKE),
     Case("panda", {"locked": {}}),  # fingers free, one of them the other's mimic
@@ -109,7 +109,7 @@ class Kinematics:
 
 @dataclass
 class Start:
-    """Where a robot starts, and which rows of its end effector's Jacobian it tracks."""
+    """A robot's start, and the rows of its end effector's Jacobian that are tracked."""
 
     q: Array
     rows: list[int]
@@ -117,7 +117,7 @@ class Start:
 
 
 def ranges(robot: Robot) -> tuple[Array, Array]:
-    """Return limits that are there, ±π elsewhere."""
+    """Return the limits, or ±π where there are none."""
     lower, upper = robot.position_limits()
     there = np.isfinite(lower) & np.isfinite(upper) & (upper > lower)
     return np.where(there, lower, -np.pi), np.where(there, upper, np.pi)
@@ -126,9 +126,9 @@ def ranges(robot: Robot) -> tuple[Array, Array]:
 def find_start(
     robot: Robot, rng: np.random.Generator, choices: list[list[int]]
 ) -> Start:
-    """Return home where one of the choices of rows is well conditioned there.
+    """Return home if one of the choices of rows is well conditioned there.
 
-    Elsewhere return the best of fifty random configurations.
+    Otherwise return the best of fifty random configurations.
     """
     kinematics = Kinematics(robot)
 
@@ -155,7 +155,7 @@ def hold_and_centre(robot: Robot, kind: str) -> float:
     """Check both propositions on a second of motion; return the least sigma_min."""
     rng = np.random.default_rng(7)
     kinematics = Kinematics(robot)
-    # The null space keeps a freedom at least.
+    # At least one degree of freedom is left to the null space.
     axes = min(robot_table.abilities(robot)["position"], robot.nv - 1)
     choices = [list(c) for c in combinations(range(3), axes)]
     start = find_start(robot, rng, choices if kind == "position" else [list(range(6))])
@@ -207,7 +207,7 @@ def hold_and_centre(robot: Robot, kind: str) -> float:
         J = kinematics.jacobian(q)[rows]
         e_N.append((g - v) - J.T @ np.linalg.solve(J @ J.T, J @ (g - v)))
     t = rollout.t[:, None]
-    # e' = -J v for a target at rest; of an orientation's error by its own coordinates.
+    # e' = -J v for a target at rest; an orientation's error in its own coordinates.
     e0, e0_dot = e[0], rollout["task.hand.error_rate"][0]
     if kind == "position":
         J = kinematics.jacobian(q0)[rows]
@@ -241,20 +241,20 @@ def test_both_propositions(case: Case) -> None:
 @pytest.mark.parametrize(
     ("name", "frame"),
     [
-        ("allegro_right_hand", "link_11.0_tip"),  # a finger, for there is no arm
+        ("allegro_right_hand", "link_11.0_tip"),  # a finger, since there is no arm
         ("baxter", "right_gripper"),
         ("bravo7_no_ee", "end_effector_ball"),
         ("finger_edu", "finger_tip_link"),
         ("go2", "RR_foot"),
         ("kinova", "j2s6s200_end_effector"),  # its fingers are fixed frames behind it
         ("panda", "panda_tcp"),
-        ("panda_collision", "panda_hand_tcp"),  # where the fingers spring from
+        ("panda_collision", "panda_hand_tcp"),  # the base of the fingers
         ("talos_full", "gripper_right_base_link"),
         ("tiago", "hand_tool_link"),  # not the tip of its ring finger
         ("tiago_pro", "gripper_right_base_link"),
         ("ur5", "tool0"),
         ("xarm7", "link_eef"),
-        ("z1", "gripperStator"),  # not the jaw that moves
+        ("z1", "gripperStator"),  # not the moving jaw
     ],
 )
 def test_end_effector_is_the_frame_that_a_person_would_name(

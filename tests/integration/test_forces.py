@@ -1,4 +1,4 @@
-"""Commanded forces on an engine that knows nothing of the law: the configurations."""
+"""Commanded forces in an independent physics engine: the configurations."""
 
 import re
 
@@ -68,7 +68,7 @@ def test_the_bound_on_the_damping_of_a_slip(
 
 
 def test_talos_presses_against_a_wall() -> None:
-    """40 N that the soles balance, on real contacts, and no step is limited."""
+    """40 N balanced by the soles, on compliant contacts; no step is limited."""
     pytest.importorskip("example_robot_data")
     log = load_experiment("forces/talos_wall", "simulation.duration=1.8", COARSE).run()
     assert log.meta["status"] == "completed"
@@ -84,7 +84,7 @@ def test_talos_presses_against_a_wall() -> None:
 
 
 def test_talos_leans_while_it_is_heavier_than_its_model() -> None:
-    """Halfway to 120 N, a tenth too heavy: it stands, and presses as commanded."""
+    """On the ramp to 120 N, 10 % too heavy: it stands, and presses as commanded."""
     pytest.importorskip("example_robot_data")
     log = load_experiment("forces/talos_lean", "simulation.duration=2.2", COARSE).run()
     assert log.meta["status"] == "completed"
@@ -97,7 +97,8 @@ def test_talos_leans_while_it_is_heavier_than_its_model() -> None:
 
 
 def test_two_pandas_lift_a_box() -> None:
-    """60 N between the palms, half of the weight on each: friction alone holds it."""
+    """60 N between the palms, half of the weight on each: friction alone holds the
+    box."""
     log = load_experiment("forces/pandas_box", "simulation.duration=1.7", COARSE).run()
     late = log.t > 1.3
     for side, sign in (("left", 1.0), ("right", -1.0)):

@@ -50,10 +50,10 @@ def test_it_has_slides_pictures_and_frames_and_needs_no_network(replays: Path) -
 
 
 @pytest.mark.parametrize(("text", "message"), [
-    ("```{replay} nobody\n:title: A run\n```", "nobody.html; `make docs` writes it"),
-    ("![A figure](nobody.png)", "there is no picture nobody.png"),
+    ("```{replay} missing\n:title: A run\n```", "missing.html; `make docs` writes it"),
+    ("![A figure](missing.png)", "there is no picture missing.png"),
 ])  # fmt: skip
-def test_what_does_not_exist_is_said(tmp_path: Path, text: str, message: str) -> None:
+def test_missing_names_are_reported(tmp_path: Path, text: str, message: str) -> None:
     source = tmp_path / "lecture.md"
     source.write_text(f"# Title\n\n{text}\n", encoding="utf-8")
     with pytest.raises(ExtensionError, match=message):

@@ -24,7 +24,7 @@ def run(name: str, *overrides: str) -> tuple[Rollout, Limits | None]:
 
 
 def check_limits(rollout: Rollout, limits: Limits | None) -> None:
-    """Nothing is beyond its limit in any row of the log."""
+    """No limit is exceeded in any row of the log."""
     assert limits is not None
     assert rollout.meta["status"] == "completed"
     q, v, tau = rollout["q"], rollout["v"], rollout["tau"]
@@ -42,7 +42,8 @@ def error(rollout: Rollout) -> np.ndarray:
 
 
 def test_half_strength() -> None:
-    """No effort beyond half; the null space pays, and the hand a little."""
+    """No effort above half of its limit; the null space deviates, and the hand
+    slightly."""
     ours, limits = run("panda_half_strength", SHORTER)
     free, _ = run("panda_half_strength", UNLIMITED, SHORTER)
     check_limits(ours, limits)
@@ -58,7 +59,7 @@ def test_half_strength() -> None:
 
 
 def test_towards_a_joint_limit() -> None:
-    """At the first stop the null space has given way, at the second the hand too."""
+    """At the first stop the null space deviates, at the second the hand, too."""
     ours, limits = run("panda_towards_limit")
     free, _ = run("panda_towards_limit", UNLIMITED, FREE)
     check_limits(ours, limits)
@@ -66,20 +67,20 @@ def test_towards_a_joint_limit() -> None:
     assert free["q"][:, 3].max() > limits.upper[3] + 0.5
     assert ours["q"][:, 3].max() > limits.upper[3] - 0.006  # up to the margin
     first, second, home = (np.searchsorted(ours.t, t) for t in (2.9, 4.9, 7.9))
-    # The deviation from strict order at a weight of 1e-3; below, its cause.
+    # Deviation from strict priority at a weight of 1e-3; its cause is below.
     assert error(ours)[first] < 5e-4
     assert ours["null_space_norm"][first] > 1.0
     assert 5e-3 < error(ours)[second] < 0.05
     waiting = (ours.t > 4.6) & (ours.t < 5.0)
     assert np.abs(ours["v"][waiting]).max() < 0.1  # at rest beyond its reach
-    assert error(ours)[home] < 1e-5  # and on the way back all is as it was
+    assert error(ours)[home] < 1e-5  # and everything recovers on the way back
     assert ours["null_space_norm"][home] < 1e-3
     assert ours["status"][home] == 0
 
 
 @pytest.mark.parametrize("name", ["panda_half_strength", "panda_towards_limit"])
 def test_the_law_until_a_limit_is_met(name: str) -> None:
-    """Before the first limited step both runs are one."""
+    """Before the first limited step both runs are identical."""
     half = "half" in name
     ours, _ = run(name, *([SHORTER] if half else []))
     free, _ = run(name, UNLIMITED, SHORTER if half else FREE)
@@ -89,10 +90,9 @@ def test_the_law_until_a_limit_is_met(name: str) -> None:
 
 
 def test_efforts_do_not_swing_where_a_target_jumps() -> None:
-    """25 cm at once: the null space does not help for the last bit of a task.
+    """A step of 25 cm: the null space does not deviate for the last bit of a task.
 
-    If it cost no more than where there is no error, efforts would change by 32 N·m in
-    2 ms.
+    If its cost were that without an error, efforts would change by 32 N·m in 2 ms.
     """
     robot = hsp.Robot.load("panda")
     home, period = robot.home(), 0.002

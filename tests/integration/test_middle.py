@@ -1,8 +1,8 @@
-"""In the middle the law is exact: steps, pushes and fields, in every metric.
+"""In the interior the law is exact: steps, pushes and fields, in every metric.
 
-Wherever a target can be reached, no limit binds, and the smallest singular value is
-above a tenth of the robot's size: to what an effort that is held allows, at most 5e-3
-of the step for each millisecond.
+The target is reachable, no limit is active, and the smallest singular value is above a
+tenth of the robot's size. The only error is that of held efforts, at most 5e-3 of the
+step per millisecond of the period.
 """
 
 from dataclasses import replace
@@ -25,7 +25,7 @@ from hsp_control.simulation.plants import Push, RigidBodyPlant
 ARMS = ("panda", "iiwa14", "xarm7", "ur5", "ur10", "kinova", "talos_arm", "z1")
 PERIODS = (0.0005, 0.001, 0.0025, 0.005, 0.01)
 STEP, TURN, FORCE = 0.2, np.deg2rad(60.0), 40.0
-RATE, DURATION = 10.0, 0.5  # ω0 [rad/s], how long it is watched [s]
+RATE, DURATION = 10.0, 0.5  # ω0 [rad/s], duration [s]
 SAMPLED = 5.0  # error of a held effort, relative to the step, over a period [1/s]
 CASES = 3 if THOROUGH else 1
 STEPPED = np.array([0.0, 0.12, 0.05])  # of two hands, and on rails
@@ -40,7 +40,7 @@ def metric_of(rng: np.random.Generator, nv: int) -> Any:
 
 
 def random_vector(rng: np.random.Generator, longest: float) -> Array:
-    """Return a vector of up to a length."""
+    """Return a random vector of a given maximum length."""
     d = rng.normal(size=3)
     return np.asarray(rng.uniform(0.05, 1.0) * longest * d / np.linalg.norm(d))
 
@@ -122,7 +122,7 @@ def test_steps_within_reach_are_the_law(name: str) -> None:
 @pytest.mark.parametrize("metric", ["identity", "mass"])
 @pytest.mark.parametrize("name", ["panda", "iiwa14"])
 def test_a_push_moves_the_hand_as_the_gains_have_it(name: str, metric: str) -> None:
-    """On a task with gains: e'' + Kv e' + Kp e = -Λ⁻¹f, and nothing else.
+    """On a task with gains: exactly e'' + Kv e' + Kp e = -Λ⁻¹f.
 
     The same rollout without bounds on the error is the law itself.
     """

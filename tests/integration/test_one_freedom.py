@@ -1,4 +1,4 @@
-"""A robot of one joint: Pinocchio hands its matrices of one column over as vectors."""
+"""A robot of one joint: Pinocchio returns single-column matrices as vectors."""
 
 from pathlib import Path
 from typing import Any
@@ -52,17 +52,17 @@ def robot(tmp_path: Path) -> Robot:
 
 
 def turning(length: float, angle: float) -> Array:
-    """Return ∂/∂angle of the place of a point on the rod."""
+    """Return ∂/∂angle of the position of a point on the rod."""
     return length * np.array([np.cos(angle), 0.0, -np.sin(angle)])
 
 
 def falling(length: float, angle: float) -> Array:
-    """Return ∂²/∂angle² of the place of a point on the rod."""
+    """Return ∂²/∂angle² of the position of a point on the rod."""
     return length * np.array([-np.sin(angle), 0.0, -np.cos(angle)])
 
 
 def test_terms_are_the_pendulums_at_every_state(robot: Robot) -> None:
-    """The arrays follow the state: they are requested once, and read after moving."""
+    """Arrays are views of the state: requested once, and read after a move."""
     state = robot.state(0.0, [0.0], [0.0])
     tip, mass, world = state.frame("tip"), state.centroidal, state.world
     for angle, rate in ((0.3, 1.5), (-2.0, -0.4)):
@@ -113,7 +113,7 @@ def test_the_error_equation_in_closed_loop(
     t = run.t[:, None]
     expected = run["task.it.error"][0] * (1.0 + 10.0 * t) * np.exp(-10.0 * t)
     np.testing.assert_allclose(run["task.it.error"], expected, rtol=0, atol=1e-8)
-    assert np.abs(run["null_space_error"]).max() < 1e-9  # nothing is left of it
+    assert np.abs(run["null_space_error"]).max() < 1e-9  # it has decayed
 
 
 def test_within_limits_beside_a_ball_and_pushed(robot: Robot) -> None:

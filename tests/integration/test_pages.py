@@ -27,7 +27,7 @@ PAGES = [
 ]
 WITH_BLOCKS = [page for page in PAGES if blocks_of(page)]
 FIRST = ("README.md", "docs/tutorial/", "docs/how_to/")
-"""Whose commands run each time; those of the others keep pace with real time."""
+"""Pages whose commands always run; others' commands run in real time."""
 WITH_COMMANDS = [
     page
     for page in WITH_BLOCKS
@@ -41,7 +41,7 @@ NOT_RUN = [
 ]
 
 
-# --- claims of a page about the names that its Python leaves --------------------------
+# --- claims of a page about the variables of its Python -------------------------------
 
 
 def the_readme(space: dict[str, Any]) -> None:
@@ -110,7 +110,7 @@ def test_a_block_is_not_run(page: str, block) -> None:
 
 @pytest.mark.parametrize("page", WITH_BLOCKS)
 def test_commands_stand_in_blocks_of_commands(page: str) -> None:
-    """A block of text is output: nobody runs it."""
+    """A block of text is output and is not run."""
     commands = {"hsp", "make", "pip", "python", "git", "cd", "source", "sudo"}
     for block in blocks_of(page):
         assert block.language, f"{page}:{block.line} does not name its language"

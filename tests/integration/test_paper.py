@@ -3,7 +3,7 @@
 `planar_arm` has its own kinematics, dynamics, costs, law (with the printed derivative
 of the pseudo-inverse) and integration, all in absolute angles. The package's run comes
 from the bundled configurations, in relative angles with the metric W = AᵀA, by
-Pinocchio and the short form of the law. Nothing is shared but the paper.
+Pinocchio and the short form of the law. The two share no code.
 """
 
 import numpy as np
@@ -20,16 +20,15 @@ from hsp_control.null_space.metrics import MetricSample
 
 CONFIGURATIONS = {int(name[6]): name for name in bundled_configs() if "paper/" in name}
 NUMBERS = (1, 2, 3, 4)
-# (1) is chaos; (2) grazes a singularity at 3.14 s.
+# (1) is chaotic; (2) grazes a singularity at 3.14 s.
 SECONDS = {1: 2.0, 2: 10.0 if THOROUGH else 5.0, 3: 10.0, 4: 10.0}
 
 
 def experiment(number: int, log_period: float = 0.01) -> Experiment:
-    """Return the bundled configuration, at a tolerance tenfold tighter than its own.
+    """Return the bundled configuration with a tolerance ten times tighter.
 
-    Of (1), which is chaos, the first 2 s.
-
-    (2) grazes a singularity at 3.14 s, where that much is lost again.
+    (1) is chaotic: its first 2 s. (2) passes near a singularity at 3.14 s, where a
+    digit is lost.
     """
     return load_experiment(
         CONFIGURATIONS[number],
@@ -46,12 +45,12 @@ def by_hand(number: int) -> PlanarSimulation:
 
 
 def absolute(rollout: Rollout) -> Array:
-    """Return the absolute angles along a run, wound up as the joints are."""
+    """Return the absolute angles along a run, unwrapped like the joints'."""
     return arm.absolute_from_relative(rollout["joint_positions"])
 
 
 def agree(found: Array, expected: Array, tolerance: float) -> None:
-    """Compare to a part of the largest value, or of 1."""
+    """Compare relative to the largest value or 1."""
     size = max(1.0, float(np.abs(expected).max()))
     np.testing.assert_allclose(
         found[: len(expected)], expected, rtol=0, atol=tolerance * size
@@ -62,9 +61,9 @@ def agree(found: Array, expected: Array, tolerance: float) -> None:
 def test_whole_trajectories(number: int) -> None:
     """θ and det(JJᵀ) to 1e-9, rates, accelerations and torques to 1e-8 of the largest.
 
-    Over 10 s, 2 s in (1), 5 s in (2) but for `make thorough`. Found: 1e-12 in (3) and
-    (4), 6e-11 in (2), whose torques reach 2e4 N·m at its near singularity and are good
-    to 1e-9 of that.
+    Over 10 s, 2 s in (1), 5 s in (2) except in `make thorough`. Measured: 1e-12 in (3)
+    and (4), 6e-11 in (2), whose torques reach 2e4 N·m near its singularity, accurate to
+    1e-9 of that.
     """
     run, hand = experiment(number).run(), by_hand(number)
     assert run.status == "completed"
@@ -94,8 +93,8 @@ def test_terms_at_random_states(number: int) -> None:
     for _ in range(50):
         theta, theta_dot = rng.uniform(-np.pi, np.pi, 3), rng.normal(size=3)
         t = rng.uniform(0.0, 10.0)
-        # Away from singularities, the disk, and where round-the-circle differences
-        # of relative angles differ from the paper's.
+        # Away from singularities, from the disk, and from angles at which wrapped
+        # differences of relative angles differ from the paper's.
         r = arm.relative_from_absolute(theta)
         unlike = abs(np.arctan2(np.sin(r[2] - r[1]), np.cos(r[2] - r[1])) - r[2] + r[1])
         near = arm.disk_distances(t, theta).min() < 0.3

@@ -14,14 +14,14 @@ EXAMPLE = ROOT / "examples" / "plugin"
 
 @pytest.fixture(scope="module")
 def installed(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Return the folder in which the example is installed, and nothing else."""
+    """Return a folder with only the installed example."""
     folder = tmp_path_factory.mktemp("installed")
     source = tmp_path_factory.mktemp("source") / "plugin"
     copy = ["cp", "-r", str(EXAMPLE), str(source)]  # a build leaves files behind
     subprocess.run(copy, check=True)
     offline = ["--no-deps", "--no-index", "--no-build-isolation", "--quiet"]
     pip = [sys.executable, "-m", "pip", "install", *offline]
-    # pip refuses constraints for a build that uses what is there.
+    # pip refuses constraints for a build without isolation.
     own = {k: v for k, v in os.environ.items() if k != "PIP_BUILD_CONSTRAINT"}
     subprocess.run([*pip, "--target", str(folder), str(source)], check=True, env=own)
     return folder
@@ -40,10 +40,10 @@ DEMO = str(EXAMPLE / "demo.yaml")
 
 @pytest.mark.process
 def test_its_types_work_in_a_configuration(installed: Path, tmp_path: Path) -> None:
-    said = hsp(installed, f"check {DEMO}", tmp_path)
-    assert "FrameHeight, 1 rows" in said
-    assert "elbow_height" in said
-    assert "DampedPlant" in said or "damped" in said.lower()
+    reported = hsp(installed, f"check {DEMO}", tmp_path)
+    assert "FrameHeight, 1 rows" in reported
+    assert "elbow_height" in reported
+    assert "DampedPlant" in reported or "damped" in reported.lower()
 
 
 @pytest.mark.process
@@ -69,7 +69,7 @@ def test_it_runs_plots_and_exports(installed: Path, tmp_path: Path) -> None:
 
 @pytest.mark.process
 @pytest.mark.slow
-@pytest.mark.parametrize("workers", further(1))  # a worker finds types as any process
+@pytest.mark.parametrize("workers", further(1))  # a worker finds types like any process
 def test_it_sweeps(workers: int, installed: Path, tmp_path: Path) -> None:
     over = "--over plant.damping=0:2:2 --out s.parquet"
     line = f"sweep {DEMO} {over} --workers {workers}"
@@ -81,5 +81,5 @@ def test_it_sweeps(workers: int, installed: Path, tmp_path: Path) -> None:
 def test_its_robot_is_reached_by_name(installed: Path, tmp_path: Path) -> None:
     live = f"live {DEMO} --robot"
     hsp(installed, f"{live} example://anywhere --duration 0.2", tmp_path)
-    said = hsp(installed, f"{live} exmaple://x", tmp_path, status=2)
-    assert "did you mean example://ADDRESS?" in said
+    reported = hsp(installed, f"{live} exmaple://x", tmp_path, status=2)
+    assert "did you mean example://ADDRESS?" in reported

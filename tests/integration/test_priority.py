@@ -1,4 +1,4 @@
-"""No field makes a feasible task fail, whatever it demands and whatever binds."""
+"""No field makes a feasible task fail, for any demand and any active limit."""
 
 from functools import partial
 
@@ -42,7 +42,7 @@ FIELDS = {
 @pytest.mark.slow
 @pytest.mark.parametrize(("name", "field"), covering(ARMS, FIELDS, times=2))
 def test_a_field_that_pushes_into_limits_leaves_the_task(name: str, field: str) -> None:
-    """The hand stays where it is, while joints are driven into their limits."""
+    """The hand stays in place while joints are driven into their limits."""
     robot, (kind, size) = hsp.Robot.load(name), FIELDS[field]
     q0 = robot.integrate(robot.neutral(), np.array(ARMS[name]))
     d = np.random.default_rng(sum(map(ord, name + field))).normal(size=robot.nv)
@@ -69,11 +69,11 @@ def test_a_field_that_pushes_into_limits_leaves_the_task(name: str, field: str) 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("name", ["panda", "xarm7"])
-def test_a_step_within_reach_is_made_whatever_a_field_asks_for(name: str) -> None:
-    """Its first accelerations are beyond the motors' limits, so that it is damped.
+def test_a_reachable_step_is_made_for_any_field(name: str) -> None:
+    """The first accelerations exceed the motors' limits, so that the law is damped.
 
-    A field's demand once passed for the tasks' there: the hand ended 0.6 and 0.8 m
-    away. Now it is as quick as without a field.
+    When a field's demand was treated as the tasks', the hand ended 0.6 and 0.8 m away.
+    Now it is as fast as without a field.
     """
     robot, rng = hsp.Robot.load(name), np.random.default_rng(1)
     q0 = robot.integrate(robot.neutral(), np.array(ARMS[name]))
@@ -99,8 +99,8 @@ def test_a_step_within_reach_is_made_whatever_a_field_asks_for(name: str) -> Non
 
 @pytest.mark.slow
 @pytest.mark.parametrize("period", [0.002, 0.01])
-def test_a_pushed_hand_comes_back_whatever_a_field_asks_for(period: float) -> None:
-    """As the law was damped wholly a tenth beyond a limit, it stayed 86 mm away."""
+def test_a_pushed_hand_returns_for_any_field(period: float) -> None:
+    """With full damping at a tenth beyond a limit it stayed 86 mm away."""
     robot, rng = hsp.Robot.load("xarm7"), np.random.default_rng([0, 3, 23])
     q0 = np.array(ARMS["xarm7"])
     d, u = rng.normal(size=robot.nv), rng.normal(size=3)

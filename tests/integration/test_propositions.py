@@ -1,7 +1,7 @@
 """The paper's three propositions along whole motions, on three robots and metrics.
 
-Errors are taken from the logged configurations by plain Pinocchio, never from the
-columns that the controller wrote about itself.
+Errors are computed from the logged configurations by plain Pinocchio, not taken from
+the controller's columns.
 """
 
 from collections.abc import Callable
@@ -119,7 +119,7 @@ METRICS: dict[str, tuple[Callable[[int], Metric], Callable[[str, Array], Array]]
 
 
 def home(name: str) -> Array:
-    """Return a start well away from singularities; never one with symmetries."""
+    """Return a start away from singularities, without symmetries."""
     robot = load(name)
     if name == "planar3r":
         return robot.integrate(robot.neutral(), np.array([-0.4, 0.9, 0.8]))
@@ -135,8 +135,8 @@ class TaskCase:
     """Tasks on a robot, started off their reference.
 
     Attributes:
-        build: The tasks, for the start's placement of the frame.
-        errors: Each task's error at (t, q) by plain Pinocchio, given the same.
+        build: The tasks, for the frame's placement at the start.
+        errors: The tasks' errors at (t, q) by plain Pinocchio, for the same placement.
         frequency: Natural frequency of the critically damped gains [rad/s].
     """
 
@@ -190,7 +190,7 @@ def about(center: Array, t: float) -> Array:
 
 
 def off_by(start: pin.SE3) -> Callable[[float, pin.SE3], Array]:
-    """Return the error of a position that is to swing off its start."""
+    """Return the error of a position that oscillates about its start."""
     return lambda t, here: swing(start.translation, OFF, t) - here.translation
 
 
@@ -395,10 +395,10 @@ def null_space_errors(run: Run, rollout: Rollout) -> tuple[Array, Array]:
 
 @every_run
 def test_proposition_2_the_null_space_error_decays_as_it_must(run: Run) -> None:
-    """Scalar K_N: ‖e_N‖_W = ‖e_N(0)‖_W exp(-K_N t) to 1e-9 of itself, all along.
+    """Scalar K_N: ‖e_N‖_W = ‖e_N(0)‖_W exp(-K_N t) to 1e-9 of itself, throughout.
 
     Any K_N: V' = -e_NᵀW K_N e_N with V = ½ e_NᵀW e_N, by differences of eighth order.
-    They are good to 1e-10 of V(0). And V falls from each row to the next.
+    The differences are accurate to 1e-10 of V(0). V decreases from row to row.
     """
     rollout = self_motion(run)
     e_N, W = null_space_errors(run, rollout)
@@ -450,7 +450,7 @@ def planar_cost(angles: Array) -> float:
 
 
 def posture() -> Array:
-    """Return where the Panda's joints would go if nothing held its hand."""
+    """Return the unconstrained minimum of the Panda's joints."""
     return home("panda") + np.array([0.8, 0.3, -0.9, 0.2, 0.7, -0.1, 0.5])
 
 
@@ -498,7 +498,7 @@ HELD_RUNS = covering(HELD, ["mass matrix", "identity"])
 
 @cache
 def settled(which: str, metric: str) -> Rollout:
-    """Return the motion to the minimum, from rest, the end effector held."""
+    """Return the motion to the minimum from rest, with the end effector held."""
     case = HELD[which]
     robot, q0 = load(case.robot), home(case.robot)
     start = plain(case.robot).placement(q0, FRAMES[case.robot])
@@ -542,10 +542,10 @@ def constrained_minimum(which: str) -> Array:
 def test_proposition_3_q_converges_to_the_constrained_minimum(
     which: str, metric: str
 ) -> None:
-    """In both metrics the same minimum, that of an optimiser that knows no robot.
+    """In both metrics the same minimum, that of a generic optimiser.
 
-    SLSQP with differences is good to 1e-8 here. The velocity that is left is Pg, the
-    projected gradient, which is zero at the minimum alone.
+    SLSQP with differences is accurate to 1e-8 here. The residual velocity is Pg, the
+    projected gradient, which is zero only at the minimum.
     """
     case, rollout = HELD[which], settled(which, metric)
     minimum = constrained_minimum(which)
@@ -560,7 +560,7 @@ def test_proposition_3_q_converges_to_the_constrained_minimum(
         case.constraint(rollout["joint_positions"][0]),
         atol=1e-9,
     )
-    # Nothing moves any more.
+    # The robot is at rest.
     np.testing.assert_allclose(rollout.v[-1], 0.0, atol=1e-9)
 
 
@@ -568,7 +568,7 @@ def test_proposition_3_q_converges_to_the_constrained_minimum(
 def test_proposition_3_the_cost_falls(which: str, metric: str) -> None:
     """f' = -‖Pg‖²_W + gᵀW e_N while the end effector is held (docs/law.md).
 
-    Once e_N has died f falls monotonically, to rounding.
+    Once e_N has decayed f decreases monotonically, to rounding.
     """
     rollout = settled(which, metric)
     case = HELD[which]

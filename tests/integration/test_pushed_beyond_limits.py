@@ -1,4 +1,4 @@
-"""A push unknown to the model moves joints beyond their limits: it is reported."""
+"""An unmodelled push moves joints beyond their limits: this is reported."""
 
 import numpy as np
 import pytest
@@ -43,7 +43,7 @@ USUAL = [each for each in CASES if THOROUGH or each != "talos on mujoco"]
 
 @pytest.mark.slow
 @pytest.mark.parametrize("case", USUAL)
-def test_a_joint_beyond_its_limit_is_told(case, tmp_path, capsys):
+def test_a_joint_beyond_its_limit_is_reported(case, tmp_path, capsys):
     config, plant = CASES[case]
     if case.startswith("talos"):
         pytest.importorskip("example_robot_data")
@@ -62,7 +62,7 @@ def test_a_joint_beyond_its_limit_is_told(case, tmp_path, capsys):
         every["joint_positions"] - limits.upper, limits.lower - every["joint_positions"]
     )
     outside = np.maximum(outside, 0.0)
-    # The push is stronger than the motors, and the status shows when.
+    # The push exceeds the motors' efforts; the status shows when.
     worst, dof = np.unravel_index(outside.argmax(), outside.shape)
     assert outside[worst, dof] > 0.03
     fast = np.abs(every.v) > (1.0 + BEYOND_SPEED) * limits.velocity
@@ -70,23 +70,23 @@ def test_a_joint_beyond_its_limit_is_told(case, tmp_path, capsys):
     np.testing.assert_array_equal(every["status"] == Status.BEYOND, beyond)
     np.testing.assert_array_equal(run["status"] == Status.BEYOND, beyond[::10])
     # A row has the worst control period since the row before it: none is missed.
-    told = run["position_excess"]
-    assert len(told) == 31
+    reported = run["position_excess"]
+    assert len(reported) == 31
     for row in range(1, 31):
         since = outside[10 * row - 9 : 10 * row + 1].max(axis=0)
-        np.testing.assert_allclose(told[row], since, atol=1e-9)
-    assert measures(run)["position_excess.max"].value == told.max()
+        np.testing.assert_allclose(reported[row], since, atol=1e-9)
+    assert measures(run)["position_excess.max"].value == reported.max()
     run.save(tmp_path / "run.npz")
-    assert Rollout.load(tmp_path / "run.npz")["position_excess"].max() == told.max()
-    # The summary names it, and when.
+    assert Rollout.load(tmp_path / "run.npz")["position_excess"].max() == reported.max()
+    # The summary has the joint and the time.
     name = experiment.robot.dof_names[dof]
     if isinstance(config, str):
         words = [each for setting in brief for each in ("--set", setting)]
         folder = str(tmp_path)
         assert main(["run", config, *words, "--out", folder]) == 0
-        said = " ".join(capsys.readouterr().out.split())
-        assert f"{name} is {told.max():.3g} rad beyond its position limit" in said
-        assert f"{beyond[::10].sum()} beyond a limit" in said
+        output = " ".join(capsys.readouterr().out.split())
+        assert f"{name} is {reported.max():.3g} rad beyond its position limit" in output
+        assert f"{beyond[::10].sum()} beyond a limit" in output
 
 
 def test_without_a_push_no_joint_is_beyond():

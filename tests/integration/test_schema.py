@@ -1,4 +1,4 @@
-"""The schema that editors read: with all that companions declare."""
+"""The schema for editors, with the companions' types."""
 
 import json
 
@@ -8,7 +8,7 @@ from hsp_control.common.resources import bundled, bundled_configs
 
 
 def test_the_bundled_schema_is_the_exported_one() -> None:
-    """Editors find it by the first line of each bundled configuration."""
+    """Editors find it by the first line of a bundled configuration."""
     file = bundled("configs") / "hsp_control.schema.json"
     assert json.loads(file.read_text(encoding="utf-8")) == exported_schema(), (
         "refresh it with: hsp schema > configs/hsp_control.schema.json"

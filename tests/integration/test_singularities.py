@@ -1,4 +1,4 @@
-"""Singularities: the law is exact away from them, and bounded and forgiving in them.
+"""Singularities: the law is exact away from them, and bounded at them.
 
 A singular value s of J L⁻ᵀ below the threshold ε is inverted by s(2 - s²/ε²)/ε² instead
 of 1/s, so ‖J#‖ ≤ 1.0887/ε. With κ = 1.0887/ε and x = g - v, for the identity metric,
@@ -68,12 +68,12 @@ class Passage:
 
     Attributes:
         robot: The robot.
-        task: The task, which leads there and back.
-        start: Where it starts, shape (nq,).
-        duration: How long it takes, with time to recover [s].
+        task: The task, whose reference passes through it and back.
+        start: The initial configuration, shape (nq,).
+        duration: Its duration, with time to recover [s].
         threshold: The singularity threshold.
         effort: Bound on the largest effort [N·m].
-        step: Of the integrator [s].
+        step: The integrator's step [s].
     """
 
     robot: Robot
@@ -85,9 +85,9 @@ class Passage:
     step: float = 0.0005
 
     def controller(self, threshold: float) -> Controller:
-        """Return a controller that draws the joints to where they started.
+        """Return a controller whose field attracts the joints to their start.
 
-        The whole error is fed back, so that the threshold stays where it is.
+        The feedback is linear, so that the threshold is constant.
         """
         task: Any = self.task
         return Controller(
@@ -114,7 +114,7 @@ class Passage:
 
 
 def stretched_planar_arm() -> Passage:
-    """Its tip leaves the disk of 3 m that it can reach by 0.4 m, and returns."""
+    """The tip's reference leaves the reachable disk of 3 m by 0.4 m, and returns."""
     robot = load("planar3r")
     q0 = robot.integrate(robot.neutral(), np.array([0.6, -0.9, -0.7]))
     here = robot.state(0.0, q0, np.zeros(3)).position("tip")[:2].copy()
@@ -127,7 +127,7 @@ def stretched_planar_arm() -> Passage:
 
 
 def panda_out_of_reach(threshold: float) -> Passage:
-    """Its hand is commanded to a point 15 cm out of reach, and back."""
+    """The hand is commanded to a point 15 cm out of reach, and back."""
     robot = load("panda")
     q0, shoulder = robot.home(), np.array([0.0, 0.0, 0.333])
     here = robot.state(0.0, q0, np.zeros(7)).position("panda_tcp").copy()
@@ -142,7 +142,7 @@ def panda_out_of_reach(threshold: float) -> Passage:
 def driven(
     name: str, frame: str, joints: dict[int, float], swing: list[float]
 ) -> Passage:
-    """A pose that follows joints which swing through a singularity and back."""
+    """A pose reference along a joint motion through a singularity and back."""
     robot = load(name)
     state, still = RobotState(robot), np.zeros(robot.nv)
     singular = robot.home()
@@ -169,7 +169,7 @@ PASSAGES: dict[str, Callable[[], Passage]] = {
     "planar arm stretched": stretched_planar_arm,
     "panda out of reach": lambda: panda_out_of_reach(DEFAULT),
     "panda out of reach, more damping": lambda: panda_out_of_reach(0.1),
-    # The wrist's centre is on the line through shoulder and elbow's offset.
+    # The wrist's centre is on the line through the shoulder and the offset elbow.
     "panda elbow": lambda: driven(
         *("panda", "panda_tcp", {3: -0.466}), [0.1, -0.15, 0.1, 0.5, -0.1, 0.2, 0.1]
     ),
@@ -194,7 +194,7 @@ def passed(which: str) -> tuple[Passage, Rollout]:
 
 
 def damped_part(rollout: Rollout) -> tuple[int, int]:
-    """Return the first row that is damped and the last."""
+    """Return the first and the last damped row."""
     (rows,) = np.nonzero(rollout["damped"])
     return int(rows[0]), int(rows[-1])
 
@@ -211,13 +211,14 @@ def decayed(rollout: Rollout, name: str, rows: slice) -> tuple[Array, Array]:
 def test_the_law_is_exact_until_the_threshold_is_met(which: str) -> None:
     """Both propositions, to 1e-5 of the initial errors, until the singularity.
 
-    The difference is the integrator's: the last joint speeds grow within milliseconds.
+    The difference is the integrator's error: joint speeds grow within milliseconds at
+    the end.
     """
     passage, rollout = passed(which)
     first, _ = damped_part(rollout)
     assert first > 40
     e, expected = decayed(rollout, passage.task.name, slice(0, first))
-    assert np.linalg.norm(e, axis=1).max() > 1e-3  # it had something to get rid of
+    assert np.linalg.norm(e, axis=1).max() > 1e-3  # there was an error to reduce
     np.testing.assert_allclose(e, expected, rtol=0, atol=1e-5 * np.abs(e).max())
     norm, t = rollout["null_space_norm"][:first], rollout.t[:first]
     np.testing.assert_allclose(
@@ -249,7 +250,7 @@ def test_effort_is_bounded_in_the_singularity(which: str) -> None:
             answer = task.jacobian @ output.acceleration + task.jacobian_dot @ state.v
             scale = 1.0 + limit * passage.threshold
             np.testing.assert_allclose(answer, task.acceleration, atol=1e-11 * scale)
-    assert tightest > 0.02  # so the bound means something
+    assert tightest > 0.02  # so that the bound is tight
     assert np.isfinite(rollout.tau).all()
     assert np.abs(rollout.tau).max() < passage.effort
     assert robot is passage.robot
@@ -302,7 +303,8 @@ class Target:
             self.task = FramePosition(frame, position, gains=gains, axes=kind)
 
     def move(self, state: RobotState, away: Array, turn: Array) -> None:
-        """Put the target ``away`` [m] and turned by ``turn`` [rad] from the frame."""
+        """Move the target by ``away`` [m] and rotate it by ``turn`` [rad] off the
+        frame."""
         here = state.frame(self.frame)
         self.position = here.position + away
         self.rotation = here.rotation @ pin.exp3(turn)
@@ -317,9 +319,9 @@ def loaded(name: str) -> Robot:
 @pytest.mark.parametrize("largest", ["none", "robot"])
 @pytest.mark.parametrize("name", ROBOTS)
 def test_random_starts(name: str, largest: Any) -> None:
-    """20,000 if thorough: finite, bounded, exact and so reported if undamped.
+    """20,000 if thorough: finite, bounded, and exact if reported undamped.
 
-    Half of them with a threshold that follows the feedback: then most are damped.
+    Half of them with a threshold that adapts to the feedback: most of these are damped.
     """
     robot = loaded(name)
     rng = np.random.default_rng(sum(map(ord, name)))
@@ -342,7 +344,7 @@ def test_random_starts(name: str, largest: Any) -> None:
         assert np.linalg.norm(a) <= limit
         values = controller.diagnose().singular_values
         (threshold,) = controller.active_stack.law.thresholds
-        # In the middle the law is exact, whatever the threshold follows.
+        # In the interior the law is exact for either threshold.
         stretched = controller.active_stack.law.problem.stretched
         near = max(NEAR * robot.size, 2.0 * DEFAULT)
         middle = values[-1] > near and stretched.max() < FAR

@@ -1,4 +1,4 @@
-"""Streams in a controller: exact tracking, runs that repeat, and YAML."""
+"""Streams in a controller: exact tracking, repeatable runs, and YAML."""
 
 import json
 from collections.abc import Callable
@@ -24,7 +24,7 @@ def hand_pose(robot: hsp.Robot) -> pin.SE3:
 
 
 def moved(pose: pin.SE3, t: float) -> pin.SE3:
-    """Return a pose that moves about ``pose``."""
+    """Return a pose trajectory near ``pose``."""
     away = np.array([0.0, 0.08 * np.sin(2 * t), 0.05 * np.sin(t) ** 2])
     turned = pin.exp3(np.array([0.3, 0.2, 0.0]) * np.sin(1.5 * t))
     return pin.SE3(pose.rotation @ turned, pose.translation + away)
@@ -33,7 +33,7 @@ def moved(pose: pin.SE3, t: float) -> pin.SE3:
 def every(
     period: float, send: Callable[[float], object]
 ) -> Callable[[LogWriter], None]:
-    """Return an ``on_row`` for rows of 10 ms that sends after each period [s]."""
+    """Return an ``on_row`` for rows of 10 ms that sends once per period [s]."""
     rows = iter(range(10**9))
 
     def on_row(recorder: LogWriter) -> None:
@@ -45,7 +45,7 @@ def every(
 
 
 def test_tracking_and_the_null_space_are_as_exact_as_without_a_stream() -> None:
-    # The law in the integrator's stages, without sampling: only the integrator errs.
+    # The law in the integrator's stages, without sampling: only the integrator's error.
     stream = hsp.StreamPose(policy="interpolate", delay=0.15)
     task = hsp.FramePose("panda_tcp", stream)
     controller = hsp.Controller(PANDA, [task], hsp.JointCentering(), null_space_gain=8)
@@ -63,7 +63,7 @@ def test_tracking_and_the_null_space_are_as_exact_as_without_a_stream() -> None:
     norms = run["null_space_norm"]
     expected = norms[0] * np.exp(-8.0 * run.t)
     assert np.abs(norms - expected).max() < 1e-5
-    # It was in fact moving.
+    # It was moving indeed.
     reference = run["task.panda_tcp.reference"]
     assert np.ptp(reference[:, 1]) > 0.07
 
@@ -113,7 +113,7 @@ def test_a_clutch_that_closes_elsewhere_makes_no_jump() -> None:
 
     def lead(_: LogWriter) -> None:
         t = next(times)
-        if not 0.8 < t < 1.6:  # open; then the operator's hand is elsewhere
+        if not 0.8 < t < 1.6:  # released; then the operator's hand is elsewhere
             away = pin.SE3(np.eye(3), np.array([0.0, 0.3 * (t > 1.0), 0.0]))
             controller.stream("panda_tcp").send(away * moved(start, t), t=t)
 
@@ -131,7 +131,7 @@ def test_a_clutch_that_closes_elsewhere_makes_no_jump() -> None:
     assert np.ptp(run["task.panda_tcp.actual"][:, 1]) > 0.2
 
 
-def test_a_preview_takes_nothing_from_the_run() -> None:
+def test_a_preview_does_not_affect_the_run() -> None:
     stream = hsp.StreamPose()
     controller = hsp.Controller(PANDA, [hsp.FramePose("panda_tcp", stream)])
     hand = controller.stream("panda_tcp")
@@ -157,7 +157,7 @@ def test_the_reference_of_a_task_changes_to_a_stream_while_it_runs() -> None:
         controller, PANDA.home(), duration=1.5, control_period=PERIOD, on_row=changed
     )
     error = np.linalg.norm(run["task.panda_tcp.error"], axis=1)
-    wanted = (1.0 + 10.0 * run.t) * np.exp(-10.0 * run.t) * 0.05  # all along
+    wanted = (1.0 + 10.0 * run.t) * np.exp(-10.0 * run.t) * 0.05  # throughout
     assert np.abs(error - wanted).max() < 5e-3
     assert np.abs(run.v[-1]).max() < 1e-3
 
@@ -227,7 +227,7 @@ def test_mistakes_name_their_place(
         hsp.load_experiment(write(tmp_path, {"type": "stream", **trajectory}))
 
 
-def test_a_log_that_does_not_hold_all_that_was_heard_is_not_repeated(
+def test_a_log_without_all_messages_is_not_repeated(
     tmp_path: Path,
 ) -> None:
     goals(tmp_path, PANDA)
@@ -261,7 +261,7 @@ def test_any_task_changes_to_a_stream_in_yaml(
 def test_a_log_records_all_that_streams_take(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Without a log nothing would be recorded here, also of a stream that comes."""
+    """Without a log nothing would be recorded here, also of a later stream."""
     monkeypatch.setattr(inbox, "BRIEF", 0)
     stream = {"type": "stream", "messages": [{"at": 0.1, "value": [0.3, 0, 0.5]}]}
     data = config({"type": "stream"})

@@ -1,4 +1,4 @@
-"""A stick leads a hand, a direction, a relative pose and joints, in a controller."""
+"""Streamed velocities of a hand, a direction, a relative pose and joints."""
 
 from collections.abc import Callable
 from dataclasses import replace
@@ -18,7 +18,8 @@ TWIST = np.array([0.06, -0.04, 0.05, 0.2, -0.3, 0.25])
 
 
 def until(last: float, send: Callable[[float], object]) -> Callable[[LogWriter], None]:
-    """Return an ``on_row`` for rows of 10 ms that sends every 20 ms, to a time [s]."""
+    """Return an ``on_row`` for rows of 10 ms that sends every 20 ms until a time
+    [s]."""
     rows = iter(range(10**9))
 
     def on_row(_: LogWriter) -> None:
@@ -30,7 +31,7 @@ def until(last: float, send: Callable[[float], object]) -> Callable[[LogWriter],
 
 
 def stick(t: float) -> np.ndarray:
-    """Return a twist that a hand on a stick might command."""
+    """Return a twist as from a joystick."""
     return TWIST * np.cos([2 * t, t, 3 * t, t, 2 * t, 1.5 * t])
 
 
@@ -52,7 +53,8 @@ def stick(t: float) -> np.ndarray:
 def test_tracking_and_the_null_space_are_as_exact_as_without_a_stick(
     case: tuple[Any, slice], axes: Any
 ) -> None:
-    """The law in the integrator's stages, without sampling: only the integrator errs.
+    """The law in the integrator's stages, without sampling: only the integrator's
+    error.
 
     RK4 is of third order in steps within which the jerk of the reference jumps.
     """
@@ -77,7 +79,7 @@ def test_tracking_and_the_null_space_are_as_exact_as_without_a_stick(
 
 
 def test_a_relative_pose_is_led_along_the_axes_of_its_reference() -> None:
-    """Link 1 is turned by 0.6 rad."""
+    """Link 1 is rotated by 0.6 rad."""
     stream = hsp.StreamPose()
     hand = RelativePose(
         "panda_tcp", reference="panda_link1", trajectory=stream, name="hand"
@@ -117,7 +119,7 @@ def test_joints_are_jogged() -> None:
 
 @pytest.mark.parametrize("axes", ["tool", *further("world")])
 def test_a_velocity_is_set_at_any_time(axes: Any) -> None:
-    """A stick takes over from a circle, smoothly, and lets go of the hand at rest."""
+    """A velocity stream replaces a circle smoothly, and releases the hand at rest."""
     circle = hsp.Circle(radius=0.03, angular_rate=2.0)
     pose = ComposedPose(circle)
     controller = hsp.Controller(PANDA, [hsp.FramePose("panda_tcp", pose, name="hand")])
@@ -153,7 +155,7 @@ def test_a_stick_that_sends_no_more_leaves_the_hand_at_rest() -> None:
     )
     reference = run["task.hand.reference"]
     assert np.diff(reference[[45, 55], 0]) == pytest.approx(0.01, abs=1e-9)
-    # 0.48 s, and 0.2 s of a dead man, and at most 0.1 s to fade
+    # 0.48 s, the dead-man time of 0.2 s, and at most 0.1 s of fading
     assert np.ptp(reference[80:], axis=0).max() == 0.0
     assert np.abs(run.v[-1]).max() < 1e-4
 

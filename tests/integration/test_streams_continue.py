@@ -1,4 +1,4 @@
-"""A controller amid a stream: copies, pickles and previews go on, to the last bit."""
+"""Copies, pickles and previews of a controller continue a stream bit for bit."""
 
 import os
 import pickle
@@ -23,11 +23,11 @@ PANDA = hsp.Robot.load("panda")
 Q, V = PANDA.home(), np.zeros(7)
 POLICIES = ("latest", "interpolate", "extrapolate")
 KINDS = ("position", "orientation", "pose", "tool", "relative", "pointing", "joints")
-FIRST, LAST = 60, 130  # steps: it is copied after the first ones
+FIRST, LAST = 60, 130  # steps; it is copied after the first ones
 
 
 def law(kind: str, policy: Any) -> hsp.Controller:
-    """Return a controller with one task that a stream leads, ``hand``."""
+    """Return a controller with one streamed task, ``hand``."""
     how: dict[str, Any] = {"policy": policy, "smoothing": 0.03, "hold_after": 0.09}
     pose = hsp.StreamPose(**how, axes="tool" if kind == "tool" else "world")
     turn = hsp.StreamOrientation(**how, axes="tool")
@@ -47,7 +47,7 @@ def law(kind: str, policy: Any) -> hsp.Controller:
 
 
 def send(controller: hsp.Controller, kind: str, k: int) -> None:
-    """Send what comes before step k: targets, chunks, velocities, out of order."""
+    """Send the messages before step k: targets, chunks, velocities, out of order."""
     if k % 9:
         return
     stream = controller.stream("hand")
@@ -85,12 +85,12 @@ def steps(controller: hsp.Controller, kind: str, which: Sequence[int]) -> list[b
 
 
 def amid(kind: str, policy: str) -> hsp.Controller:
-    """Return a controller that has made some steps, and has a message to take."""
+    """Return a controller after some steps, with a waiting message."""
     controller = law(kind, policy)
     steps(controller, kind, range(FIRST))
     size = {"joints": 7, "pose": 6, "tool": 6, "relative": 6}.get(kind, 3)
     velocity = 0.05 * np.ones(size)
-    controller.stream("hand").send(velocity=velocity)  # nobody has taken it yet
+    controller.stream("hand").send(velocity=velocity)  # not read yet
     return controller
 
 
@@ -100,7 +100,7 @@ every_case = pytest.mark.parametrize(("kind", "policy"), CASES)
 
 @pytest.fixture(scope="module")
 def elsewhere(tmp_path_factory: pytest.TempPathFactory) -> dict[str, list[bytes]]:
-    """Return the efforts of pickles that go on in another process, by case."""
+    """Return the efforts of pickles that continue in another process, by case."""
     file = tmp_path_factory.mktemp("amid") / "controllers.pkl"
     cases = {f"{k} {p}": pickle.dumps(amid(k, p)) for k, p in CASES}
     file.write_bytes(pickle.dumps(cases))
@@ -126,10 +126,8 @@ def test_a_pickle_goes_on_elsewhere_to_the_last_bit(
 
 
 @every_case
-def test_copies_go_on_and_what_looks_ahead_moves_nothing(
-    kind: str, policy: str
-) -> None:
-    """One that looks on receives what the original does; all are called in turn."""
+def test_copies_continue_and_previews_move_nothing(kind: str, policy: str) -> None:
+    """An onlooker receives the original's messages; all are called in turn."""
     expected = steps(amid(kind, policy), kind, range(FIRST, LAST))
     controller = amid(kind, policy)
     copy, onlooker = deepcopy(controller), controller._copy()
@@ -153,7 +151,7 @@ def test_copies_go_on_and_what_looks_ahead_moves_nothing(
 
 
 def leaving() -> hsp.Controller:
-    """Return a controller whose task leaves a stream from 0.3 s on, for two seconds."""
+    """Return a controller whose task fades from a stream, from 0.3 to 2.3 s."""
     stream = hsp.StreamPose(delay=0.05, dead_man=1.0)
     controller = hsp.Controller(PANDA, [hsp.FramePose(None, stream)], limits=None)
     led(controller, 0, 30)
@@ -162,12 +160,12 @@ def leaving() -> hsp.Controller:
 
 
 def led(controller: hsp.Controller, first: int, last: int) -> list[np.ndarray]:
-    """Return the efforts of steps of 10 ms, while the stream goes on."""
+    """Return the efforts of steps of 10 ms while the stream continues."""
     found = []
     for k in range(first, last):
         if k % 5 == 0:
             turn = 0.2 * np.sin(k * np.ones(3))
-            for stream in controller.streams:  # none, once it is left
+            for stream in controller.streams:  # none once the task has left it
                 stream.send(velocity=np.concatenate([0.1 * turn, turn]))
         found.append(controller.compute(0.01 * k, Q, V).tau.copy())
         controller.applied(np.zeros(7), 0.01)
@@ -177,7 +175,7 @@ def led(controller: hsp.Controller, first: int, last: int) -> list[np.ndarray]:
 def test_a_task_that_leaves_a_stream_goes_on_in_copies_and_beside_other_changes() -> (
     None
 ):
-    """A second later a stream still knows where the change began."""
+    """A second later the stream still has the start of the change."""
     expected = np.array(led(leaving(), 30, 250))
     for k in (31, 180, 240):
         controller = leaving()

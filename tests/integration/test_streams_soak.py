@@ -1,6 +1,7 @@
-"""Thousands of targets leave a controller as it was: its memory, its pickle, its words.
+"""Thousands of targets leave a controller's memory, pickle and representation
+unchanged.
 
-Half a million were sent once, in a script: nothing grew either.
+In a script half a million did so.
 """
 
 import gc

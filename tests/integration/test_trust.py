@@ -1,4 +1,4 @@
-"""Files of strangers: nothing runs, nothing outside is read, sizes are bounded."""
+"""Untrusted files: no code runs, no other file is read, sizes are bounded."""
 
 from pathlib import Path
 from typing import Any
@@ -48,7 +48,8 @@ MESH = """scene:
 
 @pytest.fixture
 def home(tmp_path: Path) -> Path:
-    """A stranger's folder with a configuration, a robot and its mesh; one beside it."""
+    """An untrusted folder with a configuration, a robot and its mesh; another next to
+    it."""
     folder, outside = tmp_path / "theirs", tmp_path / "mine"
     for where in (folder, outside):
         where.mkdir()
@@ -79,7 +80,7 @@ def test_no_code_runs_from_yaml(tag: str, tmp_path: Path) -> None:
 
 
 def test_no_pickle_is_opened(tmp_path: Path) -> None:
-    """The canary works: NumPy that may unpickle touches it."""
+    """The canary works: unpickling by NumPy triggers it."""
 
     class Touch:
         def __reduce__(self) -> tuple[Any, ...]:
@@ -111,11 +112,13 @@ def test_a_robot_elsewhere_is_refused_and_allowed(
     load_experiment(config)
     load_experiment(config, strict=True, allow=[outside])
     assert main(["check", str(config), "--strict"]) == 2
-    told = capsys.readouterr().err
-    assert told.startswith(f"hsp: {config}:1: robot.name: robot '{outside}/arm.urdf'")
-    assert told.count("\n") == 1
+    reported = capsys.readouterr().err
+    assert reported.startswith(
+        f"hsp: {config}:1: robot.name: robot '{outside}/arm.urdf'"
+    )
+    assert reported.count("\n") == 1
     assert main(["live", str(config), "--strict"]) == 2
-    assert capsys.readouterr().err == told
+    assert capsys.readouterr().err == reported
     assert main(["check", str(config), "--allow", str(outside)]) == 0
     assert main(["check", str(config)]) == 0
 
@@ -166,7 +169,9 @@ def test_an_obstacle_s_mesh_elsewhere_is_refused(home: Path) -> None:
 
 
 @pytest.mark.parametrize(("suffix", "text"), [("obj", OBJ), ("dae", DAE.encode())])
-def test_what_a_mesh_names_is_judged_too(home: Path, suffix: str, text: bytes) -> None:
+def test_files_named_in_a_mesh_are_checked_too(
+    home: Path, suffix: str, text: bytes
+) -> None:
     """OBJ names material libraries, Collada pictures."""
     (home / f"thing.{suffix}").write_bytes(text)
     (home / "arm.urdf").write_text(ARM.replace("good.stl", f"thing.{suffix}"))
@@ -175,7 +180,7 @@ def test_what_a_mesh_names_is_judged_too(home: Path, suffix: str, text: bytes) -
 
 
 def test_a_log_is_a_stranger_s_file_too(home: Path, tmp_path: Path) -> None:
-    """Its configuration and its obstacles name files; a replay reads them."""
+    """Configuration and obstacles name files, which a replay reads."""
     outside = str(home.parent / "mine")
     config = write(home, f"{outside}/arm.urdf", MESH.replace("MESH", "good.stl"))
     log = load_experiment(config).run().save(home / "run.npz")
@@ -190,7 +195,7 @@ def test_a_log_is_a_stranger_s_file_too(home: Path, tmp_path: Path) -> None:
 
 
 def test_a_page_carries_pictures_and_nothing_else(tmp_path: Path) -> None:
-    """Without strict reading, either: a page is given to others."""
+    """Also without strict reading: pages are passed on to others."""
     secret, mesh = tmp_path / "secret", tmp_path / "thing.dae"
     for name in ("secret", "picture.png"):
         (tmp_path / name).write_bytes(b"mine")
@@ -309,8 +314,8 @@ def run() -> Rollout:
     return load_experiment("paper/4_moving_obstacle", "simulation.duration=0.05").run()
 
 
-def test_logs_that_say_little_are_drawn(run: Rollout, tmp_path: Path) -> None:
-    """Nothing of tasks, field, gain, metric; an obstacle of its own type."""
+def test_sparse_logs_are_drawn(run: Rollout, tmp_path: Path) -> None:
+    """Without tasks, field, gain and metric; with an obstacle of its own type."""
     path = run.save(tmp_path / "log.npz")
     log = Rollout.load(path)
     for entry in ("tasks", "field", "null_space_gain", "metric", "versions", "columns"):

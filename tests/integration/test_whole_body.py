@@ -1,4 +1,4 @@
-"""Whole bodies on an engine that knows nothing of the law: bundled configurations."""
+"""Whole bodies in an independent physics engine: bundled configurations."""
 
 from functools import cache
 
@@ -26,21 +26,21 @@ def rms(rollout: Rollout, task: str) -> float:
 
 
 def check_forces(rollout: Rollout) -> None:
-    """Forces push, stay within friction, and are those of the engine."""
+    """Forces push, stay within friction cones, and agree with the engine's."""
     names = [c.split(".")[1] for c in rollout.columns if c.endswith("friction_used")]
     assert names
     for name in names:
         assert (rollout[f"contact.{name}.force"][:, 2] >= 0.0).all()
         assert np.nanmax(rollout[f"contact.{name}.friction_used"]) <= 1.0 + 1e-6
-    asked = sum(rollout[f"contact.{name}.force"][:, 2] for name in names)
+    requested = sum(rollout[f"contact.{name}.force"][:, 2] for name in names)
     engine = [c for c in rollout.columns if c.startswith("plant.contact.")]
     answered = sum(rollout[c][:, 2] for c in engine if c.endswith(".force"))
     settled = rollout.t > 0.3
-    np.testing.assert_allclose(answered[settled], asked[settled], rtol=0.05)
+    np.testing.assert_allclose(answered[settled], requested[settled], rtol=0.05)
 
 
 def test_talos_on_two_feet() -> None:
-    """Centre of mass, hand and trunk to a fraction of a millimetre on real contacts."""
+    """Centre of mass, hand and trunk within a fraction of a millimetre in contact."""
     rollout = run("talos_circle", "simulation.duration=0.8")
     assert rollout.meta["status"] == "completed"
     assert rms(rollout, "center_of_mass") < 2e-4
@@ -51,7 +51,7 @@ def test_talos_on_two_feet() -> None:
 
 
 def test_talos_with_a_weak_arm() -> None:
-    """At its torque limit, the hand deviates and comes back; all else goes on."""
+    """At its torque limit the hand deviates and returns; other tasks continue."""
     name, shorter = "talos_weak_arm", "simulation.duration=3.4"
     rollout = run(name, shorter, "simulation.log_period=0.01", COARSE)
     assert rollout.meta["status"] == "completed"
@@ -61,7 +61,7 @@ def test_talos_with_a_weak_arm() -> None:
     names = rollout.meta["robot"]["dofs"]
     elbow = names.index("arm_right_4_joint")
     assert used.max() <= 1.0 + 1e-9
-    assert (used[:, elbow] > 0.999).sum() > 10  # it is met, for a while
+    assert (used[:, elbow] > 0.999).sum() > 10  # the limit is active for a while
     assert rollout["status"].max() == Status.LIMITED
     assert (rollout["status"] == Status.LIMITED).mean() > 0.3
     mass = np.linalg.norm(rollout["task.center_of_mass.error"], axis=1)
@@ -103,8 +103,8 @@ FAR = (
 
 
 @pytest.mark.slow
-def test_talos_stands_while_a_hand_reaches_for_what_is_too_far() -> None:
-    """0.9 m in front: with tasks of one priority it falls within two seconds."""
+def test_talos_stands_while_a_hand_target_is_out_of_reach() -> None:
+    """0.9 m ahead: with all tasks at one priority it falls within two seconds."""
     experiment = hsp.load_experiment(
         "whole_body/talos_circle", FAR, "simulation.duration=2", COARSE
     )

@@ -1,4 +1,4 @@
-"""A hand that has to go far where limits bind, and jumps of its efforts."""
+"""A hand with a distant target and active limits, and jumps of its efforts."""
 
 from itertools import pairwise
 from typing import Any
@@ -14,15 +14,15 @@ from hsp_control.trajectories import HoldOrientation
 
 START, RAMP = 0.2, 0.3
 EVENTS = (START, START + 0.1, START + RAMP - 0.1, START + RAMP)
-"""When something begins or ends, of the changes below [s]."""
+"""Begin and end times of the changes below [s]."""
 FINEST = 1e-9
-"""To which the place of the largest change is bisected [s]."""
+"""Interval to which the largest change is bisected [s]."""
 JUMP = 1e-6
 """The largest change of an effort that is no jump [N·m]."""
 
 
 class Case:
-    """A hand that has to go far, with motors that can hardly hold the arm."""
+    """A hand with a distant target, and motors that can hardly hold the arm."""
 
     def __init__(self, name: str, seed: int) -> None:
         self.rng = rng = np.random.default_rng(seed)
@@ -34,7 +34,7 @@ class Case:
         self.axes = "xz" if self.robot.nv == 3 else "xyz"
 
     def limits(self, **more: Any) -> hsp.Limits:
-        """Return limits of which some bind: efforts near those of gravity."""
+        """Return limits of which some are active: efforts near those of gravity."""
         held = np.abs(self.state.nonlinear_effects)
         effort = (0.3 + self.rng.uniform(0.0, 1.0, self.robot.nv)) * held + 1.0
         speed = np.abs(self.v) * self.rng.uniform(0.9, 3.0, self.robot.nv) + 0.1
@@ -53,7 +53,7 @@ class Case:
         )
 
     def other(self, **options: Any) -> hsp.Task:
-        """Return a task that the hand leaves some freedom, or none."""
+        """Return a task to which the hand leaves some freedom, or none."""
         options = {"name": "other", "priority": int(self.rng.integers(1, 3)), **options}
         if self.robot.nv > 3 and self.rng.uniform() < 0.5:
             turned = HoldOrientation(self.rng.standard_normal(3))
@@ -77,10 +77,11 @@ class Case:
     def largest_jump(
         self, controller: hsp.Controller, times: Array
     ) -> tuple[float, float]:
-        """Return the largest change of an effort within 1e-9 s [N·m], and where [s].
+        """Return the largest change of an effort within 1e-9 s [N·m], and its time [s].
 
-        Changes that a rate explains are left out: the largest in the 1e-9 s before and
-        after. A force that rises where efforts can hardly hold it is steep, 1e5 N·m/s.
+        Changes that a rate explains are excluded: the largest in the 1e-9 s before and
+        after. The slope of a growing force near the efforts' limits is large, 1e5
+        N·m/s.
         """
         tau = {t: self.effort(controller, t) for t in times}
 
@@ -92,7 +93,7 @@ class Case:
 
         worst = 0.0, times[0]
         for a, b in pairwise(times):
-            # Nearer than 1e-5 s a change that is smaller than a jump hides none.
+            # Within 1e-5 s, a change below the size of a jump cannot hide one.
             while b - a > FINEST and (b - a > 1e-5 or change(a, b) >= JUMP):
                 middle = 0.5 * (a + b)
                 first = change(a, middle) >= change(middle, b)
@@ -103,7 +104,7 @@ class Case:
 
     def assert_continuous(self, controller: hsp.Controller, end: float = 0.6) -> None:
         """Efforts are continuous from 0.1 s to the end."""
-        # A short time about begin and end, where little else changes.
+        # A short interval around begin and end, with little other change.
         near = [t + d for t in EVENTS for d in (-1e-5, 0.0, 1e-5)]
         times = np.unique(np.r_[np.linspace(0.1, end, 26), near])
         jump, t = self.largest_jump(controller, times)

@@ -1,4 +1,4 @@
-"""A browser without a window, for tests of pages."""
+"""A headless browser for tests of pages."""
 
 import os
 import time
@@ -14,7 +14,7 @@ from hsp_control.companions.film.chromium import (
     headless_browser,
 )
 
-PATIENCE = 200.0  # s; only ends a test that hangs
+PATIENCE = 200.0  # [s], ends a test that hangs
 HARMLESS = "GPU stall due to ReadPixels"  # a remark of the software renderer
 
 
@@ -38,9 +38,9 @@ def opened(
     page.on("pageerror", lambda error: wrong.append(str(error)))
     page.on(
         "console",
-        lambda said: (
-            wrong.append(said.text)
-            if said.type in {"error", "warning"} and HARMLESS not in said.text
+        lambda reported: (
+            wrong.append(reported.text)
+            if reported.type in {"error", "warning"} and HARMLESS not in reported.text
             else None
         ),
     )
@@ -49,9 +49,9 @@ def opened(
 
 
 def light(url: str) -> str:
-    """The address at which a page leaves out shadows and mirrors.
+    """The address of a page without shadows and mirrors.
 
-    Where no picture is looked at: without a graphics card it takes a fifth of the time.
+    For tests without pictures: without a GPU it needs a fifth of the time.
     """
     return f"{url}{'&' if '#' in url else '#'}light"
 
@@ -59,7 +59,8 @@ def light(url: str) -> str:
 def exported(
     browser: Any, file: Path, t: float, size: tuple[int, int]
 ) -> tuple[Any, list[str]]:
-    """An exported page that stands at a time [s]: to play takes longer than to open."""
+    """An exported page paused at a time [s], since playing takes longer than
+    opening."""
     address = f"{file.resolve().as_uri()}#t={t}"
     width, height = size
     viewport = {"width": width, "height": height}
@@ -77,7 +78,7 @@ def until(page: Any, expression: str) -> None:
 
 
 def _holds(page: Any, expression: str) -> bool:
-    """Return whether an expression is true; of a page that loads anew it is not yet."""
+    """Return whether an expression is true; false while a page reloads."""
     try:
         return bool(page.evaluate(expression))
     except Error as error:

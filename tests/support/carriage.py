@@ -1,4 +1,4 @@
-"""A carriage on a rail, which is a linear mode, and the proof of its loop."""
+"""A carriage on a rail, which is a linear mode, and the check of its loop."""
 
 from pathlib import Path
 
@@ -26,9 +26,9 @@ def carriage(folder: Path) -> hsp.Robot:
 def check_that_it_is_the_loop(
     x: NDArray[np.float64], loop: LinearLoop, other: LinearLoop, rounding: float = 1e-12
 ) -> None:
-    """By Cayley and Hamilton positions obey the transition's polynomial; not another's.
+    """By Cayley and Hamilton positions obey the polynomial of the transition matrix.
 
-    That is, once the motion from before the run has passed.
+    This holds once the motion from before the run has passed; other polynomials fail.
     """
     worst = []
     for each in (loop, other):

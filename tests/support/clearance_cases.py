@@ -37,7 +37,7 @@ def barrier_at(d: float, influence: float) -> tuple[float, float, float]:
 
 
 def outside(points: Array, first: Array, second: Array, radius: float) -> float:
-    """Return by how much the farthest point stands out of a capsule."""
+    """Return the distance of the farthest point outside of a capsule."""
     along = second - first
     square = float(along @ along)
     s = (points - first) @ along / square if square > 0.0 else np.zeros(len(points))
@@ -46,7 +46,7 @@ def outside(points: Array, first: Array, second: Array, radius: float) -> float:
 
 
 def placed(robot: Robot, shapes: Iterable[LinkShape], q: Array) -> list[pin.SE3]:
-    """Return where shapes are in the world, by plain Pinocchio."""
+    """Return the world placements of shapes, by plain Pinocchio."""
     data = robot.model.createData()
     pin.forwardKinematics(robot.model, data, q)
     return [data.oMi[shape.joint] * shape.placement for shape in shapes]
@@ -74,5 +74,5 @@ def flowing(field: Cost, state: Any, step: float) -> Array:
 
 
 def agree(one: Array, other: Array) -> bool:
-    """Return whether differences by two steps agree."""
+    """Return whether differences with two step sizes agree."""
     return bool(np.abs(one - other).max() <= 1e-8 * np.abs(other).max())

@@ -1,4 +1,4 @@
-"""Robots, controllers and starts of the runs that the tests of the simulation make."""
+"""Robots, controllers and starts for tests of the simulation."""
 
 from functools import cache
 
@@ -23,7 +23,7 @@ ROBOTS: dict[str, tuple[str, str | None]] = {
 
 @cache
 def load(name: str, gravity: bool = True) -> Robot:
-    """Return a robot, or skip if it is of example-robot-data and that is not there."""
+    """Return a robot, or skip if it needs example-robot-data and that is missing."""
     source, root = ROBOTS[name]
     if source not in {"planar3r", "panda"}:
         pytest.importorskip("example_robot_data")
@@ -38,7 +38,7 @@ def start(robot: Robot, seed: int, speed: float = 0.5) -> tuple[Array, Array]:
 
 
 def distance(robot: Robot, a: tuple[Array, Array], b: tuple[Array, Array]) -> float:
-    """Return how far two states are from each other, on the manifold."""
+    """Return the distance of two states on the manifold."""
     apart = [robot.difference(a[0], b[0]), a[1] - b[1]]
     return float(np.abs(apart).max())
 

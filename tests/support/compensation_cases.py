@@ -16,7 +16,7 @@ Q0 = PANDA.home()
 def circle(
     robot: Robot = PANDA, frequency: float = 20.0, away: float = 0.05
 ) -> FramePosition:
-    """Return a circle of 5 cm that begins ``away`` [m] from where the hand is."""
+    """Return a circle of 5 cm that begins at a distance ``away`` [m] from the hand."""
     start = robot.state(0.0, robot.home(), np.zeros(robot.nv)).position("panda_tcp")
     center = start + np.array([away - 0.05, 0.0, 0.0])
     path = Circle(0.05, 2.0, center, axes=[[1.0, 0.0, 0.0], [0.0, 1.0, 0.0]])

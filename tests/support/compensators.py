@@ -1,4 +1,4 @@
-"""Compensators and nothing besides: no momentum observer by default."""
+"""Only the given compensators: no momentum observer by default."""
 
 from typing import Any
 
@@ -6,9 +6,9 @@ from hsp_control.control.compensation import Compensation
 
 
 def only(**parts: Any) -> Compensation:
-    """Return compensation of these parts; without a momentum observer if none is."""
+    """Return compensation of these parts, without a momentum observer unless given."""
     return Compensation(**{"momentum_observer": None, **parts})
 
 
 ALONE = only()
-"""The law alone, whatever the plant."""
+"""The law alone, for any plant."""

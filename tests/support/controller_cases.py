@@ -1,4 +1,4 @@
-"""A Panda's controllers and states, and all that a controller returns."""
+"""A Panda's controllers and states, and all of a controller's output."""
 
 from collections.abc import Callable
 from typing import Any
@@ -30,7 +30,7 @@ def circle() -> hsp.Circle:
 
 
 def track(**options: Any) -> hsp.FramePosition:
-    """Return a task that is far from its path and uses the whole error."""
+    """Return a task that is far from its path, with linear feedback."""
     options = {"largest_error": "none", **options}
     return hsp.FramePosition(TCP, circle(), gains=GAINS, **options)
 
@@ -53,7 +53,7 @@ def states(count: int, seed: int = 0) -> list[tuple[float, Array, Array]]:
 
 
 def contents(out: hsp.ControlOutput) -> dict[str, Any]:
-    """Return all that an output contains, by name."""
+    """Return an output's content by name."""
     return {
         "tau": out.tau,
         "acceleration": out.acceleration,
@@ -65,7 +65,7 @@ def contents(out: hsp.ControlOutput) -> dict[str, Any]:
 
 
 def assert_same(first: dict[str, Any], second: dict[str, Any]) -> None:
-    """To the last bit."""
+    """Assert equality bit for bit."""
     assert first.keys() == second.keys()
     for name, value in first.items():
         np.testing.assert_array_equal(value, second[name], err_msg=name)

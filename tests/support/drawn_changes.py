@@ -1,4 +1,4 @@
-"""A controller whose changes are drawn at random, along a motion that is given."""
+"""A controller with random changes along a given motion."""
 
 import numpy as np
 
@@ -7,11 +7,11 @@ from hsp_control.common.arrays import Array
 from hsp_control.control.changes import Change
 
 SPAN = 3.0
-"""The changes begin within this time [s]."""
+"""The interval in which changes begin [s]."""
 
 
 class Line:
-    """A controller whose changes are drawn at random, along a motion that is given."""
+    """A controller with random changes along a given motion."""
 
     def __init__(self, name: str, seed: int) -> None:
         self.rng = np.random.default_rng(seed)
@@ -44,7 +44,7 @@ class Line:
         return np.array([controller.compute(self.state(t)).tau for t in times])
 
     def draw(self, number: int) -> tuple[Change, ...]:
-        """Return changes in order of time, so that each is possible."""
+        """Return changes in order of time, all of them valid."""
         times = np.sort(self.rng.uniform(0.0, SPAN, number))
         return tuple(self._change(float(t)) for t in times)
 
@@ -89,7 +89,7 @@ class Line:
             case _:
                 joint = str(rng.choice(list(self.robot.joints)))
                 self.made += 1
-                # Now and then a name is used again.
+                # Some names are used again.
                 name = f"joint_{self.made % 3}"
                 if name in self.there:
                     return self._change(t)

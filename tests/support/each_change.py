@@ -43,11 +43,11 @@ BACK: dict[str, Callable[[Changes], object]] = {
     "payload": lambda at: at.payload("panda_hand", 0.0),
     "tool": lambda at: at.tool("panda_tcp"),
 }
-"""Conditions under which the same change is possible again, or is a change at all."""
+"""Conditions under which a change can be repeated, or has an effect at all."""
 
 
 def controller(*tasks: hsp.Task) -> hsp.Controller:
-    """Return one of a hand, a posture, and a ball that the arm keeps away from."""
+    """Return a controller of a hand and a posture, with a ball to avoid."""
     hand = hsp.FramePosition(name="hand")
     fields = hsp.TargetPosture("home", name="posture") + hsp.ObstacleClearance(["ball"])
     return hsp.Controller(ROBOT, tasks or [hand], fields, scene=[BALL])

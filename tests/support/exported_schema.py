@@ -1,4 +1,4 @@
-"""The JSON schema of a configuration, made once a process: it takes seconds."""
+"""The JSON schema of a configuration, made once per process, since it needs seconds."""
 
 import json
 import subprocess

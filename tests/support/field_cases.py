@@ -1,4 +1,4 @@
-"""Every null-space field on several robots, each beside its oracle."""
+"""Every null-space field on several robots, with its oracle."""
 
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
@@ -51,13 +51,13 @@ Field = TypeVar("Field", bound=hsp.NullSpaceField)
 def placed(
     field: Field, state: hsp.RobotState, scene: Iterable[hsp.Obstacle] = ()
 ) -> Field:
-    """Return a field, placed where the robot starts."""
+    """Return a field, placed at the robot's start."""
     return field.placed(Start(state, Scene(scene)))
 
 
 @dataclass(frozen=True)
 class Member:
-    """A field, and the same once more with plain Pinocchio.
+    """A field, and the same by plain Pinocchio.
 
     Attributes:
         make: The field for a robot, not yet placed.
@@ -262,7 +262,7 @@ def metrics(
 def evaluate(
     field: hsp.NullSpaceField, metric: hsp.metrics.Metric, state: hsp.RobotState
 ) -> hsp.fields.FieldSample:
-    """Return g and g' at a state, in memory of their own."""
+    """Return copies of g and g' at a state."""
     nv = state.robot.nv
     sample = metric.evaluate(state, hsp.metrics.MetricSample.allocate(nv))
     out = hsp.fields.FieldSample(np.full(nv, np.nan), np.full(nv, np.nan))

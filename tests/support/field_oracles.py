@@ -1,8 +1,8 @@
 """Robots and obstacles for fields, and each field's cost by plain Pinocchio.
 
-A cost is written a second time with plain Pinocchio; g = -W⁻¹∇f of that, by differences
-of eighth order, is what the field must give. Between the oracles stand the fields that
-a user may write.
+A cost is implemented a second time with plain Pinocchio; the field must equal g =
+-W⁻¹∇f of that, by differences of eighth order. Fields as users may write them are
+between the oracles.
 """
 
 from collections.abc import Callable
@@ -47,13 +47,13 @@ OBSTACLE = Obstacle(
 
 
 def constant(g: Array, state: RobotState) -> Array:
-    """Return g, the value of a field that is the same everywhere."""
+    """Return g, the value of a constant field."""
     return g
 
 
 @cache
 def load(name: str) -> Robot:
-    """Return a robot, or skip if it is of example-robot-data and that is not there."""
+    """Return a robot, or skip if it needs example-robot-data and that is missing."""
     source, root = ROBOTS[name]
     if source not in {"planar3r", "panda"}:
         pytest.importorskip("example_robot_data")
@@ -61,11 +61,11 @@ def load(name: str) -> Robot:
 
 
 def spread(size: int, low: float, high: float) -> Array:
-    """Return different numbers, to be weights or targets."""
+    """Return distinct numbers, for weights or targets."""
     return low + (high - low) * (0.5 + 0.5 * np.sin(1.0 + 2.3 * np.arange(size)))
 
 
-# --- known without the package -------------------------------------------------------
+# --- independent of the package ------------------------------------------------------
 
 
 NODES = np.arange(-4, 5)
@@ -128,7 +128,7 @@ def plain(name: str) -> Plain:
     return Plain(load(name))
 
 
-# --- the costs and vectors once more -------------------------------------------------
+# --- oracles of the costs and vectors ------------------------------------------------
 
 
 CostOracle = Callable[[float, Array], float]
@@ -157,7 +157,7 @@ def target(name: str) -> Array:
 
 
 def swaying(name: str) -> Lissajous:
-    """A displacement of a posture, for each degree of freedom another one."""
+    """A displacement of a posture, different for every degree of freedom."""
     nv = load(name).nv
     k = np.arange(nv)
     return Lissajous(0.2 + 0.05 * k, 1.0 + 0.3 * k, 0.5 * k, np.full(nv, 0.1))
@@ -208,7 +208,7 @@ GOAL = np.array([0.4, -0.3, 0.6])
 
 
 def reach(t: float, x: Array) -> float:
-    """Return a cost that no closed form is written for: nonlinear in x and in t."""
+    """Return a cost without derivatives in closed form, nonlinear in x and t."""
     away = x - GOAL
     growth = np.exp(0.3 * np.sin(t))
     return float(np.sin(2.0 * t + 0.2 * x[0] * x[1]) + 0.5 * growth * away @ away)
@@ -278,14 +278,14 @@ class ValueOnly(Cost):
 
 
 class WithGradient(ValueOnly):
-    """A user's next version."""
+    """A user's second version."""
 
     def gradient(self, state: RobotState) -> Array:
         return reach_gradient(self.frame)(state)
 
 
 class Swirl(VectorField):
-    """A user's own vector field, which is no gradient."""
+    """A user's vector field, which is no gradient."""
 
     frame: str
 
@@ -387,7 +387,7 @@ def barrier_oracle(name: str, zone: float, weights: Array) -> CostOracle:
                 high = model.upperPositionLimit[joint.idx_q]
                 for away in (q[joint.idx_q] - low, high - q[joint.idx_q]):
                     s = away / (0.5 * zone * (high - low))
-                    assert s > 0.02  # the core, which has its own test
+                    assert s > 0.02  # the core has its own test
                     if s < 1.0:
                         total -= weights[joint.idx_v] * (1.0 - s) ** 2 * np.log(s)
         return total

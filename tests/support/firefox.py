@@ -19,7 +19,7 @@ from tornado.websocket import WebSocketClientConnection, websocket_connect
 PROGRAMS = "firefox-esr", "Xvfb"
 _PREFERENCES = {
     "webgl.force-enabled": True,
-    "security.sandbox.content.level": 0,  # else root's pages may not load Mesa
+    "security.sandbox.content.level": 0,  # otherwise pages of root may not load Mesa
     "browser.shell.checkDefaultBrowser": False,
     "datareporting.policy.dataSubmissionEnabled": False,
 }
@@ -89,7 +89,7 @@ class Firefox:
                 await asyncio.sleep(0.1)
 
     async def drag(self, x: float, y: float, dx: float, dy: float) -> None:
-        """Press the mouse at a pixel, move it in eight steps, and let it go."""
+        """Press the mouse at a pixel, move it in eight steps, and release it."""
         moves = [
             {"type": "pointerMove", "x": round(x + dx * k / 8),
              "y": round(y + dy * k / 8), "duration": 30}
@@ -101,7 +101,7 @@ class Firefox:
         await self._do("input.performActions", context=self._tab, actions=[mouse])
 
     async def press(self, key: str) -> None:
-        """Press a key and let it go."""
+        """Press and release a key."""
         strokes = [{"type": kind, "value": key} for kind in ("keyDown", "keyUp")]
         keyboard = {"type": "key", "id": "keyboard", "actions": strokes}
         await self._do("input.performActions", context=self._tab, actions=[keyboard])

@@ -15,7 +15,7 @@ BRAKING, HOLDING, STOPPED = 5, 6, -10
 OK, WRONG_STATE, WRONG_CLOCK, NOT_FINITE, BUSY = 0, -1, -2, -3, -4
 WRONG_NAME, WRONG_SIZE, WRONG_VALUE, TOO_MANY, FAILED = -5, -6, -7, -8, -9
 _HEADER = 8 + 4
-"""Bytes before what the checksum is of."""
+"""Bytes before those in the checksum."""
 
 
 class PortOfC(ctypes.Structure):
@@ -117,13 +117,13 @@ class Opened:
 
 
 def summed(content: bytes) -> bytes:
-    """Return a file's content with the checksum that it then has."""
+    """Return a file's content with its checksum updated."""
     body = content[_HEADER:]
     return content[:8] + zlib.crc32(body).to_bytes(4, "little") + body
 
 
 class Layout:
-    """Where things are in the content of a file."""
+    """Offsets in the content of a file."""
 
     def __init__(self, content: bytes) -> None:
         self._content = content
@@ -134,19 +134,19 @@ class Layout:
         self.objects = self.memory + size
 
     def place(self, kind: str, name: str, rank: int = 1) -> int:
-        """Return where the place of an array is written, of the first call of a kind.
+        """Return the offset of an array's descriptor in the first call of a kind.
 
         Args:
             kind: The kind.
-            name: The argument's.
-            rank: Of the array.
+            name: The argument's name.
+            rank: The array's rank.
         """
         content = self._content
         call = content.index(_text(kind), self.objects)
         return content.index(_text(name), call) + 4 + len(name) + 8 * rank
 
     def array(self, kind: str, name: str, rank: int = 1) -> int:
-        """Return where the entries of an array begin."""
+        """Return the offset of an array's first entry."""
         at = self.place(kind, name, rank)
         (offset,) = struct.unpack_from("=Q", self._content, at)
         return self.memory + int(offset)

@@ -1,4 +1,4 @@
-"""Frozen controllers, run by a program in C, beside the same controller in Python."""
+"""Frozen controllers run by a C program, and the same controllers in Python."""
 
 import os
 import shlex
@@ -19,7 +19,7 @@ Rows = NDArray[np.float64]
 
 
 def compiled(source: Path, folder: Path, *flags: str, language: str = "c") -> Path:
-    """Return the program that a source becomes; skip where there is no compiler."""
+    """Compile a source and return the program; skip without a compiler."""
     names = ("cc", "gcc", "clang") if language == "c" else ("c++", "g++", "clang++")
     variable = os.environ.get("CC" if language == "c" else "CXX")
     found = next(filter(shutil.which, names), None)
@@ -36,7 +36,7 @@ def compiled(source: Path, folder: Path, *flags: str, language: str = "c") -> Pa
 def replayed(program: Path, frozen: Path, states: Rows) -> Rows:
     """Return status and tau of a frozen controller at rows of t, q and v."""
     lines = "\n".join(" ".join(f"{x:.17g}" for x in row) for row in states)
-    environment = {"PATH": "/usr/bin:/bin"}  # nothing of Python's
+    environment = {"PATH": "/usr/bin:/bin"}  # without Python's environment
     if sanitizer := os.environ.get("ASAN_OPTIONS"):
         environment["ASAN_OPTIONS"] = sanitizer
     done = subprocess.run(
@@ -75,7 +75,7 @@ def random_states(
 
 
 def simulated_states(experiment: hsp.Experiment, duration: float) -> Rows:
-    """Return rows of t, q and v of a closed loop, at each effort."""
+    """Return rows of t, q and v of a closed loop, one per effort."""
     own, robot = experiment.controller.preview(), experiment.robot
     period = 0.001
     q, v = experiment.q0.copy(), experiment.v0.copy()

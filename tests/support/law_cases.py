@@ -1,4 +1,4 @@
-"""Robots that the law is tested on, and the pseudo-inverse by itself."""
+"""Robots for tests of the law, and the pseudo-inverse alone."""
 
 from functools import cache, partial
 

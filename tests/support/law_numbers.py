@@ -1,4 +1,4 @@
-"""Random numbers for the law, and the law of them."""
+"""Random inputs of the law, and its results."""
 
 from collections.abc import Sequence
 from typing import Any, NamedTuple
@@ -24,13 +24,13 @@ def positive(seed: int, n: int) -> Array:
 
 
 def jacobian(seed: int, m: int, n: int, values: Any, W: Array) -> Array:
-    """Return J whose singular values in the metric, those of J L⁻ᵀ, are given."""
+    """Return J with given singular values in the metric, those of J L⁻ᵀ."""
     whitened = (orthogonal(seed, m, m) * values) @ orthogonal(seed + 1, n, m).T
     return whitened @ np.linalg.cholesky(W).T
 
 
 class Numbers(NamedTuple):
-    """All that the law needs at one state, drawn at random."""
+    """The law's input at one state, at random."""
 
     J: Array
     J_dot: Array

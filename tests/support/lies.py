@@ -1,4 +1,4 @@
-"""Lies of a robot's sensors about one joint or all: each a function of the truth."""
+"""False readings of one joint or of all, as functions of the true measurements."""
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
@@ -14,9 +14,9 @@ Values = tuple[Array, Array]
 
 @dataclass
 class Sensors:
-    """Input of a lie: all true measurements before."""
+    """Input of a fault: all true measurements so far."""
 
-    joints: Flags  # those that it is about, shape (nv,)
+    joints: Flags  # the affected joints, shape (nv,)
     begin: int  # the number of the read at which it begins
     rng: np.random.Generator
     period: float = PERIOD
@@ -33,32 +33,32 @@ class Sensors:
 
     @property
     def since(self) -> float:
-        """Time since the lie began [s]."""
+        """Time since the fault began [s]."""
         return (self.reads - self.begin) * self.period
 
     def filtered(self, value: Array, frequency: float) -> Array:
-        """Return a value after a first-order filter that begins with the lie."""
+        """Return a value after a first-order filter that starts with the fault."""
         before = value if self.memory is None else self.memory
         part = 1.0 - np.exp(-2.0 * np.pi * frequency * self.period)
         self.memory = before + part * (value - before)
         return self.memory
 
     def __call__(self, found: Measurement, lie: "Lie") -> Measurement:
-        """Return a measurement with the lie, once it has begun."""
+        """Return a measurement with the fault, once it has begun."""
         self.reads += 1
         self.q.append(found.q)
         self.v.append(found.v)
         if self.reads < self.begin:
             return found
         self.first = self.first or found
-        told = lie(self, found)
+        reported = lie(self, found)
         mine = self.joints
-        applied = told.applied
+        applied = reported.applied
         if applied is not None and found.applied is not None:
             applied = np.where(mine, applied, found.applied)
-        return told._replace(
-            q=np.where(mine, told.q, found.q),
-            v=np.where(mine, told.v, found.v),
+        return reported._replace(
+            q=np.where(mine, reported.q, found.q),
+            v=np.where(mine, reported.v, found.v),
             applied=applied,
         )
 
@@ -79,7 +79,7 @@ def _both(change: Callable[[Sensors], Values]) -> Lie:
 
 
 def begun(sensors: Sensors) -> Measurement:
-    """Return the measurement at which a lie began."""
+    """Return the measurement at which a fault began."""
     assert sensors.first is not None
     return sensors.first
 
@@ -182,8 +182,8 @@ TIME: dict[str, Lie] = {
     "in milliseconds": _t(lambda s, t: 1000.0 * t),
 }
 LIES: dict[str, Lie] = {
-    f"{what}: {name}": lie
-    for what, lies in (
+    f"{signal}: {name}": lie
+    for signal, lies in (
         ("velocity", VELOCITY),
         ("position", POSITION),
         ("both", BOTH),
@@ -195,17 +195,17 @@ LIES: dict[str, Lie] = {
 
 
 def is_seen_at_rest(lie: Lie) -> bool:
-    """Return whether a lie changes the measurements of an arm that stands."""
+    """Return whether a fault changes the measurements of an arm at rest."""
     sensors = Sensors(np.ones(7, dtype=bool), 2, np.random.default_rng(0))
     q, tau = 0.1 * np.arange(7), np.arange(7.0)
     for k in range(4):
         true = Measurement(k, k * PERIOD, q, np.zeros(7), applied=tau)
-        told = sensors(true, lie)
+        reported = sensors(true, lie)
         names = ("t", "q", "v", "applied")
-        if any(np.any(getattr(told, n) != getattr(true, n)) for n in names):
+        if any(np.any(getattr(reported, n) != getattr(true, n)) for n in names):
             return True
     return False
 
 
 THE_SIGN: Lie = _both(lambda s: (2.0 * begun(s).q - s.q[-1], -s.v[-1]))
-"""Position and velocity agree with each other, and nothing with the efforts."""
+"""Position and velocity are consistent with each other, but not with the efforts."""

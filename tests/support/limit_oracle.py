@@ -1,7 +1,7 @@
 """The QP of a limited step, assembled with NumPy and solved by DAQP: an oracle.
 
-It shares no code with the kernels, but a constant: the cost is a dense matrix, the
-contacts are rows.
+It shares only a constant with the kernels: the cost is a dense matrix, the contacts are
+rows.
 """
 
 from typing import NamedTuple
@@ -45,11 +45,10 @@ def stacked(*rows: Rows) -> Rows:
 def level_costs(law: BoundLaw, supported: bool, size: float, held: Array) -> Array:
     """Return ρ of each level, then of the null space, shape (levels + 1,).
 
-    Levels below one cost a part of that level's error over the robot's size, but
-    no more than a tenth and no less than priorities need; and what limits require,
-    ``held``, if that is more, but no more than the level itself. On contacts it is the
-    least, whatever the error. Contacts cost as much as the level below them, and so do
-    springs where there are none.
+    The cost of levels below one is proportional to that level's error over the robot's
+    size, at most a tenth and at least ``costs``; or ``held``, if larger, up to the cost
+    of the level itself. Below contacts it is ``costs`` for any error. Contacts cost as
+    much as the level below them; so do springs without contacts.
     """
     count = len(law.ends) - supported
     least = 1e-6 ** (1.0 / max(count, 1))
@@ -89,7 +88,7 @@ def deviation_cost(law: BoundLaw, supported: bool, size: float, held: Array) -> 
 
 
 class Step(NamedTuple):
-    """A limited step: H, f and rows of the unknowns (δ, forces in robot weights)."""
+    """A limited step: H, f and rows in the unknowns (δ, forces in robot weights)."""
 
     H: Array
     f: Array
@@ -114,7 +113,7 @@ def limited_step(
     Args:
         M: Mass matrix.
         a: The law's acceleration.
-        wanted: M a + N.
+        wanted: The unconstrained effort M a + N.
         tau: Bounds on the effort.
         motion: Bounds on the acceleration.
         law: The resolved law.
@@ -122,7 +121,7 @@ def limited_step(
         base: Degrees of freedom without a motor.
         weight: The robot's weight [N].
         size: The robot's size [m].
-        costs: Least costs below each level, shape (levels,).
+        costs: Smallest costs below each level, shape (levels,).
     """
     n, p = len(a), support.size
     H = np.zeros((n + p, n + p))

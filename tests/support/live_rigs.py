@@ -1,4 +1,4 @@
-"""Robots for the live loop: small, in this process, and misbehaving to order."""
+"""Robots for the live loop: small, in this process, with faults on demand."""
 
 from collections.abc import Callable
 
@@ -54,11 +54,11 @@ Trick = Callable[[Measurement], Measurement | None]
 
 
 class Rig(InProcessRobot):
-    """A robot whose measurements pass through tricks, by the number of the read.
+    """A robot whose measurements are modified, by the number of the read.
 
     Attributes:
-        sent: All efforts that it was sent.
-        reads: How often it was read.
+        sent: All efforts that it received.
+        reads: Number of reads.
     """
 
     def __init__(

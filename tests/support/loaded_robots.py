@@ -1,4 +1,4 @@
-"""Robots that many tests share, loaded once in a process: no test may change one."""
+"""Robots shared by many tests, loaded once per process: no test may change one."""
 
 from functools import cache
 
@@ -10,7 +10,7 @@ from hsp_control.common.resources import bundled_robots
 
 @cache
 def load(name: str, root: str | None = None) -> Robot:
-    """Return a robot; skip if it is of example-robot-data and that is not there."""
+    """Return a robot; skip if it needs example-robot-data and that is missing."""
     if name not in bundled_robots():
         pytest.importorskip("example_robot_data")
     return Robot.load(name, root=root)  # type: ignore[arg-type]

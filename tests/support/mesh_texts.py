@@ -1,4 +1,4 @@
-"""A tetrahedron as a mesh file of each format, in any unit and with any axis up."""
+"""A tetrahedron as a mesh file of any format, unit and up axis."""
 
 import json
 from pathlib import Path
@@ -43,9 +43,9 @@ def tetrahedron(
     if file.suffix == ".gltf":
         corners = np.array([_FROM_LINK["Y_UP"](*corner) for corner in CORNERS])
     if file.suffix == ".dae":
-        said = "" if unit is None else f'<unit name="u" meter="{unit}"/>'
-        said += "" if up is None else f"<up_axis>{up}</up_axis>"
-        file.write_text(_dae(corners).replace("<asset>", f"<asset>{said}"))
+        content = "" if unit is None else f'<unit name="u" meter="{unit}"/>'
+        content += "" if up is None else f"<up_axis>{up}</up_axis>"
+        file.write_text(_dae(corners).replace("<asset>", f"<asset>{content}"))
     else:
         file.write_text(write[file.suffix](corners))
     return file

@@ -1,7 +1,7 @@
 """Plain NumPy forms of the package's mathematics, and differences: oracles.
 
-Nothing here is fast, and nothing comes from the package: each formula stands as
-`law.md` or the paper prints it, inverses and all.
+Independent of the package and not optimised: formulas are those of `law.md` or of the
+paper, with explicit inverses.
 
 References:
     P. Hsu, J. Hauser, S. Sastry, "Dynamic Control of Redundant Manipulators", Journal
@@ -23,11 +23,11 @@ def close(actual: Array, expected: Array, atol: float) -> None:
 
 
 def slope(function: Callable[[float], Any], step: float) -> Array:
-    """Return f'(0) by six points: error h⁶ f⁽⁷⁾/140 beside rounding, about 2 ε|f|/h."""
+    """Return f'(0) by six points: truncation h⁶ f⁽⁷⁾/140, rounding about 2 ε|f|/h."""
     weights = ((1.0, 45.0), (2.0, -9.0), (3.0, 1.0))
     total = 0.0
     for k, weight in weights:
-        # Copies, because functions may return arrays that they will write into again.
+        # Copies, since functions may return arrays that they overwrite later.
         ahead = np.array(function(k * step), dtype=float)
         behind = np.array(function(-k * step), dtype=float)
         total = total + weight * (ahead - behind)
@@ -35,7 +35,7 @@ def slope(function: Callable[[float], Any], step: float) -> Array:
 
 
 def gradient(function: Callable[[Array], float], size: int, step: float) -> Array:
-    """Return ∇f(0) of a function of Rⁿ, each component by `slope`."""
+    """Return ∇f(0) of a function of Rⁿ, by `slope` per component."""
     return np.array(
         [slope(lambda s, u=unit: function(s * u), step) for unit in np.eye(size)]
     )

@@ -1,16 +1,16 @@
-"""Runs a page of the documents as a reader does: all its blocks, in one empty folder.
+"""Runs a page of the documents as a reader would: all blocks, in one empty folder.
 
-Python is executed in one namespace, commands in a shell, a YAML block is loaded and run
-for a moment, and a block behind a line such as "Save it as `mine.yaml`:" becomes that
-file. A block that cannot run so has a comment before it, which no reader sees:
+Python is executed in one namespace, commands in a shell; a YAML block is loaded and run
+briefly; a block after a line such as "Save it as `mine.yaml`:" becomes that file.
+Exceptions are marked by an invisible comment before the block:
 
     <!-- not run: needs an arm -->         it is skipped, with this reason
     <!-- slow: a minute -->                only `make test-system` runs it
-    <!-- Ctrl-C: serves a page -->         it runs until it has printed something
-    <!-- part of: {robot: {name: panda}} -->    YAML that is no whole configuration
-    <!-- part of: forces/talos_wall KEY=VALUE -->    such YAML, laid over a bundled one
-    <!-- lines of: engine/... -->          text that stands so in a file of the checkout
-    <!-- background: a robot -->           it goes on until the page ends
+    <!-- Ctrl-C: serves a page -->         it runs until its first output
+    <!-- part of: {robot: {name: panda}} -->    YAML that is a part of a configuration
+    <!-- part of: forces/talos_wall KEY=VALUE -->    such YAML, in a bundled one
+    <!-- lines of: engine/... -->          text that is in a file of the checkout
+    <!-- background: a robot -->           it runs until the page ends
     <!-- fails: unstable gains -->         its status is 2, as in the page
     <!-- given: arm.urdf: robots/planar3r/planar3r.urdf -->    the reader's own file
 """
@@ -53,7 +53,7 @@ _FILE = re.compile(r"`([\w./-]+\.(\w+))`[^`]*:\s*$")
 _ENDINGS = {"python": "py", "sh": "sh", "yaml": "yaml", "c": "c", "cpp": "cpp"}
 _SYNTAX = {"json": json.loads, "toml": tomllib.loads}
 _BRIEFLY = "--duration 1"
-"""Duration of `hsp live` where the page does not give one [s]."""
+"""Default duration of `hsp live` [s]."""
 _SHORT = "simulation.duration=0.02"
 
 
@@ -61,12 +61,12 @@ class Block(NamedTuple):
     """A block of a page.
 
     Attributes:
-        language: Of its fence.
+        language: The language of its fence.
         text: Its text.
-        line: The page's line on which its text begins.
+        line: The line of the page at which its text begins.
         kind: The kind of the comment before it, if any.
         reason: The text of the comment.
-        file: The name of the file that it is, if any.
+        file: The name of the file that it becomes, if any.
     """
 
     language: str
@@ -78,7 +78,7 @@ class Block(NamedTuple):
 
 
 def blocks_of(page: str) -> list[Block]:
-    """Return the blocks of a page, but for the directives of the site."""
+    """Return the blocks of a page except the site's directives."""
     text = (ROOT / page).read_text(encoding="utf-8")
     return [_block(text, found) for found in _FENCE.finditer(text)
             if not found[1].startswith("{")]  # fmt: skip
@@ -105,7 +105,7 @@ def runs_commands(page: str) -> bool:
 
 @contextmanager
 def types_of_a_page() -> Iterator[None]:
-    """Within the block types may be declared; afterwards nobody knows them."""
+    """Within the block types may be declared; they are removed at its end."""
     families = {each.family for each in _subclasses(Part) if each.family}
     members = {each: dict(each.members) for each in families}
     functions = dict(imported._functions)
@@ -131,7 +131,7 @@ def _subclasses(part: type[Part]) -> Iterator[type[Part]]:
 
 
 def run_page(page: str, folder: Path, *, whole: bool) -> dict[str, Any]:
-    """Run a page in a folder, and return the names that its Python leaves.
+    """Run a page in a folder, and return the variables of its Python.
 
     Args:
         page: Its path in the checkout.
@@ -177,7 +177,7 @@ def run_page(page: str, folder: Path, *, whole: bool) -> dict[str, Any]:
 
 
 def _give(path: Path, source: str) -> None:
-    """Copy a file of the checkout, or write a text that a module of the tests has."""
+    """Copy a file of the checkout, or write a text from a module of the tests."""
     path.parent.mkdir(exist_ok=True)
     if ":" in source:
         module, name = source.split(":")
@@ -187,7 +187,7 @@ def _give(path: Path, source: str) -> None:
 
 
 def _check_lines(block: Block, where: str) -> None:
-    """Check that each line of C++ stands in the file that the comment names."""
+    """Check that every line of C++ is in the file that the comment names."""
     there = set(_without_comments((ROOT / block.reason).read_text(encoding="utf-8")))
     missing = [line for line in _without_comments(block.text) if line not in there]
     assert not missing, f"{where}: not in {block.reason}: {missing}"
@@ -214,7 +214,7 @@ def _laid_over(base: dict[str, Any], over: dict[str, Any]) -> dict[str, Any]:
 
 
 def _check_yaml(block: Block, where: str) -> None:
-    """Run a configuration for a moment; a part of one together with its rest."""
+    """Run a configuration briefly; a part is completed first."""
     data, overrides = yaml.safe_load(block.text), [_SHORT]
     if block.kind == "part of":
         base, *more = [block.reason] if block.reason[0] == "{" else block.reason.split()
@@ -225,14 +225,14 @@ def _check_yaml(block: Block, where: str) -> None:
         error.add_note(where)
         raise
     assert status == "completed", where
-    collect()  # what its streams listen at is free again
+    collect()  # ports of its streams are free again
 
 
 # --- commands -------------------------------------------------------------------------
 
 
 class Shell:
-    """A folder in which commands are typed; running ones end with it."""
+    """A folder in which commands are run; background commands end with it."""
 
     def __init__(self, folder: Path) -> None:
         self._folder = folder
@@ -256,11 +256,11 @@ class Shell:
             self._alone.close()
 
     def run(self, block: Block, where: str) -> None:
-        """Type each line of a block; one that fails is an error.
+        """Run the lines of a block; a failure is an error.
 
-        A line that ends in ``&`` goes on until the page ends.
+        A line that ends in ``&`` runs until the page ends.
         """
-        if self._alone is None:  # pages name ports: one at a time on this computer
+        if self._alone is None:  # pages use fixed ports: one at a time on this computer
             self._alone = (Path(gettempdir()) / "hsp-pages.lock").open("w")
             flock(self._alone, LOCK_EX)
         for line in lines_of(block.text):
@@ -278,10 +278,10 @@ class Shell:
                 if THOROUGH or not _of_the_readme(line) or where.startswith("README"):
                     self._interrupted(line, where, serves="page" in block.reason)
             elif re.fullmatch(r"hsp [\w ./=*-]+", line) and not block.kind:
-                status, said = READY.run(
+                status, output = READY.run(
                     self._words(line)[1:], self._folder, self._environment
                 )
-                assert status == 0, f"{where}: {line}\n{said}"
+                assert status == 0, f"{where}: {line}\n{output}"
             else:
                 done = subprocess.run(
                     ["bash", "-ec", line], cwd=self._folder, env=self._environment,
@@ -292,7 +292,7 @@ class Shell:
                 assert done.returncode == status, f"{where}: {line}\n{done.stdout}"
 
     def _words(self, line: str) -> list[str]:
-        """Return the words of a command, with the files of a pattern in its place."""
+        """Return the words of a command, with patterns replaced by their files."""
         return [
             file
             for word in line.split()
@@ -307,7 +307,7 @@ class Shell:
         ]
 
     def _start(self, line: str, where: str) -> "Running":
-        """Start a command, and wait until it has printed something."""
+        """Start a command, and wait for its first output."""
         output = self._folder / f".output-{len(self._background)}"
         with output.open("w") as file:
             process = subprocess.Popen(
@@ -316,12 +316,12 @@ class Shell:
                 stderr=subprocess.STDOUT, start_new_session=True,
             )  # fmt: skip
         running = Running(process, output, f"{where}: {line}")
-        if not line.startswith("python"):  # a script of one's own may print nothing
+        if not line.startswith("python"):  # a user's script may print nothing
             running.wait_for(r".")
         return running
 
     def _interrupted(self, line: str, where: str, *, serves: bool) -> None:
-        """Start a command, look at its page if it serves one, and press Ctrl-C."""
+        """Start a command, request its page if it serves one, and press Ctrl-C."""
         running = self._start(line, where)
         if serves:
             served = running.wait_for(r"http://\S+", 200.0)
@@ -339,7 +339,7 @@ def _of_the_readme(line: str) -> bool:
 
 
 class Running(NamedTuple):
-    """A command that goes on."""
+    """A command that keeps running."""
 
     process: subprocess.Popen[bytes]
     output: Path

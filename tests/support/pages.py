@@ -1,4 +1,4 @@
-"""A page as the server sees it, without a browser; for tests."""
+"""A page as seen by the server, without a browser."""
 
 import asyncio
 import json
@@ -20,7 +20,7 @@ def scene_request(url: str, **headers: str) -> HTTPRequest:
 
 
 class Page(threading.Thread):
-    """A browser's part: connect, receive commands, answer when it has drawn."""
+    """Acts as a browser: connects, receives commands, and confirms drawing."""
 
     def __init__(self, url: str, pause: float = 0.0) -> None:
         super().__init__(daemon=True)
@@ -37,7 +37,7 @@ class Page(threading.Thread):
 
     async def look(self) -> None:
         page = await websocket_connect(scene_request(self.url))
-        protocol = page.protocol  # `leave` takes it from the page
+        protocol = page.protocol  # `leave` detaches it from the page
         self.loop, self.socket = asyncio.get_running_loop(), page
         try:
             while (message := await page.read_message()) is not None:
@@ -52,7 +52,7 @@ class Page(threading.Thread):
             pass
         finally:
             page.close()
-            # The event loop ends here, before the other side could confirm.
+            # The event loop ends here, before the other side can confirm.
             if protocol is not None and protocol.stream is not None:
                 protocol.stream.close()
 
@@ -77,5 +77,5 @@ class Steering(Page):
         asyncio.run_coroutine_threadsafe(write(), self.loop).result(10.0)
 
     def drives(self) -> tuple[bool, bool] | None:
-        said = [c for c in self.commands if c["type"] == "play_drive"]
-        return (said[-1]["mine"], said[-1]["taken"]) if said else None
+        reported = [c for c in self.commands if c["type"] == "play_drive"]
+        return (reported[-1]["mine"], reported[-1]["taken"]) if reported else None

@@ -1,4 +1,4 @@
-"""Where the checkout is, and how thoroughly it is to be tested."""
+"""The checkout's folder, and the extent of testing."""
 
 import os
 from collections.abc import Iterable
@@ -12,13 +12,13 @@ import pytest
 ROOT = Path(__file__).resolve().parents[2]
 
 THOROUGH = os.environ.get("HSP_THOROUGH") == "1"
-"""Whether more seeds are tried, and all pages drawn: `make thorough`."""
+"""Whether to try more seeds and draw all pages: `make thorough`."""
 
 
 def further(*cases: Any) -> tuple[Any, ...]:
-    """Return cases that show what others do as well, for `make thorough`; else none.
+    """Return redundant cases for `make thorough`; otherwise none.
 
-    A test whose only cases these are is skipped.
+    A test with no other cases is skipped.
     """
     return cases if THOROUGH else ()
 
@@ -26,12 +26,13 @@ def further(*cases: Any) -> tuple[Any, ...]:
 def covering(*axes: Iterable[Any], times: int = 1) -> list[tuple[Any, ...]]:
     """Return tuples of one value of each axis: their product for `make thorough`.
 
-    Else as few as have each value, those of the longest axis so many times.
+    Otherwise as few as contain every value, with that many for the longest axis.
     """
     lists = [list(axis) for axis in axes]
     if THOROUGH:
         return list(product(*lists))
-    # In each round through an axis its values meet the next ones of the others.
+    # In every round through an axis its values are paired with the next ones of the
+    # others.
     found = {
         tuple((k + k // len(axis)) % len(axis) for axis in lists): None
         for k in range(times * max(map(len, lists)))
@@ -45,4 +46,4 @@ def covering(*axes: Iterable[Any], times: int = 1) -> list[tuple[Any, ...]]:
 ON_MUJOCO = pytest.mark.skipif(
     find_spec("hsp_control.companions.mujoco") is None, reason="of another companion"
 )
-"""Of a test that also needs MuJoCo's companion."""
+"""Mark of a test that also needs the MuJoCo companion."""

@@ -2,7 +2,7 @@
 
 Nothing here comes from Pinocchio or from hsp_control, and the law stands as the paper
 prints it, with its derivative of the pseudo-inverse, so that an error in our short form
-cannot hide in both. Plain NumPy, one state at a time, no thought of speed.
+cannot hide in both. Plain NumPy, one state at a time, not optimised.
 
 The arm: unit links, a unit point mass at each link's end, no gravity. As in the paper
 the angles θ are ABSOLUTE, measured from the horizontal; the last section converts to
@@ -32,13 +32,13 @@ ANGULAR_RATE = 3.0  # of the circle and of the disk [rad/s]
 START = (-0.44090929, 0.46364761, 1.36820450)
 MIRRORED_START = START[::-1]
 
-# Masses that ride on joint i and on joint j: 4 - max(i, j), counting from one [kg].
+# Masses moved by both joint i and joint j: 4 - max(i, j), counting from one [kg].
 CARRIED = np.array([[3.0, 2.0, 1.0], [2.0, 2.0, 1.0], [1.0, 1.0, 1.0]])
 
 # r3 - r2 = θ1 - 2 θ2 + θ3 for the relative angles r2 = θ2 - θ1 and r3 = θ3 - θ2.
 SPREAD = np.array([1.0, -2.0, 1.0])
 
-# Which angles move joint two (row 1: the first) and joint three (row 2: the first two).
+# Angles that move joint two (row 1: the first) and joint three (row 2: the first two).
 MOVERS = np.array([[1.0, 0.0, 0.0], [1.0, 1.0, 0.0]])
 
 IDENTITY = np.eye(3)
@@ -178,10 +178,10 @@ def disk_cost_gradient(t: float, theta: Array) -> Array:
 
 
 def disk_cost_gradient_rate(t: float, theta: Array, theta_dot: Array) -> Array:
-    """Return (∇f)', every factor of ∇f = Σ -2 J_kᵀ r_k / d_k⁴ differentiated in turn.
+    """Return (∇f)' by the product rule on ∇f = Σ -2 J_kᵀ r_k / d_k⁴.
 
     (∇f)' = Σ -2 (J_k'ᵀ r_k + J_kᵀ r_k') / d_k⁴ + 8 (r_kᵀ r_k') J_kᵀ r_k / d_k⁶.
-    r_k' = J_k θ' - c': the disk's own motion, ∂∇f/∂t, comes in through c'.
+    r_k' = J_k θ' - c': the disk's motion, ∂∇f/∂t, enters through c'.
     """
     c, c_dot = disk_center(t)
     J, J_dot = jacobian(theta), jacobian_rate(theta, theta_dot)
@@ -264,7 +264,7 @@ def law(
         theta: Absolute angles θ, shape (3,) [rad].
         theta_dot: Their rates v = θ', shape (3,) [rad/s].
         field: g and its total rate g' for eq. (13), or None for φ_N = 0; e_N is then
-            given for g = 0: minus the self-motion, which nothing controls.
+            given for g = 0: minus the uncontrolled self-motion.
 
     Returns:
         The torques and their parts.
@@ -356,7 +356,7 @@ def simulate_paper(number: int, duration: float = 10.0) -> PlanarSimulation:
     on every grid point (rtol 2e-14) the angles of (2) to (4) are good to 1e-12 and the
     rates to 2e-11, in (2) to 4e-10 where it grazes a singularity at 3.14 s. The angles
     of (1) lose a digit a second: they are good to 1e-13 at 2 s, 1e-10 at 5 s, 1e-3 at
-    10 s, and a second implementation should be held to them for 2 s only.
+    10 s, so a second implementation should be compared for 2 s only.
 
     Args:
         number: Which of the four.
@@ -404,7 +404,7 @@ def simulate_paper(number: int, duration: float = 10.0) -> PlanarSimulation:
         task_error=np.array([row.task_error for row in laws]),
         null_space_error=np.array([row.null_space_error for row in laws]),
     )
-    # One cached result serves many tests: none may change it for the others.
+    # The cached result is shared by many tests: none may change it.
     for value in vars(simulation).values():
         if isinstance(value, np.ndarray):
             value.setflags(write=False)
@@ -415,7 +415,7 @@ def simulate_paper(number: int, duration: float = 10.0) -> PlanarSimulation:
 #
 # θ = A q with A the lower triangle of ones; the same for velocities, and for
 # accelerations. By virtual work τ_relᵀ δq = τ_absᵀ A δq, hence τ_rel = Aᵀ τ_abs.
-# All four work on the last axis, so that a whole trajectory goes through at once.
+# All four act on the last axis, so that whole trajectories can be converted.
 
 A = np.tril(np.ones((3, 3)))
 A_INVERSE = np.array([[1.0, 0.0, 0.0], [-1.0, 1.0, 0.0], [0.0, -1.0, 1.0]])

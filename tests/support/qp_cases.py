@@ -1,7 +1,7 @@
-"""Random QPs of many kinds, their solution by other solvers, proofs of an optimum.
+"""Random QPs of many kinds, their solution by other solvers, KKT residuals.
 
 The oracles solve in y, x = x0 + J y, with rows of length 1: there the cost is ½ ‖y‖²,
-so that they suffer least from the scales of the cost and of the rows.
+so that scales of cost and rows affect them least.
 """
 
 from collections.abc import Callable
@@ -69,7 +69,8 @@ def equalities(rng: Generator) -> Case:
 
 
 def degenerate(rng: Generator) -> Case:
-    """More rows through one point than unknowns; repeated, parallel, opposite rows."""
+    """Degenerate: more rows through a point than unknowns; repeated, parallel,
+    opposite."""
     n = int(rng.integers(1, 9))
     A = rng.standard_normal((2 * n, n))
     again = rng.choice([-3.0, -1.0, 0.1, 1.0, 1e3], 2 * n)[:, None] * A
@@ -94,7 +95,7 @@ def badly_scaled(rng: Generator) -> Case:
 
 
 def pinned(rng: Generator) -> Case:
-    """Rows with lower = upper that nobody declared to be equalities."""
+    """Rows with lower = upper that are not declared as equalities."""
     n, k = int(rng.integers(2, 11)), int(rng.integers(2, 11))
     return around(
         rng, factor(rng, n, n), rng.standard_normal((k, n)), min(n - 1, k)
@@ -107,7 +108,7 @@ def bounds_only(rng: Generator) -> Case:
 
 
 def unspanned(rng: Generator) -> Case:
-    """Some motions are not allowed: J has fewer columns than rows."""
+    """Some motions are excluded: J has fewer columns than rows."""
     n = int(rng.integers(2, 13))
     nz = int(rng.integers(1, n))
     k = int(rng.integers(1, 13))
@@ -125,7 +126,7 @@ def with_zeros(rng: Generator) -> Case:
 
 
 def uncoupled(rng: Generator) -> Case:
-    """Unknowns of which the last have costs of their own, as forces have."""
+    """The last unknowns have separate costs, like forces."""
     n, p, k = int(rng.integers(0, 7)), int(rng.integers(1, 7)), int(rng.integers(1, 13))
     nz = int(rng.integers(0, n + 1))
     JT = np.zeros((nz + p, n + p))
@@ -139,7 +140,7 @@ def uncoupled(rng: Generator) -> Case:
 
 
 def redundant(rng: Generator) -> Case:
-    """Equalities that follow from others."""
+    """Redundant equalities."""
     case = equalities(rng)
     count, extra = case.equalities, int(rng.integers(1, 4))
     mix = rng.standard_normal((extra, count))
@@ -152,7 +153,7 @@ def redundant(rng: Generator) -> Case:
 
 
 def infeasible(rng: Generator) -> Case:
-    """A combination of rows is bounded away from what the rows permit."""
+    """Infeasible: the bound on a combination of rows contradicts the rows'."""
     case = (dense, equalities, unspanned, badly_scaled)[rng.integers(4)](rng)
     rows, part = case.rows, rng.standard_normal(len(case.rows))
     part[rng.random(len(rows)) < 0.5] = 0.0
@@ -217,7 +218,7 @@ def around(rng: Generator, JT: Array, A: Array, count: int = 0) -> Case:
 
 
 def spans(A: Array) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-    """Return where the non-zero entries of each row begin and end."""
+    """Return the range of non-zero entries in each row."""
     begin, end = np.zeros((2, len(A)), dtype=np.int64)
     for i, row in enumerate(A):
         filled = np.flatnonzero(row)
@@ -227,7 +228,7 @@ def spans(A: Array) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
 
 
 def packed(case: Case, softness: Array | None = None) -> QP:
-    """Return the solver's argument; J's last columns with one entry are apart."""
+    """Return the solver's argument; J's last single-entry columns are separate."""
     soft = np.zeros(0) if softness is None else softness
     A, (nz, n) = np.ascontiguousarray(case.A), case.JT.shape
     own = 0
@@ -251,7 +252,7 @@ def answer(
     work: Workspace | None = None,
     iterations: int = 10,
 ) -> Answer:
-    """Return the solver's solution; ``work``: a workspace to begin warm with."""
+    """Return the solver's solution; ``work``: a workspace for a warm start."""
     x, warm = case.x0.copy(), work is not None
     if work is None:
         work = Workspace.of(len(x), len(case.A), softness is not None)
@@ -276,7 +277,7 @@ def answer(
 def in_y(case: Case) -> tuple[Array, Array, Array] | None:
     """Return the constraints as rows of length 1 on y.
 
-    Rows of zeros are left out; None if one of them is violated.
+    Rows of zeros are omitted; None if one of them is violated.
     """
     rows, offset = case.rows @ case.JT.T, case.rows @ case.x0
     lower, upper, size = case.lower - offset, case.upper - offset, norms(rows)
@@ -305,7 +306,7 @@ def by_daqp(case: Case) -> Array | None:
     return case.x0 + case.JT.T @ y if flag >= 1 else None
 
 
-# --- proofs of an optimum ------------------------------------------------------------
+# --- optimality ----------------------------------------------------------------------
 
 
 def cost(case: Case, x: Array) -> float:
@@ -323,11 +324,11 @@ def residual(case: Case, x: Array) -> float:
 
 
 def defect(case: Case, found: Answer) -> float:
-    """Return how far an answer is from the conditions of Karush, Kuhn and Tucker.
+    """Return the residual of the Karush-Kuhn-Tucker conditions.
 
-    The largest of: the residual; what x differs from x0 + J Bᵀ u, relative to 1 + |x|;
-    the relative gap between the primal and the dual cost. Multipliers of a wrong sign
-    give inf.
+    The largest of: the residual; the distance of x from x0 + J Bᵀ u, relative to 1 +
+    |x|; the relative gap between primal and dual cost. Multipliers of a wrong sign give
+    inf.
     """
     u, active = found.multipliers, found.active
     free = active >= case.equalities

@@ -1,4 +1,4 @@
-"""Ground that goes down, unknown to the plan."""
+"""Descending ground, unknown to the plan."""
 
 from math import cos, radians, sin
 

@@ -1,9 +1,8 @@
 """A process that has imported `hsp_control` forks one for every command or script.
 
-Each command still begins with no types, robots or logs of another one, and ends on its
-own: what is saved is the CPU of its imports and first checks, a second or two. How
-`hsp` itself starts is seen where plays and commands that need a shell run
-(`page_runner.py`).
+A command still begins without types, robots or logs of another one and ends
+independently; this saves the CPU time of its imports and first checks, 1 to 2 s. The
+start of `hsp` itself is tested by plays and by commands in a shell (`page_runner.py`).
 """
 
 import atexit
@@ -38,12 +37,13 @@ class ReadyCommands:
     def run(
         self, arguments: list[str], folder: Path, environment: dict[str, str]
     ) -> tuple[int, str]:
-        """Return the status of a command, or of a script ``name.py``, and its words."""
+        """Return the status and the output of a command, or of a script ``name.py``."""
         try:
             return self._asked(
                 {"arguments": arguments, "folder": str(folder), "env": environment}
             )
-        except BaseException:  # a time limit: the next one would get its answer
+        # a timeout: otherwise the next one would receive its answer
+        except BaseException:
             self.close()
             raise
 
@@ -73,10 +73,10 @@ def serve() -> None:
     from contextlib import suppress
     from importlib import import_module
 
-    sys.argv[0] = "hsp"  # as which Ctrl-C ends it during imports, too
+    sys.argv[0] = "hsp"  # so that Ctrl-C ends it during imports, too
     import_module("hsp_control.cli")
     for part in PARTS:
-        with suppress(ImportError):  # a companion that was taken away
+        with suppress(ImportError):  # a removed companion
             import_module(part)
     from multiprocessing import get_context
     from tempfile import TemporaryFile
@@ -89,18 +89,18 @@ def serve() -> None:
     requests, answers = os.fdopen(os.dup(0)), os.fdopen(os.dup(1), "w")
     fork = get_context("fork")
     gc.collect()
-    gc.freeze()  # a fork that looked for garbage would copy all of it
+    gc.freeze()  # a collection would touch, and so copy, all pages
     for line in requests:
         with TemporaryFile() as printed:
-            # Ends without taking the interpreter apart, which would copy it, too.
+            # Exits without finalising the interpreter, which would copy pages, too.
             child = fork.Process(
                 target=_become, args=(json.loads(line), printed.fileno())
             )
             child.start()
             child.join()
             printed.seek(0)
-            said = printed.read().decode()
-        print(json.dumps([child.exitcode, said]), file=answers, flush=True)
+            reported = printed.read().decode()
+        print(json.dumps([child.exitcode, reported]), file=answers, flush=True)
 
 
 def _become(request: dict[str, Any], output: int) -> None:

@@ -1,4 +1,4 @@
-"""Robots of every kind that the package meets, states drawn at random, and their terms.
+"""Robots of every kind, random states, and their terms.
 
 The kinds are fixed, planar and floating roots, continuous joints (nq ≠ nv) and joints
 that mimic others.
@@ -46,7 +46,7 @@ def draw(case: str, seed: int) -> tuple[Robot, Array, Array, np.random.Generator
 
 
 def everything(state: RobotState, frame: str) -> dict[str, Array]:
-    """Return copies of all that a state offers."""
+    """Return copies of all terms of a state."""
     kinematics = state.frame(frame)
     names = ("rotation", "position", "jacobian", "jacobian_dot", "velocity", "drift")
     terms = {name: np.array(getattr(kinematics, name)) for name in names}

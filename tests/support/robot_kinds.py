@@ -1,8 +1,8 @@
-"""Robots of every kind that dynamics distinguish, invented and small.
+"""Small artificial robots of every kind that the dynamics distinguish.
 
 Mimic joints at the end and below free joints, chains of them, a follower before its
-leader, continuous, planar and spherical joints, floating bases, a loop that is closed
-by a locked joint, rotors.
+leader, continuous, planar and spherical joints, floating bases, a loop closed by a
+locked joint, rotors.
 """
 
 from collections.abc import Callable
@@ -21,7 +21,7 @@ def follow(leader: str, multiplier: float = 1.0, offset: float = 0.0) -> str:
 
 
 def chain(*joints: tuple[str, str, str]) -> str:
-    """Return the URDF of links in a row, joined by (name, type, inner elements)."""
+    """Return the URDF of a serial chain with joints (name, type, inner elements)."""
     parts = [link("base")]
     for k, (name, kind, inner) in enumerate(joints):
         parent = f"link{k - 1}" if k else "base"
@@ -62,7 +62,7 @@ TEXTS = {
 def _with_box(
     model: pin.Model, parent: int, kind: pin.JointModel, rng: np.random.Generator
 ) -> int:
-    """Add a joint somewhere on its parent, with a box; return its number."""
+    """Add a joint at a random placement with a box; return its index."""
     k = model.njoints - 1
     place = pin.SE3(pin.rpy.rpyToMatrix(*rng.uniform(-1, 1, 3)), rng.uniform(size=3))
     joint: int = model.addJoint(parent, kind, place, f"joint{k}")
@@ -73,7 +73,7 @@ def _with_box(
 
 
 def _of_pinocchio() -> Robot:
-    """Return an arm on a ball, with rotors."""
+    """Return an arm on a spherical joint, with rotors."""
     model, parent = pin.Model(), 0
     rng = np.random.default_rng(3)
     joints = pin.JointModelSpherical(), pin.JointModelRX(), pin.JointModelRUBZ()
@@ -84,7 +84,7 @@ def _of_pinocchio() -> Robot:
 
 
 def _ball_between() -> Robot:
-    """Return a follower that a joint of several freedoms separates from its leader."""
+    """Return a robot with a multi-DOF joint between a leader and its follower."""
     model, rng = pin.Model(), np.random.default_rng(4)
     parent, kinds = 0, [pin.JointModelRY(), pin.JointModelSpherical(), None]
     for given in (*kinds, pin.JointModelPX()):
@@ -116,4 +116,4 @@ KINDS: dict[str, Callable[[Path], Robot]] = {
     "ball, rotors": lambda folder: _of_pinocchio(),
     "ball between leader and follower": lambda folder: _ball_between(),
 }
-"""Functions that load a robot of a kind, anew each time, from the given folder."""
+"""Functions that load a new robot of a kind from the given folder."""

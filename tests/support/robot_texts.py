@@ -1,4 +1,4 @@
-"""Robots as URDF texts, and where their frames are."""
+"""Robots as URDF texts, and their frames' placements."""
 
 import numpy as np
 import pinocchio as pin
@@ -64,7 +64,7 @@ def placements(model: pin.Model, q: np.ndarray) -> dict[str, np.ndarray]:
 def assert_same_placements(
     first: dict[str, np.ndarray], second: dict[str, np.ndarray]
 ) -> None:
-    """Every body of the first stands where the second's does, to rounding."""
+    """Every body of the first has the placement of the second's, to rounding."""
     assert first
     for name, placement in first.items():
         np.testing.assert_allclose(placement, second[name], rtol=0, atol=1e-14)

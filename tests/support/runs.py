@@ -1,4 +1,4 @@
-"""Runs of a loop, held or continuous, and the propositions as checks of their logs."""
+"""Runs of a sampled or continuous loop, and the propositions as checks of logs."""
 
 from typing import Any
 
@@ -10,7 +10,7 @@ from hsp_control.robot.integrators import Dop853, Rk4
 
 
 def held(law: hsp.Controller, q0: Any, period: float = 1e-3, **how: Any) -> hsp.Rollout:
-    """Run a sampled loop with a row each period, in steps of 1 ms at most."""
+    """Run a sampled loop with a row per period, in steps of at most 1 ms."""
     settings = {"log_period": period, "integrator": Rk4(min(period, 1e-3))} | how
     return hsp.simulate(law, q0, control_period=period, **settings)
 

@@ -1,4 +1,4 @@
-"""A small schema and a good text for it, to read documents by."""
+"""A small schema and a valid text, for tests of reading documents."""
 
 import re
 from functools import cache
@@ -85,7 +85,7 @@ class Scenario(Part):
 
 
 GOOD = """\
-robot: panda   # comments do not count
+robot: panda   # comments are ignored
 tasks:
   hand:
     frame: panda_hand
@@ -115,7 +115,7 @@ def read(text: str, *overrides: str, model: type[BaseModel] = Scenario) -> BaseM
 
 
 def message(text: str, *overrides: str, model: type[BaseModel] = Scenario) -> str:
-    """Return the message of the one error that a text leads to."""
+    """Return the message of the only error of a text."""
     with pytest.raises(ConfigError) as caught:
         read(text, *overrides, model=model)
     return str(caught.value)
@@ -146,7 +146,7 @@ def line_of(text: str, path: str) -> int:
 
 
 def check_place(error: Exception, file: Path) -> str:
-    """Check that an error has one line with the right place; return the key path."""
+    """Check that an error is one line with the right location; return the key path."""
     where, _, rest = str(error).removeprefix(f"{file}:").partition(": ")
     path, colon, _ = rest.partition(": ")
     if not colon or " " in path:

@@ -1,4 +1,4 @@
-"""Energies of a spring, and changes of it that add none, in plain NumPy."""
+"""Energies of a spring, and passive changes of it, in plain NumPy."""
 
 import numpy as np
 
@@ -18,7 +18,7 @@ def next_numbers(
     ramp: float,
     period: float,
 ) -> tuple[Array, bool]:
-    """Return the numbers of an impedance for the next period; whether they wait."""
+    """Return the matrices of an impedance for the next period; whether it waits."""
     step = then - now
     if not np.allclose(now, planned, rtol=1e-4, atol=1e-9):  # it has waited
         step *= min(2.0 * period / max(ramp, period), 1.0)

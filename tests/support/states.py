@@ -1,4 +1,4 @@
-"""States for differences, one of each robot, moved to where it is wanted; at home."""
+"""One state per robot, moved for differences; and starts at home."""
 
 from functools import lru_cache
 
@@ -11,10 +11,10 @@ from hsp_control.robot.state import RobotState
 
 
 def moved(robot: hsp.Robot, t: float, q: Array, v: Array | None = None) -> RobotState:
-    """Return the robot's one state at t, q and v; at rest where v is None.
+    """Return the robot's shared state at t, q and v; at rest if v is None.
 
-    To make a state takes fifty times as long as to move one, which is most of the time
-    of a difference. Copy what is read of it: the next call moves it on.
+    Making a state takes fifty times as long as moving one and would dominate a
+    difference. Copy values read from it: the next call moves it.
     """
     state = _state(robot)
     state.update(t, q, np.zeros(robot.nv) if v is None else v)
@@ -22,7 +22,7 @@ def moved(robot: hsp.Robot, t: float, q: Array, v: Array | None = None) -> Robot
 
 
 def at_home(robot: hsp.Robot, *scene: hsp.Obstacle) -> Start:
-    """Return a start at rest at home, in a scene: what parts are placed with."""
+    """Return a start at rest at home in a scene, for placing parts."""
     state = robot.state(0.0, robot.home(), np.zeros(robot.nv))
     return Start(state, Scene(scene))
 

@@ -1,4 +1,4 @@
-"""The rows that keep what gravity takes of the motors."""
+"""The rows that limit static efforts."""
 
 import numpy as np
 
@@ -11,7 +11,7 @@ from hsp_control.constraints.limits.barriers import BarrierRows
 def static_rows(
     limit: StaticEffort, state: RobotState, bandwidth: float
 ) -> tuple[Array, Array]:
-    """Return A and b of A a ≥ b, for motors that carry no contact."""
+    """Return A and b of A a ≥ b, for a robot without contacts."""
     rows = BarrierRows.allocate(limit.room(), state.robot.nv)
     nowhere = np.zeros(0, dtype=np.int64)
     state.run(limit.row_calls(state, bandwidth, nowhere, rows))

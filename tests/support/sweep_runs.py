@@ -21,7 +21,7 @@ WORKER = [
 
 @contextmanager
 def open_port() -> Iterator[int]:
-    """A port that nobody uses."""
+    """An unused port."""
     with socket.socket() as listening:
         listening.bind(("127.0.0.1", 0))
         yield listening.getsockname()[1]

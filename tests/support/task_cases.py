@@ -1,7 +1,7 @@
 """Every task on several robots, and their motion by plain Pinocchio.
 
 The motion is q(s) = q ⊕ (s v + ½ s² a) at the times t + s: differences are of eighth
-order in s, whose step is a fixed part of the motion's own time scale, so that their
+order in s, with a step of a fixed fraction of the motion's time scale, so that their
 error is rounding.
 """
 
@@ -35,7 +35,7 @@ from hsp_control.tasks import RelativePose
 
 Kind = TypeVar("Kind", bound=Task | NullSpaceField)
 
-TIME = 0.7  # [s], when all is looked at
+TIME = 0.7  # [s], of the evaluation
 GAINS = Gains(25.0, 10.0)
 FRAMES = {
     "planar3r": "tip",
@@ -58,7 +58,7 @@ def planar() -> Robot:
     return load("planar3r")
 
 
-# --- what is known without the package -----------------------------------------------
+# --- independent of the package ------------------------------------------------------
 
 
 # Eighth order, at -4 h ... 4 h.
@@ -153,10 +153,11 @@ def wobble(position: Array) -> hsp.trajectories.Lissajous:
 
 
 class Family:
-    """How to build a kind of task with a known error, and to measure it without it."""
+    """Builds a type of task with a known error, and measures it independently."""
 
     largest = 3.0  # rad or m
-    stride = 0.03  # of differences in the error, as a part of the motion's time scale
+    # step of differences of the error, relative to the motion's time scale
+    stride = 0.03
     rows: int
 
     def make(
@@ -174,7 +175,7 @@ class Family:
         seed: int,
         largest: Any = "none",
     ) -> Task:
-        """Return the same, placed, with feedback of the whole error by default."""
+        """Return the same, placed, with linear feedback by default."""
         made: Any = self.make(robot, motion, error, gains, seed)
         return placed(replace(made, largest_error=largest), robot)
 
@@ -189,7 +190,7 @@ class Family:
     def check_measure(
         self, task: Any, motion: Motion, reference: Array, actual: Array, e: Array
     ) -> None:
-        """Check the coordinates that a person would plot: here those of the task."""
+        """Check the plotted coordinates: here those of the task."""
         x = self.coordinates(task, motion)(0.0)
         np.testing.assert_allclose(actual, x, rtol=0, atol=1e-14)
         np.testing.assert_allclose(reference - actual, e, rtol=0, atol=1e-14)
@@ -334,7 +335,8 @@ class Mass(Position):
 
 @dataclass(frozen=True)
 class Direction(Family):
-    """Pointing; the reference is still, tumbles, or spins about what it points at."""
+    """Pointing; the reference is constant, tumbles, or spins about its own
+    direction."""
 
     frame: str
     axis: tuple[float, float, float]
@@ -352,7 +354,7 @@ class Direction(Family):
         angle = rng.uniform(-np.pi, np.pi)
         n = np.array([np.cos(angle), np.sin(angle), 0.0]) * np.sin(error)
         n[2] = np.cos(error)
-        # A rotation R_d with R_dᵀ m = n, turned about m by any angle.
+        # A rotation R_d with R_dᵀ m = n, rotated about m by any angle.
         turn = pin.exp3(np.array([0.0, 0.0, rng.uniform(-np.pi, np.pi)]))
         R_d = frame_along(m) @ turn @ frame_along(n).T
         reference = {
@@ -363,7 +365,8 @@ class Direction(Family):
         return Pointing(self.frame, axis=self.axis, trajectory=reference, gains=gains)
 
     def coordinates(self, task: Any, motion: Motion) -> Callable[[float], Array]:
-        """Return the turn in the frame's own axes, along two fixed ones across."""
+        """Return the rotation in the frame's axes, along two fixed perpendicular
+        ones."""
         R = motion.placement(0.0, self.frame).rotation
         across = rows_in_the_frame(task, motion)
         return lambda s: (
@@ -389,7 +392,7 @@ class Direction(Family):
 
 
 class Spinning(hsp.trajectories.OrientationTrajectory):
-    """Turns about its own third axis at 1.7 rad/s: the direction stands still."""
+    """Rotates about its own third axis at 1.7 rad/s: the direction is constant."""
 
     start: Matrix
 
@@ -417,7 +420,7 @@ class Posture(Family):
         indices = [robot.velocity_index(joint).start for joint in names]
         wanted = error * unit(np.random.default_rng(seed), len(indices))
         moved = wobble(0.1 * np.arange(len(indices)) - 0.2) if self.moves else None
-        # The rest of the reference is anything: here, where the robot is.
+        # The rest of the reference is arbitrary: here the robot's pose.
         shift = np.zeros(robot.nv)
         shift[indices] = wanted
         if moved is not None:
@@ -445,7 +448,7 @@ class Posture(Family):
 
 
 def single_joints(robot: Robot) -> list[str]:
-    """Return the joints of one freedom."""
+    """Return the single-DOF joints."""
     joints = list(zip(robot.model.names, robot.model.joints, strict=True))[1:]
     return [name for name, joint in joints if joint.nv == 1]
 
@@ -460,7 +463,7 @@ def check_quaternions(reference: Array, actual: Array, R: Array, e: Array) -> No
 
 
 def rows_in_the_frame(task: Any, motion: Motion) -> Array:
-    """Return C with J = C Rᵀ J_w, shape (2, 3): the pointing task's own rows."""
+    """Return C with J = C Rᵀ J_w, shape (2, 3): the pointing task's rows."""
     frame = task.frame
     state = motion.robot.state(TIME, motion.q, motion.v)
     J_w = pin.computeFrameJacobian(

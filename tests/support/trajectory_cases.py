@@ -57,7 +57,7 @@ BLENDED_SPIN = hsp.trajectories.BlendOrientation(
     SPIN, 1.5, rotation=R2, start_angular_velocity=[0.1, -0.4, 0.2], start_time=0.5
 )
 
-# Members, and the times at which they join their holds or one piece the next.
+# Members, and their knots: times at which pieces or holds meet.
 POINT_MEMBERS: dict[str, tuple[hsp.trajectories.Trajectory, list[float]]] = {
     "hold": (hsp.Hold([1, 2, 3, 4]), []),
     "line": (hsp.Line([3, -1], 1.5, start=[0, 1], start_time=0.5), [0.5, 2.0]),
@@ -118,8 +118,7 @@ POINT_MEMBERS["crossfade"] = (
     ),
     [0.5, 1.5],
 )
-# The paths below are followed at speeds; their pieces join where the ramps end, and
-# where blends do.
+# The paths below are followed at a speed; knots are the ends of ramps and of blends.
 CORNER = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [1.0, 1.0, 0.0]]
 POLYLINE = hsp.trajectories.Polyline(CORNER, 1.0, 5.0, 0.3)
 _END = POLYLINE.course.knots[-1]
@@ -127,7 +126,8 @@ POLYLINE_KNOTS = [0.0, 0.3, 0.85, _END - 0.85, _END - 0.3, _END]
 
 
 def ends(member: Any) -> list[float]:
-    """Return when a motion along a path begins, has risen, falls, and ends."""
+    """Return the times at which a motion along a path begins, cruises, brakes and
+    ends."""
     start, end = member.course.knots
     ramp = 1.5 * member.speed / member.acceleration
     return [start, start + ramp, end - ramp, end]

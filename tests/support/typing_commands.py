@@ -1,4 +1,4 @@
-"""Types commands of ``hsp`` as a user does, each in its own process."""
+"""Runs ``hsp`` commands as a user would, in separate processes."""
 
 import io
 import os
@@ -18,7 +18,7 @@ READY = ReadyCommands()
 
 
 def hsp(line: str, folder: Path, status: int = 0) -> str:
-    """Type a command in a folder, and return what it prints; Ctrl-C ends a play."""
+    """Run a command in a folder, and return its output; Ctrl-C ends a play."""
     if line.startswith("play "):
         return played([sys.executable, "-m", "hsp_control", *line.split()], folder)
     found, printed = READY.run(line.split(), folder, without_display())
@@ -27,14 +27,14 @@ def hsp(line: str, folder: Path, status: int = 0) -> str:
 
 
 def script(name: str, folder: Path) -> str:
-    """Run a script in a folder, and return what it prints."""
+    """Run a script in a folder, and return its output."""
     found, printed = READY.run([name], folder, without_display())
     assert found == 0, f"python {name}\n{printed}"
     return printed
 
 
 def played(command: list[str], folder: Path) -> str:
-    """Begin a play, and end it once it has computed for a while."""
+    """Start a play, and end it after it has computed for a while."""
     with subprocess.Popen(
         command, cwd=folder, text=True, env=without_display(),
         stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.STDOUT,
@@ -50,9 +50,9 @@ def played(command: list[str], folder: Path) -> str:
         while begun.is_running() and begun.cpu_times().user < enough:
             time.sleep(0.05)
         play.send_signal(signal.SIGINT)
-        said = begin + play.communicate(timeout=250)[0]
-    assert play.returncode == 0, said
-    return said
+        reported = begin + play.communicate(timeout=250)[0]
+    assert play.returncode == 0, reported
+    return reported
 
 
 def without_display() -> dict[str, str]:
@@ -62,9 +62,9 @@ def without_display() -> dict[str, str]:
 
 
 def in_this_process(line: str, folder: Path, status: int = 0) -> str:
-    """Do what `hsp` does, without another process, which takes a second to begin.
+    """Run an `hsp` command in this process, since starting another takes a second.
 
-    How a command begins and ends only a process shows: one test of each is enough.
+    Start and exit of commands are tested in separate processes, once per command.
     """
     printed = io.StringIO()
     with chdir(folder), redirect_stdout(printed), redirect_stderr(printed):
@@ -74,7 +74,7 @@ def in_this_process(line: str, folder: Path, status: int = 0) -> str:
 
 
 def typed(command: list[str], folder: Path, status: int = 0) -> str:
-    """Run a command in a folder without a display, and return what it prints."""
+    """Run a command in a folder without a display, and return its output."""
     done = subprocess.run(
         command, cwd=folder, text=True, check=False, timeout=250, env=without_display(),
         stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.STDOUT,

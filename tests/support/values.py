@@ -1,4 +1,4 @@
-"""Every part is a value, whichever family it is of: one battery for all rooms."""
+"""Checks that a part is a value, for all families."""
 
 import copy
 import pickle
@@ -16,7 +16,7 @@ from hsp_control.declaration.families import value_fields
 
 
 def twins(value: Part, names: Mapping[str, Any]) -> Iterator[Part]:
-    """Yield a part made of its fields, copied, pickled, and from what it prints."""
+    """Yield a part rebuilt from its fields, copied, pickled, and from its `repr`."""
     yield type(value)(**{f.name: getattr(value, f.name) for f in value_fields(value)})
     yield replace(value)  # type: ignore[type-var]
     yield from (copy.copy(value), copy.deepcopy(value))
@@ -47,5 +47,5 @@ def assert_documented(cls: type[Part]) -> None:
     """Check that a class has a description, and each of its fields a unit."""
     assert cls.__doc__
     for field in value_fields(cls):
-        said = cls.documentation[field.name]
-        assert re.search(r"\[[^\]]+\]", said), f"{cls.__name__}.{field.name}: {said}"
+        text = cls.documentation[field.name]
+        assert re.search(r"\[[^\]]+\]", text), f"{cls.__name__}.{field.name}: {text}"

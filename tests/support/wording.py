@@ -1,14 +1,14 @@
-"""Messages as tables of tests write them: the place, the value, what would be right."""
+"""Messages in tables of tests: the place, the value, the correct form."""
 
 import re
 
 
 def wording(message: str) -> str:
-    """Return the pattern of a message of which '...' leaves out words.
+    """Return the pattern of a message in which '...' stands for any words.
 
-    ``"tasks.hand.frame: no ... 'pan' ... 'pen'"`` is a message that begins so and
-    names the two in this order; what joins them can change without a test. One that
-    begins with '...' need not be the message's beginning. An end is never required.
+    ``"tasks.hand.frame: no ... 'pan' ... 'pen'"`` matches a message that begins so and
+    names the two in this order; the words between may change. One that begins with
+    '...' matches anywhere. The end of a message is never required.
     """
     beginning = "" if message.startswith("...") else "^"
     pieces = message.removeprefix("...").split(" ... ")

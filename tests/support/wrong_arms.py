@@ -1,4 +1,4 @@
-"""Arms that are not their models, and controllers that hold their hands."""
+"""Arms with model errors, and controllers that hold their hands."""
 
 from dataclasses import dataclass
 from typing import Any
@@ -34,12 +34,12 @@ ARMS: dict[str, list[float] | None] = {
     "xarm7": [0.0, -0.5, 0.0, 0.9, 0.0, 1.2, 0.0],
     "ur5": [0.0, -1.3, 1.8, -2.0, -1.57, 0.0],
 }
-"""The postures in which hands are held; None: home."""
+"""The postures in which hands are held; None for home."""
 MORE_ARMS: dict[str, list[float] | None] = {
     "ur10": ARMS["ur5"],
     "kinova": [0.0, 2.9, 1.3, 1.0, 1.4, 0.3],
 }
-"""Others that benchmarks hold; of joints that turn on and on the angles."""
+"""Further postures for benchmarks; for continuous joints the angles."""
 
 
 @dataclass(frozen=True)
@@ -51,20 +51,20 @@ class WrongArm:
     mass: float = 0.2  # largest relative error of masses and inertias [-]
     com: float = 0.01  # largest error of a centre of mass [m]
     rotor: float = 0.0  # rotors that the model lacks [kg m²]
-    load: float = 0.0  # mass at the hand, 4 cm beside its frame [kg]
+    load: float = 0.0  # mass at the hand, 4 cm off its frame [kg]
     coulomb: float = 0.0  # [N·m]
     viscous: float = 0.0  # [N·m·s/rad]
     delay: int = 0  # of the efforts [periods]
     lag: float = 0.0  # of the drives [s]
     noise: float = 0.0  # of the velocities [rad/s]
-    motor_inertia: float | None = None  # that the model has
+    motor_inertia: float | None = None  # rotors in the model
 
     @property
     def robot(self) -> hsp.Robot:
         return hsp.Robot.load(self.name, motor_inertia=self.motor_inertia)
 
     def plant(self, robot: hsp.Robot) -> SampledPlant:
-        """Return what moves."""
+        """Return the plant."""
         errors = {"random_mass": self.mass, "random_inertia": self.mass}
         changes: list[ModelChange] = []
         if self.mass:
@@ -112,7 +112,7 @@ def holding(arm: WrongArm, circle: float = 0.0) -> tuple[hsp.Controller, Array]:
 def held(
     arm: WrongArm, compensation: Compensation, circle: float = 0.0, **options: Any
 ) -> hsp.Rollout:
-    """Return the run of an arm that is held."""
+    """Return the run of an arm whose hand is held."""
     made, q = holding(arm, circle)
     options = {"duration": 3.0, **options}
     return hsp.simulate(

@@ -1,4 +1,4 @@
-"""Every command that reads a log reads all that anything of ours writes."""
+"""Every command that reads logs reads the logs of every writer."""
 
 from pathlib import Path
 
@@ -55,7 +55,7 @@ REPEATED = (
     *("mine", "mine-live", "mine-robot", "mine-play", "recorded"),
     *("simulated", "from_pinocchio", "loop"),
 )
-"""Logs with a configuration that is data: `hsp run` repeats them."""
+"""Logs whose configuration is plain data: `hsp run` repeats them."""
 OTHERS = {  # by the output of `hsp run`
     "function": "was made from Python and contains no configuration",
     "task": "was made from Python and contains no configuration",
@@ -65,13 +65,13 @@ TAKERS = {
     "export {log} --html out/{name}.html": "{name}.html",
     "plot {log} --panels null_space": "{name}-null_space.png",
 }
-"""Commands, and what they write; unless thorough they take logs in turn."""
+"""Commands and their outputs; unless thorough the logs are assigned in turn."""
 LOGS = [*REPEATED, *OTHERS]
-if not THOROUGH:  # written as a recorder's, and as that of a function of one's own
+if not THOROUGH:  # written like a recorder's, and like that of a user's function
     LOGS = [each for each in LOGS if each not in {"simulated", "task"}]
 VIEW = "view {log} --no-browser"
 VIEWED = "mine", "loop"
-"""And a walk; a view reads a log as an export does."""
+"""And a walk; a view reads a log like an export."""
 
 
 @pytest.fixture(scope="module")

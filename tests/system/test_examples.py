@@ -1,4 +1,4 @@
-"""Every example runs as it stands, in a copy of its folder, and the page shows it."""
+"""Every example runs unmodified in a copy of its folder, and the page shows it."""
 
 import json
 import re
@@ -62,7 +62,7 @@ def test_a_configuration_runs(name: str, folder: Path) -> None:
 
 def test_a_franka_s_box_is_moved(folder: Path) -> None:
     skip_without("franka_arm.py")
-    host = "127.0.0.9"  # no other test's
+    host = "127.0.0.9"  # not another test's
     command = f"hsp franka-box panda_obstacle --lockstep --patience 60 --host {host}"
     with Shell(folder) as shell:
         box: Running = shell._start(command, "box")
@@ -84,7 +84,7 @@ def test_the_lesson_s_cells_run(folder: Path) -> None:
 
 
 def test_examples_are_short_and_on_the_page() -> None:
-    """Each has 10 to 60 lines; the page shows each with its picture."""
+    """Examples have 10 to 60 lines; the page shows all of them with a picture."""
     for name in [*SCRIPTS, *CONFIGURATIONS]:
         assert 10 <= lines_of(name) <= 65, name
         assert f"examples/{name})" in PAGE, name

@@ -1,4 +1,4 @@
-"""A newcomer's errands, with the commands of README, tutorial and recipes."""
+"""A newcomer's first steps, with the commands of README, tutorial and recipes."""
 
 import re
 import shlex
@@ -25,19 +25,19 @@ def page(name: str, language: str) -> list[str]:
 
 
 def command(name: str, begins: str) -> str:
-    """Return the first command of a page that begins so, as it is typed."""
+    """Return the first command of a page with the given beginning."""
     lines = "".join(page(name, "sh")).replace("\\\n", " ").splitlines()
     return next(line for line in lines if line.startswith(begins)).split("#")[0]
 
 
 def hsp(line: str, capsys: Capture) -> str:
-    """Type a command, and return what it prints."""
+    """Run a command, and return its output."""
     assert main(shlex.split(line.removeprefix("hsp "))) == 0, line
     return capsys.readouterr().out
 
 
 def kept(printed: str, name: str) -> Rollout:
-    """Rename the log that a run has written, and read it."""
+    """Rename the log of a run, and read it."""
     (path,) = re.findall(r"^Log: (.+)$", printed, re.MULTILINE)
     return Rollout.load(Path(path).rename(name))
 
@@ -68,7 +68,7 @@ def test_a_gain_is_changed_and_the_runs_are_compared(capsys: Capture) -> None:
     assert Path("both.html").stat().st_size > 100_000
 
 
-def test_a_urdf_of_one_s_own(capsys: Capture) -> None:
+def test_a_user_s_urdf(capsys: Capture) -> None:
     urdf = bundled_robots()["planar3r"] / "planar3r.urdf"
     Path("arm.urdf").write_text(urdf.read_text())
     printed = hsp(command("docs/own_robot.md", "hsp inspect arm.urdf"), capsys)
@@ -80,7 +80,7 @@ def test_a_urdf_of_one_s_own(capsys: Capture) -> None:
     assert np.abs(kept(hsp("hsp run mine.yaml", capsys), "arm.npz").q).max() > 0.0
 
 
-def test_a_cost_of_one_s_own_from_python_and_from_yaml(capsys: Capture) -> None:
+def test_a_user_s_cost_from_python_and_from_yaml(capsys: Capture) -> None:
     recipe = "docs/how_to/own_cost.md"
     python = page(recipe, "python")[0]
     space: dict = {}
@@ -105,4 +105,4 @@ def test_another_metric_and_no_limits(capsys: Capture) -> None:
     hsp("hsp run metric.yaml", capsys)
     free = kept(hsp("hsp run mine.yaml --set limits=none", capsys), "free.npz")
     limited = kept(hsp("hsp run mine.yaml", capsys), "limited.npz")
-    np.testing.assert_array_equal(free.q, limited.q)  # none of them binds
+    np.testing.assert_array_equal(free.q, limited.q)  # none of them is active

@@ -18,9 +18,9 @@ from hsp_control.simulation import Rollout
 pytestmark = pytest.mark.process
 
 SEED = 2
-"""Not the campaigns' own: these are other cases."""
+"""A seed other than the campaigns', for other cases."""
 DRAWN = 3000 if THOROUGH else 1000
-"""Random states of a frozen controller: runs of 1000."""
+"""Random states of a frozen controller, in runs of 1000."""
 
 
 @pytest.mark.parametrize("robot", bundled_robots())
@@ -30,7 +30,7 @@ def test_random_states(robot: str) -> None:
     assert tally.steps == 2000
     assert tally.limited > 0
     assert tally.damped > 0
-    assert tally.status[2] > 0  # limits were met
+    assert tally.status[2] > 0  # limits were active
 
 
 @pytest.mark.parametrize(
@@ -61,7 +61,7 @@ def test_mutated_files(kind: str, cases: int) -> None:
 
 
 def test_crashes_and_hangs_are_noticed() -> None:
-    """The harness sees what it looks for, and goes on after it."""
+    """The harness detects every kind of failure, and continues."""
     with Worker("campaigns.crash_case:case", 1.0) as worker:
         assert worker.ask(0, 3).kind == "fine"  # the first has a minute more
         kinds = [worker.ask(0, index).kind for index in (1, 0, 2, 3)]
@@ -92,7 +92,7 @@ def log(run: Rollout, tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def sample(count: int, once: Callable[[Random, Path], faults.Faults]) -> set[str]:
-    """Try faults, and return what came of them, all good."""
+    """Inject faults, and return their outcomes, all good."""
     outcomes: set[str] = set()
     for k in range(count):
         with tempfile.TemporaryDirectory() as folder:

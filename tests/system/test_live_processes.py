@@ -1,7 +1,7 @@
-"""A loop and a robot in two processes, with a bad line between them, and either killed.
+"""A loop and a robot in two processes over a lossy line; either one is killed.
 
-All in lockstep: machines that run tests are late. What must hold is that all ends, in
-the safe stop, with whole logs, and that what was injected was seen.
+All in lockstep, since test machines are slow. Every run must end in the safe stop with
+complete logs, and every injected fault must be detected.
 """
 
 import json
@@ -46,7 +46,7 @@ SETTINGS = LiveSettings(start_timeout=60.0)
 def assert_stopped(log: Rollout) -> None:
     """The robot's own log: true states, to the end of its safe stop."""
     phases = log["live.phase"]
-    # No damping where the loop had brought it to rest before it let go.
+    # No damping if the loop had already brought it to rest.
     assert {Phase.RUNNING, Phase.HOLDING} <= set(phases)
     assert (np.diff(phases) >= 0).all()
     assert phases[-1] == Phase.HOLDING
@@ -91,27 +91,27 @@ def test_a_bad_line_is_seen_counted_and_survived(tmp_path: Path) -> None:
             settings=SETTINGS,
             log=logs[0],
         )
-        told = robot.wait(60.0)
+        reported = robot.wait(60.0)
         pid = robot.process.pid if robot.process else 0
     assert gone(pid)
     assert report.ended == "completed", report.reason
     assert (report.phase, report.silent) == (Phase.HOLDING, False)
-    assert told is not None
-    assert told["reason"] == "the loop closed the connection"
+    assert reported is not None
+    assert reported["reason"] == "the loop closed the connection"
     link = robot.hardware.link
-    ends = (link.counts, link.lost, told["injected"]), (
-        told["link"], told["link"]["lost"], link.injected
+    ends = (link.counts, link.lost, reported["injected"]), (
+        reported["link"], reported["link"]["lost"], link.injected
     )  # fmt: skip
     for counts, lost, injected in ends:
         assert min(injected.values()) > 10
         assert lost == injected["lost"]
         assert counts["foreign"] == 0
         for fault, seen in COUNTED.items():
-            if fault == "late":  # one that nothing overtook is new
+            if fault == "late":  # one that was not overtaken is new
                 assert injected[fault] - 3 <= counts[seen] <= injected[fault]
             else:
                 assert counts[seen] == injected[fault]
-    # The robot did what it was for, over such a line.
+    # The robot did its task despite the line.
     log = Rollout.load(logs[0])
     assert log.status == "completed"
     assert_whole(log)
@@ -145,7 +145,7 @@ def test_the_robot_s_process_is_killed(tmp_path: Path) -> None:
     log, truth = (Rollout.load(path) for path in logs)
     assert log.status == "stopped"
     assert_whole(log)
-    # In its last rows the model reckons; the robot's own log ends where it was killed.
+    # Its last rows are predicted; the robot's own log ends where it was killed.
     assert set(log["live.measured"]) == {0.0, 1.0}
     assert truth.status == "interrupted"
     assert_whole(truth)
@@ -189,11 +189,11 @@ def test_the_loop_s_process_is_killed(tmp_path: Path) -> None:
     assert truth.status == "stopped"
     assert truth.meta["message"] == "the process that started the robot has ended"
     assert_stopped(truth)
-    assert Phase.DAMPING in truth["live.phase"]  # nobody else braked it
+    assert Phase.DAMPING in truth["live.phase"]  # it was not braked otherwise
     assert log.status == "interrupted"
     assert_whole(log)
     assert set(log["live.phase"]) == {Phase.RUNNING}
-    # Repeated, they last as long as the command was given, and as long as it ran.
+    # Repeated runs have the duration of the command, or that of the run.
     assert log.config is not None
     assert truth.config is not None
     ran = np.ptp(truth.t[truth["live.phase"] == Phase.RUNNING])
@@ -202,7 +202,7 @@ def test_the_loop_s_process_is_killed(tmp_path: Path) -> None:
 
 
 @pytest.mark.smoke
-def test_a_robot_that_cannot_start_says_so(tmp_path: Path) -> None:
+def test_a_robot_that_cannot_start_is_reported(tmp_path: Path) -> None:
     experiment = hsp.load_experiment(CONFIG)
     robot = RobotProcess(experiment, log=tmp_path / "none" / "file")
     (tmp_path / "none").write_text("")
@@ -217,7 +217,8 @@ def test_a_robot_that_cannot_start_says_so(tmp_path: Path) -> None:
 def test_a_start_that_is_cut_short_leaves_no_process(
     raised: type[BaseException], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Nobody else would end it: a context that did not begin does not end."""
+    """A context manager that failed on entry has no exit, so it must end the
+    process."""
     robot = RobotProcess(hsp.load_experiment(CONFIG))
     page = PageProcess(port=None, host="127.0.0.1", held=False)
     started: list[int] = []
@@ -256,8 +257,8 @@ def test_options_that_are_none(
     assert message in capsys.readouterr().err
 
 
-def test_what_feet_feel_comes_over_the_wire(tmp_path: Path) -> None:
-    """Solo stands; a plan feels one of its feet, which the other process presses."""
+def test_forces_at_feet_are_sent_over_the_wire(tmp_path: Path) -> None:
+    """Solo stands; a plan measures a foot on which the other process presses."""
     pytest.importorskip("mujoco")
     pytest.importorskip("example_robot_data")
     experiment = hsp.load_experiment(
@@ -279,9 +280,9 @@ def test_what_feet_feel_comes_over_the_wire(tmp_path: Path) -> None:
             log=logs[0],
             log_period=0.001,
         )
-        told = robot.wait(60.0)
+        reported = robot.wait(60.0)
     assert report.ended == "completed", report.reason
-    assert told is not None
+    assert reported is not None
     loop, true = (Rollout.load(log) for log in logs)
     rows = {round(1000.0 * t): k for k, t in enumerate(true.t)}
     running = loop["live.phase"] == Phase.RUNNING

@@ -23,7 +23,7 @@ NOTEBOOKS = sorted((ROOT / "notebooks").glob("*.ipynb"))
 NAMES = [path.stem for path in NOTEBOOKS]
 USUAL = ["03_your_robot", "04_command_it_now"]
 """The others, of the law, of fields and of walking, take half a minute each and more,
-and show what other tests prove: `make thorough`."""
+and repeat what other tests prove: `make thorough`."""
 NUMBER = re.compile(r"[-+]?\d[\d.]*(e[-+]?\d+)?")
 ANSWER = re.compile(r"^```python\n(.*?)^```$", re.MULTILINE | re.DOTALL)
 
@@ -66,8 +66,8 @@ def with_answers(notebook: Any) -> Any:
 def words(cell: Any) -> tuple[list[str], int]:
     """Return a cell's output without numbers, and the number of its pictures."""
     kept = cell.get("outputs", [])
-    said = "".join(out.text for out in kept if out.output_type == "stream")
-    return NUMBER.sub("", said).split(), sum("data" in out for out in kept)
+    reported = "".join(out.text for out in kept if out.output_type == "stream")
+    return NUMBER.sub("", reported).split(), sum("data" in out for out in kept)
 
 
 def pictures(notebook: Any) -> list[bytes]:
@@ -75,64 +75,66 @@ def pictures(notebook: Any) -> list[bytes]:
     return [base64.b64decode(picture) for picture in found if picture]
 
 
-# ------------------------------------------------------------------ what they promise
+# ------------------------------------------------------------- what the texts promise
 
 
-def the_law(said: str) -> None:
-    (torque,) = re.findall(r"relative difference in torque: (\S+)", said)
+def the_law(reported: str) -> None:
+    (torque,) = re.findall(r"relative difference in torque: (\S+)", reported)
     assert float(torque) < 1e-10
-    errors = re.findall(r"\|e - predicted\| ≤ (\S+) m", said)
+    errors = re.findall(r"\|e - predicted\| ≤ (\S+) m", reported)
     assert len(errors) == 3
     assert max(map(float, errors)) < 1e-11
-    departures = re.findall(r"departure from the exponential (\S+)", said)
+    departures = re.findall(r"departure from the exponential (\S+)", reported)
     assert len(departures) == 3
     assert max(map(float, departures)) < 1e-5
-    minima = re.findall(r"law: \[(.*?)\].*difference (\S+) rad", said)
+    minima = re.findall(r"law: \[(.*?)\].*difference (\S+) rad", reported)
     assert len({minimum for minimum, _ in minima}) == 2  # one elbow up, one down
     assert max(float(difference) for _, difference in minima) < 1e-5
 
 
-def panda_fields(said: str) -> None:
-    without, with_field = (float(x) for x in re.findall(r"Jᵀ\) ≥ (\S+),", said))
+def panda_fields(reported: str) -> None:
+    without, with_field = (float(x) for x in re.findall(r"Jᵀ\) ≥ (\S+),", reported))
     assert with_field > 5.0 * without
-    a_field_keeps_clear(said)
-    assert "did you mean 'panda_tcp'?" in said
+    a_field_keeps_clear(reported)
+    assert "did you mean 'panda_tcp'?" in reported
 
 
-def your_robot(said: str) -> None:
-    a_field_keeps_clear(said)
-    assert "shelf.yaml: OK" in said
-    assert "did you mean 'gain'?" in said
-    assert "malformed XML" in said
+def your_robot(reported: str) -> None:
+    a_field_keeps_clear(reported)
+    assert "shelf.yaml: OK" in reported
+    assert "did you mean 'gain'?" in reported
+    assert "malformed XML" in reported
 
 
-def command_it_now(said: str) -> None:
-    errors = [float(x) for x in re.findall(r"within (\S+) mm of the reference", said)]
+def command_it_now(reported: str) -> None:
+    errors = [
+        float(x) for x in re.findall(r"within (\S+) mm of the reference", reported)
+    ]
     assert len(errors) == 2
     assert max(errors) < 0.5
-    assert "at the end 0.00 m/s" in said
-    assert "StreamError · value contains nan" in said
-    stretched = re.findall(r"N/m: (\S+) mm, F/K = (\S+) mm", said)
+    assert "at the end 0.00 m/s" in reported
+    assert "StreamError · value contains nan" in reported
+    stretched = re.findall(r"N/m: (\S+) mm, F/K = (\S+) mm", reported)
     assert len(stretched) == 2
     for moved, promised in stretched:
         assert abs(float(moved) / float(promised) - 1.0) < 0.03
-    (largest,) = re.findall(r"effort in 10 ms: (\S+) N·m", said)
+    (largest,) = re.findall(r"effort in 10 ms: (\S+) N·m", reported)
     assert float(largest) < 20.0
 
 
-def walking(said: str) -> None:
-    assert "completed: 0.5" in said
-    (away,) = re.findall(r"at most (\d+) mm from the plan", said)
+def walking(reported: str) -> None:
+    assert "completed: 0.5" in reported
+    (away,) = re.findall(r"at most (\d+) mm from the plan", reported)
     assert float(away) < 30.0
-    (median,) = re.findall(r"median ‖e_N‖ (\S+) rad/s", said)
+    (median,) = re.findall(r"median ‖e_N‖ (\S+) rad/s", reported)
     assert float(median) < 0.1
-    assert "completed, at the end 0.0" in said
-    rates = re.findall(r"measured (\S+) 1/s", said)
+    assert "completed, at the end 0.0" in reported
+    rates = re.findall(r"measured (\S+) 1/s", reported)
     assert abs(float(rates[0]) - 6.0) < 0.6
 
 
-def a_field_keeps_clear(said: str) -> None:
-    without, with_field = (float(x) for x in re.findall(r"nearest (\S+) mm", said))
+def a_field_keeps_clear(reported: str) -> None:
+    without, with_field = (float(x) for x in re.findall(r"nearest (\S+) mm", reported))
     assert without < -20.0
     assert with_field > 20.0
 
@@ -149,7 +151,7 @@ PROMISES = {
 @pytest.mark.timeout(400)
 @pytest.mark.parametrize("name", NAMES if THOROUGH else USUAL)
 def test_a_notebook_runs_and_keeps_its_promises(name: str, tmp_path: Path) -> None:
-    """Without a warning, with its figures inline and light, and with true numbers.
+    """Each notebook runs without a warning; figures are inline and small, numbers true.
 
     One test, so that two workers do not run the same notebook.
     """
@@ -162,7 +164,7 @@ def test_a_notebook_runs_and_keeps_its_promises(name: str, tmp_path: Path) -> No
             assert page.startswith("<iframe srcdoc=")
             assert len(page) < 2_000_000
         else:
-            # A mere object as a cell's value is a semicolon forgotten.
+            # A bare object as a cell's value shows that a semicolon is missing.
             assert "image/png" in out.data, out.data
     shown = pictures(notebook)
     assert len(shown) >= 3

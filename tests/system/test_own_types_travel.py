@@ -1,4 +1,4 @@
-"""A type of one's own is known to every command: by ``--import``, or by one list."""
+"""User-defined types reach every command, by ``--import`` or by the list in YAML."""
 
 from collections.abc import Callable
 from functools import cache
@@ -55,7 +55,7 @@ USUAL = {
     "parts.py": ["run", "check", "live", "play"],
     "--import": ["run", "live", "sweep"],
 }
-"""With a list, and with the option: each command unless thorough once, or twice."""
+"""Commands with the list and with the option; all pairs of both if thorough."""
 WITHOUT_CONTROLLER = "no controller, only the log's columns are drawn"
 
 
@@ -64,7 +64,7 @@ CASES = [
     *(("--import", what) for what in ("run", "of its robot")),
     *further(*(("--import", what) for what in WITH_LOG)),
 ]
-"""A log names the modules of its types, however these were found."""
+"""A log names the modules of its types, however they were imported."""
 
 
 @pytest.fixture(scope="module")
@@ -90,19 +90,19 @@ def folders(tmp_path_factory: pytest.TempPathFactory) -> Callable[[str], Path]:
     return folder
 
 
-@pytest.mark.parametrize(("how", "what"), CASES)
+@pytest.mark.parametrize(("how", "command"), CASES)
 def test_a_log_is_read_with_its_own_types(
-    folders: Callable[[str], Path], how: str, what: str
+    folders: Callable[[str], Path], how: str, command: str
 ) -> None:
-    said = hsp(WITH_LOG[what], folders(how))
-    assert WITHOUT_CONTROLLER not in said
-    assert "is not imported" not in said
+    reported = hsp(WITH_LOG[command], folders(how))
+    assert WITHOUT_CONTROLLER not in reported
+    assert "is not imported" not in reported
 
 
 def test_a_module_of_a_package_is_found_on_the_path(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """A reader of the log calls the same function as for a file."""
+    """A reader of the log imports the modules as for a configuration."""
     package = tmp_path / "elsewhere" / "own_package"
     package.mkdir(parents=True)
     (package / "__init__.py").touch()
@@ -113,33 +113,33 @@ def test_a_module_of_a_package_is_found_on_the_path(
     assert WITHOUT_CONTROLLER not in hsp(WITH_LOG["view"], tmp_path)
 
 
-def test_what_was_edited_is_not_run_again(tmp_path: Path) -> None:
+def test_an_edited_file_is_not_run_again(tmp_path: Path) -> None:
     parts = tmp_path / "parts.py"
     parts.write_text(PARTS)
     (tmp_path / "mine.yaml").write_text(f"{CONFIG}imports: [parts.py]\n")
     hsp("run mine.yaml", tmp_path)
     parts.write_text(f"{PARTS}\nopen('run', 'w').close()\n")
-    said = hsp("view out/mine.npz --no-browser", tmp_path)
-    assert "missing or was edited since the run; --import" in said
-    assert WITHOUT_CONTROLLER in said
+    reported = hsp("view out/mine.npz --no-browser", tmp_path)
+    assert "missing or was edited since the run; --import" in reported
+    assert WITHOUT_CONTROLLER in reported
     assert not (tmp_path / "run").exists()
-    said = hsp(f"view out/mine.npz --no-browser --import {parts}", tmp_path)
-    assert WITHOUT_CONTROLLER not in said
+    reported = hsp(f"view out/mine.npz --no-browser --import {parts}", tmp_path)
+    assert WITHOUT_CONTROLLER not in reported
     assert (tmp_path / "run").exists()
 
 
 def test_strict_reading_runs_no_code(tmp_path: Path) -> None:
     (tmp_path / "parts.py").write_text(f"{PARTS}\nopen('run', 'w').close()\n")
     (tmp_path / "mine.yaml").write_text(f"{CONFIG}imports: [parts.py]\n")
-    said = hsp("run mine.yaml --strict", tmp_path, status=2)
+    reported = hsp("run mine.yaml --strict", tmp_path, status=2)
     assert "mine.yaml:9: imports.0: parts.py is code, which --strict does not run" in (
-        said
+        reported
     )
     assert not (tmp_path / "run").exists()
     hsp("run mine.yaml", tmp_path)
     (tmp_path / "run").unlink()
-    said = hsp("view out/mine.npz --no-browser --strict", tmp_path)
-    assert WITHOUT_CONTROLLER in said
+    reported = hsp("view out/mine.npz --no-browser --strict", tmp_path)
+    assert WITHOUT_CONTROLLER in reported
     assert not (tmp_path / "run").exists()
 
 
@@ -168,10 +168,10 @@ with hsp.Recorder(arm, "out/recorded.npz") as recorder:
         script(f"{name}.py", tmp_path)
         logs = "own", "experiment", "recorded"
         for log in logs if name == "one" or THOROUGH else logs[:1]:
-            said = hsp(f"view out/{log}.npz --no-browser", tmp_path)
-            known = WITHOUT_CONTROLLER not in said
+            reported = hsp(f"view out/{log}.npz --no-browser", tmp_path)
+            known = WITHOUT_CONTROLLER not in reported
             assert known == (name == "one"), (name, log)
-        if THOROUGH:  # test_every_log.py takes others so
+        if THOROUGH:  # other commands: test_every_log.py
             hsp("export out/experiment.npz --html out/experiment.html", tmp_path)
             hsp("plot out/own.npz", tmp_path)
         if name == "one":
@@ -182,9 +182,9 @@ with hsp.Recorder(arm, "out/recorded.npz") as recorder:
 def test_freeze_and_inspect_import_too(tmp_path: Path) -> None:
     (tmp_path / "parts.py").write_text(f"{PARTS}\nopen('run', 'w').close()\n")
     (tmp_path / "mine.yaml").write_text(CONFIG)
-    said = hsp("freeze mine.yaml --import parts.py", tmp_path, status=2)
-    assert "Python" in said  # a type that it knows, and cannot freeze
-    assert "no type" not in said
+    reported = hsp("freeze mine.yaml --import parts.py", tmp_path, status=2)
+    assert "Python" in reported  # the type is known, but cannot be frozen
+    assert "no type" not in reported
     (tmp_path / "run").unlink()
     hsp("inspect panda --import parts.py", tmp_path)
     assert (tmp_path / "run").exists()

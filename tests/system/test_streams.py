@@ -24,7 +24,7 @@ def test_a_run_follows_another_process_and_its_log_repeats_it(tmp_path: Path) ->
         policy = subprocess.Popen(
             [sys.executable, str(EXAMPLE / "policy.py"), str(port), "600"]
         )
-        probe.recv(1000)  # it has begun, however busy the computer
+        probe.recv(1000)  # started, also on a busy machine
     try:
         source = f"tasks.hand.trajectory.source=udp://127.0.0.1:{port}"
         arguments = ["run", str(EXAMPLE / "panda.yaml"), "--out", str(tmp_path)]

@@ -1,4 +1,4 @@
-"""The core alone: a copy of the checkout without what stands in `companions`."""
+"""The core alone: a copy of the checkout in which `companions` is empty."""
 
 import os
 import shutil
@@ -13,16 +13,16 @@ import hsp_control as hsp
 
 pytestmark = pytest.mark.slow
 
-TIME_LIMIT = 1200.0  # s; only ends what hangs
+TIME_LIMIT = 1200.0  # [s], ends a process that hangs
 ROOMS = ["cli/test_cli.py", "cli/test_consoles.py"]
-"""The tests that run in the copy unless thorough: those that meet companions."""
+"""Tests that run in the copy: those near the companions (thorough: all)."""
 THE_SAME = "check or robots or diverging or beyond"
-"""Of these, names of tests in whose commands companions have no part."""
+"""Of these, names of tests whose commands use no companion."""
 COMPANIONS = {each.name for each in (ROOT / "hsp_control/companions").glob("[a-z]*")}
 
 
 def without_companions(folder: str, names: list[str]) -> set[str]:
-    """Of a folder called companions only what makes it a package remains."""
+    """Copy nothing from a folder called companions but its `__init__.py`."""
     if Path(folder).name == "companions":
         return set(names) - {"__init__.py"}
     if "configs" not in Path(folder).parts:
@@ -38,7 +38,7 @@ def needs_mujoco(configuration: Path) -> bool:
 
 @pytest.fixture(scope="module")
 def core(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """With the kernels that are compiled already."""
+    """Use the kernels that are already compiled."""
     core = tmp_path_factory.mktemp("core")
     for each in ROOT.iterdir():
         if each.name in {"hsp_control", "tests", "configs"}:
@@ -49,7 +49,7 @@ def core(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def run(core: Path, *command: str) -> str:
-    """Return what a command prints, which runs with the copy's package."""
+    """Run a command with the copy's package; return its output."""
     environment = {**os.environ, "PYTHONPATH": str(core), "PYTHONWARNINGS": ""}
     done = subprocess.run(
         [sys.executable, "-m", *command],
@@ -69,9 +69,9 @@ def test_the_quick_tests_pass(core: Path) -> None:
     chosen = "not slow and not process and not browser"
     rooms = ["tests/unit"] if THOROUGH else [f"tests/unit/{room}" for room in ROOMS]
     named = () if THOROUGH else ("-k", f"not ({THE_SAME})")
-    told = run(core, "pytest", *rooms, "-m", chosen, *named)
-    assert " passed" in told
-    assert "failed" not in told
+    reported = run(core, "pytest", *rooms, "-m", chosen, *named)
+    assert " passed" in reported
+    assert "failed" not in reported
 
 
 @pytest.mark.parametrize("name", ["paper/4_moving_obstacle", "panda_obstacle"])
@@ -84,8 +84,8 @@ def test_the_demo_runs_as_before(core: Path, name: str) -> None:
     assert (there.tau == here.tau).all()
 
 
-def test_what_is_gone_is_not_known(core: Path) -> None:
-    told = run(core, "hsp_control", "--help")
-    assert "check" in told
-    assert not {"sweep", "franka-box", "view", "play", "export"} & set(told.split())
+def test_removed_parts_are_unknown(core: Path) -> None:
+    reported = run(core, "hsp_control", "--help")
+    assert "check" in reported
+    assert not {"sweep", "franka-box", "view", "play", "export"} & set(reported.split())
     assert "--view" not in run(core, "hsp_control", "run", "--help")

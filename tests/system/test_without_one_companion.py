@@ -1,7 +1,7 @@
-"""The folder of any companion can be deleted, with those that are built on it.
+"""The folder of any companion can be deleted, together with its dependents.
 
-In a copy of the checkout: what remains has its layers and types, and its tests are
-collected.
+In a copy of the checkout, the remaining code passes lint and type checks, and its tests
+are collected.
 """
 
 import os
@@ -15,11 +15,11 @@ from pathlib import Path
 import pytest
 from places import ROOT, further
 
-grimp = pytest.importorskip("grimp")  # what lint-imports builds upon
+grimp = pytest.importorskip("grimp")  # the tool behind lint-imports
 
 pytestmark = pytest.mark.slow
 
-TIME_LIMIT = 1200.0  # s; only ends what hangs
+TIME_LIMIT = 1200.0  # [s], ends a process that hangs
 FOLDER = "hsp_control/companions"
 CACHE = ".mypy_cache"
 COMPANIONS = sorted(each.parent.name for each in (ROOT / FOLDER).glob("*/__init__.py"))
@@ -68,7 +68,7 @@ def built_on(companion: str) -> set[str]:
 
 @contextmanager
 def deleted(checkout: Path, names: set[str]) -> Iterator[None]:
-    """Within the block the folders of some companions are not there."""
+    """Within the block the folders of some companions are absent."""
     aside = checkout.with_name("aside")
     aside.mkdir()
     for name in names:
@@ -85,7 +85,9 @@ def deleted(checkout: Path, names: set[str]) -> Iterator[None]:
 @pytest.mark.timeout(TIME_LIMIT)
 @pytest.mark.parametrize("check", CHECKS)
 @pytest.mark.parametrize("companion", further(*COMPANIONS))
-def test_what_remains_is_whole(companion: str, check: str, checkout: Path) -> None:
+def test_the_remaining_checkout_is_complete(
+    companion: str, check: str, checkout: Path
+) -> None:
     with deleted(checkout, built_on(companion)):
         done = subprocess.run(
             [sys.executable, "-c", f"{CHECKS[check]}; run()"],

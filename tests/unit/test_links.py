@@ -1,7 +1,7 @@
-"""No document of this checkout links to a file that is not there.
+"""Documents of this checkout link only to files that exist.
 
-Links between the pages of the site are checked when it is built, those to other sites
-by `make links`: this is for README, notebooks and what else stands outside of docs.
+Links between pages of the site are checked when it is built, those to other sites by
+`make links`; this covers README, notebooks and other documents outside of docs.
 """
 
 import json
@@ -31,7 +31,7 @@ DOCUMENTS = [
 
 
 def missing(text: str, folder: Path) -> list[str]:
-    """Return the links of a Markdown text to files that are not there."""
+    """Return a Markdown text's links to files that do not exist."""
     found = (next(filter(None, each)) for each in LINK.findall(CODE.sub("", text)))
     paths = {link.partition("#")[0] for link in found if ":" not in link}
     return sorted(
@@ -43,7 +43,7 @@ def missing(text: str, folder: Path) -> list[str]:
 
 
 def taken_away(file: Path) -> bool:
-    """Return whether a file is of a companion that the package lists, but lacks."""
+    """Return whether a file belongs to a listed companion whose folder is missing."""
     if not file.is_relative_to(COMPANIONS):
         return False
     name = file.relative_to(COMPANIONS).parts[0]
@@ -62,11 +62,11 @@ def test_no_document_links_to_a_file_that_is_not_there(file: Path) -> None:
     assert missing(text, file.parent) == []
 
 
-def test_a_missing_file_is_told(tmp_path: Path) -> None:
+def test_a_missing_file_is_reported(tmp_path: Path) -> None:
     (tmp_path / "there.md").touch()
     text = (
         "[a](there.md#part) [b](gone.md) ![c](gone.png) [d](#here) [x](https://a.b/c)\n"
         "`[code](no.md)`\n\n```\n[fenced](no.md)\n```\n\n"
-        "[e]: other.md\nthe clock [s]: when it is told\n"
+        "[e]: other.md\nthe clock [s]: at its first step\n"
     )
     assert missing(text, tmp_path) == ["gone.md", "gone.png", "other.md"]

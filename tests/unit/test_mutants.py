@@ -1,4 +1,4 @@
-"""Mutants are made of any code, and their runner reports the outcomes truly."""
+"""Mutants of any code, and the outcomes that their runner reports."""
 
 from pathlib import Path
 
@@ -41,7 +41,7 @@ OF_CPP = {
     [("a.py", PYTHON, OF_PYTHON), ("a.hpp", CPP, OF_CPP)],
     ids=["Python", "C++"],
 )
-def test_edits_are_of_what_runs_and_of_nothing_that_speaks(
+def test_edits_change_code_and_no_text(
     file: str, text: str, expected: set[str]
 ) -> None:
     found = list(edits(file, text))
@@ -81,8 +81,8 @@ def test_an_edit_is_of_the_text_that_it_was_made_for() -> None:
         ("hsp_control/__init__.py", "tests/unit"),
     ],
 )
-def test_the_tests_of_a_room_are_asked_first(file: str, first: str) -> None:
-    if (ROOT / first).is_dir():  # companions may have been taken away
+def test_the_tests_of_the_same_folder_run_first(file: str, first: str) -> None:
+    if (ROOT / first).is_dir():  # companions may have been removed
         assert mutants.tests_of(file)[0] == first
 
 
@@ -112,7 +112,7 @@ def mutant(old: str, new: str, tests: str) -> Mutant:
 
 @pytest.fixture
 def checkout(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """Return a folder with one function and one test, which is the fast one, too."""
+    """Return a folder with one function and one test, also listed as the fast one."""
     (tmp_path / "code_under_test.py").write_text(CODE)
     (tmp_path / "test_area.py").write_text(TESTS)
     monkeypatch.setattr(mutants, "FAST", ("test_area.py",))
@@ -121,10 +121,10 @@ def checkout(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 @pytest.mark.process
 @pytest.mark.parametrize("number", further(3))  # `make thorough` runs it, too
-def test_the_runner_tells_who_was_caught(
+def test_the_runner_reports_caught_mutants(
     number: int, checkout: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """Each is tried alone, and the code is afterwards what it was."""
+    """Mutants are tried one at a time; the code is restored afterwards."""
     tests = "test_area.py"
     tried = [
         mutant("a * b", "0.5 * a * b", tests),
@@ -158,7 +158,7 @@ def test_tests_that_fail_anyway_catch_nothing(checkout: Path) -> None:
         *further(("bytes(1 << 40)", "FAILED test_area.py::test_area")),
     ],
 )
-def test_what_never_ends_or_eats_the_memory_is_caught(
+def test_endless_or_memory_hungry_mutants_are_caught(
     checkout: Path, monkeypatch: pytest.MonkeyPatch, wrong: str, detail: str
 ) -> None:
     monkeypatch.setattr(mutants, "LONGEST", 5.0)

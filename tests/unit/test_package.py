@@ -1,4 +1,4 @@
-"""The package's face: its names, and what importing it and starting `hsp` costs."""
+"""The package's public names, and the cost of importing it and starting `hsp`."""
 
 import ast
 import json
@@ -45,7 +45,7 @@ def test_types_and_names_agree() -> None:
         names[name] = (outer or None, inner)
     for name in hsp_control._companions():  # so that an editor completes hsp.plots.
         names[name] = ("companions", name)
-    # The line of a companion that was taken away may stay.
+    # The line of a removed companion may stay.
     assert {k: v for k, v in seen.items() if k in names} == names
     assert {v[0] for k, v in seen.items() if k not in names} <= {"companions"}
 
@@ -62,27 +62,27 @@ def test_all_names_exist_and_are_listed() -> None:
 @pytest.mark.smoke
 @pytest.mark.process
 def test_the_law_reads_alone() -> None:
-    """Whoever reads equation (13) needs some twenty modules, and no declarations."""
+    """The law of equation (13) imports some twenty modules, and no declarations."""
     modules = imported("import hsp_control.law")
     assert not modules & {"pydantic", "pinocchio", "hsp_control.robot"}
     assert len([name for name in modules if name.startswith("hsp_control")]) <= 25
 
 
 def test_few_names_are_at_the_top() -> None:
-    """The names that most programs need; a hint leads to the others."""
+    """The top level has the common names; a hint points to the others."""
     names = [name for name in hsp_control._HOMES if name not in hsp_control._NAMESPACES]
     assert len(names) <= 45
     message = r"no attribute 'Spline'; there is hsp_control\.trajectories\.Spline$"
     with pytest.raises(AttributeError, match=message):
         _ = hsp_control.Spline
-    # `changes` imports this name, but it is not the name's home.
+    # `changes` imports this name, but does not define it.
     message = r"no attribute 'Trajectory'; there is hsp_control\.trajectories"
     with pytest.raises(AttributeError, match=message):
         _ = hsp_control.Trajectory
 
 
 @pytest.mark.parametrize("namespace", hsp_control._NAMESPACES)
-def test_each_namespace_has_names_of_its_own(namespace: str) -> None:
+def test_each_namespace_has_its_own_names(namespace: str) -> None:
     module = getattr(hsp_control, namespace)
     assert module is import_module(f"hsp_control.{hsp_control._NAMESPACES[namespace]}")
     assert [name for name in vars(module) if name[0].isupper()]
@@ -90,7 +90,7 @@ def test_each_namespace_has_names_of_its_own(namespace: str) -> None:
     homes = {name: getattr(module, name).__module__ for name in names}
     assert all(home.startswith("hsp_control.") for home in homes.values()), homes
     assert len(names) <= 45
-    if namespace == "changes":  # it imports this name, and another is its own
+    if namespace == "changes":  # one name is imported, the other is defined there
         assert "Trajectory" not in names
         assert "ChangeGains" in names
 

@@ -31,7 +31,7 @@ IN_CONDA = {
     "cmeel-eigen": "eigen",
     "cmeel-boost": "libboost-headers",
 }
-"""Names in conda-forge of packages that have another one on PyPI."""
+"""Names in conda-forge of packages that are named differently on PyPI."""
 
 
 def conda_form(text: str) -> str:
@@ -41,7 +41,7 @@ def conda_form(text: str) -> str:
     return f"{IN_CONDA.get(requirement.name, requirement.name)} {bounds}".strip()
 
 
-def test_conda_requires_what_pip_does() -> None:
+def test_conda_has_the_requirements_of_pip() -> None:
     recipe = yaml.safe_load((ROOT / "packaging/conda/recipe.yaml").read_text())
     python = f"python {PROJECT['project']['requires-python']}"
     expected = ["__linux", python, *map(conda_form, PROJECT["project"]["dependencies"])]
@@ -58,8 +58,8 @@ def test_conda_requires_what_pip_does() -> None:
         for pattern in PROJECT["project"]["license-files"]
         for file in ROOT.glob(pattern)
     }
-    told = recipe["about"]["license_file"]  # also of companions that were taken away
-    assert {each for each in told if (ROOT / each).parents[1].is_dir()} == licenses
+    reported = recipe["about"]["license_file"]  # also of removed companions
+    assert {each for each in reported if (ROOT / each).parents[1].is_dir()} == licenses
 
 
 def test_every_file_has_the_package_s_version() -> None:
@@ -74,13 +74,13 @@ def test_every_file_has_the_package_s_version() -> None:
 
 
 def included() -> set[str]:
-    """Return what the source distribution has, at the top."""
+    """Return the top-level content of the source distribution."""
     listed = PROJECT["tool"]["hatch"]["build"]["targets"]["sdist"]["include"]
     always = {"LICENSE", "pyproject.toml"}
     return {name.lstrip("/") for name in listed} | always
 
 
-def test_the_source_distribution_has_what_tests_read() -> None:
+def test_the_source_distribution_has_the_files_of_tests() -> None:
     read = {
         name
         for file in (ROOT / "tests").rglob("*.py")
@@ -97,7 +97,7 @@ def containerfile() -> list[list[str]]:
     return [shlex.split(line) for line in text.splitlines() if line.strip()]
 
 
-def test_the_container_has_what_the_wheel_is_built_of() -> None:
+def test_the_container_has_the_sources_of_the_wheel() -> None:
     copied = {
         name
         for word, *names in containerfile()
@@ -155,7 +155,7 @@ def test_one_process_builds_at_a_time(hatch_build: ModuleType, tmp_path: Path) -
         ("zig", "_engine.cpython-314t-linux.so", "cp314-cp314t-manylinux_2_17_aarch64"),
     ],
 )
-def test_a_wheel_says_what_its_library_runs_with(
+def test_a_wheel_names_the_platform_of_its_library(
     hatch_build: ModuleType,
     monkeypatch: pytest.MonkeyPatch,
     compiler: str,
@@ -181,7 +181,7 @@ def test_a_wheel_says_what_its_library_runs_with(
         ((3, 12), "4.4.5", True),
     ],
 )
-def test_a_cmake_that_knows_the_stable_abi(
+def test_a_cmake_with_the_stable_abi(
     hatch_build: ModuleType,
     monkeypatch: pytest.MonkeyPatch,
     tmp_path: Path,

@@ -1,1 +1,1 @@
-"""The compared controllers: each ``make(case)`` returns a function (t, q, v) ↦ tau."""
+"""The compared controllers: a ``make(case)`` returns a function (t, q, v) ↦ tau."""

@@ -116,6 +116,6 @@ def solver_of(problem: Any) -> Any:
 
 
 def add_tasks(problem: Any, weights: Mapping[Any, float]) -> None:
-    """Add tasks to the one cost, each with its weight."""
+    """Add weighted tasks to the cost."""
     for task, weight in weights.items():
         problem.addMotionTask(task, weight, 1, 0.0)

@@ -37,7 +37,7 @@ def make(
 
     Args:
         controller: A controller that is made of a plan's parts: its contacts' schedules
-            and its tasks' references are read in each step; it computes nothing.
+            and its tasks' references are read in every step; it computes nothing.
         q0: Configuration at the start, shape (nq,).
         gain: K_N of the posture, whose α is 1 [1/s].
         posture_weight: The posture's weight [-].

@@ -1,6 +1,6 @@
 """Pictures of a simulated robot's MuJoCo scene by HTTP: ``/CAMERA.jpg``.
 
-A separate process draws each picture on request, in the scene's state at that time; the
+A separate process draws pictures on request, in the scene's state at that time; the
 simulation only copies its state. Without a graphics card Mesa draws.
 """
 
@@ -110,7 +110,7 @@ def show(address: str, plant: Plant) -> Callable[..., object]:
 
     tell()
     drawing.start()
-    # Python ends such processes with a signal that a hanging one does not receive.
+    # Python would end it with SIGTERM, which a hanging process does not receive.
     Finalize(drawing, drawing.kill, exitpriority=10)
     theirs.close()
     try:
@@ -138,7 +138,7 @@ def _serve(
 ) -> None:
     """Draw until the simulating process has ended."""
     nothing = os.open(os.devnull, os.O_RDWR)
-    for pipe in (0, 1):  # its parent's, which waits for their end
+    for pipe in (0, 1):  # those of its parent, which waits for their end
         os.dup2(nothing, pipe)
     os.nice(10)
     Thread(target=_end_with_parent, daemon=True).start()

@@ -1,4 +1,4 @@
-"""A live loop sends its state to a policy, one JSON text in each datagram."""
+"""A live loop sends its state to a policy, one JSON text per datagram."""
 
 import json
 import logging
@@ -146,7 +146,7 @@ class Teller:
         return found
 
     def _measured(self, state: RobotState) -> dict[str, dict[str, Any]]:
-        """Return the measured and the desired value of each task."""
+        """Return the measured and the desired values of the tasks."""
         found: dict[str, dict[str, Any]] = {}
         for task in self._source.controller.tasks:
             reference, actual = map(_numbers, task.measure(state))

@@ -136,7 +136,7 @@ class _Port:
 
 
 def _parts_of(text: bytes, inboxes: Mapping[str, Inbox]) -> dict[str, dict[str, Any]]:
-    """Return each stream's part of a valid datagram."""
+    """Return the streams' parts of a valid datagram."""
     try:
         data = parsed(text)
     except (ValueError, RecursionError) as error:

@@ -1,4 +1,4 @@
-"""Films of a run: a browser without a window draws each picture of the page."""
+"""Films of a run: a headless browser draws the frames of the page."""
 
 from typing import TYPE_CHECKING
 

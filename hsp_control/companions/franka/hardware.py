@@ -29,7 +29,7 @@ _LAST_WORDS = 1.5
 
 
 class FrankaHardware:
-    """`Hardware`: seven joints that take tau - g(q) each millisecond.
+    """`Hardware`: seven joints that take tau - g(q) every millisecond.
 
     The second `read` starts the torque control and waits for it: the first states
     arrive without it, while the loop prepares. A reflex, the stop button and a lost
@@ -38,7 +38,7 @@ class FrankaHardware:
     Attributes:
         period: Time between two states [s].
         q: Configuration when it was connected, shape (7,) [rad].
-        lines: Findings and settings of the connection, one sentence each.
+        lines: Sentences on findings and settings of the connection.
         real_time: Whether its time passes as ours does: not in lockstep.
     """
 
@@ -114,7 +114,7 @@ class FrankaHardware:
                 raise HardwareError(f"torque control did not start in {_START:g} s")
             return None
         _, t, *numbers = client.STATE.unpack(answer)
-        if not self._running:  # time stands still while the loop prepares
+        if not self._running:  # time is stopped while the loop prepares
             self._origin = t
         self._running = self._reads > 0
         self._reads += 1

@@ -222,7 +222,7 @@ REQUESTS = {
     FrankaCommand.AUTOMATIC_ERROR_RECOVERY: _NOTHING,
     FrankaCommand.GET_ROBOT_MODEL: _NOTHING,
 }
-"""Payload of each request."""
+"""Payloads of requests."""
 
 CONNECTED = np.dtype(_bytes(status=1) + _fields("<u2", version=1))
 """The answer to `FrankaCommand.CONNECT`, with the version of the box."""

@@ -155,7 +155,7 @@ def explained(kind: str, text: str) -> str:
 
 
 def about(names: list[str]) -> str:
-    """Return errors by name, each with its meaning and advice."""
+    """Return errors by name, with meaning and advice."""
     found = []
     for name in names:
         what, advice = REFLEXES.get(

@@ -110,7 +110,7 @@ def _beyond(top: Element, flange: str) -> list[str]:
     """Return the flange and all links attached to it."""
     found = [flange]
     joints = top.findall("joint")
-    for name in found:  # it grows while it is read
+    for name in found:  # the list grows during the loop
         found += [_child(joint) for joint in joints if _parent(joint) == name]
     return found
 

@@ -87,7 +87,7 @@ class FrankaSettings(Part, error=LiveError):
     """``enforce``: no motion without a real-time kernel and priority; ``ignore``: any
     computer, for which `communication_constraints_violation` is then likely."""
     lockstep: Flag = False
-    """Whether it is a box that waits for each command (``hsp franka-box --lockstep``):
+    """Whether it is a box that waits for every command (``hsp franka-box --lockstep``):
     the loop then waits for each of its states, however late."""
     recover: Flag = False
     """Whether a reflex that is still active from before is reset when connecting. A

@@ -76,7 +76,7 @@ class ControlBox:
             arm: The arm.
             plant: The simulated arm.
             q: Start, shape (7,) [rad].
-            say: Called with a line for each reflex, and for each end of a motion.
+            say: Called with a line per reflex, and for each end of a motion.
 
         Raises:
             LiveError: If the start is beyond a limit.

@@ -103,7 +103,7 @@ def _box(experiment: Experiment, say: Callable[[str], object]) -> ControlBox:
 
 
 class _Terminal:
-    """Prints a line for each event, and below them the present status.
+    """Prints a line per event, and below them the present status.
 
     Attributes:
         box: The box, once it exists.

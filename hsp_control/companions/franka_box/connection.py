@@ -121,7 +121,7 @@ class Connection:
         self._sent = time.time_ns()
         try:
             self.udp.sendto(state, self._peer)
-        except OSError:  # the buffer is full, or the listener has gone
+        except OSError:  # the buffer is full, or the listener has left
             return
 
     def command(self, number: int, deadline: float) -> np.void | None:

@@ -35,7 +35,7 @@ class ArmImpedance(NamedTuple):
 
 
 def of_joints(model: Model, stiffness: Array) -> ArmImpedance:
-    """Return a spring in each joint, shape (7,) [N·m/rad], critically damped."""
+    """Return a spring in every joint, shape (7,) [N·m/rad], critically damped."""
     damping = 2.0 * np.sqrt(stiffness * np.diag(model.state.mass_matrix))
     return ArmImpedance(np.diag(stiffness), np.diag(damping))
 
@@ -46,7 +46,7 @@ def of_hand(model: Model, stiffness: Array) -> ArmImpedance:
         K = Jᵀ K_x J + k (1 - J⁺J)
 
     with the Jacobian J of the frame in its own axes: K (q_d - q) is Jᵀ K_x times the
-    hand's error, to first order. Each axis is critically damped for its own inertia,
+    hand's error, to first order. The axes are critically damped for their own inertia,
     1 / (J M⁻¹ Jᵀ)_ii.
     """
     J = model.stiffness_jacobian()

@@ -1,4 +1,4 @@
-"""A robot state as it is sent: each field filled from the box's model."""
+"""A robot state as it is sent: its fields are filled from the box's model."""
 
 from typing import Any
 

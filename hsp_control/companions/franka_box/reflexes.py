@@ -223,7 +223,7 @@ class LinkDistances:
     """The distances between the links of an arm that can collide.
 
     Attributes:
-        unwatched: Properties that are not monitored, and why, a line each.
+        unwatched: Lines on properties that are not monitored, with the reason.
     """
 
     def __init__(self, state: RobotState) -> None:

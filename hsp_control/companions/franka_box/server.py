@@ -58,7 +58,7 @@ class Server:
 
         Args:
             box: The box.
-            say: Called with a line for each event.
+            say: Called with a line per event.
             host: A loopback address; the port is always `PORT`.
             lockstep: Whether to wait for commands, instead of real time.
             deadline: Of a command in real time, after its state [s].
@@ -93,7 +93,7 @@ class Server:
         """Serve clients.
 
         Args:
-            on_period: Called before each period; false ends the service.
+            on_period: Called before every period; false ends the service.
         """
         advance = self._in_lockstep if self._lockstep else self._in_real_time
         # An overflow is refused, or a reflex; NumPy need not warn.
@@ -121,7 +121,7 @@ class Server:
         """
         now = monotonic()
         late = now - self._due
-        if late > PERIOD:  # it is not made up for: the clock is shifted
+        if late > PERIOD:  # it is not caught up: the clock is shifted
             self.overrun += late
             self._due = now
         self._due += PERIOD
@@ -165,7 +165,8 @@ class Server:
                     sockets.append(client.udp)
             ready, _, _ = select(sockets, [], [], max(until - monotonic(), 0.0))
             if client is not None and client.tcp in ready:
-                self._serve_requests(client)  # it may leave, and another one connect
+                # it may disconnect, and another one connect
+                self._serve_requests(client)
             if self._listener in ready:
                 self._accept()
             if client is not None and client.udp in ready:

@@ -121,7 +121,7 @@ def check_angles(xml: Element) -> Iterator[Finding]:
 
 
 def _known_points(xml: Element) -> dict[str, Array]:
-    """Return each link's origin and the origins of the joints on it, by link [m]."""
+    """Return origins of links and of the joints on them, by link [m]."""
     points = {each.get("name", ""): [np.zeros(3)] for each in xml.findall("link")}
     for joint in xml.findall("joint"):
         parent = joint.find("parent")

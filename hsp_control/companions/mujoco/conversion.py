@@ -49,7 +49,7 @@ def pose(position: Array, wxyz: Array) -> pin.SE3:
 
 
 def build_model(selection: Selection) -> pin.Model:
-    """Return the Pinocchio model, with a frame for each body, joint and site."""
+    """Return the Pinocchio model, with a frame per body, joint and site."""
     return _ModelBuilder(selection).model
 
 

@@ -233,7 +233,7 @@ Lack = tuple[str, list[str], str]
 
 
 def omissions(selection: Selection) -> tuple[str, ...]:
-    """Return one sentence for each kind of omitted element."""
+    """Return one sentence per kind of omitted element."""
     parts = _of_joints, _of_bodies, _of_actuators, _of_constraints
     return tuple(
         f"{what} {listing(names)}: {why}"

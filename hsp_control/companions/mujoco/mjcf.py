@@ -348,7 +348,7 @@ def principal_inertia(inertia: Array) -> tuple[Array, Array]:
 
 
 def _joint_elements(joint: Joint) -> list[tuple[str, dict[str, str]]]:
-    """Return tag and attributes of each MuJoCo joint that represents a joint."""
+    """Return tags and attributes of the MuJoCo joints that represent a joint."""
     if joint.kind == FREE:
         return [("freejoint", {"name": joint.name})]
     if joint.kind == SPHERICAL:

@@ -274,7 +274,7 @@ class MujocoPlant(MujocoEngine):
     def log_channels(
         self, t: float, q: Array, v: Array, tau: Array
     ) -> Mapping[str, LogChannel]:
-        """Return each contact's force and moment at a true state under an effort."""
+        """Return the contacts' forces and moments at a true state under an effort."""
         if not self.contacts:
             return {}
         self._carried.write()
@@ -321,7 +321,7 @@ class MujocoPlant(MujocoEngine):
         }
 
     def _places(self) -> dict[str, LogChannel]:
-        """Return position and orientation of each loose solid."""
+        """Return positions and orientations of the free solids."""
         found = {}
         for solid in self.declared.solids:
             for k in range(solid.copies if solid.mass is not None else 0):
@@ -336,7 +336,7 @@ class MujocoPlant(MujocoEngine):
         return found
 
     def _wrenches(self, q: Array) -> dict[str, Array]:
-        """Return each contact's wrench about its frame's origin, in world axes."""
+        """Return the contacts' wrenches about their frames' origins, in world axes."""
         model, data = self.robot.model, self._data
         pin.forwardKinematics(model, data, q)
         origins = {

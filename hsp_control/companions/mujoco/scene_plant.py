@@ -80,7 +80,7 @@ class MujocoScenePlant(MujocoEngine):
     robot's joints at the start of the run.
 
     Attributes:
-        motors: The motor of each degree of freedom that has one, by its index in v.
+        motors: The motors, by their degree of freedom's index in v.
         contacts: The bodies whose contact forces are logged.
     """
 
@@ -152,7 +152,7 @@ class MujocoScenePlant(MujocoEngine):
     def log_channels(
         self, t: float, q: Array, v: Array, tau: Array
     ) -> Mapping[str, LogChannel]:
-        """Return the contacts' force and moment on each body that was requested."""
+        """Return the contacts' force and moment on every body that was requested."""
         if not self.contacts:
             return {}
         mujoco, probe = self._mujoco, self._probe  # the data itself is not touched
@@ -219,7 +219,7 @@ def _actuators_on(robot: Robot, model: Any, names: Names) -> dict[int, list[int]
 
 
 def _motors(model: Any, on_joints: Mapping[int, list[int]]) -> dict[int, Motor]:
-    """Return the motor of each joint that has exactly one, and no other actuator."""
+    """Return the motors of joints with exactly one, and no other actuator."""
     found = {}
     for dof, actuators in on_joints.items():
         own = motor(model, actuators[0]) if len(actuators) == 1 else None
@@ -262,7 +262,7 @@ class MujocoScene(PlantPart, type="mujoco_scene"):
     """The MuJoCo scene in which the robot is declared, with all its objects.
 
     The timestep, the integrator, friction and contacts are the scene's own. In Python,
-    `MujocoScenePlant` takes any model and its data.
+    `MujocoScenePlant` accepts any model and its data.
     """
 
     _: KW_ONLY

@@ -205,7 +205,7 @@ def obstacles_of(controller: Controller) -> dict[str, ObstacleGrip]:
 
 
 _JOINTS_MOVING: dict[str, Any] = {"speed": 1.0, "acceleration": 5.0, "jerk": 100.0}
-"""Bounds of the target of each joint [1/s, 1/s², 1/s³, in rad or m]."""
+"""Bounds of the joints' targets [1/s, 1/s², 1/s³, in rad or m]."""
 _STEPS = 20
 _DAMPING, _HOLDING = 1e-2, 0.3
 """Weights of the least squares: for the joints to stay [m/rad], and for the hand."""
@@ -369,7 +369,7 @@ class Handles:
         self.message, self.warning = message, warning
 
     def turn_knobs(self) -> None:
-        """Make the changes of the knobs, each knob's at a limited rate."""
+        """Make the changes of the knobs at a limited rate."""
         t = self._controller.state.t
         for name in list(self._wanted):
             if t - self._turned.get(name, -np.inf) < KNOB_PERIOD:

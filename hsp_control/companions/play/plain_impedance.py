@@ -25,7 +25,7 @@ class PlainImpedance:
 
     def __init__(self) -> None:
         """Begin without an inertia: the first step determines it."""
-        self._inertia = dict[tuple[str, ...], Array]()  # Λ₀ of each set of tasks
+        self._inertia = dict[tuple[str, ...], Array]()  # Λ₀ by set of tasks
 
     def __call__(self, state: RobotState, active: ActiveStack) -> Array:
         """Return M⁻¹ (tau - N), shape (nv,)."""

@@ -134,7 +134,7 @@ def play_command(options: argparse.Namespace) -> int:
         session.rehearse()
         picture = Picture(session, viewer)
         gc.collect()
-        gc.freeze()  # objects that exist now stay: collections skip them
+        gc.freeze()  # objects that exist now are permanent: collections skip them
         stack.enter_context(_stop_at_termination())
         log = options.out / f"{experiment.name}-play.npz"
 

@@ -52,7 +52,7 @@ class PageProcess:
 
     def __init__(self, *, port: int | None, host: str, held: bool) -> None:
         self.held = held  # whether a key must be held
-        self.channel, self._there = channel_pair()  # way to it
+        self.channel, self._there = channel_pair()  # queue to it
         self.url = ""  # page's address, with its key
         self._settings = {
             "channel": self._there.fileno(),
@@ -137,11 +137,11 @@ class SteeringPage(NamedTuple):
     def let_steer(
         self, experiment: Experiment, requests: OperatorRequests, journal: Path
     ) -> Callable[[float], object]:
-        """Return the function that the loop calls each period for the page."""
+        """Return the function that the loop calls every period for the page."""
         # With a dead-man's key it returns when the key is held for the first time, or
         # when the operator stops.
         controller, period = experiment.controller, live_period(experiment)
-        controller.restart(origin=0.0)  # it has made the dry run
+        controller.restart(origin=0.0)  # after the dry run
         controller.compute(0.0, experiment.q0, experiment.v0)
         _rehearse(controller, period, experiment)
         self.opening.open()
@@ -211,7 +211,7 @@ def main() -> int:
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C stops the loop only
     os.nice(_NICENESS)
     try:
-        if line := sys.stdin.readline():  # else the loop ended at once
+        if line := sys.stdin.readline():  # otherwise the loop ended at once
             _run(json.loads(line))
     except HspControlError as error:
         print(f"hsp: the loop's page: {error}", file=sys.stderr)

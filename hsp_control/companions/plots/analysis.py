@@ -115,7 +115,7 @@ def _solve(
     rollout: Rollout, controller: Controller, K_N: Array, period: float
 ) -> Array:
     """Integrate the error equation along the rows; return ‖e_N‖_W, shape (N,)."""
-    from scipy.linalg import expm  # here: SciPy takes long to import
+    from scipy.linalg import expm  # here: importing SciPy is slow
 
     nv = controller.robot.nv
     state = RobotState(controller.robot)

@@ -361,7 +361,7 @@ def _label(artist: Artist) -> str:
 
 
 def _shorten_labels(named: Sequence[Artist], others: Sequence[Artist]) -> None:
-    """Keep of labels what is true of another log, too: `KIND, a number of the first`.
+    """Remove from labels the numbers that differ from another log's.
 
     The labels of the other log are removed.
     """

@@ -76,7 +76,7 @@ def joint_positions(rollout: Rollout, *, absolute: bool = True) -> tuple[Array, 
 
 
 def decay_power(rollout: Rollout) -> Array | None:
-    """Return e_NᵀW K_N e_N at each row, shape (N,); None if K_N or W is not known."""
+    """Return e_NᵀW K_N e_N at every row, shape (N,); None if K_N or W is not known."""
     gain = rollout.meta.get("null_space_gain")
     if gain is None or not rollout.meta.get("controls_null_space", True):
         return None
@@ -240,7 +240,7 @@ def predicted_decay(rollout: Rollout) -> Decay:
         why = "no prediction: $K_N$ is a matrix, $W$ not in the log"
         return Decay(None, None, (0.0, 0.0), why)
     power = 0.5 * (W @ K_N + (W @ K_N).T)
-    from scipy.linalg import eigh  # here: SciPy takes long to import
+    from scipy.linalg import eigh  # here: importing SciPy is slow
 
     rates = eigh(power, W, eigvals_only=True)
     slowest, fastest = float(rates[0]), float(rates[-1])

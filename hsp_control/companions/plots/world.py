@@ -26,7 +26,7 @@ class View(NamedTuple):
     names: str  # the world axes of the plane, such as ``"xy"``; "" for an oblique view
 
     def project(self, points: Array) -> tuple[Array, Array]:
-        """Return x and y in the figure's plane, each of shape ``points.shape[:-1]``."""
+        """Return x and y in the figure's plane, of shape ``points.shape[:-1]``."""
         page = points @ self.rows.T
         return page[..., 0], page[..., 1]
 

@@ -243,7 +243,7 @@ def _mesh(rerun: Any, vertices: Array, triangles: Any, color: Any) -> Any:
 def _normals(vertices: Array, triangles: Any) -> Array:
     """Return the normals of vertices, shape (N, 3): without them nothing is shaded.
 
-    Each is the mean of its triangles' normals, weighted by their areas.
+    A normal is the mean of the triangles' normals, weighted by their areas.
     """
     first, second, third = np.moveaxis(vertices[triangles], 1, 0)
     of_triangles = np.cross(second - first, third - first)
@@ -260,7 +260,7 @@ def _rgb(color: str) -> list[float]:
 
 
 def _curves(rollout: Rollout) -> Iterator[tuple[str, Array]]:
-    """Yield the log's columns, each component by itself: (name, values (N,))."""
+    """Yield the log's columns by component: (name, values (N,))."""
     dofs = rollout.meta["robot"]["dofs"]
     for name, column in rollout.columns.items():
         flat = column.reshape(len(column), -1)

@@ -105,8 +105,8 @@ def serve(
 ) -> None:
     """Run a robot until it has stopped and was held.
 
-    Each period: receive efforts, advance the plant, publish the state. Stamps begin at
-    the time of day, and grow by a period each. If the process overruns by some periods,
+    In a period: receive efforts, advance the plant, publish the state. Stamps begin at
+    the time of day, and grow by one period. If the process overruns by some periods,
     it makes up for them, since a robot would have moved; if by more, the plant stands
     still, but the stamps advance.
 
@@ -118,7 +118,7 @@ def serve(
         robot: The robot, waiting for its first effort.
         topics: Its topics.
         stop_reason: Called every period; returns a reason to stop, or None.
-        lockstep: Whether a period passes with each effort, instead of in real time.
+        lockstep: Whether a period passes with every effort, instead of in real time.
     """
     step, stamp, due = round(1e9 * robot.period), time_ns(), monotonic()
     with no_garbage_collection():

@@ -2,7 +2,7 @@
 
 It contains the configuration with the files that it names, the robot unless an
 installed package has it, and the Python files that declare the user's types. Dask
-passes it to each worker when it joins, also to one that replaces another.
+passes it to every worker when it joins, also to one that replaces another.
 """
 
 import json
@@ -121,8 +121,8 @@ class Luggage(WorkerPlugin):  # type: ignore[misc]
             (self.folder / name).parent.mkdir(parents=True)
             (self.folder / name).write_bytes(content)
         self._base: Document | None = None
-        # A run that diverges overflows, which its row reports. The process that started
-        # the sweep has warned of the start already.
+        # A diverging run overflows, which its row reports. Warnings about the start
+        # were printed by the process that started the sweep.
         warnings.simplefilter("ignore", RuntimeWarning)
         warnings.simplefilter("ignore", StartWarning)
 

@@ -46,7 +46,7 @@ def one_run(luggage: str, run: int, changes: Changes, time_limit: float | None) 
 
     plugins, end = get_worker().plugins, perf_counter() + 60.0
     while luggage not in plugins and perf_counter() < end:
-        sleep(0.05)  # it comes by another way, perhaps later than the run
+        sleep(0.05)  # sent separately, possibly after the run
     return computed(plugins[luggage].experiment, run, changes, time_limit)
 
 

@@ -32,7 +32,7 @@ class SweepPlan:
         design: See `hsp_control.companions.sweeps.design.Design`.
         samples: The requested number of runs; None for a grid.
         seed: Seed of the design.
-        points: Each run's values, in the order of the factors.
+        points: The runs' values, in the order of the factors.
     """
 
     base: Document

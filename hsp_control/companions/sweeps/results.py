@@ -90,7 +90,7 @@ class Sweep:
 
     @property
     def completed(self) -> NDArray[np.bool_]:
-        """Whether each run was completed, shape (N,)."""
+        """Whether the runs were completed, shape (N,)."""
         return np.asarray(self.columns["status"] == "completed")
 
     def configuration(self, run: int) -> dict[str, Any]:

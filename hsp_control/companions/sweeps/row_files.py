@@ -1,6 +1,6 @@
 """The rows of a sweep, in memory and in a folder of Parquet files.
 
-Rows are written some seconds after they arrive, each time to a new file; each file has
+Rows are written some seconds after they arrive, always to a new file; a file has
 the whole description of the sweep. When the sweep ends, few large files replace the
 many. After an interruption the folder can be read, and continued.
 """

@@ -1,4 +1,4 @@
-"""The influence of each parameter on each metric, from the runs of any design."""
+"""The influence of parameters on metrics, from the runs of any design."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -21,7 +21,7 @@ _CLASSES = 12  # for a parameter with more values
 
 @dataclass(frozen=True)
 class Sensitivity:
-    """The influence of each parameter of a sweep on each metric.
+    """The influence of a sweep's parameters on metrics.
 
     Attributes:
         parameters: Names of the p parameters that have more than one value.

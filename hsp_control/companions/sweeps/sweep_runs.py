@@ -67,14 +67,14 @@ def sweep(
         out: A folder for Parquet files, whose name ends with ``.parquet``. Runs of the
             same sweep that are in it are not computed again. None: nothing is written.
         overrides: Values to change in all runs, each ``key.path=value``.
-        imports: Python files or modules to import first, here and in each worker, for
+        imports: Python files or modules to import first, here and in every worker, for
             the functions and types that the configuration names. Those that declare
             types of the configuration in this process are sent automatically.
         scheduler: The address of a Dask scheduler, such as ``tcp://10.0.0.1:8786``, or
             a client of one; None: workers on this computer.
         workers: The number of these; None: one per core.
         fresh: Start again, and remove the rows in ``out``.
-        time_limit: The maximum computation time of a run [s], checked at each row of
+        time_limit: The maximum computation time of a run [s], checked at every row of
             its log; None: none. A run that takes longer has the status ``timed out``,
             and is repeated when the sweep resumes.
         on_start: Called with Dask's client when there are workers.

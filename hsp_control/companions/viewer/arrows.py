@@ -231,7 +231,7 @@ def _joint_velocities(state: RobotState, v: Array, data: pin.Data) -> Array:
 
 
 def _select_joints(positions: Array, speeds: Array, spacing: float) -> list[int]:
-    """Return the indices of the fastest joints that keep a distance from each other."""
+    """Return the indices of the fastest joints that keep a mutual distance."""
     joints: list[int] = []
     for k in np.argsort(-speeds):
         if len(joints) == _MAX_ARROWS or speeds[k] <= _MIN_SPEED * speeds.max():
@@ -260,7 +260,7 @@ _ELLIPSOID_OPACITY = 0.3
 
 
 def ellipsoid(robot: Robot, controller: Controller | None, root: str) -> Layer:
-    """Draw the image {J v : |v| = 1} of unit joint velocities, at each task's frame."""
+    """Draw the image {J v : |v| = 1} of unit joint velocities, at the tasks' frames."""
     tasks = controller.tasks if controller else ()
     named = (getattr(task, "frame", None) for task in tasks)
     frames = dict.fromkeys(frame for frame in named if frame) or [robot.end_effector]

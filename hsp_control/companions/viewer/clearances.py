@@ -87,7 +87,7 @@ def _clearances(controller: Controller) -> Iterator[Clearance]:
 def _measured_shapes(
     controller: Controller, measured: list[Clearance]
 ) -> Iterator[LinkShape]:
-    """Yield each shape of a link that is in a pair, once."""
+    """Yield the shapes of links that are in a pair, once."""
     known = set()
     for clearance in measured:
         proximity = clearance.proximity(controller.state)
@@ -242,7 +242,7 @@ _SWATCH_OPACITY = 0.35  # in the legend, where the zone's own opacity would be i
 
 
 def influence(field: NullSpaceField, shown: dict[str, Shape], root: str) -> Layer:
-    """Draw the zone of each shown obstacle in which a clearance field reacts to it."""
+    """Draw the zones of shown obstacles in which a clearance field is active."""
     zones: dict[str, tuple[Shape, float]] = {}
     for term in filter(acts, terms_of_type(field, ObstacleClearance)):
         for obstacle in term.obstacles or ():

@@ -62,7 +62,7 @@ def bands_of(
 def _activities(
     rollout: Rollout, controller: Controller | None
 ) -> Iterator[tuple[Band, NDArray[np.bool_]]]:
-    """Yield the bands without intervals, and in which rows each is active."""
+    """Yield the bands without intervals, and the rows in which they are active."""
     if "status" in rollout:
         limit = Band("limit active", "a limit is active", palette.DESIRED, [])
         yield limit, rollout["status"] >= LIMITED
@@ -165,7 +165,7 @@ def extend_clip(clip: Clip, number: int) -> PageCommand:
 
 
 def track_fields(track: Track) -> Json:
-    """Return a track as the page takes it, without its times."""
+    """Return a track in the page's form, without its times."""
     values = typed_array(track.values, np.float32)
     return {"path": track.path, "property": track.property, "values": values}
 

@@ -152,7 +152,7 @@ class Comparison:
         ]
 
     def _compute_offsets(self) -> list[Array]:
-        """Return the offset of each run [m], shapes (3,)."""
+        """Return the offsets of the runs [m], shapes (3,)."""
         if self._beside is None:
             return [np.zeros(3) for _ in self._runs]
         offsets: list[Array] = []
@@ -178,7 +178,7 @@ def _merged(entries: Iterable[LegendEntry]) -> list[LegendEntry]:
 
 
 def run_roots(names: Sequence[str]) -> list[str]:
-    """Return the root node of each run; "" for the first."""
+    """Return the root nodes of the runs; "" for the first."""
     taken = {"robot", "floor", "lights", *LAYERS}
     elements = map(path_element, names[1:])
     return ["", *(f"/run {e}" if e in taken else f"/{e}" for e in elements)]

@@ -41,7 +41,7 @@ def export_html(
     newer.
 
     Args:
-        rollout: The run; or several of different names, each with its robot and its
+        rollout: The run; or several of different names, with their robots and
             controller. The view is that of the first.
         path: The file to write.
         robot: The robot of a single run; None: it and its controller are rebuilt from

@@ -27,7 +27,7 @@ class Ghosts:
         self._look = {"color": color, "opacity": opacity}
 
     def show(self, configurations: Sequence[Array], text: str = "") -> PageCommand:
-        """Return the command that shows ghosts, each q of shape (nq,), and a label."""
+        """Return the command that shows ghosts, from q of shape (nq,), and a label."""
         poses = [self._poses(q) for q in configurations]
         return page_command(
             "ghosts",
@@ -42,6 +42,6 @@ class Ghosts:
         )
 
     def _poses(self, q: Array) -> Array:
-        """Return each joint's pose, x, y, z and a quaternion, shape (joints, 7)."""
+        """Return the joints' poses, x, y, z and a quaternion, shape (joints, 7)."""
         pin.forwardKinematics(self._robot.model, self._data, q)
         return np.array([pin.SE3ToXYZQUAT(each) for each in self._data.oMi[1:]])

@@ -66,7 +66,7 @@ class LiveView:
             self._begin = now
         if now < self._next:
             return
-        # Not wall time, which other processes, such as the browser, take too.
+        # Not wall time, which includes other processes, such as the browser.
         before = time.thread_time()
         try:
             self._send(recorder, now)
@@ -87,10 +87,10 @@ class LiveView:
         self._viewer.replace_run(rollout, self._experiment.controller, status)
 
     def _send(self, recorder: LogWriter, now: float) -> None:
-        # From the last row sent: tracks and bands continue there.
+        # From the last sent row: tracks and bands continue there.
         rows = Rollout(recorder.rows(max(self._sent - 1, 0)), self._meta)
         rate = float(rows.t[-1]) / max(now - (self._begin or 0.0), 1e-9)
-        # Drawn rows per second of computing, times their cost, is drawing's share.
+        # share of drawing = drawn rows per second of computing · time per row
         finest = max(COARSEST, rate * self._cost / DRAWING_SHARE)
         before = time.thread_time()
         motion = motion_of(self._experiment.robot, rows, finest, coarsest=np.inf)

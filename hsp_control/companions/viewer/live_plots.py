@@ -121,7 +121,7 @@ def _rates(log: Rollout) -> list[str]:
 def _joints(
     log: Rollout, title: str, column: str, units: Sequence[str], kind: str
 ) -> LivePlot:
-    """Return a plot of each joint; of many joints one of the largest share."""
+    """Return one plot per joint; for many joints one of the largest share."""
     names = joint_names(log)
     given = log.meta["limits"].get(kind) or [None] * len(names)
     limits = np.array(given, dtype=float)  # NaN where there is none

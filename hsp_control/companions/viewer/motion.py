@@ -41,13 +41,13 @@ class RunMotion(NamedTuple):
         return float(np.linalg.norm(np.ptp(points, axis=0))) or 1.0
 
     def states(self) -> Iterator[RobotState]:
-        """Yield the state at each row; the next row overwrites it."""
+        """Yield the state at every row; the next row overwrites it."""
         state = RobotState(self.robot)
         for t, q, v in zip(self.rows.t, self.rows.q, self.rows.v, strict=True):
             yield state.update(float(t), q, v)
 
     def joint_poses(self) -> Array:
-        """Return each joint's x, y, z and quaternion, shape (N, njoints, 7)."""
+        """Return the joints' x, y, z and quaternion, shape (N, njoints, 7)."""
         poses = np.empty((len(self.times), self.robot.model.njoints, 7))
         for row, state in enumerate(self.states()):
             for joint, placement in enumerate(state.data.oMi):

@@ -65,7 +65,7 @@ def obstacle(
         surface |= {"side": 2}
     thing = threejs.mesh(solid, surface, pose)
     thing["object"]["receiveShadow"] = False  # shadows on it would show through
-    # The drawn square ends, the half-space does not.
+    # The drawn square is finite, the half-space is not.
     thing["object"]["castShadow"] = not isinstance(shape, shapes.HalfSpace)
     return threejs.group([thing])
 
@@ -126,7 +126,7 @@ def triangles_of(geometry: Any) -> tuple[Array, Indices]:
 
 def _rounded(points: Array, distance: float) -> Json:
     """Return the convex hull of balls around points; points (K, 3) [m]."""
-    from scipy.spatial import ConvexHull  # here: SciPy takes long to import
+    from scipy.spatial import ConvexHull  # here: importing SciPy is slow
 
     cloud = hull_corners(points)[:, None, :] + distance * _unit_sphere()
     hull = ConvexHull(cloud.reshape(-1, 3))

@@ -123,7 +123,7 @@ _STEPS = {
     "visible": 1.0,
     "length": 1 / 64,
 }
-"""Resolution of each property that a track animates."""
+"""Resolutions of the properties that a track animates."""
 
 
 def reduce_clip(command: Json, arrays: ArrayTable) -> Json:
@@ -159,7 +159,7 @@ def sort_along_curve(vertices: Array, triangles: Indices) -> tuple[Array, Indice
 
 
 def _morton_codes(points: Array) -> Indices:
-    """Return each point's Morton (1966) code: its coordinates' bits, interleaved."""
+    """Return the points' Morton (1966) codes: their coordinates' bits, interleaved."""
     extent = float(np.ptp(points, axis=0).max()) or 1.0
     cells = ((points - points.min(axis=0)) / extent * 1023.0).astype(np.int64)
     number = np.zeros(len(points), np.int64)

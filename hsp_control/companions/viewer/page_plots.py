@@ -151,7 +151,7 @@ class _CurveOfRun(NamedTuple):
 
 
 def pack_panels(runs: Sequence[ComparedRun], arrays: ArrayTable) -> Json:
-    """Return plots of runs for ``plots.js``, one for each title and unit."""
+    """Return plots of runs for ``plots.js``, one per title and unit."""
     panels: dict[tuple[str, str], Panel] = {}
     curves: dict[tuple[str, str], list[_CurveOfRun]] = {}
     for number, run in enumerate(runs):

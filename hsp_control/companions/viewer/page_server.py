@@ -38,7 +38,7 @@ _LONGEST = 4000  # maximum size of a page's message [bytes]
 
 
 def batch_messages(commands: list[bytes]) -> list[bytes]:
-    """Return packed commands as messages, each an array in MessagePack."""
+    """Return packed commands as messages, which are arrays in MessagePack."""
     messages: list[bytes] = []
     batch: list[bytes] = []
     size = 0

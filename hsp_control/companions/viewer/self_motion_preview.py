@@ -30,7 +30,7 @@ from hsp_control.robot import Robot
 
 _STEP = 0.1  # length of a step, as a norm of joint angles [rad]
 _STEPS = 36  # maximum number of steps in each direction
-_CORRECTIONS = 2  # Newton's steps after each step
+_CORRECTIONS = 2  # Newton's steps after every step
 _RANK = 1e-4  # smallest singular value of J, over the largest, that adds to its rank
 _STILL = 0.02  # smallest velocity of the elbow over that of the joints [m/rad]
 _GHOSTS = 5

@@ -154,7 +154,7 @@ def growing_paths(
 ) -> tuple[Layer, Callable[[RunMotion], Iterator[PageCommand]]]:
     """Draw paths of a run that is being computed; return also their extension.
 
-    The desired paths are those of a preview. Each extension begins at the last point.
+    The desired paths are those of a preview. An extension begins at the last point.
     """
     rings = np.arange(len(preview.times))
     sleeves = _moving(preview, "desired", rings)

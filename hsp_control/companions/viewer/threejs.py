@@ -137,7 +137,7 @@ def mesh_group(geometry: Json, surface: Json, *about: Any, shadow: bool = True) 
 
 
 def group(things: Sequence[Json]) -> Json:
-    """Return several objects as one; each keeps its shadow settings."""
+    """Return several objects as one; they keep their shadow settings."""
     return {
         "metadata": {"version": 4.5, "type": "Object"},
         "geometries": [g for thing in things for g in thing.get("geometries", [])],
@@ -165,7 +165,7 @@ def buffer_geometry(attributes: dict[str, Array]) -> Json:
 
 
 def facets(vertices: Array, triangles: Indices) -> Json:
-    """Return flat-shaded triangles: each has its own vertices and normal."""
+    """Return flat-shaded triangles, with separate vertices and normals."""
     corners = vertices[triangles]
     normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     lengths = np.linalg.norm(normals, axis=1, keepdims=True)

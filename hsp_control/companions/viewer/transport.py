@@ -158,7 +158,7 @@ class PageServer(SceneRecorder):
     def messages(self) -> list[dict[str, Any]]:
         """Return the steering page's messages since the last call; never waits.
 
-        Of each kind and object only the newest: no page can delay the program.
+        Only the newest of a kind and object: no page can delay the program.
         """
         self._check_open()
         with self._hub.lock:
@@ -204,7 +204,7 @@ def page_key(host: str, *, fresh: bool = False) -> str:
 
     On this computer it is the user's, in a file that no other user can read, so that an
     open page finds the next start. In a network, or if it is to be ``fresh``, it is new
-    at each start.
+    at every start.
     """
     new = secrets.token_urlsafe(16)
     if fresh or host != LOOPBACK:

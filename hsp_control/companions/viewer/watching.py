@@ -204,7 +204,8 @@ class Follower:
                 last = taken[0], taken[1].tobytes()
                 self.write(*taken)
                 self.failure = ""
-            except HspControlError as error:  # the loop has it, too, or soon will
+            # the loop has the same error, or soon will
+            except HspControlError as error:
                 self.failure, self._begin_anew = str(error), True
                 # A copy takes the lock for some ms: not at every failure.
                 self._ended.wait(_PATIENCE)
@@ -245,14 +246,14 @@ class Follower:
             self._copy_anew()
             self._change_journal()
         if not self._begun:
-            # Parts relative to the start are placed where the loop placed them.
+            # Parts relative to the start are placed as in the loop.
             start = controller.setup.start.state
             self._copy.compute(start.t, start.q, start.v)
             self._begun = True
         changes, known = {id(each): each for each in controller.changes}, self._changes
         for change in (changes[key] for key in changes if key not in known):
             with controller._lock:
-                # its stream continues from the state of the loop's, and looks on
+                # its stream continues from the state of the loop's, and only reads
                 own = deepcopy(change, controller._memory.queues)
             self._copy.change(own)
         self._changes = changes

@@ -26,7 +26,7 @@ from hsp_control.tasks import CenterOfMass, FrameOrientation, FramePose, Gains, 
 from hsp_control.tasks.frame_task import TrackingTask
 
 BODY, TRUNK = "center_of_mass", "trunk"
-"""Names of the tasks of every walk, besides one for each foot."""
+"""Names of the tasks of every walk, besides one per foot."""
 _SIX = 6
 """Degrees of freedom of a sole."""
 
@@ -54,7 +54,7 @@ class BipedPlan(MovingPlan):
     lift: Positive = 0.05
     """Height to which a foot is lifted [m]."""
     crouch: NonNegative = 0.04
-    """Distance by which the centre of mass is lowered, so that the knees stay bent
+    """Distance by which the centre of mass is lowered, so that the knees stay flexed
     [m]."""
     acceleration: Positive = 0.4
     """Maximum rate of change of the velocity, from step to step [m/s²]."""

@@ -22,7 +22,7 @@ class Switch(Written, Schedule):
     intervals: Intervals = ((None, None),)
     """Not used: events determine when it is active."""
     ramp: NonNegative = 0.0
-    """Not used: each change has its own."""
+    """Not used: changes have their own."""
     on: Flag = True
     """Whether it is on before the first `set` [-]."""
 
@@ -77,7 +77,7 @@ class Switch(Written, Schedule):
 class Switched:
     """The switches of a contact and of the task that replaces it.
 
-    Each begins where the other ends, so that the law blends from one to the other while
+    One begins where the other ends, so that the law blends from one to the other while
     the force fades or rises; see `PlannedTask.weight_beyond`.
     """
 

@@ -78,7 +78,7 @@ class RunningCrawl(RunningQuadruped):
         self._shift = to_rest(at_rest(mass), mass, state.t, 1.0)
 
     def _combinations(self) -> Sequence[Sequence[PointFoot]]:
-        """Return each foot alone."""
+        """Return the single feet."""
         return [[foot] for foot in self._feet]
 
     def _phase(self) -> tuple[float, str]:

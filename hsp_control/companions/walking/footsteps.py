@@ -55,7 +55,7 @@ class Velocity(NamedTuple):
     def towards(
         self, wanted: "Velocity", most: tuple[float, float, float]
     ) -> "Velocity":
-        """Return the velocity nearest to a desired one, with a bound on each change."""
+        """Return the velocity nearest to a desired one, with bounded changes."""
         parts = zip(self, wanted, most, strict=True)
         return Velocity(*(a + min(max(b - a, -m), m) for a, b, m in parts))
 

@@ -86,7 +86,7 @@ def reaction_of(points: Array, start: float, step: float, frequency: float) -> R
 
 
 class LegReaction:
-    """K of both legs, at the beginning and at the end of the last swing of each."""
+    """K of both legs, at the beginning and at the end of their last swings."""
 
     def __init__(
         self, controller: Controller, trunk: str, frames: dict[float, str]

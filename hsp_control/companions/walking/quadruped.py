@@ -30,7 +30,7 @@ STEEPEST = 0.7
 class QuadrupedPlan(MovingPlan):
     """A plan of four point feet.
 
-    It has the tasks ``trunk``, ``height`` and ``center_of_mass``, and one for each foot
+    It has the tasks ``trunk``, ``height`` and ``center_of_mass``, and one per foot
     with the name of its contact.
 
     Attributes:

@@ -295,7 +295,7 @@ class RunningSensed(RunningPlan):
             each.update(measured.t, state, measured)
 
     def log_channels(self) -> Mapping[str, LogChannel]:
-        """Return the measurements of each contact, and whether it is active."""
+        """Return the contacts' measurements, and whether they are active."""
         channels: dict[str, LogChannel] = {}
         for each in self._sensed:
             prefix = f"plan.{each.name}"

@@ -31,7 +31,7 @@ class Preview(NamedTuple):
 
     Attributes:
         phases: The phases, from a shift of the weight until the robot stands.
-        swings: Whether each of them is a swing.
+        swings: Whether they are swings.
         velocity: That of the next step.
         target: The next footstep; None if there is none.
     """
@@ -166,7 +166,7 @@ def stance_of(feet: Mapping[float, Foot], state: RobotState, crouch: float) -> S
         - (hip_height(state, each.frame) - crouch) ** 2
         for each in feet.values()
     ]
-    # Each leg contributes half of the step.
+    # Both legs contribute half of the step.
     longest = 2.0 * _STRETCH * float(np.sqrt(max(min(squares), 0.0)))
     return Stance(width, narrowest, max(3.0 * width, width + 0.1), longest)
 

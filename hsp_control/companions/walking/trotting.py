@@ -98,7 +98,7 @@ class RunningTrot(RunningQuadruped):
             pulled = away * (1.0 - LEASH / far)
             self._reference = self._reference + pulled
             speed = float(np.hypot(*now))
-            if speed > 0.0:  # a delay along its line is not made up for
+            if speed > 0.0:  # a delay along its line is not corrected
                 pulled = now * float(now @ pulled) / speed**2
             self._line = self._line + pulled
         return (now - before) / h

@@ -69,7 +69,7 @@ class Walk(BipedPlan, type="walk"):
     in place and in time (`step_adjustment.py`). A swing foot becomes a contact at
     touchdown, early or late.
 
-    It has the tasks ``center_of_mass`` and ``trunk``, and one for each foot with the
+    It has the tasks ``center_of_mass`` and ``trunk``, and one per foot with the
     name of its contact.
     """
 
@@ -470,7 +470,7 @@ class RunningWalk(RunningPlan):
         if self._mode == "single":  # along and across the sole separately
             self._point = nearest_inside(self._hull, point + displaced)
             repels = self._point + self._reaction.point(t)
-        else:  # the error goes straight to zero, anywhere in the hull
+        else:  # the error converges straight to zero, anywhere in the hull
             self._point = repels = last_inside(self._hull, point, point + displaced)
         height, yaw = self._sinking.sample(t), self._yaw.sample(t)
         acceleration = frequency**2 * (position[:2] - repels)

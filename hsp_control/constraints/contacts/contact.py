@@ -151,7 +151,7 @@ class Contact(Part, ABC, family="contacts", error=ContactError):
 
     Its rows keep it still, J a + J'v = -Kd J v: damping without stiffness, since
     stiffness would oppose the small slip of a real contact. Forces act at its points.
-    Each force lies within a friction pyramid inscribed in the Coulomb friction cone, so
+    Forces lie within a friction pyramid inscribed in the Coulomb friction cone, so
     it pushes and never pulls.
 
     A subclass declares its parameters as fields (see `Part`), sets `rows`, and
@@ -203,7 +203,7 @@ class Contact(Part, ABC, family="contacts", error=ContactError):
         return self
 
     def _check_command(self, force: CommandedForce, state: RobotState) -> None:
-        """Check that the commanded force is possible, as it is at the start."""
+        """Check that the commanded force is possible, by its value at the start."""
         if force.dimension == WRENCH and len(self.points) < 3:
             raise ContactError(
                 f"it has 6 coordinates; a contact of type {self.yaml_type} exerts no "
@@ -265,7 +265,7 @@ class Contact(Part, ABC, family="contacts", error=ContactError):
         """
 
     def calls(self, state: RobotState, out: TaskSample) -> PartCalls:
-        """Return the calls that write the rows of each step."""
+        """Return the calls that write the rows in a step."""
         return [self.call(state).given(v=state.v, damping=self.damping, out=out)]
 
     def evaluate(self, state: RobotState, out: TaskSample) -> TaskSample:
@@ -330,7 +330,7 @@ class UnactuatedRows:
 
 
 def unactuated_count(jacobian: Array, base: Indices) -> int:
-    """Return how many base motions the contacts' stacked rows (m, nv) permit."""
+    """Return the number of base motions permitted by stacked rows (m, nv)."""
     if not len(jacobian):
         return len(base)
     values = np.linalg.svd(jacobian[:, base], compute_uv=False)

@@ -37,7 +37,7 @@ class PointContact(Contact, type="point"):
 
 
 def _point_of(contact: Contact, state: RobotState) -> dict[str, Any]:
-    """Return a point of a frame: where it is in the frame, and its shift."""
+    """Return a point of a frame: its position in the frame, and its shift."""
     return {
         "frame": state.frame(contact.frame),
         "position": np.array(contact.points[0]),

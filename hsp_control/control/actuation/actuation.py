@@ -63,12 +63,12 @@ class Actuation:
             state, limits, wanted.acceleration, self._qp_outcome
         )
         self.outcome, self._rows = checks.outcome, checks.rows
-        # Whether M a + N is the effort wherever it is within the bounds, and so is a.
+        # Whether the effort is M a + N if it and a are within the bounds.
         self.direct = checks.compiled and not base.size and not support.size
         # the result there for the law's own acceleration
         self.own = Delivered(state.effort, law.acceleration, np.zeros(0), EXACT, 0.0)
         self.nearest = self.own
-        # whether `nearest` is delivered, and its status stands, shape (1,)
+        # whether `nearest` is delivered with its status, shape (1,)
         self.is_nearest: Indices = np.zeros(1, dtype=np.int64)
         self._checks: PartCalls = [
             state.rnea(wanted.acceleration),
@@ -84,7 +84,7 @@ class Actuation:
             self._qp = self._limited_step(0 if holding is None else len(holding.least))
             # the result where the QP was solved at once
             self.nearest = Delivered(*self._qp.result, LIMITED, 0.0)
-        # the calls' results where contacts carry; None: Python has to
+        # the calls' results with active contacts; None: Python computes them
         self.carried: CarriedStep | None = None
         if support.size:
             support.bind(law)
@@ -117,7 +117,7 @@ class Actuation:
             found = self._finding_forces(carried)
             last = self._delivering_forces(carried, carried.delivered, carried.forces)
             return self._state.plan([*calls, *found, last]).steps()
-        # Of distances there may be hundreds, and each row costs time, used or not.
+        # There may be hundreds of distances, and unused rows cost time, too.
         if self._qp is not None and self.direct and "barriers" not in self._rows:
             keep = PartCall(engine.Copy, x=self._state.effort, out=wanted.effort)
             given = self.outcome.violated, [keep], self._rows
@@ -172,23 +172,23 @@ class Actuation:
         if not self.direct:
             return self._calls_with_forces(delivered)
         qp, calls = self._qp, list[AnyCall]()
-        if "barriers" in self._rows:  # which `calls` leaves to Python
+        if "barriers" in self._rows:  # not among the native calls
             keep = PartCall(engine.Copy, x=self._state.effort, out=self._wanted.effort)
             qp, calls = self._whole_step([keep])
         own = self._law.acceleration, self._state.effort
         return [*calls, self._delivering(qp, *own, delivered)]
 
     def _calls_with_forces(self, delivered: DeliveredAlone) -> PartCalls:
-        """Return those of `calls_alone` where contacts carry."""
+        """Return the calls of `calls_alone` with active contacts."""
         carried, calls = self.carried, list[AnyCall]()
-        if carried is None:  # `calls` leaves it to Python
+        if carried is None:  # not among the native calls
             rows = self._limit_checks.count
             carried = CarriedStep(self._limited_step(rows))
             calls = self._finding_forces(carried)
         return [*calls, self._delivering_forces(carried, delivered, carried.forces)]
 
     def _finding_forces(self, carried: CarriedStep) -> list[AnyCall]:
-        """Return the calls that find the forces of contacts, or the nearest step."""
+        """Return the calls that compute the contact forces, or the nearest step."""
         wanted, support, bounds = self._wanted, self._support, self._limits.bounds
         keep = PartCall(engine.Copy, x=self._state.effort, out=wanted.effort)
         decide = PartCall(
@@ -211,7 +211,7 @@ class Actuation:
     def _delivering_forces(
         self, carried: CarriedStep, delivered: DeliveredAlone, forces: Array
     ) -> PartCall:
-        """Return the call that chooses the delivered effort where contacts carry."""
+        """Return the call that selects the delivered effort with active contacts."""
         bounds, result = self._limits.bounds, carried.qp.result
         return PartCall(
             engine.DeliverWithForces,
@@ -315,7 +315,7 @@ class Actuation:
 
     @property
     def relaxation(self) -> float:
-        """The largest violation of a relaxed limit, where contacts carry."""
+        """The largest violation of a relaxed limit, with active contacts."""
         if self.carried is None:
             return 0.0
         return self.carried.relaxation(self._qp_outcome)
@@ -360,7 +360,7 @@ class Actuation:
         return self._nearest(a, motion_ok, barriers)
 
     def rehearse(self) -> None:
-        """Solve the QP where the last step has left it; nothing of it is used."""
+        """Solve the QP again, to fill caches; the result is unused."""
         if self._qp is not None:
             self._qp.solve(False, {})
 
@@ -381,7 +381,7 @@ class Actuation:
         return Delivered(tau, acceleration, forces, status, relaxation)
 
     def _limited_step(self, count: int) -> LimitedStep:
-        """Return the QP, with room for so many rows of barriers."""
+        """Return the QP, with memory for a number of rows of barriers."""
         limits, nv = self._limits.limits, self._state.robot.nv
         some = np.zeros(nv, dtype=bool)
         if limits is not None:

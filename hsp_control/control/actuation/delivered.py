@@ -34,7 +34,7 @@ class DeliveredAlone(NamedTuple):
 
     @classmethod
     def allocate(cls, nv: int) -> Self:
-        """Return that of no step."""
+        """Return a record before any step."""
         integers = np.zeros((2, 1), dtype=np.int64)
         return cls(np.zeros(nv), np.zeros(nv), *integers)
 
@@ -42,12 +42,12 @@ class DeliveredAlone(NamedTuple):
 class Kept(NamedTuple):
     """Which part of a mixture was kept, shapes (1,)."""
 
-    which: Indices  # 0: none, Python has to look
-    status: Indices  # the `Status` where contacts carry
+    which: Indices  # 0: none, Python decides
+    status: Indices  # the `Status` with active contacts
 
 
 class CarriedStep:
-    """Results of a step's calls where contacts carry.
+    """Results of a step's calls with active contacts.
 
     Attributes:
         qp: The QP, solved where the law is not exact.

@@ -44,7 +44,7 @@ class Levels(NamedTuple):
 
     @classmethod
     def of(cls, law: BoundLaw, supported: bool, size: float, held: Array) -> Self:
-        """Return those of a law; ``supported``: its first level is that of contacts."""
+        """Return a law's levels; ``supported``: the first is that of contacts."""
         levels = len(law.ends) - supported
         problem = law.problem
         return cls(

@@ -23,13 +23,13 @@ class LimitsOutcome(NamedTuple):
     rows: Indices
     """Whether a row of a barrier or of static efforts is violated."""
     violated: Indices
-    """Whether one of them is."""
+    """Whether any of these is violated."""
     beyond: Indices
     """Whether a joint is beyond its range, or faster than its limit; see `Status`."""
 
     @classmethod
     def allocate(cls) -> Self:
-        """Return that of a check that found nothing."""
+        """Return the outcome without violations."""
         return cls(*np.zeros((5, 1), dtype=np.int64))
 
 
@@ -46,7 +46,7 @@ class LimitChecks:
     def __init__(
         self, state: RobotState, limits: LimitSet, acceleration: Array, qp: QPOutcome
     ) -> None:
-        """Make room.
+        """Allocate.
 
         Args:
             state: The robot's state, which has the effort M a + N.
@@ -62,7 +62,7 @@ class LimitChecks:
 
     @property
     def count(self) -> int:
-        """The number of rows that there is room for."""
+        """The capacity in rows."""
         return sum(len(each.least) for each in self.rows.values())
 
     def calls(self, excluded: Indices) -> PartCalls:
@@ -97,7 +97,7 @@ class LimitChecks:
             return {}
         found, nv = {}, state.robot.nv
         rooms = [each.room(state) for each in limits.barriers]
-        if rooms and all(rooms):  # else Python has to compute some
+        if rooms and all(rooms):  # otherwise Python computes some of them
             found["barriers"] = BarrierRows.allocate(sum(rooms), nv)
         if limits.static_effort is not None:
             found["holding"] = BarrierRows.allocate(limits.static_effort.room(), nv)

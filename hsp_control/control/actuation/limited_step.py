@@ -82,7 +82,7 @@ class QPOutcome(NamedTuple):
 
     @classmethod
     def allocate(cls) -> Self:
-        """Return that of a QP that was not solved yet."""
+        """Return the outcome of a QP before its solution."""
         return cls(np.ones(1, dtype=np.int64), np.zeros(1, dtype=np.int64))
 
 
@@ -96,7 +96,7 @@ class Wanted(NamedTuple):
 
 
 class Forces(NamedTuple):
-    """The contact forces f that are possible, see `Support`; size 0: none."""
+    """The permitted contact forces f, see `Support`; size 0: none."""
 
     map: Array  # F, shape (nv, p)
     first: Array  # forces nearest to the commanded ones, shape (p,) [N]
@@ -107,7 +107,7 @@ class Forces(NamedTuple):
 
 
 class Places(NamedTuple):
-    """The places of the rows."""
+    """The indices of the rows."""
 
     # degrees of freedom of the first rows: those without a motor, then those with a
     # limit on their effort
@@ -179,7 +179,7 @@ class LimitedStep:
     ) -> None:
         n, p, base = state.robot.nv, support.size, support.base
         held = sum(contact.rows for contact in support.contacts)
-        self.capacity = capacity  # how many rows of barriers there is room for
+        self.capacity = capacity  # capacity for rows of barriers
         counts = [len(base) + len(limited), len(support.cone), capacity]
         ends = np.cumsum([0, *counts, held])
         cones, barriers, contacts, k = map(int, ends[1:])
@@ -293,7 +293,7 @@ class LimitedStep:
         start = begin_with(_FORCE_COST, self._rows.own)
         within = optimum(self._rows, moving, memories[0], LIMITED, outcome)
         closest = [write, root(standing=p > 0), start, *within]
-        # Where there is no such step: the rows as they are, those of contacts too.
+        # Without a feasible step: soft rows, also those of contacts.
         copied = PartCall(
             engine.RelaxedRows,
             lower=lower,
@@ -324,10 +324,10 @@ class LimitedStep:
             upper=relaxed.upper,
             relaxation=self.relaxation,
         )
-        # If rounding leaves no room within the relaxed limits, the result
-        # violates them least: the status of the last QP is not used. There is so
-        # little room that sets of active constraints are equally good but for the last
-        # bits: it begins with none, lest these depend on steps before.
+        # If by rounding the relaxed limits are infeasible, the result has the smallest
+        # violation, so the status of the last QP is not used. Different active sets are
+        # then equally good up to rounding: the QP starts with none, so that the result
+        # does not depend on earlier steps.
         last = optimum(
             relaxed, moving, memories[2], RELAXED, QPOutcome.allocate(), warm=False
         )
@@ -417,7 +417,7 @@ class LimitedStep:
             place, number = slice(r, r + len(least)), np.array([len(least)])
             given = BarrierRows(number, np.ascontiguousarray(rows), least)
             at = {"A": A[place], "end": end[place], "lower": lower[place]}
-            # By the call of a step in one call: not even the last bit differs.
+            # With the same call as in a step of a single call: equal bit for bit.
             engine.PlaceRows(rows=given, a=acceleration, **at)()
             self._softness[place] = _SOFTNESS[kind]
             r += len(least)

@@ -1,4 +1,4 @@
-"""The limits in force: the numbers that every step reads, as changes make them."""
+"""The limits in force: the numbers that every step reads and changes write."""
 
 from collections.abc import Callable, Sequence
 from typing import Any, NamedTuple
@@ -219,7 +219,7 @@ class LimitsInForce:
         return calls
 
     def update(self) -> None:
-        """Find the range that the last effort leaves for the next one."""
+        """Compute the range that rate limits leave for the next effort."""
         for each in self.all:
             if each.rate:
                 each.update()
@@ -233,8 +233,8 @@ def _mean(
     sets: Sequence[tuple[RobotLimits | None, float]], robot: Robot
 ) -> RobotLimits | None:
     """Return the limits that a mixture keeps: the weighted mean of the numbers."""
-    # The bounds on efforts and accelerations are linear in them. Where one of them is
-    # inf, so is the mean. Barriers are those of all sets.
+    # Bounds on efforts and accelerations are weighted means; inf if one of them is.
+    # Barriers are those of all sets.
     if len(sets) == 1:
         return sets[0][0]
     numbers = np.sum([w * _numbers(each, robot.nv) for each, w in sets], axis=0)
@@ -253,7 +253,7 @@ def _mean(
 
 
 def _numbers(limits: RobotLimits | None, nv: int) -> Array:
-    """Return all numbers of limits in a row; None has numbers that bound nothing."""
+    """Return all numbers of limits as one array; those of None are unlimited."""
     if limits is None:
         signs = 1.0, 1.0, 1.0, -1.0, 1.0, -1.0, 1.0, 1.0, 1.0, 1.0
         return np.append(np.repeat(np.inf * np.array(signs), nv), 10.0)

@@ -14,34 +14,34 @@ from hsp_control.robot import RobotState
 class Held(NamedTuple):
     """Observed effects of held efforts, as calls read them."""
 
-    # when the period ends, NaN once that was looked at, and its length [s]
+    # end of the period, NaN once it was processed, and its length [s]
     timing: Array
-    expected: Array  # velocity that is expected then, shape (nv,) [rad/s or m/s]
-    stray: Array  # differences from it, summed over about 10 ms
-    error: Array  # largest error of late [rad/s² or m/s²]
-    drift: Array  # mean error of late
+    expected: Array  # velocity expected then, shape (nv,) [rad/s or m/s]
+    stray: Array  # prediction errors, summed over about 10 ms
+    error: Array  # largest recent error [rad/s² or m/s²]
+    drift: Array  # recent mean error
     quick: Array  # mean error of the last 30 ms
-    least: Array  # the lowest that mean was of late, 0 or less
-    most: Array  # the highest, 0 or more
+    least: Array  # recent minimum of that mean, at most 0
+    most: Array  # recent maximum, at least 0
     lasting: Array  # common part of it and the mean of the last hundredth of a second
     # common part of the mean error and that of the last hundredth of a second: a
     # force that has ended is not included
     steady: Array
-    disturbance: Array  # acceleration that something else than the effort causes
+    disturbance: Array  # acceleration with causes other than the effort
 
 
 @dataclass
 class SentMemory:
     """Memory of the sent efforts; calls read and write the arrays."""
 
-    # the last effort, and how long it is held [s], inf: not known; shape (nv + 1,)
+    # the last effort, and the time for which it is held [s], inf: unknown; (nv + 1,)
     last: Array
     held: Held
     period: float = 0.0  # of the last effort [s]; 0: there was none in this run
 
     @classmethod
     def of(cls, nv: int) -> "SentMemory":
-        """Return that of a robot to which nothing was sent."""
+        """Return the memory before any effort was sent."""
         held = Held(np.zeros(2), *(np.zeros(nv) for _ in range(10)))
         memory = cls(np.zeros(nv + 1), held)
         memory.clear()
@@ -55,7 +55,7 @@ class SentMemory:
         self.held.timing[0] = self.last[-1] = np.inf
 
     def become(self, other: "SentMemory") -> None:
-        """Hold the numbers of another memory."""
+        """Copy the values of another memory."""
         self.period = other.period
         given = other.last, *other.held
         for each, number in zip((self.last, *self.held), given, strict=True):
@@ -83,12 +83,12 @@ class SentEffort:
         self._expect = state.plan([self.expecting(self._acceleration)]).call()
 
     def record(self, tau: Array, acceleration: Array, period: float) -> None:
-        """Record an effort, the acceleration it is to give, and how long it is held."""
+        """Record an effort, its intended acceleration, and its duration."""
         self.last[:-1], self.last[-1] = tau, period
         self.record_acceleration(acceleration, period)
 
     def record_acceleration(self, acceleration: Array, period: float) -> None:
-        """Record the acceleration that an effort is to give, and not the effort."""
+        """Record the intended acceleration of an effort, not the effort."""
         self._acceleration[:] = acceleration
         self.held.timing[1] = period
         self._expect()

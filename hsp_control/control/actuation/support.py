@@ -31,7 +31,7 @@ class Support:
         base: Sequence[int] = (),
         force_offset: Callable[[str], Array] = lambda _: np.zeros(1),
     ) -> None:
-        """Bind contacts; each reads its ``force_offset``, by name, in each step."""
+        """Bind contacts, which read their ``force_offset``, by name, in every step."""
         robot, nv = state.robot, state.robot.nv
         self._state = state
         # degrees of freedom without a motor
@@ -104,7 +104,7 @@ class Support:
         self._update(self._state.t)
 
     def bind(self, law: BoundLaw) -> None:
-        """Bind all calls now, instead of in a step, and make them once."""
+        """Bind all calls now, instead of in a step, and run them once."""
         self.update(law)
         self.minimum_norm_forces(self._wanted)
         self.permits()
@@ -219,10 +219,9 @@ def _supporting_dofs(robot: Robot, contacts: Sequence[Contact]) -> Indices:
 
 
 COMMANDED_INVERSE_COST = 1e-6
-"""ε: how much cheaper it is, per squared force, to change a free force than a commanded
-one. Feet that carry 1 kN then leave a commanded force 1 mN from its command. In a
-limited step it makes a miss of the command dearer than motion of the null space, and
-cheaper than a miss of the tasks."""
+"""ε: cost of squared deviations of free forces relative to those of commanded ones.
+With 1 kN on the feet a commanded force then deviates by 1 mN. In a limited step an
+error of the command costs more than null-space motion, and less than task errors."""
 
 
 def _write_weight(t: float, contact: PlannedContact, out: Array) -> None:
@@ -230,7 +229,7 @@ def _write_weight(t: float, contact: PlannedContact, out: Array) -> None:
 
 
 class CommandedForces:
-    """Writes f_ref for the points of one contact, and how dear other forces are.
+    """Writes f_ref for the points of one contact, and the cost of deviations.
 
     Attributes:
         mask: Commanded entries of the contact's forces, shape (3 k,).

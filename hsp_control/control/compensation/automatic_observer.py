@@ -1,4 +1,4 @@
-"""Where a momentum observer is on by itself, and how fast it is.
+"""Conditions and rate of the automatic momentum observer.
 
 It is on wherever the robot may differ from its model and nothing is to yield: a spring
 that yields to a hand, and a contact that presses, are forces that the model does not
@@ -33,19 +33,19 @@ from hsp_control.robot import Robot, RobotState
 from hsp_control.tasks.compliant_task import impedance_of
 
 BANDWIDTH = 50.0
-"""Rate K_O where the period is short [1/s]."""
+"""Rate K_O at short periods [1/s]."""
 MOST_PER_PERIOD = 0.1
 """Maximum of K_O h [-]."""
 LARGEST_SHARE = 0.5
-"""Part of a joint's effort limit that is cancelled at most [-]: gravity that is wrong
-by a fifth, and the load that an arm's maker allows, are well below it."""
+"""Largest cancelled effort relative to a joint's limit [-]: gravity wrong by a fifth,
+and the load that an arm's manufacturer permits, are well below it."""
 
 
 class Choice(NamedTuple):
-    """The observer that is on by itself, or why there is none."""
+    """The automatic observer, or the reason why there is none."""
 
     observer: MomentumObserver | None
-    reason: str  # why it is off, empty if it is on
+    reason: str  # the reason why it is inactive, empty if active
 
 
 def automatic_observer(
@@ -75,7 +75,7 @@ def automatic_observer(
 
 
 def begin_automatic(controller: Controller) -> "AutomaticObserver | None":
-    """Return the observer of a real robot for one run; None where there is to be none.
+    """Return the observer of a real robot for one run; None if there is none.
 
     It learns of the period from its periods.
     """
@@ -83,7 +83,7 @@ def begin_automatic(controller: Controller) -> "AutomaticObserver | None":
 
 
 class AutomaticObserver(RunningObserver):
-    """The observer that is on by default, in one run.
+    """The automatic observer in one run.
 
     A task that is added may have an impedance: then the cancelled effort fades
     at the observer's rate, and returns when that task is removed.
@@ -93,7 +93,7 @@ class AutomaticObserver(RunningObserver):
         clip = largest_cancelled(controller.robot)
         super().__init__(BANDWIDTH, clip, 2, most_per_period=MOST_PER_PERIOD)
         self._tasks, self._forbidden = controller.planned_tasks, False
-        self._weight = 1.0  # part of the estimate that is cancelled
+        self._weight = 1.0  # fraction of the estimate that is cancelled
 
     def measure(self, run: Run) -> None:
         """Learn from the effort that acted; see `Stage.measure`."""

@@ -40,8 +40,8 @@ from hsp_control.tasks.compliant_task import impedance_of
 class Compensation(Part, error=CompensationError):
     """Compensators for the differences between the robot and its model.
 
-    Each is off unless it is given, but for the momentum observer, which is on where it
-    makes sense; None turns it off. They have no memory: the stages are made by a
+    All are inactive unless given, except the momentum observer, which is active where
+    it makes sense; None turns it off. They have no memory: the stages are made by a
     `CompensatedController`, so one set serves many controllers, runs and threads.
     """
 
@@ -51,12 +51,12 @@ class Compensation(Part, error=CompensationError):
     predictor: Predictor | None = None
     """Evaluates the law for the predicted state in which its effort will act."""
     momentum_observer: Literal["auto"] | MomentumObserver | None = "auto"
-    """Estimates the efforts that the model does not explain, and cancels them if it is
-    to. ``auto``: it cancels them on a robot that may differ from its model, at a rate
-    that suits the period, unless a hand is to yield or a contact to press."""
+    """Estimates the efforts that the model does not explain, and cancels them.
+    ``auto``: active on a robot that may differ from its model, at a rate that suits the
+    period, unless a hand is compliant or a contact has a commanded force."""
     friction_feed_forward: Literal["urdf"] | FrictionFeedForward | None = None
-    """Adds efforts against friction at the desired velocity; ``urdf`` takes the
-    friction from the robot's file."""
+    """Adds efforts against friction at the desired velocity; ``urdf``: the friction in
+    the robot's file."""
     integral_action: IntegralAction | None = None
     """Removes constant task errors by integral feedback."""
     force_feedback: ForceFeedback | None = None
@@ -66,7 +66,7 @@ class Compensation(Part, error=CompensationError):
 
     @property
     def names(self) -> tuple[str, ...]:
-        """The names of the compensators that are on for sure."""
+        """The names of the compensators that are certainly active."""
         fields = self.changed_fields()
         return tuple(name for name in fields if getattr(self, name) is not None)
 
@@ -94,7 +94,7 @@ class Compensation(Part, error=CompensationError):
     def suited(
         self, controller: Controller, period: float | None, exact: bool
     ) -> "Compensation":
-        """Return the compensators of a loop: None for ``auto`` where that is off.
+        """Return the compensators of a loop: None for ``auto`` where that is inactive.
 
         Elsewhere ``auto`` stays, since the tasks of a running loop may change.
         """
@@ -160,7 +160,7 @@ class Compensation(Part, error=CompensationError):
                 self.force_feedback.check(contacts, observer is not None)
 
     def _check_compliance(self, tasks: Sequence[Task]) -> None:
-        """Check that no force is cancelled to which a task is to yield."""
+        """Check that no force is cancelled to which a task must yield."""
         observer = self.observer
         if observer is None or not observer.cancel or observer.clip is not None:
             return
@@ -191,4 +191,4 @@ STAGES: dict[str, Callable[[Any, Controller], Stage | None]] = {
     "force_feedback": RunningForceFeedback,
     "integral_action": RunningIntegral,
 }
-"""The stage of each compensator in a run, in the order of the chain."""
+"""The compensators' stages in a run, in the order of the chain."""

@@ -20,10 +20,9 @@ from hsp_control.declaration.quantities import Names, Positive
 from hsp_control.robot import RobotState
 
 _MISSED = 0.01
-"""Share of a command by which the programme must miss it to stop the integral."""
+"""Error of a force in the QP, relative to its command, that stops the integral."""
 _SMALLEST = 1e-9
-"""Mobility, relative to the largest, below which an estimate takes a direction for
-immobile."""
+"""Mobility, relative to the largest, below which a direction is treated as immobile."""
 
 
 class ForceFeedback(Part, error=CompensationError):
@@ -82,7 +81,7 @@ class RunningForceFeedback(Stage):
             if contact.force is not None
             and (declared.contacts is None or contact.name in declared.contacts)
         ]
-        self.integrals = dict.fromkeys(names, 0.0)  # addition to each command [N]
+        self.integrals = dict.fromkeys(names, 0.0)  # addition to every command [N]
         self.actual = dict.fromkeys(
             names, np.nan
         )  # λ_m by contact, at the last step [N]
@@ -97,7 +96,7 @@ class RunningForceFeedback(Stage):
             self._estimate(run.measured, run.disturbance, run.output.forces)
 
     def _read(self, wrenches: Mapping[str, Array], pressed: bool) -> None:
-        """Read the sensors' wrenches by frame; none is used before an effort acted."""
+        """Read the sensors' wrenches by frame; none is used before the first effort."""
         for contact in self._fed:
             if contact.frame not in wrenches:
                 with within("compensation", "force_feedback", "force"):
@@ -111,7 +110,7 @@ class RunningForceFeedback(Stage):
             self.actual[contact.name] = actual if pressed else np.nan
 
     def _estimate(self, state: RobotState, disturbance: Array, forces: Array) -> None:
-        """Estimate forces from r, the effort of those that were not expected."""
+        """Estimate forces from r, the effort of unexpected forces."""
         unexpected = np.linalg.solve(state.mass_matrix, disturbance)
         support = self._controller.active_stack.support
         for contact in self._fed:

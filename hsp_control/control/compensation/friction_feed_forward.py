@@ -56,7 +56,7 @@ class FrictionFeedForward(Part, error=CompensationError):
         return np.asarray(coulomb + friction.viscous * v)
 
     def _friction(self, robot: Robot) -> JointFriction:
-        """Return the coefficients of each degree of freedom."""
+        """Return the coefficients of the degrees of freedom."""
         try:
             return JointFriction.of(robot, self.coulomb, self.viscous)
         except SimulationError as error:

@@ -44,7 +44,7 @@ class IntegralAction(Part, error=CompensationError):
     does not name."""
     _: KW_ONLY
     ki: Annotated[Mapping[str, Gain], READ_ONLY] = field(default_factory=ReadOnlyDict)
-    """Ki by task name [1/s³]: a number, one for each row, or a matrix."""
+    """Ki by task name [1/s³]: a number, one per row, or a matrix."""
     tasks: Names | None = None
     """Names of the tasks with integral action [-]; all by default."""
     limit: Positive | None = None
@@ -57,7 +57,7 @@ class IntegralAction(Part, error=CompensationError):
             raise CompensationError("integral action needs a rate [1/s], or ki by task")
 
     def gains(self, tasks: Sequence[Task]) -> dict[str, Array]:
-        """Return Ki, shape (m, m), of each task that has integral action."""
+        """Return Ki, shape (m, m), of the tasks with integral action."""
         names = [task.name for task in tasks]
         named = [("ki", name) for name in self.ki]
         named += [("tasks", name) for name in self.tasks or ()]
@@ -190,7 +190,7 @@ def _check_decay(task: Task, Ki: Array) -> None:
     companion = np.block([[zero, one, zero], [zero, zero, one], [-Ki, -Kp, -Kv]])
     slowest = float(np.linalg.eigvals(companion).real.max())
     if slowest >= 0.0:
-        # For each row separately (Routh): Ki < Kv Kp.
+        # Per row (Routh): Ki < Kv Kp.
         bound = float((np.diag(Kv) * np.diag(Kp)).min())
         raise GainError(
             f"integral action of task {task.name!r} does not decay: e'' + Kv e' + "

@@ -18,7 +18,7 @@ from hsp_control.robot.state import as_given
 
 @dataclass(frozen=True)
 class ElasticJoint:
-    """An elastic joint whose model is rigid: a motor moves a link through a spring.
+    """An elastic joint with a rigid model: a motor moves a link through a spring.
 
     M. W. Spong, "Modeling and control of elastic joint robots", J. Dyn. Sys. Meas.
     Control 109 (1987), for one joint. With the inertias relative to the model's,
@@ -27,8 +27,8 @@ class ElasticJoint:
     """
 
     link: float  # λ, the link's inertia over that of the model [-]
-    # μ, the motor's inertia over that of the model [-]; a model that is right but for
-    # the spring has λ + μ = 1
+    # μ, the motor's inertia over that of the model [-]; λ + μ = 1 if only the spring is
+    # unmodelled
     motor: float
     stiffness: float  # κ, the spring's stiffness over the model's inertia [1/s²]
     damping: float = 0.0  # δ, its damping over the model's inertia [1/s]
@@ -40,7 +40,7 @@ class ElasticJoint:
 
         The acceleration u is held: the state becomes Φ s + Γ u.
         """
-        from scipy.linalg import expm  # here: SciPy takes long to import
+        from scipy.linalg import expm  # here: importing SciPy is slow
 
         spring = np.array(
             [-self.stiffness, -self.damping, self.stiffness, self.damping]
@@ -54,7 +54,7 @@ class ElasticJoint:
 
 
 _NOTHING = 1e-12
-"""A coupling of two rows below this part of the gains is rounding."""
+"""Coupling of two rows, relative to the gains, below which it is rounding."""
 
 
 @dataclass(frozen=True)
@@ -77,8 +77,8 @@ class LinearLoop:
     compensation: Compensation = field(
         default_factory=lambda: Compensation(momentum_observer=None)
     )
-    # part of u that the robot performs: below 1 where it is heavier than its model; a
-    # matrix, shape (m, m), where that differs with the direction
+    # fraction of u that the robot performs: below 1 if it is heavier than its model; a
+    # matrix, shape (m, m), if it depends on the direction
     share: float | Array = 1.0
     # elastic joint that performs u; None: a rigid one
     joint: ElasticJoint | None = None
@@ -110,7 +110,7 @@ class LinearLoop:
         between = np.abs(gains - gains * np.eye(len(self.kp))).max()
         alone = between <= _NOTHING * np.abs(gains).max()
         if len(self.kp) > 1 and np.ndim(self.share) == 0 and alone:
-            # Rows that do not depend on one another are as many small loops.
+            # Decoupled rows are separate small loops.
             rows = gains.diagonal(axis1=1, axis2=2).T
             same = np.round(rows / (_NOTHING + np.abs(gains).max()), 12)
             rows = rows[np.unique(same, axis=0, return_index=True)[1]]
@@ -186,7 +186,7 @@ class LinearLoop:
         return [*(moved + effect[:, None, None] * u)]
 
     def _performed(self, u: Array) -> Array:
-        """Return the acceleration that the robot performs where u is commanded."""
+        """Return the robot's acceleration under the command u."""
         share = np.asarray(self.share)
         return share @ u if share.ndim else share * u
 
@@ -255,7 +255,7 @@ def field_slope(controller: Controller, state: RobotState) -> Array:
 
 
 NO_GAINS = (np.zeros((0, 0)),) * 3
-"""Kp, Kv and Ki of a loop that stands for its chain."""
+"""Kp, Kv and Ki of a loop that represents its chain."""
 
 
 class LoadedLoop(NamedTuple):
@@ -285,7 +285,7 @@ class LoadedLoop(NamedTuple):
     slope: Array
 
     def largest_part(self, wanted: float) -> float:
-        """Return this part, or less: a lighter robot must keep a tenth of its mass."""
+        """Return this fraction, bounded so that a tenth of the mass remains."""
         lightest = float(np.linalg.eigvals(self.difference).real.min())
         return wanted if lightest >= 0.0 else min(wanted, -0.9 / lightest)
 

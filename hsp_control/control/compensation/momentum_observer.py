@@ -40,8 +40,8 @@ from hsp_control.tasks import Task
 from hsp_control.tasks.compliant_task import CompliantTask
 
 LARGE_SHARE = 0.25
-"""Share of an effort limit from which on unexplained effort is no error of masses: the
-robot does not move as its model does [-]."""
+"""Unexplained effort relative to its limit above which mass errors cannot be the cause:
+the robot does not move like its model [-]."""
 
 
 class MomentumObserver(Part, error=CompensationError):
@@ -199,7 +199,7 @@ class RunningObserver(Stage):
         run.effort = run.effort - self.cancelled
 
     def log_channels(self, run: Run) -> Mapping[str, LogChannel]:
-        """Return r, and the force at each task of a frame that explains it."""
+        """Return r, and the force at every task of a frame that explains it."""
         r, meaning = self.disturbance, "estimated disturbance r"
         found = {"observer.disturbance": LogChannel(r, "N·m or N", meaning)}
         limit = run.controller.robot.model.effortLimit

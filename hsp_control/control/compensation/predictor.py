@@ -42,7 +42,7 @@ class Predictor(Part, error=CompensationError):
 
 
 class RunningPredictor(Stage):
-    """Integrates the model under the efforts that are under way."""
+    """Integrates the model under the efforts that have not acted yet."""
 
     def __init__(self, declared: Predictor, robot: Robot) -> None:
         self._declared = declared
@@ -57,7 +57,7 @@ class RunningPredictor(Stage):
 
     def measure(self, run: Run) -> None:
         """Return when and where the next effort will act; see `Stage.measure`."""
-        # Before any effort is sent, the robot is assumed to stay where it is.
+        # Before any effort is sent, the robot is assumed to be at rest.
         efforts = (tau + run.disturbance for tau in islice(run.under_way, 1, None))
         run.q, run.v = self.predict(run.q, run.v, efforts, run.period)
         run.t += self._declared.effort_delay * run.period

@@ -34,11 +34,11 @@ to the law."""
 RULE_DELAYED = 0.1
 """Recommended maximum of ω0 h with a delay and no predictor."""
 RULE_LOADED = 1.5
-"""A known plant must stay stable if it differs from the model this many times as much,
-as it may elsewhere on its way."""
+"""A known plant must be stable with its difference from the model scaled by this
+factor: it may be that large at other states."""
 RULE_HEAVY = 5.0
-"""Integral action must stay stable for a robot up to this many times as heavy, at a
-task, as its model. Without other compensators this is a rate of Kv/5."""
+"""Integral action must be stable for a robot up to this many times as heavy at a task
+as its model. Without other compensators this is a rate of Kv/5."""
 SLOWEST_GROWTH = 0.02
 """Rate of growth that is reported [1/s]: slower ones need a minute to be seen."""
 _LONG = 50
@@ -77,7 +77,7 @@ def check_rate(
     plant: Robot | None = None,
     strict: bool = True,
 ) -> list[RateFinding]:
-    """Return the problems of each task and of the null space at a control rate.
+    """Return the problems of the tasks and of the null space at a control rate.
 
     Args:
         controller: The controller.
@@ -182,7 +182,7 @@ def _findings_of(
             speed = _of_impedance(of, frequency, damped)
     late = delays.effort_delay + delays.sensor_delay > 0
     delayed = late and delays.compensation.predictor is None
-    if since > -np.inf:  # a change makes them; the message names it and its time
+    if since > -np.inf:  # of a change; the message names it and its time
         path = ("changes",)
     found = [_finding(path, loop, speed, RULE_DELAYED if delayed else RULE, "")]
     if Ki.any():
@@ -193,9 +193,9 @@ def _findings_of(
 class _Speed(NamedTuple):
     """The bandwidth of a loop, and the way to reduce it."""
 
-    what: str  # setting that decides
+    what: str  # the decisive setting
     rate: float  # its rate [1/s]
-    # which settings make the rate another one: a function of this [1/s]
+    # settings for another rate, as a function of it [1/s]
     at_most: Callable[[float], str]
 
 
@@ -384,7 +384,7 @@ def _finding(
 def _stabilising_changes(
     loop: LinearLoop, speed: _Speed, rule: float, null_space: tuple[Array, Array] | None
 ) -> tuple[list[str], list[str]]:
-    """Return changes of single settings, each of which makes the loop stable."""
+    """Return changes of single settings, any of which makes the loop stable."""
 
     def gains(s: float) -> LinearLoop:
         if null_space is None:
@@ -446,7 +446,7 @@ def _stabilising_changes(
 
 
 def _borne(loop: LinearLoop) -> int | None:
-    """Return the most periods of delay with which a loop is stable.
+    """Return the largest delay in periods with which a loop is stable.
 
     None if it is stable with the delay that it has, or unstable without any.
     """

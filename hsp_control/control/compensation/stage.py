@@ -30,19 +30,19 @@ class Run:
     def __init__(
         self, controller: Controller, measured: RobotState, ahead: int
     ) -> None:
-        """Begin; ``ahead`` is the number of efforts on their way, besides the last."""
+        """Begin; ``ahead`` is the number of delayed efforts besides the last one."""
         self.controller = controller
         self.measured = measured  # the last measurement, where an observer needs it
         self.wrenches: Mapping[str, Array] = NO_WRENCHES  # see `Measurement`
-        # how long the effort is held that comes next, and the last one: 0 at first [s]
+        # time for which the next effort is held, and the last one: 0 at first [s]
         self.period = self.last_period = 0.0
         self.starting = False  # whether the law is not yet fully active
         self.none = np.zeros(controller.robot.nv)
-        # effort that the model does not explain, and that friction consumes, (nv,)
+        # unexplained effort, and that against friction, (nv,)
         self.disturbance: Array = self.none
         self.friction: Array = self.none
         self.friction_sent: Array = self.none  # of the last effort
-        # the efforts on the model, less friction: one for each period from the last
+        # the efforts on the model, less friction: one per period from the last
         # measurement to the period that begins now
         self.under_way: deque[Array] = deque(maxlen=1 + ahead)
 
@@ -54,9 +54,9 @@ class Alone(NamedTuple):
     v: Array  # the velocity, at first as it was measured
     a: Array  # acceleration to deliver, at first the law's, shape (nv,)
     effort: Array  # effort besides M a + N, at first 0, shape (nv,)
-    period: Array  # how long each effort is held, shape (1,) [s]
+    period: Array  # time for which an effort is held, shape (1,) [s]
     acted: Array  # the effort on the model since the last measurement, (nv,)
-    disturbance: Array  # acceleration that something else causes, (nv,)
+    disturbance: Array  # acceleration from other causes, (nv,)
     starting: Indices  # whether the law is not yet fully active, shape (1,)
     damped: Indices  # the first level with a bounded inverse, or 0, shape (1,)
     status: Indices  # the `Status` of the delivered effort, shape (1,)
@@ -87,13 +87,13 @@ class Stage:
         """Change the time and the state for which the law is evaluated."""
 
     def act(self, run: Run, state: RobotState, active: ActiveStack) -> None:
-        """Change the acceleration or the effort; while tasks fade, for each set."""
+        """Change the acceleration or the effort; while tasks fade, for every set."""
 
     def finish(self, run: Run) -> None:
-        """Go on for the period for which the effort of `Run.output` is held."""
+        """Advance by the period for which the effort of `Run.output` is held."""
 
     def alone(self, shared: Alone) -> AloneCalls | None:
-        """Return the calls that do all of the above; None where it takes Python."""
+        """Return the calls equivalent to all of the above; None if they need Python."""
         return None
 
     def log_channels(self, run: Run) -> Mapping[str, LogChannel]:

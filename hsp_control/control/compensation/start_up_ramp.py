@@ -31,7 +31,7 @@ class StartUpRamp(Part, error=CompensationError):
 
 
 class RunningRamp(Stage):
-    """A start-up ramp in one run: it knows when and where it began."""
+    """A start-up ramp in one run, with its start time and state."""
 
     _bound: tuple[Array, Callable[[], object]] | None = None
 
@@ -39,7 +39,7 @@ class RunningRamp(Stage):
         self._declared = declared
         self._starting = np.zeros(1, dtype=np.int64)
         self._begun: tuple[float, Array] | None = None  # at the first state
-        # of robots whose joints have one degree of freedom each, as arrays
+        # of robots with single-DOF joints, as arrays
         self._begin, self._first = np.zeros(1), np.zeros(0)
         self._has_begun = np.zeros(1, dtype=np.int64)
 
@@ -58,7 +58,7 @@ class RunningRamp(Stage):
         run.a, run.starting = own.copy(), bool(self._starting[0])
 
     def _act_on_manifold(self, run: Run, state: RobotState) -> None:
-        """Blend with the difference that Pinocchio knows of any joint."""
+        """Blend with Pinocchio's difference, for any joint."""
         if self._begun is None:
             self._begun = state.t, state.q.copy()
         begin, q0 = self._begun
@@ -70,7 +70,7 @@ class RunningRamp(Stage):
             run.a = (1.0 - s) * (w * w * away - 2.0 * w * state.v) + s * run.a
 
     def alone(self, shared: Alone) -> AloneCalls | None:
-        """Return the blend, of robots whose joints have one degree of freedom each."""
+        """Return the blend, for robots with single-DOF joints."""
         if not _is_plain(shared.state.robot):
             return None
         return AloneCalls(act=[self._call(shared.state, shared.a, shared.starting)])
@@ -96,5 +96,5 @@ class RunningRamp(Stage):
 
 
 def _is_plain(robot: Robot) -> bool:
-    """Return whether all joints have one degree of freedom each."""
+    """Return whether all joints have one degree of freedom."""
     return len(robot.single_dof_joints) == robot.nv

@@ -18,8 +18,8 @@ from hsp_control.engine.plans import PartCall, planned
 class VelocityFilter(Part, error=CompensationError):
     """A Butterworth low-pass filter of the measured velocity.
 
-    It filters each degree of freedom by itself. It delays slow motion by 1/(2π f) at
-    first order, and by √2 times that at second order; `check_rate` takes this into
+    It filters the degrees of freedom independently. It delays slow motion by 1/(2π f)
+    at first order, and by √2 times that at second order; `check_rate` takes this into
     account. Its initial state is the steady state for the first measurement.
     """
 

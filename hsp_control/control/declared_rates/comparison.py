@@ -1,4 +1,4 @@
-"""A declared rate beside a difference of its value, along a motion of the robot.
+"""A declared rate against a difference of its value, along a motion of the robot.
 
 A value that is differentiable has the same slope over four intervals in a row, and its
 rate is that slope. Where the slopes differ, because a kink, a jump or noise lies among
@@ -15,9 +15,9 @@ from hsp_control.common.exceptions import RateError
 from hsp_control.robot import RobotState
 
 INTERVAL = 5e-5
-"""Time between two of the five states [s], along joints that turn at up to 1 rad/s."""
+"""Time between two of the five states [s], with joint speeds of up to 1 rad/s."""
 _ALLOWED = 1e-3
-"""A rate may be wrong by this part of it: sampling at 1 kHz does twice as much."""
+"""Relative tolerance of a rate: sampling at 1 kHz has twice this error."""
 _SPREADS = 2.0
 """It may be off by this many spreads of the slopes: a jump at the middle state has a
 mean slope of half its spread, and any finite rate is right there."""
@@ -160,7 +160,7 @@ def declared_by(part: object, ways: tuple[str, ...]) -> str:
 
 
 def is_own(kind: type) -> bool:
-    """Return whether a class is the package's, whose tests prove it."""
+    """Return whether a class is the package's, which is tested."""
     return kind.__module__.partition(".")[0] == "hsp_control"
 
 

@@ -48,7 +48,7 @@ _GRADIENT_BY = (
 class _OfField(NamedTuple):
     """A value of a field that must not depend on v, and its rate."""
 
-    declared: Declared  # its `by` is empty where the package takes differences
+    declared: Declared  # its `by` is empty where the package uses differences
     at: ValueAndRate
     timed: bool = True  # whether the rate is along t, too
 
@@ -152,7 +152,7 @@ def _gradient_by(cost: Cost) -> str:
 
 
 def _differenced(field: NullSpaceField) -> bool:
-    """Return whether the package takes the rate by differences."""
+    """Return whether the package computes the rate by differences."""
     base = next((each for each in (Cost, VectorField) if isinstance(field, each)), None)
     return base is not None and _inherits(field, base, _RATE_BY)
 

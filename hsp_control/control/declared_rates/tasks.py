@@ -30,7 +30,7 @@ from hsp_control.tasks.compliant_task import impedance_of
 _WRITTEN_BY = ("call", "calls", "evaluate")
 _FUNCTIONS = "rate_function", "jacobian_rate_function", "jacobian_function"
 _SOLVED = 1e-6
-"""Part of a_x - J'v that may be left of it [-]: more is a singular posture."""
+"""Tolerated residual relative to a_x - J'v [-]: more is a singular posture."""
 _DAMPED = "A task is damped by Kv of its gains"
 
 
@@ -49,7 +49,7 @@ def check_task(task: Task, state: RobotState) -> None:
     else:
         written = [declared_by(task, _WRITTEN_BY)] * 3
     if task.remembers:
-        task = deepcopy(task)  # a look ahead takes no messages
+        task = deepcopy(task)  # previews read no messages
     error_rate, jacobian_rate, jacobian = written
     if error_rate and task.order == 2:  # an error of first order depends on v
         _check_rate(task, error_rate, "error", state)
@@ -105,7 +105,7 @@ def _check_equation(task: Task, by: str, state: RobotState) -> None:
     """Check that the error equation follows from J a + J'v = a_x."""
     v, _ = velocities(state)
     there, robot = RobotState(state.robot), state.robot
-    # of the whole error: a task may shorten it in other coordinates
+    # of the unbounded error: a task may bound it in other coordinates
     feedback = task.feedback_at(state)
     largest = feedback.largest * [1.0, 1.0, np.inf]
     feedback = feedback._replace(largest=largest)

@@ -29,7 +29,7 @@ from hsp_control.trajectories import (
 from hsp_control.trajectories.crossfade import AnyReference
 
 _AFTER = 0.0, 0.1, 0.3, 1.0, 3.0
-"""Times after the present one at which it is looked at [s]: many begin with a rest."""
+"""Times after the present one at which it is checked [s]: many begin at rest."""
 _WRITTEN_BY = "call", "calls", "sample"
 
 
@@ -80,7 +80,7 @@ def _declared(each: AnyReference) -> Iterator[tuple[str, str, str]]:
 
 
 def _values(each: AnyReference, t: float) -> dict[str, Array]:
-    """Return all that a reference is at a time [s], by name."""
+    """Return a reference's values at a time [s], by name."""
     sample = each.sample(t)
     found: dict[str, Array] = {}
     if isinstance(sample, PoseSample | TrajectorySample):

@@ -98,7 +98,7 @@ class NullSpaceField(Part, ABC, family="fields", error=FieldError):
     def calls(
         self, state: RobotState, metric: MetricSample, form: int, out: FieldSample
     ) -> PartCalls:
-        """Return the calls that write the sample of each step.
+        """Return the calls that write the sample in a step.
 
         Args:
             state: The state that every step reads. Its values change between steps.
@@ -173,7 +173,7 @@ class FieldSum(NullSpaceField):
     """
 
     terms: Annotated[Sequence[InstanceOf[NullSpaceField]], AfterValidator(tuple)]
-    """The fields, each with its weight [-]."""
+    """The fields, with their weights [-]."""
     _: KW_ONLY
     name: str = ""
     """Name of the field in the log [-]; the names of its terms by default."""
@@ -213,7 +213,7 @@ class FieldSum(NullSpaceField):
         )
 
     def allocate_terms(self, nv: int) -> tuple[FieldSample, ...]:
-        """Return a sample of zeros for each term."""
+        """Return a sample of zeros for every term."""
         return tuple(FieldSample.allocate(nv) for _ in self.terms)
 
     def calls_of_terms(

@@ -146,7 +146,7 @@ class JacobianCost(Cost):
 def _chain(robot: Robot, frame: str) -> tuple[Indices, Indices]:
     """Return the degrees of freedom that move a frame, from the root on, shape (k,).
 
-    And, of the same shape, the index among them at which the joint of each begins.
+    And, of the same shape, the index among them at which its joint begins.
     """
     model = robot.model
     dofs: list[int] = []

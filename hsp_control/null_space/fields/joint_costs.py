@@ -150,7 +150,7 @@ class EqualJointAngles(Cost, type="equal_joint_angles"):
     """
 
     joints: Annotated[Names, Field(min_length=2)]
-    """Names of two or more joints with one degree of freedom each, in order [-]."""
+    """Names of two or more single-DOF joints, in order [-]."""
 
     def placed(self, start: Start) -> Self:
         """Return the cost, checked."""

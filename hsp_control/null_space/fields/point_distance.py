@@ -54,7 +54,7 @@ class PointDistance(Cost, type="point_distance"):
         )
 
     def derivatives(self, state: RobotState, gradient: Array, rate: Array) -> PartCalls:
-        """Return the calls, each of which adds a frame to f, ∇f and (∇f)'."""
+        """Return the calls, which add the frames to f, ∇f and (∇f)'."""
         center, moving = self._placed_obstacle.center.supplied()
         total = np.zeros(1)
         adding = [

@@ -36,7 +36,7 @@ class Weight(Part, ABC, error=FieldError):
     def calls(self, time: Array) -> tuple[PartCalls, Array] | None:
         """Return the engine's calls that write w and w', and where they write them.
 
-        The array has shape (2,); None: `sample` is called in each step.
+        The array has shape (2,); None: `sample` is called in every step.
 
         Args:
             time: The present time, shape (1,) [s].
@@ -123,7 +123,7 @@ class SetWeight(Weight):
     """w and w' that are written elsewhere at run time, perhaps times a ramp."""
 
     numbers: InstanceOf[np.ndarray]
-    """w [-] and w' [1/s], shape (2,), read in each step."""
+    """w [-] and w' [1/s], shape (2,), read in every step."""
     ramp: Ramp | None = None
     """A factor of w [-]; by default none."""
 

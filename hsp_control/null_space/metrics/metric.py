@@ -66,7 +66,7 @@ class Metric(Part, ABC, family="metrics", error=MetricError):
         raise TypeError(f"{type(self).__name__} implements neither call nor evaluate")
 
     def calls(self, state: RobotState, out: MetricSample) -> PartCalls:
-        """Return the calls that write the sample of each step."""
+        """Return the calls that write the sample in a step."""
         if self.form != VARYING:
             self.evaluate(state.read_only, out)
             return []

@@ -25,8 +25,8 @@ from hsp_control.common.arrays import Array
 ROUNDING = 1e-6
 """A second moment may be negative by this share of their sum: files are rounded."""
 NEGLIGIBLE = 1e-9
-"""It may also be negative by this share of the robot's mass [m²], as if all of that lay
-within 30 µm: nothing in motion shows so little. Zeros that were rounded are below it
+"""It may also be negative by this fraction of the robot's mass [m²], the moment of all
+of it within 30 µm, which has no observable effect. Zeros that were rounded are below it
 (-5e-20 kg·m²), and so are links of 1e-8 kg that stand for a frame.
 """
 FLOOR = 1e-3
@@ -54,7 +54,7 @@ class ImpossibleInertia(NamedTuple):
         low, middle, high = self.moments
         if self.negative:
             return f"a principal moment is {low:.3g} kg·m²; must not be negative"
-        low, middle = max(low, 0.0), max(middle, 0.0)  # but for rounding
+        low, middle = max(low, 0.0), max(middle, 0.0)  # except for rounding
         return (
             f"the principal moment {high:.3g} exceeds the sum of the other two, "
             f"{low:.3g} + {middle:.3g} = {low + middle:.3g} kg·m²"
@@ -100,7 +100,7 @@ def nearest_possible(tensor: Array) -> Array:
     """
     if is_possible(tensor):
         return tensor
-    from scipy.optimize import nnls  # here: SciPy takes long to import
+    from scipy.optimize import nnls  # here: importing SciPy is slow
 
     moments, axes = np.linalg.eigh(tensor)
     basis = np.eye(3) + FLOOR / (1.0 - 3.0 * FLOOR)

@@ -1,8 +1,8 @@
 """Build the Pinocchio model of a robot from its URDF, without meshes, or of several.
 
-Of several robots in one workspace the Jacobians are decoupled, so each follows the
-control law as if it were alone. For collision avoidance each robot is an obstacle for
-the others, and its true velocity is known.
+Of several robots in one workspace the Jacobians are decoupled, so every one follows the
+control law as if it were alone. For collision avoidance a robot is an obstacle for the
+others, and its true velocity is known.
 """
 
 import os
@@ -98,7 +98,7 @@ def moving_joints(model: pin.Model) -> dict[str, Any]:
 
 
 def frames_by_name(model: pin.Model) -> dict[str, int]:
-    """Return the index of each frame; of a link and a joint of one name the link's."""
+    """Return the frames' indices; of a link and a joint of one name the link's."""
     links = {f.name for f in model.frames if f.type == pin.FrameType.BODY}
     return {
         frame.name: i

@@ -66,7 +66,7 @@ def find_problem(file: Path) -> str:
 
 
 def _declared(ending: str, heading: bytes) -> int:
-    """Return how many elements a mesh file's heading declares; 0 if it has no count."""
+    """Return the number of elements in a mesh file's heading; 0 without a count."""
     if ending not in _COUNTS:
         return 0
     counts = _COUNTS[ending].finditer(heading.partition(b"end_header")[0])

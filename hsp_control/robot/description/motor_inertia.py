@@ -48,7 +48,7 @@ MotorInertias = Annotated[
         _stored,
     ),
 ]
-"""A number, one for each joint in a list or by name, or ``bundled``; 0: bare links."""
+"""A number, one per joint in a list or by name, or ``bundled``; 0: bare links."""
 
 
 def write_motor_inertia(
@@ -100,7 +100,7 @@ def write_motor_inertia(
 
 
 def rotors_of_urdf(robot: Element) -> dict[str, float]:
-    """Return I k² of each joint whose ``<transmission>`` gives it [kg·m² or kg].
+    """Return I k² of joints with a ``<transmission>`` that gives it [kg·m² or kg].
 
     Raises:
         ModelError: If a number is none, or negative, or a rotor's reduction is 0.

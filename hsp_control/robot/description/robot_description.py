@@ -83,12 +83,12 @@ class OneRobot(Part, error=ModelError):
     same name beside the URDF, if there is one."""
     motor_inertia: MotorInertias | None = None
     """Inertia of the rotors reflected to the joints, with their reductions squared
-    [kg·m² or kg]: one number, or one for each joint in a list or by name; 0: the bare
+    [kg·m² or kg]: one number, or one per joint in a list or by name; 0: the bare
     links. ``bundled``: those in the README of a bundled robot. By default those in the
     ``<transmission>`` elements of the URDF."""
 
     def find(self, access: Access = ANYWHERE) -> RobotSource:
-        """Return where it comes from; see `find_robot` and `find_description`.
+        """Return its source; see `find_robot` and `find_description`.
 
         Raises:
             ModelError: If it is several robots.

@@ -67,7 +67,7 @@ class BodyShape:
 
 @dataclass(frozen=True)
 class RobotSource:
-    """Where a robot comes from, and the settings that its folder gives."""
+    """A robot's source, and the settings in its folder."""
 
     name: str  # name of a known robot, or the URDF file's name without ``.urdf``
     # the URDF file. Of a robot whose `shapes` are given: the MJCF file, or the name of

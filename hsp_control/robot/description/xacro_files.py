@@ -65,7 +65,7 @@ def xacro_text(value: str | bool | float) -> str:
     if isinstance(value, bool):
         return str(value).lower()
     if isinstance(value, float) and value.is_integer():
-        value = int(value)  # `7` is read as 7.0, but a macro may count with it
+        value = int(value)  # `7` is read as 7.0, but a macro may need an integer
     return str(value)
 
 
@@ -106,7 +106,7 @@ def expand(
     try:
         with _packages_found(substitution_args, package_dirs):
             document = xacro.process_file(str(file), mappings=asked)
-    except Exception as error:  # whatever its expressions raise
+    except Exception as error:  # expressions may raise anything
         reason = " ".join(str(error).split()) or type(error).__name__
         if type(error).__name__ == "UndefinedArgumentsException" or reason.startswith(
             "Undefined substitution argument"

@@ -77,7 +77,7 @@ class DroppedPeriods(Drive, type="dropped"):
 
 
 class EffortDelay(Drive, type="delay"):
-    """The effort commanded some periods ago; the first effort until there is one."""
+    """The effort commanded some periods ago; at first the first effort."""
 
     stage: ClassVar[float] = 20.0
     strength: ClassVar[str] = "periods"
@@ -156,16 +156,16 @@ class Jitter(Drive, type="jitter"):
     strength: ClassVar[str] = "longest"
 
     longest: NonNegative
-    """Maximum additional delay [s], drawn for each period; an effort takes effect at
+    """Maximum additional delay [s], drawn for every period; an effort takes effect at
     the end of its period at the latest."""
 
     def begin(self, robot: Robot, random: np.random.Generator) -> Driving:
-        """Return a function that draws a delay for each effort; see `Drive.begin`."""
+        """Return a function that draws a delay for every effort; see `Drive.begin`."""
         return lambda tau: (tau, float(random.uniform(0.0, self.longest)))
 
 
 class Saturation(Drive, type="saturation"):
-    """Each joint's effort is clipped at its limit."""
+    """Joint efforts are clipped at their limits."""
 
     stage: ClassVar[float] = 50.0
 

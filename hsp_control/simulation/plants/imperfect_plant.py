@@ -1,6 +1,6 @@
 """A plant with imperfect sensors and drives.
 
-Each part has its own random numbers: adding one does not change those of the others.
+Parts have independent random numbers: adding one does not change those of the others.
 """
 
 from collections.abc import Mapping, Sequence
@@ -117,7 +117,7 @@ class ImperfectPlant(SampledPlant):
         return self.plant.contact_wrenches(t, q, v, applied)
 
     def inertial(self) -> Inertial | None:
-        """Return the reading of its own unit, or of the plant's."""
+        """Return the reading of its IMU, or of the plant's."""
         for sense in self._sensing:
             if isinstance(sense, RunningImu):
                 return sense.reading

@@ -51,7 +51,7 @@ class Inertias(ModelChange):
 
     Every body that has mass is scaled and shifted, and then gets its own uniform random
     errors. The inertias stay physically consistent: the second moments of mass along
-    the principal axes change, each by its own random factor.
+    the principal axes change by independent random factors.
     """
 
     mass_factor: Positive = 1.0
@@ -61,11 +61,11 @@ class Inertias(ModelChange):
     com_shift: Vector3 = (0.0, 0.0, 0.0)
     """Displacement of every centre of mass in its joint's frame [m]."""
     random_mass: Share = 0.0
-    """Largest relative error of a mass [-], drawn for each body: 0.2 is ±20 %."""
+    """Largest relative error of a mass [-], drawn for every body: 0.2 is ±20 %."""
     random_inertia: Share = 0.0
-    """Largest relative error of a principal second moment [-], drawn for each body."""
+    """Largest relative error of a principal second moment [-], drawn for every body."""
     random_com: NonNegative = 0.0
-    """Largest error of a centre of mass along each axis [m], drawn for each body."""
+    """Largest error of a centre of mass along each axis [m], drawn for every body."""
 
     def apply(self, model: pin.Model, robot: Robot, seed: int) -> None:
         """Change every body that has mass."""

@@ -195,7 +195,7 @@ class IntegratedPlant(SampledPlant):
         return self._advance
 
     def native_steps(self) -> Steps | None:
-        """Return the steps that `advance` takes, if they are native.
+        """Return the steps of `advance`, if they are native.
 
         A caller begins with `hold`, and ends with `moved`.
         """
@@ -251,7 +251,7 @@ class Imperfection(Part, ABC, error=SimulationError):
 
     @property
     def periods(self) -> int:
-        """By how many control periods it delays, for the rate check."""
+        """Its delay in control periods, for the rate check."""
         return 0
 
 
@@ -311,7 +311,7 @@ def to_json_data(value: Any) -> Any:
 
 
 def contact_channels(wrenches: Mapping[str, Array]) -> dict[str, LogChannel]:
-    """Return ``plant.contact.<name>.force`` and ``.moment`` for each contact.
+    """Return ``plant.contact.<name>.force`` and ``.moment`` for every contact.
 
     A wrench (6,) of the world on the robot is force and moment in world axes, about the
     origin of the contact's frame.

@@ -43,7 +43,7 @@ class Spring:
         self.stiffness, self.largest = stiffness, largest
 
     def force(self, point: Array) -> Array:
-        """Return the force on the point, shape (3,) [N], where it is in the world."""
+        """Return the force on the point, shape (3,) [N], from its world position."""
         force = self.stiffness * (self.hand - point)
         size = float(np.linalg.norm(force))
         return force * min(1.0, self.largest / size) if size > 0.0 else force

@@ -74,7 +74,7 @@ def is_exact(plant: Plant, robot: Robot) -> bool:
 class StickingPlant(SampledPlant):
     """M v' + N = tau - D v - f, where f_i = c_i sign(v_i), or |f_i| <= c_i at v_i = 0.
 
-    Each step of length h solves for the velocity v⁺ at its end
+    A step of length h solves for the velocity v⁺ at its end
 
         v⁺ = argmin ½ xᵀ(M + ½hD)x - xᵀ[(M - ½hD)v + h(tau - N)] + h Σ c_i |x_i|,
 

@@ -147,7 +147,7 @@ class VelocityNoise(Sensor, type="velocity_noise"):
 
 
 class SensorDelay(Sensor, type="delay"):
-    """The state of some periods ago; the start state until there is one."""
+    """The state of some periods ago; at first the start state."""
 
     stage: ClassVar[float] = 10.0
     strength: ClassVar[str] = "periods"

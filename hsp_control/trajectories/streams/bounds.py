@@ -14,7 +14,7 @@ PLANNED = 0.95
 
 
 class MotionBounds(NamedTuple):
-    """Largest magnitude of the first three derivatives, for each coordinate."""
+    """Largest magnitude of the first three derivatives, for every coordinate."""
 
     speed: Array  # (n,) [1/s]
     acceleration: Array  # (n,) [1/s²]
@@ -40,7 +40,7 @@ def linear_bounds(
 def angular_bounds(speed: float, acceleration: float, jerk: float) -> MotionBounds:
     """Return bounds on a rotation vector that keep those on ω, ω' and ω''; see `Chart`.
 
-    A vector with components up to b/√3 is no longer than b. Each piece has axes of its
+    A vector with components up to b/√3 is no longer than b. A piece has axes of its
     own; where one begins, a component of ω may be beyond its bound while all of ω is
     not, and is then brought back. For that the speed is planned 5 % smaller; the
     maximum in 400 adversarial streams was 0.5 %.

@@ -32,7 +32,7 @@ class Received(NamedTuple):
 
 
 class Inbox:
-    """A queue of messages; each reader remembers the number of its last one.
+    """A queue of messages; readers remember the number of their last one.
 
     Messages of `send`, of a listening thread or of a topic of ROS 2 are available at
     once, and the oldest are dropped if many are queued. A recording is available from
@@ -112,7 +112,7 @@ class Inbox:
             self._waiting.append(Received(self.count, message))
 
     def fail(self, error: BaseException) -> None:
-        """Make each reader raise: the listening thread has ended with an error."""
+        """Make all readers raise: the listening thread has ended with an error."""
         try:
             text = str(error)
         except BaseException:  # of a user's own type
@@ -121,7 +121,7 @@ class Inbox:
         self.failure = f"{name}: {text}" if text else name
 
     def reject(self, reason: str, *, aloud: bool = True) -> None:
-        """Count an invalid message; each kind of reason is logged once."""
+        """Count an invalid message; kinds of reasons are logged once."""
         with self._lock:
             self.rejected += 1
             self.reason = reason
@@ -179,11 +179,11 @@ class Taken(NamedTuple):
     """A message in a record."""
 
     message: Message
-    t: float  # when the step was that took it [s]
+    t: float  # time of the step that read it [s]
 
 
 class Reader:
-    """Takes messages for one run, and records them; it begins with the untaken ones.
+    """Reads messages for one run, and records them; it begins with the unread ones.
 
     Attributes:
         inbox: The queue.
@@ -228,7 +228,7 @@ class Reader:
         return other
 
     def _add(self, message: Message, t: float) -> None:
-        """Record a message that is taken at a time [s], as long as there is room."""
+        """Record a message that is read at a time [s], if memory is left."""
         most = MOST if self.logged else min(BRIEF, MOST)
         if self._recorded + message.size <= most:
             self.record.append(Taken(message, t))

@@ -126,7 +126,7 @@ class Message(NamedTuple):
         """Return its data for `message_of`, and the time ``at`` of taking it.
 
         Args:
-            t: When the step was that took it [s].
+            t: Time of the step that read it [s].
         """
         data: dict[str, Any] = {"at": t if self.at == -inf else self.at}
         if self.t is not None:

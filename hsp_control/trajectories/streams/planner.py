@@ -24,9 +24,9 @@ from hsp_control.trajectories.streams.bounds import MotionBounds
 from hsp_control.trajectories.streams.chart import Chart, State
 from hsp_control.trajectories.streams.message import Axes, Message
 
-SOON = 1e-3  # when a rehearsed step would be [s]
+SOON = 1e-3  # time of a rehearsed step [s]
 KEPT = 1.0
-"""How long the reference is known after a time [s]."""
+"""Time for which the reference is known after a time [s]."""
 MOST = 4096  # maximum number of stored waypoints
 _AT_ONCE = 256  # maximum number of simultaneous messages; the oldest others are ignored
 _CONSIDERED = 256  # waypoints before and after a time: see `KnownWaypoints`
@@ -54,12 +54,12 @@ class Room(NamedTuple):
 
     messages: int = 4  # rows of the queue: messages, and waypoints of a chunk
     waypoints: int = 16
-    pieces: int = 8  # those that may begin in one step, and stay known
-    arrivals: int = 512  # of messages, by which the sender's clock is known
+    pieces: int = 8  # pieces that may begin in one step and are stored
+    arrivals: int = 512  # of messages, for the estimate of the sender's clock
 
     @classmethod
     def without_python(cls, policy: Policy, period: float) -> "Room":
-        """Return the room for a message each period [s], which no call extends."""
+        """Return the room for a message every period [s], which no call extends."""
         arrivals = ceil(1.1 * _CLOCK / period) + 2  # periods are not exactly equal
         most = 1
         if policy.name != "latest":
@@ -170,7 +170,8 @@ class Planner:
         moves = self.call(t)
         self.now = float(t)
         begun = self._piece.item() - self._number
-        # A step with messages does most: the next one will do, unless it has some, too.
+        # A step with messages does most of the work: it is left to the next one, unless
+        # that has some, too.
         if not messages or begun > self._room.pieces // 2:
             if begun:
                 self._remember()
@@ -191,7 +192,7 @@ class Planner:
     def _remember(self) -> None:
         """Keep the pieces that are followed by others now."""
         number, last, room = self._number, self._piece.item(), len(self._pieces)
-        if last - number >= room:  # those between are not known any more
+        if last - number >= room:  # those in between are no longer stored
             number = last - room + 1
             self._past.clear()
             self._starts.clear()
@@ -270,7 +271,7 @@ class Planner:
         return self.now - float(max(self._received.item(), self._begun.item()))
 
     def count(self, of: str) -> int:
-        """Return how many messages were ``taken``, ``late`` or ``refused``."""
+        """Return the numbers of ``taken``, ``late`` and ``refused`` messages."""
         return int(self._memory[of].item())
 
     # -- copies -----------------------------------------------------------------------
@@ -310,7 +311,7 @@ class Planner:
                 messages = [Message.of(None, value[None], None)]
             t = self.now + SOON
             self.advance(t, messages)
-            self.advance(t + SOON, ())  # the step after it keeps the plan before
+            self.advance(t + SOON, ())  # the next step keeps the previous plan
 
     @contextmanager
     def _taken_back(self) -> Iterator[None]:
@@ -328,7 +329,7 @@ class Planner:
     # -- without Python ---------------------------------------------------------------
 
     def calls(self, out: Any) -> PartCalls:
-        """Return the calls that take a program's messages, and write a sample."""
+        """Return the calls that read a program's messages, and write a sample."""
         advance = PartCall(engine.Stream, t=TIME, **self._arguments)
         return [advance, *self.chart.calls(self.state, out)]
 

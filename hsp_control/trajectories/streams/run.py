@@ -24,7 +24,7 @@ from hsp_control.trajectories.streams.streamed import Streamed
 
 
 class StreamRun:
-    """A stream in one run of a controller: takes messages, and plans the reference.
+    """A stream in one run of a controller: reads messages, and plans the reference.
 
     A controller stores the runs of its streams. A copy or a pickle continues from the
     present state, with the messages that wait, and receives the later ones to itself. A
@@ -237,7 +237,7 @@ class StreamRun:
 
     @property
     def shared(self) -> dict[int, Any]:
-        """The memo of `deepcopy` for a copy that looks on: the queue itself."""
+        """The memo of `deepcopy` for a copy that only reads: the queue itself."""
         return {id(self._inbox): self._inbox}
 
     def leave_python(self, period: float) -> None:

@@ -85,7 +85,7 @@ LARGEST_FILE = 100_000_000  # maximum size of a recording [bytes]
 
 
 def recorded(data: Sequence[Mapping[str, Any]], space: Space) -> list[Message]:
-    """Return the messages of a recording, each with its time ``at``."""
+    """Return the messages of a recording, with their times ``at``."""
     messages: list[Message] = []
     for k, each in enumerate(data):
         try:

@@ -38,7 +38,7 @@ from hsp_control.trajectories.trajectory import Trajectory
 class Stream(Streamed, Trajectory, type="stream"):
     """x(t) in Rⁿ that is streamed: the position of a point, or a posture.
 
-    The bounds hold for each coordinate.
+    The bounds hold for every coordinate.
     """
 
     space: ClassVar[Space] = Space(None, False)
@@ -83,7 +83,7 @@ class Stream(Streamed, Trajectory, type="stream"):
         return Chart(self.dimension, False).begin(np.asarray(self.start), np.eye(3))
 
     def bounds(self) -> MotionBounds:
-        """Return the bounds on each coordinate."""
+        """Return the bounds on every coordinate."""
         return linear_bounds(self.speed, self.acceleration, self.jerk, self.dimension)
 
 
@@ -145,7 +145,7 @@ class StreamOrientation(Turning, OrientationTrajectory, type="stream"):
 class StreamPose(Turning, PoseTrajectory, type="stream"):
     """M(t) that is streamed, as x, y, z and a quaternion, or as twists in world axes.
 
-    The linear bounds hold for each coordinate, the angular ones in every direction.
+    The linear bounds hold for every coordinate, the angular ones in every direction.
     """
 
     space: ClassVar[Space] = POSE

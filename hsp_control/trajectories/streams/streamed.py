@@ -93,7 +93,7 @@ class Streamed(Part, error=TrajectoryError):
             kind_of(self.source).check_address(self.source)
         if (
             self.messages is not None
-        ):  # their content is checked where its kind is known
+        ):  # their content is checked where its type is known
             recorded(self.messages, Space(None, False))
 
     @property

@@ -31,14 +31,14 @@ class HspCamera(Camera):
 
     @staticmethod
     def find_cameras() -> list[dict[str, Any]]:
-        """Return nothing: nobody knows where a simulation runs."""
+        """Return nothing: the address of a simulation is not known."""
         return []
 
     def connect(self, warmup: bool = True) -> None:
         """Look for the first time.
 
         Raises:
-            ConnectionError: If nobody answers, or the scene has no such camera.
+            ConnectionError: Without an answer, or if the scene has no such camera.
         """
         self._picture()
         self._open = True
@@ -47,7 +47,7 @@ class HspCamera(Camera):
         """Return the camera's present picture, red first, shape (height, width, 3).
 
         Raises:
-            ConnectionError: If nobody answers.
+            ConnectionError: Without an answer.
         """
         if not self._open:
             raise DeviceNotConnectedError(f"{self} is not connected; call connect()")

@@ -22,7 +22,7 @@ GENTLE = {
     "tasks.hand.gains.natural_frequency": 4,
     "tasks.fingers.gains.natural_frequency": 4,
 }
-LOOPS = {  # a configuration, what is set of it, and options
+LOOPS = {  # a configuration, its overrides, and options
     "simulated": (
         PLUGIN / "panda.yaml",
         {**GENTLE, "simulation.integrator.step": 0.005},
@@ -47,7 +47,7 @@ def free_port() -> int:
 
 
 class Running(NamedTuple):
-    """A loop that runs: its process, its addresses and its log."""
+    """A running loop: its process, addresses and log."""
 
     process: subprocess.Popen
     states: str
@@ -57,7 +57,7 @@ class Running(NamedTuple):
     log: Path
 
     def stop(self) -> Path:
-        """End it as Ctrl-C does, and return its log."""
+        """End it like Ctrl-C, and return its log."""
         self.process.send_signal(signal.SIGINT)
         assert self.process.wait(120.0) == 0
         return self.log
@@ -107,7 +107,7 @@ def seen(tmp_path: Path) -> Iterator[Running]:
 
 @pytest.fixture
 def franka(tmp_path: Path) -> Iterator[Running]:
-    """A Franka, as far as its control box is one."""
+    """A Franka, by its emulated control box."""
     command = [HSP, "franka-box", "panda", "--lockstep", "--patience", "60"]
     command += ["--host", "127.0.0.2"]
     with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as box:
@@ -124,7 +124,7 @@ def franka(tmp_path: Path) -> Iterator[Running]:
 def leader() -> Iterator[str]:
     """A sender of poses on a circle; returns the address."""
     address = f"127.0.0.1:{free_port()}"
-    where = ["0.3069", "0", "0.4869"]  # where the hand starts
+    where = ["0.3069", "0", "0.4869"]  # the hand's start
     script = str(PLUGIN / "tests/leader.py")
     process = subprocess.Popen([sys.executable, script, address, *where])
     yield address

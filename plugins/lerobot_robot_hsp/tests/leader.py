@@ -1,4 +1,4 @@
-"""A leader without an arm: publishes states as a loop, of a hand on a small circle.
+"""A leader without an arm: publishes states like a loop, of a hand on a small circle.
 
 python leader.py HOST:PORT X Y Z
 """

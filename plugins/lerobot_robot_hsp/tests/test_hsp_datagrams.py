@@ -1,4 +1,4 @@
-"""The plugin's client, which needs Python alone, beside a loop: part of `make test`."""
+"""The plugin's client, in pure Python, with a loop: part of `make test`."""
 
 import json
 import socket
@@ -42,7 +42,7 @@ def hear_all(loop: Loop) -> None:
         last = loop.state(last)["number"]
 
 
-def test_it_hears_the_loop_and_moves_its_hand(states: str, loop: Loop) -> None:
+def test_it_receives_states_and_moves_the_hand(states: str, loop: Loop) -> None:
     targets = f"127.0.0.1:{free_port()}"
     stream = hsp.StreamPose(source=f"udp://{targets}", delay=0.02)
     task = hsp.FramePose("panda_tcp", stream, name="hand")
@@ -93,13 +93,13 @@ def tell(states: str) -> Iterator[Told]:
         yield told
 
 
-def test_what_is_old_or_no_state_is_not_heard(
+def test_old_or_invalid_states_are_ignored(
     loop: Loop, tell: Told, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     judged, is_newer = [], loop._is_newer
 
-    def noted(heard: dict) -> bool:
-        judged.append((heard["number"], is_newer(heard)))
+    def noted(received: dict) -> bool:
+        judged.append((received["number"], is_newer(received)))
         return judged[-1][1]
 
     monkeypatch.setattr(loop, "_is_newer", noted)
@@ -141,7 +141,7 @@ def test_rotation_vectors_are_pinocchio_s_and_go_on_at_half_a_turn() -> None:
             pin.exp3(np.array(rotation_vector_of(q))), pin.exp3(turn), atol=1e-12
         )
     last, steps = None, []
-    for angle in np.linspace(pi - 0.4, pi + 3.0, 200):  # a hand that points downwards
+    for angle in np.linspace(pi - 0.4, pi + 3.0, 200):  # a hand pointing down
         new = rotation_vector_of(quaternion_of([angle, 1e-3, 0.0]), last)
         steps.append(
             0.0 if last is None else float(np.linalg.norm(np.subtract(new, last)))

@@ -1,4 +1,4 @@
-"""The robot and the leader as LeRobot calls them, and LeRobot's own commands."""
+"""The robot and the leader as called by LeRobot, and LeRobot's commands."""
 
 import json
 import os
@@ -87,14 +87,14 @@ def test_actions_may_be_joint_positions(arm: Running) -> None:
         ({"frame": "wrist"}, "publishes no pose of 'wrist'"),
     ],
 )
-def test_what_the_loop_lacks_is_named(
+def test_missing_parts_of_the_loop_are_named(
     arm: Running, changes: dict, message: str
 ) -> None:
     with pytest.raises(LoopError, match=message):
         HspRobot(config(arm, **changes)).connect()
 
 
-def test_without_a_loop_it_says_how_to_start_one() -> None:
+def test_without_a_loop_the_message_has_the_command() -> None:
     states = f"127.0.0.1:{free_port()}"
     robot = HspRobot(HspRobotConfig(states=states, timeout=0.1))
     with pytest.raises(LoopError, match=f"hsp live CONFIG .* udp://{states}"):
@@ -162,15 +162,15 @@ def test_lerobot_s_commands_teleoperate_record_and_replay(
     recorded = state[:, at]
     assert np.ptp(recorded[:, 1]) > 0.1
     assert 60 < len(action) <= 180
-    # The replay ran last: it begins where the messages begin again.
+    # The replay ran last: it begins where messages resume.
     taken, t = log["stream.hand.taken"], log["t"]
     begin = t[np.searchsorted(taken, taken[-1] - len(action) + 1)]
     replayed = log["task.hand.actual"][t > begin + 1.0, :3]
     fine = np.linspace(0, len(recorded) - 1, 10 * len(recorded))
     path = np.array([np.interp(fine, range(len(recorded)), p) for p in recorded.T[:3]])
     away = np.linalg.norm(replayed[:, :, None] - path, axis=1).min(axis=1)
-    print(f"the replay is within {1e3 * away.max():.2f} mm of what was recorded")
-    assert away.max() < 0.01  # on a machine that does more besides
+    print(f"the replay is within {1e3 * away.max():.2f} mm of the recording")
+    assert away.max() < 0.01  # on a busy machine
     opening = state[:, names["observation.state"]["names"].index("gripper.pos")]
     assert np.ptp(opening) > 0.01
     if kind == "arm":

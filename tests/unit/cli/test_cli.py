@@ -1,4 +1,4 @@
-"""The command line as a person uses it: output, exit status, one message an error."""
+"""The command line as a user types it: output, exit status, one message per error."""
 
 import _thread
 import json
@@ -40,19 +40,19 @@ def test_run_leaves_a_log_that_numpy_alone_reads(
     assert meta["columns"]["tau"]["unit"] == "N·m"
 
 
-def test_run_tells_a_program_what_it_did(
+def test_run_reports_its_result_as_json(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """The names are those of a sweep; the output agrees with the log."""
+    """The columns are named as in a sweep; the output agrees with the log."""
     arguments = ["run", MOVING, "--out", str(tmp_path), "--json", *SHORT]
     assert main(arguments) == 0
-    told = json.loads(capsys.readouterr().out)
-    rollout = Rollout.load(told["log"])
-    assert (told["status"], told["rows"]) == ("completed", 11)
-    assert told["effort.max"] == np.abs(rollout.tau).max()
-    assert told["null_space_error.end"] == rollout["null_space_norm"][-1]
+    report = json.loads(capsys.readouterr().out)
+    rollout = Rollout.load(report["log"])
+    assert (report["status"], report["rows"]) == ("completed", 11)
+    assert report["effort.max"] == np.abs(rollout.tau).max()
+    assert report["null_space_error.end"] == rollout["null_space_norm"][-1]
     error = np.linalg.norm(rollout["task.tip.error"], axis=1)
-    assert told["tracking.tip.max"] == pytest.approx(error.max(), rel=1e-12)
+    assert report["tracking.tip.max"] == pytest.approx(error.max(), rel=1e-12)
 
 
 def test_an_exit_of_a_users_code_is_a_failure(
@@ -75,26 +75,27 @@ def test_an_exit_of_a_users_code_is_a_failure(
     assert "SystemExit(0)" in capsys.readouterr().err
 
 
-def test_check_tells_a_program_what_a_configuration_is(
+def test_check_describes_a_configuration_as_json(
     capsys: pytest.CaptureFixture[str],
 ) -> None:
     assert main(["check", MOVING, "--json"]) == 0
-    told = json.loads(capsys.readouterr().out)
-    assert told["robot"] == {"name": "planar3r", "nq": 6, "nv": 3}
-    assert (told["tasks"]["tip"]["type"], told["tasks"]["tip"]["rows"]) == (
+    report = json.loads(capsys.readouterr().out)
+    assert report["robot"] == {"name": "planar3r", "nq": 6, "nv": 3}
+    assert (report["tasks"]["tip"]["type"], report["tasks"]["tip"]["rows"]) == (
         "FramePosition",
         2,
     )
-    assert told["null_space"]["degrees_of_freedom"] == 1
-    assert len(told["singular_values"]) == 2
-    assert told["advice"] == []
-    assert told["limits"] == "none"
+    assert report["null_space"]["degrees_of_freedom"] == 1
+    assert len(report["singular_values"]) == 2
+    assert report["advice"] == []
+    assert report["limits"] == "none"
 
 
 def test_a_log_is_not_replaced_by_its_repetition(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """It may be that of a robot; what else is set is in the name."""
+    """The configuration may be a robot's default one; other overrides are in the
+    name."""
     run = ["run", "--out", str(tmp_path), "--json"]
     assert main([*run, MOVING, *SHORT]) == 0
     log = tmp_path / LOG
@@ -102,9 +103,9 @@ def test_a_log_is_not_replaced_by_its_repetition(
     capsys.readouterr()
     shown = ["--set", "title=Once more", "--set", "view.speed=2"]
     assert main([*run, str(log), *shown]) == 0
-    told = json.loads(capsys.readouterr().out)
+    report = json.loads(capsys.readouterr().out)
     again = tmp_path / "4_moving_obstacle-simulation.duration=0.1-again.npz"
-    assert told["log"] == str(again)
+    assert report["log"] == str(again)
     setting = f"description={'x' * 200}", f"tasks.tip.gains={{kp: 100, kv: {20:0130d}}}"
     long = [word for each in setting for word in ("--set", each)]
     assert main([*run, str(log), *long]) == 0
@@ -124,18 +125,18 @@ def test_a_log_is_not_replaced_by_its_repetition(
     ([MOVING, "--set", "start.coordinates=[0, 0, 0]"], 3 - 1),  # stretched
     ([MOVING, "--set", "tasks.tip.schedule={intervals: [[1, null]]}"], 3),
 ])  # fmt: skip
-def test_check_counts_what_contacts_and_tasks_leave(
+def test_check_reports_the_freedom_that_contacts_and_tasks_leave(
     config: list[str], freedom: int, capsys: pytest.CaptureFixture[str]
 ) -> None:
     assert main(["check", "--json", *config]) == 0
-    told = json.loads(capsys.readouterr().out)
-    assert told["null_space"]["degrees_of_freedom"] == freedom
+    report = json.loads(capsys.readouterr().out)
+    assert report["null_space"]["degrees_of_freedom"] == freedom
 
 
-def test_the_summary_tells_of_a_target_out_of_reach(
+def test_the_summary_reports_a_target_out_of_reach(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """A planar arm of 3 m, and a target in 4 m."""
+    """A planar arm of 3 m, and a target at 4 m."""
     config = tmp_path / "far.yaml"
     config.write_text(
         "robot: {name: planar3r}\n"
@@ -145,11 +146,11 @@ def test_the_summary_tells_of_a_target_out_of_reach(
         "simulation: {duration: 4, control_period: 0.002}\n"
     )
     assert main(["run", str(config), "--out", str(tmp_path)]) == 0
-    told = capsys.readouterr().out
-    assert re.search(r"\d+ rows: target out of reach, 1\.\d\d m at the end", told)
+    report = capsys.readouterr().out
+    assert re.search(r"\d+ rows: target out of reach, 1\.\d\d m at the end", report)
 
 
-@pytest.mark.parametrize(("hand", "told"), [
+@pytest.mark.parametrize(("hand", "report"), [
     (
         "{type: frame_position, trajectory: "
         "{type: line, origin: world, start: [0.4, 0, 0.5], end: [1.6, 0, 0.5], "
@@ -163,7 +164,7 @@ def test_the_summary_tells_of_a_target_out_of_reach(
         "... task 'hand': ... cannot be reached in its orientation",
     ),
     (
-        # 39 turns: looked at evenly it would be seen where it begins, within reach
+        # 39 turns: equidistant samples would all be near the start, within reach
         "{type: frame_position, trajectory: {type: circle, center: [-1.1, 0, 0.5], "
         "radius: 1.5, angular_rate: 122.52211349000193}}",
         "... task 'hand': ... out of reach",
@@ -174,10 +175,10 @@ def test_the_summary_tells_of_a_target_out_of_reach(
         None,
     ),
 ])  # fmt: skip
-def test_check_tells_before_the_run_what_is_out_of_reach(
-    hand: str, told: str | None, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+def test_check_reports_targets_out_of_reach_before_the_run(
+    hand: str, report: str | None, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """By how much and when, or that it is the orientation alone."""
+    """The report has distance and time, or says that only the orientation fails."""
     config = tmp_path / "far.yaml"
     config.write_text(
         f"robot: {{name: panda}}\ntasks: {{hand: {hand}}}\n"
@@ -185,10 +186,14 @@ def test_check_tells_before_the_run_what_is_out_of_reach(
     )
     assert main(["check", str(config)]) == 0
     warned = capsys.readouterr().err
-    assert ("reach" not in warned) if told is None else re.search(wording(told), warned)
+    assert (
+        ("reach" not in warned)
+        if report is None
+        else re.search(wording(report), warned)
+    )
 
 
-def test_check_tells_what_is_too_fast_for_joints(
+def test_check_reports_references_too_fast_for_joints(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     config = tmp_path / "fast.yaml"
@@ -199,11 +204,11 @@ def test_check_tells_what_is_too_fast_for_joints(
         "simulation: {duration: 2, control_period: 0.001}\n"
     )
     assert main(["check", str(config)]) == 0
-    told = r"task 'hand': its reference moves at 4 m/s at t = .* 'panda_joint\d'"
-    assert re.search(told, capsys.readouterr().err)
+    report = r"task 'hand': its reference moves at 4 m/s at t = .* 'panda_joint\d'"
+    assert re.search(report, capsys.readouterr().err)
 
 
-@pytest.mark.parametrize(("config", "tasks", "told"), [
+@pytest.mark.parametrize(("config", "tasks", "report"), [
     (  # three links of 1 m each
         MOVING,
         "{tip: {type: frame_position, axes: x, trajectory: "
@@ -216,7 +221,7 @@ def test_check_tells_what_is_too_fast_for_joints(
         "{type: hold, point: [0, 4]}}}",
         "reach by 1 m, at the start",
     ),
-    pytest.param(  # its feet stay where they are
+    pytest.param(  # the feet stay in place
         "whole_body/talos_circle",
         "{hand: {type: frame_position, frame: gripper_right_base_link, trajectory: "
         "{type: hold, point: [4, 0, 1]}}}",
@@ -231,19 +236,19 @@ def test_check_tells_what_is_too_fast_for_joints(
         marks=ON_MUJOCO,
     ),
 ])  # fmt: skip
-def test_check_tells_of_targets_along_some_axes_and_of_hands_on_legs(
-    config: str, tasks: str, told: str | None, capsys: pytest.CaptureFixture[str]
+def test_check_reports_targets_along_some_axes_and_of_hands_on_legs(
+    config: str, tasks: str, report: str | None, capsys: pytest.CaptureFixture[str]
 ) -> None:
     options = ["--set", f"tasks={tasks}", "--set", "simulation.duration=2"]
     assert main(["check", config, *options]) == 0
     warned = capsys.readouterr().err
-    assert ("reach" not in warned) if told is None else re.search(told, warned)
+    assert ("reach" not in warned) if report is None else re.search(report, warned)
 
 
 def test_check_warns_of_motors_that_cannot_hold_the_robot(
     capsys: pytest.CaptureFixture[str],
 ) -> None:
-    """At the start of this run gravity requires 23 N·m of joint 2."""
+    """At the start of this run gravity requires 23 N·m at joint 2."""
     assert main(["check", "panda_obstacle"]) == 0
     assert "none binds at the start" in capsys.readouterr().out
     weak = ["--set", "limits={effort: {joints: {panda_joint2: 20}}}"]
@@ -251,18 +256,18 @@ def test_check_warns_of_motors_that_cannot_hold_the_robot(
     text = capsys.readouterr().out
     assert "bind at the start: the law is not exact there" in text
     (line,) = [line for line in text.splitlines() if "cannot hold" in line]
-    told = "At the start joint 'panda_joint2' ... 23.2 N·m ... 20"
-    assert re.search(wording(told), line)
+    report = "At the start joint 'panda_joint2' ... 23.2 N·m ... 20"
+    assert re.search(wording(report), line)
     assert main(["check", "panda_obstacle", *weak, "--json"]) == 0
-    told = json.loads(capsys.readouterr().out)
-    assert (told["limits"], told["advice"]) == ("limited", [line])
+    report = json.loads(capsys.readouterr().out)
+    assert (report["limits"], report["advice"]) == ("limited", [line])
 
 
 @pytest.mark.slow
-def test_robots_lists_what_can_be_loaded(
+def test_robots_lists_loadable_robots(
     capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    every = tuple(robot_table.rows())  # loads them all: once
+    every = tuple(robot_table.rows())  # loads all of them, once
     monkeypatch.setattr(robot_table, "rows", lambda: iter(every))
     assert main(["robots"]) == 0
     rows = capsys.readouterr().out.splitlines()
@@ -278,7 +283,7 @@ def test_robots_lists_what_can_be_loaded(
     assert "iiwa_joint_7" in capsys.readouterr().out
 
 
-def test_doctor_says_what_this_machine_lacks(
+def test_doctor_lists_missing_parts_of_this_machine(
     capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.delenv("OPENBLAS_NUM_THREADS", raising=False)
@@ -296,11 +301,11 @@ def test_doctor_says_what_this_machine_lacks(
     assert "not set" not in text
 
 
-def test_doctor_tells_an_installation_of_another_version(
+def test_doctor_reports_an_installation_of_another_version(
     capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     version = metadata.version
-    for installed, told in (
+    for installed, report in (
         (__version__, ("ok", __version__)),
         ("0.0.1", ("note", f"{__version__}, installed as 0.0.1")),
     ):
@@ -312,7 +317,7 @@ def test_doctor_tells_an_installation_of_another_version(
         assert main(["doctor", "--json"]) == 0
         checks = {each["topic"]: each for each in json.loads(capsys.readouterr().out)}
         ours = checks["hsp_control"]
-        assert (ours["state"], ours["found"]) == told
+        assert (ours["state"], ours["found"]) == report
 
 
 def versions_without(package: str) -> Callable[[str], str]:
@@ -326,7 +331,7 @@ def versions_without(package: str) -> Callable[[str], str]:
     return found
 
 
-@pytest.mark.parametrize(("typed", "told"), [
+@pytest.mark.parametrize(("typed", "message"), [
     (["rnu"], "there is no command 'rnu'; did you mean 'run'?"),
     (
         ["run", MOVING, "--jsno"],
@@ -334,16 +339,16 @@ def versions_without(package: str) -> Callable[[str], str]:
     ),
     (["check", MOVING, "twice"], "'twice' is one argument too many"),
     (["run", MOVING, "a=1"], "one argument too many; did you mean --set a=1?"),
-    # Not taken for --strict.
+    # Not parsed as --strict.
     (["run", MOVING, "--st", "a=1"], "no '--st' here; did you mean '--set'?"),
 ])  # fmt: skip
-def test_what_was_mistyped_is_guessed(
-    typed: list[str], told: str, capsys: pytest.CaptureFixture[str]
+def test_typing_errors_get_a_suggestion(
+    typed: list[str], message: str, capsys: pytest.CaptureFixture[str]
 ) -> None:
     with pytest.raises(SystemExit) as ended:
         main(typed)
     assert ended.value.code == 2
-    assert told in capsys.readouterr().err
+    assert message in capsys.readouterr().err
 
 
 @pytest.mark.parametrize(("arguments", "message"), [
@@ -376,8 +381,8 @@ def test_a_library_that_a_slim_system_lacks_is_named(
     reason = "cannot open shared object file: No such file or directory"
     lacks("libgomp.so.1", reason)
     assert main(["check", MOVING]) == 2
-    told = "hsp: libgomp.so.1 ... libgomp1 (Debian ... libgomp"
-    assert re.search(wording(told), capsys.readouterr().err)
+    report = "hsp: libgomp.so.1 ... libgomp1 (Debian ... libgomp"
+    assert re.search(wording(report), capsys.readouterr().err)
     lacks("libother.so", reason)
     assert main(["check", MOVING]) == 2
     assert "libother.so is missing on this system" in capsys.readouterr().err
@@ -404,7 +409,7 @@ def test_a_diverging_run_keeps_its_log(
         assert json.loads(str(columns["meta"]))["status"] == "diverged"
 
 
-def test_ctrl_c_keeps_what_was_computed(
+def test_ctrl_c_keeps_computed_rows(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     check, rows = DeferredInterrupt.check, iter(range(1000))
@@ -461,5 +466,5 @@ def test_a_package_whose_command_is_broken_stops_no_other(
     broken = EntryPoint("fly", "no_such_package.command:FLY", "hsp_control.commands")
     monkeypatch.setattr(options, "entry_points", lambda group: {"fly": broken})
     assert main(["schema"]) == 0
-    told = "hsp: 'fly' cannot be imported from no_such_package.command:FLY: No module"
-    assert told in capsys.readouterr().err
+    report = "hsp: 'fly' cannot be imported from no_such_package.command:FLY: No module"
+    assert report in capsys.readouterr().err

@@ -9,7 +9,7 @@ from hsp_control.cli import consoles
 
 
 @pytest.mark.parametrize("terminal", [True, False])
-def test_only_a_terminal_shows_what_is_being_done(
+def test_only_a_terminal_shows_progress(
     terminal: bool, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     text = io.StringIO()
@@ -18,4 +18,4 @@ def test_only_a_terminal_shows_what_is_being_done(
     with consoles.working("Drawing [a]"):
         print("a result")
     assert ("Drawing [a] ... 0:00:00" in text.getvalue()) is terminal
-    assert capsys.readouterr().out == "a result\n"  # a pipe gets it untouched
+    assert capsys.readouterr().out == "a result\n"  # a pipe receives it unchanged

@@ -36,14 +36,14 @@ def test_a_configuration_is_frozen(
         ("compliance/panda_cartesian_impedance", r"\.yaml:\d+: changes: "),
     ],
 )
-def test_what_cannot_be_frozen_is_refused_with_its_place(
+def test_parts_that_cannot_be_frozen_are_refused_with_their_place(
     config: str, message: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     if config not in bundled_configs():
         pytest.skip("it belongs to a companion that is not there")
     assert main(["freeze", config, "--out", str(tmp_path)]) == 2
-    said = " ".join(capsys.readouterr().err.split())
-    assert re.search(message, said), said
+    reported = " ".join(capsys.readouterr().err.split())
+    assert re.search(message, reported), reported
     assert not list(tmp_path.iterdir())
 
 
@@ -65,8 +65,10 @@ def test_a_task_that_comes_and_goes(
     capsys.readouterr()
     for option, known in (("--presence", "; did you mean 'elbow'?"), ("--payload", "")):
         assert main([*command, option, "elbwo"]) == 2
-        said = " ".join(capsys.readouterr().err.split())
-        assert re.search(rf"two\.yaml:1: {option}: .*'elbwo'{re.escape(known)}", said)
+        reported = " ".join(capsys.readouterr().err.split())
+        assert re.search(
+            rf"two\.yaml:1: {option}: .*'elbwo'{re.escape(known)}", reported
+        )
 
 
 @pytest.mark.parametrize(
@@ -89,7 +91,7 @@ PAGE = Path(__file__).parents[3] / "docs/how_to/without_python.md"
 @pytest.mark.process
 @pytest.mark.smoke
 def test_the_page_leads_to_an_arm_that_moves(tmp_path: Path) -> None:
-    """Its first section, in a shell, in an empty folder."""
+    """The page's first section, in a shell, in an empty folder."""
     if not shutil.which("cc"):
         pytest.skip("there is no C compiler")
     section = PAGE.read_text("utf-8").split("\n## ")[1]
@@ -101,7 +103,7 @@ def test_the_page_leads_to_an_arm_that_moves(tmp_path: Path) -> None:
     commands = "".join(re.findall(r"```sh\n(.*?)```", section, re.DOTALL))
     shell = f'hsp() {{ {sys.executable} -m hsp_control "$@"; }}\n'
     shell += f'python() {{ {sys.executable} "$@"; }}\n'
-    # CMake came with the package's own build where the machine has none.
+    # Without CMake on the machine, the package's build brought its own.
     path = f"{Path(sys.executable).parent}{os.pathsep}{os.environ['PATH']}"
     run = subprocess.run(
         ["bash", "-euc", shell + commands],

@@ -18,10 +18,11 @@ AWAY = 0.1
 
 
 class Somewhere(InProcessRobot):
-    """A robot whose first joint stands aside: at ``hold``, ``halt`` or ``lost``.
+    """A robot whose first joint is away from the start, at ``hold``, ``halt`` or
+    ``lost``.
 
     Attributes:
-        q: Where it is, shape (nq,).
+        q: Its configuration, shape (nq,).
     """
 
     def __init__(self, address: str, robot: Robot, period: float) -> None:
@@ -59,7 +60,7 @@ def test_it_begins_where_the_robot_is(
     run = Rollout.load(tmp_path / "panda_obstacle-live.npz")
     assert run["q"][0] == pytest.approx(hardware.q, abs=1e-6)
     assert run.config is not None
-    assert run.config["simulation"]["duration"] == 0.1  # of the loop, not the file
+    assert run.config["simulation"]["duration"] == 0.1  # in the loop, not in the file
     assert np.abs(run["task.hand.error"][run.t < 0.1]).max() < 1e-5
     # The outcome is printed as `hsp run` prints it.
     printed = " ".join(capsys.readouterr().out.split())

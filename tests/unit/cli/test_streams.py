@@ -1,4 +1,4 @@
-"""Commands write to whatever they are given: nothing, ASCII, a pipe that is closed."""
+"""Commands write to any stdout: none, ASCII only, or a closed pipe."""
 
 import os
 import subprocess
@@ -62,7 +62,7 @@ from hsp_control.cli.streams import lost_text, make_usable
 make_usable()
 make_usable()
 for k in range(10_000):
-    print("a line that fills what a pipe holds", k, flush=k % 2 == 0)
+    print("a line that fills the buffer of a pipe", k, flush=k % 2 == 0)
 print("done", lost_text(), file=sys.stderr)
 """
 
@@ -70,8 +70,8 @@ print("done", lost_text(), file=sys.stderr)
 @pytest.mark.parametrize("where", ["pipe", "/dev/full"])
 @pytest.mark.process
 @pytest.mark.smoke
-def test_a_command_goes_on_where_nobody_takes_its_text(where: str) -> None:
-    """A run must not be lost with the reader of its summary."""
+def test_a_command_continues_when_its_output_is_closed(where: str) -> None:
+    """A run is kept although the reader of its summary has closed the pipe."""
     if where == "pipe":
         reader, writer = os.pipe()
         os.close(reader)
@@ -91,12 +91,12 @@ def test_a_command_goes_on_where_nobody_takes_its_text(where: str) -> None:
 @pytest.mark.parametrize(("where", "status"), [("/dev/full", 2), ("/dev/null", 0)])
 @pytest.mark.process
 @pytest.mark.smoke
-def test_the_status_tells_whether_all_was_written(where: str, status: int) -> None:
+def test_the_status_reports_whether_all_was_written(where: str, status: int) -> None:
     with Path(where).open("w") as file:
         command = [sys.executable, "-m", "hsp_control", "robots", "panda"]
         done = subprocess.run(command, stdout=file, stderr=subprocess.PIPE, text=True)
-    said = "hsp: standard output: No space left on device" if status else ""
-    assert (done.returncode, done.stderr.strip()) == (status, said)
+    reported = "hsp: standard output: No space left on device" if status else ""
+    assert (done.returncode, done.stderr.strip()) == (status, reported)
 
 
 @pytest.mark.process
@@ -107,7 +107,7 @@ def test_the_schema_needs_no_docstrings() -> None:
 
 
 @pytest.mark.parametrize("kind", ["fifo", "device"])
-def test_what_never_ends_is_no_log_and_no_recording(kind: str, tmp_path: Path) -> None:
+def test_endless_inputs_are_no_log_and_no_recording(kind: str, tmp_path: Path) -> None:
     path = tmp_path / "a.npz"
     if kind == "fifo":
         os.mkfifo(path)

@@ -1,12 +1,12 @@
-"""The silence of another process."""
+"""How long another process has been silent."""
 
 import pytest
 
 from hsp_control.common.silence import Silence
 
 
-def test_a_step_that_takes_long_is_no_silence() -> None:
-    """This process was stopped itself."""
+def test_a_long_step_is_no_silence() -> None:
+    """Time in which this process itself was stopped is no silence of the other."""
     silence = Silence(-900.0)
     for k in range(10):
         found = silence.look(900.0 * k, received=False)

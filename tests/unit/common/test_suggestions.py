@@ -20,9 +20,9 @@ def test_the_nearest_name_is_suggested() -> None:
 
 
 def test_an_unknown_argument_is_named_with_the_nearest_one() -> None:
-    """Of the controller, and of what is made of it; their signatures stay."""
-    told = "Controller: ... 'nullspace_gain' ... 'null_space_gain' ... robot, tasks"
-    with pytest.raises(TypeError, match=wording(told)):
+    """On the controller and the objects it returns; their signatures are unchanged."""
+    reported = "Controller: ... 'nullspace_gain' ... 'null_space_gain' ... robot, tasks"
+    with pytest.raises(TypeError, match=wording(reported)):
         hsp.Controller(nullspace_gain=3)  # type: ignore[call-arg]
     with pytest.raises(TypeError, match=r"^Recorder: unknown argument 'log_perod'"):
         hsp.Recorder(None, log_perod=1)  # type: ignore[call-arg]
@@ -34,10 +34,10 @@ def test_an_unknown_argument_is_named_with_the_nearest_one() -> None:
         (hsp.freeze, "perid", "period"),
         (hsp.run_loop, "duraton", "duration"),
     ):
-        said = (
+        output = (
             rf"^{call.__qualname__}: unknown argument '{wrong}'; did you mean '{meant}'"
         )
-        with pytest.raises(TypeError, match=said):
+        with pytest.raises(TypeError, match=output):
             call(**{wrong: 1})
     with pytest.raises(TypeError, match="missing 1 required positional argument"):
         hsp.Controller(None)  # type: ignore[call-arg]

@@ -1,4 +1,4 @@
-"""A run made in Python is repeated by its log, or the log names the obstacle."""
+"""A run made in Python can be repeated from its log, or the log says why it cannot."""
 
 import shutil
 from pathlib import Path
@@ -36,7 +36,8 @@ def repeated(log: Path) -> hsp.Rollout:
 
 
 def test_a_simulation_repeats_from_where_and_when_it_began(tmp_path: Path) -> None:
-    """Relative values refer to another configuration, and a change is over before."""
+    """Relative values refer to a configuration other than Q0; a change precedes the
+    run."""
     made = law(start=ROBOT.home())
     made.at(0.5).gains("tip", hsp.Gains(natural_frequency=3.0))
     run = hsp.simulate(made, Q0, **RUN, start_time=1.0)
@@ -82,7 +83,7 @@ def test_a_live_loop_repeats_as_a_simulation_until_its_stop(tmp_path: Path) -> N
     killed = tmp_path / "killed.journal"
 
     def on_period(t: float) -> None:
-        if t > 0.05 and not killed.exists():  # what a killed one leaves
+        if t > 0.05 and not killed.exists():  # the journal of a killed run
             shutil.copy(log, killed)
         if t > 0.1:
             requests.stop()
@@ -104,7 +105,7 @@ def test_a_live_loop_repeats_as_a_simulation_until_its_stop(tmp_path: Path) -> N
     ({}, {"plant": hsp.plants.RigidBodyPlant(heavier())},
      "its plant is a RigidBodyPlant that was built in Python; give a PlantPart"),
 ])  # fmt: skip
-def test_what_cannot_be_repeated_says_why(
+def test_an_unrepeatable_run_gives_the_reason(
     made: dict[str, Any], given: dict[str, Any], why: str, tmp_path: Path
 ) -> None:
     log = hsp.simulate(law(**made), Q0, **RUN | given).save(tmp_path / "run.npz")

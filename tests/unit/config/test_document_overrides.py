@@ -1,4 +1,4 @@
-"""Check overrides, and where errors that are raised later are located."""
+"""Overrides, and the location of errors that are raised after reading."""
 
 import pickle
 import re
@@ -72,8 +72,10 @@ def test_mistakes_in_overrides(override: str, expected: str) -> None:
 
 
 def test_mistakes_of_overrides_come_last() -> None:
-    told = "panda.yaml:2: view: 3 ... and 1 more: ... 'steps=x': steps: 'x' ... integer"
-    assert re.search(wording(told), message("robot: a\nview: 3", "steps=x"))
+    reported = (
+        "panda.yaml:2: view: 3 ... and 1 more: ... 'steps=x': steps: 'x' ... integer"
+    )
+    assert re.search(wording(reported), message("robot: a\nview: 3", "steps=x"))
 
 
 # --- errors raised later -------------------------------------------------------------

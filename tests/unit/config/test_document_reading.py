@@ -1,4 +1,4 @@
-"""Check what is read from a text, and every message of one that is no YAML."""
+"""Values read from a text, and every message about a text that is not YAML."""
 
 import os
 import re
@@ -13,7 +13,7 @@ from hsp_control.config import yaml_reader
 from hsp_control.config.document import Document
 from hsp_control.config.yaml_reader import MAX_SIZE
 
-# --- what is read --------------------------------------------------------------------
+# --- values --------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize(
@@ -58,14 +58,14 @@ def test_every_key_path_has_a_location() -> None:
     assert document.mark(("fields", 0, "weight")) == (15, 3)
     assert document.mark(("fields", 1, "middle", "joint")) == (16, 30)
     assert document.location(("tasks", "elbow", "gains")) == "panda.yaml:11"
-    # Behind an alias, the line to mend is where its anchor stands.
+    # Behind an alias, the line to correct is that of its anchor.
     assert document.location(("tasks", "elbow", "gains", "kp")) == "panda.yaml:5"
     # A missing key is reported at its nearest ancestor.
     assert document.location(("tasks", "hand", "gains", "ki", 3)) == "panda.yaml:5"
     assert document.location(("nothing",)) == "panda.yaml:1"
 
 
-# --- what is not YAML, or more than data ---------------------------------------------
+# --- not YAML, or more than data ------------------------------------------------------
 
 
 UNREADABLE = [
@@ -103,7 +103,7 @@ UNREADABLE = [
 
 
 @pytest.mark.parametrize(("text", "expected"), UNREADABLE)
-def test_what_cannot_be_read(text: str, expected: str) -> None:
+def test_unreadable_input(text: str, expected: str) -> None:
     assert re.search(wording(f"panda.yaml:{expected}"), message(text))
 
 

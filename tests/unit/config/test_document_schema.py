@@ -14,7 +14,7 @@ from typing_extensions import TypeAliasType
 from wording import wording
 
 TASK = "robot: panda\ntasks:\n  hand:\n    frame: hand\n"
-"""Four lines, after which a test adds a key to the task."""
+"""Four lines; tests append a key of the task."""
 
 INVALID = [
     # keys
@@ -88,7 +88,7 @@ INVALID = [
 
 
 @pytest.mark.parametrize(("text", "expected"), INVALID)
-def test_what_does_not_follow_the_schema(text: str, expected: str) -> None:
+def test_texts_that_do_not_follow_the_schema(text: str, expected: str) -> None:
     assert re.search(wording(f"panda.yaml:{expected}"), message(text))
 
 
@@ -110,7 +110,7 @@ Chosen = Annotated[
 
 
 class Lenient(BaseModel):
-    """Types that the scenario above does not use, converted where pydantic can."""
+    """Types that the scenario above does not use; pydantic converts where it can."""
 
     pair: tuple[float, float] = (0.0, 0.0)
     pairs: list[tuple[float, float]] = []
@@ -201,5 +201,5 @@ def test_several_mistakes_are_listed_in_the_order_of_the_file() -> None:
         "panda.yaml:5: fields.0.middel: ... 'middle'",
         "panda.yaml:6: fields.1.weight: 'b' ... number",
     )
-    for told, line in zip(expected, [first, *lines], strict=True):
-        assert re.search(wording(told), line.strip())
+    for reported, line in zip(expected, [first, *lines], strict=True):
+        assert re.search(wording(reported), line.strip())

@@ -81,7 +81,7 @@ def test_a_configuration_becomes_the_objects_it_names() -> None:
     positions = experiment.robot.joint_positions(experiment.q0)
     assert positions[3] == -2.0  # given by name
     assert positions[1] == experiment.robot.joint_positions(experiment.robot.home())[1]
-    # The blend starts where the robot does, so that the run starts without error.
+    # The blend begins at the robot's pose, so the run starts without error.
     assert len(experiment.run()) == 3
     np.testing.assert_allclose(experiment.run()["task.pen.error"][0], 0.0, atol=1e-12)
 
@@ -112,8 +112,8 @@ def test_limits_that_are_all_commented_out_are_not_none(tmp_path: Path) -> None:
     file.write_text("\n".join([*lines, "limits:", "#  effort: 9"]))
     with pytest.raises(exceptions.ConfigError) as raised:
         load_experiment(file)
-    told = f"{file}:{len(lines) + 1}: limits: nothing ... none ... robot's own"
-    assert re.search(wording(told), str(raised.value))
+    reported = f"{file}:{len(lines) + 1}: limits: nothing ... none ... robot's own"
+    assert re.search(wording(reported), str(raised.value))
 
 
 def test_a_run_is_repeated_from_its_own_log(tmp_path: Path) -> None:
@@ -144,7 +144,7 @@ def test_a_log_of_a_robot_file_can_be_repeated_from_elsewhere(
     assert load_experiment(log).robot.nv == 3
 
 
-# Each row: what is changed, the class of the error, and its message.
+# Each row: the changed value, the class of the error, and its message.
 MISTAKES = [
     ("robot.name", "pandda", "RobotNotFoundError",
      "robot.name: no ... 'pandda' ... 'panda'"),

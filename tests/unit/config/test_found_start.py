@@ -1,4 +1,4 @@
-"""A start that is found: recorded, repeated, refused with numbers, offered by check."""
+"""A searched start: logged, repeated, refused with numbers, suggested by check."""
 
 from pathlib import Path
 from typing import Any
@@ -37,7 +37,7 @@ def test_auto_is_regular_for_the_tasks_and_recorded(tmp_path: Path) -> None:
     assert repeated.scenario.start.configuration is not None
 
 
-def test_an_orientation_counts_if_it_is_given() -> None:
+def test_a_given_orientation_is_used() -> None:
     pose = {"position": [0.5, 0.0, 0.5], "rotation": [0.0, 2.5, 0.0]}
     experiment = load_experiment({**IIWA, "start": {"pose": pose}})
     robot = experiment.robot
@@ -60,7 +60,7 @@ def test_an_orientation_counts_if_it_is_given() -> None:
         ("auot", r"start: .* expected 'auto' or a dict; did you mean 'auto'"),
     ],
 )
-def test_mistakes_say_where(start: Any, message: str) -> None:
+def test_mistakes_have_their_place(start: Any, message: str) -> None:
     with pytest.raises((ConfigurationError, ConfigError, LookupError), match=message):
         load_experiment({**IIWA, "start": start})
 
@@ -94,7 +94,7 @@ def test_check_offers_a_start_that_can_be_pasted(
     assert "singular at the start:" not in capsys.readouterr().out
 
 
-def test_check_names_what_collides(
+def test_check_names_colliding_links(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     ball = {

@@ -53,7 +53,7 @@ def costs(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
     hsp.Barrier.family.members.pop("above_of_a_test", None)
 
 
-def test_yaml_names_what_a_file_has(
+def test_yaml_lists_the_content_of_a_file(
     costs: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     assert main(["run", "x.yaml"]) == 2
@@ -63,7 +63,7 @@ def test_yaml_names_what_a_file_has(
     assert "--import costs_of_a_test.py runs code, which" in capsys.readouterr().err
     assert costs.stem not in sys.modules
     assert main(["run", "x.yaml", "--import", str(costs)]) == 0
-    # A log names the function, too; and the file was run already.
+    # A log names the function, too; the file is not run again.
     experiment = hsp.load_experiment("out/x.npz")
     elbow, nod = experiment.controller.field.terms  # type: ignore[attr-defined]
     assert elbow == 20.0 * hsp.FunctionCost(sys.modules[costs.stem].elbow)

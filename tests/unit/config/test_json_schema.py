@@ -85,7 +85,7 @@ def test_every_number_has_a_unit(properties: list[tuple[str, Any]]) -> None:
         ("Stiffness [-1/s²].", False),
     ],
 )
-def test_what_a_unit_is(text: str, has_one: bool) -> None:
+def test_units(text: str, has_one: bool) -> None:
     assert bool(UNIT.search(text)) is has_one
 
 
@@ -122,7 +122,7 @@ NAMED = {**TASK, "name": "elbow"}
     ("tasks", "added", "good"),
     [
         (TASK, TASK, True),
-        (TASK, NAMED, True),  # in a list of changes, no key is its name
+        (TASK, NAMED, True),  # changes are a list: none has a key as its name
         (NAMED, NAMED, False),
         (TASK, {**NAMED, "frme": "hand"}, False),
     ],

@@ -160,11 +160,11 @@ WRONG: dict[str, Any] = {
     "mapping": {"nonsense": 1},
 }
 FOREIGN = ("instance", "should be", "Input", "Sequence", "dataclass", "function-")
-"""Words of pydantic."""
+"""Words that only pydantic uses."""
 
 
 def inner_paths(value: Any, path: KeyPath = ()) -> Iterator[KeyPath]:
-    """Yield the key paths of a value, from the outside."""
+    """Yield the key paths of a value, outermost first."""
     entries: Any = ()
     if isinstance(value, dict):
         entries = value.items()
@@ -183,7 +183,7 @@ def holder_of(data: Any, path: KeyPath) -> Any:
 
 
 def mistakes(data: Any, path: KeyPath) -> Iterator[tuple[str, Any, str]]:
-    """Yield what is wrong, the data with it, and the key path that it is at."""
+    """Yield a mistake's name, the data with it, and its key path."""
     for what, value in WRONG.items():
         wrong = json.loads(json.dumps(data))
         holder_of(wrong, path)[path[-1]] = value
@@ -198,7 +198,7 @@ def mistakes(data: Any, path: KeyPath) -> Iterator[tuple[str, Any, str]]:
 
 
 def kinds(data: Any) -> dict[Any, KeyPath]:
-    """Return one key path of each kind: the type of its holder, and its last keys."""
+    """Return one key path per kind: the type that holds it, and its last keys."""
     found: dict[Any, KeyPath] = {}
     for path in inner_paths(data):
         holder = holder_of(data, path)
@@ -214,7 +214,7 @@ def together(error: HspControlError, path: KeyPath) -> bool:
 
 
 def refusal(document: Document) -> HspControlError | None:
-    """Return the error of a document, if it has mistakes."""
+    """Return the error that a document raises, or None."""
     try:
         validate(document, Scenario)
     except HspControlError as error:
@@ -230,7 +230,7 @@ def test_any_mistake_in_any_configuration_is_named_at_its_place() -> None:
         name: file.read_text(encoding="utf-8")
         for name, file in bundled_configs().items()
     }
-    # Each kind in the shortest text that has it, which is read soonest.
+    # Each kind is taken from the shortest text that has it: it is read fastest.
     for name, text in sorted(texts.items(), key=lambda each: len(each[1])):
         data, marks = read_yaml(text)
         for kind, path in kinds(data).items():

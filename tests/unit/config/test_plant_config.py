@@ -43,7 +43,7 @@ def panda(plant: Any) -> dict[str, Any]:
 
 @pytest.mark.parametrize("kind", ["rigid_body", "mujoco"])
 def test_everything_at_once(kind: str, tmp_path: Path) -> None:
-    """It runs on both engines, and its log is enough to run it again."""
+    """It runs on both engines, and its log alone suffices to repeat the run."""
     if kind == "mujoco":
         pytest.importorskip("hsp_control.companions.mujoco")
     experiment = load_experiment(panda({**EVERYTHING, "type": kind}))
@@ -148,7 +148,7 @@ def test_plants_that_are_none(plant: Any, message: str) -> None:
     ["mujoco", {"type": "rigid_body", "friction": "urdf"},
      {"type": "rigid_body", "drives": {"delay": 1}}],
 )  # fmt: skip
-def test_what_moves_by_itself_needs_a_control_period(plant: Any) -> None:
+def test_sampled_plants_need_a_control_period(plant: Any) -> None:
     if plant == "mujoco":
         pytest.importorskip("hsp_control.companions.mujoco")
     config = panda(plant)

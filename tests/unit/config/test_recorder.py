@@ -1,4 +1,4 @@
-"""A loop of one's own is recorded in the log that all commands take."""
+"""A user's loop is recorded in a log that all commands read."""
 
 from asyncio import CancelledError
 from contextlib import suppress
@@ -21,7 +21,7 @@ def law(field: hsp.NullSpaceField) -> hsp.Controller:
 
 
 def run(controller: hsp.Controller, recorder: hsp.Recorder, steps: int) -> None:
-    """Hold each effort for a period; the hand goes elsewhere meanwhile."""
+    """Hold each effort for a period, while the hand moves away."""
     robot = controller.robot
     q, v = robot.home(), np.zeros(robot.nv)
     there = robot.state(0.0, q, v).position(robot.end_effector) + 0.03
@@ -47,7 +47,7 @@ def test_a_recorded_loop_is_repeated(tmp_path: Path) -> None:
     np.testing.assert_allclose(log.t, np.linspace(0.0, 0.5, 51), atol=1e-12)
     again = hsp.load_experiment(path).run()
     np.testing.assert_allclose(again.t, log.t)
-    # Only what integrates the robot differs.
+    # Only the integrator differs.
     for name in ("q", "task.hand.reference", "task.hand.error"):
         np.testing.assert_allclose(again[name], log[name], atol=2e-3)
     home = controller.robot.home()
@@ -57,7 +57,7 @@ def test_a_recorded_loop_is_repeated(tmp_path: Path) -> None:
 
 
 def test_a_recorder_that_begins_later_repeats_its_part(tmp_path: Path) -> None:
-    """The circle is about where the controller began, and so is its time."""
+    """The circle is relative to the controller's start, in place and in time."""
     path, robot = tmp_path / "part.npz", load("panda")
     hand = hsp.FramePosition(name="hand", trajectory=hsp.Circle(0.05, 3.0), blend=0.01)
     controller = hsp.Controller(robot, [hand], hsp.JointCentering())
@@ -79,10 +79,10 @@ def test_a_recorder_that_begins_later_repeats_its_part(tmp_path: Path) -> None:
     np.testing.assert_allclose(again.q, log.q, atol=2e-3)
 
 
-def test_what_was_sent_is_recorded_and_for_how_long_it_was_held(
+def test_sent_efforts_and_their_durations_are_recorded(
     tmp_path: Path,
 ) -> None:
-    """Five periods a row; the robot got half of each effort."""
+    """A row every five periods; the robot received half of each effort."""
     path, controller = tmp_path / "sent.npz", law(hsp.JointCentering())
     q, v, efforts = controller.robot.home(), np.zeros(7), []
     with hsp.Recorder(controller, path, log_period=5 * PERIOD) as recorder:
@@ -116,7 +116,7 @@ def test_how_long_efforts_were_held_is_logged_where_rows_have_whole_periods(
     assert config["simulation"]["control_period"] == (held and pytest.approx(held))
 
 
-def test_what_cannot_be_repeated_says_why_and_an_error_ends_the_log(
+def test_an_unrepeatable_run_gives_the_reason_and_an_error_ends_the_log(
     tmp_path: Path,
 ) -> None:
     path, controller = tmp_path / "mine.npz", law(hsp.FunctionCost(lambda s: s.q[0]))
@@ -149,7 +149,7 @@ def test_what_cannot_be_repeated_says_why_and_an_error_ends_the_log(
         type(error).__name__ if isinstance(error, BaseException) else None
     ),
 )  # fmt: skip
-def test_whatever_is_raised_the_next_recorder_can_write(
+def test_after_any_exception_the_next_recorder_can_write(
     error: BaseException, rows: int, tmp_path: Path
 ) -> None:
     path, controller = tmp_path / "mine.npz", law(hsp.JointCentering())
@@ -173,7 +173,7 @@ def test_whatever_is_raised_the_next_recorder_can_write(
         assert first.rollout.status == "stopped"
 
 
-def test_a_recorder_that_nobody_closed_is_named_until_it_is_forgotten(
+def test_an_unclosed_recorder_is_named_until_it_is_freed(
     tmp_path: Path,
 ) -> None:
     path, controller = tmp_path / "mine.npz", law(hsp.JointCentering())

@@ -1,4 +1,4 @@
-"""A configuration as plain data has the same meaning: logs keep it like this."""
+"""A configuration as plain data, as logs store it, has the same meaning."""
 
 import json
 from dataclasses import fields
@@ -90,13 +90,11 @@ def scenario_of(name: str) -> Scenario:
 
 
 @pytest.mark.parametrize(("name", "defaults"), covering(NAMES, [False, True]))
-def test_a_configuration_equals_what_it_becomes_as_data(
-    name: str, defaults: bool
-) -> None:
+def test_a_configuration_equals_its_plain_data(name: str, defaults: bool) -> None:
     scenario = scenario_of(name)
     data = plain_data(scenario, defaults=defaults)
     assert validate(Document(data, {}, name), Scenario) == scenario
-    # JSON and YAML change nothing either.
+    # Neither does a way through JSON or YAML change it.
     assert json.loads(json.dumps(data, allow_nan=False)) == data
     again = Document.parse(yaml.safe_dump(data), name)
     assert validate(again, Scenario) == scenario
@@ -116,7 +114,7 @@ def test_with_defaults_no_key_is_missing() -> None:
     assert plain_data(empty, defaults=True)["contacts"] == {}
 
 
-def test_what_only_python_can_say_is_named() -> None:
+def test_options_of_python_alone_are_named() -> None:
     cost = FunctionCost(lambda q, t: 0.0)
     model = NullSpaceSettings(fields=[cost])
     with pytest.raises(ConfigError, match=r"^fields\.0.function: YAML cannot express"):
@@ -154,7 +152,7 @@ def test_an_experiment_of_parts_goes_to_yaml_and_back(tmp_path: Path) -> None:
     first, second = made.run(), again.run()
     np.testing.assert_array_equal(first.tau, second.tau)
     assert not list(validator().iter_errors(yaml.safe_load(made.to_yaml())))
-    # A log has the same, and its run can be repeated.
+    # A log stores the same, and its run can be repeated.
     log = load_experiment(first.save(tmp_path / "run.npz"))
     np.testing.assert_array_equal(log.run().tau, first.tau)
 
@@ -174,7 +172,8 @@ def test_a_wrong_setting_is_named(settings: dict[str, Any], message: str) -> Non
 
 
 def test_obstacles_that_parts_hold_are_in_the_scene() -> None:
-    """YAML names obstacles; what holds one in Python is written with its name."""
+    """YAML names obstacles; a part that holds one in Python is written with its
+    name."""
     ball = Obstacle("ball", Sphere(0.1), Hold([0.6, 0.4, 0.6]))
     field = JointCentering() + 20.0 * ObstacleClearance([ball])
     limits = Limits(barriers=[ObstacleDistance(obstacles=[ball])])

@@ -1,4 +1,4 @@
-"""Mistakes about contacts, limits, priorities and the base: a located message each."""
+"""Mistakes in contacts, limits, priorities and the base: one located message."""
 
 import json
 import re
@@ -39,7 +39,7 @@ FOOT = "contacts.front_left"
 TWICE = {"intervals": [[0, 2], [1, 3]]}
 REMOVED = object()
 
-# Each row: the robot, what is changed, the class of the error, and its message.
+# Each row: the robot, the changed value, the class of the error, and its message.
 MISTAKES: list[tuple[dict[str, Any], str, Any, str, str]] = [
     (SOLO, f"{FOOT}.frame", "FL_FOT", "FrameNotFoundError",
      f"{FOOT}.frame: no ... 'FL_FOT' ... 'FL_FOOT'"),
@@ -106,7 +106,7 @@ def changed(base: dict[str, Any], path: str, value: Any) -> dict[str, Any]:
 
 
 def check(data: dict[str, Any], error: str, message: str, file: Path) -> None:
-    """The one message names the file, a line of it, and the culprit."""
+    """The message names the file, the line, and the wrong value."""
     file.write_text(yaml.safe_dump(data, sort_keys=False))
     with pytest.raises(getattr(exceptions, error)) as caught:
         load_experiment(file)

@@ -1,4 +1,4 @@
-"""Barriers of one's own: their rows, what the controller keeps, and what is refused."""
+"""User-defined barriers: their rows, their margins in the loop, and refusals."""
 
 from collections.abc import Callable
 from typing import Any
@@ -25,7 +25,7 @@ class FrameHeight(hsp.Barrier):
     """How fast the height rises [m/s]."""
 
     def values(self, state: hsp.RobotState) -> float:
-        """Return the height less what it has risen."""
+        """Return the height above the risen minimum."""
         return float(state.position(self.frame)[2]) - self.rate * state.t
 
 
@@ -42,7 +42,7 @@ class Reach(hsp.Barrier):
 
 
 class Given(hsp.Barrier):
-    """Values as they are given."""
+    """Values as given."""
 
     function: Callable[[hsp.RobotState], Any]
     """h of a state [-]."""
@@ -52,7 +52,7 @@ class Given(hsp.Barrier):
 
 
 class Flat(FrameHeight):
-    """With one row too few dimensions."""
+    """The Jacobian of the only row has one dimension too few."""
 
     def gradients(self, state: hsp.RobotState) -> Any:
         return np.ones(7)
@@ -80,13 +80,13 @@ def test_rows_are_the_barriers_second_derivative(seed: int) -> None:
         rate, second = (h(e) - h(-e)) / (2 * e), (h(e) - 2 * h(0) + h(-e)) / e**2
         A, b = limit.rows(robot.state(0.4, q, v), 10.0, np.zeros(7))
         expected = second + 20.0 * rate + 100.0 * (h(0) - limit.minimum)
-        # differences over 3 ms against differences over 1 ms, of values of up to 1000
+        # differences over 3 ms and over 1 ms, of values up to 1000
         np.testing.assert_allclose(A @ a - b, np.atleast_1d(expected), atol=0.02)
 
 
 @pytest.mark.slow
 def test_a_hand_that_is_drawn_below_stays_above() -> None:
-    """It rests at the barrier; one that is far away changes no effort."""
+    """The frame rests at the barrier; a distant barrier changes no effort."""
     robot = panda()
     here = robot.state(0.0, robot.home(), np.zeros(7)).position("panda_tcp")
     deep = hsp.Hold(here + np.array([0.1, 0.05, -0.3]))

@@ -1,7 +1,8 @@
 """Contacts and floating bases: rows, forces, the law on constrained plants, schedules.
 
-Rows against differences; the effort against a plant that solves the constraint for
-itself; the laws of errors and of the null space along motions of that plant.
+Rows against differences; the effort against a plant that solves the constraint
+independently; the equations of errors and of the null space along motions of that
+plant.
 """
 
 from collections.abc import Callable
@@ -89,7 +90,7 @@ CONTACTS: dict[str, tuple[Callable[[], hsp.Robot], hsp.contacts.Contact]] = {
 @pytest.mark.parametrize("kind", CONTACTS)
 @given(seeds)
 @settings(max_examples=10)
-def test_rows_are_the_velocity_of_what_touches(kind: str, seed: int) -> None:
+def test_rows_are_the_velocity_at_the_contact(kind: str, seed: int) -> None:
     load, contact = CONTACTS[kind]
     robot = load()
     state = random_state(robot, seed)
@@ -129,7 +130,7 @@ def test_rows_are_the_velocity_of_what_touches(kind: str, seed: int) -> None:
 
 @given(seeds)
 @settings(max_examples=10)
-def test_unactuated_rows_ask_for_no_effort(seed: int) -> None:
+def test_unactuated_rows_demand_no_effort(seed: int) -> None:
     """Two point feet: Uᵀ(M a + N) = 0 is a row of the law, and J' is its derivative."""
     robot = solo()
     base = np.array(robot.unactuated)
@@ -154,7 +155,7 @@ def test_unactuated_rows_ask_for_no_effort(seed: int) -> None:
     assert abs(found[0]) == pytest.approx(abs(u @ effort[base]) / mass, rel=1e-9)
 
     def projector(s: float) -> Array:
-        """The row space, which does not depend on U's sign."""
+        """Compare row spaces: they do not depend on U's sign."""
         row = rows(robot.state(0.0, robot.integrate(q, s * v), v)).jacobian
         held = np.vstack(
             [
@@ -226,7 +227,7 @@ def test_effort_and_forces_are_one_solution(seed: int) -> None:
     support = controller.active_stack.support
     rest = state.inverse_dynamics(out.acceleration) - out.tau
     rest = rest - support.map @ out.forces
-    assert np.abs(rest).max() < 1e-6  # [N] of 900 N: what the solver leaves
+    assert np.abs(rest).max() < 1e-6  # [N] of 900 N: the solver's residual
     assert not out.tau[:6].any()
     if out.status < Status.RELAXED:
         for contact in controller.contacts:
@@ -241,7 +242,7 @@ def test_effort_and_forces_are_one_solution(seed: int) -> None:
 
 
 def test_forces_are_permitted_up_to_the_friction_cone() -> None:
-    """The pyramid touches the cone from within at its edges, with each contact's μ."""
+    """The edges of the inscribed pyramid lie on the cone, with each contact's μ."""
     frictions = (0.3, 0.9)
     contacts = [
         PlannedContact(hsp.contacts.PointContact(foot, friction=mu), PRESENT)
@@ -258,11 +259,11 @@ def test_forces_are_permitted_up_to_the_friction_cone() -> None:
             assert support.permits()
             support.forces[3 * k : 3 * k + 2] = (1.0 + 1e-9) * tangential
             assert not support.permits()
-    support.forces[:] = 0.0, 0.0, -1.0, 0.0, 0.0, 5.0  # it pulls
+    support.forces[:] = 0.0, 0.0, -1.0, 0.0, 0.0, 5.0  # a pulling force
     assert not support.permits()
 
 
-def test_the_log_says_how_much_friction_is_used() -> None:
+def test_the_log_has_the_used_friction() -> None:
     """The largest ‖f_t‖/(μ f_n) of a sole's corners, each sole with its own μ."""
     robot, frictions = talos(), (0.4, 0.9)
     contacts = [
@@ -290,14 +291,14 @@ def test_the_log_says_how_much_friction_is_used() -> None:
 
 
 def test_propositions_hold_for_a_humanoid() -> None:
-    """On the constrained plant both levels' errors obey their equation."""
+    """On the constrained plant the errors of both levels obey their equations."""
     controller = standing()
     robot = controller.robot
     plant = ContactPlant(robot, [RigidContact(f) for f in SOLES], damping=40.0)
     q0 = robot.integrate(
         robot.home(), np.r_[np.zeros(6), 0.02 * np.cos(np.arange(robot.nv - 6))]
     )
-    v0 = controller.flow(0.0, q0)  # a start that the contacts allow
+    v0 = controller.flow(0.0, q0)  # a start that is consistent with the contacts
     how: dict[str, Any] = {"duration": 0.3, "log_period": 0.02, "plant": plant}
     rollout = continuous(controller, q0, v0, tolerance=1e-9, **how)
     assert not rollout["damped"].any()
@@ -306,7 +307,7 @@ def test_propositions_hold_for_a_humanoid() -> None:
 
 
 def test_null_space_decays_on_the_constrained_plant() -> None:
-    """Self-motion that is not the field's dies out like exp(-K_N t)."""
+    """Self-motion other than the field's decays like exp(-K_N t)."""
     controller = standing()
     robot = controller.robot
     state = robot.state(0.0, robot.home(), np.zeros(robot.nv))

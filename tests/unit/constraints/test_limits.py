@@ -1,6 +1,6 @@
-"""The numbers of limits for a robot, and the distances that they keep.
+"""Limits as numbers of a robot, and distance limits.
 
-``tests/unit/control/test_limits.py`` has what the controller does with them.
+``tests/unit/control/test_limits.py`` tests them in the control step.
 """
 
 from functools import cache
@@ -53,9 +53,9 @@ def of(robot: Robot, *scene: Obstacle, **options: Any) -> RobotLimits:
 
 
 def test_a_joint_without_a_speed_has_the_largest_of_its_unit() -> None:
-    """Else it would compensate for the others' limits at any speed."""
+    """Otherwise this joint could be commanded any speed to keep the others' limits."""
     own = panda().model.velocityLimit
-    assert own.max() > own[0]  # its joints have two
+    assert own.max() > own[0]  # its joints have two degrees of freedom
     for missing in (0.0, np.finfo(np.float32).max):
         model = panda().model.copy()
         model.velocityLimit[0] = missing
@@ -87,11 +87,11 @@ def test_by_default_they_are_the_robots_own() -> None:
 
 
 def test_by_default_gravity_may_overload_no_motor_of_an_arm() -> None:
-    """Where it could demand more than a motor has in some posture, it is limited."""
+    """The gain is limited where it could demand more than a motor's effort."""
     robot, rng, rest = panda(), np.random.default_rng(1), np.zeros(7)
     for _ in range(2000):
-        asked = robot.inverse_dynamics(robot.random_configuration(rng), rest, rest)
-        assert (np.abs(asked) < robot.largest_gravity).all()
+        requested = robot.inverse_dynamics(robot.random_configuration(rng), rest, rest)
+        assert (np.abs(requested) < robot.largest_gravity).all()
     for none in ({}, {"effort": "none"}, {"effort": 1.0, "static_effort": "none"}):
         assert of(robot, **none).static_effort is None
     assert of(fingers(), effort=1.0).static_effort is not None
@@ -137,7 +137,8 @@ def test_positions_of_some_joints() -> None:
     np.testing.assert_array_equal(limits.lower, lower)
     np.testing.assert_array_equal(limits.upper, upper)
     assert limits.motion.upper[3] == -0.505
-    np.testing.assert_array_equal(of(panda()).lower, own.lower)  # the robot's stay
+    # the robot's own limits are unchanged
+    np.testing.assert_array_equal(of(panda()).lower, own.lower)
 
 
 def test_a_range_without_limits_for_a_root() -> None:
@@ -197,7 +198,7 @@ MISFITS: list[tuple[Any, dict[str, Any], type[HspControlError], str, str]] = [
 
 
 @pytest.mark.parametrize(("robot", "options", "error", "path", "message"), MISFITS)
-def test_what_does_not_fit_the_robot(
+def test_parts_that_do_not_fit_the_robot(
     robot: Any,
     options: dict[str, Any],
     error: type[HspControlError],
@@ -229,7 +230,7 @@ def test_start_outside_the_limits_names_the_joint() -> None:
 
 
 def ball() -> Obstacle:
-    """Return a ball that comes into the Panda's elbow and goes again."""
+    """Return a ball that moves into the Panda's elbow and away again."""
     home = panda().state(0.0, panda().home(), np.zeros(7))
     center = home.position("panda_link4") + np.array([0.0, 0.35, 0.0])
     path = Lissajous([0.0, 0.28, 0.0], [1.0, 2.0, 1.0], [0.0, 3.14, 0.0], center)
@@ -255,7 +256,7 @@ def test_distance_rows_are_its_second_derivative(kind: str) -> None:
     limit = DISTANCES[kind].placed(at_home(robot, ball(), table()))
     rng = np.random.default_rng(2)
     v, a = 0.3 * rng.standard_normal(7), rng.standard_normal(7)
-    q = robot.integrate(robot.home(), 0.3 * rng.standard_normal(7))  # nothing parallel
+    q = robot.integrate(robot.home(), 0.3 * rng.standard_normal(7))  # no parallel faces
     state = robot.state(0.4, q, v)
 
     def room(s: float, a: Array) -> Array:
@@ -271,19 +272,20 @@ def test_distance_rows_are_its_second_derivative(kind: str) -> None:
     rate = (room(h, rest) - room(-h, rest)) / (2.0 * h)
     least = -second(rest) - 20.0 * rate - 100.0 * near
     close = near + 0.5 * np.minimum(rate, 0.0) < 0.2
-    for wanted in (a, 1e3 * a):  # what far pairs permit, and what they do not
-        asked = second(wanted) - second(rest)
-        chosen = close | (asked < 0.5 * least)
+    # speeds that distant pairs permit, and speeds that they do not
+    for wanted in (a, 1e3 * a):
+        requested = second(wanted) - second(rest)
+        chosen = close | (requested < 0.5 * least)
         A, b = limit.rows(state, 10.0, wanted)
         assert len(A) == chosen.sum() > 0
         scale = 1e-2 * np.linalg.norm(wanted)
-        np.testing.assert_allclose(A @ wanted, asked[chosen], rtol=0, atol=scale)
+        np.testing.assert_allclose(A @ wanted, requested[chosen], rtol=0, atol=scale)
         np.testing.assert_allclose(b, least[chosen], rtol=0, atol=2e-2)
 
 
 @pytest.mark.parametrize("name", ["panda", "kinova", *further("solo12")])
 def test_the_rows_are_those_of_single_pairs(name: str) -> None:
-    """Also where q is no vector, and where Coal computes a distance (the cloud)."""
+    """Also where q is not in a vector space, and with distances by Coal (the cloud)."""
     robot, rng = Robot.load(name), np.random.default_rng(4)
     points = rng.uniform(-0.05, 0.05, (20, 3))
     cloud = Obstacle("cloud", PointCloud(points, 0.01), Hold([0.4, 0.3, 0.4]))
@@ -291,7 +293,8 @@ def test_the_rows_are_those_of_single_pairs(name: str) -> None:
     seen = at_home(robot, cloud)
     q = robot.integrate(robot.home(), 0.1 * rng.standard_normal(robot.nv))
     state = robot.state(0.4, q, 0.3 * rng.standard_normal(robot.nv))
-    wanted = 1e4 * rng.standard_normal(robot.nv)  # so that also far pairs count
+    # so that distant pairs are active, too
+    wanted = 1e4 * rng.standard_normal(robot.nv)
     for limit in (
         SelfDistance().placed(start),
         ObstacleDistance().placed(start),
@@ -303,13 +306,13 @@ def test_the_rows_are_those_of_single_pairs(name: str) -> None:
         chosen = [int(np.abs(least - each).argmin()) for each in b]
         assert len(b) > 0
         assert chosen == sorted(set(chosen))
-        # second differences over 3 ms: 1e5 times the rounding of a distance
+        # second differences over 3 ms amplify rounding of the distance by 1e5
         np.testing.assert_allclose(b, least[chosen], rtol=0, atol=1e-9)
         np.testing.assert_allclose(A, gradients[chosen], rtol=0, atol=1e-14)
 
 
 def test_a_row_turns_no_corner_in_one_step() -> None:
-    """A capsule's side ends: d'' jumps by 3.3 m/s², and efforts have to follow."""
+    """Where a capsule's side ends, d'' jumps by 3.3 m/s², and so must the efforts."""
     robot, rng = panda(), np.random.default_rng(6)
     limit = ObstacleDistance().placed(at_home(robot, ball(), table()))
     v = rng.standard_normal(7)

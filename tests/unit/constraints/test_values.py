@@ -1,4 +1,4 @@
-"""Contacts and limits are values: one set of tests for all of them, by reflection."""
+"""Contacts and limits are values; the classes are found by reflection."""
 
 import inspect
 from dataclasses import replace
@@ -56,7 +56,7 @@ EXAMPLES: dict[type[Part], Part] = {
     SlidingContact: SlidingContact("foot", force=CommandedForce(20.0)),
     SurfaceContact: SurfaceContact("foot", length=0.2, width=0.1),
 }
-"""One of each class."""
+"""One instance of each class."""
 
 TRIED = [
     *EXAMPLES.values(),
@@ -72,7 +72,7 @@ TRIED = [
     Limits(position=PositionRange(-1.0, [1.0, None]), effort=ByJoint({"b": 5, "a": 2})),
     Limits(barriers=(ObstacleDistance(0.1, obstacles=[BALL]), SelfDistance(0.0))),
 ]
-"""And what is given in some other form."""
+"""Values that are given in another form are converted."""
 
 
 @pytest.mark.parametrize("part", TRIED, ids=repr)
@@ -99,11 +99,11 @@ def test_they_are_values(part: Part) -> None:
         ),
     ],
 )
-def test_as_yaml_says_it(family: type[Part], data: dict[str, Any], part: Part) -> None:
+def test_as_in_yaml(family: type[Part], data: dict[str, Any], part: Part) -> None:
     assert TypeAdapter(family).validate_python(data) == part
 
 
-def test_limits_as_yaml_says_them() -> None:
+def test_limits_from_yaml() -> None:
     data: dict[str, Any] = {
         "effort": {"scale": {"a": 0.5}},
         "velocity": {"joints": {"a": 2}},

@@ -1,4 +1,5 @@
-"""The momentum observer that nobody declared: where it is on, and what it is worth."""
+"""The automatic momentum observer: where it is active, and how much error it
+removes."""
 
 from typing import Any
 
@@ -37,10 +38,11 @@ def controller(**options: Any) -> hsp.Controller:
 
 
 class Own(RigidBodyPlant):
-    """A plant of somebody's own, of which nothing is known."""
+    """A user's plant, whose model is unknown."""
 
 
-# ----------------------------------------------------------------------- where it is on
+# --------------------------------------------------------------------- where it is
+# active
 
 
 @pytest.mark.parametrize(
@@ -54,7 +56,7 @@ def test_it_is_on_at_a_rate_that_suits_the_period(period: float, rate: float) ->
     assert words == f"on, {rate:g} 1/s (auto)"
     # half of each joint's effort limit
     assert own.clip == tuple(0.5 * PANDA.model.effortLimit)
-    # On a robot the period is found from the calls, and the result is the same.
+    # On a robot the period is measured between calls; the result is the same.
     command, declared = (
         CompensatedController(controller()),
         CompensatedController(controller(), Compensation(momentum_observer=own)),
@@ -68,7 +70,7 @@ def test_it_is_on_at_a_rate_that_suits_the_period(period: float, rate: float) ->
         )
 
 
-def test_it_says_why_it_is_off() -> None:
+def test_it_reports_why_it_is_inactive() -> None:
     stiff = controller()
     spring = controller(impedance=hsp.Impedance(stiffness=600.0, damping=30.0))
     walker = hsp.Robot.load("talos")
@@ -112,7 +114,7 @@ def plants() -> dict[str, tuple[Plant | None, bool]]:
         "the model, pushed": (RigidBodyPlant(PANDA, pushes), False),
         "other bodies": (RigidBodyPlant(HEAVY), True),
         "a sensor": (ImperfectPlant(exact, [VelocityNoise(0.01)]), True),
-        "somebody's own": (Own(PANDA, pushes), True),
+        "user's plant": (Own(PANDA, pushes), True),
     }
 
 
@@ -132,7 +134,7 @@ def test_in_a_simulation_it_is_on_where_the_plant_is_not_the_model(name: str) ->
 
 
 def test_a_spring_that_comes_while_it_runs_yields() -> None:
-    """The cancelled disturbance fades while a task with an impedance is active."""
+    """The compensation fades out while an impedance task is active."""
     made = hsp.Controller(PANDA, [hsp.FrameOrientation("panda_tcp", name="turn")])
     command = CompensatedController(made)
     push = np.zeros(7)
@@ -155,7 +157,7 @@ def test_a_spring_that_comes_while_it_runs_yields() -> None:
 
 
 class Pushed(RigidBodyPlant):
-    """The model under an effort that nobody commands."""
+    """The model under an effort that is not commanded."""
 
     def __init__(self, robot: hsp.Robot, push: Array) -> None:
         super().__init__(robot)
@@ -165,12 +167,13 @@ class Pushed(RigidBodyPlant):
         return super().acceleration(t, q, v, tau + self.push)
 
 
-# -------------------------------------------------------------------- what it is worth
+# -------------------------------------------------------------------------- its effect
 
 
 @pytest.mark.parametrize("rate", [20.0, 50.0])
 def test_two_poles_are_as_late_as_one(rate: float) -> None:
-    """r = d (1 - (1 + 2 K_O t) exp(-2 K_O t)), beside the first order's exponential."""
+    """r = d (1 - (1 + 2 K_O t) exp(-2 K_O t)), beside that of a first-order
+    observer."""
     d, tau = np.array([3.0, -1.0, 0.5, 0.2, 1.0, -0.3, 0.1]), np.zeros(7)
     first, second = (
         MomentumObserver(rate, order=order).begin(PANDA)  # type: ignore[arg-type]
@@ -184,7 +187,7 @@ def test_two_poles_are_as_late_as_one(rate: float) -> None:
         found = [each.update(state, tau, H).copy() for each in (first, second)]
         x = 2.0 * rate * k * H
         expected = d * (1.0 - (1.0 + x) * np.exp(-x))
-        # Two exact steps in a row are half a period early each.
+        # Each of the two exact steps is half a period early.
         np.testing.assert_allclose(found[1], expected, atol=1.1 * rate * H * 3.0)
         missing += H * (d - np.array(found))
         q, v = plant.advance(k * H, (k + 1) * H, tau + d)
@@ -195,7 +198,8 @@ def test_two_poles_are_as_late_as_one(rate: float) -> None:
 
 @pytest.mark.parametrize("name", ["panda", *further("iiwa14")])
 def test_efforts_have_at_most_twice_the_noise(name: str) -> None:
-    """Of an arm at rest whose velocities have noise: at most twice what there was."""
+    """With velocity noise at rest, the efforts' noise grows by a factor of 2 at
+    most."""
     arm = WrongArm(name, 0, mass=0.0, noise=0.01)
     sizes = []
     for compensation in (ALONE, Compensation()):
@@ -221,16 +225,16 @@ RIGID = {("xarm7", "a load of 1 kg")}
 
 
 SEEDS = 3 if THOROUGH else 1
+"""Arms with model errors per case and robot."""
 USUAL = {"all": ["xarm7"], "a load of 1 kg": ["ur5"]}
-"""Arms of a case, unless thorough."""
-"""Of arms that are not their models, of each kind."""
+"""Robots per case, unless thorough."""
 
 
 @pytest.mark.parametrize(
     "case", ["all", "a load of 1 kg", *further("masses", "late", "friction and noise")]
 )
 def test_a_held_pose_stays_where_it_belongs(case: str) -> None:
-    """Median 1 mm and 0.3°, worst 5 mm and 2°, and no joint wanders."""
+    """Errors: median 1 mm and 0.3°, worst 5 mm and 2°; no joint drifts."""
     found = []
     arms = ARMS if THOROUGH else USUAL[case]
     for name in arms:
@@ -244,14 +248,14 @@ def test_a_held_pose_stays_where_it_belongs(case: str) -> None:
     assert (np.max(found, axis=0) < (5.0, 2.0, 5.0)).all()
 
 
-def test_an_arm_with_its_rotors_bears_a_load_on_its_light_wrist() -> None:
+def test_an_arm_with_rotors_tolerates_a_load_on_its_light_wrist() -> None:
     arm = WrongArm("xarm7", 0, load=1.0, motor_inertia=0.05)
     log = held(arm, Compensation(), duration=2.0)
     assert 1e3 * np.linalg.norm(log["task.hand.error"][-1, :3]) < 1.0
 
 
 def test_two_arms_are_held_as_one_is() -> None:
-    """The bundled pair on their paths: an observer takes most of the error away."""
+    """The bundled pair of arms on its paths: the observer removes most of the error."""
     found = []
     for observer in ("auto", "null"):
         log = hsp.load_experiment(
@@ -269,7 +273,8 @@ def test_two_arms_are_held_as_one_is() -> None:
 
 @pytest.mark.parametrize("name", ["panda", *further("ur5")])
 def test_a_circle_is_followed(name: str) -> None:
-    """8 cm at 2 rad/s, within 1 mm and 1°, in both directions of the normal."""
+    """A circle of 8 cm at 2 rad/s within 1 mm and 1°, with either sign of the
+    normal."""
     for seed, load in ((0, 0.0), (1, 1.0)):
         arm = WrongArm(name, seed, load=load, delay=1)
         log = held(arm, Compensation(), duration=2.4, circle=0.08)

@@ -1,4 +1,4 @@
-"""The calls of steps are bound when a change is made, and not in a step."""
+"""Calls of steps are bound when a change is declared, not during a step."""
 
 import pickle
 from collections.abc import Iterator
@@ -21,7 +21,7 @@ H, AT, RAMP = PERIOD, 0.02, 0.005
 
 @contextmanager
 def nothing_bound(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
-    """Make every binding of calls an error."""
+    """Make every binding of a call an error."""
 
     def refused(*_: object, **__: object) -> object:
         raise AssertionError("calls are bound in a step")
@@ -29,14 +29,15 @@ def nothing_bound(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
     with monkeypatch.context() as patched:
         for name in ("plan", "bind_move"):
             patched.setattr(RobotState, name, refused)
-        for module in (plans, trajectory):  # all calls of plans are bound by it
+        for module in (plans, trajectory):  # binds all calls of plans
             patched.setattr(module, "bind", refused)
-        patched.setattr(engine, "_BY_NAME", _Refused())  # and of what plans streams
+        # and those of the streams' planner
+        patched.setattr(engine, "_BY_NAME", _Refused())
         yield
 
 
 class _Refused(dict[str, object]):
-    """Kinds none of which a step makes a call of."""
+    """Kinds of which a step makes no new call."""
 
     def __missing__(self, name: str) -> object:
         raise AssertionError(f"a call of {name} is bound in a step")
@@ -46,7 +47,8 @@ class _Refused(dict[str, object]):
 def test_no_step_around_a_change_binds(
     kind: str, begun: bool, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """The first one, those of its ramp, the one after it, and where it is folded."""
+    """The first step, the ramp, the step after it, and the one that merges the
+    change."""
     made = controller()
     if begun:
         step(made, 0)
@@ -58,13 +60,13 @@ def test_no_step_around_a_change_binds(
     made.at(2.0).null_space_gain(4.0)
     assert (
         len(made._in_force.time_line.open) == 1
-    )  # the other one is over, and forgotten
+    )  # the other change is over and forgotten
 
 
 def test_the_sets_of_overlapping_changes_are_all_bound(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    """Also where the weight of one that comes passes that of one that goes."""
+    """Also where the weight of the incoming task exceeds that of the outgoing one."""
     made = controller()
     step(made, 0)
     posture = hsp.JointPosture("start", joints=["panda_joint1"], priority=2)
@@ -77,7 +79,7 @@ def test_the_sets_of_overlapping_changes_are_all_bound(
 
 
 def test_changes_that_go_on_are_forgotten(monkeypatch: pytest.MonkeyPatch) -> None:
-    """One comes before the last one is forgotten: what is over goes when it comes."""
+    """A change before the last one is forgotten: finished ones are dropped then."""
     made = controller()
     for k in range(0, 3000, 10):
         if k % 100 == 0:
@@ -90,11 +92,11 @@ def test_changes_that_go_on_are_forgotten(monkeypatch: pytest.MonkeyPatch) -> No
 
 
 @pytest.mark.parametrize("kind", CHANGES)
-def test_what_is_over_is_forgotten(kind: str) -> None:
-    """Of many changes no more stays than of the first ones, in whatever is kept."""
+def test_past_changes_are_forgotten(kind: str) -> None:
+    """Many changes leave no more in memory than the first few."""
 
     def kept(number: int) -> tuple[int, str, int]:
-        # as many steps for any number: they are counted, in the clock's check as well
+        # the same number of steps for any number of changes: counters grow with steps
         made = controller()
         step(made, 0)
         for k in range(1, 1500 if THOROUGH else 500):
@@ -116,7 +118,7 @@ def test_what_is_over_is_forgotten(kind: str) -> None:
 
 
 def test_a_schedule_is_bound_beforehand(monkeypatch: pytest.MonkeyPatch) -> None:
-    """All that is to come: in the first step."""
+    """Future changes are bound in the first step."""
     hand = hsp.FramePosition(name="hand")
     schedule = Schedule([(0.01, 0.02), (0.03, 0.04)], ramp=0.004)
     turned = hsp.FrameOrientation(schedule=schedule, priority=2, name="turned")
@@ -131,7 +133,7 @@ def test_a_schedule_is_bound_beforehand(monkeypatch: pytest.MonkeyPatch) -> None
 def test_a_target_is_bound_when_it_is_set(
     pose: bool, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """So is the move that is planned when a target arrives."""
+    """A move that is planned when a target arrives binds nothing, either."""
     made = controller(*([hsp.FramePose(name="hand")] if pose else []))
     step(made, 0)
     for k in range(1, 40):
@@ -143,7 +145,7 @@ def test_a_target_is_bound_when_it_is_set(
 
 
 def test_a_velocity_is_bound_when_it_is_sent(monkeypatch: pytest.MonkeyPatch) -> None:
-    """In the tool's axes, where the integral is Python's, too; and where it fades."""
+    """In tool axes, where Python integrates, too; and while the integral fades out."""
     made = controller(hsp.FramePose(name="hand"))
     step(made, 0)
     twist = np.array([0.02, 0.0, 0.01, 0.0, 0.1, 0.0])
@@ -156,7 +158,7 @@ def test_a_velocity_is_bound_when_it_is_sent(monkeypatch: pytest.MonkeyPatch) ->
 
 
 def test_a_pickle_of_a_standing_robot_goes_on(monkeypatch: pytest.MonkeyPatch) -> None:
-    """The law is bound where the robot is: elsewhere contacts leave other motions.
+    """The law is bound at the robot's state: elsewhere contacts permit other motions.
 
     No step binds, also while a foot is lifted.
     """
@@ -172,7 +174,7 @@ def test_a_pickle_of_a_standing_robot_goes_on(monkeypatch: pytest.MonkeyPatch) -
     q, v = robot.home(), 0.01 * np.ones(robot.nv)
     made.applied(made.compute(0.0, q, v).tau, H)
     again = pickle.loads(pickle.dumps(made))
-    again.applied(again.compute(H, q, v).tau, H)  # it is bound there
+    again.applied(again.compute(H, q, v).tau, H)  # bound at this state
     made.applied(made.compute(H, q, v).tau, H)
     for k in (*range(2, 60), 1040, 1041):
         with nothing_bound(monkeypatch):
@@ -186,7 +188,7 @@ def test_a_pickle_of_a_standing_robot_goes_on(monkeypatch: pytest.MonkeyPatch) -
     "kind", [k for k in CHANGES if k not in ("add", "remove", "replace")]
 )
 def test_a_change_of_numbers_leaves_the_step_one_call(kind: str) -> None:
-    """It gives what the law, the limits and a modifier give that adds nothing."""
+    """The result equals that of law and limits with a modifier that adds nothing."""
     made, apart = controller(), controller()
     for k in range(1, 3):
         for each in (made, apart):

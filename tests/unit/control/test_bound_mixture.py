@@ -1,4 +1,4 @@
-"""A step that mixes tasks or limits is one call, and delivers what its parts do."""
+"""A step that mixes tasks or limits is one call, equal to its parts in sequence."""
 
 from collections.abc import Callable
 
@@ -12,14 +12,14 @@ from hsp_control.control.changes import Changes
 
 H, BEGIN, RAMP = 1e-3, 0.010, 0.020
 ROBOT = hsp.Robot.load("panda")
-POSTURE = hsp.JointPosture("start", joints=["panda_joint1"], name="bent", priority=2)
+POSTURE = hsp.JointPosture("start", joints=["panda_joint1"], name="posture", priority=2)
 TURNED = hsp.FrameOrientation("panda_tcp", name="turned", priority=2)
 
 CHANGES: dict[str, Callable[[Changes], object]] = {
     "add": lambda at: at.add(POSTURE),
     "remove": lambda at: at.remove("turned"),
     "exchange": lambda at: at.remove("turned").add(POSTURE),
-    # both at once are damped: they demand the same motion
+    # together they are damped: both constrain the same motion
     "same": lambda at: at.remove("hand").add(hsp.FramePosition("panda_tcp")),
     "limits": lambda at: at.limits(hsp.Limits(bandwidth=30.0)),
     "no limits": lambda at: at.limits(None),
@@ -28,7 +28,7 @@ CHANGES: dict[str, Callable[[Changes], object]] = {
 
 
 def controller(kind: str, speed: float | None = None) -> hsp.Controller:
-    """Return one in the middle of a change; with a bound on speeds that binds."""
+    """Return a controller during a change, with an active speed limit."""
     tasks = [hsp.FramePosition("panda_tcp", name="hand"), TURNED]
     limits = hsp.Limits() if speed is None else hsp.Limits(velocity=np.full(7, speed))
     made = hsp.Controller(ROBOT, tasks, hsp.JointCentering(), limits=limits)
@@ -58,8 +58,8 @@ def test_no_part_is_delivered_by_python(
 
 
 @pytest.mark.parametrize(("kind", "speed"), covering(CHANGES, [0.31, None]))
-def test_it_delivers_what_its_parts_do(kind: str, speed: float | None) -> None:
-    """As with a modifier, which is called part by part, and here adds nothing."""
+def test_it_delivers_the_result_of_its_parts(kind: str, speed: float | None) -> None:
+    """Equal to the step part by part, which a modifier (here an idle one) requires."""
     whole, parts = controller(kind, speed), controller(kind, speed)
     statuses = set()
     for k in range(1, 45):
@@ -77,8 +77,8 @@ def test_it_delivers_what_its_parts_do(kind: str, speed: float | None) -> None:
 
 
 @pytest.mark.parametrize("scheduled", [False, True])
-def test_it_delivers_what_its_parts_do_on_feet(scheduled: bool) -> None:
-    """One is lifted, by a change or a schedule, and another pushes less meanwhile."""
+def test_it_delivers_the_result_of_its_parts_on_feet(scheduled: bool) -> None:
+    """A foot is lifted by a change or a schedule, while another one pushes less."""
     pytest.importorskip("example_robot_data")
     robot = hsp.Robot.load("solo12")
     feet = [name for name in robot.frame_names if name.endswith("_FOOT")]

@@ -1,4 +1,4 @@
-"""Changes while running: one time line, smooth however they overlap."""
+"""Changes at run time: one time line, smooth also where changes overlap."""
 
 import copy
 import pickle
@@ -31,7 +31,7 @@ seeds = st.integers(0, 2**32 - 1)
 def test_efforts_stay_continuous_through_a_hundred_changes(
     name: str, seed: int
 ) -> None:
-    """Where a change begins or ends, efforts change no more than anywhere else."""
+    """Efforts change no more where a change begins or ends than elsewhere."""
     line = Line(name, seed)
     changes = line.draw(100)
     edges = np.array([[each.at, each.end] for each in changes]).ravel()
@@ -95,7 +95,7 @@ def test_copies_made_at_any_time_compute_the_same(duplicate: Any, seed: int) -> 
             )
 
 
-# -- the cases of the trial ---------------------------------------------------------
+# -- single changes -----------------------------------------------------------------
 
 
 @pytest.fixture
@@ -104,7 +104,7 @@ def panda() -> "Trial":
 
 
 class Trial:
-    """The Panda at home, with a hand that has to go 3 cm."""
+    """The Panda at home, with its target 3 cm away."""
 
     def __init__(self, **options: Any) -> None:
         self.robot = hsp.Robot.load("panda")
@@ -161,7 +161,7 @@ def gains(frequency: float) -> hsp.Gains:
 def test_impossible_changes(
     make: Callable[[hsp.Controller], object], message: str, panda: Trial
 ) -> None:
-    """Each is refused when it is made, and nothing of it stays."""
+    """Invalid changes are refused at the call and leave no trace."""
     with pytest.raises(hsp.HspControlError, match=message):
         make(panda.controller)
     assert panda.controller.changes == ()

@@ -97,9 +97,9 @@ def g_at(
 
 
 @given(t=st.floats(-0.5, 2.0), seed=st.integers(0, 2**32 - 1))
-def test_the_rate_of_what_is_in_between_is_exact(t: float, seed: int) -> None:
-    """Of a field that changes to another, and before it is there to a third."""
-    # Where a change begins or ends it is C², not more.
+def test_the_rate_in_between_is_exact(t: float, seed: int) -> None:
+    """A field fades to another one, and before that ends to a third."""
+    # At the begin and end of a change it is C² only.
     assume(all(abs(t - edge) > 0.01 for edge in (0.0, 0.6, 1.0, 1.4)))
     rng = np.random.default_rng(seed)
     law, metric = controller(), hsp.metrics.IdentityMetric()
@@ -144,13 +144,13 @@ CHANGES: dict[str, Callable[[hsp.Controller], Any]] = {
 
 
 @pytest.mark.parametrize(
-    ("what", "metric"),
+    ("part", "metric"),
     covering(CHANGES, [hsp.metrics.MassMatrixMetric(), hsp.metrics.IdentityMetric()]),
 )
-def test_proposition_2_holds_all_the_way(what: str, metric: hsp.metrics.Metric) -> None:
+def test_proposition_2_holds_all_the_way(part: str, metric: hsp.metrics.Metric) -> None:
     """‖e_N‖_W decays like exp(-K_N t) before, through and after the change."""
     law = controller(metric=metric)
-    CHANGES[what](law)
+    CHANGES[part](law)
     log = run(law)
     check_null_space(log, K_N, least=0.1, rtol=1e-6)
 
@@ -193,7 +193,7 @@ def solution(
 
 
 def far() -> hsp.FramePosition:
-    """Return a hand that is 10 cm from its path."""
+    """Return a task whose hand is 10 cm off its path."""
     return replace(
         hand(),
         trajectory=hsp.Circle(0.05, 2.0, [0.45, 0.1, 0.5], normal=[1.0, 0.0, 0.0]),
@@ -201,7 +201,7 @@ def far() -> hsp.FramePosition:
 
 
 def test_the_error_equation_holds_while_gains_change() -> None:
-    """Of two changes that overlap, by coupled gains, beside an integrated solution."""
+    """Two overlapping changes of coupled gains, against an integrated solution."""
     law = hsp.Controller(
         panda(), [far()], hsp.JointCentering(), null_space_gain=K_N, limits=None
     )
@@ -225,14 +225,14 @@ def test_the_error_equation_holds_while_gains_change() -> None:
     error = log["task.hand.error"]
     assert np.abs(error[0]).max() > 0.05
     np.testing.assert_allclose(error, solution(log, gains), rtol=0, atol=1e-8)
-    # It is another motion than with either gains.
+    # The motion differs from that with either of the gains.
     for one in (GAINS, COUPLED):
         other = solution(log, lambda t, one=one: one.matrices(3))
         assert np.abs(error - other).max() > 1e-3
 
 
 def test_the_error_equation_holds_while_references_change() -> None:
-    """Of a position and an orientation, whose error is that of a frame in between."""
+    """Position and orientation; the error is that of a frame in between."""
     turned = replace(TURNED, priority=1)
     law = hsp.Controller(
         panda(), [far(), turned], hsp.JointCentering(), null_space_gain=K_N, limits=None
@@ -264,7 +264,7 @@ def test_the_error_equation_of_other_tasks_holds_while_one_comes_and_goes(
     log = run(law)
     expected = solution(log, lambda t: GAINS.matrices(3))
     np.testing.assert_allclose(log["task.hand.error"], expected, rtol=0, atol=1e-8)
-    # While its weight is one its error obeys its equation.
+    # While the weight is one, the error obeys its equation.
     t, e = log.t, log["task.turned.error"]
     alone = (t >= 0.3) & (t <= 0.4)
     first = np.flatnonzero(alone)[0]

@@ -74,12 +74,12 @@ CHANGES: dict[str, Callable[[Case], hsp.Controller]] = {
 
 
 @pytest.mark.parametrize("name", ROBOTS)
-@pytest.mark.parametrize("what", CHANGES)
+@pytest.mark.parametrize("change", CHANGES)
 @given(seed=seeds)
 @many
-def test_efforts_are_continuous(what: str, name: str, seed: int) -> None:
+def test_efforts_are_continuous(change: str, name: str, seed: int) -> None:
     case = Case(name, seed)
-    case.assert_continuous(CHANGES[what](case))
+    case.assert_continuous(CHANGES[change](case))
 
 
 @given(seed=seeds)
@@ -125,12 +125,12 @@ def lifted(controller: hsp.Controller, contact: str) -> None:
 
 
 ABOUT = np.append(np.linspace(-1e-6, 1e-6, 20), -0.5 * FINEST)
-"""Where to look about an edge; the last 1e-9 s contain it [s]."""
+"""Sample times around a change's begin or end, which is in the last 1e-9 s [s]."""
 OF_LEGS = 5e-6
-"""Changes of efforts on legs [N·m]. Feet that press against each other move nothing,
-and cost 1e-6 of what a motion does: rounding decides the last 1e-6 N·m of that."""
+"""Changes of efforts on legs [N·m]. Internal forces of the feet move nothing, and cost
+1e-6 of a motion, so that rounding decides their last 1e-6 N·m."""
 HANDED = (START, START + RAMP)
-"""When a task moves what a contact keeps at rest before and afterwards [s]."""
+"""Interval in which a task moves a foot that is in contact before and after it [s]."""
 
 
 def handed_over() -> tuple[Schedule, Schedule]:
@@ -144,7 +144,7 @@ def handed_over() -> tuple[Schedule, Schedule]:
 @given(seed=seeds)
 @many
 def test_a_contact_with_a_schedule(moves: bool, name: str, seed: int) -> None:
-    """It ends and begins without a jump; so does a task that moves it meanwhile."""
+    """A contact ends and begins without a jump; so does the task in between."""
     case = Case(name, seed)
     off, on = handed_over()
     tip = hsp.contacts.SlidingContact(
@@ -183,7 +183,7 @@ def standing(seed: int, **schedules: Schedule) -> tuple[hsp.Controller, Array, A
 @given(seed=seeds)
 @many
 def test_a_foot_that_a_plan_switches(seed: int) -> None:
-    """Whenever it lets it go, and puts it down, also before it has let it go."""
+    """For any lift-off and touch-down times, also touch-down during the lift-off."""
     walking = pytest.importorskip("hsp_control.companions.walking.contact_switch")
     foot = walking.Switched()
     foot.contact, foot.task = walking.Switch(), walking.Switch(on=False)
@@ -196,7 +196,7 @@ def test_a_foot_that_a_plan_switches(seed: int) -> None:
     for t in START + 0.1 + ABOUT:
         np.testing.assert_allclose(effort(t + FINEST), effort(t), rtol=0, atol=OF_LEGS)
     t = START + 0.2
-    for begins in (t, t + 0.01, t + 0.02):  # the last two: while it carries already
+    for begins in (t, t + 0.01, t + 0.02):  # in the last two it carries load
         before = effort(begins - 1e-9)
         foot.set_down(begins, 0.1)
         np.testing.assert_allclose(effort(begins), before, rtol=0, atol=OF_LEGS)
@@ -214,7 +214,7 @@ def test_a_foot_that_a_plan_switches(seed: int) -> None:
 @given(seed=seeds)
 @many
 def test_a_foot_that_is_lifted_while_it_moves(seed: int) -> None:
-    """Also in the forces: they stay at their places among those of all contacts."""
+    """Also in the forces, whose index among those of all contacts is unchanged."""
     pytest.importorskip("example_robot_data")
     rng, robot = np.random.default_rng(seed), load("solo12")
     feet = [name for name in robot.frame_names if name.endswith("_FOOT")]
@@ -243,14 +243,14 @@ def test_a_foot_that_is_lifted_while_it_moves(seed: int) -> None:
 
 
 @pytest.mark.parametrize(
-    "what", ["limits_change", "limits_go_and_others_come", "limits_come"]
+    "change", ["limits_change", "limits_go_and_others_come", "limits_come"]
 )
 def test_a_change_of_limits_is_compiled_when_it_is_made(
-    what: str, monkeypatch: pytest.MonkeyPatch
+    change: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """No step makes a QP, of whatever set of limits."""
+    """No step builds a QP, for any set of limits."""
     case = Case("panda", 0)
-    controller = CHANGES[what](case)
+    controller = CHANGES[change](case)
     case.effort(controller, 0.0)
     controller.at(START + RAMP).limits(case.limits())
     monkeypatch.setattr(actuation, "LimitedStep", None)
@@ -263,7 +263,7 @@ def test_a_change_of_limits_is_compiled_when_it_is_made(
 @given(seed=seeds)
 @many
 def test_a_mixture_keeps_the_limits(name: str, seed: int) -> None:
-    """The effort of each set of tasks is within the limits, and so is their mean."""
+    """The effort for each set of tasks is within the limits, and so is their mean."""
     case = Case(name, seed)
     controller = a_task_is_added(case)
     for t in START + RAMP * case.rng.uniform(0.0, 1.0, 5):
@@ -277,8 +277,8 @@ def test_a_mixture_keeps_the_limits(name: str, seed: int) -> None:
         assert (out.acceleration <= bounds.a_upper + 1e-6).all()
 
 
-def test_what_opposes_friction_fades_with_the_tasks() -> None:
-    """It follows the velocity that each set of tasks desires."""
+def test_friction_compensation_fades_with_the_tasks() -> None:
+    """Friction opposes the velocity that each set of tasks commands."""
     case = Case("panda", 0)
     controller = a_task_is_added(case)
     friction = FrictionFeedForward(coulomb=1.0, viscous=0.5)
@@ -287,7 +287,7 @@ def test_what_opposes_friction_fades_with_the_tasks() -> None:
     times = START + np.array([-1e-9, 1e-9, RAMP - 1e-9, RAMP + 1e-9])
     tau, sent = [], []
     for t in times:
-        # else the effort's rate joins what it sent before
+        # otherwise the rate limit ties the effort to the previous one
         controller.restart(origin=0.0)
         tau.append(command.effort(t, case.q, case.v, 1e-3).copy())
         sent.append(np.array(columns()["friction.feed_forward"].value))

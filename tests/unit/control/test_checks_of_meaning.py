@@ -16,8 +16,8 @@ PANDA = hsp.Robot.load("panda")
 REST = np.zeros(7)
 
 
-def told(target: object, **options: object) -> list[str]:
-    """Warnings about a target where a loop begins."""
+def warnings_of(target: object, **options: object) -> list[str]:
+    """Warnings about a target at the start of a loop."""
     task = hsp.FramePosition("panda_tcp", target, name="hand", **options)  # type: ignore[arg-type]
     controller = hsp.Controller(PANDA, [task])
     with warnings.catch_warnings(record=True) as found:
@@ -29,23 +29,24 @@ def told(target: object, **options: object) -> list[str]:
 
 
 @pytest.mark.parametrize(
-    ("target", "options", "said"),
+    ("target", "options", "warning"),
     [
         ([0.4, 0.2, 0.5], {}, ""),
-        ([1.5, 0.0, 0.5], {}, ""),  # out of reach: that can be meant
+        ([1.5, 0.0, 0.5], {}, ""),  # out of reach, which may be intended
         ([3.0, 0.0, 0.5], {}, "the robot reaches 1.1 m: it goes as near"),
         ([400.0, 200.0, 500.0], {}, "millimetres? Lengths are in m"),
-        ([400.0, 200.0, 500.0], {"blend": 1.0}, "millimetres?"),  # it begins here
+        # begins at the current pose
+        ([400.0, 200.0, 500.0], {"blend": 1.0}, "millimetres?"),
         ([500.0], {"axes": "z"}, "499.5 m away from 'panda_tcp'"),
-        (hsp.Circle(radius=0.1, angular_rate=1.0), {}, ""),  # about the start
+        (hsp.Circle(radius=0.1, angular_rate=1.0), {}, ""),  # relative to the start
     ],
 )
-def test_a_target_far_beyond_the_reach_is_said_once(
-    target: object, options: dict[str, object], said: str
+def test_a_target_far_out_of_reach_is_reported_once(
+    target: object, options: dict[str, object], warning: str
 ) -> None:
-    found = told(target, **options)
-    assert len(found) == bool(said)
-    assert said in "".join(found)
+    found = warnings_of(target, **options)
+    assert len(found) == bool(warning)
+    assert warning in "".join(found)
 
 
 def test_a_target_that_is_set_is_looked_at_too() -> None:
@@ -58,13 +59,15 @@ def test_a_target_that_is_set_is_looked_at_too() -> None:
 
 
 @pytest.mark.filterwarnings("error")
-def test_a_run_that_is_damped_most_of_the_time_says_so() -> None:
+def test_a_mostly_damped_run_is_reported() -> None:
     out = hsp.FramePosition("panda_tcp", [1.5, 0.0, 0.5], blend=1.0, name="hand")
     controller = hsp.Controller(PANDA, [out])
     options = {"duration": 4.0, "control_period": 0.005}
-    with pytest.warns(RunWarning, match=r"damped in \d+ of 401 rows.*'hand': ") as told:
+    with pytest.warns(
+        RunWarning, match=r"damped in \d+ of 401 rows.*'hand': "
+    ) as warnings_of:
         run = hsp.simulate(controller, PANDA.home(), **options)  # type: ignore[arg-type]
-    assert str(int((run["damped"] > 0.0).sum())) in str(told[0].message)
+    assert str(int((run["damped"] > 0.0).sum())) in str(warnings_of[0].message)
     near = hsp.FramePosition("panda_tcp", blend=1.0)
     hsp.simulate(hsp.Controller(PANDA, [near]), PANDA.home(), **options)  # type: ignore[arg-type]
 
@@ -90,7 +93,7 @@ def test_degrees_are_named_in_python_and_in_yaml(
 
 
 def test_a_recorded_loop_whose_times_are_milliseconds_is_warned_of() -> None:
-    """It gives no period; the first step shows it."""
+    """No period is given; the first step reveals the unit."""
     controller = hsp.Controller(PANDA, [hsp.FramePosition("panda_tcp")])
     recorder = hsp.Recorder(controller)
     recorder.record(controller.compute(0.0, PANDA.home(), REST))
@@ -99,7 +102,7 @@ def test_a_recorded_loop_whose_times_are_milliseconds_is_warned_of() -> None:
     recorder.close()
 
 
-def test_the_command_line_says_the_same(capsys: pytest.CaptureFixture[str]) -> None:
+def test_the_command_line_prints_the_same(capsys: pytest.CaptureFixture[str]) -> None:
     far = "tasks.hand.trajectory={type: hold, point: [400, 200, 500]}"
     kind = "tasks.hand.type=frame_position"
     code = main(["check", "panda_limits", "--set", kind, "--set", far])

@@ -1,4 +1,4 @@
-"""Times that cannot be those of a loop are reported once."""
+"""Implausible times of a loop are reported once."""
 
 import re
 import warnings
@@ -15,7 +15,7 @@ from hsp_control.control.clock_check import ClockWarning
 H = 0.002
 
 
-def told(times: Sequence[float], period: float = H) -> list[str]:
+def reported(times: Sequence[float], period: float = H) -> list[str]:
     """Return the messages about the clock of a loop."""
     robot = hsp.Robot.load("panda")
     controller = hsp.Controller(robot, [hsp.FramePosition()])
@@ -24,7 +24,7 @@ def told(times: Sequence[float], period: float = H) -> list[str]:
         for t in times:
             output = controller.compute(t, robot.home(), np.zeros(7))
             controller.applied(output.tau, period)
-            controller.applied(output.tau, period)  # what was sent in its place
+            controller.applied(output.tau, period)  # the effort that was sent instead
     return [str(each.message) for each in caught if each.category is ClockWarning]
 
 
@@ -42,15 +42,15 @@ STEPS = H * np.arange(40)
         (np.append(STEPS, STEPS), H, "... runs back: t = 0 s ... -0.078 s"),
     ],
 )
-def test_a_clock_of_something_else_is_said_once(
+def test_a_clock_of_something_else_is_reported_once(
     times: Sequence[float], period: float, message: str
 ) -> None:
-    (found,) = told(times, period)
+    (found,) = reported(times, period)
     assert re.search(wording(message), found)
 
 
-def test_a_state_with_the_time_of_a_clock_is_said() -> None:
-    """Its time is measured from the first step already."""
+def test_a_state_with_an_absolute_clock_time_is_reported() -> None:
+    """Times count from the first step."""
     robot = hsp.Robot.load("panda")
     controller = hsp.Controller(robot, [hsp.FramePosition()])
     state = robot.state(1.76e9, robot.home(), np.zeros(7))
@@ -58,8 +58,8 @@ def test_a_state_with_the_time_of_a_clock_is_said() -> None:
         controller.compute(state)
 
 
-def test_a_change_at_the_time_of_a_clock_is_said() -> None:
-    """It would never begin; a state at rest for a day is no clock."""
+def test_a_change_at_an_absolute_clock_time_is_reported() -> None:
+    """The change would never begin; a robot at rest for a day is no clock error."""
     robot = hsp.Robot.load("panda")
     controller = hsp.Controller(robot, [hsp.FramePosition(name="hand")])
     controller.compute(1.76e9, robot.home(), np.zeros(7))
@@ -72,8 +72,8 @@ def test_a_change_at_the_time_of_a_clock_is_said() -> None:
     assert caught[0].filename == __file__
 
 
-def test_what_happens_to_a_loop_is_no_wrong_clock() -> None:
-    """Steps that are late, made twice, or after a pause; and a start at any time."""
+def test_ordinary_delays_of_a_loop_are_no_clock_error() -> None:
+    """Late or repeated steps, steps after a pause, and any start time are accepted."""
     rng = np.random.default_rng(0)
     late = STEPS + H * rng.uniform(-0.4, 0.4, STEPS.size)
     twice = np.repeat(STEPS, 2)
@@ -81,11 +81,11 @@ def test_what_happens_to_a_loop_is_no_wrong_clock() -> None:
     slow = np.cumsum(rng.choice([H, 30 * H], STEPS.size))
     rehearsed = np.concatenate([np.zeros(50), STEPS])
     for times in (STEPS, rehearsed, late, twice, pause, slow, 1.76e9 + STEPS):
-        assert told(times) == []
+        assert reported(times) == []
 
 
 def test_the_integrators_stages_are_no_clock() -> None:
-    """They go back and forth, and nothing is held."""
+    """Times go back and forth; no effort is held."""
     robot = hsp.Robot.load("panda")
     controller = hsp.Controller(robot, [hsp.FramePosition()])
     with warnings.catch_warnings():
@@ -113,7 +113,7 @@ def moved(unit: float, noise: float = 0.0, *, kind: str = "numbers") -> list[str
 
 
 @pytest.mark.parametrize("kind", ["numbers", "state"])
-def test_times_in_milliseconds_are_said_once_where_only_compute_is_called(
+def test_times_in_milliseconds_are_reported_once_by_compute_alone(
     kind: str,
 ) -> None:
     (found,) = moved(1000.0, kind=kind)
@@ -137,7 +137,7 @@ MOVED_BY: dict[str, Callable[[hsp.Controller, np.ndarray], object]] = {
 
 @pytest.mark.parametrize("by", MOVED_BY)
 def test_the_unit_is_seen_when_the_robot_moves_after_a_long_rest(by: str) -> None:
-    """While it rests nothing is looked at, so that a step costs nothing."""
+    """At rest the check is skipped, so that it costs no time."""
     robot = hsp.Robot.load("panda")
     task = hsp.FramePosition(name="hand")
     if by in ("message", "chunk"):

@@ -1,7 +1,7 @@
 """Commanded contact forces: in the allocation alone, balanced by the other contacts.
 
 The closed form against its optimality conditions; the law with and without a command;
-motions of plants that solve the contact for themselves, where errors and null space
+motions of plants that solve the contact independently, where errors and null space
 obey their equations and the force is the commanded one.
 """
 
@@ -80,7 +80,7 @@ def random_state(robot: hsp.Robot, seed: int) -> hsp.RobotState:
 def test_the_closed_form_is_the_optimum(without_support: int, seed: int) -> None:
     """A f = w, and E⁻¹(f - r) lies in the range of Aᵀ: the conditions of Lagrange.
 
-    Also where contacts can exert no effort along some base motions, as point feet.
+    Also where contacts transmit no effort along some base motions, as with point feet.
     """
     rng = np.random.default_rng(seed)
     n, size, nv = 6, 15, 10
@@ -110,11 +110,11 @@ def test_the_closed_form_is_the_optimum(without_support: int, seed: int) -> None
     np.testing.assert_allclose(tau, wanted - F @ forces, atol=1e-12)
 
 
-# --- the law does not notice ---------------------------------------------------------
+# --- the law is unchanged ------------------------------------------------------------
 
 
-def test_a_force_that_nothing_can_balance_gives_way_before_the_law() -> None:
-    """60 N, and soles on ice: the hand presses less, and the law is untouched."""
+def test_an_unbalanced_force_is_reduced_before_the_law() -> None:
+    """60 N with soles on ice: the hand presses less, the acceleration is the law's."""
     state = talos().state(0.0, talos().home(), np.zeros(talos().nv))
     controller = leaning(wall(CommandedForce([0.0, 0.0, 60.0])), friction=0.2)
     out = controller.compute(state)
@@ -130,7 +130,7 @@ def test_a_force_that_nothing_can_balance_gives_way_before_the_law() -> None:
 
 
 def pressing(contact: Contact, **options: Any) -> hsp.Controller:
-    """Return a Panda that turns its hand as it pleases, and presses."""
+    """Return a Panda that presses, with the hand's orientation free."""
     return hsp.Controller(
         panda(),
         [hsp.FrameOrientation(TIP, gains=GAINS, name="turn")],
@@ -141,8 +141,8 @@ def pressing(contact: Contact, **options: Any) -> hsp.Controller:
     )
 
 
-def test_a_fixed_base_presses_with_what_is_commanded() -> None:
-    """tau = M a + N - Jᵀλ: a rigid contact answers with λ, to rounding, in motion."""
+def test_a_fixed_base_presses_as_commanded() -> None:
+    """tau = M a + N - Jᵀλ: in motion a rigid contact reacts with λ, to rounding."""
 
     def command(t: float) -> Array:
         return np.array([3.0 * np.sin(4.0 * t), 2.0, 20.0 + 5.0 * np.cos(3.0 * t)])
@@ -301,7 +301,7 @@ TIPPING = SurfaceContact(
         ),
     ],
 )
-def test_what_cannot_be_commanded(make: Any, message: str) -> None:
+def test_impossible_commands(make: Any, message: str) -> None:
     with pytest.raises(hsp.HspControlError, match=wording(message)):
         make()
 

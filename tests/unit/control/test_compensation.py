@@ -1,4 +1,4 @@
-"""Each compensator by itself, and what they are worth together."""
+"""Each compensator alone, and their combined effect."""
 
 import copy
 import pickle
@@ -91,7 +91,7 @@ def test_a_run_repeats_itself_and_its_compensators_travel(name: str) -> None:
         assert_array_equal(values, again[column])
         assert_array_equal(values, other[column])
     bare = run(made, duration=0.05)
-    # Nothing stays behind in the controller or its tasks.
+    # No state remains in the controller or its tasks.
     assert_array_equal(bare.tau, run(controller(), duration=0.05).tau)
     assert set(bare.columns) <= set(first.columns)
 
@@ -101,7 +101,7 @@ def test_a_run_repeats_itself_and_its_compensators_travel(name: str) -> None:
 def test_a_copy_of_a_chain_goes_on_and_moves_nothing(
     name: str, copied: Callable[[Any], Any]
 ) -> None:
-    """In the middle of a run in which other efforts act than were returned."""
+    """During a run whose applied efforts differ from the returned ones."""
     alone = {} if name in ("default", "all") else {name: EVERYTHING[name]}
     compensation = {"default": Compensation(), "all": ALL}.get(name) or only(**alone)
     original, untouched = (
@@ -139,8 +139,8 @@ def test_compensators_need_a_control_period() -> None:
 @pytest.mark.parametrize(
     ("name", "rate"), covering(["panda", "iiwa14", "planar3r"], [20.0, 200.0])
 )
-def test_the_observer_is_a_low_pass_on_what_pushes(name: str, rate: float) -> None:
-    """r = d (1 - exp(-K_O t)) for a constant d, while the robot falls about.
+def test_the_observer_is_a_low_pass_of_the_push(name: str, rate: float) -> None:
+    """r = d (1 - exp(-K_O t)) for a constant d, while the robot falls.
 
     The mean of Cᵀv - G over a period is good to h²/12 of its second derivative: 1e-4.
     """
@@ -158,8 +158,8 @@ def test_the_observer_is_a_low_pass_on_what_pushes(name: str, rate: float) -> No
         q, v = plant.advance(k * H, (k + 1) * H, tau + d)
 
 
-def test_what_is_cancelled_is_clipped() -> None:
-    """Beyond it the arm yields as if there were no observer."""
+def test_the_compensation_is_clipped() -> None:
+    """Beyond the bound the arm yields as without an observer."""
     heavy = changed(PANDA, [Inertias(1.5)])
     plant = hsp.plants.RigidBodyPlant(heavy)
     clipped, free = (
@@ -191,7 +191,7 @@ def test_what_is_cancelled_is_clipped() -> None:
 
 
 def test_known_friction_costs_nothing_and_the_observer_leaves_it_alone() -> None:
-    """Oil in all joints, known exactly: the law is what it was without any.
+    """Exactly known viscous friction: the law is the same as without friction.
 
     The observer would cancel all of it if the feed-forward were part of its model: the
     friction here is some 0.5 N·m.
@@ -223,7 +223,7 @@ def test_known_friction_costs_nothing_and_the_observer_leaves_it_alone() -> None
 
 @pytest.mark.parametrize("levels", [1, 2, 3])
 def test_the_desired_velocity_is_the_law_s_flow(levels: int) -> None:
-    """v_d = J# x_d' + P g whatever v is: what is measured, and its noise, cancel."""
+    """v_d = J# x_d' + P g for any v: the measured velocity and its noise cancel."""
     from hsp_control.control.compensation.friction_feed_forward import desired_velocity
 
     robot, rng = PANDA, np.random.default_rng(2)
@@ -237,7 +237,7 @@ def test_the_desired_velocity_is_the_law_s_flow(levels: int) -> None:
     tasks: list[hsp.Task] = {
         1: [circle(), turned],
         2: [circle(), second],
-        3: [circle(), second, third],  # nine rows on seven freedoms
+        3: [circle(), second, third],  # nine rows, seven joints
     }[levels]
     made = hsp.Controller(
         robot, tasks, TargetPosture(np.zeros(7) + Q0 * 0.9), limits=None
@@ -247,7 +247,7 @@ def test_the_desired_velocity_is_the_law_s_flow(levels: int) -> None:
     for _ in range(5):
         state = robot.state(0.4, q, rng.uniform(-1.0, 1.0, 7))
         made.compute(state)
-        # Round-off of a product of inverses, at velocities of 1 rad/s.
+        # Rounding of a product of inverses, at velocities of 1 rad/s.
         assert_allclose(desired_velocity(state, made.active_stack), flow, atol=1e-12)
 
 
@@ -291,14 +291,14 @@ def test_an_offset_enters_each_error_equation_exactly(task: hsp.Task) -> None:
         rates.append(task.evaluate(near, feedback=feedback).error_rate)
     Kp, Kv, offset, *_ = feedback
     residual = (rates[0] - rates[1]) / (2 * h) + Kv @ e_dot + Kp @ e
-    # Rounding 1e-16/h and the difference's own h², beside terms of 3 and more.
+    # Rounding 1e-16/h and the truncation h², relative to terms of 3 and more.
     assert_allclose(residual, -offset, atol=1e-7)
 
 
 def test_with_an_integral_the_error_is_that_of_the_third_order() -> None:
-    """From an offset start, beside the exponential of the companion matrix.
+    """From an offset start, against the exponential of the companion matrix.
 
-    Held efforts make the difference, of first order in h: 1 % of the error's size.
+    Held efforts cause the difference, of first order in h: 1 % of the error's size.
     """
     robot = PANDA
     made = controller()
@@ -325,7 +325,7 @@ def test_an_integral_only_unwinds_while_the_law_is_not_delivered() -> None:
     action.advance({"hand": e}, 0.5, saturated=False)
     assert_allclose(action.integrals["hand"], 0.5 * e)
     assert_allclose(offset, 4000.0 * 0.5 * e)
-    action.advance({"hand": e}, 0.5, saturated=True)  # would grow: stays
+    action.advance({"hand": e}, 0.5, saturated=True)  # would grow: frozen
     assert_allclose(action.integrals["hand"], 0.5 * e)
     action.advance({"hand": -e}, 0.25, saturated=True)  # unwinds
     assert_allclose(action.integrals["hand"], 0.25 * e)
@@ -335,7 +335,7 @@ def test_an_integral_only_unwinds_while_the_law_is_not_delivered() -> None:
     assert np.abs(offset).max() == pytest.approx(8.0)
 
 
-# -------------------------------------------------------------------- the small ones
+# ------------------------------------------------------------------ other compensators
 
 
 @pytest.mark.parametrize("order", [1, 2])
@@ -352,22 +352,20 @@ def test_half_of_the_power_passes_at_the_cut_off(order: int) -> None:
             [own.apply(np.sin([2 * np.pi * frequency * s]), H / 4) for s in t]
         )
         size = np.abs(out[len(t) // 2 :]).max()
-        # Sampling bends the first order by 2 % at a twentieth of the rate.
+        # Sampling changes the first-order response by 2 % at a twentieth of the rate.
         assert size == pytest.approx(gain, rel=0.03)
     t = np.arange(0.0, 1.0, H)
     own = RunningFilter(declared)
     late = np.array([own.apply(np.array([s]), H)[0] for s in t])
-    # A held input is itself half a period late.
+    # A held input has itself a delay of half a period.
     assert t[-1] - late[-1] == pytest.approx(declared.delay, abs=0.51 * H)
 
 
 @pytest.mark.parametrize(
     ("efforts", "sensors"), [(2, 0), (1, 2), *further((1, 0), (0, 1))]
 )
-def test_the_predictor_knows_where_the_robot_will_be(
-    efforts: int, sensors: int
-) -> None:
-    """The law sees the state in which its effort acts, to Rk4's error."""
+def test_the_predictor_returns_the_later_state(efforts: int, sensors: int) -> None:
+    """The law uses the predicted state at which its effort acts, to Rk4's error."""
     plant = hsp.plants.ImperfectPlant(
         hsp.plants.IntegratedPlant(hsp.plants.RigidBodyPlant(PANDA), Rk4(H)),
         [SensorDelay(sensors)] if sensors else [],
@@ -386,7 +384,7 @@ def test_the_predictor_knows_where_the_robot_will_be(
 def test_the_law_is_of_the_time_at_which_its_effort_acts(
     efforts: int, sensors: int
 ) -> None:
-    """Sent at t: the effort of the moving task at t + the drives' delay, no other."""
+    """The effort sent at t is that of the moving task at t + the drives' delay."""
     made, state = controller(), hsp.RobotState(PANDA)
     compensation = Compensation(predictor=Predictor(efforts, sensors))
     log = run(made, compensation, duration=0.05)
@@ -399,7 +397,7 @@ def test_the_law_is_of_the_time_at_which_its_effort_acts(
     for k in (0, 7, 40):
         assert_allclose(effort(k, efforts), log.tau[k], rtol=0, atol=1e-9)
         other = effort(k, efforts + 1) - log.tau[k]
-        assert np.abs(other).max() > 1e-3  # a period more or less would be seen
+        assert np.abs(other).max() > 1e-3  # a delay wrong by one period would fail
 
 
 @pytest.mark.parametrize("frequency", [0.0, 10.0])
@@ -421,5 +419,5 @@ def test_the_ramp_leads_from_gravity_to_the_law(frequency: float) -> None:
     for k in (250, 400):  # the ramp is over: the law, exactly
         here = state.update(smooth.t[k], smooth.q[k], smooth.v[k])
         assert_array_equal(made.compute(here).tau, smooth.tau[k])
-    # A spring to where it was found holds it there at first.
+    # At first a spring holds the arm at its initial posture.
     assert np.abs(smooth.q[40] - q).max() < (0.02 if frequency else 0.03)

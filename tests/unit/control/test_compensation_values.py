@@ -1,4 +1,4 @@
-"""Compensators are values: shared, compared, sent elsewhere, and checked."""
+"""Compensators are values: shared, compared, pickled, and checked."""
 
 import pickle
 from collections.abc import Iterator
@@ -28,7 +28,7 @@ from hsp_control.control.compensation import (
 
 
 def test_one_compensation_serves_many_commands_at_once() -> None:
-    """Two in turns, and four in threads, beside each one by itself."""
+    """Two interleaved and four in threads equal each one alone."""
 
     def efforts(q: Array, command: CompensatedController) -> Iterator[Array]:
         command.restart()
@@ -145,7 +145,7 @@ def test_a_robot_that_may_fall_cannot_have_some(name: str) -> None:
 
 
 def test_a_second_order_filter_is_the_bilinear_transform_of_butterworths() -> None:
-    """Its coefficients are those of SciPy, its answers to an impulse too."""
+    """Coefficients and impulse responses equal SciPy's."""
     from scipy import signal
 
     b, a = VelocityFilter(40.0, 2).coefficients(0.001)

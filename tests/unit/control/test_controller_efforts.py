@@ -1,4 +1,4 @@
-"""Check what the controller returns, without memory, near singularities too."""
+"""The controller's output, without memory, near singularities too."""
 
 import numpy as np
 import pinocchio as pin
@@ -21,7 +21,7 @@ from hsp_control import Controller, FramePosition, Limits, TargetPosture
 from hsp_control.common.exceptions import ControllerError
 from hsp_control.control.actuation import Status
 
-# --- what it returns -----------------------------------------------------------------
+# --- the output ----------------------------------------------------------------------
 
 
 @metrics
@@ -70,14 +70,14 @@ def test_diagnosis(kind: str) -> None:
         )
         assert_allclose(diagnosis.null_space_norm, np.sqrt(e_N @ W @ e_N), rtol=1e-13)
         assert diagnosis.field_value == controller.field.value(state)
-        # To look changes nothing.
+        # Reading the output changes nothing.
         again = controller.diagnose()
         assert_array_equal(again.singular_values, diagnosis.singular_values)
         assert_same(contents(controller.compute(state)), out)
 
 
 def test_a_state_may_be_given_in_any_form() -> None:
-    """To the last bit; values that a float32 can hold, in that one, too."""
+    """Bit for bit; values that float32 represents exactly, also given as float32."""
     controller = Controller(panda(), [track()], TargetPosture("home"), limits=None)
     t, q, v = states(1)[0]
     q, v = q.astype(np.float32).astype(float), v.astype(np.float32).astype(float)
@@ -98,7 +98,7 @@ def test_a_state_may_be_given_in_any_form() -> None:
 
 
 def test_a_step_in_one_call_is_the_step_in_many() -> None:
-    """To the last bit: with (t, q, v) all is one native call, with a state several."""
+    """Bit for bit: with (t, q, v) a step is one native call, with a state several."""
     level = FramePosition("panda_link4", circle(), priority=2)
     found = set[tuple[Status, bool]]()
     for tasks, limits in (

@@ -1,4 +1,4 @@
-"""Check what the controller refuses, and that NaN never comes out of it."""
+"""Inputs that the controller refuses; its output is never NaN."""
 
 from collections.abc import Callable
 from dataclasses import KW_ONLY
@@ -44,11 +44,11 @@ from hsp_control.trajectories import CallableTrajectory, Trajectory, TrajectoryS
 Parts = dict[str, Any]
 
 
-# --- what it refuses -----------------------------------------------------------------
+# --- refusals ------------------------------------------------------------------------
 
 
 def indefinite_gain() -> Array:
-    """Return K_N = [[1, 1.5], [0, 1]] ⊕ I: it decays for W = I but not in W1."""
+    """Return K_N = [[1, 1.5], [0, 1]] ⊕ I: e_N decays for W = I but not in W1."""
     K_N = np.eye(7)
     K_N[0, 1] = 1.5
     return K_N
@@ -154,11 +154,11 @@ def test_refuses(options: Parts, error: type[Exception], message: str) -> None:
     assert isinstance(caught.value, LookupError if not_there else ValueError)
 
 
-# --- NaN never comes out -------------------------------------------------------------
+# --- no NaN in the output ------------------------------------------------------------
 
 
 class Broken(Trajectory):
-    """A user's trajectory that goes wrong after half a second."""
+    """A user's trajectory that becomes invalid after half a second."""
 
     value: float
     where: str
@@ -194,7 +194,7 @@ class BrokenField(hsp.NullSpaceField):
 
 
 class BrokenMetric(Metric):
-    """A user's metric that is not a number after half a second."""
+    """A user's metric that is NaN after half a second."""
 
     form: ClassVar[int] = VARYING
 
@@ -204,7 +204,7 @@ class BrokenMetric(Metric):
 
 
 class BrokenTask(hsp.FramePosition):
-    """A user's task whose arrays go wrong after half a second."""
+    """A user's task whose arrays become invalid after half a second."""
 
     _: KW_ONLY
     where: str
@@ -229,7 +229,7 @@ def broken_task(where: str, value: float) -> BrokenTask:
 
 
 def late(wrong: Any, right: Any) -> Callable[..., Any]:
-    """Return a function of a time or a state that goes wrong after half a second."""
+    """Return a function of time or state that becomes invalid after half a second."""
     return lambda x: wrong if getattr(x, "t", x) > 0.5 else right
 
 
@@ -342,5 +342,5 @@ def test_nan_of_a_user_is_an_error_and_never_an_effort(
     with pytest.raises(error, match=wording(message)) as caught:
         controller.compute(panda().state(0.75, q, v))
     assert type(caught.value) is error
-    # The failure leaves nothing behind: the controller goes on as if new.
+    # The failure leaves no trace: the controller continues as if new.
     assert_same(contents(controller.compute(panda().state(0.25, q, v))), before)

@@ -1,4 +1,4 @@
-"""A task or a trajectory of a user's own that is wrong is named at the first step."""
+"""Errors in a user's task or trajectory are reported at the first step."""
 
 from asyncio import CancelledError
 from collections.abc import Callable
@@ -110,20 +110,20 @@ MISTAKES: dict[str, tuple[Callable[..., None], str]] = {
 }
 
 
-@pytest.mark.parametrize("what", MISTAKES)
-def test_what_is_wrong_in_a_task_is_named(what: str) -> None:
-    mistake, words = MISTAKES[what]
+@pytest.mark.parametrize("mistake", MISTAKES)
+def test_a_wrong_task_is_named(mistake: str) -> None:
+    wrong, words = MISTAKES[mistake]
     first_step(Height(right))
     with pytest.raises(RateError) as caught:
-        first_step(Height(mistake))
+        first_step(Height(wrong))
     message = str(caught.value)
     assert message.startswith("tasks.Height: task 'Height': ")
     assert words in message
-    assert what == "v in e" or "Height.evaluate is wrong" in message
+    assert mistake == "v in e" or "Height.evaluate is wrong" in message
 
 
 class Bounded(Height):
-    """One whose feedback grows no more where the error is large."""
+    """A task whose feedback saturates at large errors."""
 
     def fed_back(self, feedback: Feedback, error: Array, error_rate: Array) -> Array:
         damped = feedback.Kv @ error_rate + feedback.offset
@@ -131,7 +131,7 @@ class Bounded(Height):
 
 
 class Undeclared(Height):
-    """One that feeds back what it does not declare."""
+    """A task with feedback that it does not declare."""
 
     def evaluate(
         self,
@@ -148,7 +148,7 @@ class Undeclared(Height):
 
 
 def test_a_feedback_that_is_not_linear_is_declared() -> None:
-    """With `fed_back` its equation is its own, and checked; without, it is refused."""
+    """With `fed_back` its own equation is checked; without, it is refused."""
     task = Bounded(right)
     first_step(task)
     robot_state = ROBOT.state(0.0, HOME, np.zeros(7))
@@ -173,7 +173,7 @@ def test_a_task_that_comes_later_is_checked_when_it_comes() -> None:
 
 @every_task
 def test_no_task_of_the_package_is_called_wrong(case: Case) -> None:
-    """Each as somebody's own subclass, in motion, with errors up to the largest."""
+    """Every task as a user's subclass, in motion, with errors up to the largest."""
     motion = place(case, 5)
     for error in (0.0, 0.4):
         task: Any = case.family.build(motion.robot, motion, error, GAINS, 5)
@@ -281,7 +281,7 @@ def wave_accelerations(t: float) -> Array:
 
 
 def waves_that_end(t: float) -> Array:
-    if t > 0.25:  # what it raises then is raised then, and no `Exception`
+    if t > 0.25:  # raised at that time, not at the check; a BaseException
         raise CancelledError
     return waves(t)
 
@@ -324,20 +324,20 @@ FINE: dict[str, Any] = {
 }
 
 
-@pytest.mark.parametrize("what", WRONG)
-def test_a_wrong_trajectory_is_named(what: str) -> None:
-    wrong, words = WRONG[what]
+@pytest.mark.parametrize("mistake", WRONG)
+def test_a_wrong_trajectory_is_named(mistake: str) -> None:
+    wrong, words = WRONG[mistake]
     with pytest.raises(RateError, match=f"^trajectory {words}|^trajectory .*{words}"):
         check_trajectories(wrong, 0.2)
 
 
-@pytest.mark.parametrize("what", FINE)
-def test_a_right_trajectory_is_not_named(what: str) -> None:
-    check_trajectories(FINE[what], 0.2)
+@pytest.mark.parametrize("variant", FINE)
+def test_a_right_trajectory_is_not_named(variant: str) -> None:
+    check_trajectories(FINE[variant], 0.2)
 
 
 def test_it_is_found_wherever_it_is_used() -> None:
-    """In a task, for an obstacle, and in a change, each with its place."""
+    """In a task, for an obstacle, and in a change, with the place in the message."""
     wrong = Wave("velocity")
     with pytest.raises(RateError, match=r"^tasks\.panda_tcp: trajectory Wave: "):
         first_step(hsp.FramePosition("panda_tcp", wrong, blend=0.5))

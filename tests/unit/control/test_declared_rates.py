@@ -1,4 +1,4 @@
-"""A rate that somebody has written wrong is named at the first step, and only then."""
+"""A wrong user-defined rate is reported at the first step, and only then."""
 
 import sys
 from collections.abc import Callable
@@ -46,7 +46,7 @@ def g_rate(s: hsp.RobotState) -> Array:
 
 
 def still(rate: Callable[[hsp.RobotState], Array]) -> Callable[..., Array]:
-    """Return a rate that forgets that time goes on."""
+    """Return a rate without the partial derivative in time."""
 
     def of(s: hsp.RobotState) -> Array:
         rest = s.robot.state(s.t, s.q, np.zeros(7))
@@ -66,7 +66,7 @@ WRONG: dict[str, Callable[[Any], Any]] = {
 
 
 class Vector(VectorField):
-    """A field by its methods."""
+    """A field defined by its methods."""
 
     by: Any
 
@@ -78,7 +78,7 @@ class Vector(VectorField):
 
 
 class Direct(hsp.NullSpaceField):
-    """A field of no other kind."""
+    """A field without a common base class's method."""
 
     by: Any
 
@@ -107,7 +107,7 @@ class Slope(hsp.Cost):
 
 
 class Both(hsp.Cost):
-    """A cost with both in one method."""
+    """A cost with gradient and rate in one method."""
 
     by: Any
 
@@ -127,7 +127,7 @@ def _square(q: Array, v: Array, factor: float, gradient: Array, rate: Array) -> 
 
 
 class Kernel(hsp.Cost):
-    """A cost by a kernel."""
+    """A cost defined by a kernel."""
 
     factor: float
 
@@ -136,7 +136,7 @@ class Kernel(hsp.Cost):
 
 
 class Reach(hsp.fields.JacobianCost):
-    """A cost of a frame's Jacobian, by its terms."""
+    """A cost of a frame's Jacobian, defined by its terms."""
 
     slope_factor: float = 1.0
     rate_factor: float = 1.0
@@ -147,7 +147,7 @@ class Reach(hsp.fields.JacobianCost):
 
 
 class Swell(hsp.fields.Weight):
-    """A weight by its method."""
+    """A weight defined by its method."""
 
     by: Any
 
@@ -385,12 +385,12 @@ QUIET: dict[str, Any] = {
 }
 
 
-@pytest.mark.parametrize("what", QUIET)
-def test_what_is_right_or_has_no_rate_there_is_not_named(what: str) -> None:
-    first_step(QUIET[what])
+@pytest.mark.parametrize("variant", QUIET)
+def test_a_right_or_undefined_rate_is_not_named(variant: str) -> None:
+    first_step(QUIET[variant])
 
 
-def test_it_is_looked_at_once_and_on_a_state_of_its_own() -> None:
+def test_it_is_checked_once_and_on_a_separate_state() -> None:
     seen: list[tuple[float, Any]] = []
 
     def watched(s: hsp.RobotState) -> Array:
@@ -408,7 +408,8 @@ def test_it_is_looked_at_once_and_on_a_state_of_its_own() -> None:
             effort, plain.compute(1.0 + 0.001 * k, HOME, v).tau
         )
     assert sum(not np.array_equal(each, v) for _, each in seen) == 7
-    assert min(t for t, _ in seen) == 1.0  # nothing is called before the run begins
+    # user code is not called before the run begins
+    assert min(t for t, _ in seen) == 1.0
     np.testing.assert_array_equal(one.state.q, HOME)
 
 
@@ -421,7 +422,7 @@ def test_a_wrong_field_that_comes_later_is_refused_when_it_comes() -> None:
     assert one.changes == ()
     np.testing.assert_array_equal(one.compute(0.0, HOME, np.zeros(7)).tau, before)
     planned = controller(hsp.JointCentering())
-    planned.at(1.0).field(wrong)  # where it starts is not known yet
+    planned.at(1.0).field(wrong)  # the start is not known yet
     with pytest.raises(RateError, match="field 'late'"):
         planned.compute(0.0, HOME, np.zeros(7))
 
@@ -449,7 +450,7 @@ null_space:
 """
 
 
-def test_a_configuration_is_told_the_line(
+def test_errors_of_a_configuration_have_the_line(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(imported, "_functions", {})

@@ -1,4 +1,4 @@
-"""The cost of deviations from the law, and postures that motors can hold."""
+"""The cost of deviations from the law, and postures within the motors' limits."""
 
 from dataclasses import replace
 from typing import Any
@@ -46,7 +46,7 @@ METRICS: dict[str, hsp.metrics.Metric] = {
 
 
 def inverse_cost(law: BoundLaw, held: Array) -> Array:
-    """Return J Jᵀ, which is to be H⁻¹."""
+    """Return J Jᵀ, which should equal H⁻¹."""
     levels, directions = (
         Levels.of(law, False, panda().size, held),
         Directions.of(7),
@@ -72,9 +72,8 @@ def test_levels_share_directions_as_the_law_does(
 ) -> None:
     """J Jᵀ H = 1 with log H from the levels' projectors.
 
-    Also where the smallest singular value is a little above the threshold, or the
-    threshold itself, but for rounding: then the law, which is exact, may have found the
-    spectrum.
+    Also where the smallest singular value is slightly above the threshold, or equal to
+    it up to rounding: then the spectrum may come from the exact law.
     """
     robot, rng = panda(), np.random.default_rng(seed)
     posture = hsp.JointPosture(robot.home(), joints=["panda_joint2"], priority=2)
@@ -95,19 +94,20 @@ def test_levels_share_directions_as_the_law_does(
 
     if threshold in {0.999, 1.0}:
         values = computed(1e-3, "none").diagnose().singular_values
-        assume(values[-1] > 1e-100)  # else its square is no number
+        assume(values[-1] > 1e-100)  # so that its square does not underflow
         controller = computed(threshold * values[-1], "none")
     else:
         controller = computed(threshold, "robot")
     law = controller._active.law
-    planned([law.damped_beside(state.v)]).run(0.0)  # as where a limit binds
-    held = 10.0 ** rng.uniform(-7.0, 1.0, size=levels)  # from strict to as dear
+    planned([law.damped_beside(state.v)]).run(0.0)  # as with an active limit
+    # from strict priorities to equal costs
+    held = 10.0 ** rng.uniform(-7.0, 1.0, size=levels)
     H = limit_oracle.deviation_cost(law, False, robot.size, held)
     np.testing.assert_allclose(inverse_cost(law, held) @ H, np.eye(7), atol=1e-5)
 
 
 FIELD = 0.01 * hsp.JointCentering()
-"""It demands less than the limits permit far from them."""
+"""It demands less than the limits permit at a distance from them."""
 
 
 def on_springs(limits: hsp.Limits | None, *below: hsp.FramePosition) -> hsp.Controller:
@@ -125,8 +125,8 @@ def on_springs(limits: hsp.Limits | None, *below: hsp.FramePosition) -> hsp.Cont
 def test_springs_yield_as_a_body_with_stops(seed: int) -> None:
     """Only joints at a bound get a reaction, and it leads away from the bound.
 
-    But for what the null space costs beside a spring: 1.4e-4 of the largest at most, in
-    400 cases.
+    Except for the cost of the null space relative to a spring: at most 1.4e-4 of the
+    largest in 400 cases.
     """
     rng, robot = np.random.default_rng(seed), panda()
     q = robot.home() + 0.2 * rng.standard_normal(7)
@@ -158,7 +158,7 @@ def straight_elbow(limits: hsp.Limits | None) -> hsp.Controller:
 def test_efforts_are_continuous_near_a_straight_elbow(
     limits: hsp.Limits | None,
 ) -> None:
-    """The elbow opens by 0.4 mrad in a step, from 0.55 rad to its limit.
+    """The elbow opens by 0.4 mrad per step, from 0.55 rad to its limit.
 
     Efforts change by less than 40 N·m, where directions pass from the hand to the elbow
     and to the null space. And none jumps: the largest change of an effort fades as its
@@ -191,10 +191,10 @@ def test_efforts_are_continuous_near_a_straight_elbow(
         assert max(first, second) < 0.02 * changes[worst]
 
 
-# --- postures that motors can hold ---------------------------------------------------
+# --- postures within the motors' limits ----------------------------------------------
 
 
-@pytest.mark.parametrize("locked", [None, {}])  # with {} one finger follows the other
+@pytest.mark.parametrize("locked", [None, {}])  # with {} one finger mimics the other
 def test_static_rows_are_the_second_derivative(locked: dict[str, float] | None) -> None:
     """∇G·a + drift = G'' along q + s v + ½ s² a, by differences."""
     robot = panda() if locked is None else hsp.Robot.load("panda", locked=locked)
@@ -220,9 +220,9 @@ def test_static_rows_are_the_second_derivative(locked: dict[str, float] | None) 
 
 @pytest.mark.slow
 def test_an_arm_goes_where_it_can_be_held() -> None:
-    """A target that its shoulder cannot hold: it comes to rest before it."""
+    """At a target beyond the shoulder's static effort the arm stops before it."""
     robot, used = panda(), {}
-    share = 0.35  # of 87 N·m at the shoulder, which takes 37 with the arm stretched
+    share = 0.35  # of 87 N·m at the shoulder; the stretched arm needs 37
     gains = hsp.Gains(natural_frequency=6.0)
     far = hsp.FramePosition("panda_tcp", hsp.Hold([0.7, 0.0, 0.4]), gains=gains)
     for static in (None, share):
@@ -233,5 +233,5 @@ def test_an_arm_goes_where_it_can_be_held() -> None:
         still = [robot.inverse_dynamics(q, 0 * q, 0 * q) for q in rollout["q"][::20]]
         used[static] = (np.abs(still) / robot.model.effortLimit).max()
     assert used[None] > share + 0.02
-    # A barrier is kept to the error of an acceleration held for 1 ms, over α².
+    # The barrier holds up to the error of an acceleration held for 1 ms, over α².
     assert used[share] < share + 1e-3

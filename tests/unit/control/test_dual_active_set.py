@@ -1,4 +1,5 @@
-"""The QP solver: proofs of optima, two other solvers, warm starts, softness, codes."""
+"""The QP solver: optimality, two other solvers, warm starts, soft rows, status
+codes."""
 
 from pathlib import Path
 from typing import Any
@@ -32,7 +33,7 @@ from hsp_control.control.actuation.dual_active_set import (
 
 seeds = st.integers(0, 2**32 - 1)
 EACH = 150
-"""QPs of a kind."""
+"""QPs per kind."""
 
 
 # --- optima --------------------------------------------------------------------------
@@ -40,7 +41,7 @@ EACH = 150
 
 @pytest.mark.parametrize("kind", KINDS)
 def test_many_of_each_kind(kind: str) -> None:
-    """Solved where there is a solution; each answer proves itself; DAQP agrees."""
+    """Solved where feasible; answers satisfy the KKT conditions and agree with DAQP."""
     for seed in range(EACH):
         case = KINDS[kind](np.random.default_rng(seed))
         found = answer(case)
@@ -79,7 +80,7 @@ def test_any_warm_start_gives_the_same(kind: str, seed: int) -> None:
     work.held[:] = rng.integers(-1, 2, len(work.held))
     warm = answer(case, work=work)
     assert warm.code == SOLVED
-    if set(warm.active) == set(cold.active):  # the same to the last bit
+    if set(warm.active) == set(cold.active):  # bit for bit
         np.testing.assert_array_equal(warm.x, cold.x)
     tolerance = 1e-8 * (1.0 + np.abs(cold.x).max())
     np.testing.assert_allclose(warm.x, cold.x, rtol=0, atol=tolerance)
@@ -97,9 +98,9 @@ def test_a_warm_start_from_the_answer_takes_no_iteration(seed: int) -> None:
 
 
 def test_a_contradiction_that_stays_is_found_at_once() -> None:
-    """A warm start begins with what contradicted the last constraint, without it.
+    """A warm start begins with the active set that contradicted the last constraint.
 
-    But where it held nearly dependent rows.
+    Except where that set has nearly dependent rows.
     """
     iterations = []
     for seed in range(EACH):
@@ -135,7 +136,7 @@ def with_slacks(case: Case, softness: Array) -> Case:
 def test_a_slack_is_one_more_unknown(kind: str, seed: int) -> None:
     """The same x as DAQP's with all slacks; half of the constraints are soft.
 
-    Where the hard ones contradict each other both report it.
+    Where the hard ones are infeasible both report it.
     """
     rng = np.random.default_rng(seed)
     case = KINDS[kind](rng)._replace(equalities=0)
@@ -152,7 +153,7 @@ def test_a_slack_is_one_more_unknown(kind: str, seed: int) -> None:
 
 @given(seeds)
 def test_a_contradiction_is_shared_by_the_costs(seed: int) -> None:
-    """x ≥ 1 and x ≤ -1, little softness: violated in proportion to σ²."""
+    """x ≥ 1 and x ≤ -1, with stiff slacks: violations are in proportion to σ²."""
     weight = np.random.default_rng(seed).uniform(0.1, 10.0)
     A = np.array([[1.0, 0.0], [1.0, 0.0]])
     case = two(A, np.array([1.0, -np.inf]), np.array([np.inf, -1.0]))
@@ -166,7 +167,7 @@ def test_a_contradiction_is_shared_by_the_costs(seed: int) -> None:
 
 @given(seeds)
 def test_a_soft_answer_does_not_depend_on_its_start(seed: int) -> None:
-    """Slacks begin anew, too: the same to the last bit, with the same active set."""
+    """Slacks are reset, too: the same bits, with the same active set."""
     rng = np.random.default_rng(seed)
     case = dense(rng)
     softness = 10.0 ** rng.uniform(-2.0, 0.0, len(case.rows))
@@ -206,7 +207,7 @@ def test_contradictions_are_infeasible(
 
 
 def test_iterations_are_limited() -> None:
-    """With a limit of none: the code reports it."""
+    """With an iteration limit of zero the code reports it."""
     case = degenerate(np.random.default_rng(5))
     assert answer(case).code == SOLVED
     assert answer(case, iterations=0).code == EXHAUSTED
@@ -221,10 +222,9 @@ def test_sizes_that_do_not_fit_are_refused() -> None:
 
 
 def test_active_constraints_span_no_more_than_there_is() -> None:
-    """Where they span everything, what remains of another one is rounding.
+    """Where active rows span the space, the residual of another one is rounding.
 
-    Efforts of a Talos that contradict each other; once they were one too many for the
-    solver's memory.
+    From contradicting effort limits of a Talos: one row more than the solver's memory.
     """
     with np.load(Path(__file__).parent / "data/full_active_set.npz") as arrays:
         given: Any = {name: arrays[name] for name in arrays.files}

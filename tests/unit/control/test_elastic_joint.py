@@ -20,7 +20,7 @@ H, OMEGA = 0.001, 20.0
 
 
 class Sprung(SampledPlant):
-    """A carriage that a motor pulls by a spring; it measures at the joint."""
+    """A carriage that a motor drives through a spring, with link-side sensors."""
 
     def __init__(self, robot: Robot, joint: ElasticJoint) -> None:
         super().__init__(robot)
@@ -40,7 +40,7 @@ class Sprung(SampledPlant):
 
 
 def elastic(measured: Literal["motor", "link"], stiffness: float = 5e3) -> ElasticJoint:
-    """Return a joint like a Panda's first ones: damped by 2 % of the critical."""
+    """Return a joint like a Panda's first ones, with a damping ratio of 2 %."""
     link, motor = 2.0 / 3.0, 1.0 / 3.0
     damping = 2.0 * 0.02 * np.sqrt(stiffness * link * motor)
     return ElasticJoint(link, motor, stiffness, damping, measured)

@@ -1,4 +1,4 @@
-"""Check what one tries first: degrees, targets, errors, and steps that call others."""
+"""A user's first attempts: degrees, targets, errors, and re-entrant steps."""
 
 import pickle
 import re
@@ -35,7 +35,7 @@ def holding(**options: Any) -> hsp.Controller:
 # --- degrees ------------------------------------------------------------------------
 
 
-def test_degrees_are_asked_about_at_the_first_state_and_after_a_restart() -> None:
+def test_degrees_are_reported_at_the_first_state_and_after_a_restart() -> None:
     home = panda().home()
     degrees = np.rad2deg(home)
     message = wording("joint 'panda_joint2' ... -45 rad ... 1.7628 rad: degrees?")
@@ -47,14 +47,14 @@ def test_degrees_are_asked_about_at_the_first_state_and_after_a_restart() -> Non
     with pytest.raises(ConfigurationError, match=message):
         hsp.simulate(law, degrees, duration=0.01, control_period=0.001)
     before = contents(law.compute(0.0, home, REST))
-    law.compute(0.0, degrees, REST)  # later states are not looked at
+    law.compute(0.0, degrees, REST)  # later states are not checked
     law.restart()
     with pytest.raises(ConfigurationError, match="degrees"):
         law.compute(0.0, degrees, REST)
     assert_same(contents(law.compute(0.0, home, REST)), before)
 
 
-# --- a target that one sets ---------------------------------------------------------
+# --- a target set by the user -------------------------------------------------------
 
 
 def pose_of(frame: Any) -> pin.SE3:
@@ -119,10 +119,10 @@ def test_a_target_of_another_kind_is_refused(
         hsp.Controller(panda(), tasks).set_target(name, value)
 
 
-def test_errors_by_name_and_what_is_printed() -> None:
+def test_errors_by_name_and_their_text() -> None:
     law = holding(null_space_gain=8.0)
-    told = "Controller of panda: 'panda_tcp' ... field rest, K_N = 8 ... no limits"
-    assert re.search(wording(told), repr(law))
+    reported = "Controller of panda: 'panda_tcp' ... field rest, K_N = 8 ... no limits"
+    assert re.search(wording(reported), repr(law))
     out = law.compute(0.0, panda().home(), REST)
     np.testing.assert_array_equal(out.error("panda_tcp"), out.task.error)
     np.testing.assert_array_equal(out.error_rate("panda_tcp"), out.task.error_rate)
@@ -139,7 +139,7 @@ def test_errors_by_name_and_what_is_printed() -> None:
 
 @given(st.integers(0, 2**32 - 1), st.sampled_from(["panda", "iiwa14", "ur5"]))
 def test_a_jump_of_a_tenth_of_a_limit_is_warned_of(seed: int, name: str) -> None:
-    """Of the joint with the largest share, and nothing below; not if it moves."""
+    """The joint with the largest share is named; none below, none in motion."""
     robot, rng = load(name), np.random.default_rng(seed)
     q, rest = robot.random_configuration(rng), np.zeros(robot.nv)
     limit = np.asarray(robot.model.effortLimit)
@@ -162,8 +162,8 @@ FIRST_EFFORT = wording(
 )
 
 
-def test_a_loop_of_ones_own_is_told_once_when_it_sends() -> None:
-    """Computing alone moves nothing; a restart is another start."""
+def test_a_user_s_loop_is_warned_once_when_it_sends() -> None:
+    """`compute` alone moves no robot; after a restart the check runs again."""
     circle = hsp.Circle(radius=0.1, angular_rate=2.0)
     hand = hsp.FramePose("panda_tcp", circle)
     law = hsp.Controller(panda(), [hand], hsp.JointCentering(), limits=None)
@@ -221,7 +221,7 @@ CALLS = wording("... calls the same controller ... controller.preview()")
         lambda law, s: law.at(1.0).null_space_gain(3.0),
     ],
 )
-def test_a_field_that_calls_its_own_controller_is_told(call: Any) -> None:
+def test_a_field_that_calls_its_controller_raises(call: Any) -> None:
     armed = False
 
     def cost(state: Any) -> float:
@@ -241,7 +241,7 @@ def test_a_field_that_calls_its_own_controller_is_told(call: Any) -> None:
 
 
 def test_another_thread_waits() -> None:
-    """It finds the lock taken, also by way of `flow`, and gets its own effort."""
+    """It finds the lock held, also through `flow`, and gets its own effort."""
     entered, go = threading.Event(), threading.Event()
 
     def cost(state: Any) -> float:

@@ -1,4 +1,4 @@
-"""Check the flow: a start on it has no transient, and robots become it."""
+"""The flow: a start on it has no transient, and robots converge to it."""
 
 import numpy as np
 import pytest
@@ -28,7 +28,7 @@ def swaying_posture(state: hsp.RobotState) -> Array:
 
 @metrics
 def test_flow_meets_the_task_and_follows_the_field(kind: str) -> None:
-    """v = J#x_d' + P g: J v = x_d', and v - g is smallest in the metric."""
+    """v = J#x_d' + P g: J v = x_d', and ‖v - g‖_W is minimal."""
     metric = METRICS[kind](7)
     field = FunctionField(swaying_posture)
     tasks = [track(), hold_orientation()]
@@ -44,7 +44,7 @@ def test_flow_meets_the_task_and_follows_the_field(kind: str) -> None:
         W = metric.evaluate(state, MetricSample.allocate(7)).W
         null = np.linalg.svd(J)[2][6:]
         g = swaying_posture(state)
-        # P(g - v) = 0: on the flow the null-space error has died.
+        # P(g - v) = 0: on the flow the null-space error is zero.
         np.testing.assert_allclose(null @ W @ (g - v), 0.0, rtol=0, atol=1e-10)
         e_N = controller.compute(state).null_space_error
         np.testing.assert_allclose(e_N, 0.0, rtol=0, atol=1e-11)
@@ -71,16 +71,16 @@ def test_robot_becomes_the_flow(kind: str) -> None:
         np.abs(v - controller.flow(t, q)).max()
         for t, q, v in zip(rollout.t, rollout.q, rollout.v, strict=True)
     ]
-    # In between, both errors die like (1 + 20 t) exp(-20 t); at the end it is the
-    # integrator's tolerance that is left.
+    # Before, both errors decay like (1 + 20 t) exp(-20 t); at the end the integrator's
+    # tolerance remains.
     assert gaps[0] > 0.1
     assert gaps[-1] < 1e-8
-    # The flow itself is not at rest: the robot follows something that moves.
+    # The flow itself moves: the robot follows a moving reference.
     assert np.abs(rollout.v[-1]).max() > 0.1
 
 
 def test_looking_ahead_moves_nothing() -> None:
-    """Neither the time, nor where the run begins, nor what is still to come."""
+    """Reading the flow changes neither the time, nor the start, nor later changes."""
     robot = hsp.Robot.load("panda")
     q, v = robot.home(), np.zeros(7)
     far = q + 0.2

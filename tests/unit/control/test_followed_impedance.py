@@ -1,4 +1,4 @@
-"""An impedance in force follows the planned one as fast as its damping permits."""
+"""The active impedance follows the planned one as fast as its damping permits."""
 
 from types import SimpleNamespace
 from typing import Any
@@ -20,7 +20,7 @@ ENDS = np.array([3, 6])
 
 
 def springs(rng: np.random.Generator, damping: str) -> np.ndarray:
-    """Return the numbers of an impedance whose axes are turned."""
+    """Return the matrices of an impedance with rotated axes."""
 
     def turned(most: float) -> Any:
         turn = np.linalg.qr(rng.normal(size=(6, 6)))[0]

@@ -1,4 +1,4 @@
-"""Force feedback: the felt force goes to the command at the rate K_i, within bounds."""
+"""Force feedback: the measured force converges at the rate K_i, within bounds."""
 
 from typing import Any
 
@@ -49,7 +49,7 @@ def run(
 
 
 def test_the_error_decays_at_its_rate() -> None:
-    """A rigid plane answers at once, so λ_d - λ_m goes as (1 - K_i h)^n."""
+    """A rigid plane reacts at once, so λ_d - λ_m decays as (1 - K_i h)^n."""
     feedback = Compensation(force_feedback=ForceFeedback(8.0))
     log = run(pressing(), feedback, 5.0)
     felt = log[f"plant.contact.{TIP}.force"][:, 2]
@@ -63,7 +63,7 @@ def test_the_error_decays_at_its_rate() -> None:
     assert np.abs(log["task.turn.error"]).max() < 1e-6
 
 
-def test_the_integral_rests_where_the_command_gives_way() -> None:
+def test_the_integral_rests_where_the_command_is_reduced() -> None:
     """A motor at its limit cannot press harder: nothing winds up."""
     state = panda().state(0.0, panda().home(), np.zeros(7))
     holding = np.abs(state.nonlinear_effects) + 5.0
@@ -75,7 +75,7 @@ def test_the_integral_rests_where_the_command_gives_way() -> None:
     assert np.abs(log["contact.press.integral"]).max() < 1.0
 
 
-def test_the_integral_waits_until_the_contact_bears() -> None:
+def test_the_integral_waits_until_the_contact_carries() -> None:
     feedback = Compensation(force_feedback=ForceFeedback(8.0))
     fading = Schedule([(0.1, None)], ramp=0.1)
     log = run(pressing(schedule=fading), feedback, 5.0)
@@ -85,7 +85,7 @@ def test_the_integral_waits_until_the_contact_bears() -> None:
 
 
 def test_an_estimate_needs_no_sensor() -> None:
-    """In the air nothing is felt; on a plane what is commanded, if the model holds."""
+    """Zero force in the air; the commanded force on a plane with an exact model."""
     feedback = ForceFeedback(1e-6, force="estimated")
     both = Compensation(force_feedback=feedback, momentum_observer=OBSERVER)
     log = run(pressing(), both, 0.0)
@@ -121,7 +121,7 @@ def test_an_estimate_needs_no_sensor() -> None:
         ),
     ],
 )
-def test_what_cannot_be_fed_back(
+def test_impossible_feedback(
     newtons: float | None, parts: dict[str, Any], message: str
 ) -> None:
     with pytest.raises(CompensationError, match=wording(message)):

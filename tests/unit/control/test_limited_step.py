@@ -1,4 +1,4 @@
-"""Steps within limits: the optimum of a QP, and where there is none what is relaxed."""
+"""Steps within limits: the optimum of a QP; where infeasible, the relaxed rows."""
 
 from functools import cache
 from typing import Any
@@ -25,7 +25,7 @@ seeds = st.integers(0, 2**32 - 1)
 def arm(
     strength: float = 0.5, static: float | str = "none", **options: Any
 ) -> hsp.Controller:
-    """Return a weak arm whose posture is less important than its hand."""
+    """Return a weak arm whose posture has a lower priority than its hand."""
     path = hsp.Circle(0.2, 4.0, [0.45, 0.0, 0.45], normal=[0.0, 0.0, 1.0])
     gains = hsp.Gains(natural_frequency=10.0)
     hand = hsp.FramePosition("panda_tcp", path, gains=gains, name="hand")
@@ -38,7 +38,7 @@ def arm(
 
 
 def pressing() -> hsp.Controller:
-    """Return a weak arm that presses with more than its motors may have left."""
+    """Return a weak arm commanded to press beyond its motors' limits."""
     contact = hsp.contacts.SlidingContact(
         "panda_tcp", friction=0.4, force=hsp.contacts.CommandedForce([4.0, 2.0, 40.0])
     )
@@ -51,7 +51,7 @@ def pressing() -> hsp.Controller:
 
 @cache
 def controller(name: str) -> tuple[hsp.Controller, Array]:
-    """Return a controller, and the configuration around which it is tried."""
+    """Return a controller, and the configuration around which states are drawn."""
     if name == "mass matrix":
         metric = hsp.metrics.MassMatrixMetric()
         return arm(metric=metric), panda().home()
@@ -74,7 +74,7 @@ def drawn(name: str, seed: int, spread: float) -> hsp.Controller:
 
 
 def actuation_of(made: hsp.Controller) -> Actuation:
-    """Return what delivered the controller's last step."""
+    """Return the object that delivered the controller's last step."""
     ((limits, _),) = made._in_force.limits.sets
     return made._in_force.mixture.actuation(made._active, limits)
 
@@ -104,7 +104,7 @@ def repeated(made: hsp.Controller, barriers: Barriers | None = None) -> Delivere
 @given(seeds)
 @settings(max_examples=25)
 def test_it_is_the_optimum(name: str, spread: float, seed: int) -> None:
-    """Within all rows, and not dearer than what DAQP finds for the same QP."""
+    """Within all rows, at no higher cost than DAQP's solution of the same QP."""
     made = drawn(name, seed, spread)
     _, a, forces, status, _ = repeated(made)
     if status != Status.LIMITED:
@@ -133,7 +133,7 @@ def test_it_is_the_optimum(name: str, spread: float, seed: int) -> None:
     beyond = np.maximum(qp.rows.lower - value, value - qp.rows.upper) / scale
     assert beyond.max() < 1e-7
     other = limit_oracle.solve(*qp)
-    if other is None:  # the oracle gives up on some that can be solved
+    if other is None:  # the oracle fails on some feasible QPs
         return
     cost, least = (0.5 * each @ qp.H @ each + qp.f @ each for each in (x, other))
     assert cost <= least + 1e-6 * (1.0 + abs(least))
@@ -191,8 +191,8 @@ def test_distances_are_relaxed_less_than_motion_and_motion_less_than_holding() -
     assert (a[5] + 5.0) / (5.0 - a[5]) == pytest.approx(300.0, rel=1e-2)
 
 
-def test_a_violation_does_not_depend_on_how_far_what_is_wanted_is() -> None:
-    """All other unknowns cost 1e-6, which fades: else it would shift a by 0.01."""
+def test_a_violation_does_not_depend_on_the_distance_of_the_target() -> None:
+    """All other unknowns cost 1e-6, which fades out: it would shift a by 0.01."""
     made, far = arm(), -1e4
     made.compute(0.0, panda().home(), np.zeros(7))
     bounds, first = actuation_of(made)._limits.bounds, np.eye(7)[5]
@@ -209,12 +209,12 @@ def test_contacts_are_relaxed_less_than_distances() -> None:
     stack = made._active
     rise = stack.law.problem.task.jacobian[2]
     a = stack.law.acceleration
-    asked = row(rise, float(rise @ a) + 4.0)
-    _, found, _, status, _ = repeated(made, {"barriers": asked})
+    requested = row(rise, float(rise @ a) + 4.0)
+    _, found, _, status, _ = repeated(made, {"barriers": requested})
     assert status == Status.RELAXED
     moved = float(rise @ (found - a))
     assert moved / (4.0 - moved) == pytest.approx(30.0 / 1e3, rel=0.05)
-    # And the next step, without the contradiction, is as if nothing had been.
+    # The next step, without the contradiction, equals one without that history.
     _, found, _, status, _ = repeated(made)
     assert status == Status.LIMITED
     np.testing.assert_allclose(found, a, atol=1e-7)
@@ -226,11 +226,11 @@ def test_contacts_are_relaxed_less_than_distances() -> None:
 def test_one_native_call_is_the_same_as_its_parts(
     strength: float, static: float | str
 ) -> None:
-    """A modifier that changes nothing takes the other way: check, and then deliver."""
+    """An idle modifier selects the other path: check, then deliver."""
     made, rng, seen = arm(strength, static), np.random.default_rng(0), set()
     made.restart(origin=0.0)
     for k in range(60):
-        if k == 30:  # another stack is prepared, for later
+        if k == 30:  # another stack is prepared for a later step
             made.prepare(made.state, without=["j1"])
         q = panda().home() + 0.3 * rng.standard_normal(7)
         v = 0.3 * rng.standard_normal(7)
@@ -247,7 +247,7 @@ def test_one_native_call_is_the_same_as_its_parts(
 
 
 def test_a_relaxed_step_does_not_depend_on_steps_before() -> None:
-    """As if nothing had been active in their QPs: the same to the last bit."""
+    """Bit for bit as if nothing had been active in their QPs."""
     made, rng, relaxed = arm(0.1, 0.5), np.random.default_rng(0), 0
     made.compute(0.3, panda().home(), np.zeros(7))
     marks = [
@@ -271,7 +271,8 @@ def test_a_relaxed_step_does_not_depend_on_steps_before() -> None:
 
 
 def test_a_step_is_not_the_result_of_an_earlier_qp() -> None:
-    """Without limits nothing is checked; the QP is solved where a foot would slip."""
+    """Without limits nothing is checked; a QP is solved only where a foot would
+    slip."""
     loaded = hsp.load_experiment("whole_body/solo12_trunk", "limits=none")
     made, rng, seen = loaded.controller, np.random.default_rng(0), []
     made.compute(0.0, loaded.q0, loaded.v0)

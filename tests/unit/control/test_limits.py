@@ -1,4 +1,4 @@
-"""Limits: the step is the law's where none binds, and keeps them where one does."""
+"""Limits: the step is the law's where none is active, and within them elsewhere."""
 
 from copy import deepcopy
 from typing import Any
@@ -99,7 +99,7 @@ def test_bounds_are_the_barriers() -> None:
 
 @given(seeds)
 def test_position_bounds_are_the_barriers_of_both_limits(seed: int) -> None:
-    """h'' + 2αh' + α²h ≥ 0 for the room h to either limit, also beyond it."""
+    """h'' + 2αh' + α²h ≥ 0 for the distance h to either limit, also beyond it."""
     robot, rng = panda(), np.random.default_rng(seed)
     limits = of(robot, velocity=None, position_margin=0.0, bandwidth=8.0)
     lower, upper = robot.position_limits()
@@ -115,9 +115,9 @@ def test_position_bounds_are_the_barriers_of_both_limits(seed: int) -> None:
 def test_the_drift_is_made_up_for_where_it_leads_beyond_a_limit(
     seed: int, drift: float
 ) -> None:
-    """The acceleration with the drift keeps the barrier.
+    """The acceleration with the drift satisfies the barrier.
 
-    What has ended makes no bound wider; what is still there does, on the other side.
+    A drift that has ended widens no bound; a present one widens that of the other side.
     """
     robot, rng = panda(), np.random.default_rng(seed)
     limits = of(robot, velocity=None)
@@ -132,8 +132,8 @@ def test_the_drift_is_made_up_for_where_it_leads_beyond_a_limit(
     np.testing.assert_allclose(a_lower + drift, plain[0], rtol=0, atol=1e-11)
 
 
-def test_what_lasts_is_made_up_for_by_what_a_light_joint_can_do() -> None:
-    """Of what has been, a tenth of the range is made up for; of what is, more."""
+def test_lasting_errors_are_compensated_within_a_light_joint_s_effort() -> None:
+    """Past drift widens by at most a tenth of the range; present drift by more."""
     robot = panda()
     limits = of(robot, velocity=None)
     motion = limits.motion
@@ -149,7 +149,7 @@ def test_what_lasts_is_made_up_for_by_what_a_light_joint_can_do() -> None:
 
 @given(seeds, st.floats(-9.0, 9.0))
 def test_speeds_may_be_held_against_a_steady_force(seed: int, steady: float) -> None:
-    """The barrier of the speed is wider by what holds the robot against it.
+    """The speed barrier is widened by the effort that holds the robot against it.
 
     A drift that has ended changes nothing.
     """
@@ -208,7 +208,7 @@ def violations(rollout: hsp.Rollout, limits: RobotLimits) -> dict[str, float]:
 
 
 def limit_rich(seed: int) -> tuple[hsp.Controller, RobotLimits, Array]:
-    """Return a random controller whose limits become active, its limits and a start."""
+    """Return a random controller with active limits, the limits, and a start."""
     robot, rng = panda(), np.random.default_rng(seed)
     lower, upper = robot.position_limits()
     q0 = 0.5 * (lower + upper) + 0.35 * (upper - lower) * rng.uniform(-1.0, 1.0, 7)
@@ -232,11 +232,11 @@ def limit_rich(seed: int) -> tuple[hsp.Controller, RobotLimits, Array]:
 @pytest.mark.slow
 @pytest.mark.parametrize("seed", range(6 if THOROUGH else 3))
 def test_no_limit_is_violated(seed: int) -> None:
-    """Limit-rich rollouts; benchmarks/limit_rollouts.py runs a thousand of them."""
+    """Rollouts with active limits; benchmarks/limit_rollouts.py runs a thousand."""
     controller, limits, q0 = limit_rich(seed)
     rollout = held(controller, q0, duration=0.8)
     assert rollout.meta["status"] == "completed"
-    assert (rollout["status"] == Status.LIMITED).any()  # limits did bind
+    assert (rollout["status"] == Status.LIMITED).any()  # limits were active
     worst = violations(rollout, limits)
     assert max(worst.values()) <= 1e-8, worst
 
@@ -246,8 +246,8 @@ def test_no_limit_is_violated(seed: int) -> None:
 def test_a_load_that_the_model_lacks_drives_no_joint_beyond_its_limit(
     period: float,
 ) -> None:
-    """It hangs at a joint that moves to its limit: 27 mrad beyond it, and 15 at rest,
-    where the bounds know the model alone. At rest it is where the margin begins."""
+    """An unmodelled load at a joint near its limit: at rest it stays at the margin.
+    (With bounds from the model alone: 27 mrad beyond the limit, 15 at rest.)"""
     robot = panda()
     _, upper = robot.position_limits()
     beyond, q0 = robot.home(), robot.home()
@@ -266,18 +266,18 @@ def test_a_load_that_the_model_lacks_drives_no_joint_beyond_its_limit(
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("bent", "side"), [(0.5, 0.05), (1.5, -0.05)])
+@pytest.mark.parametrize(("angle", "side"), [(0.5, 0.05), (1.5, -0.05)])
 def test_a_wrist_with_an_unknown_tool_stays_within_its_range(
-    bent: float, side: float
+    angle: float, side: float
 ) -> None:
-    """1 kg beside the flange, friction, 2 ms of delay, noise: it is driven to its end.
+    """1 kg off the flange, friction, 2 ms of delay and noise, driven to the limit.
 
-    116 and 86 mrad beyond it where the mean over a tenth of a second was made up for.
+    (116 and 86 mrad beyond it when the bounds used the mean over 0.1 s.)
     """
     robot = hsp.Robot.load("iiwa14")
     _, upper = robot.position_limits()
     q0 = robot.home()
-    q0[5], q0[6] = bent, upper[6] - 0.4
+    q0[5], q0[6] = angle, upper[6] - 0.4
     beyond = q0.copy()
     beyond[6] = upper[6] + 0.3
     most = np.asarray(robot.model.effortLimit)
@@ -299,10 +299,11 @@ def test_a_wrist_with_an_unknown_tool_stays_within_its_range(
         check_rate=False,
     )
     assert run["position_excess"].max() < 2e-3
-    assert run["joint_positions"][:, 6].max() > upper[6] - 0.06  # it came near
+    # it came near the limit
+    assert run["joint_positions"][:, 6].max() > upper[6] - 0.06
 
 
-def test_the_error_of_the_acceleration_is_what_is_observed() -> None:
+def test_the_error_of_the_acceleration_is_the_observed_one() -> None:
     robot = hsp.Robot.load("planar3r")
     state, q = robot.state(0.0, robot.home(), np.zeros(3)), robot.home()
     v, a = np.array([0.1, 0.2, 0.0]), np.array([1.0, -1.0, 0.0])
@@ -313,29 +314,29 @@ def test_the_error_of_the_acceleration_is_what_is_observed() -> None:
         state.update(0.001 * k, q, v)
         effort.record(tau, a, 0.001)
         v = v + 0.001 * (a + np.array([3.0, 0.0, 0.0]))
-        engine.Observe(v=9.0 * v, held=held)(0.001 * k + 0.0005)  # within it
+        engine.Observe(v=9.0 * v, held=held)(0.001 * k + 0.0005)  # within the limit
         engine.Observe(v=v, held=held)(0.001 * (k + 1))
     np.testing.assert_allclose(held.error, [3.0, 0.0, 0.0], rtol=1e-3, atol=1e-9)
-    # The mean over 0.1 s, of an error that has lasted as long.
+    # The mean over 0.1 s of an error that has lasted as long.
     mean = [3.0 * (1.0 - np.exp(-1.0)), 0.0, 0.0]
     np.testing.assert_allclose(held.drift, mean, rtol=1e-9, atol=1e-9)
     np.testing.assert_array_equal(held.steady, held.drift)
-    # A position limit holds against the mean over 30 ms, and the worst that it was.
+    # A position limit uses the mean over 30 ms and its largest value.
     quick = 3.0 * (1.0 - np.exp(-1.0 / 0.3))
     np.testing.assert_allclose(held.quick, [quick, 0.0, 0.0], rtol=1e-9, atol=1e-9)
     np.testing.assert_array_equal(held.most, held.quick)
     np.testing.assert_array_equal(held.lasting, held.quick)
     np.testing.assert_allclose(held.least, 0.0, atol=1e-9)
     state.update(0.1, q, v)
-    effort.record(tau, a, 0.02)  # a longer period is used alone
+    effort.record(tau, a, 0.02)  # a period longer than that is used alone
     engine.Observe(v=v + 0.02 * (a - 8.0), held=held)(0.12)
     np.testing.assert_allclose(held.error, [8.0, 8.0, 8.0], rtol=1e-9)
-    # The first one's mean still has the old sign: nothing of it is there any more.
+    # The first mean still has the old sign: that error is over.
     assert held.drift[0] > 0.0
     np.testing.assert_array_equal(held.steady, [0.0, *held.drift[1:]])
     np.testing.assert_allclose(held.most[0], np.exp(-0.2) * quick, rtol=1e-9)
     np.testing.assert_array_equal(held.least, np.minimum(held.quick, 0.0))
-    assert held.least[0] < 0.0  # so quick it is
+    assert held.least[0] < 0.0  # that fast
     kept, drift, steady = deepcopy(memory), held.drift.copy(), held.steady.copy()
     memory.clear()
     assert not held.error.any()
@@ -347,8 +348,8 @@ def test_the_error_of_the_acceleration_is_what_is_observed() -> None:
     np.testing.assert_allclose(held.error, [8.0, 8.0, 8.0], rtol=1e-9)
 
 
-def test_contradiction_is_relaxed_and_told() -> None:
-    """A joint that its motor cannot stop before the limit: least violation."""
+def test_contradiction_is_relaxed_and_reported() -> None:
+    """A joint that cannot brake before its limit: the smallest possible violation."""
     robot = panda()
     q, v = robot.home(), np.zeros(7)
     _, upper = robot.position_limits()
@@ -361,7 +362,7 @@ def test_contradiction_is_relaxed_and_told() -> None:
     assert 0.0 < out.relaxation < np.inf
 
 
-def told(
+def status_of(
     controller: hsp.Controller, dof: int, *, away: float = 0.0, speed: float = 0.0
 ) -> Status:
     """Return the status where a joint is beyond its upper end, and moves back."""
@@ -374,26 +375,26 @@ def told(
 
 
 @pytest.mark.parametrize("dof", [0, 3, 6])
-def test_what_is_measured_beyond_a_limit_is_told_in_that_step(dof: int) -> None:
-    """Whatever is delivered, also a free step on the way back."""
+def test_a_measured_excess_is_reported_in_that_step(dof: int) -> None:
+    """With any delivered step, also an unconstrained one on the way back."""
     law = hsp.Controller(panda(), [hsp.FramePosition("panda_tcp")])
-    for _ in range(3):  # the first steps, and those that are one call
-        assert told(law, dof, away=1.1e-3) is Status.BEYOND
-        assert told(law, dof, away=1.1e-3, speed=-0.9) is Status.BEYOND
-        assert told(law, dof, away=0.9e-3) < Status.BEYOND
+    for _ in range(3):  # the first steps, and the later ones of a single call
+        assert status_of(law, dof, away=1.1e-3) is Status.BEYOND
+        assert status_of(law, dof, away=1.1e-3, speed=-0.9) is Status.BEYOND
+        assert status_of(law, dof, away=0.9e-3) < Status.BEYOND
         for sign in (-1.0, 1.0):
-            assert told(law, dof, speed=1.021 * sign) is Status.BEYOND
-            assert told(law, dof, speed=1.019 * sign) < Status.BEYOND
-    # Where one set of limits follows another, that of either is used.
+            assert status_of(law, dof, speed=1.021 * sign) is Status.BEYOND
+            assert status_of(law, dof, speed=1.019 * sign) < Status.BEYOND
+    # During a change of limits the status of either set is used.
     wide = hsp.Limits(position="none", velocity=10.0)
     law.at(-1.0).ramp(10.0).limits(wide)
-    assert told(law, dof, away=1.1e-3) is Status.BEYOND
+    assert status_of(law, dof, away=1.1e-3) is Status.BEYOND
     for limits in (None, wide):
         free = hsp.Controller(panda(), [hsp.FramePosition("panda_tcp")], limits=limits)
-        assert told(free, dof, away=1.1e-3) < Status.BEYOND
+        assert status_of(free, dof, away=1.1e-3) < Status.BEYOND
 
 
-def test_effort_rate_needs_to_know_what_went_out() -> None:
+def test_effort_rate_needs_the_sent_effort() -> None:
     robot = panda()
     limits = hsp.Limits(effort_rate=1000.0)
     controller = hsp.Controller(robot, [hand()], limits=limits)
@@ -410,7 +411,7 @@ def test_effort_rate_needs_to_know_what_went_out() -> None:
 
 
 def swinging() -> hsp.Obstacle:
-    """Return a ball that comes into the arm's elbow and goes again."""
+    """Return a ball that moves into the arm's elbow and away again."""
     robot = panda()
     elbow = robot.state(0.0, robot.home(), np.zeros(7)).position("panda_link4")
     center = elbow + np.array([0.0, 0.35, 0.0])
@@ -438,7 +439,7 @@ def elbow(limits: hsp.Limits | None) -> hsp.Controller:
 
 
 def test_a_step_with_minimum_distances_runs_no_python() -> None:
-    """As one without them; else it costs ten times as much."""
+    """Like a step without limits; otherwise it costs ten times as much."""
     robot = panda()
     limits = hsp.Limits(barriers=[ObstacleDistance(0.02), SelfDistance()])
     law = elbow(limits)

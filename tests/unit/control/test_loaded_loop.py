@@ -1,4 +1,4 @@
-"""The loop of a robot that carries what its controller does not know of."""
+"""The closed loop with an unmodelled load."""
 
 import re
 from typing import Any
@@ -54,7 +54,7 @@ def whole(made: hsp.Controller, parts: Compensation, delay: int) -> LoadedLoop:
 
 
 def boundary(loop: LoadedLoop) -> float:
-    """Return the part of the load at which the loop begins to grow."""
+    """Return the fraction of the load at which the loop becomes unstable."""
     low, high = 0.01, 20.0
     assert loop.with_part(low).radius() < 1.0 < loop.with_part(high).radius()
     for _ in range(30):
@@ -110,33 +110,33 @@ def test_the_robot_grows_and_decays_at_the_rate_of_the_linear_loop(case: str) ->
         error = np.linalg.norm(log["task.hand.error"], axis=1)
         windows = [error[k : k + 100].max() for k in (200, 300, 400, 500)]
         assert bool(windows[-1] > windows[0]) is grows
-        if grows:  # the growing mode leaves all others behind
+        if grows:  # the growing mode dominates all others
             rate = np.log(loop.with_part(times).radius()) / H
             found = np.polyfit([0.0, 1.0, 2.0, 3.0], np.log(windows), 1)[0]
             assert found == pytest.approx(rate, rel=0.1, abs=0.05)
 
 
-def test_what_is_told_is_the_boundary_and_the_advice_works() -> None:
+def test_the_reported_limit_is_the_boundary_and_the_advice_works() -> None:
     made, strong = holding(), only(integral_action=IntegralAction(7.0))
     edge = boundary(whole(made, strong, 0))
     (found,) = check_rate(made, Q0, H, strong, plant=loaded())
     assert found.path == ("compensation", "integral_action")
     assert not found.unstable
-    told = re.fullmatch(
+    reported = re.fullmatch(
         r"the plant's bodies .* is (.*) times as heavy .* differ (.*) times as much; "
         r".* 1\.5 .* Ki of at most (.*) times this or .*observer",
         found.message,
     )
-    assert told is not None, found.message
+    assert reported is not None, found.message
     state, true = ARM.state(0.0, Q0, np.zeros(7)), loaded()
     J = state.frame("panda_tcp").jacobian[:3]
     # For the identity metric J# = Jᵀ (J Jᵀ)⁻¹: β from the two mass matrices.
     M, heavy = state.mass_matrix, true.state(0.0, Q0, np.zeros(7)).mass_matrix
     performed = J @ np.linalg.solve(heavy, M @ np.linalg.pinv(J))
     beta = np.linalg.eigvals(performed).real.min()
-    assert float(told[1]) == pytest.approx(1.0 / beta, rel=5e-3)
-    assert float(told[2]) == pytest.approx(edge, rel=5e-3)
-    weaker = IntegralAction(7.0 * float(told[3]))
+    assert float(reported[1]) == pytest.approx(1.0 / beta, rel=5e-3)
+    assert float(reported[2]) == pytest.approx(edge, rel=5e-3)
+    weaker = IntegralAction(7.0 * float(reported[3]))
     assert not check_rate(made, Q0, H, only(integral_action=weaker), plant=loaded())
     observed = Compensation(
         integral_action=IntegralAction(7.0), momentum_observer=MomentumObserver(50.0)
@@ -150,9 +150,9 @@ def test_what_is_told_is_the_boundary_and_the_advice_works() -> None:
 
 
 def test_configurations_with_a_payload_are_warned_of_it() -> None:
-    """2 kg are borne at a rate of 5 1/s; 3 kg, which the arm carries, are not at 7.
+    """Stable with 2 kg at a rate of 5 1/s; unstable with 3 kg, its payload, at 7.
 
-    Without weight; with it, self-motion that nothing holds runs away with any load.
+    Without gravity; with it, uncontrolled self-motion diverges with any load.
     """
     document: dict[str, Any] = {
         "robot": {"name": "panda", "gravity": [0.0, 0.0, 0.0]},
@@ -177,8 +177,8 @@ def test_configurations_with_a_payload_are_warned_of_it() -> None:
     assert not hsp.load_experiment(driven, "plant.payload.mass=3").rate_findings
 
 
-def test_weight_that_nothing_holds_is_told_and_an_observer_holds_it() -> None:
-    """The arm does as predicted: its posture runs away, or stays where it is."""
+def test_an_unbalanced_weight_is_reported_and_an_observer_holds_it() -> None:
+    """As predicted, the posture diverges or stays."""
     arm = hsp.Robot.load("panda")
     hand = hsp.FramePosition("panda_tcp", gains=hsp.Gains(natural_frequency=20.0))
     true = changed(arm, [Payload(frame="panda_hand", mass=1.0)])

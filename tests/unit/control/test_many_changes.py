@@ -1,4 +1,4 @@
-"""Changes that come faster than their past is forgotten."""
+"""Changes at a higher rate than past ones are forgotten."""
 
 import sys
 from collections.abc import Callable
@@ -32,7 +32,7 @@ def controller() -> hsp.Controller:
 
 @pytest.mark.parametrize("kind", MOVES)
 def test_those_that_are_over_do_not_gather(kind: str) -> None:
-    """A thousand a second, each over before the next one: at most two are known."""
+    """A thousand per second, each over before the next: at most two are stored."""
     made = controller()
     for k in range(100):
         MOVES[kind](made.at(0.001 * k).ramp(0.0005), k)
@@ -44,9 +44,10 @@ def test_those_that_are_over_do_not_gather(kind: str) -> None:
 def test_too_many_that_overlap_are_refused(
     kind: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """The one too many changes nothing; the run goes on."""
+    """The change beyond the maximum is refused without effect; the run continues."""
     module = sys.modules[Crossfade.__module__]
-    monkeypatch.setattr(module, "MOST_OVERLAPPING", 8)  # not 64: each takes time
+    # not 64: every change costs time
+    monkeypatch.setattr(module, "MOST_OVERLAPPING", 8)
     made = controller()
     for k in range(8):
         MOVES[kind](made.at(0.0).ramp(1.0 + k), k)

@@ -22,7 +22,7 @@ COPIES: dict[str, Callable[[hsp.Controller], hsp.Controller]] = {
 
 
 def controller() -> hsp.Controller:
-    """Return one with all that is remembered: rates, speeds, a stiffness that waits."""
+    """Return a controller with every kind of memory, also a stiffness that waits."""
     hand = hsp.FramePose(
         name="hand",
         impedance=hsp.Impedance([200.0] * 3 + [10.0] * 3),
@@ -35,7 +35,7 @@ def controller() -> hsp.Controller:
 
 
 def sent(made: hsp.Controller, k: int) -> bytes:
-    """Let a period pass, in which the arm moves away from what it was to do."""
+    """Let a period pass, in which the arm deviates from its command."""
     made.applied(np.sin(0.1 * k + np.arange(7)), H)
     return b"".join(each.tobytes() for each in made._memory.sent.held)
 
@@ -49,7 +49,7 @@ def computed(made: hsp.Controller, k: int) -> bytes:
 @pytest.mark.parametrize("kind", COPIES)
 @pytest.mark.parametrize("between", [True, False], ids=["computed", "sent"])
 def test_a_copy_goes_on_to_the_last_bit(kind: str, between: bool) -> None:
-    """Made at any step, before its effort is sent or afterwards."""
+    """A copy at any step, before or after its effort is sent."""
     made, twins = controller(), list[hsp.Controller]()
     made.feedback("hand").offset[:] = 0.1  # as a compensator writes it
     for k in range(60):
@@ -60,14 +60,14 @@ def test_a_copy_goes_on_to_the_last_bit(kind: str, between: bool) -> None:
         if not between and k % 7 == 0:
             twins.append(COPIES[kind](made))
         assert len(efforts) == len(held) == 1
-    assert made._memory.waiting  # the stiffness is behind: it would add energy
+    assert made._memory.waiting  # the stiffness lags: a larger one would add energy
     assert all(each.stiffness("hand")[0, 0] > 200.0 for each in (made, *twins))
     assert all(each.feedback("hand").offset[0] == 0.1 for each in twins)
 
 
 @pytest.mark.parametrize("kind", COPIES)
-def test_a_copy_says_nothing_that_was_said(kind: str) -> None:
-    """Neither of the first effort, nor of a clock that stands still."""
+def test_a_copy_does_not_repeat_reports(kind: str) -> None:
+    """No memory of the first effort, nor of a stopped clock, remains."""
     made = controller()
     with warnings.catch_warnings(record=True) as said:
         warnings.simplefilter("always")
@@ -84,7 +84,7 @@ def test_a_copy_says_nothing_that_was_said(kind: str) -> None:
 
 
 def test_a_restart_remembers_nothing() -> None:
-    """The remaining memory is that of a new one, but for the number of begins."""
+    """The remaining memory is that of a new controller, but for the run counter."""
     made, new = controller(), controller()
     for k in range(60):
         computed(made, k)
@@ -98,6 +98,6 @@ def test_a_restart_remembers_nothing() -> None:
 
 
 def _plain(memory: RunMemory) -> dict[str, object]:
-    """Return what a memory contains, so that it can be compared."""
+    """Return the contents of a memory in a form that can be compared."""
     fields = vars(memory) | {"sent": vars(memory.sent), "clock": vars(memory.clock)}
     return {name: pickle.dumps(each) for name, each in fields.items()}

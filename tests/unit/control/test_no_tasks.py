@@ -1,4 +1,4 @@
-"""A controller without tasks: the arm without weight, and the field alone."""
+"""A controller without tasks: gravity compensation and the field."""
 
 from pathlib import Path
 
@@ -31,7 +31,7 @@ def test_the_velocity_converges_to_the_field(metric: Metric) -> None:
 
 
 def test_tasks_come_and_go() -> None:
-    """The effort has no jump where the only task begins or ends."""
+    """The effort is continuous where the only task begins or ends."""
     robot = hsp.Robot.load("panda")
     controller = hsp.Controller(robot, [], hsp.JointCentering())
     controller.at(0.2).ramp(0.2).add(hsp.FramePosition("panda_tcp", name="hand"))
@@ -40,12 +40,12 @@ def test_tasks_come_and_go() -> None:
     there = np.isfinite(run["task.hand.error"]).all(axis=1)
     assert there[(run.t > 0.2005) & (run.t < 0.7995)].all()
     assert not there[(run.t < 0.1995) | (run.t > 0.8005)].any()
-    # The ramp is C²: a jump would be of the size of the efforts, not of a period's.
+    # The ramp is C²: a jump would be as large as the efforts, not as their change.
     change = np.abs(np.diff(run.tau, axis=0)).max()
     assert change < 0.2 < 0.01 * np.abs(run.tau).max()
 
 
-def test_a_configuration_says_it(
+def test_a_configuration_declares_it(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     led = tmp_path / "led.yaml"

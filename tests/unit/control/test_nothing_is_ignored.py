@@ -1,4 +1,4 @@
-"""Whatever is assigned or given has an effect, or is refused."""
+"""Every assignment and argument has an effect, or is refused."""
 
 from collections.abc import Mapping
 from typing import Any
@@ -30,7 +30,7 @@ def public(thing: object) -> list[str]:
 
 
 def everything(controller: hsp.Controller) -> list[object]:
-    """Return the controller and all that one gets from it, parts of parts included."""
+    """Return the controller and all objects it exposes, parts of parts included."""
     controller.compute(0.0, controller.robot.home(), np.zeros(controller.robot.nv))
     return [controller, *parts([getattr(controller, n) for n in public(controller)])]
 
@@ -54,7 +54,7 @@ def parts(waiting: list[Any]) -> list[object]:
 
 
 def test_no_attribute_can_be_assigned() -> None:
-    """Of the controller and of all its parts; a new attribute cannot escape."""
+    """On the controller and all its parts; new attributes are covered, too."""
     all_parts = everything(panda(limits=hsp.Limits()))
     assert {
         *("Controller", "FramePose", "Circle", "Gains", "JointCentering"),
@@ -79,7 +79,7 @@ def test_no_attribute_can_be_assigned() -> None:
         (None, np.zeros(7), np.zeros(7), "time t is None"),
     ],
 )
-def test_what_is_no_state_gives_one_exact_error(
+def test_an_invalid_state_gives_one_exact_error(
     t: Any, q: Any, v: Any, message: str
 ) -> None:
     with pytest.raises(hsp.HspControlError, match=message):

@@ -22,7 +22,7 @@ from hsp_control.common.exceptions import GainError
 from hsp_control.control.fitting import checked_gain
 
 COUNT = 2500 if THOROUGH else 500
-"""Gains for each of four robots."""
+"""Gains per robot, of four robots."""
 ROBOTS = ("planar3r", "panda", "ur5", "talos_arm_free_flyer")
 seeds = st.integers(0, 2**32 - 1)
 
@@ -37,7 +37,7 @@ def mass_matrices(robot: Robot, count: int, rng: np.random.Generator) -> Array:
 
 
 def random_gain(nv: int, rng: np.random.Generator) -> Any:
-    """Return a gain of one of the kinds that one may try."""
+    """Return a gain of one of the kinds that a user may try."""
     rates = 10.0 ** rng.uniform(-1.0, 2.0, nv)
     turn = np.linalg.qr(rng.normal(size=(nv, nv)))[0]
     kinds: tuple[Any, ...] = (
@@ -61,8 +61,8 @@ def smallest_rates(W: Array, K_N: Array) -> Array:
 
 
 @pytest.mark.parametrize("name", ROBOTS)
-def test_what_is_accepted_decays_at_every_configuration(name: str) -> None:
-    """Over the mass matrix; and refusing positive definite matrices is no pedantry."""
+def test_accepted_gains_decay_at_every_configuration(name: str) -> None:
+    """Over the mass matrix; some positive definite K_N must be refused, too."""
     robot, rng = load(name), np.random.default_rng(41)
     accepted, refused = [], []
     for _ in range(COUNT):
@@ -79,7 +79,7 @@ def test_what_is_accepted_decays_at_every_configuration(name: str) -> None:
 
 
 @pytest.mark.parametrize("name", ROBOTS)
-def test_in_a_constant_metric_what_decays_is_accepted_and_nothing_else(
+def test_in_a_constant_metric_exactly_decaying_gains_are_accepted(
     name: str,
 ) -> None:
     robot, rng = load(name), np.random.default_rng(42)
@@ -107,7 +107,7 @@ def test_in_a_constant_metric_what_decays_is_accepted_and_nothing_else(
 
 @given(seeds)
 def test_a_ramp_between_gains_that_decay_decays(seed: int) -> None:
-    """V' is linear in K_N, so that a mixture decays at least like the slower one."""
+    """V' is linear in K_N, so a mixture decays at least as fast as the slower one."""
     robot, rng = load("panda"), np.random.default_rng(seed)
     W = np.diag(10.0 ** rng.uniform(-1.0, 1.0, 7))[None]
     fair = [np.linalg.solve(W[0], damping(7, rng)) for _ in range(2)]

@@ -1,4 +1,4 @@
-"""Times count from the first step, whatever a robot's clock reads then."""
+"""Times are relative to the first step, for any reading of the robot's clock."""
 
 import copy
 import pickle
@@ -13,13 +13,13 @@ from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import NonFiniteError
 
 H = 2.0**-9
-"""Of steps: with it, times at all of these clocks have the same bits after t - t0."""
+"""Period [s] for which t - t0 has the same bits at all of these clocks."""
 CLOCKS = [0.0, 2.0**14, -(2.0**20), 2.0**30 + 2.0**29]
 ROBOT = hsp.Robot.load("panda")
 
 
 def controller() -> hsp.Controller:
-    """Return one in which all depends on time: a circle, a schedule, a change."""
+    """Return a controller with a circle, a schedule and a change."""
     circle = hsp.Circle(radius=0.1, angular_rate=2.0)
     hand = hsp.FramePosition(trajectory=circle, blend=0.5, name="hand")
     schedule = hsp.trajectories.Schedule([(0.1, 0.4)], ramp=0.1)
@@ -37,7 +37,7 @@ def posture(k: int) -> tuple[Array, Array]:
 
 
 def efforts(made: hsp.Controller, clock: float, steps: range) -> Array:
-    """Return those of steps at a clock that read ``clock`` at step 0."""
+    """Return the efforts of steps at a clock that reads ``clock`` at step 0."""
     found = []
     for k in steps:
         found.append(made.compute(clock + k * H, *posture(k)).tau)
@@ -59,7 +59,7 @@ def test_a_clock_may_begin_anywhere(clock: float) -> None:
 
 
 def test_the_first_step_of_a_clock_is_near_gravity() -> None:
-    """Times measured from the first step are still ahead: the blend, and the circle."""
+    """Blend and circle begin at the first step, not at the clock's zero."""
     q, rest = ROBOT.home(), np.zeros(7)
     gravity = ROBOT.inverse_dynamics(q, rest, rest)
     tau = controller().compute(1.76e9, q, rest).tau
@@ -96,8 +96,8 @@ def test_any_thread_may_make_the_first_step() -> None:
     np.testing.assert_array_equal(np.vstack(found), USUAL)
 
 
-def test_an_origin_that_is_given_counts() -> None:
-    """Of a clock, before the first step; and None forgets it."""
+def test_a_given_origin_is_used() -> None:
+    """Set to a clock's time before the first step; None resets it."""
     made, later = controller(), STEPS[20:]
     made.restart(origin=100.0)
     np.testing.assert_array_equal(efforts(made, 100.0, later), USUAL[20:])
@@ -108,11 +108,11 @@ def test_an_origin_that_is_given_counts() -> None:
     with pytest.raises(NonFiniteError, match="origin is inf; needs a finite number"):
         made.restart(origin=np.inf)
     made.compute(1e3, *posture(0))
-    assert made.state.t == 900.0  # what was refused has changed nothing
+    assert made.state.t == 900.0  # refused calls have no effect
 
 
 def test_a_state_has_the_time_since_the_first_step() -> None:
-    """Whatever the clock: that of the controller, and any other one of its robot."""
+    """At any clock, for the controller and any other one of its robot."""
     made = controller()
     efforts(made, CLOCKS[-1], STEPS[:20])
     k = STEPS[20]
@@ -126,7 +126,7 @@ def test_a_state_has_the_time_since_the_first_step() -> None:
 
 @pytest.mark.parametrize("begun", [False, True])
 def test_looking_ahead_moves_nothing(begun: bool) -> None:
-    """Neither the flow nor the rows: their times count from the first step as well."""
+    """Times of the flow and of the rows are relative to the first step, too."""
     made, usual, clock = controller(), controller(), CLOCKS[-1]
     if begun:
         efforts(made, clock, STEPS[:20])

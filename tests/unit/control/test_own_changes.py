@@ -1,4 +1,4 @@
-"""A change of one's own: what its `apply` returns is checked when it is made."""
+"""User-defined changes: the result of `apply` is checked when one is made."""
 
 from dataclasses import replace
 from typing import Any
@@ -13,7 +13,7 @@ ROBOT, REST = hsp.Robot.load("planar3r"), np.zeros(3)
 
 
 class Calm(hsp.changes.Change):
-    """K_N becomes a multiple of what it is."""
+    """K_N is multiplied by a factor."""
 
     factor: Number
 

@@ -1,4 +1,4 @@
-"""A payload that is taken up while the arm moves: the law of the model of the time."""
+"""A payload picked up in motion: the law uses the model of the current time."""
 
 import pickle
 import warnings
@@ -52,7 +52,7 @@ def controller(metric: Metric | None = None, **options: Any) -> hsp.Controller:
 
 
 def loaded(share: float) -> pin.Model:
-    """Return the model with a part of the payload, as Pinocchio has it."""
+    """Return Pinocchio's model with a fraction of the payload."""
     model = panda().model.copy()
     frame = model.frames[model.getFrameId("panda_hand")]
     body = pin.Inertia(share * MASS, CENTER, share * INERTIA)
@@ -61,7 +61,7 @@ def loaded(share: float) -> pin.Model:
 
 
 def smooth(t: float) -> float:
-    """Return the share: the quintic from 0 to 1 of Siciliano et al. (2009), (4.21)."""
+    """Return the fraction: the quintic 0 to 1 of Siciliano et al. (2009), (4.21)."""
     x = np.clip((t - AT) / RAMP, 0.0, 1.0)
     return float(x**3 * (10.0 - 15.0 * x + 6.0 * x * x))
 
@@ -84,14 +84,14 @@ def test_terms_are_those_of_the_model_of_the_time(t: float) -> None:
         return upper + np.triu(upper, 1).T
 
     np.testing.assert_allclose(state.mass_matrix, inertia(0.0), atol=1e-13)
-    h = 1e-4  # its rate, what the ramp adds included: an error of h⁴, and of rounding/h
+    h = 1e-4  # its rate, including the ramp's part: an error of h⁴ and of rounding/h
     rate = (inertia(-2 * h) - 8 * inertia(-h) + 8 * inertia(h) - inertia(2 * h)) / 12
     np.testing.assert_allclose(state.mass_matrix_rate, rate / h, atol=1e-9)
 
 
 @pytest.mark.parametrize("metric", [IdentityMetric(), MassMatrixMetric()], ids=str)
 def test_the_law_is_exact_while_it_is_taken_up(metric: Metric) -> None:
-    """The error is what it is without, and ‖e_N‖_W decays, W = M(q, t)."""
+    """The error is that without a payload, and ‖e_N‖_W decays, W = M(q, t)."""
     robot = panda()
     run = hsp.simulate(controller(metric, limits=None), start(robot), duration=1.0)
     norm = run["null_space_norm"]
@@ -107,7 +107,7 @@ def test_the_law_is_exact_while_it_is_taken_up(metric: Metric) -> None:
 
 
 def test_efforts_have_no_jump() -> None:
-    """Across the ends of ramps that overlap, between them as well."""
+    """Continuous at the ends of overlapping ramps and between them."""
     made = controller(limits=None)
     made.at(0.5).ramp(0.3).payload("panda_link5", 1.0)
     made.at(0.6).ramp(0.1).payload("panda_hand", 0.5, inertia=0.001)
@@ -127,7 +127,7 @@ def test_efforts_have_no_jump() -> None:
     ],
 )
 def test_simulated_bodies_carry_it(plant: Any) -> None:
-    """At 1 kHz; a robot that did not would miss by 0.1 m without an observer."""
+    """At 1 kHz; without payload and observer the error would be 0.1 m."""
     robot, none = panda(), Compensation(momentum_observer=None)
     made = controller(MassMatrixMetric())
     run = hsp.simulate(
@@ -151,11 +151,11 @@ def test_an_observer_does_not_take_it_for_a_disturbance() -> None:
         made, start(panda()), duration=1.2, control_period=1e-3,
         compensation=Compensation(momentum_observer=MomentumObserver(50.0)),
     )  # fmt: skip
-    # Efforts are held: what is left is of the size of the period.
+    # Efforts are held: the residual is of first order in the period.
     assert np.abs(run["observer.disturbance"]).max() < 0.1
 
 
-def test_a_plant_that_is_nobody_of_ours_is_named() -> None:
+def test_an_unknown_plant_is_named() -> None:
     class Own(RigidBodyPlant):
         dynamics = None  # type: ignore[assignment]
 
@@ -182,7 +182,7 @@ def test_a_copy_and_a_pickle_carry_it_on() -> None:
             np.testing.assert_array_equal(other.compute(t, q, v).tau, tau)
 
 
-def test_what_is_over_is_forgotten() -> None:
+def test_past_changes_are_forgotten() -> None:
     made, q, v = controller(), start(panda()), np.zeros(7)
     made.compute(0.0, q, v)
     for k in range(300):
@@ -193,7 +193,7 @@ def test_what_is_over_is_forgotten() -> None:
 
 
 def test_gravity_changes_with_the_base() -> None:
-    """A base that is tilted: efforts are those of the model, and the arm stays."""
+    """On a tilted base the efforts are the model's, and the arm stays."""
     robot, tilted = panda(), np.array([0.0, 4.9, -8.5])
     made = hsp.Controller(robot, [hsp.FramePose(name="hand")], hsp.JointCentering())
     made.at(0.2).ramp(0.5).gravity(tilted)
@@ -210,7 +210,7 @@ def test_gravity_changes_with_the_base() -> None:
         made.at(6.0).gravity([0.0, 0.0, -981.0])
 
 
-def test_what_static_effort_looks_at_counts_it() -> None:
+def test_a_payload_is_part_of_static_effort() -> None:
     made, q = controller(), start(panda())
     made.compute(0.0, q, np.zeros(7))
     gravity = Gravity(panda().model, made.state.dynamics, made.state.world)
@@ -233,7 +233,7 @@ def test_what_static_effort_looks_at_counts_it() -> None:
         (("panda_hand", 0.0, [0, 0, 0], 0.1), "inertia: is not 0, but the mass is"),
     ],
 )
-def test_what_is_no_payload_is_refused(change: Any, message: str) -> None:
+def test_invalid_payloads_are_refused(change: Any, message: str) -> None:
     made = hsp.Controller(panda(), [hsp.FramePosition()])
     with pytest.raises(HspControlError, match=message):
         made.at(0.0).payload(*change)
@@ -245,7 +245,7 @@ LEGGED = {"panda": ("panda_hand", "fixed"), "solo12": ("base_link", "free_flyer"
 
 
 def carrying(name: str, task: hsp.Task, **options: Any) -> hsp.Controller:
-    """Return one whose robot takes up one payload, and puts down another."""
+    """Return a controller whose robot picks up one payload and puts down another."""
     frame, root = LEGGED[name]
     robot = hsp.Robot.load(name, root=root)  # type: ignore[arg-type]
     base: Any = "flying" if robot.unactuated else None
@@ -259,7 +259,7 @@ def carrying(name: str, task: hsp.Task, **options: Any) -> hsp.Controller:
 
 
 def part_of(robot: hsp.Robot, t: float) -> list[tuple[str, pin.Inertia]]:
-    """Return what of both bodies is carried at a time."""
+    """Return the carried fractions of both payloads at a time."""
     x = np.clip((t - 0.4) / 0.5, 0.0, 1.0)
     left = 1.0 - float(x**3 * (10.0 - 15.0 * x + 6.0 * x * x))
     here = pin.Inertia(smooth(t) * MASS, CENTER, smooth(t) * INERTIA)
@@ -268,21 +268,22 @@ def part_of(robot: hsp.Robot, t: float) -> list[tuple[str, pin.Inertia]]:
 
 
 def balance(robot: hsp.Robot, t: float, q: Array, v: Array) -> tuple[Array, Array]:
-    """Return c and A v/m of the model of a time, as Pinocchio has them."""
+    """Return Pinocchio's c and A v/m for the model of a time."""
     model = robot.model.copy()
     for name, body in part_of(robot, t):
         frame = model.frames[model.getFrameId(name)]
         model.inertias[frame.parentJoint] += frame.placement.act(body)
     data = model.createData()
     momentum = pin.computeCentroidalMomentum(model, data, q, v).angular.copy()
-    mass = sum(each.mass for each in [*model.inertias][1:])  # the world's is no robot's
+    # without the world's inertia
+    mass = sum(each.mass for each in [*model.inertias][1:])
     c = pin.centerOfMass(model, data, q).copy()
     return c, momentum / mass
 
 
 @pytest.mark.parametrize("t", [0.2, 0.45, 0.55, 0.65, 0.8, 5.0])
 @pytest.mark.parametrize("name", LEGGED)
-def test_the_centre_of_mass_moves_with_what_comes_and_goes(name: str, t: float) -> None:
+def test_the_centre_of_mass_includes_payloads_that_fade(name: str, t: float) -> None:
     """c', c'' and the rate of A v/m along a motion, by differences of fourth order."""
     made = carrying(name, hsp.tasks.CenterOfMass())
     robot, rng = made.robot, np.random.default_rng(7)
@@ -325,7 +326,7 @@ def test_the_centre_of_mass_moves_with_what_comes_and_goes(name: str, t: float) 
     ids=["centre", "momentum"],
 )
 def test_balance_obeys_its_equation_while_it_is_taken_up(task: hsp.Task) -> None:
-    """The error is the one without a payload, but for the integrator's."""
+    """The error equals that without a payload up to the integrator's error."""
     # Per mass a momentum is small: so are the singular values of its rows.
     made = carrying("panda", task, singularity_threshold=1e-4)
     robot = made.robot
@@ -345,7 +346,7 @@ def test_balance_obeys_its_equation_while_it_is_taken_up(task: hsp.Task) -> None
 
 
 def test_a_robot_on_feet_takes_up_a_payload() -> None:
-    """Its trunk stays, and the ground carries the weight."""
+    """The trunk stays, and the ground carries the weight."""
     experiment = hsp.load_experiment("whole_body/solo12_trunk")
     made, robot = experiment.controller, experiment.robot
     made.at(0.1).ramp(0.2).payload("base_link", 0.5, [0.05, 0.0, 0.05])
@@ -357,7 +358,7 @@ def test_a_robot_on_feet_takes_up_a_payload() -> None:
     assert up == pytest.approx(0.5 * 9.81, abs=0.05 + 10.0 * np.abs(acceleration).max())
 
 
-def test_a_configuration_says_it(tmp_path: Path) -> None:
+def test_a_configuration_declares_it(tmp_path: Path) -> None:
     text = (
         "robot: {name: panda}\ntasks: {hand: {type: frame_pose}}\n"
         "changes: [{type: payload, frame: panda_hand, mass: 2, center: [0, 0, 0.06],\n"
@@ -372,7 +373,7 @@ def test_a_configuration_says_it(tmp_path: Path) -> None:
 
 
 def test_a_live_robot_and_its_safe_stop_carry_it(tmp_path: Path) -> None:
-    """Also while it stops: without, the hand would sink by centimetres."""
+    """Also during a stop: without the payload the hand would sink by centimetres."""
     text = (
         "robot: {name: panda}\ntasks: {hand: {type: frame_pose}}\n"
         "changes: [{type: payload, frame: panda_hand, mass: 2, at: 0.2, ramp: 0.2}]\n"

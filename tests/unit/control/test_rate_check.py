@@ -1,4 +1,4 @@
-"""Gains that a loop's rate permits: in theory, in the chain's links, on the robot."""
+"""Gains that a loop's rate permits: closed forms, the chain's parts, the robot."""
 
 import re
 from itertools import pairwise
@@ -85,7 +85,7 @@ def rate(gain: float, **options: Any) -> LinearLoop:
             ),
             1.0,
         ),
-        # K_N h + α h < 2 for a field as stiff as the gain.
+        # K_N h + α h < 2 for a field whose slope equals the gain.
         (lambda x: LinearLoop(x * x * ONE, 2.0 * x * ONE, ZERO, H), 1.0),
     ],
 )  # fmt: skip
@@ -123,7 +123,7 @@ def test_the_limits_of_theory(make: Any, limit: float) -> None:
 def test_the_linear_loop_is_the_chain_link_by_link(
     delays: tuple[int, int], compensation: dict[str, Any], heavy: float, tmp_path: Path
 ) -> None:
-    """A carriage on a rail *is* the linear mode, also one heavier than its model."""
+    """A carriage on a rail is the linear mode, also with a wrong mass."""
     robot = carriage(tmp_path)
     h, frequency = 0.01, 12.0
     task = JointPosture(np.zeros(1), gains=Gains(natural_frequency=frequency))
@@ -150,9 +150,9 @@ def test_the_linear_loop_is_the_chain_link_by_link(
 def test_a_lag_of_the_drives_is_in_the_linear_loop(
     lag: float, observer: MomentumObserver | None, tmp_path: Path
 ) -> None:
-    """Beside a drive that holds the mean of each period; x differs within one.
+    """Against a drive that holds the mean of each period; x differs within one.
 
-    x(t) moves under the mean as if it acted from the period's begin: second order in h.
+    Under the mean x(t) moves as if it acted from the period's start: second order in h.
     """
     robot, h = carriage(tmp_path), 0.002
     task = JointPosture(np.zeros(1), gains=Gains(natural_frequency=12.0))
@@ -178,8 +178,8 @@ def test_a_lag_of_the_drives_is_in_the_linear_loop(
 
 
 @pytest.mark.slow
-def test_integral_action_that_a_heavier_robot_does_not_bear_is_told() -> None:
-    """The weightless arm agrees: 10 % beside the prediction it decays or grows."""
+def test_integral_action_unstable_for_a_heavier_robot_is_reported() -> None:
+    """Without gravity the arm agrees: 10 % off the prediction it decays or grows."""
     robot = Robot.load("panda", gravity=[0.0, 0.0, 0.0])
     task = JointPosture(Q0, gains=Gains(natural_frequency=20.0))
     made = Controller(robot, [task], limits=None)
@@ -190,14 +190,14 @@ def test_integral_action_that_a_heavier_robot_does_not_bear_is_told() -> None:
         (found,) = check_rate(made, Q0, 1e-3, strong)
         assert found.path == ("compensation", "integral_action")
         assert not found.unstable
-        told = re.fullmatch(
+        reported = re.fullmatch(
             r"if the robot is (.*) times as heavy at task 'posture' .* factor of 5: .*"
             r"Ki of at most (.*) times this, or a (faster )?momentum .*",
             found.message,
         )
-        assert told is not None
-        assert (told[3] is None) is (observer is None)
-        times, scale = float(told[1]), float(told[2])
+        assert reported is not None
+        assert (reported[3] is None) is (observer is None)
+        times, scale = float(reported[1]), float(reported[2])
         if observer is None:
             assert times == pytest.approx(40.0 / 12.0, rel=0.02)  # Kv Kp/Ki
         for factor, grows in ((0.9 * times, False), (1.1 * times, True)):
@@ -246,7 +246,7 @@ def holding(
 def test_the_robot_grows_just_above_and_dies_just_below(
     gains: Any, limit: float, delay: int
 ) -> None:
-    """3 % to either side of the limit."""
+    """Stable 3 % below the limit, unstable 3 % above."""
     for side in (-1.0, 1.0):
         made = holding(**gains((1.0 + 0.03 * side) * limit / H))
         engine = IntegratedPlant(RigidBodyPlant(PANDA), Rk4(H))
@@ -313,14 +313,14 @@ def test_the_advice_on_a_compensator_works(
 ) -> None:
     made = holding(frequency=40.0, gain=20.0)
     found = check_rate(made, Q0, H, make(wrong), effort_delay=delay, strict=False)
-    told = [re.search(advice, each.message) for each in found if each.unstable]
-    numbers = [float(match[1]) for match in told if match]
+    reported = [re.search(advice, each.message) for each in found if each.unstable]
+    numbers = [float(match[1]) for match in reported if match]
     best = min(numbers) if "most" in advice else max(numbers)
     check_rate(made, Q0, H, make(best), effort_delay=delay)
 
 
 @pytest.mark.parametrize("which", ["effort_delay", "sensor_delay"])
-def test_a_delay_that_the_loop_does_not_bear_is_told_with_one_that_it_bears(
+def test_an_excessive_delay_is_reported_with_the_tolerated_one(
     which: str,
 ) -> None:
     """For ω0 = 20: the phase margin over the crossover, less half a period's hold."""
@@ -362,7 +362,7 @@ def test_a_field_s_slope_is_taken_in_the_null_space_and_the_metric() -> None:
     np.testing.assert_allclose(K, 100.0 * np.eye(4), atol=1e-9)
     M = state.mass_matrix
     J = state.frame("panda_tcp").jacobian[:3]
-    # At the field's own minimum but for 1e-3 rad: 3 Zᵀ M⁻¹ Z', in M's own coordinates.
+    # 1e-3 rad from the field's minimum: 3 Zᵀ M⁻¹ Z', in coordinates in which M = I.
     L = np.linalg.cholesky(M)
     Z = np.linalg.svd(np.linalg.solve(L, J.T).T)[2][3:].T
     slope = 3.0 * Z.T @ np.linalg.inv(L) @ np.linalg.inv(L).T @ Z
@@ -418,22 +418,22 @@ LATE = {"type": "rigid_body", "sensors": {"delay": 1}}
         ),
     ],
 )
-def test_mistakes_are_told_where_they_stand(
+def test_mistakes_are_reported_with_their_place(
     sections: dict[str, Any], message: str
 ) -> None:
     with pytest.raises(hsp.HspControlError, match=wording(message)):
         load_experiment(config(**sections))
 
 
-def test_the_command_line_says_what_is_close(
+def test_the_command_line_suggests_close_names(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     file = tmp_path / "close.yaml"
     file.write_text(yaml.safe_dump(config(null_space={"gain": 500})))
     for command in (["check", str(file)], ["run", str(file), "--out", str(tmp_path)]):
         assert main(command) == 0
-        said = capsys.readouterr().err
-        assert re.search(wording("...hsp: null_space.gain: ... 0.5 ... 0.2"), said)
+        output = capsys.readouterr().err
+        assert re.search(wording("...hsp: null_space.gain: ... 0.5 ... 0.2"), output)
     assert main(["check", str(file), "--set", "null_space.gain=2500"]) == 2
     assert "unstable at this rate" in capsys.readouterr().err
 
@@ -453,34 +453,34 @@ def test_the_command_line_says_what_is_close(
         ),
     ],
 )
-def test_a_simulation_refuses_what_a_run_refuses(
+def test_a_simulation_has_the_refusals_of_a_run(
     gains: dict[str, float], delay: int, message: str
 ) -> None:
-    """With the delays of its plant; and its advice is followed."""
+    """With the plant's delays; a run with the advised gains is stable."""
     how: dict[str, Any] = {"duration": 0.01, "integrator": Rk4(0.1 * H)}
     if delay:
         engine = IntegratedPlant(RigidBodyPlant(PANDA), Rk4(H))
         how["plant"] = ImperfectPlant(engine, [SensorDelay(0)], [EffortDelay(delay)])
     with pytest.raises(hsp.errors.UnstableRateError, match=message):
         simulate(holding(**gains), Q0, control_period=H, **how)
-    if not delay:  # nothing is held
+    if not delay:  # no effort is held
         simulate(holding(**gains), Q0, **how)
     (name,) = gains
     mended = {name: 100.0 if delay else 200.0}
     simulate(holding(**mended), Q0, control_period=H, **how)
 
 
-def test_a_delay_that_is_not_borne_is_told_with_the_one_that_is() -> None:
+def test_an_excessive_delay_is_named_with_the_tolerated_one() -> None:
     robot = Robot.load("panda")
     task = JointPosture(Q0, gains=Gains(natural_frequency=40.0))
     made = Controller(robot, [task], limits=None)
     with pytest.raises(UnstableRateError) as caught:
         check_rate(made, Q0, H, Compensation(), effort_delay=30)
-    told = re.search(
+    reported = re.search(
         r"a delay of the efforts of at most (\d+) period", str(caught.value)
     )
-    assert told is not None, caught.value
-    most = int(told[1])
+    assert reported is not None, caught.value
+    most = int(reported[1])
     check_rate(made, Q0, H, Compensation(), effort_delay=most)
     with pytest.raises(UnstableRateError):
         check_rate(made, Q0, H, Compensation(), effort_delay=most + 1)

@@ -1,4 +1,4 @@
-"""The stream of a task, as a controller gives it: received in whichever run it is."""
+"""A task's stream handle from its controller: messages reach the current run."""
 
 import pickle
 from collections.abc import Callable
@@ -23,14 +23,14 @@ def controller(trajectory: hsp.trajectories.Trajectory) -> hsp.Controller:
 
 
 def run(made: hsp.Controller, seconds: float) -> np.ndarray:
-    """Make steps; return where the reference is then."""
+    """Make steps; return the reference after them."""
     for k in range(round(seconds / 0.01)):
         made.compute(0.01 * k, ROBOT.home(), REST)
     reference, _ = made.tasks[0].measure(made.state.read_only)
     return reference
 
 
-def test_what_is_sent_before_the_first_step_is_heard_in_it() -> None:
+def test_messages_before_the_first_step_are_read_in_it() -> None:
     made = controller(hsp.trajectories.Stream())
     stream = made.stream("hand")
     stream.send(TARGET)
@@ -58,7 +58,8 @@ def test_it_goes_on_in_the_next_run() -> None:
 
 
 def test_a_target_gives_the_same_stream() -> None:
-    """Also where a change brings it, and after another reference took over."""
+    """Also where a change introduces the stream, and after another reference replaced
+    it."""
     made = controller(hsp.Hold())
     with pytest.raises(hsp.HspControlError, match="'hand' follows no stream, but Hold"):
         made.stream("hand")
@@ -68,7 +69,7 @@ def test_a_target_gives_the_same_stream() -> None:
     assert isinstance(stream, StreamHandle)
     assert run(made, 5.0) == pytest.approx(TARGET, abs=1e-6)
     made.stream("hand").send([0.4, 0.0, 0.5])
-    assert stream.counts()["taken"] == 1.0  # it is taken in a step
+    assert stream.counts()["taken"] == 1.0  # read in the next step
     made.compute(5.1, ROBOT.home(), REST)
     assert stream.counts()["taken"] == 2.0
     made.at(5.1).reference("hand", hsp.Hold())
@@ -131,9 +132,9 @@ LED: dict[str, Callable[[], tuple[Any, Callable[[hsp.Controller], Any]]]] = {
 }
 
 
-@pytest.mark.parametrize("what", LED)
-def test_what_looks_ahead_moves_no_stream_of(what: str) -> None:
-    """Nor a copy or a pickle, which go on by themselves, to the last bit."""
+@pytest.mark.parametrize("call", LED)
+def test_looking_ahead_moves_no_stream_of(call: str) -> None:
+    """Nor a copy or a pickle, which continue independently, bit for bit."""
 
     def begun() -> hsp.Controller:
         ball = hsp.Obstacle("ball", hsp.Sphere(0.1), hsp.Hold([0.5, 0.2, 0.6]))
@@ -142,9 +143,9 @@ def test_what_looks_ahead_moves_no_stream_of(what: str) -> None:
         hand = hsp.FramePosition(name="hand")
         made = hsp.Controller(ROBOT, [hand], field, scene=[ball])
         made.compute(0.0, ROBOT.home(), REST)
-        stream, lead = LED[what]()
+        stream, lead = LED[call]()
         lead(made)
-        size = 7 if what == "a field" else 3
+        size = 7 if call == "a field" else 3
         made.compute(0.12, ROBOT.home(), REST)
         made.stream(stream).send(0.3 * np.ones(size))
         return made
@@ -169,7 +170,7 @@ def test_what_looks_ahead_moves_no_stream_of(what: str) -> None:
     "copied", [copy, deepcopy, lambda each: pickle.loads(pickle.dumps(each))]
 )
 def test_a_message_to_a_copy_moves_the_copy_alone(copied: Callable[[Any], Any]) -> None:
-    """What waited when it was made moves both."""
+    """Messages that wait when the copy is made move both."""
     made, rest = hsp.Controller(ROBOT, [hsp.FramePosition(name="hand")]), np.zeros(7)
     made.compute(0.0, ROBOT.home(), rest)
     made.set_target("hand", [0.4, 0.1, 0.5])

@@ -1,4 +1,4 @@
-"""Frames that move in their links while a tool is exchanged: the law stays exact."""
+"""Frames move in their links during a tool change; the law stays exact."""
 
 import copy
 import pickle
@@ -16,10 +16,10 @@ from hsp_control.robot.kinematics import LocalMotion
 ROBOT = hsp.Robot.load("panda")
 FRAME, OTHER = "panda_tcp", "panda_link1"
 AT, RAMP = 0.2, 0.4
-"""When the tool is taken up, and how long that takes [s]."""
+"""Start and duration of the tool change [s]."""
 TIP, TURN = np.array([0.03, -0.05, 0.12]), np.array([0.4, -0.7, 0.3])
 H = 1e-4
-"""Of differences [s]: their error is of the order of H²; rounding is 1e-16/H²."""
+"""Step of differences [s]: truncation of the order of H², rounding of 1e-16/H²."""
 
 GAINS = hsp.Gains(natural_frequency=6.0, damping_ratio=0.8)
 MOVING = hsp.trajectories.ComposedPose(
@@ -40,7 +40,7 @@ TASKS: dict[str, Callable[[], hsp.Task]] = {
 
 
 def controller(task: hsp.Task) -> hsp.Controller:
-    """Return one whose two frames both move, the second one twice, overlapping."""
+    """Return a controller with two moving frames, the second twice, overlapping."""
     made = hsp.Controller(
         ROBOT,
         [task],
@@ -93,7 +93,7 @@ def test_the_law_is_exact_while_the_tool_moves(kind: str, seed: int) -> None:
 
 @pytest.mark.parametrize("name", [FRAME, OTHER])
 def test_a_frame_that_moves_in_its_joint_has_exact_rates(name: str) -> None:
-    """Placement, J, J' and both accelerations, beside differences of Pinocchio's."""
+    """Placement, J, J' and both accelerations, against differences of Pinocchio's."""
     made = controller(TASKS["pose"]())
     q, v = motion(3)
     model, index = ROBOT.model, ROBOT.frame_id(name)
@@ -155,7 +155,7 @@ def test_efforts_stay_continuous_where_a_tool_comes_and_goes() -> None:
 
 
 def test_a_tip_stays_where_it_is_to_be_while_it_is_exchanged() -> None:
-    """In a closed loop: from the law's errors alone nobody sees that the tool moves."""
+    """In closed loop the task error shows no effect of the moving tool."""
     made = hsp.Controller(ROBOT, [hsp.FramePosition(FRAME, name="hand")], limits=None)
     made.at(AT).ramp(RAMP).tool(FRAME, [0.0, 0.0, 0.1])
     run = hsp.simulate(made, ROBOT.home(), duration=1.0)
@@ -165,7 +165,7 @@ def test_a_tip_stays_where_it_is_to_be_while_it_is_exchanged() -> None:
     assert np.linalg.norm(moved) == pytest.approx(0.1, abs=1e-6)
 
 
-def test_a_target_counts_from_the_tool_there_is() -> None:
+def test_a_target_is_relative_to_the_present_tool() -> None:
     """Relative values of a change refer to the tip, and so does a copy of the run."""
     made = hsp.Controller(ROBOT, [hsp.FramePosition(FRAME, name="hand")])
     q, v = ROBOT.home(), np.zeros(7)
@@ -187,8 +187,8 @@ def test_a_target_counts_from_the_tool_there_is() -> None:
     np.testing.assert_array_equal(made.state.position(FRAME), home.position(FRAME))
 
 
-def test_nobody_else_moves_the_frames_of_a_controller() -> None:
-    """Neither who has its state nor a part's own Python; a snapshot is one's own."""
+def test_only_the_controller_moves_its_frames() -> None:
+    """Neither holders of the state nor user code can write it; a snapshot is a copy."""
     made = controller(TASKS["position"]())
     made.compute(0.0, *motion(0))
     there = LocalMotion.fixed(pin.SE3(np.eye(3), TIP))

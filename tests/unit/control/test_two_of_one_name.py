@@ -1,4 +1,4 @@
-"""Two tasks of one name, while one fades into the other: each has its own rows."""
+"""While a task fades into another one of the same name, their rows are distinct."""
 
 import numpy as np
 import pytest
@@ -14,7 +14,7 @@ REST = np.zeros(7)
 
 
 def point(offset: Array) -> hsp.FramePosition:
-    """Return a task of the name hand that holds the hand beside its place at home."""
+    """Return a task named "hand" whose target is offset from the hand's home."""
     here = ROBOT.state(0.0, ROBOT.home(), REST).position("panda_tcp")
     target = hsp.Hold(here + offset)
     return hsp.FramePosition("panda_tcp", target, axes="xyz", name="hand")
@@ -24,7 +24,7 @@ OLD, NEW = np.array([0.02, 0.0, 0.0]), np.array([0.0, 0.03, 0.01])
 
 
 def changed() -> hsp.Controller:
-    """Return a controller that exchanges its hand, from 0.1 to 0.3 s."""
+    """Return a controller that exchanges this task, from 0.1 to 0.3 s."""
     joints = [f"panda_joint{k}" for k in (1, 2, 3)]
     old = hsp.JointPosture(ROBOT.home(), joints=joints, name="hand")
     made = hsp.Controller(ROBOT, [old], limits=None)
@@ -52,7 +52,7 @@ def test_each_has_its_rows_and_errors() -> None:
 
 
 def test_each_has_its_columns_in_the_log() -> None:
-    """Of the same kind, too: their errors are not one column."""
+    """Also for tasks of the same type: their errors are separate columns."""
     made = hsp.Controller(ROBOT, [point(OLD)], limits=None)
     made.at(0.1).ramp(0.2).remove("hand").add(point(NEW))
     log = hsp.simulate(

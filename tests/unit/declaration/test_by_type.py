@@ -121,7 +121,7 @@ def test_a_mistake_is_one_error_with_its_key(data: Any, message: str) -> None:
         Chain(filters=data)
 
 
-def test_a_member_that_is_declared_later_counts() -> None:
+def test_a_later_declared_member_is_included() -> None:
     assert "later" not in ByType(Filter).model.model_fields
     type("Later", (Filter,), {"__module__": __name__}, type="later")
     assert [type(f).__name__ for f in Chain(filters={"later": True}).filters] == [
@@ -147,7 +147,7 @@ def test_a_read_only_mapping_refuses_every_change() -> None:
     assert pickle.loads(pickle.dumps(mapping)) == mapping == copy.deepcopy(mapping)
 
 
-def test_what_is_no_data_is_said() -> None:
+def test_invalid_data_is_reported() -> None:
     class OnlyPython(Filter):
         """A filter without a type."""
 

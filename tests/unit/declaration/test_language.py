@@ -1,4 +1,4 @@
-"""Mistakes, in Python and in YAML: each message speaks the language that was typed."""
+"""Mistakes in Python and in YAML: a message uses the syntax of the input."""
 
 import re
 from collections.abc import Callable
@@ -104,11 +104,11 @@ def test_a_message_speaks_the_language_that_was_typed(
     file = tmp_path / "mine.yaml"
     file.write_text(YAML)
     assert main(["check", str(file), "--set", override]) == 2
-    said = capsys.readouterr().err
-    assert re.search(wording(f"... {yaml}"), said)
-    assert said.count("hsp: ") == 1
+    reported = capsys.readouterr().err
+    assert re.search(wording(f"... {yaml}"), reported)
+    assert reported.count("hsp: ") == 1
 
 
-def test_a_command_says_which_one_was_meant(capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_command_suggests_the_likely_one(capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["run", "panda"]) == 2
     assert re.search("'panda' is a robot.* hsp play panda", capsys.readouterr().err)

@@ -27,7 +27,7 @@ def test_parts_are_replaced_and_the_rest_stays_the_same_object() -> None:
     assert with_parts_replaced(TASKS, Line, lambda line: larger) is TASKS
 
 
-def test_an_error_says_where_the_part_is() -> None:
+def test_an_error_has_the_place_of_the_part() -> None:
     def refuse(circle: Circle) -> Circle:
         raise TrajectoryError("no")
 

@@ -46,7 +46,7 @@ from hsp_control.trajectories.pose import PoseTrajectory
 
 
 class GadgetError(HspControlError, ValueError):
-    """What is wrong with a gadget."""
+    """An error of a gadget."""
 
 
 class Gadget(Part, ABC, family="gadgets", error=GadgetError):
@@ -57,7 +57,7 @@ class Gadget(Part, ABC, family="gadgets", error=GadgetError):
 
     _: KW_ONLY
     label: str = "gadget"
-    """What it is called,
+    """The name of it,
     on one line [-]."""
 
     @property
@@ -95,12 +95,12 @@ class Rod(Gadget, type="rod"):
 
 
 class Bag(Gadget, type="bag"):
-    """One with others in it."""
+    """A part with other parts in it."""
 
     first: Gadget
-    """What is in it."""
+    """Its content."""
     spare: Gadget | None = None
-    """What may be in it."""
+    """Its optional content."""
     grid: Matrix = ((1.0, 0.0), (0.0, 1.0))
     """Two rows [-]."""
     counts: dict[str, Vector] = dataclasses.field(default_factory=dict)
@@ -218,7 +218,7 @@ def test_a_type_is_declared_once() -> None:
     class One(Local, type="one"):  # type: ignore[no-redef]
         a: Number = 5.0
 
-    # Run again, as a cell of a notebook is.
+    # Defined again, as by rerunning a notebook's cell.
     assert first is not One
     assert Local.family.members == {"one": One}
     assert type(validated.validate_python({"type": "one"})) is One
@@ -372,7 +372,7 @@ def test_errors_are_those_of_the_class_that_was_called() -> None:
 # --- schemas --------------------------------------------------------------------------
 
 
-def test_the_schema_says_what_each_field_is() -> None:
+def test_the_schema_describes_every_field() -> None:
     schema = TypeAdapter(Gadget).json_schema()
     assert schema["discriminator"] == {"propertyName": "type"}
     assert len(schema["oneOf"]) == 3
@@ -386,7 +386,7 @@ def test_the_schema_says_what_each_field_is() -> None:
     ball = by_type["ball"]["properties"]
     assert by_type["ball"]["required"] == ["type", "radius"]
     assert ball["type"]["description"] == "ball: A round one."
-    assert ball["label"]["description"] == "What it is called, on one line [-]."
+    assert ball["label"]["description"] == "The name of it, on one line [-]."
     assert ball["radius"]["type"] == "number"
     assert ball["radius"]["exclusiveMinimum"] == 0
     assert ball["center"]["minItems"] == ball["center"]["maxItems"] == 3
@@ -412,7 +412,7 @@ def test_every_property_has_a_description(base: type[Part]) -> None:
             assert "default" not in about or "oneOf" not in about
 
 
-def test_what_python_shows_of_a_part() -> None:
+def test_signature_and_help_of_a_part() -> None:
     """A signature without pydantic's words, and the docstrings of the fields."""
     assert str(inspect.signature(Ball)) == (
         "(radius: float, center: ArrayLike = (0.0, 0.0, 0.0), *, label: str = 'gadget')"
@@ -423,7 +423,7 @@ def test_what_python_shows_of_a_part() -> None:
     )
     assert Ball.__doc__ == (
         "A round one.\n\nArgs:\n    radius: Radius [m].\n    center: Center [m].\n"
-        "    label: What it is called, on one line [-]."
+        "    label: The name of it, on one line [-]."
     )
     assert TypeAdapter(Ball).json_schema()["description"] == "A round one."
     assert len(str(inspect.signature(StreamPose))) < 650
@@ -431,7 +431,7 @@ def test_what_python_shows_of_a_part() -> None:
 
 
 def test_docstrings_of_fields_are_inherited() -> None:
-    label = "What it is called, on one line [-]."
+    label = "The name of it, on one line [-]."
     assert Ball.documentation == {
         "label": label, "radius": "Radius [m].", "center": "Center [m]."
     }  # fmt: skip

@@ -1,4 +1,4 @@
-"""No number that a user gives is so large or small that products of it overflow."""
+"""Numbers from users are bounded, so that their products do not overflow."""
 
 from typing import Any
 
@@ -36,7 +36,7 @@ def with_last(value: Any, number: float) -> Any:
 
 
 @pytest.mark.parametrize("kind", [*NUMBERS, *ARRAYS])
-def test_what_is_huge_is_refused(kind: Any) -> None:
+def test_huge_numbers_are_refused(kind: Any) -> None:
     adapter, value = TypeAdapter(kind), ARRAYS.get(kind, 1.0)
     adapter.validate_python(with_last(value, LARGEST))
     for huge in (1.01e30, 1e150, 1.7e308):
@@ -49,7 +49,7 @@ def test_what_is_huge_is_refused(kind: Any) -> None:
 
 
 @pytest.mark.parametrize("kind", [quantities.Positive, quantities.PositiveNumbers])
-def test_what_is_positive_is_not_nearly_0(kind: Any) -> None:
+def test_positive_numbers_are_not_nearly_0(kind: Any) -> None:
     TypeAdapter(kind).validate_python(1e-30)
     for tiny in (1e-31, 1e-300, 5e-324):
         with pytest.raises(ValidationError, match="absurdly small; must be 1e-30"):
@@ -62,7 +62,7 @@ def panda() -> hsp.Robot:
 
 
 def test_the_largest_that_is_allowed_gives_an_effort(panda: hsp.Robot) -> None:
-    """Without a warning of NumPy's: pytest makes errors of them."""
+    """Without a NumPy warning: pytest raises warnings as errors."""
     q, v, gains = panda.home(), np.zeros(7), hsp.Gains(natural_frequency=1e3)
     for target in ([LARGEST, 0.0, 0.0], [-LARGEST, LARGEST, LARGEST]):
         task = hsp.FramePosition("panda_tcp", target, gains=gains)
@@ -71,9 +71,9 @@ def test_the_largest_that_is_allowed_gives_an_effort(panda: hsp.Robot) -> None:
         assert np.isfinite(tau).all()
 
 
-def test_the_message_says_where_and_what_would_be_right(panda: hsp.Robot) -> None:
-    told = wording("Hold: point.1: 1e+150 ... 1e+30")
-    with pytest.raises(HspControlError, match=told):
+def test_the_message_has_the_place_and_the_right_value(panda: hsp.Robot) -> None:
+    reported = wording("Hold: point.1: 1e+150 ... 1e+30")
+    with pytest.raises(HspControlError, match=reported):
         hsp.FramePosition("panda_tcp", [0.4, 1e150, 0.4])
 
 

@@ -1,4 +1,4 @@
-"""How hard limits hold the levels, beside plain formulas."""
+"""Saturation of levels by limits, against plain formulas."""
 
 from typing import Any, NamedTuple
 
@@ -37,19 +37,19 @@ class Law(NamedTuple):
 
 
 class Metric(NamedTuple):
-    """Of a metric its factor."""
+    """Stands for a metric: its factor."""
 
     L: Array
 
 
 class Problem(NamedTuple):
-    """Of a problem its metric."""
+    """Stands for a problem: its metric."""
 
     metric: Metric
 
 
 def drawn(seed: int, size: float, L: Array | None = None) -> dict[str, Any]:
-    """Return a random request of a size, with limits of some 10."""
+    """Return a random request of given size, with limits of about 10."""
     rng = np.random.default_rng(seed)
     root, other = rng.normal(size=(2, NV, NV))
     M, W = root @ root.T + np.eye(NV), other @ other.T + 0.1 * np.eye(NV)
@@ -85,7 +85,7 @@ def excesses(given: dict[str, Any], change: Array) -> Array:
 
 
 def costs(given: dict[str, Any]) -> list[float]:
-    """Return the largest A/K - n² of each level, as the page has it."""
+    """Return the largest A/K - n² of each level, by the formula of docs/edge.md."""
     law = given["law"]
     L_inverse = np.linalg.inv(law.problem.metric.L)
     joint = np.linalg.norm(L_inverse, axis=0).max()
@@ -93,7 +93,8 @@ def costs(given: dict[str, Any]) -> list[float]:
     rows = np.vstack([E, E, M, M, given["barred"].A]) @ L_inverse.T
     length = np.linalg.norm(rows, axis=1)
     parts = (rows @ given["factors"].Q.T / length[:, None]) ** 2
-    left = 1.0 / np.diag(given["factors"].X)  # what those before leave of each row
+    # the part of each row that higher levels leave
+    left = 1.0 / np.diag(given["factors"].X)
     found, start, of_level = [], 0, np.zeros(len(left))
     for k, end in enumerate(ENDS):
         s = np.minimum(left[start:end] / law.thresholds[k], 1.0)
@@ -109,21 +110,22 @@ def costs(given: dict[str, Any]) -> list[float]:
 
 @given(seeds, st.floats(10.0, 1e6))
 def test_it_is_the_plain_formula(seed: int, size: float) -> None:
-    """Levels' accelerations beyond a limit, less the share that lower ones can meet."""
-    asked = drawn(seed, size)
-    call, held = held_levels(**asked)
+    """Levels' accelerations beyond a limit, less the share that lower ones can
+    absorb."""
+    requested = drawn(seed, size)
+    call, held = held_levels(**requested)
     planned([call]).run(0.0)
-    np.testing.assert_allclose(held, costs(asked), rtol=1e-9, atol=1e-12 * size)
+    np.testing.assert_allclose(held, costs(requested), rtol=1e-9, atol=1e-12 * size)
 
 
 @given(seeds)
 def test_the_identity_is_a_metric_as_others(seed: int) -> None:
-    """Whether it is known to be the identity, or given as a matrix."""
+    """The identity metric as a constant and as a matrix give the same."""
     found = []
     for form in (IDENTITY, CONSTANT):
-        asked = drawn(seed, 1e5, np.eye(NV))
-        asked["law"] = asked["law"]._replace(form=form)
-        call, held = held_levels(**asked)
+        requested = drawn(seed, 1e5, np.eye(NV))
+        requested["law"] = requested["law"]._replace(form=form)
+        call, held = held_levels(**requested)
         planned([call]).run(0.0)
         found.append(held)
     np.testing.assert_allclose(found[0], found[1], rtol=1e-12)
@@ -133,18 +135,18 @@ def test_the_identity_is_a_metric_as_others(seed: int) -> None:
 @pytest.mark.parametrize("metric", ["identity", "mass"])
 @given(seeds)
 @settings(max_examples=10, deadline=None)
-def test_what_a_level_asks_for_does_not_know_those_below(
+def test_the_demand_of_a_level_does_not_depend_on_lower_ones(
     metric: str, far: bool, seed: int
 ) -> None:
     """The first level's part of a is the law of a controller without the others.
 
-    With a target out of reach that is the damped law's.
+    With a target out of reach it is the damped law's.
     """
     robot, rng = load("panda"), np.random.default_rng(seed)
     q, v = robot.home() + 0.3 * rng.standard_normal(7), 0.3 * rng.standard_normal(7)
     here = robot.state(0.0, q, v).position("panda_tcp")
     goal = here + (2.0 if far else 0.02) * rng.standard_normal(3)
-    error: Any = "robot" if far else "none"  # which bounds no inverse
+    error: Any = "robot" if far else "none"  # does not bound the inverse
     tasks = [
         hsp.FramePosition("panda_tcp", hsp.Hold(goal), largest_error=error),
         hsp.FrameOrientation("panda_tcp", priority=2, largest_error=error),
@@ -166,13 +168,13 @@ def test_what_a_level_asks_for_does_not_know_those_below(
 
 
 @given(st.floats(0.0, 2.0 * np.pi), st.floats(-3.0, 5.0))
-def test_a_deviation_turns_no_faster_than_a_period_bears(
+def test_a_deviation_rotates_slowly_enough_for_a_period(
     angle: float, exponent: float
 ) -> None:
     """A task along one direction of a plane moves one joint x beyond its limit.
 
     The nearest step, δ = H⁻¹c x/(cᵀH⁻¹c), turns with the direction by K at most for
-    each radian, however large x is; with a cost of 1e-6 it would by 1e6 x.
+    each radian, for any x; with a cost of 1e-6 it would turn by 1e6 x.
     """
     x = 10.0**exponent
 

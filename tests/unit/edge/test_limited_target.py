@@ -1,4 +1,4 @@
-"""The acceleration a step approaches where a limit binds, beside plain formulas."""
+"""The acceleration that a step approaches at an active limit, against formulas."""
 
 from typing import NamedTuple
 
@@ -22,7 +22,7 @@ seeds = st.integers(0, 2**32 - 1)
 
 
 class Asked(NamedTuple):
-    """Commanded accelerations, and those that limits permit."""
+    """Commanded accelerations, and the bounds of limits."""
 
     M: Array
     a: Array
@@ -34,7 +34,7 @@ class Asked(NamedTuple):
 
 
 def drawn(seed: int, size: float, bound: float) -> Asked:
-    """Return a random request: accelerations are of a size, bounds as far as bound."""
+    """Return a random request with given sizes of accelerations and bounds."""
     rng = np.random.default_rng(seed)
     root = rng.normal(size=(NV, NV))
     M = root @ root.T + np.eye(NV)
@@ -50,7 +50,7 @@ def drawn(seed: int, size: float, bound: float) -> Asked:
 
 
 def excess(given: Asked, change: Array) -> float:
-    """Return by how much a + change is beyond limits, relative to what they permit."""
+    """Return the excess of a + change over its limits, relative to their range."""
     a, effort = given.a + change, given.effort + given.M @ change
     beyond = np.maximum(a - given.bounds.upper, given.bounds.lower - a)
     found = [0.0, *(np.abs(effort) / given.permitted.effort - 1.0)]
@@ -62,14 +62,14 @@ def excess(given: Asked, change: Array) -> float:
 
 
 def times_permitted(given: Asked, x: Array) -> float:
-    """Return how many times what limits permit an acceleration is."""
+    """Return the ratio of an acceleration to its bound."""
     efforts = np.abs(given.M @ x) / given.permitted.effort
     motions = np.abs(x) / given.permitted.acceleration
     return float(max(1.0, efforts.max(), motions.max()))
 
 
 def called(given: Asked) -> Asked:
-    """Return what the call makes of it."""
+    """Return the result of the call for a request."""
     a, effort, lower = given.a.copy(), given.effort.copy(), given.barred.lower.copy()
     made = given._replace(a=a, effort=effort, barred=Barred(given.barred.A, lower))
     planned([limited_target(*made)]).run(0.0)
@@ -78,63 +78,67 @@ def called(given: Asked) -> Asked:
 
 @given(seeds, st.floats(0.1, 1e4))
 def test_it_is_the_plain_formula(seed: int, size: float) -> None:
-    """E_t/2 of the step is the damped law's, of a field 1/min(1 + E, r) is left."""
-    asked = drawn(seed, size, 10.0)
-    law, damped, own, own_damped, braking, braking_damped = asked.parts
-    beyond = min(excess(asked, -own), excess(asked, np.zeros(NV)))
+    """E_t/2 of the step is the damped law's; a factor 1/min(1 + E, r) of a field
+    remains."""
+    requested = drawn(seed, size, 10.0)
+    law, damped, own, own_damped, braking, braking_damped = requested.parts
+    beyond = min(excess(requested, -own), excess(requested, np.zeros(NV)))
     exact = 1.0 - min(beyond / LARGE, 1.0)
     to_damped = (1.0 - exact) * (damped - law)
     field = exact * (own + braking) + (1.0 - exact) * (own_damped + braking_damped)
-    times = min(1.0 + excess(asked, to_damped), times_permitted(asked, field))
+    times = min(1.0 + excess(requested, to_damped), times_permitted(requested, field))
     change = to_damped - (1.0 - 1.0 / times) * field
 
-    found = called(asked)
+    found = called(requested)
     scale = 1e-12 * (1.0 + size)  # rounding of some 50 operations
-    np.testing.assert_allclose(found.a, asked.a + change, atol=scale)
+    np.testing.assert_allclose(found.a, requested.a + change, atol=scale)
     np.testing.assert_allclose(
-        found.effort, asked.effort + asked.M @ change, atol=100.0 * scale
+        found.effort, requested.effort + requested.M @ change, atol=100.0 * scale
     )
     np.testing.assert_allclose(
-        found.barred.lower, asked.barred.lower - asked.barred.A @ change, atol=scale
+        found.barred.lower,
+        requested.barred.lower - requested.barred.A @ change,
+        atol=scale,
     )
 
 
 @given(seeds)
 def test_within_limits_nothing_changes(seed: int) -> None:
-    """Whatever the damped law and a field demand."""
-    asked = drawn(seed, 1e4, 10.0)
-    asked.a[:] = 0.0
-    asked.effort[:] = 0.0
-    np.testing.assert_array_equal(called(asked).a, asked.a)
+    """For any demand of the damped law and of a field."""
+    requested = drawn(seed, 1e4, 10.0)
+    requested.a[:] = 0.0
+    requested.effort[:] = 0.0
+    np.testing.assert_array_equal(called(requested).a, requested.a)
 
 
 @given(seeds, st.floats(1e-6, 3.0))
 def test_no_more_is_lost_than_is_beyond(seed: int, beyond: float) -> None:
-    """Of a field's demand against tasks E/(1 + E) is lost where a is E beyond.
+    """A field's demand against tasks loses E/(1 + E) where a exceeds its limit by E.
 
-    What loses more where it begins to violate a limit swings from one side of it to the
-    other.
+    A larger loss at the onset of a violation makes the step oscillate about the limit.
     """
-    asked = drawn(seed, 1.0, 10.0)
-    most = times_permitted(asked, 1e6 * asked.a) / 1e6
-    permitted = asked.a / most  # as much as the limits permit
+    requested = drawn(seed, 1.0, 10.0)
+    most = times_permitted(requested, 1e6 * requested.a) / 1e6
+    permitted = requested.a / most  # at the limits
     a, field = (1.0 + beyond) * permitted, (5.0 + beyond) * permitted
     zero = np.zeros(NV)
-    opposed = asked._replace(
+    opposed = requested._replace(
         a=a,
-        effort=asked.M @ a,
+        effort=requested.M @ a,
         parts=Parts(a, a, field, field, zero, zero),
-        bounds=Within(-asked.permitted.acceleration, asked.permitted.acceleration),
-        barred=Barred(asked.barred.A, np.full(2, -1e9)),
+        bounds=Within(
+            -requested.permitted.acceleration, requested.permitted.acceleration
+        ),
+        barred=Barred(requested.barred.A, np.full(2, -1e9)),
     )
     lost = np.linalg.norm(a - called(opposed).a) / np.linalg.norm(field)
     assert lost <= beyond / (1.0 + beyond) * (1.0 + 1e-6) + 1e-12
 
 
 def test_an_excess_without_end_leaves_finite_numbers() -> None:
-    """A joint without a range permits no acceleration: it is 0, or beyond wholly."""
-    asked = drawn(0, 1.0, 10.0)
-    asked.permitted.acceleration[0] = 0.0
-    asked.bounds.upper[0] = asked.a[0] - 1.0
-    found = called(asked)
+    """A joint of range 0 permits no acceleration: a is 0, or entirely beyond."""
+    requested = drawn(0, 1.0, 10.0)
+    requested.permitted.acceleration[0] = 0.0
+    requested.bounds.upper[0] = requested.a[0] - 1.0
+    found = called(requested)
     assert np.isfinite(found.a).all()

@@ -10,8 +10,8 @@ from hsp_control.law.outcome import DAMPED, EXACT, NOT_FINITE, LawOutcome
 
 
 @pytest.mark.parametrize(("away", "damped"), [(0.0, ""), (0.2, ""), (2.0, "panda_tcp")])
-def test_in_the_middle_the_exact_law_counts_alone(away: float, damped: str) -> None:
-    """The threshold follows the error, and the damped law with it."""
+def test_in_the_interior_only_the_exact_law_acts(away: float, damped: str) -> None:
+    """The threshold, and with it the damped law, depends on the error."""
     robot = load("panda")
     q = robot.home() + np.array([0.08, -0.3, 0.4, -0.1, -0.3, 0.2, 0.5])
     here = robot.state(0.0, q, np.zeros(7)).position("panda_tcp")
@@ -23,7 +23,7 @@ def test_in_the_middle_the_exact_law_counts_alone(away: float, damped: str) -> N
     assert output.damped == damped
     assert law.outcome.outcome is (DAMPED if damped else EXACT)
 
-    # Where a limit may come near to the damped law, it is written; a stays as it is.
+    # Where a limit may be near the damped law, that is written, too; a is unchanged.
     assert law.edge_level[0] == (away > 1.0)
     a, e_N = law.acceleration.copy(), law.null_space_error.copy()
     planned([law.damped_beside(np.zeros(7))]).run(0.0)

@@ -16,10 +16,10 @@ FAR = hsp.Hold([2.0, 0.5, 0.5])
 @pytest.mark.parametrize("metric", ["identity", "mass"])
 @given(st.integers(0, 2**32 - 1))
 @settings(max_examples=10, deadline=None)
-def test_it_is_what_the_law_does_with_a_field_and_not_without(
+def test_it_is_the_effect_of_a_field_on_the_law(
     metric: str, levels: int, seed: int
 ) -> None:
-    """Of the damped law, whose P is no projector; the law is linear in φ_N."""
+    """For the damped law, whose P is no projector; the law is linear in φ_N."""
     robot, rng = load("panda"), np.random.default_rng(seed)
     q = robot.home() + 0.3 * rng.standard_normal(7)
     v, g = 0.3 * rng.standard_normal(7), 300.0 * rng.standard_normal(7)

@@ -1,4 +1,4 @@
-"""How near a singular posture is: the share of the damped law, by NumPy's SVD."""
+"""The weight of the damped law near a singular posture, by NumPy's SVD."""
 
 import numpy as np
 
@@ -8,7 +8,7 @@ from hsp_control.trajectories import HoldPose
 
 
 def test_near_share_is_that_of_the_smallest_singular_value() -> None:
-    """Elbows from bent to nearly straight, a hand that is called away.
+    """Elbows from 90° to nearly straight, with a distant target.
 
     μ = 3x² - 2x³ with x = 2 - 2σ/σ_x. Errors are small enough for this share alone.
     """

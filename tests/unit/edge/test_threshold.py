@@ -1,4 +1,4 @@
-"""The threshold follows the feedback: the law is not steep where tasks are lost."""
+"""The threshold grows with the feedback: it bounds the law's slope at singularities."""
 
 from typing import Any, NamedTuple
 
@@ -33,7 +33,7 @@ from hsp_control.null_space.fields import Rest
 seeds = st.integers(0, 2**32 - 1)
 LEAST = 0.03
 SLOW = Following.of(0.8, on_legs=False)._replace(steepest=150.0, modest=1.3)
-STEP = 1e-6  # of differences; the law bends within ε of 0.03 or more
+STEP = 1e-6  # step of differences; the law varies over ε ≥ 0.03
 
 
 def written(
@@ -46,7 +46,7 @@ def written(
     whitened: float | Array = 1.0,
     turning: float = 0.0,
 ) -> tuple[float, Thresholds]:
-    """Return the thresholds of springs, where they pull, or of other levels."""
+    """Return the thresholds of spring levels under load, or of other levels."""
     m, thresholds = len(demand), Thresholds.allocate(len(ends))
     J, pulling = np.ones((m, 7)), np.broadcast_to(pulls, m)
     springs = np.full(m, bool(pulling.any()))
@@ -71,7 +71,7 @@ def written(
 
 
 def how_held(lacking: float, wanted: float, following: Following) -> float:
-    """Return how much a level is held, of squares of what it lacks and wants."""
+    """Return the saturation of a level from squares of its deficit and demand."""
     return engine.HowHeld(
         lacking=lacking, wanted=wanted, least=LEAST, following=following
     )()
@@ -80,7 +80,7 @@ def how_held(lacking: float, wanted: float, following: Following) -> float:
 def threshold_below(
     demand: Array, held: float, above: float, thresholds: Thresholds
 ) -> float:
-    """Return the threshold of the second level, which follows slowly."""
+    """Return the threshold of the second level, which is rate-limited."""
     return engine.ThresholdBelow(
         demand=demand,
         held=held,
@@ -92,10 +92,10 @@ def threshold_below(
 
 
 @given(seeds, st.floats(-3.0, 6.0), st.floats(0.1, 10.0))
-def test_it_bounds_what_the_feedback_asks_for_over_its_square(
+def test_it_bounds_the_feedback_over_its_square(
     seed: int, size: float, scale: float
 ) -> None:
-    """‖f‖/ε² ≤ L + f_0/ε_0² for each level, and ε = ε_0 for all that is modest.
+    """‖f‖/ε² ≤ L + f_0/ε_0² for each level, and ε = ε_0 for small f.
 
     f_0 is that of legs; on a fixed base it is 0. In a metric that makes J L⁻ᵀ longer
     than J the same holds for ε in its scale.
@@ -120,17 +120,17 @@ def test_it_bounds_what_the_feedback_asks_for_over_its_square(
 
 
 @given(seeds, st.floats(0.0, 1.0))
-def test_a_level_below_a_held_one_asks_for_less_than_draws_that_one(
+def test_a_level_below_a_saturated_one_demands_less_than_that_one(
     seed: int, lacks: float
 ) -> None:
-    """It gets 2 s ‖f‖/ε² at most along s; held for good, that is 2 L s/40."""
+    """Along s it receives at most 2 s ‖f‖/ε²; when permanently saturated, 2 L s/40."""
     rng, following = np.random.default_rng(seed), SLOW
     demand, above = 10.0 ** rng.uniform(-1.0, 4.0, (2, 1)) * unit(rng, 3)
     square = above @ above
     held = how_held(lacks**2 * square, square, following)
     assert 0.0 <= held <= 1.0
     assert held == 0.0 or (lacks > 0.0 and square > 1.3**2)
-    # it fades with what is demanded: nothing jumps where an error vanishes
+    # it fades with the demand, so it is continuous where an error vanishes
     arm = following._replace(modest=0.0)
     least = how_held(lacks**2 * 1e-12 * square, 1e-12 * square, arm)
     assert least <= 1e-6 * np.sqrt(square) / (150.0 * LEAST**2)
@@ -144,7 +144,7 @@ def test_a_level_below_a_held_one_asks_for_less_than_draws_that_one(
 def test_a_level_below_follows_as_slowly_as_those_above_turn(
     seed: int, size: float, log_s: float
 ) -> None:
-    """ε² = f size/(L s_1); and it is below s where all are resolved at once."""
+    """ε² = f size/(L s_1); and it is below s where all levels are resolved together."""
     rng, following = np.random.default_rng(seed), SLOW
     demand = 10.0**size * rng.standard_normal(6)
     scales = 10.0 ** rng.uniform(-1.0, 1.0, (6, 1))
@@ -157,7 +157,7 @@ def test_a_level_below_follows_as_slowly_as_those_above_turn(
 
 
 @given(seeds, st.floats(0.01, 2.0))
-def test_springs_need_what_a_field_needs_as_far_as_they_pull(
+def test_springs_have_the_demand_of_a_field_in_proportion_to_force(
     seed: int, pull: float
 ) -> None:
     rng, following = np.random.default_rng(seed), SLOW
@@ -171,7 +171,7 @@ def test_springs_need_what_a_field_needs_as_far_as_they_pull(
 
 
 class Slopes(NamedTuple):
-    """How steep a law is in q, and how steep it may be: spectral norms."""
+    """Slope of a law in q, and its bound: spectral norms."""
 
     found: float
     bound: float
@@ -277,7 +277,7 @@ def slope_in_v(controller: Controller, q: Array, v: Array) -> Array:
 @given(seeds)
 @settings(max_examples=25)
 def test_no_target_makes_it_steep_in_v(name: str, seed: int) -> None:
-    """The parts J#J and P have eigenvalues in [0, 1]; ε is not that of the speed."""
+    """J#J and P have eigenvalues in [0, 1]; ε does not depend on the speed."""
     robot, rng = load(name), np.random.default_rng(seed)
     q, lost = near_singular(robot, rng)
     target = 10.0 ** rng.uniform(-3.0, 3.0) * unit(rng, len(lost))

@@ -1,4 +1,4 @@
-"""Kinds, calls and plans of the engine: what is checked, what is kept, what is made."""
+"""Kinds, calls and plans of the engine: checks, lifetimes, and construction."""
 
 import copy
 import gc
@@ -45,7 +45,7 @@ def test_a_call_reads_its_arrays_anew_each_time() -> None:
     np.testing.assert_array_equal(out.position, [1.0, -2.0])
 
 
-def test_a_kind_tells_its_arguments() -> None:
+def test_a_kind_lists_its_arguments() -> None:
     kind = engine.UniformLine
     assert repr(kind).startswith("UniformLine(start: reads float64 (d,), velocity: ")
     assert kind.timed
@@ -164,7 +164,7 @@ WRONG: dict[str, tuple[Callable[[], Any], str]] = {
 
 
 @pytest.mark.parametrize("case", WRONG)
-def test_what_does_not_fit_is_named(case: str) -> None:
+def test_unsuitable_parts_are_named(case: str) -> None:
     make, message = WRONG[case]
     with pytest.raises((TypeError, ValueError, AttributeError), match=wording(message)):
         make()
@@ -191,7 +191,7 @@ def test_a_plan_makes_its_calls_in_turn() -> None:
     assert not Plan([line()]).python
 
 
-def test_what_python_raises_goes_through_a_plan() -> None:
+def test_python_exceptions_pass_through_a_plan() -> None:
     told: list[int] = []
 
     def fail() -> None:
@@ -232,7 +232,7 @@ def test_a_group_is_a_record_or_given_member_by_member() -> None:
         assert all(same.values[name] is array for name, array in by_member.items())
 
 
-def test_what_is_told_of_a_call_is_not_its_memory() -> None:
+def test_the_description_of_a_call_is_a_copy() -> None:
     call = line()
     call.values.clear()
     assert call.values["start"][0] == 1.0
@@ -241,7 +241,7 @@ def test_what_is_told_of_a_call_is_not_its_memory() -> None:
 @pytest.mark.parametrize(
     "how", [copy.deepcopy, lambda x: pickle.loads(pickle.dumps(x))]
 )
-def test_copies_have_memory_of_their_own(how: Callable[[Any], Any]) -> None:
+def test_copies_have_independent_memory(how: Callable[[Any], Any]) -> None:
     out = TrajectorySample.allocate(2)
     plan, copied = how((Plan([line(out)]), out))
     plan(2.0)
@@ -290,7 +290,7 @@ def moving(told: list[float], blocks: Any = ()) -> tuple[Move, list[Array]]:
     return move, memory
 
 
-def test_a_move_copies_what_is_valid_and_makes_its_calls() -> None:
+def test_a_move_copies_valid_input_and_makes_its_calls() -> None:
     told: list[float] = []
     move, (t, q, v) = moving(told)
     assert move(0.5, np.arange(6.0)[::2], np.ones(2)) == -1.0
@@ -311,7 +311,7 @@ def test_a_move_copies_what_is_valid_and_makes_its_calls() -> None:
         (0.0, np.zeros(3, dtype=">f8"), np.zeros(2)),
     ],
 )
-def test_a_move_refuses_what_is_not(t: float, q: Any, v: Any) -> None:
+def test_a_move_refuses_invalid_input(t: float, q: Any, v: Any) -> None:
     told: list[float] = []
     move, memory = moving(told)
     assert move(t, q, v) is None
@@ -340,7 +340,7 @@ def test_equal_steps_divide_an_interval() -> None:
     assert h[0] == pytest.approx(0.1)
 
 
-def test_a_plan_says_what_it_does_and_what_writes_it() -> None:
+def test_a_plan_lists_its_calls_and_their_outputs() -> None:
     out = TrajectorySample.allocate(2)
     second = line(start=out.position)
     plan = Plan([line(out), PythonCall(print), Plan([second])])

@@ -1,4 +1,4 @@
-"""Which library the engine is: the installed one, or the one that HSP_ENGINE names."""
+"""The engine's library: the installed one, or that of HSP_ENGINE."""
 
 import os
 import shutil
@@ -21,7 +21,7 @@ print(sys.modules["hsp_control.engine._engine"].__file__, y[0])
 """
 
 
-def asked(library: Path) -> subprocess.CompletedProcess[str]:
+def requested(library: Path) -> subprocess.CompletedProcess[str]:
     return subprocess.run(
         [sys.executable, "-c", WHICH],
         env=os.environ | {"HSP_ENGINE": str(library)},
@@ -34,11 +34,11 @@ def asked(library: Path) -> subprocess.CompletedProcess[str]:
 @pytest.mark.process
 def test_another_library_is_used_instead(tmp_path: Path) -> None:
     other = Path(shutil.copy2(_engine.__file__, tmp_path / "_engine.so"))
-    assert asked(other).stdout.split() == [str(other), "1.0"]
+    assert requested(other).stdout.split() == [str(other), "1.0"]
 
 
 @pytest.mark.process
 def test_a_library_that_is_not_there_is_an_error(tmp_path: Path) -> None:
-    ran = asked(tmp_path / "nowhere.so")
+    ran = requested(tmp_path / "nowhere.so")
     assert ran.returncode != 0
     assert "nowhere.so" in ran.stderr

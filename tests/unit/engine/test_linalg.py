@@ -82,7 +82,7 @@ def test_cholesky(seed: int, n: int, exponent: float, scale: float) -> None:
     assert (np.diag(L) > 0.0).all()
     np.testing.assert_array_equal(np.triu(L, 1), 0.0)
     close(L @ L.T, A, 4 * n * EPS * scale)
-    # The factor itself is as uncertain as A's condition number.
+    # The relative error of the factor grows with A's condition number.
     close(L, np.linalg.cholesky(A), 10 * n * EPS * np.sqrt(scale) * 10.0**-exponent)
 
 
@@ -128,7 +128,7 @@ def test_orthonormalise(
     Q, X = junk(m, n), junk(m, m)
     bound = orthonormalise_rows(J, Q, X)
     close(Q @ Q.T, np.eye(m), 10 * n * EPS)
-    # Rounding relative to what is added up, and to what that cancels: the condition.
+    # Rounding relative to the summands, amplified by cancellation: the condition.
     slack = 20 * n * EPS * np.abs(X) @ np.abs(J) * 10.0**-exponent
     assert (np.abs(X @ J - Q) <= slack + 1e-15).all()
     np.testing.assert_array_equal(np.triu(X, 1), 0.0)
@@ -152,7 +152,7 @@ def test_no_rows_are_orthonormal() -> None:
 def test_triangularise_rows(
     seed: int, n: int, data: st.DataObject, scale: float
 ) -> None:
-    """T Tᵀ = Y Yᵀ: T is Y in other coordinates; any rank."""
+    """T Tᵀ = Y Yᵀ at any rank: T is Y in other coordinates."""
     m = data.draw(st.integers(1, n))
     rank = data.draw(st.integers(0, m))
     Y = scale * normal(seed, m, rank) @ normal(seed + 1, rank, n)

@@ -1,6 +1,6 @@
-"""Misuse of the engine from Python: it is refused, or harmless, and never memory.
+"""Misuse of the engine from Python is refused or harmless, never a memory error.
 
-Calls that may end a process are tried in another one.
+Calls that may end a process run in another one.
 """
 
 import gc
@@ -113,7 +113,7 @@ def try_kinds(trace: Path, rounds: int) -> None:
     done = 0
     for kind in kinds:
         if kind.name in ("EqualSteps", "Periods"):
-            continue  # they repeat as often as their numbers require
+            continue  # their arguments determine how often they repeat
         for seed in range(rounds):
             trace.write_text(f"{kind.name} with the seed {seed}")
             try:
@@ -146,7 +146,7 @@ def alone(
 
 @pytest.mark.process
 def test_no_sizes_and_no_indices_reach_memory_of_something_else(tmp_path: Path) -> None:
-    """With Eigen's assertions each wrong index ends it; without, many of them do."""
+    """With Eigen's assertions every wrong index ends the process; without, many do."""
     trace = tmp_path / "trace"
     ran = alone(
         """
@@ -331,7 +331,7 @@ def test_plans_as_deep_as_they_may_be_are_run() -> None:
 @pytest.mark.parametrize(
     "value", [np.str_("a"), np.datetime64("2020-01-01"), np.complex128(1j), "a", None]
 )
-def test_what_is_no_number_does_not_count(value: object) -> None:
+def test_nan_is_ignored(value: object) -> None:
     assert PythonCall(lambda: value)() == 0.0
 
 

@@ -1,4 +1,4 @@
-"""Names of the engine: one type each, whatever file it is in."""
+"""Type names of the engine are unique across its files."""
 
 import re
 from collections import defaultdict
@@ -9,7 +9,7 @@ TYPE = re.compile(r"^(?:template <.*> )?(?:struct|class) (\w+) (?:: .*)?\{", re.
 
 
 def test_no_two_types_have_one_name() -> None:
-    """Files would share the templates made of them, and take one for the other."""
+    """The linker would merge templates of equally named types (an ODR violation)."""
     found = defaultdict(list)
     folder = ROOT / "engine"
     for path in sorted(folder.rglob("*.hpp")):

@@ -1,4 +1,4 @@
-"""Kinds of a user's own: compiled, loaded, used, and refused where they are wrong."""
+"""User-defined kinds: compiled, loaded, used, and refused where they are wrong."""
 
 import copy
 import pickle
@@ -32,7 +32,7 @@ extern "C" auto hsp_kinds_1() { return hsp::kinds<Doubled>(); }
 
 @pytest.fixture(scope="module")
 def cache(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Return where libraries are kept: each takes seconds to compile."""
+    """Return the folder of libraries, shared since a build takes seconds."""
     return tmp_path_factory.mktemp("cache")
 
 
@@ -56,7 +56,7 @@ def test_a_file_is_compiled_once_and_used(
     assert "-> y [3]" in listing(call)
     with pytest.raises(ValueError, match=r"Doubled: y has the shape \(2,\)"):
         kinds.Doubled(x=x, y=np.zeros(2))
-    monkeypatch.setenv("CXX", "false")  # what is compiled is kept
+    monkeypatch.setenv("CXX", "false")  # compiled libraries are kept
     assert own_kinds.load(source) is kinds
     source.write_text(SOURCE.replace("2.0 * x", "4.0 * x"))
     with pytest.raises(EngineError, match=r"doubled\.cpp does not compile"):
@@ -81,7 +81,7 @@ struct Copy {  // as one of the engine's is called
   void operator()() { y = 3.0 * x; }
 };
 
-struct Memory {  // is refused, and counts how many of it there are
+struct Memory {  // throws, and counts its instances
   static inline int alive = 0;
   Memory() { ++alive; }
   ~Memory() { --alive; }
@@ -107,7 +107,7 @@ extern "C" auto hsp_kinds_1() { return hsp::kinds<Doubled, Copy, Large, Alive>()
 
 @pytest.fixture
 def others(source: Path) -> SimpleNamespace:
-    """Kinds of another file: compiled once for all tests."""
+    """Kinds of another file, compiled once for all tests."""
     source.write_text(OTHERS)
     return own_kinds.load(source)
 
@@ -117,7 +117,7 @@ def test_a_call_that_cannot_be_prepared_leaves_nothing_behind(
     others: SimpleNamespace,
 ) -> None:
     alive = others.Alive(x=np.zeros(1))
-    before = alive()  # the one of which its members were read has gone
+    before = alive()  # the instance whose members were read was destroyed
     for _ in range(3):
         with pytest.raises(ValueError, match="too much memory"):
             others.Large(x=np.zeros(1))
@@ -136,15 +136,15 @@ def test_a_library_beside_its_file_needs_no_compiler(
 
 
 @pytest.mark.slow
-def test_what_does_not_compile_says_what_the_compiler_says(source: Path) -> None:
+def test_compile_errors_have_the_compiler_s_message(source: Path) -> None:
     """Errors in the code are reported, and a kind needs a description."""
     wrong = SOURCE.replace("2.0 * x;", "2.0 * z;").replace("doc =", "words =")
     source.write_text(wrong)
     with pytest.raises(EngineError, match="does not compile:") as raised:
         own_kinds.load(source)
-    said = str(raised.value)
-    assert re.search("z.* was not declared|undeclared", said)
-    assert "a kind needs a description: static" in said
+    reported = str(raised.value)
+    assert re.search("z.* was not declared|undeclared", reported)
+    assert "a kind needs a description: static" in reported
 
 
 @pytest.mark.slow
@@ -160,8 +160,10 @@ def test_files_with_one_name_for_a_kind_do_not_get_each_others(source: Path) -> 
 
 
 @pytest.mark.slow
-def test_copies_and_pickles_of_calls_have_the_own_kind(others: SimpleNamespace) -> None:
-    """Not the engine's, where that has one of the same name."""
+def test_copies_and_pickles_of_calls_have_the_user_s_kind(
+    others: SimpleNamespace,
+) -> None:
+    """A user's kind, not the engine's of the same name."""
     call = others.Copy(x=np.ones(1), y=np.zeros(1))
     for same in (
         copy.copy(call),
@@ -203,8 +205,8 @@ def test_zig_compiles_for_any_processor_as_the_engine_does(
     monkeypatch.delenv("CXX", raising=False)
     monkeypatch.setenv("PATH", "")
     monkeypatch.setitem(sys.modules, "ziglang", ModuleType("ziglang"))
-    said = own_kinds.command(source, source.with_suffix(".so"))
-    assert said[:5] == [sys.executable, "-m", "ziglang", "c++", "-mcpu=baseline"]
+    reported = own_kinds.command(source, source.with_suffix(".so"))
+    assert reported[:5] == [sys.executable, "-m", "ziglang", "c++", "-mcpu=baseline"]
 
 
 def test_no_file_and_no_compiler(source: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -1,4 +1,4 @@
-"""Plans of parts' calls: their arguments by name, and what supplies these."""
+"""Plans of parts' calls: arguments by name, and the calls that write them."""
 
 import numpy as np
 import pytest
@@ -27,10 +27,10 @@ def test_arguments_are_added_by_name_and_none_twice() -> None:
 
 
 def test_a_function_is_given_its_arguments_by_name_and_the_time_first() -> None:
-    told: list[tuple[float, str]] = []
+    reported: list[tuple[float, str]] = []
 
     def follow(t: float, name: str) -> None:
-        told.append((t, name))
+        reported.append((t, name))
 
     x, out = np.ones(2), np.zeros(2)
     plan = planned(
@@ -38,7 +38,7 @@ def test_a_function_is_given_its_arguments_by_name_and_the_time_first() -> None:
     )
     assert [len(plan.follow), len(plan.write)] == [1, 1]
     plan.run(0.5)
-    assert told == [(0.5, "a")]
+    assert reported == [(0.5, "a")]
     np.testing.assert_array_equal(out, 3.0)
 
 
@@ -58,7 +58,7 @@ class Motion:
         return self.value, [PartCall(engine.Copy, x=self.source, out=self.value)]
 
 
-def test_what_supplies_arguments_is_called_before_also_for_members_of_a_group() -> None:
+def test_calls_that_write_arguments_come_first_also_for_groups() -> None:
     offset, doubled = (
         Motion(),
         CallOutput(PartCall(add, x=Motion(), y=Motion()), junk()),

@@ -154,8 +154,8 @@ METRICS = {
 # -- states and samples ---------------------------------------------------------------
 
 
-def test_what_is_bound_to_one_state_or_sample_is_not_given_to_another() -> None:
-    """Turn by turn, as finite differences do, and with samples that come and go."""
+def test_calls_bound_to_a_state_or_sample_are_not_shared() -> None:
+    """Alternating, as in finite differences, and with samples created and freed."""
     robot, frame = Robot.load("panda"), "panda_tcp"
     first, second = RobotState(robot), RobotState(robot)
     rng = np.random.default_rng(5)
@@ -230,7 +230,7 @@ def test_formulas_agree_with_coal_and_with_differences(kind: str) -> None:
 
         halves = [slope(along, h) for h in (1e-4, 5e-5)]
         if np.abs(halves[0] - halves[1]).max() > 1e-6:
-            continue  # a feature changes between the steps: the rate jumps
+            continue  # the nearest feature changes between the steps: the rate jumps
         agreed += 1
         np.testing.assert_allclose(rate, halves[1], atol=1e-6)
 
@@ -242,7 +242,7 @@ JOINTS = 150
 
 @pytest.fixture(scope="module")
 def chain(tmp_path_factory: pytest.TempPathFactory) -> Robot:
-    """Return a chain so long that a vector of its freedoms is seen among the rest."""
+    """Return a long chain, so that a vector of size nv stands out in memory."""
     axes, ball = (
         ("0 0 1", "0 1 0", "1 0 0"),
         '<geometry><sphere radius="0.01"/></geometry>',
@@ -287,12 +287,12 @@ def allocated(step: Callable[[], Any], steps: int) -> tuple[int, int]:
 
 
 VECTOR = 8 * JOINTS
-"""Bytes of the smallest array of freedoms; objects of Python hold fewer."""
+"""Bytes of the smallest array of size nv; Python objects are smaller."""
 
 
 @pytest.mark.slow
 def test_a_step_allocates_nothing(chain: Robot) -> None:
-    """Neither the law nor Pinocchio, which is called without its Python bindings."""
+    """Neither the law nor Pinocchio, called without its Python bindings, allocates."""
     name, q, v = f"link{JOINTS}", chain.home() + 0.1, np.full(JOINTS, 1e-3)
     frame = chain.state(0.1, q, v).frame(name)
     here = HoldPose(frame.position, frame.rotation)
@@ -313,7 +313,7 @@ def test_a_step_allocates_nothing(chain: Robot) -> None:
         controller.compute(state)
 
     peak, left = allocated(compute, 500)
-    # The output, 1.5 kB of Python's own small objects, and no other vector.
+    # The output, 1.5 kB of small Python objects, and no other vector.
     assert peak < len(out._memory) + out.tau.nbytes + 2 * VECTOR
     assert left < 50
 

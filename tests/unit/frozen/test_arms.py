@@ -1,4 +1,5 @@
-"""The sources for arms compile and stop, against declarations of what they include."""
+"""The drivers for arms compile and stop, with declarations instead of vendor
+headers."""
 
 import subprocess
 from pathlib import Path
@@ -19,7 +20,7 @@ def frozen(tmp_path: Path) -> Path:
 
 
 def declared(folder: Path, stands_for: str, headers: list[str]) -> list[str]:
-    """Return the flags with which each of the headers is one of ours."""
+    """Return the flags that replace the vendor's headers by ours."""
     for each in headers:
         header = folder / "include" / each
         header.parent.mkdir(parents=True, exist_ok=True)
@@ -57,7 +58,7 @@ def test_a_controller_of_ros2_control_brakes(
     ]
     went, effort = zip(*(map(float, row.split()) for row in rows), strict=True)
     assert effort[20] == effort[19]  # the last one
-    assert effort[21] != effort[20]  # that of the stop
-    assert len({*effort[21:30]}) == 1  # it holds a robot that is at rest
+    assert effort[21] != effort[20]  # the effort of the stop
+    assert len({*effort[21:30]}) == 1  # holds a robot at rest
     # Without a state: the last effort for five periods, then the manager is informed.
     assert [k for k, ok in enumerate(went) if not ok] == [*range(35, 40)]

@@ -70,7 +70,7 @@ def test_a_compensator_in_python_is_refused_with_its_key(
         hsp.freeze(controller, tmp_path / "frozen.hsp", compensation=compensation)
 
 
-def test_what_does_not_fit_is_refused(tmp_path: Path) -> None:
+def test_unsuitable_input_is_refused(tmp_path: Path) -> None:
     controller = hsp.load_experiment("panda_limits").controller
     compensation = PARTS.Compensation(integral_action=PARTS.IntegralAction(ki={"x": 1}))
     with pytest.raises(

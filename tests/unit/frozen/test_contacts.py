@@ -97,7 +97,7 @@ def test_a_robot_on_feet_that_sees_nothing_any_more_is_stopped(tmp_path: Path) -
 
 
 def pressing(value: float | list[float]) -> hsp.Controller:
-    """Return a standing robot of which one foot presses as it is commanded."""
+    """Return a standing robot with a commanded force at one foot."""
     own = hsp.load_experiment("whole_body/solo12_trunk").controller.contacts
     foot = replace(own[0], force=CommandedForce(value=value))
     return solo(contacts=(foot, *own[1:]))
@@ -105,7 +105,7 @@ def pressing(value: float | list[float]) -> hsp.Controller:
 
 @pytest.mark.parametrize("ramp", [0.0, 0.02])
 def test_a_commanded_force(ramp: float, tmp_path: Path) -> None:
-    """Also while one ramp is not over when the next begins, and to nothing."""
+    """Also with overlapping ramps, and to zero."""
     declared = pressing(6.0)
     foot = declared.contacts[0].name
     opened = Opened(hsp.freeze(declared, tmp_path / "frozen.hsp"))
@@ -145,7 +145,7 @@ def test_a_commanded_force_along_a_plane_is_frozen_as_it_is(
 
 @pytest.mark.parametrize("ramp", [0.0, 0.02])
 def test_a_commanded_force_along_a_plane(ramp: float, tmp_path: Path) -> None:
-    """Within its friction pyramid; bit by bit while ramps overlap."""
+    """Within its friction pyramid; bit for bit while ramps overlap."""
     declared = pressing([0.5, -0.3, 6.0])
     foot, side = declared.contacts[0].name, declared.contacts[0].side
     opened = Opened(hsp.freeze(declared, tmp_path / "frozen.hsp"))
@@ -193,7 +193,7 @@ def in_step(declared: hsp.Controller, folder: Path, new: dict[int, Any]) -> Open
 
 
 def test_a_commanded_moment(tmp_path: Path) -> None:
-    """Of a sole, whose corners share it and each push."""
+    """The force of a sole, distributed to corners that may only push."""
     own = hsp.load_experiment("whole_body/talos_circle").controller
     foot = own.contacts[0]
     wrench = CommandedForce(value=[0.0, 0.0, 400.0, 0.0, 0.0, 0.0])
@@ -207,7 +207,7 @@ def test_a_commanded_moment(tmp_path: Path) -> None:
     port = opened.ports[f"{foot.name}.force"]
     assert (port.size, port.unit.decode()) == (6, "N, N·m")
     for edge in ([0, 0, 100, 100 * y, 0, 0], [0, 0, 100, 0, -100 * x, 0]):
-        # where the foot would tilt
+        # beyond which the foot tilts
         for share, status in ((0.98, OK), (1.02, WRONG_VALUE)):
             moment = np.array(edge) * [1, 1, 1, share, share, 1]
             assert opened.set(f"{foot.name}.force", moment) == status
@@ -215,7 +215,7 @@ def test_a_commanded_moment(tmp_path: Path) -> None:
 
 
 def test_the_force_of_a_sliding_contact(tmp_path: Path) -> None:
-    """It slides with friction against the velocity that the tasks intend."""
+    """Kinetic friction opposes the velocity that the tasks command."""
     own = hsp.load_experiment("forces/panda_wipe").controller
     start = own.setup.start.state.q
     wiper = replace(own.contacts[0], force=CommandedForce(value=5.0))
@@ -226,7 +226,7 @@ def test_the_force_of_a_sliding_contact(tmp_path: Path) -> None:
     assert opened.set("wiper.force", 0.0) == OK
 
 
-def test_what_nothing_carries_is_not_stopped(tmp_path: Path) -> None:
+def test_an_unsupported_robot_is_not_stopped(tmp_path: Path) -> None:
     controller = solo(contacts=(), base="driven")
     opened = Opened(hsp.freeze(controller, tmp_path / "frozen.hsp"))
     q, v = controller.setup.start.state.q, np.zeros(18)

@@ -61,7 +61,9 @@ def test_a_pose_and_centering(replay: Path, tmp_path: Path) -> None:
     )
 
 
-def test_what_is_frozen_is_not_changed_and_begins_anew(tmp_path: Path) -> None:
+def test_freezing_does_not_change_the_controller_and_begins_anew(
+    tmp_path: Path,
+) -> None:
     experiment = hsp.load_experiment("panda_limits")
     controller, q = experiment.controller, experiment.q0
     first = hsp.freeze(controller, tmp_path / "first.hsp").read_bytes()
@@ -75,14 +77,14 @@ def test_what_is_frozen_is_not_changed_and_begins_anew(tmp_path: Path) -> None:
     np.testing.assert_array_equal(after, before)
 
 
-def test_the_library_knows_nothing_of_python() -> None:
+def test_the_library_does_not_depend_on_python() -> None:
     content = library().read_bytes()
     assert b"hsp_step" in content
     for word in (b"libpython", b"Py_", b"PyObject", b"PyErr", b"numpy"):
         assert word not in content
 
 
-def test_what_a_build_needs_is_there() -> None:
+def test_the_files_of_a_build_exist() -> None:
     assert (include_folder() / "hsp_step.h").is_file()
     assert (cmake_folder() / "hsp_step-config.cmake").is_file()
 
@@ -100,7 +102,7 @@ def height(state: hsp.RobotState) -> float:
         ),
     ],
 )
-def test_what_changes_over_time_is_refused(
+def test_time_varying_parts_are_refused(
     changed: object, message: str, tmp_path: Path
 ) -> None:
     controller = hsp.load_experiment("panda_limits").controller
@@ -169,9 +171,7 @@ class ElbowHeight(hsp.Cost):
 
 
 @pytest.mark.smoke
-def test_a_kind_of_ones_own_is_found_in_its_library(
-    replay: Path, tmp_path: Path
-) -> None:
+def test_a_user_s_kind_is_found_in_its_library(replay: Path, tmp_path: Path) -> None:
     source = tmp_path / "height.cpp"
     source.write_text(HEIGHT)
     try:
@@ -198,7 +198,7 @@ def test_a_kind_of_ones_own_is_found_in_its_library(
 def test_rows_of_barriers_and_of_static_efforts(
     static: Any, replay: Path, tmp_path: Path
 ) -> None:
-    """Rows that Python's step writes when they are needed have their room here."""
+    """Rows that Python writes on demand have memory in the file."""
     robot = hsp.Robot.load("panda")
     q = robot.home()
     wrist = robot.state(0.0, q, np.zeros(7)).position("panda_link6")
@@ -223,7 +223,7 @@ def test_rows_of_barriers_and_of_static_efforts(
 
 @pytest.mark.process
 def test_every_bundled_configuration(replay: Path, tmp_path: Path) -> None:
-    """Those that are frozen give the same bits; the others are refused with a key."""
+    """Configurations that can be frozen give the same bits; others name the key."""
     refused = {}
     for name in bundled_configs():
         experiment = hsp.load_experiment(name)
@@ -241,7 +241,7 @@ def test_every_bundled_configuration(replay: Path, tmp_path: Path) -> None:
             np.testing.assert_array_equal(
                 replayed(replay, frozen, states), computed(controller, states), name
             )
-    # what presses, walks, or changes while it runs
+    # those that press, walk, or change at run time
     folders = {name.split("/")[0] for name in refused}
     assert folders == {"compliance", "forces", "walking", "whole_body"}
     assert len(refused) == 10

@@ -100,7 +100,7 @@ def test_another_version_or_processor(
         Opened(other)
 
 
-def test_what_is_wrong_behind_a_right_checksum_is_no_crash(
+def test_corrupt_data_with_a_valid_checksum_causes_no_crash(
     frozen: Path, tmp_path: Path
 ) -> None:
     content, other = frozen.read_bytes(), tmp_path / "other.hsp"
@@ -120,7 +120,7 @@ def test_what_is_wrong_behind_a_right_checksum_is_no_crash(
 def test_a_changed_file_that_opens_steps_and_stops(
     frozen: Path, q: np.ndarray, tmp_path: Path
 ) -> None:
-    """Numbers may be any behind a right checksum: a status reports it, and no crash."""
+    """Random numbers with a valid checksum: a status is returned, no crash."""
     content, other = frozen.read_bytes(), tmp_path / "other.hsp"
     rng = np.random.default_rng(SEED)
     stepped = 0
@@ -134,9 +134,9 @@ def test_a_changed_file_that_opens_steps_and_stops(
         except RuntimeError:
             continue
         if len(opened.tau) == len(q):
-            said = [opened.step(0.001 * k, q, 0.0 * q) for k in range(3)]
-            said += [opened.stop(0.001 * k, q, 0.0 * q) for k in range(3, 6)]
-            assert all(opened.error for status in said if status < 0)
+            reported = [opened.step(0.001 * k, q, 0.0 * q) for k in range(3)]
+            reported += [opened.stop(0.001 * k, q, 0.0 * q) for k in range(3, 6)]
+            assert all(opened.error for status in reported if status < 0)
             stepped += 1
     assert stepped > 20
 
@@ -152,10 +152,8 @@ def test_a_number_has_one_type(frozen: Path, tmp_path: Path) -> None:
         Opened(other)
 
 
-def test_a_step_repeats_nothing_as_often_as_a_file_says(
-    frozen: Path, tmp_path: Path
-) -> None:
-    """Kinds that do so are those of simulations, which no file may have."""
+def test_a_file_s_numbers_do_not_make_a_step_loop(frozen: Path, tmp_path: Path) -> None:
+    """Kinds that may loop forever are those of simulations, not permitted in files."""
     content, other = frozen.read_bytes(), tmp_path / "other.hsp"
     for kind in (b"EqualSteps", b"Periods"):
         named = len(kind).to_bytes(4, "little") + kind
@@ -226,7 +224,7 @@ def test_a_wrong_state_is_refused_with_the_last_effort(
 ) -> None:
     v = np.zeros(7)
     assert opened.step(0.0, np.full(7, np.nan), v) == WRONG_STATE
-    np.testing.assert_array_equal(opened.tau, np.zeros(7))  # there was none yet
+    np.testing.assert_array_equal(opened.tau, np.zeros(7))  # there was no effort yet
     assert opened.step(0.0, q, v) == OK
     assert opened.error == ""
     last = opened.tau.copy()
@@ -261,7 +259,7 @@ def test_a_clock_that_jumps_is_refused_until_a_restart(
     np.testing.assert_array_equal(opened.tau, first)
 
 
-def test_times_count_from_the_first_step(
+def test_times_are_relative_to_the_first_step(
     opened: Opened, controller: hsp.Controller, q: np.ndarray
 ) -> None:
     own, begin = controller.preview(), 1.76e9
@@ -326,8 +324,8 @@ def test_two_handles_do_not_know_of_each_other(frozen: Path, q: np.ndarray) -> N
         np.testing.assert_array_equal(one.tau, alone.tau)
 
 
-def test_two_threads_in_one_handle_are_told(opened: Opened, q: np.ndarray) -> None:
-    """A step is refused or whole: ctypes lets both threads run at once."""
+def test_two_threads_in_one_handle_are_reported(opened: Opened, q: np.ndarray) -> None:
+    """A concurrent step is refused or complete: ctypes releases the GIL."""
     found: list[int] = []
 
     def steps() -> None:

@@ -36,7 +36,7 @@ def run(
     steps: range,
     changes: dict[int, Callable[[float], object]],
 ) -> None:
-    """Step both, and compare; changes are made after a step, with its time."""
+    """Step both and compare; changes are made after a step, at its time."""
     q = controller._declared.start
     assert q is not None
     for k in steps:
@@ -80,7 +80,7 @@ def test_gains_and_the_null_space_gain(ramp: float, tmp_path: Path) -> None:
 @pytest.mark.parametrize("ramp", [0.0, 0.02])
 @pytest.mark.parametrize("fields", [1, 2])
 def test_weights_of_fields(fields: int, ramp: float, tmp_path: Path) -> None:
-    """Also while one that goes on is not over, to nothing, and of one field alone."""
+    """Also during an earlier change, to zero, and for a single field."""
     robot = hsp.Robot.load("panda")
     reach = hsp.Manipulability("panda_tcp")
     field = hsp.JointCentering() + 0.3 * reach if fields == 2 else hsp.JointCentering()
@@ -187,7 +187,7 @@ def test_too_many_ramps_at_a_time(tmp_path: Path) -> None:
     assert opened.ramp("hand.Kv", 30.0 * np.eye(3), 0.01) == OK
 
 
-def said(mass: float, center: list[float], moments: list[float]) -> np.ndarray:
+def reported(mass: float, center: list[float], moments: list[float]) -> np.ndarray:
     """Return a payload as a program sets it, of moments about the frame's axes."""
     a, b, c = moments
     return np.array([mass, *center, a, 0.0, 0.0, b, 0.0, c])
@@ -206,7 +206,7 @@ def test_payloads_are_taken_up_and_put_down(
     ) -> Callable[[float], None]:
         def change(t: float) -> None:
             controller.at(t).ramp(ramp).payload(frame, mass, center, moments)
-            body = said(mass, center, moments)
+            body = reported(mass, center, moments)
             assert opened.ramp(f"{frame}.payload", body, ramp) == OK
 
         return change
@@ -214,7 +214,7 @@ def test_payloads_are_taken_up_and_put_down(
     heavy = carry(2.0, [0.01, -0.02, 0.1], [0.01, 0.012, 0.009])
     light = carry(0.3, [0.0, 0.01, 0.05], [0.0, 0.0, 0.0])
     nothing = carry(0.0, [0.0, 0.0, 0.0], [0.0, 0.0, 0.0])
-    # also while another is taken up, twice the same, and none after none
+    # also during another change, the same one twice, and none after none
     changes = {
         3: heavy,
         8: light,
@@ -229,7 +229,7 @@ def test_payloads_are_taken_up_and_put_down(
 
 
 def test_an_observer_has_the_model_of_the_step(tmp_path: Path) -> None:
-    """Its own evaluation comes before the law's, in Python as without it."""
+    """The model is evaluated before the law, in Python as without it."""
     experiment = hsp.load_experiment("panda_limits")
     observer = hsp.compensation.MomentumObserver(30.0)
     observed = hsp.compensation.Compensation(momentum_observer=observer)
@@ -240,7 +240,7 @@ def test_an_observer_has_the_model_of_the_step(tmp_path: Path) -> None:
     command = hsp.compensation.CompensatedController(controller, observed)
     command.restart(origin=0.0)
     place = next(at for at in opened.ports if at.endswith(".payload"))
-    body = said(1.0, [0.0, 0.0, 0.1], [0.0, 0.0, 0.0])
+    body = reported(1.0, [0.0, 0.0, 0.1], [0.0, 0.0, 0.0])
     for k in range(60):
         t = k * H
         q = experiment.q0 + 0.02 * np.sin(0.1 * k)
@@ -270,16 +270,16 @@ def test_gravity(ramp: float, tmp_path: Path) -> None:
 
     changes = {4: tilt([1.0, 0.5, -9.6]), 15: tilt([0.0, 0.0, -1.62])}
     run(controller, opened, range(60), changes)
-    assert LIB.hsp_restart(opened.handle) == OK  # the model is that of the file, too
+    assert LIB.hsp_restart(opened.handle) == OK  # the file's model is used, too
     other = hsp.load_experiment("panda_limits").controller.preview()
     run(other, opened, range(5), {})
 
 
 def test_a_new_run_carries_nothing(tmp_path: Path) -> None:
     controller, opened = pair("panda_limits", tmp_path)
-    body = said(1.0, [0.0, 0.0, 0.1], [0.0, 0.0, 0.0])
+    body = reported(1.0, [0.0, 0.0, 0.1], [0.0, 0.0, 0.0])
     frame = next(at for at in opened.ports if at.endswith(".payload"))
-    assert opened.set(frame, body) == OK  # before the first step: from the beginning
+    assert opened.set(frame, body) == OK  # before the first step: active from the start
     controller.at(-1.0).ramp(0.0).payload(frame.split(".")[0], 1.0, [0.0, 0.0, 0.1])
     run(controller, opened, range(5), {})
     assert LIB.hsp_restart(opened.handle) == OK
@@ -293,22 +293,22 @@ def test_a_new_run_carries_nothing(tmp_path: Path) -> None:
         (-1.0, [0.0, 0.0, 0.0]),
         (np.nan, [0.0, 0.0, 0.0]),
         (1e300, [0.0, 0.0, 0.0]),
-        (1.0, [0.1, 0.1, 0.3]),  # more about one axis than about both others
+        (1.0, [0.1, 0.1, 0.3]),  # one moment exceeds the sum of the others
         (1.0, [-0.1, 0.1, 0.1]),
         (0.0, [0.1, 0.1, 0.1]),  # without mass
     ],
 )
-def test_what_is_no_body_is_refused(
+def test_impossible_bodies_are_refused(
     mass: float, moments: list[float], tmp_path: Path
 ) -> None:
     _, opened = pair("panda_limits", tmp_path)
     frame = next(at for at in opened.ports if at.endswith(".payload"))
-    body = said(mass, [0.0, 0.0, 0.1], moments)
+    body = reported(mass, [0.0, 0.0, 0.1], moments)
     assert opened.set(frame, body) == WRONG_VALUE
     assert opened.set("gravity", [0.0, 0.0, -981.0]) == WRONG_VALUE
 
 
-def test_only_what_moves_carries(tmp_path: Path) -> None:
+def test_only_moving_links_carry(tmp_path: Path) -> None:
     controller, opened = pair("panda_limits", tmp_path)
     assert "panda_tcp.payload" in opened.ports
     with pytest.raises(FreezeError, match=r"^payloads: .* is fixed to the world"):
@@ -318,7 +318,7 @@ def test_only_what_moves_carries(tmp_path: Path) -> None:
 def test_too_many_payloads_at_a_time(tmp_path: Path) -> None:
     controller, opened = pair("panda_limits", tmp_path)
     frame = next(at for at in opened.ports if at.endswith(".payload"))
-    body = said(1.0, [0.0, 0.0, 0.1], [0.0, 0.0, 0.0])
+    body = reported(1.0, [0.0, 0.0, 0.1], [0.0, 0.0, 0.0])
     run(controller, opened, range(1), {})
     for _ in range(8):
         assert opened.ramp(frame, body, 0.1) == OK

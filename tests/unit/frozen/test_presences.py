@@ -1,4 +1,4 @@
-"""Tasks and fields of a frozen controller come and go as on a time line."""
+"""Tasks and fields of a frozen controller fade as on a time line."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
@@ -26,17 +26,17 @@ Q = ROBOT.home()
 
 
 class ChangePresence(Change):
-    """A task fades in or out, from however far it is present."""
+    """A task fades in or out from its current weight."""
 
     task: InstanceOf[hsp.Task]
     """The task, placed."""
     place: int
-    """Its index among all, to which it returns once it was gone."""
+    """Its index among all tasks, to which it returns after an absence."""
     presence: float
-    """How far it is present then."""
+    """Its weight at the end."""
 
     def apply(self, setup: Setup) -> Setup:
-        """Return the setup with this presence of the task."""
+        """Return the setup with this weight of the task."""
         at, ramp, x = self.at, self.ramp, self.presence
         for each in setup.tasks:
             if each.task.name == self.task.name:
@@ -84,7 +84,7 @@ class Pair:
         assert self.opened.ramp(f"{name}.presence", x, ramp) == OK
 
     def change(self, name: str, x: float, at: float, ramp: float) -> None:
-        """Let a task of the controller in Python be present from a time on."""
+        """Add a task to the controller in Python from a time on."""
         tasks = self.tasks or [x.task for x in self.controller.setup.tasks]
         place = [each.name for each in tasks].index(name)
         task = tasks[place]
@@ -120,7 +120,7 @@ class Pair:
 @pytest.mark.parametrize("ramp", [0.0, 0.03])
 @pytest.mark.parametrize("level", [1, 2])
 def test_tasks_come_and_go(level: int, ramp: float, tmp_path: Path) -> None:
-    """Several at once, in either order, some not wholly; and again before they went."""
+    """Several at once, in either order, some partially; and again before the end."""
     tasks = [hand(), turn(priority=level), elbow(priority=2 * level - 1)]
     declared = hsp.Controller(ROBOT, tasks, hsp.JointCentering(), start=Q)
     pair = Pair(declared, tmp_path, ["hand", "elbow"])
@@ -169,7 +169,7 @@ def test_within_limits_that_bind(tmp_path: Path) -> None:
 
 
 def test_where_the_law_is_damped(tmp_path: Path) -> None:
-    """Python mixes there part by part."""
+    """Python mixes part by part here."""
     given: dict[str, Any] = {"singularity_threshold": 0.5, "start": Q}
     declared = hsp.Controller(ROBOT, [hand(), turn(priority=2)], **given)
     pair = Pair(declared, tmp_path, ["turn"])
@@ -188,7 +188,7 @@ def test_on_feet(tmp_path: Path) -> None:
 
 
 def test_a_stream_that_comes_and_goes(tmp_path: Path) -> None:
-    """It moves on while it is absent, or almost so."""
+    """Its reference moves on while it is absent or nearly so."""
     stream = StreamPose(policy="latest", delay=0.03)
     task = hsp.FramePose("panda_tcp", stream, name="hand")
     declared = hsp.Controller(ROBOT, [task], hsp.JointCentering(), start=Q)
@@ -219,7 +219,7 @@ def test_before_the_first_step_it_is_not_there(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("ramp", [0.0, 0.02])
 def test_a_field_whose_weight_is_a_ramp(ramp: float, tmp_path: Path) -> None:
-    """It fades by a factor of its weight, in the middle of its own ramp."""
+    """A factor on its weight fades it, also during its own ramp."""
     weight = Ramp(initial=0.5, final=3.0, start=0.01, duration=0.1)
     field = replace(hsp.JointCentering(), weight=weight)
     declared = hsp.Controller(ROBOT, [hand()], field, start=Q)
@@ -248,7 +248,7 @@ def test_a_presence_is_between_0_and_1(wrong: float, tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    ("tasks", "presences", "says"),
+    ("tasks", "presences", "reason"),
     [
         ([hand(), turn()], ["hnad"], r"no task 'hnad'; did you mean 'hand'\?"),
         ([hand(), turn()], ["hand", "hand"], "task 'hand' is named twice"),
@@ -256,10 +256,10 @@ def test_a_presence_is_between_0_and_1(wrong: float, tmp_path: Path) -> None:
     ],
 )
 def test_which_tasks_come_and_go(
-    tasks: list[hsp.Task], presences: list[str], says: str, tmp_path: Path
+    tasks: list[hsp.Task], presences: list[str], reason: str, tmp_path: Path
 ) -> None:
     declared = hsp.Controller(ROBOT, tasks, start=Q)
-    with pytest.raises(FreezeError, match=rf"^presences: .*{says}"):
+    with pytest.raises(FreezeError, match=rf"^presences: .*{reason}"):
         hsp.freeze(declared, tmp_path / "frozen.hsp", presences=presences)
 
 

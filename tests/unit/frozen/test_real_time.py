@@ -20,7 +20,7 @@ pytestmark = [
     pytest.mark.skipif(sys.platform != "linux", reason="glibc's names, Linux' seccomp"),
     pytest.mark.skipif(
         "libasan" in os.environ.get("LD_PRELOAD", ""),
-        reason="AddressSanitizer has the allocations, and asks the system",
+        reason="AddressSanitizer replaces malloc, and makes system calls",
     ),
 ]
 SEED = 61
@@ -88,7 +88,7 @@ def check_quiet(
 ) -> None:
     program = compiled(Path(__file__).with_name("quiet.c"), tmp_path)
     frozen = hsp.freeze(controller, tmp_path / "frozen.hsp", presences=come_and_go)
-    # where no limit is violated, and where some are, and contradict each other
+    # with no limit violated, and with contradicting violated ones
     calm = simulated_states(experiment, 0.1)
     given = experiment.robot, experiment.q0, 100, SEED
     wild = random_states(*given, away=0.5, speed=0.5)
@@ -105,4 +105,4 @@ def check_quiet(
     assert 0 < within < steps
     assert allocations == locks == 0
     if "without system calls" not in done.stdout:
-        pytest.skip("allocations and locks counted; seccomp is not allowed here")
+        pytest.skip("allocations and locks were checked; seccomp is not allowed here")

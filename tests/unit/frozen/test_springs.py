@@ -14,7 +14,7 @@ SOFT, STIFF = [300.0, 400.0, 500.0], [900.0, 1200.0, 600.0]
 
 
 def pair(impedance: hsp.Impedance, folder: Path) -> tuple[hsp.Controller, Opened]:
-    """Return a controller with a hand on springs, and the same without Python."""
+    """Return a controller with an impedance task, and the same without Python."""
     robot = hsp.Robot.load("panda")
     hand = hsp.FramePosition("panda_tcp", impedance=impedance, name="hand")
     controller = hsp.Controller(
@@ -29,12 +29,12 @@ def pair(impedance: hsp.Impedance, folder: Path) -> tuple[hsp.Controller, Opened
 
 
 class Both:
-    """Steps of both at the same states, which have to be equal."""
+    """Steps both at the same states and compares them."""
 
     def __init__(self, controller: hsp.Controller, opened: Opened) -> None:
         self.controller, self.opened = controller, opened
         self.q, self.count = controller.robot.home(), 0
-        self.step(0.0)  # the target is here
+        self.step(0.0)  # the target is at the hand
 
     def step(self, speed: float, away: float = 0.0) -> None:
         """Make a step at a speed [rad/s], so far from home [rad]."""
@@ -54,12 +54,12 @@ class Both:
 
     @property
     def stiffness(self) -> np.ndarray:
-        """That in force, of the frozen one."""
+        """The frozen controller's active stiffness."""
         return self.opened.get("hand.stiffness", 9)
 
 
 def test_it_waits_where_it_would_add_energy(tmp_path: Path) -> None:
-    """Bit by bit: also once the change is forgotten, and when another one comes."""
+    """Bit for bit: also after the change is forgotten, and with another one."""
     both = Both(*pair(hsp.Impedance(SOFT), tmp_path))
     both.step(0.0, away=0.1)
     both.change(hsp.Impedance(STIFF), 0.02, stiffness=np.diag(STIFF))
@@ -81,7 +81,7 @@ def test_it_waits_where_it_would_add_energy(tmp_path: Path) -> None:
     np.testing.assert_allclose(both.stiffness, np.diag(STIFF).ravel(), rtol=1e-12)
 
 
-def test_what_is_set_is_so_at_once(tmp_path: Path) -> None:
+def test_settings_are_effective_at_once(tmp_path: Path) -> None:
     both = Both(*pair(hsp.Impedance(SOFT), tmp_path))
     both.step(0.0, away=0.1)
     both.change(hsp.Impedance(STIFF), 0.0, stiffness=np.diag(STIFF))
@@ -139,12 +139,12 @@ def test_before_the_first_step_it_is_so_from_the_beginning(tmp_path: Path) -> No
         np.diag([300.0, 300.0, -1.0]),
         np.diag([300.0, np.nan, 300.0]),
         np.array([[300.0, 1.0, 0.0], [0.0, 300.0, 0.0], [0.0, 0.0, 300.0]]),
-        np.zeros((3, 3)),  # a ratio damps nothing there
+        np.zeros((3, 3)),  # without stiffness a ratio gives no damping
         1e8 * np.eye(3),  # unstable at this period
         1e300 * np.eye(3),
     ],
 )
-def test_what_is_no_stiffness_is_refused(stiffness: Any, tmp_path: Path) -> None:
+def test_invalid_stiffness_is_refused(stiffness: Any, tmp_path: Path) -> None:
     both = Both(*pair(hsp.Impedance(SOFT), tmp_path))
     assert both.opened.set("hand.stiffness", stiffness) == WRONG_VALUE
     assert "stiff" in both.opened.error
@@ -155,7 +155,8 @@ def test_what_is_no_stiffness_is_refused(stiffness: Any, tmp_path: Path) -> None
 
 
 def test_each_stiff_direction_is_damped(tmp_path: Path) -> None:
-    """Along one without stiffness the hand can be led, and need not be damped."""
+    """Along a direction without stiffness the hand can be guided, undamped if
+    declared."""
     line = [0.0, 0.0, 500.0]
     own = hsp.Impedance(line, damping=[0.0, 0.0, 30.0])
     both = Both(*pair(own, tmp_path))

@@ -54,14 +54,14 @@ def test_it_brakes_and_holds(payload: float, opened: Opened) -> None:
     controller, robot = experiment.controller.preview(), experiment.robot
     q = experiment.q0.copy()
     rng = np.random.default_rng(61)
-    v = rng.normal(0.0, 1.0, 7)  # so fast that the efforts' limits bind
+    v = rng.normal(0.0, 1.0, 7)  # so fast that effort limits are active
     controller.compute(0.0, q, v)
     assert opened.step(0.0, q, v) >= OK
     if payload:
         controller.at(0.0).ramp(0.0).payload("panda_tcp", payload, (0.0, 0.0, 0.1))
         body = [payload, 0.0, 0.0, 0.1, *np.zeros(6)]
         assert opened.set("panda_tcp.payload", body) == OK
-    controller.compute(H, q, v)  # the model is that of this time
+    controller.compute(H, q, v)  # the model of this time
     dynamics = controller.state.dynamics
     state = hsp.RobotState(robot, dynamics)
     assert controller.limits is not None
@@ -77,13 +77,13 @@ def test_it_brakes_and_holds(payload: float, opened: Opened) -> None:
         a = robot.forward_dynamics(q, v, tau, dynamics)
         v = v + H * a
         q = robot.integrate(q, H * v)
-    assert sorted(phases) == phases  # it brakes, and then it holds
+    assert sorted(phases) == phases  # brakes, then holds
     assert {*phases} == {BRAKING, HOLDING}
     assert np.abs(v).max() < 1e-4
 
 
 def test_it_goes_on_with_the_load_that_the_steps_showed(opened: Opened) -> None:
-    """The robot stands under the law's efforts: it carries what they carry."""
+    """The robot stands on the law's efforts, which already carry the payload."""
     experiment = hsp.load_experiment("panda_limits")
     assert experiment.controller.limits is not None
     limits = np.array(experiment.controller.limits.effort)
@@ -123,13 +123,13 @@ def test_joints_without_ends_are_held_too(tmp_path: Path) -> None:
     assert np.abs(v).max() < 1e-3
 
 
-def test_after_a_refused_step_it_brakes_whatever_the_clock_says(opened: Opened) -> None:
+def test_after_a_refused_step_it_brakes_at_any_clock_time(opened: Opened) -> None:
     q, v = hsp.load_experiment("panda_limits").q0, 0.1 * np.ones(7)
     assert opened.step(5.0, q, v) >= OK
     last = opened.tau.copy()
     assert opened.step(4.0, q, v) == WRONG_CLOCK
     np.testing.assert_array_equal(opened.tau, last)
-    assert opened.stop(4.0, np.nan * q, v) == WRONG_STATE  # nothing is known
+    assert opened.stop(4.0, np.nan * q, v) == WRONG_STATE  # no state
     np.testing.assert_array_equal(opened.tau, last)
     assert opened.stop(4.0, q, v) == BRAKING
     braked = opened.tau.copy()
@@ -142,21 +142,21 @@ def test_after_a_refused_step_it_brakes_whatever_the_clock_says(opened: Opened) 
     np.testing.assert_array_equal(opened.tau, last)
 
 
-def test_it_can_be_the_first_that_is_asked(opened: Opened) -> None:
+def test_it_can_be_the_first_call(opened: Opened) -> None:
     q = hsp.load_experiment("panda_limits").q0
     assert opened.stop(100.0, q, np.zeros(7)) == HOLDING
     rest = hsp.Robot.load("panda").inverse_dynamics(q, np.zeros(7), np.zeros(7))
     np.testing.assert_array_equal(opened.tau, rest)
 
 
-# -- nothing is known ---------------------------------------------------------------
+# -- without states -----------------------------------------------------------------
 
 REPEATED = 5
-"""Periods in a row with the last effort, as in `hsp_step.h`."""
+"""Consecutive periods with the last effort, as in `hsp_step.h`."""
 
 
 def test_a_dead_sensor_does_not_drive_the_arm(opened: Opened) -> None:
-    """The arm is accelerated when q turns into NaN for good: it comes to rest."""
+    """q becomes NaN permanently while the arm accelerates: it comes to rest."""
     experiment = hsp.load_experiment("panda_limits")
     robot, q = experiment.robot, experiment.q0.copy()
     v = np.linspace(-0.5, 0.5, 7)
@@ -173,10 +173,10 @@ def test_a_dead_sensor_does_not_drive_the_arm(opened: Opened) -> None:
         q = robot.integrate(q, H * v)
         speeds.append(np.abs(v).max())
     assert speeds[50] > 0.25
-    # Not braked is what the expected velocity lacks: what the repeated efforts change,
-    # and the Coriolis terms.
+    # The expected velocity lacks the effect of the repeated efforts and the Coriolis
+    # terms; that part is not braked.
     assert speeds[-1] < 0.15 * speeds[50]
-    assert opened.step(0.3, q, v) == STOPPED  # no law again without a restart
+    assert opened.step(0.3, q, v) == STOPPED  # the law returns only after a restart
     assert opened.stop(0.301, q, v) == BRAKING
 
 
@@ -210,5 +210,5 @@ def test_a_stop_that_sees_again_holds_where_the_robot_is(opened: Opened) -> None
         assert opened.stop(H * k, np.nan * q, v) == WRONG_STATE
     moved = q + 0.1
     assert opened.stop(0.1, moved, v) == HOLDING
-    rest = robot.inverse_dynamics(moved, v, v)  # no pull to where it was expected
+    rest = robot.inverse_dynamics(moved, v, v)  # no pull to the expected position
     np.testing.assert_allclose(opened.tau, rest, rtol=0.0, atol=1e-12)

@@ -1,4 +1,4 @@
-"""Targets that a program sets move the reference as a stream's do in Python."""
+"""Targets set by a program move the reference as stream messages do in Python."""
 
 from pathlib import Path
 from typing import Any
@@ -93,7 +93,7 @@ class Pair:
 def random_target(kind: str, rng: np.random.Generator, far: float) -> np.ndarray:
     moved = START * pin.exp6(pin.Motion(rng.uniform(-far, far, 6)))
     value = pin.SE3ToXYZQUAT(moved)
-    value[3:] *= 1.0 + 1e-5 * rng.normal()  # a sender's rounding
+    value[3:] *= 1.0 + 1e-5 * rng.normal()  # rounding by the sender
     return {"position": value[:3], "orientation": value[3:]}.get(kind, value)
 
 
@@ -105,7 +105,7 @@ def test_targets_and_velocities_whenever_they_come(kind: str, tmp_path: Path) ->
         pair.opened.get("hand.velocity", pair.opened.ports["hand.velocity"].size)
     )
     pair.target(random_target(kind, rng, 0.1))  # before the first step
-    for far in (1e-4, 0.02, 0.3, 1.0):  # in time, and as fast as it may
+    for far in (1e-4, 0.02, 0.3, 1.0):  # in a given time, and in the shortest one
         for _ in range(12 if THOROUGH else 6):
             for _ in range(rng.integers(3)):  # none, one, or two between two steps
                 if rng.random() < 0.5:
@@ -122,7 +122,7 @@ class Sender:
         self.rng, self.offset = rng, 1e3
 
     def time(self, t: float) -> float:
-        """Return the time of a message that comes now, some of which are late."""
+        """Return the time stamp of a message that arrives now, possibly late."""
         if self.rng.random() < 0.03:
             self.offset -= 5.0
         return t + self.offset - self.rng.exponential(0.01)
@@ -131,7 +131,7 @@ class Sender:
 @pytest.mark.smoke
 @pytest.mark.parametrize("kind", KINDS)
 def test_targets_with_velocities_and_times(kind: str, tmp_path: Path) -> None:
-    """Late ones, ones of a clock that restarts, and beside velocities in one period."""
+    """Late ones, a sender's restarted clock, and velocities in the same period."""
     rng, pair = np.random.default_rng(SEED), Pair(kind, tmp_path)
     sender, rates = Sender(rng), pair.opened.ports["hand.velocity"].size
 
@@ -158,7 +158,7 @@ def test_targets_with_velocities_and_times(kind: str, tmp_path: Path) -> None:
 
 
 def test_a_moving_target_is_passed_with_its_velocity(tmp_path: Path) -> None:
-    """By the times of the sender, although the messages come late."""
+    """At the sender's times, although messages arrive late."""
     pair = Pair("extrapolate", tmp_path)
     rng, speed = np.random.default_rng(SEED), 0.1
     for k in range(0, 300, 10):
@@ -183,14 +183,14 @@ def test_a_velocity_that_is_repeated_fades_when_it_is_not(tmp_path: Path) -> Non
         pair.steps(20)
     errors = pair.steps(400)
     np.testing.assert_array_equal(errors[-1], errors[-100])
-    assert errors[-1, 0] > 0.015  # 0.1 m/s for 0.2 s, and on for what fades
+    assert errors[-1, 0] > 0.015  # 0.1 m/s for 0.2 s, and the fading afterwards
 
 
 @pytest.mark.parametrize(("kind", "every"), covering(WAYPOINTS, [1, 4, 16]))
 def test_a_hand_that_moves_is_followed_through_its_waypoints(
     kind: str, every: int, tmp_path: Path
 ) -> None:
-    """Until it stops to send; at each step there may be more than the delay's."""
+    """Until the sender stops; at a step more messages than the delay's may wait."""
     pair = Pair(kind, tmp_path)
     for k in range(0, 400, every):
         moved = np.array([0.05 * np.sin(0.005 * k), 1e-4 * k, 0.0, 0.0, 0.001 * k, 0])
@@ -270,7 +270,7 @@ def test_a_wrong_target_changes_nothing(
 
 
 def test_a_target_that_no_motion_reaches(tmp_path: Path) -> None:
-    """Python's stream rests, and counts it; so does the frozen one."""
+    """As in Python, the stream comes to rest and counts the lost message."""
     pair = Pair("position", tmp_path)
     pair.steps(2)
     pair.target(np.array([9e5, 0.0, 0.0]))
@@ -285,7 +285,7 @@ def test_a_target_that_no_motion_reaches(tmp_path: Path) -> None:
         (StreamPose(messages=[], **HOW), "messages"),
     ],
 )
-def test_what_a_program_cannot_feed_is_refused(
+def test_inputs_that_a_program_cannot_give_are_refused(
     stream: Any, key: str, tmp_path: Path
 ) -> None:
     hand = hsp.FramePose("panda_tcp", stream, name="hand")
@@ -322,7 +322,7 @@ def test_of_many_messages_in_a_period_the_last_eight_are_followed(
 
 
 def test_a_stream_is_not_taken_from_who_has_it(tmp_path: Path) -> None:
-    """Freezing takes no message, and what was sent before does not cross."""
+    """Freezing reads no message, and earlier messages are not in the file."""
     pair = Pair("position", tmp_path)
     pair.stream.send(START.translation + 0.1)
     before = hsp.freeze(pair.controller, tmp_path / "first.hsp").read_bytes()

@@ -1,4 +1,4 @@
-"""Check capsules around points, cylinders and meshes, and the beads in them."""
+"""Capsules around points, cylinders and meshes, and the spheres in them."""
 
 import logging
 from pathlib import Path
@@ -39,9 +39,9 @@ def volume(first: Array, second: Array, radius: float) -> float:
 def test_capsule_holds_every_point_and_is_no_larger_than_a_ball(
     cloud: Array, scale: float
 ) -> None:
-    """Whatever the cloud: one point, equal ones, on a line, in a plane.
+    """For any cloud: one point, equal ones, on a line, in a plane.
 
-    The ball is the one about the points' mean.
+    The ball is centred at the points' mean.
     """
     points = scale * cloud
     first, second, radius = enclosing_capsule(points)
@@ -50,13 +50,13 @@ def test_capsule_holds_every_point_and_is_no_larger_than_a_ball(
     assert volume(first, second, radius) <= volume(first, first, ball) + 1e-9 * scale**3
 
 
-# --- what stands for the links -------------------------------------------------------
+# --- shapes of links -----------------------------------------------------------------
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("name", ["panda", "iiwa14", "ur5"])
 def test_beads_cover_their_capsule_and_stand_out_little(name: str) -> None:
-    """No farther apart than the radius r: the cover is √1.25 r thick at the most."""
+    """Spheres at most r apart: the cover is at most √1.25 r thick."""
     robot = load(name)
     rng = np.random.default_rng(3)
     capsules, beads = link_shapes(robot), link_shapes(robot, "spheres")

@@ -1,4 +1,4 @@
-"""Check distances, witness points and their gradients in closed form."""
+"""Distances, witness points and gradients against closed forms."""
 
 from collections.abc import Callable
 from pathlib import Path
@@ -87,7 +87,7 @@ def random_place(rng: np.random.Generator, spread: float) -> pin.SE3:
 
 
 def point_jacobian(robot: Robot, q: Array, joint: int, point: Array) -> Array:
-    """Return the linear Jacobian of a point that a joint carries, by Pinocchio."""
+    """Return the linear Jacobian of a point on a link, by Pinocchio."""
     data = robot.model.createData()
     axes = pin.ReferenceFrame.LOCAL_WORLD_ALIGNED
     J = pin.computeJointJacobians(robot.model, data, q)
@@ -137,7 +137,7 @@ def test_distance_witnesses_and_gradient_in_closed_form(link: str, other: str) -
             (at,) = placed(robot, links, q)
             d, n = closed_form(own, at, shape, there)
             if other == "box" and d <= 0.0:
-                continue  # how deep a ball is in a box is another matter
+                continue  # penetration into a box is defined differently
             if (
                 other == "plane"
                 and link == "capsule"
@@ -191,8 +191,8 @@ def test_two_links_of_one_robot_push_each_other() -> None:
             assert not either.gradient(state, np.zeros(1)).any()
 
 
-def test_pairs_of_all_kinds_at_once_are_what_each_is_alone() -> None:
-    """Spheres and solids are measured apart, whatever the order of the pairs."""
+def test_pairs_of_all_kinds_together_equal_single_ones() -> None:
+    """Spheres and other solids are computed separately; the order of pairs is kept."""
     robot, rng = load("panda"), np.random.default_rng(9)
     links = [LinkShape("own", 7, random_place(rng, 0.1), Sphere(0.05).geometry())]
     obstacles = []
@@ -227,7 +227,7 @@ SOLIDS: dict[str, Shape] = {
 def test_nothing_is_nan_where_a_normal_has_no_direction(
     shape: str, offset: float
 ) -> None:
-    """The obstacle's centre is in the origin of a link, or hardly beside it."""
+    """The obstacle's centre is at a link's origin, or very near it."""
     robot, rng = load("panda"), np.random.default_rng(0)
     state = robot.state(0.0, robot.random_configuration(rng), rng.standard_normal(7))
     for link in range(1, 8):
@@ -269,7 +269,7 @@ def test_meshes_hulls_clouds_and_terrain(tmp_path: Path) -> None:
         above = center - [0.01, 0.02, 0.2]
         inner = distance(Mesh(hollow), q, above).distances[0]
         outer = distance(Mesh(hollow, convex=True), q, above).distances[0]
-        assert outer == pytest.approx(0.17, abs=1e-7)  # the lid over the notch
+        assert outer == pytest.approx(0.17, abs=1e-7)  # the face over the notch
         assert inner > outer + 0.02
 
         points = rng.uniform(-0.2, 0.2, (6, 3))

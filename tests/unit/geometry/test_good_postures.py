@@ -1,4 +1,4 @@
-"""Good postures: regular, within limits, clear, and near the middle."""
+"""Good postures: regular, within limits, collision-free, near the mid-range."""
 
 import numpy as np
 import pinocchio as pin
@@ -46,7 +46,7 @@ def test_an_arm_that_is_straight_in_the_middle_bends_few_joints() -> None:
 
 
 def test_it_keeps_clear_of_obstacles() -> None:
-    """A ball where the hand would be, by the choice without it."""
+    """A ball at the hand's position in the posture chosen without it."""
     robot = Robot.load("iiwa14")
     free = PostureSearch(robot, hand(robot)).find(LEAST)
     there = robot.state(0.0, free.q, np.zeros(7)).position(robot.end_effector)
@@ -72,7 +72,7 @@ def test_a_pose_is_reached_in_a_good_posture() -> None:
     assert sigma(robot, found.q) > LEAST
 
 
-def test_what_cannot_be_found_is_said_with_numbers() -> None:
+def test_a_failed_search_is_reported_with_numbers() -> None:
     robot = Robot.load("planar3r")
     search = PostureSearch(robot, [("tip", (0, 1))])
     far = Target("tip", pin.SE3(np.eye(3), np.array([9.0, 0.0, 0.0])), 3)
@@ -103,7 +103,7 @@ def two_arms(name: str, apart: float) -> Robot:
 
 @pytest.mark.parametrize("apart", [0.2, *further(0.6)])
 def test_two_equal_arms_side_by_side_begin_well(apart: float) -> None:
-    """One posture in six is clear of a UR10's own links: none of 50 for both."""
+    """One in six postures of a UR10 is free of self-collision: none of 50 for both."""
     robot = two_arms("ur10", apart)
     frames = [f"{side}_tool0" for side in ("left", "right")]
     search = PostureSearch(robot, [(frame, POSE) for frame in frames])
@@ -115,7 +115,7 @@ def test_two_equal_arms_side_by_side_begin_well(apart: float) -> None:
 
 
 def test_a_pose_of_one_of_two_equal_arms_is_reached_in_a_good_posture() -> None:
-    """The other one stays where it is good alone."""
+    """The other arm keeps the posture that is good for it alone."""
     robot = two_arms("ur10", 0.6)
     frames = [f"{side}_tool0" for side in ("left", "right")]
     search = PostureSearch(robot, [(frame, POSE) for frame in frames])

@@ -1,4 +1,4 @@
-"""Check which shapes stand for a robot's links, and where they hang."""
+"""Shapes of a robot's links and their placements."""
 
 import logging
 from pathlib import Path
@@ -48,7 +48,7 @@ def test_shapes_hang_where_pinocchio_puts_them(name: str, proxy: str) -> None:
 
 
 def test_boxes_lone_cylinders_and_balls(tmp_path: Path) -> None:
-    """A box's corners are held; a cylinder without balls gets them; a ball stays."""
+    """A box's corners are enclosed; a cylinder gets end balls; a ball is unchanged."""
     robot = odd_robot(
         tmp_path,
         collision('<box size="0.2 0.3 0.1"/>')
@@ -91,7 +91,7 @@ def test_a_mesh_of_the_robots_own_that_cannot_be_read(tmp_path: Path) -> None:
     (capsule,) = link_shapes(robot)
     own = pin.SE3(turned(0.3, -0.2, 1.0), np.array([0.1, 0.02, -0.03]))
     points = np.array([own.act(p) for p in OCTAHEDRON])
-    assert abs(outside(points, *ends(capsule))) < 1e-6  # its numbers are single
+    assert abs(outside(points, *ends(capsule))) < 1e-6  # stored in single precision
 
 
 @pytest.mark.parametrize(
@@ -107,7 +107,7 @@ def test_a_mesh_of_the_robots_own_that_cannot_be_read(tmp_path: Path) -> None:
 def test_a_mesh_that_declares_more_than_it_has(
     ending: str, heading: str, tmp_path: Path
 ) -> None:
-    """Assimp reads so many elements, for hours and without an end."""
+    """Assimp would read so many elements for hours."""
     file = tmp_path / f"endless.{ending}"
     file.write_text(heading.format(3))
     assert not find_problem(file)
@@ -128,7 +128,8 @@ FLAT = {
 @pytest.mark.parametrize("proxy", ["capsules", "spheres", "hulls", "meshes"])
 @pytest.mark.parametrize("which", FLAT)
 def test_flat_meshes_are_links_too(which: str, proxy: Any, tmp_path: Path) -> None:
-    """They have no hull, at which Coal ends the process; a capsule holds them."""
+    """Flat meshes have no hull (Coal ends the process there); a capsule encloses
+    them."""
     vertices, triangles = FLAT[which]
     write_stl(tmp_path / "flat.stl", vertices, triangles)
     robot = odd_robot(tmp_path, collision('<mesh filename="flat.stl"/>'))
@@ -170,7 +171,7 @@ def test_meshes_without_a_place_or_a_hull(tmp_path: Path) -> None:
 def test_a_robot_without_geometry_gets_capsules_and_one_warning(
     tmp_path: Path, caplog: pytest.LogCaptureFixture
 ) -> None:
-    """From joint to joint, and a ball at the last; logged once for all its fields."""
+    """From joint to joint, and a ball at the last; logged once for all fields."""
     robot = odd_robot(tmp_path)
     rounded = Obstacle("ball", Sphere(0.1), Hold([1.0, 0.0, 0.0]))
     flat = Obstacle("box", Box((0.1, 0.1, 0.1)), Hold([-1.0, 0.0, 0.0]))

@@ -1,4 +1,4 @@
-"""A mesh file's unit and up axis count, and all of Assimp's formats are read."""
+"""A mesh file's unit and up axis are applied; all of Assimp's formats are read."""
 
 from pathlib import Path
 
@@ -26,7 +26,7 @@ every_file = pytest.mark.parametrize(("name", "unit", "up"), FILES)
 
 
 def assert_same_points(found: Array, expected: Array) -> None:
-    """Each is among the others."""
+    """Every known format is among Assimp's."""
     away = np.linalg.norm(found[:, None] - expected[None], axis=2)
     assert max(away.min(axis=0).max(), away.min(axis=1).max()) < 1e-6
 
@@ -35,7 +35,7 @@ def assert_same_points(found: Array, expected: Array) -> None:
 def test_distances_see_a_mesh_in_metres_and_upright(
     name: str, unit: str | None, up: str | None, tmp_path: Path
 ) -> None:
-    """With a scale along the link's axes, and an origin that turns."""
+    """With a scale along the link's axes, and a rotated origin."""
     file = tetrahedron(tmp_path / name, unit, up)
     mesh = f'<mesh filename="{file.name}" scale="0.1 0.2 0.5"/>'
     robot = odd_robot(tmp_path, collision(mesh))
@@ -50,30 +50,32 @@ def test_distances_see_a_mesh_in_metres_and_upright(
 def test_an_obstacle_is_in_metres_and_upright(
     name: str, unit: str | None, up: str | None, tmp_path: Path
 ) -> None:
-    """Its scale is a factor on the file's unit."""
+    """The URDF's scale is a factor on the file's unit."""
     mesh = Mesh(tetrahedron(tmp_path / name, unit, up), scale=0.5)
     assert_same_points(np.array(mesh.geometry().vertices()), 0.5 * CORNERS)
     assert mesh.bounding_radius == pytest.approx(1.5)
 
 
-@pytest.mark.parametrize(("said", "message"), [
+@pytest.mark.parametrize(("content", "message"), [
     ('<unit meter="0"/>', '<unit meter="0">; must be a positive length'),
     ('<unit meter="-1"/>', '<unit meter="-1">; must be a positive length'),
     ('<unit meter="nan"/>', '<unit meter="nan">; must be a positive length'),
     ('<unit meter="inch"/>', '<unit meter="inch">; must be a positive length'),
     ("<up_axis>UP</up_axis>", "<up_axis>UP; must be one of X_UP, Y_UP, Z_UP"),
 ])  # fmt: skip
-def test_a_unit_that_is_none_is_named(said: str, message: str, tmp_path: Path) -> None:
+def test_a_unit_that_is_none_is_named(
+    content: str, message: str, tmp_path: Path
+) -> None:
     file = tetrahedron(tmp_path / "mesh.dae")
-    file.write_text(file.read_text().replace("<asset>", f"<asset>{said}"))
+    file.write_text(file.read_text().replace("<asset>", f"<asset>{content}"))
     with pytest.raises(SceneError, match=message):
         Mesh(file).geometry()
     with pytest.raises(ModelError, match=f"a collision mesh: .*mesh.dae: {message}"):
         link_shapes(odd_robot(tmp_path, collision(f'<mesh filename="{file.name}"/>')))
 
 
-def test_only_the_files_own_asset_counts(tmp_path: Path) -> None:
-    """A geometry may have another one, after it."""
+def test_only_the_file_s_own_asset_is_used(tmp_path: Path) -> None:
+    """A later geometry may have another unit."""
     file = tetrahedron(tmp_path / "mesh.dae", "0.01", "Z_UP")
     other = '<asset><unit meter="7"/><up_axis>Y_UP</up_axis></asset><mesh>'
     file.write_text(file.read_text().replace("<mesh>", other))

@@ -1,4 +1,4 @@
-"""Check that shapes, obstacles and scenes are values, and what they refuse."""
+"""Shapes, obstacles and scenes are values; their refusals."""
 
 import json
 import re
@@ -98,7 +98,7 @@ VALID: dict[type[Part], dict[str, Any]] = {
 
 
 @pytest.mark.parametrize("value", VALUES, ids=lambda value: type(value).__name__)
-def test_what_is_equal(value: Any) -> None:
+def test_equality(value: Any) -> None:
     assert_is_a_value(value, globals())
 
 
@@ -128,7 +128,7 @@ def test_shapes_have_their_names_in_yaml() -> None:
 
 @pytest.mark.parametrize("shape", SHAPES.values(), ids=SHAPES)
 def test_logs_describe_shapes(shape: Shape) -> None:
-    """By the name of the class and its fields, as JSON data."""
+    """As JSON data: the class name and the fields."""
     about = json.loads(json.dumps(shape_to_log(shape)))
     assert shape_from_log(type(shape).__name__, about) == shape
 
@@ -151,7 +151,8 @@ def test_centers_that_are_not_in_the_world(center: Any, message: str) -> None:
 
 
 def test_obstacles_in_yaml_are_named_by_their_keys() -> None:
-    """As are those of a mapping in Python, whose names must be the same."""
+    """Keys of a mapping are names, in Python too, and must agree with the
+    obstacles'."""
     ball: dict[str, Any] = {
         "shape": {"type": "sphere", "radius": 0.1},
         "center": {"type": "hold", "point": [0.4, 0.3, 0.5]},

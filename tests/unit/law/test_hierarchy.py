@@ -29,7 +29,8 @@ def lexicographic(x: Numbers, levels: list[int]) -> tuple[Array, Array]:
         k = slice(start, start + rows)
         J = x.J[k]
         values, U = np.linalg.eigh(J @ Q @ J.T)
-        kept = values > 1e-6  # of order 1; absolute: a blocked level is all rounding
+        # of order 1; absolute, since a blocked level is only rounding
+        kept = values > 1e-6
         G_plus = (U[:, kept] / values[kept]) @ U[:, kept].T
         a = a + Q @ J.T @ G_plus @ (x.a_x[k] - x.J_dot[k] @ x.v - J @ a)
         Q = Q - Q @ J.T @ G_plus @ J @ Q
@@ -59,9 +60,10 @@ def test_compatible_levels_are_one_stack(
 @forms
 @given(seeds, st.lists(st.integers(1, 3), min_size=2, max_size=4))
 def test_recursion_is_the_stacked_law(form: int, seed: int, levels: list[int]) -> None:
-    """The recursion itself, which one singular direction of no account calls.
+    """The recursion itself, triggered by a redundant singular direction.
 
-    A last level repeats a row of the first, which the first fulfils: nothing changes.
+    The last level repeats a row of the first, which already fulfils it: nothing
+    changes.
     """
     m = sum(levels)
     x = numbers(seed, m, 13, form)
@@ -84,11 +86,11 @@ def test_recursion_is_the_stacked_law(form: int, seed: int, levels: list[int]) -
 def test_conflict_leaves_the_upper_level_exact(
     form: int, seed: int, upper: int, lower: int
 ) -> None:
-    """A lower level that has the upper's rows, and others: the oracle's answer."""
+    """A lower level contains the upper's rows and others: as the oracle."""
     rng = np.random.default_rng(seed)
     x = numbers(seed, upper + lower, 7, form)
     mix = rng.standard_normal((lower, upper))
-    # The first lower row is wholly blocked; the acceleration that it wants is its own.
+    # The first lower row is entirely blocked, with a different command.
     x.J[upper] = mix[0] @ x.J[:upper]
     x.J_dot[upper] = mix[0] @ x.J_dot[:upper]
     a, e_N, damped = resolve(x, form, levels=[upper, lower])
@@ -107,7 +109,7 @@ def test_conflict_leaves_the_upper_level_exact(
 
 @given(seeds)
 def test_priorities_meet_the_stack_where_they_take_over(seed: int) -> None:
-    """Either side of the threshold: the same acceleration, so nothing jumps."""
+    """The acceleration is the same on both sides of the threshold: no jump."""
     x = numbers(seed, 4, 7, IDENTITY)
     threshold = 0.5  # `numbers` gives the stack the singular values 2 ... 0.5
     below, _, damped = resolve(x, IDENTITY, threshold=threshold * 1.0001, levels=[2, 2])
@@ -134,9 +136,10 @@ def metric_of(kind: str) -> hsp.metrics.Metric:
 
 
 def conflicting(kind: str) -> hsp.Controller:
-    """Return a hand on a circle, above one that wants it elsewhere, and a wrist.
+    """Return a hand on a circle, above a conflicting task, and a wrist.
 
-    The second level's x row is the first's, at every state: rank 5 of 6, for good.
+    The second level's x row equals the first's at every state: rank 5 of 6,
+    permanently.
     """
     robot = panda()
     circle = Circle(0.1, 1.5, [0.45, 0.0, 0.4], normal=[0.0, 0.0, 1.0])
@@ -159,7 +162,7 @@ def conflicting(kind: str) -> hsp.Controller:
 
 @pytest.mark.parametrize("kind", ["identity", "constant", "mass_matrix"])
 def test_propositions_hold_per_level(kind: str) -> None:
-    """Level 1 as if alone; level 2 on what is left of it; V decays exponentially."""
+    """Level 1 as if alone; level 2 in its null space; V decays exponentially."""
     controller = conflicting(kind)
     robot = controller.robot
     q, v0 = robot.home(), 0.3 * np.cos(np.arange(7.0))

@@ -17,7 +17,7 @@ seeds = st.integers(0, 2**32 - 1)
 
 
 def phi_N(x: Numbers, form: int) -> Array:
-    """Return the package's null-space acceleration: what the field adds."""
+    """Return the package's null-space acceleration: the field's contribution."""
     return resolve(x, form)[0] - resolve(x, form, controls=False)[0]
 
 
@@ -35,7 +35,7 @@ def test_law_equals_its_short_form(form: int, seed: int, m: int) -> None:
     a, e_N, damped = resolve(x, form)
     expected = oracles.law(*x)
     assert not damped
-    # Rounding, grown by cond(W) = 100 and by |W⁻¹| = 10; terms are of order 10.
+    # Rounding, amplified by cond(W) = 100 and |W⁻¹| = 10; terms are of order 10.
     np.testing.assert_allclose(e_N, expected.null_space_error, rtol=0, atol=1e-11)
     np.testing.assert_allclose(a, expected.acceleration, rtol=1e-11, atol=1e-10)
     phi = expected.null_space_acceleration
@@ -45,8 +45,9 @@ def test_law_equals_its_short_form(form: int, seed: int, m: int) -> None:
 @pytest.mark.slow
 @forms
 @given(seeds, rows)
-def test_task_is_met_whatever_the_field_asks(form: int, seed: int, m: int) -> None:
-    """J φ_N = 0, J a + J'v = a_x, J e_N = 0: the task never feels the null space."""
+def test_task_is_met_for_any_field(form: int, seed: int, m: int) -> None:
+    """J φ_N = 0, J a + J'v = a_x, J e_N = 0: no effect of the null space on the
+    task."""
     x = numbers(seed, m, 7, form)
     a, e_N, _ = resolve(x, form)
     atol = 1e-12 * max(1.0, np.abs(a).max())
@@ -61,9 +62,9 @@ def test_task_is_met_whatever_the_field_asks(form: int, seed: int, m: int) -> No
 def test_redundant_rows_change_nothing(
     form: int, seed: int, m: int, data: st.DataObject
 ) -> None:
-    """A stack of constant rank below its rows: the law of the rows that count.
+    """A stack of constant deficient rank: the law of its independent rows.
 
-    The added rows are combinations C of the others, with the accelerations that follow.
+    The added rows are combinations C of the others, with consistent accelerations.
     """
     extra = data.draw(st.integers(1, 7 - m))
     x = numbers(seed, m, 7, form)
@@ -97,7 +98,7 @@ def test_singular_values_of_stacks_of_any_shape(
     np.testing.assert_allclose(
         singular_values(triangle.tobytes()), expected, rtol=0, atol=1e-13 * expected[0]
     )
-    # Each singular value has an error of a few roundings of the largest one.
+    # The error of any singular value is a few roundings of the largest one.
     error = 1e-14 * expected[0]
     most, least = np.prod((expected + error) ** 2), np.prod((expected - error) ** 2)
     assert (least if expected[-1] > error else 0.0) <= determinant <= most
@@ -153,7 +154,7 @@ def test_moore_penrose_axioms_at_rank_loss(
     J = jacobian(seed + 2, m, n, values, W)
     J_sharp, damped = pseudo_inverse(J, W, threshold=0.1)
     assert damped
-    # A zero that rounding lifts to 1e-16 comes in as 2e-16/threshold².
+    # A zero that rounding lifts to 1e-16 contributes 2e-16/threshold².
     assert_moore_penrose(J, J_sharp, W, atol=1e-11)
 
 

@@ -1,4 +1,4 @@
-"""Check the law on robots: the paper's equation (13), its identities, its decay.
+"""The law on robots: the paper's equation (13), its identities, its decay.
 
 Three oracles: the paper's equation with a (J⁺)' by differences along the motion, the
 short form of `oracles.law` in plain NumPy, and the derivative of V itself.
@@ -60,7 +60,7 @@ def moving_field(robot: hsp.Robot) -> hsp.NullSpaceField:
 
 
 def case(name: str) -> Case:
-    """Return one of the robots that the law is tried on, at a random state."""
+    """Return a robot with tasks and a field, at a random state."""
     rng = np.random.default_rng(sum(map(ord, name)))
     circle = hsp.Circle(0.1, 2.0, [0.4, 0.1, 0.5], normal=[0.0, 1.0, 1.0])
     if name == "planar3r":
@@ -76,20 +76,20 @@ def case(name: str) -> Case:
             hsp.FramePosition("panda_tcp", circle, gains=GAINS),
             hsp.FrameOrientation("panda_tcp", HoldOrientation(np.eye(3)), gains=GAINS),
         ]
-    elif name == "panda_fingers":  # one finger mimics the other, both in the task
+    elif name == "panda_fingers":  # one finger mimics the other, both are in the task
         robot = load("panda_fingers")
         tasks = [hsp.FramePosition("panda_rightfinger", circle, gains=GAINS)]
     elif name == "tiago_no_hand":  # continuous joints in a chain
         robot = load("tiago_no_hand")
         tasks = [hsp.FramePosition("arm_tool_link", circle, gains=GAINS)]
-    else:  # a floating root, as if it were driven
+    else:  # a floating root, as if it were actuated
         robot = load("solo12")
         tasks = [
             hsp.FramePosition("FL_FOOT", circle, gains=GAINS),
             hsp.FrameOrientation("base_link", HoldOrientation(np.eye(3)), gains=GAINS),
         ]
     q = robot.random_configuration(rng)
-    # A random state is far from the reference: the threshold is to stay all the same.
+    # A random state is far from the reference; the threshold must stay the same.
     tasks = [replace(task, largest_error="none") for task in tasks]
     return Case(
         robot, tasks, moving_field(robot), q, rng.standard_normal(robot.nv), q.copy()
@@ -153,8 +153,7 @@ def controller(c: Case, metric: hsp.metrics.Metric, gain: Any) -> hsp.Controller
         c.field,
         metric=metric,
         null_space_gain=gain,
-        # Exact wherever these states are: the mass matrix' whitening makes J large or
-        # small by itself.
+        # A threshold far below these singular values: whitening by M scales J.
         singularity_threshold=1e-4,
         base="driven" if c.robot.unactuated else None,
         limits=None,
@@ -162,10 +161,10 @@ def controller(c: Case, metric: hsp.metrics.Metric, gain: Any) -> hsp.Controller
 
 
 def step_of(v: Array) -> float:
-    """Return a step in which the joints together move by 0.001.
+    """Return a step in which ‖Δq‖ is 0.001.
 
-    Near a singularity J# bends within 0.01: the differences' error h⁶ f⁽⁷⁾/140 was then
-    4e-7 of it on panda_fingers, here 1e-12; rounding is 1e-15 over the step.
+    Near a singularity J# varies within 0.01: the differences' error h⁶ f⁽⁷⁾/140 was
+    then 4e-7 of it on panda_fingers, here 1e-12; rounding is 1e-15 over the step.
     """
     return 0.001 / max(1.0, float(np.abs(v).sum()))
 
@@ -182,7 +181,7 @@ def test_controller_applies_the_short_form(name: str, kind: str) -> None:
     out = controller(c, metric, 7.0).compute(state)
     assert not out.damped
     expected = oracles.law(x.J, x.J_dot, x.a_x, c.v, x.g, x.g_dot, K_N, x.W, x.W_dot)
-    # Rounding, grown by J's condition; seen: 2e-14 of a, 1e-13 of e_N.
+    # Rounding, amplified by J's condition; measured: 2e-14 of a, 1e-13 of e_N.
     size = np.abs(expected.acceleration).max()
     assert_allclose(out.acceleration, expected.acceleration, rtol=0, atol=1e-12 * size)
     assert_allclose(out.null_space_error, expected.null_space_error, rtol=0, atol=1e-12)
@@ -207,7 +206,7 @@ def test_identity_metric_is_equation_13_as_printed(name: str) -> None:
     )
     ours = controller(c, metric, K_N)
     out = ours.compute(state)
-    # The differences' rounding, 1e-12 of (J⁺)'; the turning term itself is of order 1.
+    # The differences' rounding, 1e-12 of (J⁺)'; the rotation term itself is of order 1.
     assert_allclose(out.null_space_error, expected.null_space_error, rtol=0, atol=1e-12)
     assert_allclose(out.acceleration, expected.acceleration, rtol=0, atol=1e-9)
     without = oracles.paper_law(
@@ -285,14 +284,14 @@ def test_lyapunov_function_decays_as_proved(name: str, kind: str, gain: str) -> 
 
     step = min(step_of(c.v), 0.1 / np.abs(a).max())
     expected = -e_N @ W @ K_N @ e_N
-    assert abs(expected) > 0.1  # there is something to see
-    # Rounding of the differences: 1e-15 of V over 1e-4 s; seen: 1e-12 of V'.
+    assert abs(expected) > 0.1  # the decay is measurable
+    # Rounding of the differences: 1e-15 of V over 1e-4 s; measured: 1e-12 of V'.
     assert_allclose(slope(V, step), expected, rtol=1e-10)
 
 
 @pytest.mark.parametrize("kind", METRICS)
 def test_law_of_a_rank_deficient_task(kind: str) -> None:
-    """The planar arm cannot leave its plane: xyz has rank 2 of 3, for ever.
+    """The planar arm cannot leave its plane: xyz always has rank 2 of 3.
 
     The law is exact all the same, and equal to that of xy alone.
     """

@@ -1,4 +1,4 @@
-"""Which source of a joint is wrong is decided by the model, then by other joints."""
+"""The wrong source of a joint is isolated by the model, then by other joints."""
 
 import numpy as np
 import pytest
@@ -11,14 +11,22 @@ NEITHER = (False, False)
 
 
 def isolated(
-    isolation: FaultIsolation, *surprises: tuple[float, float], wrong: str = ""
+    isolation: FaultIsolation,
+    *surprises: tuple[float, float],
+    wrong: str = "",
+    constant: str = "",
+    slight: bool = True,
 ) -> list[tuple[bool, bool]]:
     """Return the right sources of joints with these surprises of (v, q).
 
-    ``wrong``: "1" for a joint of which one source is wrong; by default all are.
+    ``wrong``: "1" for joints with one wrong source; all by default.
     """
     joints = np.array([each == "1" for each in wrong or "1" * len(surprises)])
-    by_v, by_q = isolation.isolate(joints, np.array(surprises).T)
+    still = np.array([each in constant.split() for each in "vq"])[:, None]
+    still = np.tile(still, joints.size)
+    by_v, by_q = isolation.isolate(
+        joints, np.array(surprises).T, still, np.full(joints.size, slight)
+    )
     return list(zip(by_v.tolist(), by_q.tolist(), strict=True))
 
 
@@ -26,9 +34,6 @@ def test_the_source_that_deviates_less_is_right() -> None:
     assert isolated(FaultIsolation(2), (CLEAR, 1.0), (1.0, CLEAR)) == [V, Q]
     assert isolated(FaultIsolation(1), (DOUBTFUL, 1.0)) == [V]
     assert isolated(FaultIsolation(1), (UNDECIDED, 1.0)) == [NEITHER]
-    small = 0.03  # rad/s
-    assert isolated(FaultIsolation(1), (DOUBTFUL * small, small)) == [NEITHER]
-    assert isolated(FaultIsolation(1), (CLEAR * small, small)) == [V]
 
 
 def test_of_joints_in_doubt_one_that_is_undecided_leaves_none_decided() -> None:
@@ -40,14 +45,18 @@ def test_of_joints_in_doubt_one_that_is_undecided_leaves_none_decided() -> None:
 def test_the_kind_that_is_wrong_elsewhere_is_wrong_in_joints_in_doubt(
     wrong: tuple[bool, bool],
 ) -> None:
-    """Whatever their own surprises; also later, but not where the case is clear."""
+    """For any surprises of their own; also later, but where these are clearer still."""
     right = wrong[::-1]
-    clear = (1.0, CLEAR) if wrong == V else (CLEAR, 1.0)
+
+    def of(ratio: float, source: tuple[bool, bool]) -> tuple[float, float]:
+        return (1.0, ratio) if source == V else (ratio, 1.0)
+
     isolation = FaultIsolation(3)
-    found = isolated(isolation, clear, (DOUBTFUL, 1.0), (1.0, UNDECIDED))
-    assert found == [right] * 3
-    later = isolated(isolation, (1.0, DOUBTFUL), clear[::-1], (0.5, 0.5), wrong="111")
-    assert later[1] == wrong  # that source of this joint is right
+    doubtful = (DOUBTFUL, 1.0), (1.0, UNDECIDED)
+    assert isolated(isolation, of(CLEAR, wrong), *doubtful) == [right] * 3
+    assert isolated(isolation, *doubtful, of(CLEAR, right)) == [right] * 3
+    found = isolated(isolation, *doubtful, of(0.05, right))
+    assert found[2] == wrong  # that source of this joint is right
 
 
 def test_joints_that_are_not_wrong_say_nothing_of_a_kind() -> None:
@@ -62,7 +71,7 @@ def test_where_both_kinds_are_wrong_somewhere_none_decides() -> None:
 
 
 def test_an_undecided_joint_is_decided_by_others_only() -> None:
-    """Its own surprise is no evidence any more: its expectation follows no source."""
+    """Its own surprise is no longer evidence: its expectation follows no source."""
     isolation = FaultIsolation(2)
     isolation.undecided = np.array([True, False])
     assert isolated(isolation, (1.0, CLEAR), (0, 0), wrong="00")[0] == NEITHER

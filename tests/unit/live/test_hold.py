@@ -1,4 +1,4 @@
-"""The hold of the safe stop: a spring and a damper about where the robot came to rest.
+"""The hold of the safe stop: a spring and a damper about the rest position.
 
 tau = g(q) - M₀ (ω² (q ⊖ q₀) + 2 ω v), M₀ the mass matrix at q₀.
 """
@@ -25,7 +25,7 @@ def mass_and_gravity(q: Array) -> tuple[Array, Array]:
 
 
 def stopped(speed: float = 0.0) -> tuple[SafeStop, Array]:
-    """Return a safe stop that holds, and where."""
+    """Return a safe stop in its hold, and the held configuration."""
     q = panda().random_configuration(np.random.default_rng(1))
     stop = SafeStop(panda(), SETTINGS, FREE, PERIOD)
     stop.effort(panda().state(0.0, q, np.full(7, speed)))
@@ -33,7 +33,7 @@ def stopped(speed: float = 0.0) -> tuple[SafeStop, Array]:
 
 
 def test_it_begins_at_rest_and_where_the_robot_then_is() -> None:
-    """Not before the fastest joint is at rest."""
+    """Damping ends only when the fastest joint is at rest."""
     q = panda().home()
     stop = SafeStop(panda(), SETTINGS, FREE, PERIOD)
     v = np.zeros(7)
@@ -65,7 +65,7 @@ def test_it_begins_at_the_latest_after_the_longest_damping() -> None:
 
 
 def test_it_pulls_back_to_where_it_began_with_the_inertia_there() -> None:
-    """However far the robot has been moved, and wherever it was commanded meanwhile."""
+    """For any displacement of the robot and any command in between."""
     stop, q0 = stopped()
     M0, _ = mass_and_gravity(q0)
     rng = np.random.default_rng(2)
@@ -101,7 +101,7 @@ def test_it_begins_anew() -> None:
 
 
 def test_its_pull_is_scaled_as_one_vector_into_the_limits() -> None:
-    """In its own direction, as far as the first motor goes."""
+    """The effort keeps its direction; the first motor to saturate sets its size."""
     stop, q0 = stopped()
     q = q0.copy()
     q[1] += 0.8

@@ -1,4 +1,5 @@
-"""Whatever a robot's driver does, the loop raises nothing, stops safely and reports."""
+"""With any fault of a robot's driver the loop stops safely, reports, and does not
+raise."""
 
 import itertools
 import os
@@ -52,7 +53,7 @@ RATE, EFFORT = 1000.0, 80.0
 QUICK = StopSettings(hold=0.02)
 SETTINGS = LiveSettings(effort_rate=RATE, effort=EFFORT, stop=QUICK)
 BEGIN = 60
-"""The read at which something goes wrong: the arm moves by then."""
+"""The read at which the fault occurs, while the arm moves."""
 
 
 def rig(tricks: dict[int, Trick] | None = None, **settings: Any) -> Rig:
@@ -64,7 +65,7 @@ def run(robot: Rig, **options: Any) -> LoopReport:
 
 
 def assert_safe(robot: Rig, report: LoopReport) -> None:
-    """The sent efforts keep their limits, and the robot is at rest."""
+    """The sent efforts were within limits, and the robot is at rest."""
     sent = np.array(robot.sent)
     assert np.isfinite(sent).all()
     assert np.abs(sent).max() <= EFFORT + 1e-9
@@ -80,7 +81,7 @@ def assert_safe(robot: Rig, report: LoopReport) -> None:
         assert robot.robot.reason == "the loop has ended"
 
 
-# --- what `read` returns -------------------------------------------------------------
+# --- return values of `read` ---------------------------------------------------------
 
 
 class Hostile:
@@ -123,7 +124,7 @@ ODD_RESULTS = st.one_of(
     st.sampled_from(
         [(), 3, "state", {}, object(), Hostile(), Measurement, np.zeros(14),
          Other(1, 0.0, np.zeros(7), np.zeros(7))]
-    ).map(lambda what: lambda m: what),
+    ).map(lambda case: lambda m: case),
     st.tuples(st.sampled_from(["q", "v", "applied"]), ODD_ARRAYS).map(
         lambda pair: lambda m: m._replace(**{pair[0]: pair[1]})
     ),
@@ -136,11 +137,11 @@ ODD_RESULTS = st.one_of(
 @pytest.mark.slow
 @settings(max_examples=100 if THOROUGH else 5)
 @given(odd=ODD_RESULTS, count=st.sampled_from([1, 30, 20_000]))
-def test_whatever_read_returns(odd: Trick, count: int) -> None:
+def test_any_result_of_read(odd: Trick, count: int) -> None:
     robot = rig(always(odd, BEGIN, count))
     report = run(robot)
     assert_safe(robot, report)
-    # An object that is a valid value in this place, such as halted=1.0, is no fault.
+    # Valid values, such as halted=1.0, are no fault.
     assert report.ended in {"fault", "completed"}
     if count == 20_000 and report.ended == "fault":
         assert report.t < 0.15 + 0.3
@@ -167,7 +168,7 @@ def fast(found: Measurement) -> Measurement:
 
 
 class Frozen:
-    """Repeats the first state that it sees, as if it were new."""
+    """Repeats the first state as if it were new."""
 
     def __init__(self) -> None:
         self.seen: Measurement | None = None
@@ -200,7 +201,7 @@ FAULTS: dict[str, tuple[Any, int, str]] = {
     "a huge position": (replaced(q=np.full(7, 1e300)), 1, r"absurd: q\[0\] is 1e\+300"),
     "a huge speed": (replaced(v=np.full(7, -1e200)), 1, r"absurd: v\[0\] is -1e\+200"),
     "an applied effort": (replaced(applied=np.full(7, np.nan)), 1, "not finite"),
-    "what the hardware says": (replaced(fault="two of them send"), 1, "two of them"),
+    "fault of the hardware": (replaced(fault="two senders"), 1, "two senders"),
     "a reason that is none": (replaced(fault=None), 1, "fault is of type NoneType"),
     "another type": (lambda m: tuple(m), 1, "type tuple; needs a Measurement"),
     "complex numbers": (replaced(q=np.zeros(7, complex)), 1, "holds complex128"),
@@ -213,7 +214,7 @@ ALIKE = {
     *("an age of the future", "a clock that goes back", "a huge speed"),
     *("always the same state", "complex numbers", "a time without resolution"),
 }
-"""Faults beside which there is another one that the same check finds."""
+"""Faults similar to another one, which the same check detects."""
 
 
 @pytest.mark.parametrize("kind", [k for k in FAULTS if THOROUGH or k not in ALIKE])
@@ -226,12 +227,12 @@ def test_each_fault_of_a_measurement_is_named(kind: str, tmp_path: Path) -> None
     with pytest.raises(AssertionError, match=reason):
         raise AssertionError(report.reason)
     assert_safe(robot, report)
-    if count < 20_000:  # the loop holds the robot itself, for states come again
+    if count < 20_000:  # the loop holds the robot, since states arrive again
         assert (report.phase, report.silent) == (Phase.HOLDING, False)
     logged = Rollout.load(log)
     assert (logged.status, logged.meta["message"]) == ("stopped", report.reason)
     longest = 0.02 if count != 21 else 0.03  # without a state there is no row
-    assert (np.diff(logged.t) < longest).all()  # also where the robot's clock jumps
+    assert (np.diff(logged.t) < longest).all()  # also if the robot's clock jumps
 
 
 @pytest.mark.parametrize("end", ["lower", "upper"])
@@ -259,7 +260,7 @@ def test_speeds_may_be_beyond_a_limit_by_a_tenth_of_it() -> None:
 
 @pytest.mark.parametrize("states", [1, 3])
 def test_a_jump_is_farther_than_the_greatest_speed_over_the_gap(states: int) -> None:
-    """Also where the clock stands still: the numbers of the states count."""
+    """Also with a stopped clock: the states' sequence numbers decide."""
     monitor = MeasurementMonitor(panda(), None, SETTINGS, PERIOD)
     monitor.last = Measurement(4, 0.5, start(), np.zeros(7))
     speed = own_limits(panda()).velocity[3] * (1.0 + SETTINGS.velocity_margin)
@@ -275,8 +276,8 @@ def test_a_jump_is_farther_than_the_greatest_speed_over_the_gap(states: int) -> 
 
 @pytest.mark.parametrize("friction", [1.0, 0.1])
 def test_a_robot_that_its_friction_can_hold_is_not_frozen(friction: float) -> None:
-    """The same state to the last bit, and a velocity of 0: brakes can hold all, and a
-    gear's friction not what the law wants by then."""
+    """Identical states with zero velocity: brakes may hold every joint; gear friction
+    cannot hold against the law's growing efforts."""
     still = always(replaced(q=start(), v=np.zeros(7)), 1)
     patient = LiveSettings(stop=QUICK, velocity_margin=99.0, friction=friction)
     report = run(Rig(watched(patient), still), duration=0.1, settings=patient)
@@ -288,7 +289,7 @@ def test_a_robot_that_its_friction_can_hold_is_not_frozen(friction: float) -> No
 
 
 def test_a_state_that_stays_is_frozen_where_the_efforts_would_move_it() -> None:
-    """Under the efforts that act: those that hold the arm leave it where it is."""
+    """Under the efforts that act: holding efforts leave the arm in place."""
     v = np.full(7, 1e-6)  # with 0 in all joints, brakes may hold it
     hold = panda().inverse_dynamics(start(), v, np.zeros(7))
     for effort, frozen in ((hold, False), (hold + 5.0 * np.eye(7)[1], True)):
@@ -302,7 +303,7 @@ def test_a_state_that_stays_is_frozen_where_the_efforts_would_move_it() -> None:
 
 
 def test_buffers_that_the_driver_reuses_are_copied() -> None:
-    """A driver that hands out the same arrays, and overwrites them at once."""
+    """A driver that returns the same arrays every time and overwrites them."""
     buffers = np.zeros(7), np.zeros(7)
 
     class Reusing(Rig):
@@ -317,7 +318,7 @@ def test_buffers_that_the_driver_reuses_are_copied() -> None:
     np.testing.assert_array_equal(plain.sent, reusing.sent)
 
 
-# --- what is raised ------------------------------------------------------------------
+# --- exceptions ----------------------------------------------------------------------
 
 
 class Odd(Exception):
@@ -339,12 +340,12 @@ ERRORS = st.sampled_from(
 )  # fmt: skip
 
 
-@pytest.mark.parametrize("asked", ASKED, ids=repr)
-def test_a_stop_that_is_cut_short_is_not_completed(asked: BaseException) -> None:
+@pytest.mark.parametrize("interrupted", ASKED, ids=repr)
+def test_a_stop_that_is_cut_short_is_not_completed(interrupted: BaseException) -> None:
     """The duration is over, and Ctrl-C comes while the safe stop brakes."""
 
     def ask(found: Measurement) -> Measurement:
-        raise asked
+        raise interrupted
 
     robot = Rig(watched(SETTINGS), {25: ask})
     report = run_loop(law(), robot, duration=20 * PERIOD, settings=SETTINGS)
@@ -390,7 +391,7 @@ class Failing(Rig):
     error=ERRORS,
     times=st.sampled_from([1, 3, 20_000]),
 )
-def test_whatever_is_raised(method: str, error: BaseException, times: int) -> None:
+def test_any_exception(method: str, error: BaseException, times: int) -> None:
     first = 1 if method in {"close", "on_period", "change"} else BEGIN
     robot, requests = Failing(method, error, first, times), OperatorRequests()
 
@@ -413,8 +414,8 @@ def test_whatever_is_raised(method: str, error: BaseException, times: int) -> No
     ids=repr,
 )
 @pytest.mark.parametrize("where", ["read", "write", "close", "on_period", "change"])
-def test_what_is_no_exception_is_a_fault(where: str, error: BaseException) -> None:
-    test_whatever_is_raised.hypothesis.inner_test(where, error, 1)  # type: ignore[attr-defined]
+def test_a_base_exception_is_a_fault(where: str, error: BaseException) -> None:
+    test_any_exception.hypothesis.inner_test(where, error, 1)  # type: ignore[attr-defined]
 
 
 @pytest.mark.parametrize(
@@ -429,10 +430,10 @@ def test_what_is_no_exception_is_a_fault(where: str, error: BaseException) -> No
     ),
     ids=repr,
 )
-def test_what_a_field_raises_ends_in_the_safe_stop(
+def test_an_exception_of_a_field_ends_in_the_safe_stop(
     error: BaseException, once: bool, tmp_path: Path
 ) -> None:
-    """And the files are free: the next run in this process writes the same log."""
+    """The files are closed: the next run in this process writes the same log."""
     armed, count = False, 0
 
     def swing(state: RobotState) -> Array:
@@ -454,8 +455,8 @@ def test_what_a_field_raises_ends_in_the_safe_stop(
         law(field), robot, duration=0.3, settings=SETTINGS, log=log, on_period=arm
     )
     assert_safe(robot, report)
-    asked = isinstance(error, KeyboardInterrupt | SystemExit)
-    assert report.ended == ("operator" if asked else "fault")
+    interrupted = isinstance(error, KeyboardInterrupt | SystemExit)
+    assert report.ended == ("operator" if interrupted else "fault")
     assert not report.silent
     assert Rollout.load(log).meta["message"] == report.reason
     armed = False
@@ -483,7 +484,7 @@ def test_a_run_that_cannot_begin_leaves_the_log_free(
         patch.setattr("hsp_control.live.loop.LoopLog.begin", fail)
         with pytest.raises(type(error)) as raised:
             run(robot, log=log)
-    assert raised.value is error  # its traceback keeps all that was there
+    assert raised.value is error  # its traceback keeps all local variables alive
     assert robot.closed
     assert run(rig(), log=log).ended == "completed"
 
@@ -492,7 +493,7 @@ ODD_EFFORTS = [np.zeros(3), np.full(7, np.nan), "tau"]
 
 
 @pytest.mark.parametrize(
-    ("what", "given_"),
+    ("case", "given_"),
     [
         *itertools.product(
             ["applied", "effort", "log_channels"], [RuntimeError("mine"), None]
@@ -501,7 +502,7 @@ ODD_EFFORTS = [np.zeros(3), np.full(7, np.nan), "tau"]
         *further(*itertools.product(["applied", "log_channels"], ODD_EFFORTS)),
     ],
 )
-def test_whatever_an_effort_source_does(what: str, given_: Any, tmp_path: Path) -> None:
+def test_any_fault_of_an_effort_source(case: str, given_: Any, tmp_path: Path) -> None:
     class Mine(CompensatedController):
         calls = 0
 
@@ -515,16 +516,16 @@ def test_whatever_an_effort_source_does(what: str, given_: Any, tmp_path: Path) 
 
         def effort(self, *args: Any) -> Any:
             usual = super().effort
-            return self._odd(lambda: usual(*args)) if what == "effort" else usual(*args)
+            return self._odd(lambda: usual(*args)) if case == "effort" else usual(*args)
 
         def applied(self, tau: Array, period: float) -> None:
             super().applied(tau, period)
-            if what == "applied":
+            if case == "applied":
                 self._odd(lambda: None)
 
         def log_channels(self) -> Any:
             usual = super().log_channels
-            return self._odd(usual) if what == "log_channels" else usual()
+            return self._odd(usual) if case == "log_channels" else usual()
 
     robot = rig()
     report = run_loop(
@@ -533,11 +534,11 @@ def test_whatever_an_effort_source_does(what: str, given_: Any, tmp_path: Path) 
     )  # fmt: skip
     raised = isinstance(given_, Exception)
     assert report.ended == (
-        "completed" if what == "applied" and not raised else "fault"
+        "completed" if case == "applied" and not raised else "fault"
     )
     assert_safe(robot, report)
     logged = Rollout.load(tmp_path / "a.journal")
-    assert logged.meta["message"] == report.reason  # also where a row failed
+    assert logged.meta["message"] == report.reason  # also after a failed row
 
 
 # --- the operator --------------------------------------------------------------------
@@ -582,7 +583,7 @@ def test_a_second_signal_leaves_it_to_the_robot() -> None:
 
 @pytest.mark.parametrize("standstill", [0.1, 2.0])
 def test_completed_means_at_rest(standstill: float) -> None:
-    """The safe stop ends after its longest damping, whether or not the robot rests."""
+    """The safe stop ends after its longest damping time, at rest or not."""
     weak = {"damping": 0.1, "natural_frequency": 0.1}
     stop = StopSettings(
         longest_damping=0.005, hold=0.001, standstill=standstill, **weak
@@ -600,9 +601,9 @@ def test_completed_means_at_rest(standstill: float) -> None:
     assert 0.15 < report.speed < 1.5
     assert report.speed == pytest.approx(speeds[-1], rel=0.02)
     assert report.at_rest is (standstill > 1.5)
-    told = (report.ended, report.reason)
+    reported = (report.ended, report.reason)
     if report.at_rest:
-        assert told == ("completed", "the duration is over")
+        assert reported == ("completed", "the duration is over")
     else:
         moved = f"then the robot still moved at {report.speed:.3g}"
-        assert told == ("fault", f"the duration is over; {moved}")
+        assert reported == ("fault", f"the duration is over; {moved}")

@@ -13,11 +13,11 @@ from hsp_control.live import LiveSettings, LoopReport, Measurement, Phase, run_l
 from hsp_control.live.live_log import DueRows
 
 RESPONSE, LATE = 0.0003, 0.0017
-"""How long each effort takes to be sent, and every tenth [s]."""
+"""Duration of sending an effort, and of every tenth one [s]."""
 LOST = (40, 41, 42, 70)
-"""The reads in which nothing arrives."""
+"""The reads at which nothing arrives."""
 UNSEEN = 80
-"""The read before which a state was sent that nobody saw."""
+"""The read before which a state was lost."""
 
 
 class Told(Rig):
@@ -62,7 +62,7 @@ def logged(
         law(),
         robot,
         duration=0.1,
-        log=tmp_path_factory.mktemp("live") / "told.journal",
+        log=tmp_path_factory.mktemp("live") / "run.journal",
         log_period=PERIOD,
         clock=lambda: robot.now,
     )
@@ -71,12 +71,12 @@ def logged(
     return robot, report, hsp.Rollout.load(report.log)
 
 
-def test_each_row_has_what_the_robot_said_and_was_sent(
+def test_each_row_has_the_received_state_and_the_sent_effort(
     logged: tuple[Told, LoopReport, hsp.Rollout],
 ) -> None:
     robot, _, run = logged
     rows = 0
-    for k in range(1, len(run)):  # in the first the robot's time stood still
+    for k in range(1, len(run)):  # in the first the robot's clock had not started
         told = robot.told.get(float(run.t[k]))
         if told is None:
             continue
@@ -93,17 +93,17 @@ def test_each_row_has_what_the_robot_said_and_was_sent(
     assert set(run["live.phase"]) == {Phase.RUNNING, Phase.DAMPING, Phase.HOLDING}
 
 
-def test_its_end_has_the_counts_of_the_report(
+def test_its_end_has_the_numbers_of_the_report(
     logged: tuple[Told, LoopReport, hsp.Rollout],
 ) -> None:
     robot, report, run = logged
-    said = run.meta["live"]
+    reported = run.meta["live"]
     late = sum(spent == LATE for _, spent in robot.answers.values())
-    assert said["missed"] == report.deadlines.missed == late
-    assert said["silent_periods"] == robot.skipped == len(LOST)
-    assert said["unseen"] == report.deadlines.skipped_states == len(LOST) + 1
-    assert said["periods"] == report.deadlines.periods
-    assert said["response"][-1] == pytest.approx(LATE)
+    assert reported["missed"] == report.deadlines.missed == late
+    assert reported["silent_periods"] == robot.skipped == len(LOST)
+    assert reported["unseen"] == report.deadlines.skipped_states == len(LOST) + 1
+    assert reported["periods"] == report.deadlines.periods
+    assert reported["response"][-1] == pytest.approx(LATE)
 
 
 def test_no_time_has_two_rows() -> None:
@@ -119,7 +119,8 @@ def test_no_time_has_two_rows() -> None:
 
 
 def test_a_phase_begins_with_a_row(tmp_path: Path) -> None:
-    """However far apart rows are: else nobody saw when and where the stop began."""
+    """A row at the stop for any row interval: it shows when and where the stop
+    began."""
     tricks: dict[int, Trick] = {
         60: lambda found: found._replace(q=found.q + 1.0)  # the fault
     }
@@ -154,7 +155,7 @@ def test_a_stop_without_states_is_logged_as_predicted(tmp_path: Path) -> None:
 
 
 def test_efforts_follow_limits_that_fall_in_a_run() -> None:
-    """Also of a source that commands more than its controller may."""
+    """Also with a source that commands more than its controller permits."""
 
     class Strong(CompensatedController):
         def effort(self, t: float, q: Array, v: Array, period: float) -> Array:
@@ -171,9 +172,9 @@ def test_efforts_follow_limits_that_fall_in_a_run() -> None:
     assert efforts[90:150].max() == EFFORT[0]
 
 
-def test_after_an_effort_that_was_not_sent_the_rate_counts_from_the_last_one() -> None:
+def test_after_an_unsent_effort_the_rate_is_relative_to_the_last_one() -> None:
     class Fails(Rig):
-        """Does not report which effort it has, so that its loop must know."""
+        """Does not report its effort, so that the loop has to know it."""
 
         def read(self, timeout: float) -> Measurement | None:
             found = super().read(timeout)

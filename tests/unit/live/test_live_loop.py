@@ -1,4 +1,4 @@
-"""The live loop's logic: robots in this process, clocks that nobody waits for."""
+"""The live loop's logic: robots in this process, simulated clocks."""
 
 import re
 import warnings
@@ -42,11 +42,11 @@ from hsp_control.live.live_log import DueRows
 from hsp_control.live.loop import LiveRun
 
 AT_REST = 0.02
-"""Speeds of a robot that holds: below twice the speed at which damping ends [rad/s]."""
+"""Bound on speeds during the hold: twice the speed at which damping ends [rad/s]."""
 
 
 def assert_held(rig: Rig, report: LoopReport) -> None:
-    """The loop brought the robot itself to rest before it let go."""
+    """The loop itself brought the robot to rest before it ended."""
     assert report.phase is Phase.HOLDING
     assert not report.silent
     assert report.speed < AT_REST
@@ -55,11 +55,11 @@ def assert_held(rig: Rig, report: LoopReport) -> None:
     assert np.abs(rig.robot.v).max() < AT_REST
 
 
-# --- what it does when all is well ---------------------------------------------------
+# --- without faults ------------------------------------------------------------------
 
 
 def test_it_is_the_simulation_then_stops(tmp_path: Path) -> None:
-    """Nothing is late in this process: to the last bit the sampled loop of simulate."""
+    """Without delays the loop equals the sampled loop of simulate bit for bit."""
     rig, log = Rig(), tmp_path / "run.journal"
     report = run_loop(law(), rig, duration=0.4, log=log, log_period=0.01)
     assert isinstance(rig, Hardware)
@@ -121,14 +121,14 @@ def test_tau_less_gravity_is_the_same_motion() -> None:
     compensating = Rig(watched(settings))
     run_loop(law(), compensating, duration=0.3, settings=settings)
     for sent, relieved in zip(plain.sent[:300:50], compensating.sent[:300:50]):  # noqa: B905
-        assert np.abs(sent - relieved).max() > 1.0  # gravity is not nothing
+        assert np.abs(sent - relieved).max() > 1.0  # gravity is not negligible
     np.testing.assert_allclose(plain.robot.q, compensating.robot.q, atol=1e-9)
     relieved = np.array(compensating.sent)
-    # At the end, held still, such a robot is sent nothing.
+    # At the end, at rest, such a robot is sent zero efforts.
     assert np.abs(relieved[-1]).max() < 0.05
 
 
-# --- whatever happens: the safe stop -------------------------------------------------
+# --- with faults: the safe stop ------------------------------------------------------
 
 
 def interrupt(found: Measurement) -> Measurement:
@@ -165,7 +165,7 @@ def test_a_disk_that_is_full_stops_it(
     monkeypatch.undo()
     assert (
         len(Rollout.load(tmp_path / "run.journal")) == 18
-    )  # 20 less magic and heading
+    )  # 20 minus magic and heading
 
 
 # --- changes while it runs -----------------------------------------------------------
@@ -205,17 +205,17 @@ def test_field_gains_and_tasks_change_without_a_jump(tmp_path: Path) -> None:
     )  # fmt: skip
     assert report.ended == "completed", report.reason
     assert_held(rig, report)
-    assert controller.field.name == "other"  # complete, and the old one forgotten
+    assert controller.field.name == "other"  # complete, and the previous one forgotten
     assert [task.name for task in controller.tasks] == ["tip"]
     run = Rollout.load(log)
     ran = run["live.phase"] == Phase.RUNNING
     steps = np.abs(np.diff(run.tau[ran], axis=0)).max(axis=1)
-    # Without a change they are as large: the motion's own, see the first 0.1 s.
+    # As large as without a change: the motion's own, as in the first 0.1 s.
     assert steps.max() < 5.0 * steps[10:100].max()
     assert np.isfinite(run["task.elbow.error"][(run.t > 0.4) & (run.t < 0.6), 0]).all()
     assert np.isnan(run["task.elbow.error"][run.t > 0.83]).all()
     assert np.isnan(run["field.other.g"][run.t < 0.09]).all()
-    assert list(run.meta["tasks"]) == ["tip", "elbow"]  # what has left is drawn too
+    assert list(run.meta["tasks"]) == ["tip", "elbow"]  # a removed one is drawn, too
 
 
 def test_a_task_of_another_form_is_logged_by_another_name() -> None:
@@ -299,7 +299,7 @@ def test_the_monitor_follows_limits_that_change(at_first: Limits | None) -> None
     report = run_loop(source, Rig(), duration=5.0)
     assert report.ended == "fault"
     assert re.search("panda_joint. is at .*, outside", report.reason)
-    # Only the narrow range is left so early; the ranges grow by 0.02 of tolerance.
+    # Only the narrow range is left so early; tolerance widens ranges by 0.02.
     reference = run_loop(Beyond(law(limits=Limits(position=wide))), Rig(), duration=5.0)
     assert 0.2 < report.t < reference.t
 
@@ -317,9 +317,9 @@ def test_a_row_is_due_at_each_tenth_state_also_where_times_are_rounded(
     assert rows == [*range(0, 500, 10)]
 
 
-def test_schedules_of_feet_are_asked_at_the_controllers_time() -> None:
-    """A run may begin at another time than the robot's."""
-    asked: list[float] = []
+def test_schedules_of_feet_use_the_controller_s_time() -> None:
+    """A run's time may differ from the robot's clock."""
+    requested: list[float] = []
     measured = Measurement(1, 0.2, start(), np.zeros(7))
     run: Any = SimpleNamespace(
         reader=SimpleNamespace(
@@ -327,8 +327,8 @@ def test_schedules_of_feet_are_asked_at_the_controllers_time() -> None:
         ),
         detector=SimpleNamespace(check=lambda state: None),
         safe_stop=SimpleNamespace(
-            feet=SimpleNamespace(update=lambda each: asked.append(each.t))
+            feet=SimpleNamespace(update=lambda each: requested.append(each.t))
         ),
     )
     LiveRun.feel_ground(run)
-    assert asked == [7.2]
+    assert requested == [7.2]

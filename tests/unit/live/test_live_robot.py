@@ -27,7 +27,8 @@ RATED = LiveSettings(effort_rate=RATE)
 
 
 def fed(robot: SimulatedRobot, efforts: Iterable[Array]) -> Array:
-    """Return the motors' efforts of all periods, to the end of the robot's own stop."""
+    """Return the motors' efforts in all periods up to the end of the robot's own
+    stop."""
     taus = []
     for effort in efforts:
         robot.advance([effort])
@@ -39,7 +40,7 @@ def fed(robot: SimulatedRobot, efforts: Iterable[Array]) -> Array:
     return np.array(taus)
 
 
-# --- what it checks ------------------------------------------------------------------
+# --- checks --------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize(
@@ -88,7 +89,7 @@ def test_no_number_ends_it(efforts: list[list[float]]) -> None:
 
 
 def test_a_motion_that_cannot_be_computed_ends_under_its_brakes() -> None:
-    """Without limits in the URDF a huge effort is accepted, and moves to infinity."""
+    """Without limits in the URDF a huge effort is accepted, and q overflows."""
     endless = Robot.load("planar3r")
     assert np.isinf(LiveSettings().effort_limits(endless)).all()
     plant = IntegratedPlant(RigidBodyPlant(endless), SemiImplicitEuler(PERIOD))
@@ -102,19 +103,19 @@ def test_a_motion_that_cannot_be_computed_ends_under_its_brakes() -> None:
     assert np.abs(robot.v).max() < 0.1
 
 
-# --- which effort it has -------------------------------------------------------------
+# --- the effort in force -------------------------------------------------------------
 
 
 class Lossy(Rig):
-    """A robot that does not get all efforts, and its efforts in force.
+    """A robot that misses some efforts, and its efforts in force.
 
     Attributes:
-        in_force: The effort that it had in each period.
+        in_force: The effort in force in each period.
     """
 
-    def __init__(self, settings: LiveSettings, says: bool, every: int) -> None:
+    def __init__(self, settings: LiveSettings, reports: bool, every: int) -> None:
         super().__init__(watched(settings))
-        self.says, self.every = says, every
+        self.reports, self.every = reports, every
         self.in_force: list[Array] = []
 
     def read(self, timeout: float) -> Measurement | None:
@@ -122,24 +123,25 @@ class Lossy(Rig):
         assert found is not None
         if found.applied is not None and not found.halted:
             self.in_force.append(found.applied)
-        return found if self.says else found._replace(applied=None)
+        return found if self.reports else found._replace(applied=None)
 
     def write(self, effort: Array) -> None:
         if len(self.sent) % self.every < self.every - 5:
             super().write(effort)
-        else:  # five in a row are lost
+        else:  # five consecutive losses
             self.sent.append(np.array(effort))
 
 
 @pytest.mark.parametrize(
-    ("compensates", "says"), covering([False, True], [True, False])
+    ("compensates", "reports"), covering([False, True], [True, False])
 )
-def test_lost_efforts_do_not_add_up_where_the_robot_says_what_it_has(
-    says: bool, compensates: bool
+def test_lost_efforts_do_not_add_up_if_the_robot_reports_its_effort(
+    reports: bool, compensates: bool
 ) -> None:
-    """An effort that always wants to go on as fast as it may, over a bad line.
+    """An effort that always changes at its rate limit, over a lossy line.
 
-    Where only what was sent is known, six steps in one are sent after five are lost.
+    If the loop knows only the sent efforts, after five losses it sends six steps at
+    once.
     """
     settings = LiveSettings(
         effort_rate=RATE, compensates_gravity=compensates, velocity_margin=9.0
@@ -151,11 +153,11 @@ def test_lost_efforts_do_not_add_up_where_the_robot_says_what_it_has(
             side = 1.0 if int(t / 0.02) % 2 else -1.0
             return gravity(q) + side * np.array([8.0, 8.0, 8.0, 8.0, 0.1, 0.1, 0.1])
 
-    robot = Lossy(settings, says, every=11)
+    robot = Lossy(settings, reports, every=11)
     report = run_loop(Sawtooth(law()), robot, duration=0.2, settings=settings)
     steps = np.abs(np.diff(robot.in_force, axis=0))
-    assert steps.max() <= RATE * PERIOD * (1.0 + 1e-6)  # it accepts no others
-    if says:
+    assert steps.max() <= RATE * PERIOD * (1.0 + 1e-6)  # others are refused
+    if reports:
         assert report.ended == "completed", report.reason
         assert steps.max() == pytest.approx(RATE * PERIOD)
         assert robot.robot.reason == "the loop has ended"
@@ -170,12 +172,12 @@ def test_lost_efforts_do_not_add_up_where_the_robot_says_what_it_has(
 def test_a_robot_never_rejects_an_effort_over_a_bad_line(
     seed: int, loss: float
 ) -> None:
-    """States and efforts are lost at random, while it runs and while it stops."""
+    """States and efforts are lost at random, during the run and the stop."""
     rng = np.random.default_rng(seed)
     chosen = LiveSettings(effort_rate=100.0, velocity_margin=9.0)
 
     class Bad(Lossy):
-        lost = 0  # states in a row
+        lost = 0  # consecutive states
 
         def read(self, timeout: float) -> Measurement | None:
             found = super().read(timeout)
@@ -189,7 +191,7 @@ def test_a_robot_never_rejects_an_effort_over_a_bad_line(
             else:
                 Rig.write(self, effort)
 
-    robot = Bad(chosen, says=True, every=1)
+    robot = Bad(chosen, reports=True, every=1)
     quick = law(gains=Gains(natural_frequency=10.0))
     report = run_loop(quick, robot, duration=0.1, settings=chosen)
     assert report.ended == "completed", report.reason
@@ -241,14 +243,14 @@ def test_nothing_presses_while_brakes_hold_a_robot(
 def test_a_stop_keeps_the_limits_of_motors_that_bear_gravity_themselves(
     sign: float,
 ) -> None:
-    """The sent effort is tau - g: the limits apply to tau, not to it."""
+    """The sent effort is tau - g: the limits apply to tau."""
     q, limit = start(), 40.0
     chosen = LiveSettings(effort_rate=4e4, effort=limit, compensates_gravity=True)
     limiter = EffortLimiter(panda(), chosen, PERIOD)
     limiter.reset(q)
     inertia = panda().state(0.0, q, np.zeros(7)).mass_matrix
     assert np.abs(limiter.gravity).max() > 20.0
-    for _ in range(5):  # some joints' rates bind, and the others reach their limits
+    for _ in range(5):  # rate limits are active in some joints, effort limits in others
         assert limiter.apply(np.full(7, sign * 1e3), q, inertia)
         assert (np.abs(limiter.applied) <= limit + 1e-9).all()
     np.testing.assert_allclose(limiter.applied, sign * limit, atol=1e-6)
@@ -263,14 +265,14 @@ def test_a_lost_effort_corrects_the_momentum_observer() -> None:
 
         def effort(self, t: float, q: Array, v: Array, period: float) -> Array:
             tau = super().effort(t, q, v, period)
-            told = self.log_channels()["observer.disturbance"].value
-            estimated = float(np.abs(told).max())
+            reported = self.log_channels()["observer.disturbance"].value
+            estimated = float(np.abs(reported).max())
             self.largest = max(self.largest, estimated if t > 0.02 else 0.0)
             tau[:4] += 6.0 if int(t / 0.02) % 2 else -6.0
             return tau
 
     known, unknown = Watching(law(), observer), Watching(law(), observer)
-    for command, says in ((known, True), (unknown, False)):
-        run_loop(command, Lossy(LiveSettings(), says, every=11), duration=0.1)
-    # The plant is the model: nothing disturbs it but sampling.
+    for command, reports in ((known, True), (unknown, False)):
+        run_loop(command, Lossy(LiveSettings(), reports, every=11), duration=0.1)
+    # The plant is the model: sampling is the only disturbance.
     assert known.largest < 0.1 * unknown.largest

@@ -17,13 +17,13 @@ from hsp_control.trajectories.streams import streamed as declared
 
 
 class FailingKind:
-    """A kind of address whose thread raises as soon as the loop runs."""
+    """A type of address whose thread raises as soon as the loop runs."""
 
     def __init__(self, error: BaseException | None) -> None:
         self.error, self.go, self.ended = error, Event(), Event()
 
     def check_address(self, source: str) -> None:
-        """All are valid."""
+        """All addresses are valid."""
 
     def is_local(self, source: str) -> bool:
         return True
@@ -33,7 +33,7 @@ class FailingKind:
             try:
                 while not self.go.wait(0.01):
                     if inbox() is None:
-                        return  # nobody uses it any more, as after the warm-up
+                        return  # no longer in use, as after the warm-up
                 if self.error is not None:
                     raise self.error
             finally:
@@ -58,7 +58,7 @@ def streamed(kind: FailingKind, monkeypatch: pytest.MonkeyPatch) -> hsp.Controll
     ],
     ids=lambda error: type(error).__name__,
 )
-def test_what_a_streams_thread_raises_ends_in_the_safe_stop(
+def test_an_exception_of_a_stream_s_thread_ends_in_the_safe_stop(
     error: BaseException, monkeypatch: pytest.MonkeyPatch
 ) -> None:
 
@@ -79,5 +79,5 @@ def test_what_a_streams_thread_raises_ends_in_the_safe_stop(
     assert "mine://here: its thread has ended: " in report.reason
     assert type(error).__name__ in report.reason
     assert report.at_rest
-    # The address is listened to again in the next run.
+    # The next run listens at the address again.
     assert run(None).ended == "completed"

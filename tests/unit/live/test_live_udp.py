@@ -82,7 +82,7 @@ def test_other_versions_kinds_and_lengths_are_refused() -> None:
 
 
 @given(seed=st.integers(0, 1000), delay=st.integers(1, 5))
-def test_each_fault_does_what_it_says_and_is_counted(seed: int, delay: int) -> None:
+def test_each_fault_has_its_effect_and_is_counted(seed: int, delay: int) -> None:
     faults = Faults(0.2, 0.2, 0.2, 0.2, delay=delay, seed=seed)
     injector = FaultInjector(faults)
     came: list[int | None] = []
@@ -134,7 +134,7 @@ def links() -> Iterator[tuple[Link, Link]]:
     receiver.close()
 
 
-def test_a_link_sorts_what_comes(links: tuple[Link, Link]) -> None:
+def test_a_link_sorts_its_packets(links: tuple[Link, Link]) -> None:
     sender, receiver = links
     raw = sender._socket
     foreign = encode(packet(1)._replace(session=8))
@@ -148,13 +148,13 @@ def test_a_link_sorts_what_comes(links: tuple[Link, Link]) -> None:
         "sent": 0, "accepted": 3, "duplicated": 2, "stale": 1, "corrupted": 1,
         "foreign": 1,
     }  # fmt: skip
-    # 1, 3 and 6 are here, 2 came late, one was corrupted: one more never came.
+    # 1, 3 and 6 arrived, 2 was late, one was corrupted: one more is lost.
     assert receiver.lost == 1
     assert receiver.peer == sender.address
     assert receiver.receive(0.0) == []
 
 
-def test_nobody_to_send_to_and_nowhere_to_listen() -> None:
+def test_no_peer_and_no_free_address() -> None:
     link = Link(7)
     with pytest.raises(HardwareError, match="no packet of the robot has arrived yet"):
         link.send(PacketKind.EFFORT)
@@ -171,7 +171,7 @@ def test_nobody_to_send_to_and_nowhere_to_listen() -> None:
     drift=st.floats(-1e-5, 1e-5),
     delays=st.lists(st.floats(0.0, 0.1), min_size=200, max_size=200),
 )
-def test_age_is_what_a_packet_waited_longer_than_the_quickest(
+def test_age_is_the_delay_beyond_that_of_the_fastest_packet(
     offset: float, drift: float, delays: list[float]
 ) -> None:
     ages = AgeEstimator(window=1.0)
@@ -187,7 +187,7 @@ def test_age_is_what_a_packet_waited_longer_than_the_quickest(
 
 
 @pytest.mark.slow
-def test_a_served_robot_runs_stops_and_says_why() -> None:
+def test_a_served_robot_runs_stops_and_gives_the_reason() -> None:
     hardware = UdpHardware(panda(), PERIOD)
     assert isinstance(hardware, Hardware)
     robot = watched()
@@ -195,7 +195,7 @@ def test_a_served_robot_runs_stops_and_says_why() -> None:
     tau = panda().inverse_dynamics(start(), np.zeros(7), np.zeros(7))
     seen: list[int] = []
 
-    def pilot() -> None:  # the server polls every period: the loop's turn
+    def pilot() -> None:  # the server polls every period: now the loop's
         found = hardware.read(0.0)
         if found is None:
             return
@@ -216,8 +216,8 @@ def test_a_served_robot_runs_stops_and_says_why() -> None:
 
 
 @pytest.mark.slow
-def test_efforts_that_answer_old_states_are_nobody_s() -> None:
-    """All efforts come, in order, and too late: that is silence."""
+def test_efforts_that_answer_old_states_are_ignored() -> None:
+    """Efforts that all arrive in order, but too late, are silence."""
     receiver, robot = Link(7), watched(LiveSettings(watchdog=10))
     link = Link(7, peer=receiver.address)
     tau = panda().inverse_dynamics(start(), np.zeros(7), np.zeros(7))
@@ -226,7 +226,7 @@ def test_efforts_that_answer_old_states_are_nobody_s() -> None:
     def pilot() -> None:
         newest = receiver.receive(0.0)
         if newest and robot.t > 0.05:
-            receiver.newest = 20  # what it answers is long ago
+            receiver.newest = 20  # it answers an old state
         if newest:
             receiver.send(PacketKind.EFFORT, tau)
 
@@ -242,7 +242,8 @@ def test_efforts_that_answer_old_states_are_nobody_s() -> None:
 def test_an_effort_may_answer_a_state_as_old_as_the_watchdog_waits(
     lag: int, in_time: bool
 ) -> None:
-    """The answer to a state comes a period later, so a lag of nine is an age of ten."""
+    """The answer to a state arrives a period later, so a lag of nine is an age of
+    ten."""
     receiver, robot = Link(7), watched(LiveSettings(watchdog=10))
     link = Link(7, peer=receiver.address)
     tau = panda().inverse_dynamics(start(), np.zeros(7), np.zeros(7))
@@ -262,7 +263,7 @@ def test_an_effort_may_answer_a_state_as_old_as_the_watchdog_waits(
 
 
 @pytest.mark.slow
-def test_a_robot_that_nobody_wants_or_whose_parent_dies_ends() -> None:
+def test_a_robot_without_a_client_or_parent_ends() -> None:
     hardware = UdpHardware(panda(), PERIOD)
     link = Link(hardware.session, peer=hardware.address)
     robot = watched()
@@ -285,8 +286,8 @@ def test_a_robot_that_nobody_wants_or_whose_parent_dies_ends() -> None:
     link.close()
 
 
-def test_a_turn_ends_where_the_other_end_says_so() -> None:
-    """Packets may be lost, and strangers may say what they like."""
+def test_a_turn_ends_when_the_other_end_says_bye() -> None:
+    """Despite lost packets, and messages from other senders."""
     here, there = Link(7), Link(7, peer=None, faults=Faults(lost=1.0))
     stranger = Link(7, peer=here.address)
     there.peer = here.address
@@ -301,7 +302,7 @@ def test_a_turn_ends_where_the_other_end_says_so() -> None:
     assert [each.kind for each in here.turn(60.0) or []] == [PacketKind.BYE]
     there.end_turn()
     assert here.receive(0.0) == []
-    assert here.counts["corrupted"] == 1  # the stranger's
+    assert here.counts["corrupted"] == 1  # from another sender
     for link in (here, there, stranger):
         link.close()
     assert here.turn(0.0) is None
@@ -334,7 +335,7 @@ def test_in_lockstep_a_robot_waits_for_the_loop_and_a_loop_for_the_robot() -> No
     assert (robot.reason, reads) == (CLOSED_BY_LOOP, 30)
     assert link.counts["accepted"] == 30 + 3
     lives[0] = False
-    while hardware.read(0.0) is not None:  # what it sent while it stopped
+    while hardware.read(0.0) is not None:  # sent during its stop
         pass
     hardware.drain()
     link.close()
@@ -343,7 +344,7 @@ def test_in_lockstep_a_robot_waits_for_the_loop_and_a_loop_for_the_robot() -> No
 def test_in_lockstep_a_robot_whose_loop_is_silent_stops(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    """It waits for an answer once, and not in each period of its stop."""
+    """It waits for an answer once, not in every period of its stop."""
     hardware = UdpHardware(panda(), PERIOD, alive=lambda: True)
     robot = watched()
     link = Link(hardware.session, peer=hardware.address)
@@ -364,7 +365,7 @@ def test_in_lockstep_a_robot_whose_loop_is_silent_stops(
     link.close()
 
 
-def test_a_robot_that_is_held_up_says_for_how_long(
+def test_a_stalled_robot_reports_the_duration(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     now, periods = [0.0], iter(range(1000))
@@ -387,15 +388,15 @@ def test_a_robot_that_is_held_up_says_for_how_long(
 
 @pytest.mark.slow
 @pytest.mark.parametrize(
-    ("raised", "what"),
+    ("raised", "source"),
     covering(
         [OddError, MemoryError, SystemExit, GeneratorExit], ["row", "receive", "send"]
     ),
 )
-def test_whatever_is_raised_around_a_served_robot_stops_it(
-    what: str, raised: type[BaseException], monkeypatch: pytest.MonkeyPatch
+def test_any_exception_around_a_served_robot_stops_it(
+    source: str, raised: type[BaseException], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Its cameras, its log, its line: it brakes, is held, and then it ends."""
+    """Errors of cameras, log or line: it brakes, holds, and then ends."""
     hardware = UdpHardware(panda(), PERIOD)
     robot = watched()
     link = Link(hardware.session, peer=hardware.address)
@@ -408,28 +409,28 @@ def test_whatever_is_raised_around_a_served_robot_stops_it(
 
     def row(t: float, *_: object) -> None:
         rows.append(t)
-        if len(rows) == 20 and what != "row":
-            monkeypatch.setattr(link, what, fails)
-        if len(rows) == 20 and what == "row":
+        if len(rows) == 20 and source != "row":
+            monkeypatch.setattr(link, source, fails)
+        if len(rows) == 20 and source == "row":
             raise raised("why")
 
     def fails(*_: object, **__: object) -> None:
         raise raised("why")
 
     after: list[float] = []
-    told = [row, lambda t, *_: after.append(t)]
-    serve(robot, link, stop_reason=pilot, on_rows=told)  # type: ignore[arg-type]
+    reported = [row, lambda t, *_: after.append(t)]
+    serve(robot, link, stop_reason=pilot, on_rows=reported)  # type: ignore[arg-type]
     assert robot.reason.endswith(f": {raised.__name__}: why")
     assert robot.done
-    if what == "row":
+    if source == "row":
         assert (len(rows), len(after)) == (20, 19)
     hardware.close()
     hardware.drain()
     link.close()
 
 
-def test_our_own_packets_that_come_back_are_foreign() -> None:
-    """A switch that mirrors, or a second socket: states go on to count."""
+def test_our_returned_packets_are_foreign() -> None:
+    """A mirroring switch or a second socket: states are still accepted."""
     robot = Link(7, receives=PacketKind.EFFORT)
     loop = Link(7, peer=robot.address, receives=PacketKind.STATE)
     robot.peer = loop.address

@@ -1,4 +1,5 @@
-"""The load that a safe stop goes on with: how it is found, and what a lie leaves."""
+"""The load that a safe stop compensates: its estimate, and the effect of a fault on
+it."""
 
 import numpy as np
 import pinocchio as pin
@@ -12,9 +13,9 @@ from hsp_control.live.safe_stop import SafeStop
 from hsp_control.live.settings import StopSettings
 
 LIMITS = np.full(7, 100.0)
-"""So a load may be 30 N·m."""
+"""Effort limits [N·m]; a load may thus be 30 N·m."""
 RATE, BEFORE, AHEAD = 3.0, 0.2, 0.05
-"""Of the estimate [1/s], how old it is when it is used, and its head start [s]."""
+"""Rate of the estimate [1/s], its age when it is used [s], and its lead [s]."""
 LOAD = np.array([0.0, 4.0, -1.0, -5.0, 0.2, -2.0, 0.1])
 ZERO = np.zeros(7)
 NONE = np.zeros(7, dtype=bool)
@@ -32,7 +33,7 @@ def observe(
     begin: int = 0,
     silent: Flags = NONE,
 ) -> None:
-    """Show states at one posture, which efforts and a load hold."""
+    """Feed states at one posture, held by efforts and a load."""
     state = panda().state(0.0, start(), v)
     for k in range(begin, begin + states):
         state.update(k * PERIOD, start(), v)
@@ -54,7 +55,7 @@ def test_a_load_is_found_by_a_mean_then_by_a_low_pass_and_used_later() -> None:
 
 
 def test_a_wrong_first_velocity_moves_a_braked_joint_no_faster_than_itself() -> None:
-    """The gain is at most k = 1/T₀: an error x leaves k M x at most."""
+    """The gain is at most k = 1/T₀, so an error x causes at most k M x."""
     safe, wrong = stop(np.full(7, 1e4)), 0.3 * np.eye(7)[1]
     observe(safe, ZERO, 1)
     observe(safe, ZERO, 1 + round(BEFORE / PERIOD), v=wrong, begin=1)
@@ -69,13 +70,13 @@ def test_a_load_is_bounded_by_that_of_a_contact() -> None:
         safe = stop()
         observe(safe, sign * 1000.0 * np.ones(7), 1000)
         np.testing.assert_array_equal(safe.load, sign * 0.3 * LIMITS)
-    unknown = stop(np.full(7, np.inf))  # nobody knows what is much there
+    unknown = stop(np.full(7, np.inf))  # no scale is known there
     observe(unknown, LOAD, 1000)
     np.testing.assert_array_equal(unknown.load, 0.0)
 
 
 def test_a_wrong_velocity_leaves_a_bounded_load() -> None:
-    """An error x is an impulse M x, and leaves K M x at most: K x / k in the stop."""
+    """An error x is an impulse M x and causes at most K M x: K x/k in the stop."""
     safe, wrong = stop(), 0.5 * np.eye(7)[3]
     observe(safe, ZERO, 300)
     momentum = panda().state(0.0, start(), ZERO).mass_matrix @ wrong
@@ -88,8 +89,8 @@ def test_a_wrong_velocity_leaves_a_bounded_load() -> None:
     assert (np.abs(safe.load) < 0.1 * RATE * np.abs(momentum).max()).all()
 
 
-def test_what_a_dead_sensor_hides_is_no_load() -> None:
-    """Its joint seems to be held against the effort that accelerates it."""
+def test_the_effect_of_a_dead_sensor_is_no_load() -> None:
+    """The joint appears to be held against the effort that accelerates it."""
     safe, silent = stop(), NONE.copy()
     silent[3] = True
     observe(safe, LOAD, 1000)
@@ -124,7 +125,7 @@ def test_a_new_run_forgets_the_load_and_a_stop_keeps_it() -> None:
 
 @pytest.mark.parametrize("observed", [False, True])
 def test_an_arm_with_an_unknown_load_does_not_sink(observed: bool) -> None:
-    """At rest; without what was learnt before the stop it sinks."""
+    """At rest; without the load estimated before the stop it sinks."""
     model = panda().model.copy()
     hand = model.frames[model.getFrameId("panda_tcp")]
     load = pin.Inertia(1.0, np.zeros(3), 1e-3 * np.eye(3))
@@ -147,7 +148,8 @@ def test_an_arm_with_an_unknown_load_does_not_sink(observed: bool) -> None:
 
 
 def test_a_stop_early_in_a_run_still_learns_the_load() -> None:
-    """Masses that are 20 % off, link by link; frozen, the load's rest moved the arm."""
+    """Masses wrong by 20 % per link; with a frozen estimate its residual moved the
+    arm."""
     robot = hsp.Robot.load("ur5")
     model, rng = robot.model.copy(), np.random.default_rng(2)
     for k in range(1, model.njoints):

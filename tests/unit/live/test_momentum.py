@@ -1,4 +1,4 @@
-"""Causes of a change of momentum: efforts, bounded contacts, or a lie."""
+"""Causes of a change of momentum: efforts, bounded contacts, or a sensor fault."""
 
 import numpy as np
 import pytest
@@ -11,7 +11,7 @@ from hsp_control.live.momentum_check import Driving, MomentumCheck, smaller
 
 SETTINGS = LiveSettings()
 LIMITS = np.full(7, 100.0)
-"""So friction may be 10 N·m, and contacts exert 30 N·m."""
+"""Effort limits [N·m]; friction may thus be 10 N·m, and contacts 30 N·m."""
 INERTIA = np.diag([2.0, 2.0, 2.0, 2.0, 0.5, 0.5, 0.5])
 ZERO = np.zeros(7)
 ONE = np.eye(7)[0]
@@ -22,9 +22,9 @@ def check() -> MomentumCheck:
 
 
 def pushed(force: float, *, follows: float = 1.0, seconds: float = 0.3) -> Array:
-    """Return which joints are found while something pushes the first one.
+    """Return the joints reported while an external effort acts on the first one.
 
-    The effort is ±20 N·m; the joint follows it by a part, and what pushes wholly.
+    The effort is ±20 N·m; the joint follows a fraction of it, and all of the push.
     """
     momentum, v = check(), np.zeros(7)
     found = np.zeros(7, dtype=bool)
@@ -39,11 +39,11 @@ def pushed(force: float, *, follows: float = 1.0, seconds: float = 0.3) -> Array
 
 
 def test_contacts_and_friction_may_push_by_their_bounds() -> None:
-    """40 N·m, and 0.3 rad/s of noise in 50 ms are 12 N·m more."""
+    """40 N·m; noise of 0.3 rad/s in 50 ms adds 12 N·m."""
     assert not pushed(35.0).any()
     assert not pushed(-35.0).any()
     assert pushed(60.0).tolist() == [True] + 6 * [False]
-    assert pushed(-90.0)[0]  # against its effort, which it may follow by less
+    assert pushed(-90.0)[0]  # against its effort; it may follow by less than the effort
 
 
 def test_a_joint_may_be_heavier_than_its_model() -> None:
@@ -69,7 +69,7 @@ def test_a_jump_of_velocity_and_slope_is_found_at_once() -> None:
     assert jump(1.0).rest[0] > 100.0  # N·m, over 3 ms
     assert jump(-1.0).rest[0] < -100.0
     assert not jump(0.3).beyond.any()  # noise
-    assert not jump(1.0, of_q=False).beyond.any()  # another check's
+    assert not jump(1.0, of_q=False).beyond.any()  # for another check
     assert not jump(1.0, of_v=False).beyond.any()
 
 
@@ -97,7 +97,7 @@ def test_the_smaller_of_two_velocities_drives_no_joint() -> None:
 
 @pytest.mark.parametrize("sign", [1.0, -1.0])
 def test_a_heavier_joint_follows_a_steady_effort_by_less(sign: float) -> None:
-    """Its momentum is between 0 and the impulse, however large that is."""
+    """Its momentum is between 0 and the impulse, for any impulse."""
     momentum, v = check(), np.zeros(7)
     for k in range(300):
         effort = sign * 300.0 * ONE * (k > 100)

@@ -1,4 +1,4 @@
-"""The effort nearest to another that rates permit, against a search of all."""
+"""The nearest effort within rate limits, against an exhaustive search."""
 
 from itertools import product
 
@@ -14,7 +14,7 @@ from hsp_control.live.settings import LiveSettings
 
 
 def exact(wanted: Array, least: Array, most: Array, inertia: Array) -> Array:
-    """Return the minimum by trying which bounds hold: 3ⁿ sets."""
+    """Return the minimum over all active sets: 3ⁿ."""
     A, best = np.linalg.inv(inertia), (np.inf, wanted)
     for held in product((-1, 0, 1), repeat=wanted.size):
         sides = np.array(held)
@@ -40,7 +40,7 @@ def test_it_is_the_exact_minimum(seed: int) -> None:
     found = nearest_effort(wanted, center - width, center + width, inertia)
     assert found is not None
     right = exact(wanted, center - width, center + width, inertia)
-    # The sweeps end early where axes are nearly parallel: it is near, and within.
+    # For nearly parallel axes the sweeps end early: the result is feasible and near.
     A = np.linalg.inv(inertia)
     of = [float((x - wanted) @ A @ (x - wanted)) for x in (found, right)]
     clipped = np.clip(wanted, center - width, center + width)
@@ -50,7 +50,7 @@ def test_it_is_the_exact_minimum(seed: int) -> None:
     assert (found <= center + width).all()
 
 
-def test_within_the_bounds_it_is_what_is_wanted() -> None:
+def test_within_the_bounds_it_is_the_desired_effort() -> None:
     wanted, far = np.array([1.0, -2.0]), np.array([np.inf, np.inf])
     found = nearest_effort(wanted, -far, far, np.eye(2))
     np.testing.assert_array_equal(found, wanted)

@@ -1,4 +1,4 @@
-"""The checks of one joint's sensors, fed by hand: where each of them stops to judge."""
+"""The checks of one joint's sensors on given states: their thresholds."""
 
 import numpy as np
 import pytest
@@ -15,7 +15,7 @@ SETTINGS = LiveSettings()
 
 
 def stopped(joints: list[int], speed: float) -> Flags:
-    """Return which sensors are dead after some joints stop in one period."""
+    """Return the sensors that are reported dead after joints stop in one period."""
     check = VelocityCheck(panda(), SETTINGS, PERIOD)
     v = np.zeros(7)
     v[joints] = speed
@@ -26,7 +26,7 @@ def stopped(joints: list[int], speed: float) -> Flags:
 
 
 def test_friction_stops_one_slow_joint_in_a_period_and_not_several() -> None:
-    """At 50 rad/s² and in two periods: 0.1 rad/s, less where more of them stop."""
+    """At 50 rad/s² in two periods: 0.1 rad/s; less if several joints stop."""
     assert not stopped([0], 0.06).any()
     assert not stopped([0, 1], 0.04).any()
     assert stopped([0, 1], 0.06).tolist() == [True, True] + 5 * [False]
@@ -50,9 +50,9 @@ def test_a_slope_across_a_gap_is_not_compared_with_the_velocity_after_it(
 
 
 def felt(share: float) -> bool:
-    """Return whether another joint's motion shows that a silent one moves."""
+    """Return whether another joint's motion shows that a frozen one moves."""
     inertia = np.array([[1.0, 0.5], [0.5, 1.0]])
-    free: Array = np.linalg.solve(inertia, [1.0, 0.0])  # an effort on the first one
+    free: Array = np.linalg.solve(inertia, [1.0, 0.0])  # an effort at the first joint
     check = ReactionCheck(SETTINGS.velocity_error)
     for k in range(300):
         check.expect(np.array([True, False]), inertia, free)
@@ -60,7 +60,7 @@ def felt(share: float) -> bool:
     return check.felt
 
 
-def test_what_moves_by_much_more_than_the_reaction_moves_for_another_reason() -> None:
+def test_motion_beyond_the_reaction_has_another_cause() -> None:
     assert [felt(share) for share in (0.3, 1.0, 2.0)] == [False, True, False]
 
 
@@ -76,29 +76,55 @@ def test_a_joint_that_accelerates_within_a_period_is_no_contradiction(
         a = 2.0 * w * np.cos(w * (t[k] - 0.5 * period))
         check.update(np.full(7, way[k - 1]), np.full(7, v[k]), period, np.full(7, a))
         assert not (check.doubtful | check.contradicted).any(), k
-    for _ in range(3):  # a lie is one all the same
+    for _ in range(3):  # still a fault
         check.update(np.zeros(7), np.full(7, 2.8), period, np.full(7, 100.0))
     assert check.contradicted.all()
 
 
 class Motion:
-    """Trusted sources of a Panda at rest whose last joint reports a motion."""
+    """Trusted signals of a Panda at rest whose joints report a motion."""
 
     def __init__(self, period: float) -> None:
         self.trusted = TrustedMotion(panda(), SETTINGS, period)
         self.period, self.count, self.q = period, 0, start()
 
-    def update(self, moves: float, says: float) -> str | None:
-        """Return the fault after a period."""
+    def update(
+        self, moves: float, says: float, *, first: float = 0.0, effort: float = 0.0
+    ) -> str | None:
+        """Return the fault after a period.
+
+        Args:
+            moves: Slope of the last joint's positions [rad/s].
+            says: Its velocity [rad/s].
+            first: Velocity of the first joint, whose positions are constant [rad/s].
+            effort: Of the last joint from now on, besides gravity [N·m].
+        """
         self.count += 1
         self.q, v = self.q.copy(), np.zeros(7)
         self.q[6] += moves * self.period
-        v[6] = says
+        v[[0, 6]] = first, says
         passed = self.period if self.count > 1 else 0.0
-        told = Measurement(self.count, self.count * self.period, self.q, v)
-        self.trusted.update(told, passed, np.zeros(7, dtype=bool))
-        self.trusted.applied(self.q, np.zeros(7), gravity(self.q))
+        reported = Measurement(self.count, self.count * self.period, self.q, v)
+        self.trusted.update(reported, passed, np.zeros(7, dtype=bool))
+        tau = gravity(self.q)
+        tau[6] += effort
+        self.trusted.applied(self.q, np.zeros(7), tau)
         return self.trusted.fault
+
+
+def test_a_source_that_is_trusted_again_is_expected_where_it_is() -> None:
+    """Meanwhile the model expected the joint elsewhere, as its load is not known."""
+    motion = Motion(PERIOD)
+    for _ in range(100):
+        motion.update(0.0, 0.0)
+    for _ in range(60):  # both sources leave the expectation, by as much
+        motion.update(1.0, -1.0, effort=-0.1)
+    trusted = motion.trusted
+    assert not trusted.trusted_positions[6]
+    assert trusted._expected.v[2, 6] < -0.5  # the effort acts in the model alone
+    for _ in range(30):  # a clear case: velocities are wrong
+        motion.update(1.0, -1.0, first=3.0)
+    assert trusted.trusted_positions.all()
 
 
 @pytest.mark.parametrize("period", [0.001, 0.005, 0.01])
@@ -120,7 +146,7 @@ def test_one_noisy_velocity_of_a_braked_joint_is_no_acceleration() -> None:
     for _ in range(50):
         assert motion.update(0.2, 0.2) is None
     motion.trusted.stop(np.zeros(7))
-    assert motion.update(0.2, 0.7) is None  # beyond what braking leaves, once
-    faults = [motion.update(0.6, 0.6) for _ in range(10)]  # the others rest
+    assert motion.update(0.2, 0.7) is None  # beyond the residual of braking, once
+    faults = [motion.update(0.6, 0.6) for _ in range(10)]  # the others are at rest
     (found,) = filter(None, faults)
     assert "panda_joint7 is braked, and moves at 0.6 rad/s" in found

@@ -1,4 +1,4 @@
-"""Needs of a loop in real time: priority, no collector."""
+"""Real-time settings of a loop: priority, no garbage collection."""
 
 import gc
 import inspect
@@ -13,13 +13,13 @@ from hsp_control.live.real_time import no_garbage_collection, real_time_priority
 
 
 def test_the_collector_is_away_and_comes_back(monkeypatch: pytest.MonkeyPatch) -> None:
-    counted = inspect.unwrap(gc.get_freeze_count)  # conftest.py's is a number
+    counted = inspect.unwrap(gc.get_freeze_count)  # replaced in conftest.py
     monkeypatch.setattr(gc, "get_freeze_count", counted)
     assert gc.isenabled()
     with no_garbage_collection():
         assert not gc.isenabled()
     frozen = gc.get_freeze_count()
-    assert frozen > 1000  # what the tests had frozen before is so still
+    assert frozen > 1000  # objects that the tests had frozen before still are
     gc.unfreeze()
     with no_garbage_collection():
         assert not gc.isenabled()
@@ -48,7 +48,7 @@ def test_steps_leave_nothing_to_collect(config: str) -> None:
         for k in range(first, last):
             controller.applied(controller.compute(0.001 * k, q, v).tau, 0.001)
 
-    steps(0, 2)  # what a first step binds, and reads from the cache, stays
+    steps(0, 2)  # objects bound or cached by a first step stay
     with no_garbage_collection():
         tracked = len(gc.get_objects())
         steps(2, 52)

@@ -1,4 +1,4 @@
-"""The safe stop and what is around it: damping dissipates, hold holds."""
+"""The safe stop: damping dissipates, the hold holds, the watchdog acts."""
 
 import numpy as np
 import pytest
@@ -27,12 +27,12 @@ def at_random(seed: int) -> tuple[Array, Array]:
 
 
 @given(seed=seeds, limited=st.booleans())
-def test_damping_takes_energy_whatever_the_inertia(seed: int, limited: bool) -> None:
+def test_damping_dissipates_energy_for_any_inertia(seed: int, limited: bool) -> None:
     q, v = at_random(seed)
     most = LIMITED if limited else FREE
     stop = SafeStop(panda(), StopSettings(damping=8.0), most, PERIOD)
     tau = stop.effort(panda().state(0.0, q, v))
-    power = float(v @ (tau - gravity(q)))  # what is not potential energy
+    power = float(v @ (tau - gravity(q)))  # not into potential energy
     M = panda().state(0.0, q, v).mass_matrix
     assert stop.phase is Phase.DAMPING
     assert power < 0.0
@@ -48,7 +48,9 @@ def test_a_share_of_the_damping_brakes_where_clipped_damping_would_drive() -> No
     for _ in range(1000):
         q = panda().random_configuration(rng)
         v = rng.standard_normal(7) * rng.choice([0.0, 1.0, 3.0], 7)
-        most = np.abs(gravity(q)) + rng.uniform(0.5, 20.0, 7)  # little is left to brake
+        most = np.abs(gravity(q)) + rng.uniform(
+            0.5, 20.0, 7
+        )  # little is left for braking
         stop = SafeStop(panda(), StopSettings(rest_speed=1e-9), most, PERIOD)
         tau = stop.effort(state.update(0.0, q, v))
         assert v @ (tau - gravity(q)) <= 1e-9
@@ -61,7 +63,7 @@ def test_a_share_of_the_damping_brakes_where_clipped_damping_would_drive() -> No
 @pytest.mark.slow
 @pytest.mark.parametrize(("seed", "factor"), [(0, 0.6), (1, 1.0), (2, 1.6)])
 def test_it_stops_a_robot_that_is_not_the_model(seed: int, factor: float) -> None:
-    """Wrong masses: it comes to rest, and the hold keeps it within gravity's error."""
+    """With wrong masses it comes to rest; the hold's error is that of gravity."""
     _, v = at_random(seed)
     own = changed(panda(), [Inertias(factor, 1.0, [0.0, 0.0, 0.0])])
     plant = IntegratedPlant(RigidBodyPlant(own), Rk4(PERIOD))
@@ -121,10 +123,10 @@ def test_reckoning_is_the_model_s_motion() -> None:
     np.testing.assert_array_equal(reckoning.state.q, before)
 
 
-# --- the robot that watches itself ---------------------------------------------------
+# --- the robot's watchdog ------------------------------------------------------------
 
 
-def test_its_watchdog_counts_and_forgives() -> None:
+def test_its_watchdog_counts_and_resets() -> None:
     robot = watched(LiveSettings(watchdog=5))
     tau = gravity(start()) + 0.3
     for _ in range(3):
@@ -137,7 +139,7 @@ def test_its_watchdog_counts_and_forgives() -> None:
     assert robot.phase is Phase.DAMPING
     assert robot.reason == "the watchdog: no valid effort for 6 periods"
     for _ in range(1500):
-        robot.advance([tau + 50.0])  # it follows nobody any more
+        robot.advance([tau + 50.0])  # commands are ignored from now on
         assert np.isfinite(robot.tau).all()
     assert robot.done
     assert np.abs(robot.v).max() < 0.01
@@ -150,7 +152,7 @@ def test_its_watchdog_counts_and_forgives() -> None:
 def test_deadlines_are_counted_over_all_and_sorted_over_the_last() -> None:
     deadlines = Deadlines(0.001, capacity=100)
     assert deadlines.response is None
-    deadlines.add(0.5, 0.01)  # the worst, and long ago
+    deadlines.add(0.5, 0.01)  # the worst one, long ago
     for k in range(150):
         deadlines.add(0.001, 1e-5 * (k % 100 + 1))
     assert deadlines.periods == 151

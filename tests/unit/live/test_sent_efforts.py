@@ -1,4 +1,4 @@
-"""Which efforts a robot can have: those that were sent, and its own for a while."""
+"""Efforts that may be in force: the sent ones and, for a while, the robot's own."""
 
 import numpy as np
 import pytest
@@ -12,7 +12,7 @@ from hsp_control.live.sent_efforts import SentEfforts
 
 @pytest.mark.parametrize("sign", [1.0, -1.0])
 def test_its_own_effort_lasts_five_answers_and_then_fades(sign: float) -> None:
-    """It has 0 where -10 is sent, or 10: brakes, or another load, hold it at first."""
+    """Zero effort although ±10 is sent: at first brakes or a load hold the joint."""
     sent = SentEfforts(np.array([5.0]), 4)
     held, has = np.array([-10.0 * sign]), np.array([0.0])
     sent.restart(held)
@@ -21,7 +21,7 @@ def test_its_own_effort_lasts_five_answers_and_then_fades(sign: float) -> None:
         least, most, spare = sent.bounds_of(has)
         assert (least, most) == (min(held, has), max(held, has))
         assert spare == 0.5
-    for k in range(1, 20):  # what is beyond comes nearer by a part in a hundred
+    for k in range(1, 20):  # the excess decays by a hundredth
         bounds = sent.bounds_of(has)
         assert bounds[2] == 0.05
         has = bounds[1] if sign > 0.0 else bounds[0]
@@ -35,12 +35,12 @@ def test_its_own_effort_lasts_five_answers_and_then_fades(sign: float) -> None:
 def test_a_robot_may_have_an_old_effort_for_as_long_as_its_watchdog_waits(
     missing: int, watchdog: int
 ) -> None:
-    """Or for as long as its loop waits for a state."""
+    """Or as long as the loop waits for a state."""
     settings = LiveSettings(missing=missing, watchdog=watchdog, effort_rate=1e9)
     limiter, q = EffortLimiter(panda(), settings, PERIOD), start()
     limiter.reset(q)
     gravity = limiter.sent.copy()
-    for _ in range(10):  # its start is over
+    for _ in range(10):  # its start-up is over
         assert limiter.contradiction(limiter.sent, halted=False) is None
         limiter.apply(gravity, q)
     limiter.apply(gravity + 5.0, q)
@@ -50,8 +50,8 @@ def test_a_robot_may_have_an_old_effort_for_as_long_as_its_watchdog_waits(
         assert limiter.contradiction(old, halted=False) is None
 
 
-def test_a_robot_that_halted_may_have_what_its_own_stop_needs() -> None:
-    """Half more than its limits, less the gravity that it adds itself."""
+def test_a_halted_robot_may_have_the_effort_of_its_own_stop() -> None:
+    """1.5 times its limits, less the gravity that it compensates itself."""
     settings = LiveSettings(compensates_gravity=True)
     limiter, q = EffortLimiter(panda(), settings, PERIOD), start()
     limiter.reset(q)
@@ -74,16 +74,16 @@ def test_a_robot_waits_for_its_first_effort_without_an_end() -> None:
     assert robot.phase == Phase.RUNNING
 
 
-@pytest.mark.parametrize(("says", "held"), [(True, 6), (False, 1)])
+@pytest.mark.parametrize(("reports", "held"), [(True, 6), (False, 1)])
 def test_after_a_lost_state_an_effort_is_near_the_one_before_it_too(
-    says: bool, held: int
+    reports: bool, held: int
 ) -> None:
-    """The last may be lost; after five a line is dead one way, and efforts arrive."""
+    """The last effort may be lost; after five lost states efforts may still arrive."""
     settings = LiveSettings(effort_rate=1000.0)
     limiter, q = EffortLimiter(panda(), settings, PERIOD), start()
     limiter.reset(q)
     before = limiter.sent.copy()
-    limiter.robot_has(before if says else None)
+    limiter.robot_has(before if reports else None)
     steps = []
     for _ in range(held + 3):
         limiter.apply(before + 100.0, q)

@@ -1,4 +1,4 @@
-"""How old a state is, by clocks that know nothing of one another."""
+"""The age of a state, by two unsynchronised clocks."""
 
 import numpy as np
 import pytest
@@ -11,11 +11,11 @@ from hsp_control.live.link import AgeEstimator, Packet, PacketKind
 from hsp_control.live.udp import UdpHardware
 
 APART = 1234.5
-"""How far the two clocks are apart [s]."""
+"""Offset of the two clocks [s]."""
 
 
 def ages_of(delays: Array, every: float = 0.1, window: float = 1.0) -> Array:
-    """Return the ages of packets that are sent regularly, after these delays [s]."""
+    """Return the ages of packets sent periodically with these delays [s]."""
     estimator = AgeEstimator(window)
     sent = every * np.arange(len(delays))
     return np.array(
@@ -31,8 +31,8 @@ def test_the_quickest_packet_has_no_age_and_others_are_older_than_it() -> None:
     np.testing.assert_allclose(ages_of(delays), [0, 0, 0.006, 0, 0.002], atol=1e-9)
 
 
-def test_a_quick_packet_counts_through_the_next_window() -> None:
-    """At least for one window, whenever it came, and never for more than two."""
+def test_a_fast_packet_is_used_through_the_next_window() -> None:
+    """For at least one window, for any arrival time, and for at most two."""
     for quick in range(12):
         delays = np.full(60, 0.008)
         delays[quick] = 0.001
@@ -47,13 +47,14 @@ def test_ages_are_never_negative_and_know_no_offset() -> None:
     delays = np.random.default_rng(0).uniform(0.001, 0.02, 300)
     ages = ages_of(delays)
     assert ages.min() >= 0.0
-    for k in range(10, 300):  # at most the quickest of all, at least of the last ten
+    # at most the minimum of all, at least that of the last ten
+    for k in range(10, 300):
         least = delays[: k + 1].min(), delays[k - 9 : k + 1].min()
         assert delays[k] - least[1] - 1e-9 <= ages[k] <= delays[k] - least[0] + 1e-9
 
 
 def test_a_clock_that_drifts_is_followed() -> None:
-    """By 1 ms/s, and the age stays below what it drifts by in two windows."""
+    """With a drift of 1 ms/s the error stays below the drift in two windows."""
     estimator = AgeEstimator(1.0)
     ages = [estimator.age(0.1 * k + 1e-4 * k, 0.1 * k) for k in range(500)]
     assert max(ages) < 2.2e-3
@@ -63,7 +64,7 @@ def test_a_clock_that_drifts_is_followed() -> None:
 def test_states_of_a_robot_have_the_age_of_the_newest_packet(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    """Of one that waited 30 ms longer than the quickest; all that came count."""
+    """A packet that waited 30 ms longer than the fastest; all packets are used."""
     now, arrived = [100.0], list[Packet]()
     monkeypatch.setattr(udp, "monotonic", lambda: now[0])
     hardware = UdpHardware(panda(), PERIOD)
@@ -86,7 +87,7 @@ def test_states_of_a_robot_have_the_age_of_the_newest_packet(
     try:
         assert age(0, delay=0.002) == pytest.approx(0.0, abs=1e-6)
         assert age(1, delay=0.032) == pytest.approx(0.03, abs=1e-6)
-        # two at once: the later one is 10 ms younger
+        # two arrive together: the later one is 10 ms younger
         assert age(2, 3, delay=0.012) == pytest.approx(0.01, abs=1e-6)
         assert age(4, delay=0.001) == pytest.approx(0.0, abs=1e-6)
         assert age(5, delay=0.002) == pytest.approx(0.001, abs=1e-6)
@@ -96,7 +97,7 @@ def test_states_of_a_robot_have_the_age_of_the_newest_packet(
         hardware.drain()
 
 
-def test_a_robot_of_whatever_phase_of_its_stop_has_stopped_by_itself(
+def test_a_robot_in_any_phase_of_its_stop_has_stopped_by_itself(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     hardware = UdpHardware(panda(), PERIOD)

@@ -1,4 +1,4 @@
-"""Periods without a state: how long is waited for it, and what is known meanwhile."""
+"""Periods without a state: the waiting time, and the prediction in between."""
 
 import numpy as np
 import pytest
@@ -11,12 +11,12 @@ from hsp_control.live.state_reader import StateReader
 
 
 class Silent:
-    """Hardware with its own clock that sends states until it is stopped.
+    """Hardware with a clock that sends states until it is stopped.
 
     Attributes:
         now: Its clock [s].
         still: Whether it sends nothing.
-        waits: How long each `read` may wait [s].
+        waits: Timeouts of all `read` calls [s].
     """
 
     period = PERIOD
@@ -36,7 +36,7 @@ class Silent:
         return Measurement(self._sequence, self._sequence * PERIOD, q, self._v.copy())
 
     def write(self, effort: Array) -> None:
-        """Take no notice."""
+        """Ignore the effort."""
 
     def close(self) -> None:
         """Do nothing."""
@@ -58,18 +58,18 @@ def reader_of(hardware: Silent) -> StateReader:
 
 
 def test_after_a_stall_each_missing_state_is_waited_for_as_before() -> None:
-    """Else all that were tolerated would be missing within no time."""
+    """Otherwise the tolerated number of missing states would pass at once."""
     hardware = Silent(np.zeros(7))
     reader = reader_of(hardware)
     hardware.still = True
-    hardware.now += 0.03  # this computer did not get the processor
+    hardware.now += 0.03  # this process was not scheduled
     hardware.waits.clear()
     for _ in range(10):
         reader.read(np.zeros(7), None)
     np.testing.assert_allclose(hardware.waits[2:], PERIOD, rtol=1e-9)
 
 
-def test_the_speed_of_a_robot_that_says_nothing_is_that_of_the_model() -> None:
+def test_the_speed_of_a_silent_robot_is_that_of_the_model() -> None:
     v = np.full(7, 0.01)
     hardware = Silent(v)
     reader = reader_of(hardware)
@@ -82,8 +82,8 @@ def test_the_speed_of_a_robot_that_says_nothing_is_that_of_the_model() -> None:
     assert reader.speed == pytest.approx(0.01 + 20 * PERIOD * 20.0, rel=0.2)
 
 
-def test_what_was_predicted_before_a_state_came_does_not_count() -> None:
-    """Every second state is lost, in all for ten times what is allowed at once."""
+def test_predictions_before_a_late_state_are_discarded() -> None:
+    """Every second state is lost, ten times as many as may be lost in a row."""
     lost = dict.fromkeys(range(41, 20_000, 2), missing)
     settings = LiveSettings(prediction_time=0.02, stop=StopSettings(hold=0.2))
     report = run_loop(law(), Rig(watched(), lost), duration=0.1, settings=settings)

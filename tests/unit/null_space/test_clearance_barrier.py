@@ -1,4 +1,5 @@
-"""Check the barrier of the clearance fields, far away and once per state."""
+"""The barrier of the clearance fields: its formula, range, and number of
+evaluations."""
 
 from typing import Any
 
@@ -20,17 +21,17 @@ from hsp_control.trajectories import Hold, UniformLine
 
 # --- the barrier ---------------------------------------------------------------------
 
-CORE = 0.02  # s below which it is a parabola
+CORE = 0.02  # for smaller s it is a parabola
 
 
 @given(s=st.floats(-2.0, 1.5), influence=st.floats(0.01, 10.0))
-def test_barrier_is_its_formula_and_its_own_derivatives(
+def test_barrier_is_its_formula_with_exact_derivatives(
     s: float, influence: float
 ) -> None:
     """-(1 - s)² ln s above the core, a parabola with the same tangent below.
 
-     Differences of sixth order over a hundredth of the distance to where the formula
-    .
+    Differences of sixth order over a hundredth of the distance to the change of the
+    formula.
     """
     value, first, second = barrier_at(s * influence, influence)
     s = s * influence / influence
@@ -54,7 +55,7 @@ def test_barrier_is_its_formula_and_its_own_derivatives(
         assert bend / influence == pytest.approx(second, rel=1e-7, abs=1e-6 / influence)
 
 
-# --- far away, and once per state ----------------------------------------------------
+# --- out of influence, and once per state --------------------------------------------
 
 
 def evaluate(field: Cost, state: Any) -> FieldSample:
@@ -67,10 +68,10 @@ def evaluate(field: Cost, state: Any) -> FieldSample:
 
 
 def test_the_rate_is_zero_however_quick_the_obstacle() -> None:
-    """Out of influence g is zero in a neighbourhood, so that g' is zero exactly.
+    """Out of influence g is zero in a neighbourhood, so g' is exactly zero.
 
-    At 20 m/s a ball comes 4 cm nearer within a differences' step of 2 ms: differencing
-    would see it inside, and give a rate that is not there yet.
+    At 20 m/s a ball moves 4 cm within a difference step of 2 ms: differences would
+    reach into the influence and give a wrong rate.
     """
     robot = load("panda")
     start = np.array([0.5, 0.5, 0.5])
@@ -105,9 +106,9 @@ def calls(monkeypatch: pytest.MonkeyPatch) -> list[int]:
 
 
 def test_distances_are_measured_once_per_state(calls: list[int]) -> None:
-    """However often they are requested; and four times more along the flow, for g'.
+    """For any number of requests; and four times more along the flow, for g'.
 
-    That is Coal's part; distances in closed form have an exact rate.
+    This applies to Coal; distances in closed form have an exact rate.
     """
     robot = load("panda")
     ball = Obstacle("ball", Sphere(0.1), AIR)
@@ -135,7 +136,7 @@ def test_distances_are_measured_once_per_state(calls: list[int]) -> None:
 
 
 def test_rows_of_a_log_bind_nothing_anew(monkeypatch: pytest.MonkeyPatch) -> None:
-    """The value of the field and those of its terms are taken of one state."""
+    """The values of the field and of its terms belong to one state."""
     bound: list[int] = []
     make = ClosedFormDistances.calls
 

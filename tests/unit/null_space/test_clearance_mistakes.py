@@ -1,4 +1,4 @@
-"""Check that wrong shapes, obstacles and starts in contact are refused by name."""
+"""Wrong shapes, obstacles and starts in contact are refused by name."""
 
 import json
 import re
@@ -29,7 +29,7 @@ BALL = Obstacle("ball", Sphere(0.1), Hold([0.5, 0.3, 0.5]))
 
 
 def on(robot: Robot, field: NullSpaceField) -> NullSpaceField:
-    """Place a field on a robot at rest at home, beside the ball."""
+    """Place a field on a robot at rest at home, near the ball."""
     return placed(field, still(robot), [BALL])
 
 
@@ -96,8 +96,8 @@ TOUCHING = {
 }  # fmt: skip
 
 
-def test_a_start_in_contact_is_refused_where_the_configuration_says_so() -> None:
-    """A barrier cannot push out what is inside already; pair and depth are named."""
+def test_a_start_in_contact_is_refused_with_its_place() -> None:
+    """A barrier cannot resolve an initial contact; pair and depth are named."""
     with pytest.raises(SceneError) as caught:
         load_experiment(TOUCHING)
     robot = load("panda")
@@ -105,8 +105,8 @@ def test_a_start_in_contact_is_refused_where_the_configuration_says_so() -> None
     state = still(robot)
     d, pair = ObstacleClearance([ball]).proximity(state).nearest(state)
     assert d < 0.0
-    told = f"... null_space.fields.0: ... {pair}, {-d:.3g} m deep ... start: auto"
-    assert re.search(wording(told), str(caught.value))
+    reported = f"... null_space.fields.0: ... {pair}, {-d:.3g} m deep ... start: auto"
+    assert re.search(wording(reported), str(caught.value))
     assert "to ball" in pair
     apart = json.loads(
         json.dumps(TOUCHING).replace("[0.2, 0.0, 0.7]", "[0.2, 0.3, 0.7]")

@@ -1,7 +1,7 @@
-"""Check the clearance fields' gradient and rate on whole robots and in the loop.
+"""Gradient and rate of the clearance fields on whole robots and in the loop.
 
-The last word is the closed loop, where ‖e_N‖ may only follow exp(-K_N t) if the field's
-rate holds everything that moves.
+The closed loop is decisive: ‖e_N‖ follows exp(-K_N t) only if the field's rate includes
+every motion.
 """
 
 from collections.abc import Callable
@@ -65,8 +65,8 @@ def test_gradient_and_rate_for_every_shape(
     """Against differences of the value, and of the gradient along the flow in time.
 
     Where the nearest feature changes, between caps and side or face and edge, the rate
-    jumps, and differences across the jump are wrong: they disagree with themselves at
-    half the step, and that state is passed over. At few, or nothing would be shown.
+    jumps, and differences across the jump are wrong: they disagree with those of half
+    the step, and the state is skipped. Only few may be, or the test would be void.
     """
     robot = load(name)
     octa = write_stl(tmp_path / "octa.stl", OCTAHEDRON, FACES)
@@ -93,7 +93,7 @@ def test_gradient_and_rate_for_every_shape(
         agreed += 1
         # A barrier at d > 0.06 m by steps of 5e-4 rad m: (5e-4/0.06)⁶ · 7!/140 = 1e-11;
         # the field's own rate, of fourth order by 1e-3: (1e-3/0.06)⁴ · 5!/30 = 3e-7 at
-        # worst, 1e-9 where d is not that small and the arm not that quick.
+        # worst, 1e-9 at larger d and lower speed.
         scale = float(np.abs(g).max())
         np.testing.assert_allclose(g, by_value[1], rtol=0, atol=1e-9 * scale)
         scale = float(np.abs(g_dot).max())
@@ -127,10 +127,10 @@ def test_gradient_by_hulls_is_as_good_as_gjk() -> None:
 
 
 def test_a_floor_has_no_edge_where_links_lie_level() -> None:
-    """A capsule's lower end changes where it lies along the floor; the beads' does not.
+    """A capsule parallel to the floor switches its lower end; a row of balls does not.
 
-    The forearm is turned through the horizontal. With capsules the gradient jumps by a
-    third there, from one step to the next.
+    The forearm rotates through the horizontal, where with capsules the gradient jumps
+    by a third within a step.
     """
     robot = load("panda")
     floor = Obstacle("floor", shapes.HalfSpace(), Hold([0.0, 0.0, 0.0]))
@@ -176,7 +176,7 @@ GAIN = 5.0
 def run(
     field: Cost, duration: float, integrator: Integrator
 ) -> tuple[Array, Array, Any]:
-    """Return ‖e_N‖ and what it shall be while the hand holds still, from rest."""
+    """Return ‖e_N‖ and its prediction while the hand is held, from rest."""
     robot = load("panda")
     hand = "panda_tcp"
     hold = FramePosition(hand, Hold(), gains=Gains(100, 20))
@@ -197,16 +197,17 @@ def test_the_null_space_error_is_exponential_beside_a_moving(which: str) -> None
     """‖e_N‖ = ‖e_N(0)‖ exp(-K_N t), to 1e-6 of its start, while the obstacle passes.
 
     The rate jumps where the nearest point moves from a capsule's side to its end, and
-    where the links' balls roll over the edges of a box that turns; the exponential does
-    not, as an integrator that shortens its steps there shows: 3e-7.
+    where the links' balls roll over the edges of a rotating box; the exponential does
+    not, as an integrator with shorter steps there shows: 3e-7.
     """
     robot = load("panda")
-    # Not the shoulder, which stands in the floor and cannot leave it.
+    # Without the shoulder, which is in the floor permanently.
     links = [s.link for s in link_shapes(robot) if s.joint > 2]
     field = ObstacleClearance([LOOPS[which]], influence=0.3, links=links)
     norm, expected, rollout = run(field, 1.2, Dop853(1e-9, 1e-9))
     assert norm[0] > 0.1
     np.testing.assert_allclose(norm, expected, rtol=0, atol=1e-6 * norm[0])
-    assert np.abs(rollout["field.g"][30:]).max() > 0.5  # it did push all the time
+    # the field was active throughout
+    assert np.abs(rollout["field.g"][30:]).max() > 0.5
     assert rollout["distance.obstacle_clearance"].min() > 0.05
     assert np.abs(rollout["task.panda_tcp.error"]).max() < 1e-8

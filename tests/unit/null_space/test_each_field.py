@@ -1,4 +1,4 @@
-"""Check what each field promises by itself, and sums of fields."""
+"""Properties of single fields, and sums of fields."""
 
 from dataclasses import replace
 
@@ -37,7 +37,7 @@ from hsp_control.trajectories import Hold
 
 
 def test_joint_centering_draws_no_joint_faster_than_its_weight() -> None:
-    """A finger opens by 4 cm: over its own range it would be drawn at 2500 1/s."""
+    """A finger's range is 4 cm: scaled by it, the rate would be 2500 1/s."""
     robot = Robot.load("panda", locked={})
     speeds = JointCentering().gradient_rate(
         robot.state(0.0, robot.home(), np.ones(robot.nv))
@@ -49,9 +49,9 @@ def test_joint_centering_draws_no_joint_faster_than_its_weight() -> None:
 
 @pytest.mark.slow
 def test_target_posture_is_smooth_all_the_way_round() -> None:
-    """Three turns through pi: slope and rate change by no more than their bounds.
+    """Three turns through pi: slope and rate change within their bounds.
 
-    ∇f = w sin d has slope w, (∇f)' = w cos d v has slope w |v|: 0.02 rad of turning
+    ∇f = w sin d has slope w, (∇f)' = w cos d v has slope w |v|: a rotation by 0.02 rad
     changes them by 0.02 of that; ½d² would jump by 2 pi w.
     """
     robot = load("planar3r")
@@ -70,7 +70,7 @@ def test_target_posture_is_smooth_all_the_way_round() -> None:
     assert np.abs(np.diff(rates, axis=0)).max() <= bound
     assert np.abs(np.diff(values)).max() <= 5.0 * step * (1 + 1e-9)
     assert max(values) == pytest.approx(10.0, abs=3e-4)
-    # It winds: a whole turn further all is the same again.
+    # It is periodic: the same after a whole turn.
     turn = round(2.0 * np.pi / step)
     np.testing.assert_allclose(slopes[turn], slopes[0], atol=3 * step)
 
@@ -167,8 +167,8 @@ class _HalfAsClear(ObstacleClearance):
 @pytest.mark.parametrize(
     "own", [_HalfAsFast(), _HalfAsSteep(), _HalfAsClear([OBSTACLE], influence=2)]
 )
-def test_a_step_calls_what_a_subclass_overrides(own: NullSpaceField) -> None:
-    """Though the field that it derives from is one of kernels, which a step prefers."""
+def test_a_step_calls_methods_that_a_subclass_overrides(own: NullSpaceField) -> None:
+    """Although the base class has kernels, which a step prefers."""
     of_package = type(own).__mro__[1](**own.all_fields())
     robot, found = load("panda"), []
     state = robot.state(TIME, *draw("panda", 3))
@@ -185,7 +185,7 @@ def test_a_step_calls_what_a_subclass_overrides(own: NullSpaceField) -> None:
 
 
 def test_a_sum_of_ramped_fields_is_exact_at_both_ends_and_flat() -> None:
-    """Before the start it is one field, after the end the other, to the last bit."""
+    """Bit for bit the first field before the start, the second one after the end."""
     robot = load("panda")
     before = 0.3 * JointCentering() + swirl_field("panda", rate=True)
     slow = StateWeight(lambda s: 1.5 + np.sin(s.t))

@@ -35,8 +35,8 @@ def test_value(name: str, which: str) -> None:
 def test_field_and_its_rate(case: tuple[str, str], metric_name: str) -> None:
     """g = -W⁻¹∇f (or the vector itself), and g' its total derivative along the flow.
 
-    The gradient is good to 1e-13 of f by differences of eighth order here, to 1e-12
-    (`differences.gradient`) there; W⁻¹ of a mass matrix lifts either by 1e2.
+    Differences of eighth order give the gradient to 1e-13 of f, those of the package
+    (`differences.gradient`) to 1e-12; W⁻¹ of a mass matrix amplifies both by 1e2.
     """
     name, which = case
     member = MEMBERS[which]
@@ -65,19 +65,20 @@ def test_field_and_its_rate(case: tuple[str, str], metric_name: str) -> None:
 
     rate = derivative(along, 0.005)
     scale = scale + np.abs(rate).max()
-    # The error of W⁻¹, times g, which may be far larger than its rate, over the step.
+    # The error of W⁻¹ times g, which may be far larger than g', over the step.
     rounding = 0.25 * np.finfo(float).eps * np.linalg.cond(W(q)) * np.abs(g).max()
     atol = member.rate_accuracy * scale + rounding / 0.005
     np.testing.assert_allclose(g_dot, rate, rtol=0, atol=atol)
     if member.parts(name) and metric_name != "identity":
-        assert np.abs(g_dot).max() > 1e-3  # else nothing was tested
+        assert np.abs(g_dot).max() > 1e-3  # otherwise the test is void
 
 
 # --- differences ---------------------------------------------------------------------
 
 
 def test_rate_along_flow_of_anything() -> None:
-    """Numbers, matrices, a state's own arrays; time alone, at rest; fast motion too."""
+    """Results as numbers, matrices or a state's arrays; in time at rest; fast
+    motion."""
     robot, frame = load("panda"), "panda_tcp"
     q, v = draw("panda", 21)
     state = robot.state(TIME, q, v)

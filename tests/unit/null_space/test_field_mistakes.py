@@ -1,4 +1,4 @@
-"""Check that wrong arguments and functions of fields are refused by name."""
+"""Wrong arguments and functions of fields are refused by name."""
 
 from collections.abc import Callable
 from typing import Any

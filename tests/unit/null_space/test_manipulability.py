@@ -48,7 +48,7 @@ def coupling(nv: int) -> Array:
     return A.T @ A
 
 
-# -- what the costs say ----------------------------------------------------------------
+# -- values ----------------------------------------------------------------------------
 
 
 def test_the_planar_arm_in_closed_form() -> None:
@@ -61,7 +61,7 @@ def test_the_planar_arm_in_closed_form() -> None:
     for q1, q2 in np.random.default_rng(5).uniform(0.3, 2.8, (10, 2)):
         q = robot.integrate(robot.neutral(), np.array([q1, q2, 0.4]))
         state = robot.state(0.0, q, np.array([0.3, -0.7, 0.2]))
-        # The floor of 1e-12 in G stands beside σ² of 0.02 and more.
+        # The floor of 1e-12 in G is small against σ² of 0.02 and more.
         assert field.value(state) == pytest.approx(-np.sin(q2), abs=1e-10)
         close(field.gradient(state), [0.0, -np.cos(q2), 0.0], 1e-9)
         close(field.gradient_rate(state), [0.0, -0.7 * np.sin(q2), 0.0], 1e-8)
@@ -88,7 +88,7 @@ def singular_members(robot: Robot, frame: str, axes: str) -> dict[str, JacobianC
 @pytest.mark.slow
 @pytest.mark.parametrize("name", HANDS if THOROUGH else ["planar3r", "panda"])
 def test_finite_at_every_singularity(name: str) -> None:
-    """Joints at multiples of 45°: stretched, folded, wrist aligned, all at once."""
+    """Joints at multiples of 45°: stretched, folded, wrist aligned, all combined."""
     robot = load(name)
     planar = name == "planar3r"
     frame, axes = HANDS[name], "xy" if planar else "xyz"
@@ -108,7 +108,7 @@ def test_finite_at_every_singularity(name: str) -> None:
     def finite(joints: list[float], turn: float, seed: int) -> None:
         nonlocal worst
         angles = np.pi * np.array(joints)
-        angles[0] = turn  # off the world's axes, where rounding does not help
+        angles[0] = turn  # off the world's axes, where zeros are not exact
         q = robot.integrate(robot.neutral(), angles)
         v = np.random.default_rng(seed).normal(size=robot.nv)
         state = robot.state(0.0, q, v)
@@ -120,10 +120,10 @@ def test_finite_at_every_singularity(name: str) -> None:
             assert np.isfinite(field.gradient_rate(state)).all(), which
 
     finite()
-    assert worst < 1e-12  # some of them were as singular as can be
+    assert worst < 1e-12  # some of them were exactly singular
 
 
-# -- what cannot be --------------------------------------------------------------------
+# -- refusals --------------------------------------------------------------------
 
 PANDA = {"frame": "panda_tcp"}
 MISTAKES: list[tuple[type, dict[str, Any], type[HspControlError], str]] = [
@@ -176,7 +176,7 @@ class Reach(JacobianCost):
 
 @pytest.mark.parametrize("rows", ["position", "orientation", "pose"])
 def test_a_user_s_own_cost_of_the_jacobian(rows: Rows) -> None:
-    """Its terms are all that it needs: value, gradient and rate follow."""
+    """Value, gradient and rate follow from its terms."""
     robot, frame = load("panda"), HANDS["panda"]
     rng = np.random.default_rng(10)
     q, v = robot.random_configuration(rng), rng.normal(size=robot.nv)
@@ -195,19 +195,21 @@ def test_a_user_s_own_cost_of_the_jacobian(rows: Rows) -> None:
 
 
 def test_frames_beyond_a_joint_that_mimics() -> None:
-    """The running sums know no freedom twice; frames before it, or elsewhere, serve."""
+    """Each joint is summed once; frames before it or on other branches work, too."""
     robot = Robot.load("panda", locked={})
     assert robot.mimics
     at_home = robot.state(0.0, robot.home(), np.zeros(robot.nv))
-    told = "frame: ... 'panda_rightfinger' ... 'panda_finger_joint2' ... mimic: false"
-    with pytest.raises(FieldError, match=wording(told)):
+    reported = (
+        "frame: ... 'panda_rightfinger' ... 'panda_finger_joint2' ... mimic: false"
+    )
+    with pytest.raises(FieldError, match=wording(reported)):
         placed(Manipulability("panda_rightfinger"), at_home)
     free = Robot.load("panda", locked={}, mimic=False)
     q = free.random_configuration(np.random.default_rng(9))
     state = free.state(0.0, q, np.ones(9))
     beyond = Manipulability("panda_rightfinger", rows="pose")
     close(beyond.gradient(state), differences.gradient(beyond.value, state), 1e-9)
-    # The finger that leads is an ordinary prismatic joint, also where it is followed.
+    # The leading finger is an ordinary prismatic joint, with or without followers.
     leading = Manipulability("panda_leftfinger")
     state = robot.state(0.0, q[:8], np.ones(8))
     other = free.state(0.0, q, np.ones(9))

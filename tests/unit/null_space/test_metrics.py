@@ -1,4 +1,4 @@
-"""Check the metrics: the mass matrix, and which constant ones are refused."""
+"""Metrics: the mass matrix, and refused constant ones."""
 
 from typing import Any
 
@@ -26,7 +26,7 @@ seeds = st.integers(0, 2**32 - 1)
 
 
 def test_the_mass_matrix_over_the_robots_own_inertia() -> None:
-    """P is that of M itself; a descent is quicker in proportion to the inertia."""
+    """P is that of M itself; a descent is faster in proportion to the inertia."""
     robot, rng = load("panda"), np.random.default_rng(32)
     state = robot.state(0.0, robot.random_configuration(rng), rng.standard_normal(7))
     metric = MassMatrixMetric(inertia="robot").placed(Start(state, Scene()))
@@ -63,7 +63,7 @@ def test_natural_gradient_descends_where_the_plain_one_need_not() -> None:
         np.testing.assert_allclose(gradient @ v, -v @ sample.W @ v, rtol=1e-9)
         assert gradient @ v < 0.0
         rises += bool(gradient @ P @ -gradient > 0.0)
-    assert rises > 10  # of 200: the reason for raising with the metric
+    assert rises > 10  # of 200: why gradients are multiplied by W⁻¹
 
 
 @pytest.mark.parametrize(
@@ -88,7 +88,7 @@ def test_constant_metric_refuses(W: Any, message: str) -> None:
 
 @given(seeds, st.integers(2, 8))
 def test_coordinates_that_are_singular_but_for_rounding(seed: int, n: int) -> None:
-    """AᵀA of a singular A has a least eigenvalue of ±1e-16, by the toss of a coin."""
+    """AᵀA of a singular A has a smallest eigenvalue of ±1e-16, of either sign."""
     rng = np.random.default_rng(seed)
     A = rng.standard_normal((n, n - 1)) @ rng.standard_normal((n - 1, n))
     with pytest.raises(MetricError, match="not positive definite"):

@@ -1,4 +1,4 @@
-"""Check which pairs of links a robot keeps apart, its own and other robots'."""
+"""Pairs of links that are kept apart, of one robot and of several."""
 
 from dataclasses import replace
 from pathlib import Path
@@ -31,7 +31,7 @@ def names(robot: Robot) -> set[frozenset[str]]:
 
 
 def disabled(robot: Robot) -> set[frozenset[str]]:
-    """Return the pairs that the SRDF leaves out."""
+    """Return the pairs that the SRDF disables."""
     assert robot.source.srdf is not None
     return {
         frozenset((pair.attrib["link1"], pair.attrib["link2"]))
@@ -58,7 +58,8 @@ def test_an_srdf_that_cannot_be_read(
 
 
 def test_pairs_of_links_that_are_watched() -> None:
-    """All pairs but neighbours, links of one joint, the SRDF's, and what overlaps."""
+    """All pairs except neighbours, links of one joint, the SRDF's, and overlapping
+    ones."""
     robot = load("panda")
     links = link_shapes(robot)
     watched = names(robot)
@@ -133,7 +134,7 @@ def test_each_robot_is_the_others_moving_obstacle() -> None:
 
 
 def arm_with_srdf(folder: Path, name: str) -> tuple[Path, set[frozenset[str]]]:
-    """Write a Panda, and an SRDF that leaves out one pair; return its file and pair."""
+    """Write a Panda and an SRDF that disables one pair; return its file and pair."""
     robot = load("panda")
     urdf = folder / "arm.urdf"
     urdf.write_text(robot.source.urdf.read_text())
@@ -153,7 +154,7 @@ def test_the_srdf_beside_a_urdf_leaves_pairs_out(tmp_path: Path) -> None:
 
 
 def test_an_srdf_disables_all_pairs_of_a_link_but_some(tmp_path: Path) -> None:
-    """As in MoveIt, and so in the record of a log; a pair that is disabled stays so."""
+    """As in MoveIt, also in a log's record; a disabled pair stays disabled."""
     urdf, _ = arm_with_srdf(tmp_path, "pairs.srdf")
     every = names(Robot.load(urdf))
     kept, other, both = (

@@ -1,7 +1,7 @@
-"""Check that all fields and metrics are values: of the families, by reflection.
+"""All fields and metrics are values; the classes are found by reflection.
 
-A value has no robot and no memory. So one field serves many states, of many robots, in
-many threads.
+A value has no robot and no memory, so that one field serves many states, robots and
+threads.
 """
 
 import copy
@@ -66,7 +66,7 @@ OTHER: dict[str, Any] = {
     "direction": [1, 2],
     "matrix": np.diag(np.linspace(1.0, 2.0, 7)),
 }
-"""Other values of fields that have no default."""
+"""Second values of fields without a default."""
 
 
 def members() -> dict[str, type[Part]]:
@@ -114,9 +114,9 @@ def test_members_are_values(name: str) -> None:
 
 @every_member
 def test_placing_needs_a_robot_and_nothing_else(name: str) -> None:
-    """Placing a placed value gives an equal one; neither it nor its use leaves a trace.
+    """Placing a placed value gives an equal one; placing and use leave no trace.
 
-    A field's attributes are its fields, before and after.
+    The attributes of a part are its declared fields, before and after.
     """
     robot = load("panda")
     state = robot.state(0.0, robot.home(), np.linspace(-1.0, 1.0, 7))
@@ -145,7 +145,7 @@ def defaults(name: str) -> list[Part]:
 
 
 def used(part: NullSpaceField | Metric, state: RobotState) -> list[Array]:
-    """Return what a part computes at a state: directly, and by its calls."""
+    """Return a part's results at a state: directly, and by its calls."""
     nv = state.robot.nv
     if isinstance(part, Metric):
         direct, planned = MetricSample.allocate(nv), MetricSample.allocate(nv)

@@ -1,4 +1,4 @@
-"""Weights that move, and sums of fields."""
+"""Time-varying weights, and sums of fields."""
 
 import re
 from collections.abc import Callable
@@ -61,7 +61,7 @@ METRICS: dict[str, Metric] = {
 
 
 def evaluate(field: NullSpaceField, metric: Metric, state: RobotState) -> FieldSample:
-    """Return g and g' at a state, in memory of their own."""
+    """Return copies of g and g' at a state."""
     nv = state.robot.nv
     sample = metric.evaluate(state, MetricSample.allocate(nv))
     out = FieldSample(np.full(nv, np.nan), np.full(nv, np.nan))
@@ -87,9 +87,9 @@ weights = st.floats(0.0, 5.0)
 def test_ramp_and_its_rate(
     t: float, a: float, b: float, start: float, duration: float
 ) -> None:
-    """The quintic between the ends, the ends outside; the rate is its derivative.
+    """The quintic between the ends, constant outside; the rate is its derivative.
 
-    By differences of fourth order it has no error in s⁵ but h⁴ f⁽⁵⁾/30.
+    The only error of fourth-order differences of s⁵ is h⁴ f⁽⁵⁾/30.
     """
     state = at(t)
     w, w_dot = Ramp(initial=a, final=b, start=start, duration=duration).sample(state)
@@ -109,18 +109,18 @@ def test_ramp_and_its_rate(
 
 
 def at(t: float) -> RobotState:
-    """Return the Panda's state at home at a time; one place in memory."""
+    """Return the Panda's state at home at a time, always the same object."""
     return memory().update(t, load("panda").home(), np.zeros(7))
 
 
 @cache
 def memory() -> RobotState:
-    """Return memory for a state."""
+    """Return a state without values."""
     return load("panda").state(0.0, load("panda").home(), np.zeros(7))
 
 
 def test_a_weight_of_the_state_and_its_rate() -> None:
-    """Exact by the product rule where the function is written out."""
+    """Exact by the product rule, for functions with derivatives."""
     robot = load("panda")
     weight = StateWeight(
         lambda s: 1.5 + np.sin(2.0 * s.t + s.position("panda_hand")[0])
@@ -156,7 +156,7 @@ def swirl(robot: Robot) -> FunctionField:
 
 
 def moving_sum(robot: Robot) -> FieldSum:
-    """Return a sum of a sum, all weights moving."""
+    """Return a sum of a sum with time-varying weights."""
     rising = Ramp(initial=0.2, final=2.0, start=0.1, duration=1.5)
     falling = Ramp(initial=2.0, final=0.0, start=0.0, duration=2.0)
     of_state = StateWeight(lambda s: 1.2 + np.cos(s.t + s.position("panda_hand")[2]))
@@ -207,7 +207,7 @@ def test_each_terms_share_is_kept_and_they_add_up() -> None:
     assert not samples[-1].g.any()  # of weight 0
 
 
-def test_the_log_tells_who_moves_the_arm() -> None:
+def test_the_log_has_the_share_of_every_term() -> None:
     """Columns ``field.<name>.g`` add up to ``field.g`` in every row of a run."""
     robot = load("panda")
     ramp = Ramp(initial=0.0, final=1.0, start=0.02, duration=0.1)
@@ -249,7 +249,7 @@ def test_the_log_tells_who_moves_the_arm() -> None:
     assert all(f"field.{name}.g" in described for name in names)
 
 
-# -- what cannot be --------------------------------------------------------------------
+# -- refusals --------------------------------------------------------------------
 
 MISTAKES: list[tuple[Callable[[], Any], str]] = [
     (lambda: ConstantWeight(-1.0), "ConstantWeight: value: -1.0 ... negative"),
@@ -281,7 +281,7 @@ def test_every_mistake_is_named(make: Callable[[], Any], message: str) -> None:
     assert re.search(wording(message), str(caught.value))
 
 
-def test_what_is_no_weight_and_no_field() -> None:
+def test_invalid_weights_and_fields() -> None:
     field = Rest()
     with pytest.raises(TypeError):
         "2" * field  # type: ignore[operator]

@@ -1,4 +1,4 @@
-"""Several robots as one: each block is the robot alone, where it was put."""
+"""Several robots as one: every block equals the robot alone at its placement."""
 
 import copy
 import re
@@ -35,7 +35,8 @@ from hsp_control.robot.description.sources import RobotSource
 from hsp_control.robot.integrators import Rk4
 
 LEFT = placement([0.0, 0.3, 0.1], [0.0, 0.0, 0.0])
-RIGHT = placement([0.9, -0.4, 0.2], [0.7, -0.4, 2.5])  # tilted: gravity pulls otherwise
+# tilted: gravity has another direction
+RIGHT = placement([0.9, -0.4, 0.2], [0.7, -0.4, 2.5])
 HERE = pin.SE3.Identity()
 
 
@@ -48,7 +49,7 @@ def pair() -> Robot:
 
 
 def alone(place: pin.SE3) -> Robot:
-    """Return one Panda that feels gravity as if it stood there."""
+    """Return one Panda with the gravity of that placement."""
     down = place.rotation.T @ np.array([0.0, 0.0, -9.81])
     return Robot.load("panda", gravity=down)
 
@@ -68,9 +69,9 @@ def test_placement_is_a_position_and_roll_pitch_yaw() -> None:
 
 
 def test_combined_robots_do_not_mix() -> None:
-    """Each part moves, weighs and is limited as if alone, where it was put.
+    """Kinematics, gravity and limits of a part equal those of the robot alone.
 
-    A tilted Panda, a planar arm (cos, sin) upside down, and a dog that floats.
+    A tilted Panda, a planar arm (cos, sin) upside down, and a floating quadruped.
     """
     up = pin.SE3(pin.rpy.rpyToMatrix(np.pi, 0.2, 0.3), np.array([1.0, 2.0, 0.5]))
     own = {
@@ -95,7 +96,7 @@ def test_combined_robots_do_not_mix() -> None:
         of_q = slice(start_q, start_q + robot.nq)
         of_v = slice(start_v, start_v + robot.nv)
         start_q, start_v = of_q.stop, of_v.stop
-        # Gravity as the part feels it, which may hang from the ceiling.
+        # Gravity in the part's axes; it may hang from the ceiling.
         turned = copy.deepcopy(robot)
         turned.model.gravity.linear = place.rotation.T @ robot.model.gravity.linear
         alone = turned.state(0.0, q[of_q], v[of_v])
@@ -110,7 +111,7 @@ def test_combined_robots_do_not_mix() -> None:
         ):
             np.testing.assert_allclose(actual, expected, rtol=1e-12, atol=1e-12)
         M[of_v, of_v] = M_dot[of_v, of_v] = 0.0
-        # The last frame: moved to where the part stands, by its own joints alone.
+        # The last frame, at the part's placement, moved by its own joints alone.
         frame, mine = robot.frame_names[-1], alone.frame(robot.frame_names[-1])
         there = state.frame(f"{name}_{frame}")
         R = np.kron(np.eye(2), place.rotation)
@@ -127,10 +128,10 @@ def test_combined_robots_do_not_mix() -> None:
 
 
 def test_each_arm_moves_as_if_alone() -> None:
-    """Two tasks and centering on both: the same path as the arm by itself.
+    """Two tasks and centering on both: the same path as the arm alone.
 
-    The law of a block-diagonal Jacobian and metric falls into blocks. Rk4 takes the
-    same steps, so that what is left is rounding.
+    With a block-diagonal Jacobian and metric the law decouples. Rk4 makes the same
+    steps, so that differences are rounding.
     """
     both = pair()
     q0 = both.home() + np.tile(0.1 * np.arange(7), 2)
@@ -165,11 +166,11 @@ def test_each_arm_moves_as_if_alone() -> None:
             )
 
 
-# -- what cannot be --------------------------------------------------------------------
+# -- refusals --------------------------------------------------------------------
 
 
 def source() -> RobotSource:
-    """Return where the Panda comes from."""
+    """Return the source of the Panda."""
     return load("panda").source
 
 
@@ -205,7 +206,7 @@ def test_every_mistake_is_named(
 
 
 def test_a_link_may_have_a_joints_name(tmp_path: Path) -> None:
-    """Pinocchio finds frames by their names alone; Z1's and SO-100's hands are such."""
+    """Pinocchio finds frames by name alone; the hands of Z1 and SO-100 are such."""
     file = tmp_path / "arm.urdf"
     file.write_text(ARM.replace('"lower"', '"elbow"'))
     arm = Robot.load(file, tool_frames={"tip": ToolFrame("elbow", (0.0, 0.0, 0.5))})

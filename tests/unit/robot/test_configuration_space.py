@@ -1,4 +1,4 @@
-"""Check the space of configurations: its kind, limits, home and random draws."""
+"""The configuration space: joint types, limits, home and random draws."""
 
 import re
 from pathlib import Path
@@ -28,7 +28,7 @@ def hand_built(*joints: Any) -> Robot:
 
 
 def test_unit_blocks() -> None:
-    """Where quaternions and (cos, sin) pairs lie in q."""
+    """Indices of quaternions and (cos, sin) pairs in q."""
     robot = hand_built(
         pin.JointModelFreeFlyer(),  # x y z, quaternion
         pin.JointModelRX(),
@@ -41,7 +41,7 @@ def test_unit_blocks() -> None:
     assert robot.nq == 7 + 1 + 2 + 4 + 4 + 1 + 2
     assert robot.unit_blocks == ((3, 4), (8, 2), (12, 2), (14, 4), (19, 2))
     assert not robot.flat
-    # Every block is one that Pinocchio normalises, and nothing else is.
+    # Exactly these blocks are normalised by Pinocchio.
     q = np.full(robot.nq, 3.0)
     normalised = pin.normalize(robot.model, q)
     changed = np.zeros(robot.nq, dtype=bool)
@@ -57,7 +57,7 @@ def test_unit_blocks() -> None:
             ConfigurationError, match=re.escape(f"is a {kind} of norm 1.5")
         ):
             robot.state(0.0, spoilt, np.zeros(robot.nv))
-    # Joints added in Python have no limits unless they are given some.
+    # Joints added in Python have no limits unless given.
     lower, upper = robot.position_limits()
     np.testing.assert_array_equal(lower, np.full(robot.nv, -np.inf))
     np.testing.assert_array_equal(upper, np.full(robot.nv, np.inf))
@@ -69,7 +69,8 @@ def test_unit_blocks() -> None:
 @pytest.mark.slow
 @pytest.mark.parametrize("case", ROBOTS)
 def test_position_limits(case: str) -> None:
-    """The URDF's for joints with one number; none for continuous joints and roots."""
+    """The URDF's for joints with one coordinate; none for continuous joints and
+    roots."""
     robot = load(case)
     lower, upper = robot.position_limits()
     urdf = ElementTree.parse(robot.source.urdf)
@@ -94,7 +95,7 @@ def test_home_is_the_sources_or_neutral_or_the_middle_of_the_range() -> None:
     np.testing.assert_array_equal(panda.home(), panda.source.home)
     # One joint locked: the recommended posture no longer fits, so limits decide. The
     # fourth joint's range, -3.0718 to -0.0698, does not contain 0; the sixth's, -0.0175
-    # to 3.7525, does, if barely.
+    # to 3.7525, just does.
     locks = {"panda_joint1": 0.0, "panda_finger_joint1": 0.0}
     shorter = Robot.load("panda", locked=locks)
     middle = (-3.0718 - 0.0698) / 2
@@ -110,7 +111,7 @@ def test_home_is_the_sources_or_neutral_or_the_middle_of_the_range() -> None:
         rtol=0,
         atol=1e-15,
     )
-    # Who may fall starts as the SRDF has it stand.
+    # A legged robot starts in the SRDF's standing posture.
     np.testing.assert_allclose(load("solo12").home()[:7], [0, 0, 0.235, 0, 0, 0, 1])
     np.testing.assert_allclose(load("solo12").home()[7:10], [0.1, 0.8, -1.6])
 
@@ -118,7 +119,7 @@ def test_home_is_the_sources_or_neutral_or_the_middle_of_the_range() -> None:
 @pytest.mark.slow
 @pytest.mark.parametrize("name", sorted({*BUNDLED, *example_robots()} - set(REFUSED)))
 def test_random_and_home_configurations_are_within_limits(name: str) -> None:
-    """For every robot that there is, with a floating root and without."""
+    """For every available robot, with and without a floating root."""
     robot = Robot.load(name)
     lower, upper = robot.position_limits()
     rng = np.random.default_rng(25)
@@ -132,7 +133,7 @@ def test_random_and_home_configurations_are_within_limits(name: str) -> None:
     # They differ, unless the URDF's limits are 0 and 0 (the double pendulums').
     if (upper > lower).any():
         assert np.abs(robot.difference(drawn[0], drawn[1])).max() > 0.0
-    # The generator decides: the same seed draws the same.
+    # The same seed gives the same draw.
     again = robot.random_configuration(np.random.default_rng(25))
     np.testing.assert_array_equal(again, drawn[0])
 
@@ -145,7 +146,7 @@ def test_lists_will_do() -> None:
 
 
 @pytest.mark.parametrize("wrong", [[0.1], np.zeros(8), "left", None])
-def test_integrate_and_difference_say_what_does_not_fit(wrong: object) -> None:
+def test_integrate_and_difference_name_wrong_shapes(wrong: object) -> None:
     robot = load("panda")
     with pytest.raises(ShapeError, match=r"^displacement (has shape|.*; needs 7 n)"):
         robot.integrate(robot.home(), wrong)

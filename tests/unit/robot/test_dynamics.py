@@ -1,4 +1,4 @@
-"""The engine's dynamics beside Pinocchio's own bindings, for robots of every kind.
+"""The engine's dynamics against Pinocchio's bindings, for robots of every kind.
 
 Both run the same algorithms, compiled with other flags: they agree to rounding.
 """
@@ -44,7 +44,7 @@ def chain_with(joint: object) -> pin.Model:
 
 
 def compare(model: pin.Model, q: Array, v: Array, a: Array) -> None:
-    """Check every call of the engine at a state; Pinocchio's own data are new."""
+    """Check every call of the engine at a state, with new Pinocchio data."""
     nv, x = model.nv, model.nvExtended
     own, data = dynamics_of(model), model.createData()
     near = {"rtol": 1e-11, "atol": 1e-11 * max(1.0, float(np.abs(v).max())) ** 2}
@@ -117,7 +117,7 @@ def test_gravity_has_the_slope_and_the_drift_of_its_differences(case: str) -> No
     assert_allclose(gravity.drift, expected, rtol=0, atol=1e-7 * scale)
 
 
-def test_a_copy_computes_in_memory_of_its_own() -> None:
+def test_a_copy_computes_in_separate_memory() -> None:
     robot, q, v, rng = draw("panda", seed=22)
     a, effort = rng.standard_normal(7), np.zeros(7)
     at = {"dynamics": robot.dynamics(), "q": q, "v": v}
@@ -159,7 +159,7 @@ def test_numbers_that_are_no_robot_are_refused() -> None:
 
 
 def test_dynamics_are_those_of_the_model_as_it_is_now() -> None:
-    """Whose numbers are read once, and again after each change."""
+    """The model's numbers are read once, and again after a change."""
     robot = Robot.load("panda")
     q, zero = robot.home(), np.zeros(7)
 

@@ -1,4 +1,4 @@
-"""Inertias that no body can have, and their projection to those that one can have."""
+"""Physically impossible inertias, and their projection to possible ones."""
 
 import re
 from pathlib import Path
@@ -45,14 +45,15 @@ def test_projection_is_of_a_body_symmetric_and_idempotent(seed: int) -> None:
     moments = np.linalg.eigvalsh(second_moments(projected))
     assert moments[0] >= FLOOR * moments.sum() * (1.0 - 1e-9)
     assert nearest_possible(projected) is projected
-    np.testing.assert_allclose(  # the axes stay
+    np.testing.assert_allclose(  # the axes are unchanged
         projected @ tensor, tensor @ projected, atol=1e-14 * np.abs(tensor).max()
     )
 
 
 @pytest.mark.parametrize("seed", range(5))
 def test_projection_is_nearest_in_the_pseudo_inertia(seed: int) -> None:
-    """No other mass, centre of mass and second moments are: by a general search."""
+    """No other mass, centre of mass and second moments are nearer: by general
+    search."""
     tensor, mass = of_no_body(seed), 0.7
     wrong = np.zeros((4, 4))
     wrong[:3, :3], wrong[3, 3] = second_moments(tensor), mass
@@ -94,12 +95,12 @@ def test_links_are_named_with_the_reason() -> None:
 
 def test_a_robot_is_loaded_with_projected_inertias(tmp_path: Path) -> None:
     path = write(tmp_path, HEAVY)
-    asked, not_asked = Robot.load(path, project_inertias=True), Robot.load(path)
-    changed, given = asked.model.inertias[1], not_asked.model.inertias[1]
+    requested, not_asked = Robot.load(path, project_inertias=True), Robot.load(path)
+    changed, given = requested.model.inertias[1], not_asked.model.inertias[1]
     assert changed.mass == given.mass == 2.0
     np.testing.assert_array_equal(changed.lever, given.lever)
     np.testing.assert_allclose(given.inertia, np.diag([0.1, 0.1, 0.5]))
     np.testing.assert_allclose(
         changed.inertia, nearest_possible(np.diag([0.1, 0.1, 0.5])), rtol=1e-14
     )
-    assert asked.model.inertias[2] == not_asked.model.inertias[2]
+    assert requested.model.inertias[2] == not_asked.model.inertias[2]

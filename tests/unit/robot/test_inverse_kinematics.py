@@ -1,4 +1,4 @@
-"""Inverse kinematics reaches what forward kinematics gave, within limits."""
+"""Inverse kinematics reaches poses from forward kinematics, within limits."""
 
 import numpy as np
 import pinocchio as pin
@@ -55,11 +55,11 @@ def test_beyond_reach_it_comes_as_near_as_the_arm_is_long() -> None:
 
 
 def test_limits_hold_where_they_bind() -> None:
-    """The same place again, with the elbow's limit just short of the solution."""
+    """The same target with an elbow limit just short of the solution."""
     robot = Robot.load("iiwa14")
     target = Target(robot.end_effector, place_at(robot, robot.home()), 3)
     lower, upper = robot.position_limits()
     lower[3] = robot.home()[3] + 0.02
     found = reach(robot, target, robot.home(), robot.home(), lower, upper)
-    assert found.converged  # four joints are left for three numbers
+    assert found.converged  # four joints are left for three rows
     assert found.q[3] >= lower[3]

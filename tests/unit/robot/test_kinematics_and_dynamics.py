@@ -1,4 +1,4 @@
-"""Check frames and dynamics against Pinocchio, differences, energy and MuJoCo."""
+"""Frames and dynamics against Pinocchio, differences, energy and MuJoCo."""
 
 from typing import Any
 from xml.etree import ElementTree
@@ -16,15 +16,16 @@ LWA = pin.LOCAL_WORLD_ALIGNED
 
 
 def frames(robot: Robot, rng: np.random.Generator) -> list[str]:
-    """Return four frames at random and the last: it often hangs on a mimic joint."""
+    """Return four random frames and the last, which is often on a mimic joint."""
     chosen = rng.choice(len(robot.frame_names), 4, replace=False)
     return [robot.frame_names[i] for i in chosen] + [robot.frame_names[-1]]
 
 
 def step_of(v: Array) -> float:
-    """Return a step [s] in which the joints together turn by 0.01 rad.
+    """Return a step [s] in which the joints together move by 0.01 rad.
 
-    The differences of `oracles.slope` then err by 1e-14 in theory, 1e-13 by rounding.
+    Differences by `oracles.slope` then have a truncation of 1e-14 and rounding of
+    1e-13.
     """
     return 0.01 / max(1.0, float(np.abs(v).sum()))
 
@@ -36,8 +37,8 @@ def step_of(v: Array) -> float:
 def test_frames_equal_pinocchios(case: str) -> None:
     """Placement, J, J', velocity and classical acceleration (of v' = 0).
 
-    But for J' where joints mimic others, which Pinocchio gets wrong (by 3.6 on
-    tiago_pro); there the differences of the next tests decide.
+    Except J' with mimic joints, where Pinocchio is wrong (by 3.6 on tiago_pro); there
+    the differences of the next tests decide.
     """
     robot, q, v, rng = draw(case, seed=1)
     model, data = robot.model, robot.model.createData()
@@ -101,7 +102,7 @@ def test_mass_matrix_rate_is_the_derivative_along_the_flow(case: str) -> None:
     # Rounding: 2e-16 of M over 0.01/Σ|v| s.
     atol = 1e-12 * np.abs(state.mass_matrix).max() * np.abs(v).sum()
     np.testing.assert_allclose(state.mass_matrix_rate, expected, rtol=0, atol=atol)
-    assert np.abs(expected).max() > 1e3 * atol  # there is something to see
+    assert np.abs(expected).max() > 1e3 * atol  # the term is not zero
 
 
 @pytest.mark.parametrize("case", ROBOTS)
@@ -147,7 +148,7 @@ def test_mimic_fingers_carry_both_fingers_inertia() -> None:
 
 
 def mujoco_model(robot: Robot) -> Any:
-    """Return MuJoCo's own reading of the URDF, without what only MuJoCo adds."""
+    """Return the URDF as MuJoCo reads it, without MuJoCo's additions."""
     mujoco = pytest.importorskip("mujoco")
     tree = ElementTree.parse(robot.source.urdf)
     for link in tree.getroot().findall("link"):

@@ -1,4 +1,4 @@
-"""Check robots loaded by name and by path, and their roots."""
+"""Robots loaded by name and by path, and their roots."""
 
 import importlib.util
 from collections.abc import Callable
@@ -39,8 +39,8 @@ def example(name: str) -> Robot:
 @pytest.mark.parametrize(
     ("name", "mimic"), covering(sorted(example_robots()), [True, False])
 )
-def test_every_example_robot_loads_or_says_why_not(name: str, mimic: bool) -> None:
-    """Nothing but ModelError, and of exactly the robots that are known for it."""
+def test_every_example_robot_loads_or_gives_the_reason(name: str, mimic: bool) -> None:
+    """Only ModelError is raised, for exactly the listed robots."""
     reason = REFUSED.get(name)
     if not mimic and reason in {NO_HAND_MASS, NO_LEADER}:
         reason = REFUSED_WITHOUT_MIMIC.get(name)
@@ -59,7 +59,7 @@ def test_every_example_robot_loads_or_says_why_not(name: str, mimic: bool) -> No
     following = [j for j in joints if j.find("mimic") is not None]
     following = [j for j in following if j.get("type") != "fixed"]
     assert robot.nv == plain.nv + extra - len(following)
-    # The root comes first, then the URDF's joints without those that only follow.
+    # The root comes first, then the URDF's joints without mimicking ones.
     assert len(robot.dof_names) == robot.nv
     assert len(robot.joint_names) == len(robot.joints)
     last = list(robot.joints.values())[-1]
@@ -92,7 +92,7 @@ def test_without_example_robot_data(monkeypatch: pytest.MonkeyPatch) -> None:
 def test_bundled_folder_of_a_wheel(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """In a wheel the data lie inside the package; a folder without a URDF is none."""
+    """In a wheel the data are in the package; a folder without a URDF is no robot."""
     arm = tmp_path / "data" / "robots" / "arm"
     arm.mkdir(parents=True)
     (arm / "arm.urdf").write_text(ARM)
@@ -128,11 +128,11 @@ def test_package_folders_of_a_file(
     ("root", "nq", "nv"), [("fixed", 2, 2), ("planar", 6, 5), ("free_flyer", 9, 8)]
 )
 def test_root(root: Any, nq: int, nv: int, write: Callable[..., Path]) -> None:
-    text = ARM.replace(link("base", ""), link("base"))  # a root must move some mass
+    text = ARM.replace(link("base", ""), link("base"))  # a root needs mass
     robot = Robot.load(write(text), root=root)
     fixed = Robot.load(write(text))
     assert (robot.nq, robot.nv) == (nq, nv)
-    # All stands where the root puts it. The pose by Pinocchio's own conventions.
+    # Frames move with the root; the pose follows Pinocchio's conventions.
     angles = np.array([0.4, -0.7])
     if root == "fixed":
         pose, q = pin.SE3.Identity(), angles

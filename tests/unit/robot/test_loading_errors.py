@@ -1,4 +1,4 @@
-"""Check every error of a robot that cannot be loaded."""
+"""Every error of a robot that cannot be loaded."""
 
 import os
 from collections.abc import Callable
@@ -66,7 +66,7 @@ def test_file_that_may_not_be_read(
 
 
 def grown(*parts: str) -> str:
-    """Return the arm with more elements."""
+    """Return the arm's URDF with additional elements."""
     return ARM.replace("</robot>", "".join(parts) + "</robot>")
 
 
@@ -142,7 +142,7 @@ def test_file_that_is_no_robot(
 def test_hint_to_lock_joints_that_move_no_mass_helps(
     name: str, options: dict[str, Any]
 ) -> None:
-    """The message's own words, read as YAML, are the cure."""
+    """The YAML that the message suggests is the cure."""
     pytest.importorskip("example_robot_data")
     with pytest.raises(ModelError, match="lock the joints: locked: ") as caught:
         Robot.load(name, **options)
@@ -151,14 +151,17 @@ def test_hint_to_lock_joints_that_move_no_mass_helps(
     assert not set(hint["locked"]) & set(robot.joint_names)
 
 
-def test_what_the_parser_leaves_out_is_an_error(write: Callable[..., Path]) -> None:
+def test_elements_that_the_parser_skips_are_an_error(
+    write: Callable[..., Path],
+) -> None:
     text = ARM.replace('ixy="0"', "", 1)
     with pytest.raises(ModelError, match=r"leaves out a part of the model: .*upper\]"):
         Robot.load(write(text))
 
 
 def test_root_and_joint_that_do_the_same(write: Callable[..., Path]) -> None:
-    """A massless base that yaws about its first joint's axis: two joints for one."""
+    """A massless base that yaws about its first joint's axis: one joint is
+    redundant."""
     text = robot_xml(
         link("base", ""), link("upper"), joint("shoulder", "base", "upper")
     )
@@ -205,7 +208,7 @@ def test_a_pipe_is_not_read_for_ever(tmp_path: Path) -> None:
     os.mkfifo(tmp_path / "arm.urdf")
     with pytest.raises(RobotNotFoundError, match="a device or a pipe, which may never"):
         Robot.load(tmp_path / "arm.urdf")
-    os.mkfifo(tmp_path / "package.xml")  # it is read where a mesh is looked for
+    os.mkfifo(tmp_path / "package.xml")  # read where a mesh is looked up
     (tmp_path / "b.urdf").write_text(robot_xml(link("a")))
     with pytest.raises(ModelError, match="no moving joint"):
         Robot.load(tmp_path / "b.urdf")

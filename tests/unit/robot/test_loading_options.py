@@ -1,4 +1,4 @@
-"""Check options of loading, the likely hand, and robots of Pinocchio's own models."""
+"""Options of loading, the likely hand, and robots from Pinocchio models."""
 
 import re
 from collections.abc import Callable
@@ -30,7 +30,7 @@ from hsp_control.robot.description.urdf import read_urdf
 
 
 def full_configuration(model: pin.Model, values: dict[str, float]) -> np.ndarray:
-    """Return q of an unreduced model with one-freedom joints, others at zero."""
+    """Return q of an unreduced model of single-DOF joints, others at zero."""
     displacement = np.zeros(model.nv)
     for name, value in values.items():
         displacement[model.joints[model.getJointId(name)].idx_v] = value
@@ -68,10 +68,10 @@ def test_follower_is_at_multiplier_times_leader_plus_offset(
     ("planar3r", {"joint1": -1.5, "joint3": 4.0}),  # beyond half a turn
     ("kinova", {"j2s6s200_joint_1": -2.0, "j2s6s200_joint_3": 1.0}),
 ])  # fmt: skip
-def test_locked_joint_stands_where_it_is_told(
+def test_locked_joint_is_at_its_given_position(
     name: str, locks: dict[str, float]
 ) -> None:
-    """Bodies stand as in the whole robot, and M is the rest of the whole M."""
+    """Poses are those of the whole robot, and M is the submatrix of its M."""
     if name not in BUNDLED:
         pytest.importorskip("example_robot_data")
     robot = Robot.load(name, locked=locks)
@@ -94,13 +94,14 @@ def test_locked_joint_stands_where_it_is_told(
 def test_followers_may_be_named_if_they_agree_with_their_leader(
     write: Callable[..., Path],
 ) -> None:
-    """So that one list of locks serves with and without mimic, as the Panda's does."""
+    """So the same list of locked joints works with and without mimic, as the
+    Panda's."""
     path = write(gripper())
     locks = {"shoulder": 0.4, "follower": -1.5 * 0.4 + 0.3}
     assert Robot.load(path, locked=locks).joint_names == ("elbow",)
     assert Robot.load(path, locked=locks, mimic=False).joint_names == ("elbow",)
-    told = "... lock 'follower' at 0.4: ... 'shoulder' ... -0.3"
-    with pytest.raises(ModelError, match=wording(told)):
+    reported = "... lock 'follower' at 0.4: ... 'shoulder' ... -0.3"
+    with pytest.raises(ModelError, match=wording(reported)):
         Robot.load(path, locked={"shoulder": 0.4, "follower": 0.4})
     with pytest.raises(ModelError, match="it mimics 'shoulder'; lock 'shoulder'"):
         Robot.load(path, locked={"follower": 0.4})
@@ -178,26 +179,26 @@ def welded(parent: str, name: str) -> list[str]:
 @pytest.mark.parametrize(
     ("parts", "expected"),
     [
-        # A chain ends at its last link, be it welded to the last that moves.
+        # A chain ends at its last link, also if that is fixed to the last moving one.
         ([chain("base", "a", "b")], "b"),
         ([chain("base", "a", "b"), link("tool"), joint("weld", "b", "tool", "fixed")],
          "tool"),
-        # The longest chain, and the last of equals.
+        # The longest chain; among equals the last.
         ([chain("base", "a", "b"), chain("base", "x", "y", "z")], "z"),
         ([chain("base", "x", "y", "z"), chain("base", "a", "b", "c")], "z"),
         # A fork in the second half is a hand with fingers; one in the first is not.
         ([chain("base", "a", "b", "c", "d", "e"), chain("d", "f")], "d"),
         ([chain("base", "a", "b", "c", "d", "e"), chain("a", "f")], "e"),
-        # But one short branch is a link of the arm's mechanism, and no elbow the hand.
+        # A single short branch belongs to the arm's mechanism; an elbow is no hand.
         ([chain("base", "a", "b", "c", "d", "e", "f"), chain("c", "rod")], "f"),
         ([chain("base", "a", "b", "c", "d", "e", "f"), chain("c", "rod"),
           chain("c", "bar")], "c"),
-        # A finger that is welded on is none to track, and neither is a sensor.
+        # Neither a fixed finger nor a sensor is the hand.
         ([chain("base", "a", "b"), link("hand_camera"),
           joint("weld", "b", "hand_camera", "fixed")], "b"),
         ([chain("base", "a", "b"), link("left_finger"),
           joint("weld", "b", "left_finger", "fixed")], "b"),
-        # The body that was welded on as the hand precedes those welded on later.
+        # A body fixed as the hand precedes those fixed later.
         ([chain("base", "a", "b"), *welded("b", "my_tcp"), *welded("b", "cover")],
          "my_tcp"),
         ([chain("base", "a", "b"), *welded("b", "ee_link"), *welded("b", "tool0"),
@@ -206,7 +207,7 @@ def welded(parent: str, name: str) -> list[str]:
          "grasp"),
         ([chain("base", "a", "b"), *welded("b", "gripper_frame_link"),
           *welded("b", "cover")], "gripper_frame_link"),
-        # A jaw is none, also where it is one more joint of the chain.
+        # A jaw is no hand, also if it is a further joint of the chain.
         ([chain("base", "a", "b"), link("c"), joint("gripper", "b", "c")], "b"),
         ([chain("base", "a", "b"), link("c"), joint("moving_jaw", "b", "c")], "b"),
         ([chain("base", "a", "b"), link("c"), joint("finger", "b", "c"), link("d"),
@@ -215,7 +216,7 @@ def welded(parent: str, name: str) -> list[str]:
           *welded("b", "tcp")], "tcp"),
         ([chain("base", "a", "b"), link("c"), joint("gripper", "b", "c"),
           *welded("b", "gripper_frame")], "gripper_frame"),
-        # But the wrist that turns a gripper is the arm's, and a finger alone is one.
+        # The wrist of a gripper belongs to the arm; a single finger is a gripper.
         ([chain("base", "a", "b"), link("c"), joint("gripper_roll", "b", "c")], "c"),
         ([chain("base", "a", "b"), link("c_gripper"), joint("c", "b", "c_gripper")],
          "c_gripper"),
@@ -239,7 +240,7 @@ def test_the_hand(parts: list[str], expected: str, write: Callable[..., Path]) -
          "ends with 'a-b', where fingers branch off"),
     ],
 )  # fmt: skip
-def test_it_is_said_why_a_link_is_the_hand(
+def test_the_reason_for_the_choice_of_hand_is_reported(
     parts: list[str], why: str, write: Callable[..., Path]
 ) -> None:
     text = robot_xml(link("base", ""), chain("base", "z", "a", "b"), *parts)
@@ -251,7 +252,7 @@ def test_it_is_said_why_a_link_is_the_hand(
 
 
 def of_panda() -> tuple[Robot, list[object]]:
-    """Return the bundled Panda, and what Pinocchio makes of its files."""
+    """Return the bundled Panda, and Pinocchio's model of its files."""
     robot = Robot.load("panda", locked={}, mimic=False)
     source = robot.source
     folders = [str(folder) for folder in source.package_dirs]
@@ -281,7 +282,7 @@ def test_a_robot_of_a_pinocchio_model_is_that_of_its_urdf() -> None:
     np.testing.assert_allclose(tau[1], tau[0], atol=1e-9)
 
 
-def test_what_is_no_pinocchio_model_is_refused() -> None:
+def test_objects_that_are_no_pinocchio_model_are_refused() -> None:
     _, (model, collision, visual) = of_panda()
     less = pin.buildReducedModel(model, [8, 9], pin.neutral(model))
     for arguments, message in (

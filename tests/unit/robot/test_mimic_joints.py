@@ -1,4 +1,4 @@
-"""Followers of all kinds load; what bounds and brakes them does so their leaders."""
+"""Mimic joints of all kinds; their limits and friction apply to their leaders."""
 
 import itertools
 import logging
@@ -88,7 +88,7 @@ def test_a_follower_bounds_its_leader(
     'lower="-3" upper="3" effort="9" velocity="9"',  # wider than the leader's
     'lower="0" upper="0" effort="0" velocity="0"',  # none
 ])  # fmt: skip
-def test_what_is_wider_than_the_leaders_limits_does_not_count(
+def test_limits_wider_than_the_leader_s_have_no_effect(
     limits: str, write: Write
 ) -> None:
     robot = Robot.load(write(pair(-0.9, limits)))
@@ -101,13 +101,15 @@ def test_what_is_wider_than_the_leaders_limits_does_not_count(
 def test_limits_that_contradict_are_named(
     write: Write, caplog: pytest.LogCaptureFixture
 ) -> None:
-    """Such grippers exist, and their leaders move."""
+    """Such grippers exist; their leaders move within their own limits."""
     limits = 'lower="4" upper="5" effort="9" velocity="9"'
     with caplog.at_level(logging.WARNING):
         robot = Robot.load(write(pair(1.0, limits)))
     assert robot.position_limits()[1][0] == 3.0
-    told = "... joint 'follower': ... 'leader' ... 3.9 to 4.9 ... -3 to 3 ... ignored"
-    assert re.search(wording(told), caplog.text)
+    reported = (
+        "... joint 'follower': ... 'leader' ... 3.9 to 4.9 ... -3 to 3 ... ignored"
+    )
+    assert re.search(wording(reported), caplog.text)
 
 
 def test_a_follower_brakes_its_leader(write: Write) -> None:
@@ -133,7 +135,7 @@ def test_a_chain_is_bounded_by_all_of_it(write: Write) -> None:
 
 
 def test_a_leader_that_comes_late_keeps_its_name(write: Write) -> None:
-    """Its angle is q; it has its limits, and its frame is where it is."""
+    """q is its angle; limits and frame are its own."""
     path = write(TEXTS["follower first"])
     robot, free = Robot.load(path), Robot.load(path, mimic=False)
     assert robot.joint_names == ("shoulder", "elbow", "wrist")
@@ -162,10 +164,11 @@ def test_a_leader_that_comes_late_keeps_its_name(write: Write) -> None:
 
 @pytest.mark.parametrize("multiplier", [1.0, 2.5, -1.5, 0.0])
 @pytest.mark.parametrize("kinds", [*itertools.product(TYPES, TYPES)])
-def test_what_gravity_takes_of_a_leader_counts_its_followers(
+def test_static_efforts_of_a_leader_include_its_followers(
     kinds: tuple[str, str], multiplier: float, write: Write
 ) -> None:
-    """The limit on it: its bound holds, and its rows are G'' along the motion."""
+    """A limit on the follower: its bound holds, and its rows are G'' along the
+    motion."""
     leader, follower = kinds
     path = write(
         chain(
@@ -191,6 +194,6 @@ def test_what_gravity_takes_of_a_leader_counts_its_followers(
     rate = (room(h) - room(-h)) / (2.0 * h)
     second = (room(h) - 2.0 * room(0.0) + room(-h)) / h**2
     barrier = second + 2.0 * alpha * rate + alpha**2 * room(0.0)
-    # Differences of differences, of numbers about 2: rounding and truncation.
+    # Second differences of numbers near 2: rounding and truncation.
     expected = barrier[gravity > 1e-3]
     np.testing.assert_allclose(A @ a - b, expected, rtol=0.0, atol=1e-3)

@@ -1,4 +1,4 @@
-"""Rotors in the model: given, bundled or from a URDF, and what keeps them."""
+"""Rotor inertia in the model: given, bundled or from a URDF, and kept in copies."""
 
 from pathlib import Path
 from typing import Any
@@ -75,7 +75,7 @@ def test_a_rotor_of_no_joint_is_named_when_the_robot_is_loaded(
     ("transmission", "expected"),
     [("", 0.0), (PLAIN, 0.05), (DRAKE, 0.05), (OUTSIDE, 0.05), (SILENT, 0.0)],
 )
-def test_a_urdf_says_it_in_its_transmissions(
+def test_a_urdf_declares_it_in_its_transmissions(
     transmission: str, expected: float, tmp_path: Path
 ) -> None:
     """I k², for a reduction of any sign; the other joint has none."""
@@ -114,7 +114,7 @@ def test_it_is_the_diagonal_of_m_in_every_algorithm(name: str) -> None:
 
 
 @pytest.mark.parametrize("name", ["panda", "iiwa14"])
-def test_bundled_arms_have_rotors_where_they_are_asked_for(name: str) -> None:
+def test_bundled_arms_have_rotors_on_request(name: str) -> None:
     bare, whole = hsp.Robot.load(name), hsp.Robot.load(name, motor_inertia="bundled")
     assert not bare.model.armature.any()
     assert (whole.model.armature >= 0.1).all()
@@ -156,7 +156,7 @@ def test_locking_combining_and_copying_keep_it() -> None:
         np.testing.assert_allclose(M[place, place], alone, atol=1e-12)
 
 
-def test_a_plant_has_the_rotors_of_the_controller_and_its_own_besides() -> None:
+def test_a_plant_has_the_controller_s_rotors_and_further_ones() -> None:
     robot = hsp.Robot.load("panda", motor_inertia=0.1)
     for part, expected in (
         (RigidBody(), 0.1),
@@ -192,7 +192,7 @@ def test_mistakes_are_named(given: Any, message: str) -> None:
         hsp.Robot.load("panda", motor_inertia=given)
 
 
-def test_what_is_not_there_is_named(tmp_path: Path) -> None:
+def test_missing_names_are_named(tmp_path: Path) -> None:
     with pytest.raises(ModelError, match="planar3r comes without motor inertias; give"):
         hsp.Robot.load("planar3r", motor_inertia="bundled")
     wrong = PLAIN.replace("2e-5", "much")

@@ -1,4 +1,4 @@
-"""Every joint of Pinocchio's has its exact rates here, or is refused by name."""
+"""Every Pinocchio joint has exact rates, or is refused by name."""
 
 from collections.abc import Callable
 from typing import Any
@@ -95,7 +95,7 @@ def test_a_translation_has_three_lengths() -> None:
 
 
 def sliding() -> Robot:
-    """A joint of three slides within their limits, and one that turns on it."""
+    """A joint of three slides within limits, and a revolute joint on it."""
     model = pin.Model()
     slide = model.addJoint(
         0, pin.JointModelTranslation(), pin.SE3.Identity(), "slide",
@@ -115,7 +115,7 @@ def sliding() -> Robot:
 
 
 def test_the_slides_of_a_translation_keep_their_limits() -> None:
-    """The hand is commanded to 0.9 m: the slide ends at 0.2 m."""
+    """The hand is commanded to 0.9 m; the slide's limit is 0.2 m."""
     robot = sliding()
     lower, upper = robot.position_limits()
     np.testing.assert_array_equal(lower, [-0.2, -0.2, -0.2, -2.0])

@@ -64,7 +64,7 @@ def all_joints() -> hsp.Robot:
 
 
 def followers() -> hsp.Robot:
-    """Followers of each kind of joint, of a leader that turns often, and a whole."""
+    """A chain with mimic joints of several types, also of a multi-turn leader."""
     rng = np.random.default_rng(2)
     kinds = [
         (pin.JointModelRX(), None),
@@ -92,7 +92,7 @@ def followers() -> hsp.Robot:
 
 
 def one_of_many() -> hsp.Robot:
-    """A joint of three slides, one after the other, beside one that turns."""
+    """A joint of three slides in series, next to a revolute one."""
     table = pin.JointModelComposite()
     pose = pin.exp6(pin.Motion(0.2 * np.arange(6.0)))
     for kind in (pin.JointModelPX(), pin.JointModelPY(), pin.JointModelPZ()):
@@ -107,7 +107,7 @@ def one_of_many() -> hsp.Robot:
 
 
 def tilted() -> hsp.Robot:
-    """A joint that turns often about its own axis, and one that it leads."""
+    """A multi-turn joint about a general axis, and its follower."""
     joints = "".join(
         f'<joint name="j{k}" type="continuous"><parent link="l{k}"/>'
         f'<child link="l{k + 1}"/><axis xyz="{axis}"/>'
@@ -138,7 +138,7 @@ ROBOTS = {
 
 
 def equal(one: hsp.Robot, other: hsp.Robot) -> None:
-    """The same motion of the same frames, to the last bit."""
+    """The same motion of the same frames, bit for bit."""
     assert one.frame_names == other.frame_names
     assert one.dof_names == other.dof_names
     assert one.end_effector == other.end_effector
@@ -164,7 +164,7 @@ def test_a_record_is_the_robot(kind: str) -> None:
 
 
 def copied(folder: Path) -> Path:
-    """Return a URDF of one's own: a bundled one in another folder."""
+    """Return a user's URDF: a bundled one in another folder."""
     source = hsp.Robot.load("planar3r").source.urdf
     folder.mkdir(exist_ok=True)
     return Path(shutil.copy(source, folder / "mine.urdf"))
@@ -178,7 +178,7 @@ def log_of(robot: hsp.Robot, path: Path) -> hsp.Rollout:
     return run
 
 
-def test_an_edited_urdf_is_named_and_the_log_s_own_counts(
+def test_an_edited_urdf_is_named_and_the_log_s_robot_is_used(
     tmp_path: Path, caplog: pytest.LogCaptureFixture
 ) -> None:
     urdf = copied(tmp_path / "robots")
@@ -287,8 +287,8 @@ def vertices(robot: hsp.Robot) -> list[Array]:
     return [np.array(shape.geometry.vertices()) for shape in shapes]
 
 
-def test_a_log_contains_the_meshes_of_somebodys_robot(tmp_path: Path) -> None:
-    """Its shapes are drawn, and distances measured, where its files are not."""
+def test_a_log_contains_the_meshes_of_a_user_s_robot(tmp_path: Path) -> None:
+    """Without its files, its shapes are drawn and distances measured."""
     urdf = with_meshes(tmp_path)
     robot = hsp.Robot.load(urdf)
     record = json.loads(json.dumps(robot_record(robot)))
@@ -299,7 +299,7 @@ def test_a_log_contains_the_meshes_of_somebodys_robot(tmp_path: Path) -> None:
     assert len(before) == 2
     np.testing.assert_array_equal(vertices(again), before)
     assert not any(visual.missing for visual in read_visuals(again))
-    # And a log of what was replayed contains them, too.
+    # A log of the replayed run contains them, too.
     assert robot_record(again)["parts"][0]["meshes"] == record["parts"][0]["meshes"]
 
 
@@ -315,10 +315,10 @@ def test_packages_are_no_part_of_a_log_and_large_meshes_are_named(
     monkeypatch.setattr(recorded_meshes, "MOST", room)
     (part,) = robot_record(robot)["parts"]
     assert [*part["meshes"]] == felt
-    (said,) = messages(caplog, "no room")
+    (reported,) = messages(caplog, "no room")
     left_out = [name for name in whole["meshes"] if name not in felt]
     for name in left_out:
-        assert f"{name} (0.0 MB)" in said
+        assert f"{name} (0.0 MB)" in reported
     assert part["left_out"] == dict.fromkeys(left_out, "0.0 MB")
     caplog.clear()
     record = robot_record(robot)
@@ -326,8 +326,8 @@ def test_packages_are_no_part_of_a_log_and_large_meshes_are_named(
     assert not caplog.records  # the files are there
     shutil.rmtree(robot.source.urdf.parent)
     recorded_robot(record)
-    (said,) = messages(caplog, "does not contain")
-    assert all(name in said for name in left_out)
+    (reported,) = messages(caplog, "does not contain")
+    assert all(name in reported for name in left_out)
 
 
 def messages(caplog: pytest.LogCaptureFixture, what: str) -> list[str]:
@@ -342,7 +342,7 @@ RED = bytes.fromhex(
 
 
 def test_a_mesh_is_recorded_with_the_files_that_are_drawn_of_it(tmp_path: Path) -> None:
-    """A Collada file's picture and a glTF file's buffer are files of their own."""
+    """A Collada file's texture and a glTF file's buffer are separate files."""
     urdf = with_meshes(tmp_path)
     folder = urdf.parent / "meshes"
     (urdf.parent / "pictures").mkdir()
@@ -376,7 +376,7 @@ def test_a_mesh_is_recorded_with_the_files_that_are_drawn_of_it(tmp_path: Path) 
     assert seen[1].mesh is not None
     np.testing.assert_array_equal(gltf_again.mesh[0], seen[1].mesh[0])
     np.testing.assert_array_equal(vertices(again), felt)
-    # And a log of what was replayed is the same.
+    # A log of the replayed run is the same.
     assert robot_record(again)["parts"][0] == record["parts"][0]
 
 
@@ -408,9 +408,9 @@ def test_a_mesh_that_was_edited_since_is_named(
     file = urdf.parent / "meshes" / "b.obj"
     file.write_text(PYRAMID.replace("0.3", "0.6"))
     again = recorded_robot(record)
-    (said,) = messages(caplog, "have changed")
-    assert "meshes/b.obj" in said
-    assert "a.obj" not in said
+    (reported,) = messages(caplog, "have changed")
+    assert "meshes/b.obj" in reported
+    assert "a.obj" not in reported
     np.testing.assert_array_equal(vertices(again), before)
 
 
@@ -433,7 +433,7 @@ def test_damaged_meshes_are_named(meshes: object, tmp_path: Path) -> None:
      {f"{sha256(b'x').hexdigest()[:32]}.sh": packed(b"x")}],
     ids=lambda beside: str(beside)[:20],
 )  # fmt: skip
-def test_files_beside_recorded_meshes_are_what_their_names_say(
+def test_files_beside_recorded_meshes_match_their_names(
     beside: object, tmp_path: Path
 ) -> None:
     record = robot_record(hsp.Robot.load(with_meshes(tmp_path)))

@@ -50,7 +50,7 @@ def test_its_parts_are_not_assigned_or_written(name: str) -> None:
 def test_update_moves_all_of_it_and_shows_the_memory_itself(
     steps: list[tuple[int, bool]],
 ) -> None:
-    """In any order with `compute` of numbers: q, v, t and terms belong together."""
+    """Interleaved with `compute` of numbers: q, v, t and terms stay consistent."""
     law, fresh = controller(), controller()
     for each in (law, fresh):
         each.restart(origin=0.0)
@@ -78,7 +78,7 @@ def test_update_moves_all_of_it_and_shows_the_memory_itself(
 @pytest.mark.parametrize(
     "make", [copy.copy, copy.deepcopy, lambda s: pickle.loads(pickle.dumps(s))]
 )
-def test_a_copy_is_a_state_of_its_own(make: Callable[[Any], Any]) -> None:
+def test_a_copy_is_an_independent_state(make: Callable[[Any], Any]) -> None:
     law = controller()
     t, q, v = states(1)[0]
     law.compute(t, q, v)
@@ -106,7 +106,7 @@ def test_unknown_frame() -> None:
 
 
 @pytest.mark.parametrize("name", [3, ["panda_hand"], None])
-def test_what_is_no_name_is_no_frame_and_no_joint(name: Any) -> None:
+def test_objects_that_are_no_names_are_refused(name: Any) -> None:
     robot = draw("panda", seed=22)[0]
     with pytest.raises(FrameNotFoundError, match=re.escape(f"no frame {name!r} (")):
         robot.frame_id(name)
@@ -117,7 +117,7 @@ def test_what_is_no_name_is_no_frame_and_no_joint(name: Any) -> None:
 @pytest.mark.parametrize(("joint", "hint"), [
     ("panda_joint8", "; did you mean 'panda_joint"),
     ("panda_finger_joint1", "; did you mean 'panda_joint"),  # locked
-    ("universe", " (the model has panda_joint1, "),  # Pinocchio's, not a joint
+    ("universe", " (the model has panda_joint1, "),  # Pinocchio's universe, not a joint
     ("panda_hand", " (the model has panda_joint1, "),  # a frame
 ])  # fmt: skip
 def test_unknown_joint(joint: str, hint: str) -> None:
@@ -135,10 +135,10 @@ def test_unknown_joint(joint: str, hint: str) -> None:
 def test_pickle_and_deep_copy_round_trip(
     case: str, duplicate: Callable[[Robot], Robot]
 ) -> None:
-    """The other robot is another object with the same results, to the last bit."""
+    """The copy is another object with the same results, bit for bit."""
     robot, q, v, _ = draw(case, seed=28)
     if robot.mimics and duplicate is by_pickle:
-        # Pinocchio would restore a model that ends the process when it is used.
+        # Pinocchio would restore a model that crashes the process.
         with pytest.raises(
             ModelError, match=r"mimic joints cannot be pickled; .*False"
         ):

@@ -26,7 +26,7 @@ YAML_KEYS = {
     "licence",
     "source",
 }
-# Mass of the links that move [kg], and where the end effector is at home [m].
+# Mass of the moving links [kg], and the end effector's position at home [m].
 EXPECTED = {
     "iiwa14": (25.61, (0.21 + 0.2 * np.sqrt(3), 0.0, 0.034 + 0.21 * np.sqrt(3))),
     "panda": (16.822132, (0.306891, 0.0, 0.486882)),
@@ -65,7 +65,7 @@ def links(path: Path) -> list[ElementTree.Element]:
 
 @pytest.mark.parametrize("name", NAMES)
 def test_files_name_no_place_on_this_machine(name: str) -> None:
-    """No absolute path; no address but licence, meshes' package and their schema."""
+    """No absolute path; no URL but those of licence, mesh package and schema."""
     assert ElementTree.parse(urdf(name)).getroot().attrib["name"] == name
     for file in sorted((ROBOTS / name).rglob("*.*")):
         text = file.read_text(encoding="utf-8")
@@ -81,7 +81,7 @@ def test_files_name_no_place_on_this_machine(name: str) -> None:
 
 @pytest.mark.parametrize("name", NAMES)
 def test_robot_yaml(name: str) -> None:
-    """Known keys only; home fits the model and puts the end effector as documented."""
+    """Known keys only; at home the end effector is at the documented position."""
     settings = robot_yaml(name)
     assert set(settings) <= YAML_KEYS
     model = load(name)
@@ -121,7 +121,7 @@ def test_every_link_could_be_a_body(name: str) -> None:
 
 @pytest.mark.parametrize("name", NAMES)
 def test_collision_geometry_is_capsules(name: str) -> None:
-    """Every link with a mass has one at least, and no other shapes."""
+    """Every link with mass has at least one primitive, and no other shapes."""
     shapes = link_shapes(Robot.load(name))
     assert {type(shape.geometry).__name__ for shape in shapes} == {"Capsule"}
     assert len(shapes) == {"iiwa14": 9, "panda": 13, "planar3r": 3}[name]

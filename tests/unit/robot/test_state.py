@@ -1,4 +1,4 @@
-"""Check that one state can be moved, read in any order and fed wrong numbers."""
+"""A state can be moved, read in any order, and given wrong numbers."""
 
 import gc
 import itertools
@@ -40,7 +40,7 @@ def test_update_moves_everything(case: str) -> None:
 @pytest.mark.slow
 @pytest.mark.parametrize("case", ["panda", "panda_fingers", "solo12"])
 def test_order_of_questions_does_not_matter(case: str) -> None:
-    """Pinocchio's algorithms share one memory: none may spoil what another wrote."""
+    """Pinocchio's algorithms share one memory: none may overwrite another's results."""
     robot, q, v, _ = draw(case, seed=13)
     name = robot.frame_names[-1]
     a = np.ones(robot.nv)
@@ -58,7 +58,7 @@ def test_order_of_questions_does_not_matter(case: str) -> None:
     }
     # One call may leave a Jacobian that another recomputes: equal up to rounding only.
     orders = list(itertools.permutations(questions))
-    for order in orders if THOROUGH else orders[::7]:  # all begin one, in each place
+    for order in orders if THOROUGH else orders[::7]:  # all occur in all positions
         state = robot.state(0.0, q, v)
         first = {what: questions[what](state) for what in order}
         for what in order:
@@ -70,7 +70,7 @@ def test_order_of_questions_does_not_matter(case: str) -> None:
 
 @pytest.mark.parametrize("case", ["planar3r", "panda", "panda_fingers", "solo12"])
 def test_companion_states_do_not_disturb(case: str) -> None:
-    """`displaced` and `ahead` are states elsewhere; the state itself stays."""
+    """`displaced` and `ahead` return other states; the state itself is unchanged."""
     robot, q, v, rng = draw(case, seed=15)
     name = robot.frame_names[-1]
     state = robot.state(0.5, q, v)
@@ -84,7 +84,7 @@ def test_companion_states_do_not_disturb(case: str) -> None:
     there = robot.state(0.75, robot.integrate(q, displacement), v)
     assert_equal_terms(everything(companion, name), everything(there, name))
 
-    # A companion's companion is a third state: nested differences work.
+    # A displaced state's displaced state is a third one: nested differences work.
     again = companion.displaced(0.25, -displacement)
     assert again is not companion
     assert companion.t == 0.75
@@ -96,7 +96,7 @@ def test_companion_states_do_not_disturb(case: str) -> None:
     np.testing.assert_array_equal(ahead.v, v)
     assert state.t == 0.5
     np.testing.assert_array_equal(state.q, q)
-    # Untouched, not merely recomputable: what was handed out still reads the same.
+    # Unchanged, not merely recomputed: arrays returned earlier have the same values.
     assert_equal_terms(everything(state, name), before)
 
 
@@ -110,14 +110,14 @@ def test_arrays_outlive_the_state_that_they_came_from() -> None:
         M = robot.state(0.0, q, v).mass_matrix
         held.append((frame, frame.position.copy(), frame.rotation.copy(), M, M.copy()))
         gc.collect(0)
-        np.full(2000, np.nan)  # would land in memory that had been freed
+        np.full(2000, np.nan)  # otherwise written to freed memory
     for frame, position, rotation, M, M_kept in held:
         np.testing.assert_array_equal(frame.position, position)
         np.testing.assert_array_equal(frame.rotation, rotation)
         np.testing.assert_array_equal(M, M_kept)
 
 
-# --- borders -------------------------------------------------------------------------
+# --- invalid input -------------------------------------------------------------------
 
 
 def poisoned(vector: Array, value: float, place: int = 1) -> Array:
@@ -152,10 +152,10 @@ BAD_STATES = {
 
 
 @pytest.mark.filterwarnings("ignore:invalid value encountered:RuntimeWarning")
-@pytest.mark.parametrize("what", BAD_STATES)
-def test_bad_state_is_refused_and_leaves_the_old_one(what: str) -> None:
+@pytest.mark.parametrize("bad", BAD_STATES)
+def test_bad_state_is_refused_and_leaves_the_old_one(bad: str) -> None:
     robot, q, v, _ = draw("solo12", seed=19)
-    spoil, error, message = BAD_STATES[what]
+    spoil, error, message = BAD_STATES[bad]
     state = robot.state(0.5, q, v)
     name = robot.frame_names[-1]
     before = everything(state, name)
@@ -176,7 +176,7 @@ def test_bad_state_is_refused_and_leaves_the_old_one(what: str) -> None:
 
 
 def test_calls_after_a_move_see_its_time_and_state() -> None:
-    """Also those that are Python, such as a field that somebody wrote."""
+    """Also Python calls, such as a user's field."""
     robot, q, v, _ = draw("panda", seed=31)
     state, seen = robot.state(0.0, q, v), list[tuple[float, float, Array]]()
 
@@ -204,7 +204,7 @@ def test_a_refused_move_changes_nothing_and_calls_nothing() -> None:
 
 
 def test_a_type_error_of_a_call_is_its_own() -> None:
-    """It is not taken for one about the time."""
+    """It is not reported as an error of the time."""
     robot, q, v, _ = draw("panda", seed=33)
     state = robot.state(0.0, q, v)
 

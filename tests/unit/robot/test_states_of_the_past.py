@@ -1,7 +1,7 @@
-"""Nothing of an earlier state is in a later one, of robots of every kind.
+"""No result depends on an earlier state, for robots of every kind.
 
-Pinocchio's algorithms keep what they compute with in their data. The n-th result of one
-robot is compared with the first one of another, to the last bit: the same code ran.
+Pinocchio's algorithms store intermediate results in their data. The n-th result of one
+robot is compared with the first one of another, bit for bit.
 """
 
 from collections.abc import Iterator
@@ -25,7 +25,7 @@ kinds = pytest.mark.parametrize("kind", KINDS)
 
 
 class Used:
-    """All that computes something of one robot, to be called again and again."""
+    """All functions of one robot, to be called repeatedly."""
 
     def __init__(self, robot: Robot) -> None:
         self.robot = robot
@@ -47,7 +47,7 @@ class Used:
             )
 
     def everything(self, t: float, q: Array, v: Array, tau: Array) -> dict[str, Array]:
-        """Return copies of all that there is to know at a state."""
+        """Return copies of all results at a state."""
         found = everything(self.state.update(t, q, v), self.frame)
         found["forward dynamics"] = self.robot.forward_dynamics(q, v, tau)
         found["inverse dynamics"] = self.robot.inverse_dynamics(q, v, tau)
@@ -88,10 +88,10 @@ def test_the_nth_state_is_a_fresh_one(kind: str, tmp_path: Path) -> None:
 def test_forward_dynamics_are_the_inverse_of_inverse_dynamics(
     kind: str, tmp_path: Path
 ) -> None:
-    """M is not what RNEA uses.
+    """M disagrees with RNEA.
 
-    Pinocchio's CRBA leaves out what a joint of several freedoms between a leader and
-    its follower shares with them.
+    Pinocchio's CRBA omits the coupling of a multi-DOF joint between a leader and its
+    follower.
     """
     robot, rng = KINDS[kind](tmp_path), np.random.default_rng(8)
     for _ in range(5):
@@ -110,7 +110,7 @@ def reductions(folder: Path) -> Iterator[tuple[str, Robot, Robot, Array, Array]]
         file = folder / f"{kind}.urdf"
         file.write_text(text)
         robot, free = Robot.load(file), Robot.load(file, mimic=False)
-        # each as in its URDF: q_free = A q_free + B q + b, link by link of a chain
+        # as in the URDF: q_free = A q_free + B q + b, link by link of a chain
         A, B, b = (np.zeros((free.nv, *each)) for each in ((free.nv,), (robot.nv,), ()))
         for name in robot.joint_names:
             own, there = (each.velocity_index(name) for each in (robot, free))
@@ -129,7 +129,7 @@ def reductions(folder: Path) -> Iterator[tuple[str, Robot, Robot, Array, Array]]
 
 
 def test_mimic_joints_move_as_free_ones_that_are_moved_so(tmp_path: Path) -> None:
-    """Placements, M, efforts and their rates, by the robot whose joints are free."""
+    """Placements, M, efforts and their rates, from the robot without mimic."""
     found = set()
     rng = np.random.default_rng(9)
     for kind, robot, free, G, o in reductions(tmp_path):
@@ -172,10 +172,10 @@ def test_mimic_joints_move_as_free_ones_that_are_moved_so(tmp_path: Path) -> Non
 
 
 @kinds
-def test_a_mass_matrix_does_not_depend_on_what_was_computed_before(
+def test_a_mass_matrix_does_not_depend_on_earlier_results(
     kind: str, tmp_path: Path
 ) -> None:
-    """Whatever the memory of the dynamics was used for."""
+    """After any earlier use of the dynamics' memory."""
     robot, rng = KINDS[kind](tmp_path), np.random.default_rng(2)
     for _ in range(3):
         q = robot.random_configuration(rng)

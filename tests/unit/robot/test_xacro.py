@@ -1,4 +1,4 @@
-"""Xacro files: expanded where xacro is installed, else an exact message."""
+"""Xacro files: expanded if xacro is installed, otherwise an exact message."""
 
 import sys
 from pathlib import Path
@@ -28,7 +28,7 @@ class ArgumentMissingError(Exception):
 
 @pytest.fixture
 def xacro(monkeypatch: pytest.MonkeyPatch) -> ModuleType:
-    """A stand-in for xacro: it knows arguments and $(find), and nothing else."""
+    """A stand-in for xacro, with arguments and $(find) only."""
     package, args = ModuleType("xacro"), ModuleType("xacro.substitution_args")
 
     def process_file(name: str, mappings: dict[str, str]) -> minidom.Document:
@@ -52,7 +52,7 @@ def xacro(monkeypatch: pytest.MonkeyPatch) -> ModuleType:
 
 
 @pytest.mark.parametrize("name", ["arm.urdf.xacro", "arm.xacro", "arm.urdf"])
-def test_a_xacro_file_is_expanded_whatever_its_name(
+def test_a_xacro_file_of_any_name_is_expanded(
     name: str, tmp_path: Path, xacro: ModuleType
 ) -> None:
     path = tmp_path / name
@@ -85,7 +85,7 @@ def test_packages_are_found_without_ros(
     assert xacro.substitution_args._eval_find is None  # as it was
 
 
-def test_without_xacro_the_message_says_what_to_do(
+def test_without_xacro_the_message_has_the_remedy(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setitem(sys.modules, "xacro", None)

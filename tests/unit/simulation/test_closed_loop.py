@@ -1,4 +1,4 @@
-"""Check the closed loop: sampled and continuous control, time, and progress."""
+"""The closed loop: sampled and continuous control, time, and progress."""
 
 from typing import Any
 
@@ -17,7 +17,7 @@ from hsp_control.trajectories import Lissajous
 def test_sampled_control_converges_in_first_order(which: str) -> None:
     """Held efforts deviate from the continuous law in proportion to the period.
 
-    Slopes by regression over 8, 4, 2 and 1 ms; 1.01 to 1.04 are found.
+    Slopes by regression over 8, 4, 2 and 1 ms; measured: 1.01 to 1.04.
     """
     controller = planar_controller() if which == "planar3r" else panda_controller()
     robot = controller.robot
@@ -54,7 +54,7 @@ class Spy(RigidBodyPlant):
 
 
 def test_sampled_control_holds_the_effort() -> None:
-    """One effort a period, from beginning to end; the first is the logged one."""
+    """One effort per period from beginning to end; the first one is logged."""
     plant = Spy(planar_controller().robot)
     run = simulate(
         planar_controller(),
@@ -90,7 +90,7 @@ def test_continuous_control_is_evaluated_in_every_stage() -> None:
 
 
 def test_the_plant_may_be_another_robot() -> None:
-    """A task error that dies on the model itself remains on an arm under gravity."""
+    """A task error that decays on the model persists on an arm under gravity."""
     pytest.importorskip("example_robot_data")
     model, real = Robot.load("ur5"), Robot.load("ur5", gravity=(0.0, 0.0, -9.0))
     q0 = model.random_configuration(np.random.default_rng(1))

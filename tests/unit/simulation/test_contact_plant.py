@@ -1,4 +1,4 @@
-"""Rigid contacts: against Pinocchio's own solver, and by what they must conserve."""
+"""Rigid contacts: against Pinocchio's solver, and by conserved quantities."""
 
 from collections.abc import Callable
 from typing import Any
@@ -42,7 +42,7 @@ def contact_rows(plant: ContactPlant, q: Array, v: Array) -> tuple[Array, Array]
 
 
 def stance(plant: ContactPlant, seed: int, speed: float = 1.0) -> tuple[Array, Array]:
-    """Return a random configuration, and a velocity that moves no contact."""
+    """Return a random configuration, and a velocity with J v = 0 at contacts."""
     robot, rng = plant.robot, np.random.default_rng(seed)
     q = robot.integrate(robot.home(), 0.4 * rng.normal(size=robot.nv))
     v = speed * rng.normal(size=robot.nv)
@@ -60,8 +60,8 @@ def wrench(plant: ContactPlant, frame: str, at: Any) -> tuple[Array, Array]:
     """Return the force and the moment on a frame at (t, q, v, tau), as logged."""
     channels = plant.log_channels(*at)
     force, moment = (
-        np.asarray(channels[f"plant.contact.{frame}.{what}"].value)
-        for what in ("force", "moment")
+        np.asarray(channels[f"plant.contact.{frame}.{part}"].value)
+        for part in ("force", "moment")
     )
     return force, moment
 
@@ -93,7 +93,7 @@ def test_the_equations_of_motion_hold(name: str) -> None:
 
 
 def test_a_contact_holds_and_does_no_work() -> None:
-    """Solo12 falls about four held feet for 0.3 s: they stay, and energy with them."""
+    """Solo12 falls about four fixed feet for 0.3 s: feet and energy stay constant."""
     plant = plant_of("solo12")
     robot = plant.robot
     q, v = stance(plant, 0, speed=0.5)

@@ -1,4 +1,4 @@
-"""A plant that its motors cannot move is reported, with a feasible number."""
+"""A plant too heavy for its motors is reported, with a feasible value."""
 
 import re
 from typing import Any
@@ -17,7 +17,7 @@ ROBOT = hsp.Robot.load("panda")
 HOME = ROBOT.home()
 
 
-def told(robot: hsp.Robot = ROBOT, **fields: Any) -> list[str]:
+def reported(robot: hsp.Robot = ROBOT, **fields: Any) -> list[str]:
     return [*heavy_plant(RigidBody(**fields), robot, HOME)]
 
 
@@ -51,33 +51,33 @@ HEAVY: dict[str, tuple[Any, Any]] = {
 def test_the_number_in_the_message_would_do_and_a_larger_one_would_not(
     words: str, rotors: float
 ) -> None:
-    """Also beside rotors of the model, which no factor of the bodies changes."""
+    """Also with rotors in the model, which a factor on the bodies does not change."""
     robot = hsp.Robot.load("panda", motor_inertia=rotors)
     fields, of = HEAVY[words]
-    (message,) = told(robot, **fields)
+    (message,) = reported(robot, **fields)
     assert message.startswith(words)
     most = float(re.search(r"at most ([\d.e+]+)", message).group(1))  # type: ignore[union-attr]
-    assert told(robot, **of(most)) == []
-    assert told(robot, **of(1.02 * most)) != []
+    assert reported(robot, **of(most)) == []
+    assert reported(robot, **of(1.02 * most)) != []
 
 
-def test_what_a_robot_can_move_is_not_told() -> None:
-    assert told() == []
-    assert told(**payload(3.0), **scaled(mass_factor=1.2, random_mass=0.2)) == []
-    assert told(motor_inertia=0.3) == []
-    # A robot without limits of its motors is not looked at.
+def test_a_movable_plant_is_not_reported() -> None:
+    assert reported() == []
+    assert reported(**payload(3.0), **scaled(mass_factor=1.2, random_mass=0.2)) == []
+    assert reported(motor_inertia=0.3) == []
+    # A robot without effort limits is not checked.
     arm = hsp.Robot.load("planar3r")
     plant = RigidBody(motor_inertia=1e3)
     assert [*heavy_plant(plant, arm, arm.home())] == []
-    # Each field answers for itself.
-    both = told(**payload(30.0), motor_inertia=1e3)
+    # The fields are checked separately.
+    both = reported(**payload(30.0), motor_inertia=1e3)
     assert [each.split(" is ")[0] for each in both] == [
         "plant.payload.mass",
         "plant.motor_inertia",
     ]
 
 
-def test_a_simulation_and_the_command_line_say_it(
+def test_a_simulation_and_the_command_line_report_it(
     capsys: pytest.CaptureFixture[str],
 ) -> None:
     controller = hsp.Controller(ROBOT, [hsp.FramePosition("panda_tcp")], start=HOME)

@@ -1,4 +1,4 @@
-"""Plants that are not the model: each imperfection alone, and all in the loop."""
+"""Plants that differ from the model: imperfections alone, and all in the loop."""
 
 import pickle
 from collections.abc import Callable, Sequence
@@ -90,7 +90,7 @@ def test_random_inertias_are_possible_ones_within_their_bounds(name: str) -> Non
         assert np.abs(after.lever - before.lever).max() <= 0.01
         least, middle, greatest = np.linalg.eigvalsh(after.inertia)
         assert least >= -1e-15
-        # As possible as before: some URDFs are not, beyond this by themselves.
+        # As physically consistent as before: some URDFs are not by more than this.
         low, mid, high = np.linalg.eigvalsh(before.inertia)
         if low + mid >= high:
             assert least + middle >= greatest - 1e-12
@@ -98,7 +98,7 @@ def test_random_inertias_are_possible_ones_within_their_bounds(name: str) -> Non
     assert 0.8 <= min(ratios) <= max(ratios) <= 1.2
     third = changed(robot, [Inertias(random_mass=0.2)], seed=4)
     for before, after in zip(robot.model.inertias, third.model.inertias, strict=True):
-        if before.mass > 0.0:  # another mass alone: another density
+        if before.mass > 0.0:  # only the mass: another density
             density = after.mass / before.mass
             np.testing.assert_allclose(
                 after.inertia, density * before.inertia, rtol=1e-9, atol=1e-15
@@ -185,7 +185,7 @@ def test_without_friction_it_is_the_ideal_plant_to_second_order(name: str) -> No
 
 
 def test_a_step_obeys_coulombs_law_in_every_joint() -> None:
-    """The residual of M Δv - h(tau - N) is h c sign(v), or less where v = 0."""
+    """The residual of M Δv - h(tau - N) is h c sign(v), at most that where v = 0."""
     robot = load("panda")
     coulomb = np.array([5.0, 5.0, 3.0, 3.0, 1.0, 1.0, 0.5])
     plant = StickingPlant(robot, JointFriction.of(robot, coulomb), step=1e-4)
@@ -221,21 +221,21 @@ def shown(
 
 @pytest.mark.parametrize("name", ROBOTS)
 def test_a_differenced_velocity_is_that_of_two_positions(name: str) -> None:
-    """The first one, one of the same time, and that of a root are passed on."""
+    """Passed through: the first velocity, one at an equal time, and a root's."""
     robot = load(name)
-    (q, v), told = some_state(robot), np.ones(robot.nv)
+    (q, v), reported = some_state(robot), np.ones(robot.nv)
     sense = DifferencedVelocity().begin(robot, q, v, np.random.default_rng(0))
-    np.testing.assert_array_equal(sense(1.0, q, told)[1], told)
-    np.testing.assert_array_equal(sense(1.0, q, told)[1], told)
+    np.testing.assert_array_equal(sense(1.0, q, reported)[1], reported)
+    np.testing.assert_array_equal(sense(1.0, q, reported)[1], reported)
     later = robot.integrate(q, 0.01 * v)
-    expected = np.where(robot.is_single_dof(), v, told)
-    np.testing.assert_allclose(sense(1.01, later, told)[1], expected, atol=1e-9)
-    assert (expected == told).sum() == (6 if name == "go2" else 0)
+    expected = np.where(robot.is_single_dof(), v, reported)
+    np.testing.assert_allclose(sense(1.01, later, reported)[1], expected, atol=1e-9)
+    assert (expected == reported).sum() == (6 if name == "go2" else 0)
 
 
 @pytest.mark.parametrize("name", ROBOTS)
 def test_an_encoder_counts(name: str) -> None:
-    """Within half a count everywhere, on counts alone; a root is measured exactly."""
+    """Multiples of a count within half a count; a root is measured exactly."""
     robot = load(name)
     states = [some_state(robot, seed) for seed in range(20)]
     count = 2.0 * np.pi / 2**10
@@ -266,7 +266,7 @@ def test_noise_has_its_size_and_its_seed(name: str) -> None:
     np.testing.assert_allclose(rate[:, joints].std(axis=0), 0.02, rtol=0.1)
     assert np.abs(off[:, joints].mean(axis=0)).max() < 0.001
     alike = np.corrcoef(off[:, -1], rate[:, -1])[0, 1]
-    assert abs(alike) < 0.1  # the same seed, but each kind has its own numbers
+    assert abs(alike) < 0.1  # the same seed, but independent numbers per kind
     again = shown(PositionNoise(0.01), robot, states, seed=1)
     other = shown(PositionNoise(0.01), robot, states, seed=2)
     np.testing.assert_array_equal(again[-1][0], positions[-1][0])
@@ -330,7 +330,7 @@ def test_a_lag_acts_by_its_mean_over_the_period(time_constant: float) -> None:
 
 
 def test_a_drive_that_loses_efforts() -> None:
-    """Each is the commanded one, or the previous one; the first is there."""
+    """Every effort is the commanded or the previous one; the first is applied."""
     efforts = [np.full(7, float(k)) for k in range(2000)]
     found = [effort[0] for effort in driven(DroppedPeriods(0.3), efforts, seed=2)]
     lost = 0
@@ -341,7 +341,7 @@ def test_a_drive_that_loses_efforts() -> None:
 
 
 class Spy(SampledPlant):
-    """A plant that writes down under what it moves."""
+    """A plant that records the efforts that act."""
 
     def __init__(self, robot: Robot) -> None:
         super().__init__(robot)
@@ -356,7 +356,7 @@ class Spy(SampledPlant):
 
 
 def timeline(*drives: Drive, seed: int = 0) -> list[tuple[float, float, float]]:
-    """Return (from, to, effort) as a plant moves for 8 periods of 1 s."""
+    """Return (from, to, effort) while a plant moves for 8 periods of 1 s."""
     spy = Spy(load("panda"))
     plant = ImperfectPlant(spy, drives=drives, seed=seed)
     plant.reset(0.0, spy.robot.neutral(), np.zeros(7))
@@ -376,7 +376,7 @@ def test_an_effort_later_than_its_period_begins_the_next() -> None:
 
 
 @pytest.mark.parametrize("kind", ["ideal", "sticking", "mujoco"])
-def test_a_push_gives_its_impulse_whatever_the_plant(kind: str) -> None:
+def test_a_push_gives_its_impulse_to_any_plant(kind: str) -> None:
     """3 N for 0.5 s on 2 kg: 0.75 m/s, and along the rail alone."""
     robot = cart()
     robot.model.addFrame(
@@ -393,7 +393,7 @@ def test_a_push_gives_its_impulse_whatever_the_plant(kind: str) -> None:
         engine = pytest.importorskip("hsp_control.companions.mujoco.plant")
 
         plant = engine.MujocoPlant(robot, engine.Mujoco(pushes=[push]))
-    # In the stages of RK4 an edge may count for a third of a step more or less.
+    # RK4's stages may misplace an edge by a third of a step.
     exact = 1e-9 if kind != "ideal" else 1e-3
     assert moved(plant, 0.0, 1.0, 0.0)[1] == pytest.approx(0.75, rel=exact)
 
@@ -437,7 +437,7 @@ def ideal() -> Rollout:
     return run()
 
 
-def test_the_log_has_the_truth_beside_what_was_measured_and_what_acted() -> None:
+def test_the_log_has_true_and_measured_states_and_the_acting_effort() -> None:
     rollout, again = (
         run(
             sensors=[Encoder(1e-3), VelocityNoise(0.02)],
@@ -470,7 +470,7 @@ def test_the_log_has_the_truth_beside_what_was_measured_and_what_acted() -> None
 def test_a_copy_begins_its_sensors_and_drives_anew(
     copied: Callable[[Any], Any],
 ) -> None:
-    """It had none; the original goes on as if there were no copy."""
+    """The copy begins without memory; the original continues as without a copy."""
 
     def moved(plant: ImperfectPlant, times: range, q: Array, v: Array) -> list[Array]:
         found = []

@@ -1,4 +1,4 @@
-"""The inertial measurement unit: what it reports carries the true motion on."""
+"""The IMU: integrating its readings reproduces the true motion."""
 
 import numpy as np
 import pytest
@@ -13,8 +13,8 @@ from hsp_control.simulation.plants.sensors import Imu
 pytest.importorskip("example_robot_data")
 SILENT = dict.fromkeys(
     (
-        f"{what}_{how}"
-        for what in ("gyroscope", "accelerometer")
+        f"{quantity}_{how}"
+        for quantity in ("gyroscope", "accelerometer")
         for how in ("noise", "walk", "bias")
     ),
     0.0,
@@ -24,7 +24,7 @@ H = 0.002
 
 
 def readings(imu, states, seed=0):
-    """Return what a unit reports of states."""
+    """Return an IMU's readings at states."""
     robot = Robot.load("solo12")
     sense = imu.begin(robot, *states[0][1:], np.random.default_rng(seed))
     found = []
@@ -37,7 +37,7 @@ def readings(imu, states, seed=0):
 
 
 def tumbling(periods=20):
-    """Return the states of a robot that is thrown and turns, as rigid bodies do."""
+    """Return the states of a robot in free flight with rotation."""
     robot, random = Robot.load("solo12"), np.random.default_rng(5)
     rk4 = Rk4(step=1e-3)
     plant = RigidBody(sensors=[Imu("base_link")]).build(robot, rk4).plant

@@ -1,4 +1,4 @@
-"""Check integrators: orders of convergence, invariants, charts, shortened steps."""
+"""Integrators: orders of convergence, invariants, charts, adaptive steps."""
 
 import pickle
 from collections.abc import Callable
@@ -30,7 +30,8 @@ def falling(robot: Robot) -> Callable[[float, Array, Array], Array]:
 def one_by_one(
     calls: list[Any], interval: Array, longest: float, now: Array, h: Array
 ) -> None:
-    """Divide an interval into equal steps, and make the calls of each, in Python."""
+    """Divide an interval into equal steps, and make the calls of every step in
+    Python."""
     start, end = interval
     steps = integrators.number_of_steps(end - start, longest)
     h[0] = (end - start) / steps
@@ -48,7 +49,7 @@ def one_by_one(
 def test_order_of_an_integrator(
     name: str, method: Any, expected: float, longest: float
 ) -> None:
-    """A robot that falls freely, root and all, for 0.2 s: slope by regression."""
+    """A robot with a floating root in free fall for 0.2 s: slope by regression."""
     robot = load(name)
     q0, v0 = start(robot, 1, speed=1.0)
     dynamics = falling(robot)
@@ -64,7 +65,8 @@ def test_order_of_an_integrator(
 
 @pytest.mark.parametrize("name", ROBOTS)
 def test_dop853_keeps_its_tolerance(name: str) -> None:
-    """In one call for the whole second, and a tenth of the tolerance is a tenth off."""
+    """One call for a whole second; a tenth of the tolerance gives a tenth of the
+    error."""
     robot = load(name)
     q0, v0 = start(robot, 2, speed=1.0)
     dynamics = falling(robot)
@@ -109,7 +111,7 @@ def test_energy_is_kept_without_effort(
 
 
 def test_momentum_of_a_tumbling_robot(monkeypatch: pytest.MonkeyPatch) -> None:
-    """No gravity: linear and angular momentum stay, though the chart is laid anew.
+    """Without gravity linear and angular momentum are constant across charts.
 
     Two seconds at 4 rad/s are 8 rad; a chart about the start is singular at 2 pi.
     """
@@ -157,7 +159,7 @@ def test_whole_turns_need_new_charts(monkeypatch: pytest.MonkeyPatch) -> None:
 
     def counted(t: float, q: Array, v: Array) -> Array:
         evaluations.append(t)
-        if len(evaluations) > 4000:  # four times what it takes with new charts
+        if len(evaluations) > 4000:  # four times the number with new charts
             raise StuckError
         return dynamics(t, q, v)
 
@@ -171,7 +173,7 @@ def test_whole_turns_need_new_charts(monkeypatch: pytest.MonkeyPatch) -> None:
 
 @pytest.mark.parametrize("method", [Rk4, SemiImplicitEuler])
 def test_native_steps_are_those_that_are_made_one_by_one(method: Any) -> None:
-    """To the last bit, over intervals of 10 ms by steps of at most 3 ms."""
+    """Bit for bit, over intervals of 10 ms with steps of at most 3 ms."""
     robot = load("panda")
     tau = np.linspace(-3.0, 3.0, 7)
 
@@ -191,7 +193,7 @@ def test_native_steps_are_those_that_are_made_one_by_one(method: Any) -> None:
         assert ours[0].tobytes() == theirs[0].tobytes()
         assert ours[1].tobytes() == theirs[1].tobytes()
     copy = pickle.loads(pickle.dumps(native.take))
-    copy()  # it owns what it reads
+    copy()  # it owns its input
     assert native.h[0] == pytest.approx(0.0025)
 
 
@@ -200,7 +202,7 @@ def test_native_steps_are_those_that_are_made_one_by_one(method: Any) -> None:
     [SimulationError, ZeroDivisionError, OverflowError, np.linalg.LinAlgError],
 )
 def test_trials_that_fail_are_shortened(failure: type[Exception]) -> None:
-    """Where the dynamics cannot be computed, a shorter step need not go."""
+    """Where the dynamics raise, a shorter step may not be possible, either."""
     robot = load("planar3r")
 
     def swing(t: float, q: Array, v: Array) -> Array:
@@ -214,7 +216,7 @@ def test_trials_that_fail_are_shortened(failure: type[Exception]) -> None:
     np.testing.assert_allclose(q, expected, rtol=0, atol=1e-10)
 
 
-def test_dynamics_that_fail_for_good_say_why() -> None:
+def test_dynamics_that_fail_permanently_give_the_reason() -> None:
     robot = load("planar3r")
 
     def fails_with(failure: Exception) -> Callable[[float, Array, Array], Array]:
@@ -234,12 +236,12 @@ def test_dynamics_that_fail_for_good_say_why() -> None:
     message = r"^the integrator failed at t = 0.4 s: by nothing$"
     with pytest.raises(SimulationError, match=message):
         run(ZeroDivisionError("by nothing"))
-    with pytest.raises(KeyError, match=r"yours"):  # no business of the integrator's
+    with pytest.raises(KeyError, match=r"yours"):  # not caused by the integrator
         run(KeyError("yours"))
 
 
-def test_held_efforts_move_rigid_bodies_by_rk4_unless_it_is_said() -> None:
-    """It differs from a tight DOP853 by less than any figure shows."""
+def test_held_efforts_move_rigid_bodies_by_rk4_by_default() -> None:
+    """The difference to a tight DOP853 is below the resolution of any figure."""
     robot = load("panda")
     for plant in (None, RigidBody(), RigidBodyPlant(robot)):
         assert default_integrator(plant, 0.01) == Rk4(1e-3)

@@ -1,4 +1,4 @@
-"""The journal of a log: whatever ends its writer, all whole rows can be read."""
+"""The journal of a log: all complete rows can be read, however its writer ends."""
 
 import os
 import shutil
@@ -54,7 +54,7 @@ def whole(path: Path) -> tuple[dict[str, np.ndarray], dict[str, Any]]:
 
 @pytest.fixture(scope="module")
 def run(tmp_path_factory: pytest.TempPathFactory) -> tuple[Rollout, bytes]:
-    """Return a run, and the journal that it wrote meanwhile."""
+    """Return a run, and the journal that it wrote."""
     path = tmp_path_factory.mktemp("run") / "a.journal"
     return load_experiment(SMALL).run(log=path), path.read_bytes()
 
@@ -69,7 +69,7 @@ def test_it_is_the_log_that_was_written(
     assert list(read.columns) == list(rollout.columns)
     for name, column in rollout.columns.items():
         np.testing.assert_array_equal(read[name], column)
-    # And it can be kept as every other log is.
+    # It can be saved as any other log.
     kept = Rollout.load(read.save(tmp_path / "a.npz"))
     np.testing.assert_array_equal(kept.q, rollout.q)
 
@@ -92,14 +92,14 @@ def test_cut_anywhere_all_whole_rows_before_are_there(
         assert read.status == expected
         if expected == "interrupted":
             assert read.meta["message"] == KILLED
-    # The end's frame first, then row by row: never two at once, none before its time.
+    # The end's frame first, then rows one by one, none early.
     assert seen[0] == len(rollout)
     assert set(np.diff(seen)) <= {0, -1}
     assert seen[-1] <= len(rollout) - 2
 
 
 def test_columns_that_come_during_a_run_are_empty_before(tmp_path: Path) -> None:
-    """Also where the writer was killed before the first row that has them."""
+    """Also if the writer was killed before the first row with them."""
     controller, path = law(), tmp_path / "a.journal"
     controller.at(0.03).add(JointPosture(start(), priority=2, name="posture"))
     run = simulate(controller, start(), duration=0.06, control_period=0.01, log=path)
@@ -124,7 +124,7 @@ def test_a_changed_byte_spoils_one_row_and_no_other(data: st.DataObject) -> None
     path = Path(os.environ.get("TMPDIR", "/tmp")) / f"spoilt-{os.getpid()}.journal"
     try:
         writer = JournalWriter(path)
-        writer.write_heading({"a": (2,)}, {"what": "ä"})
+        writer.write_heading({"a": (2,)}, {"note": "ä"})
         rows = np.arange(12.0).reshape(6, 2)
         for row in rows:
             writer.write_row(row)
@@ -141,8 +141,8 @@ def test_a_changed_byte_spoils_one_row_and_no_other(data: st.DataObject) -> None
         spoilt_row = (at - first) // frame
         left = np.delete(rows, spoilt_row, axis=0)
         np.testing.assert_array_equal(reader.rows(0)["a"], left)
-        assert reader.meta["what"] == "ä"
-        # At the end it may be a row that is still being written.
+        assert reader.meta["note"] == "ä"
+        # At the end of the file it may be a row in progress.
         assert reader.damaged == (spoilt_row < 5)
     finally:
         path.unlink(missing_ok=True)
@@ -168,7 +168,7 @@ def test_continuous_joints_are_unwound(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("share", [0.3, 0.5, 0.8])
-def test_a_damaged_row_is_said(
+def test_a_damaged_row_is_reported(
     share: float, run: tuple[Rollout, bytes], tmp_path: Path
 ) -> None:
     rollout, data = run
@@ -188,7 +188,7 @@ def test_a_damaged_row_is_said(
     assert set(read.t) < set(rollout.t)
 
 
-def test_a_damaged_end_is_said_and_an_unfinished_row_is_not(
+def test_a_damaged_end_is_reported_but_not_an_unfinished_row(
     run: tuple[Rollout, bytes], tmp_path: Path
 ) -> None:
     rollout, data = run
@@ -257,7 +257,9 @@ def test_a_folder_that_is_deleted_meanwhile_comes_back(tmp_path: Path) -> None:
     assert (reader.read(), reader.ended) == (2, True)
 
 
-def test_what_is_no_journal_is_said(run: tuple[Rollout, bytes], tmp_path: Path) -> None:
+def test_an_invalid_journal_is_reported(
+    run: tuple[Rollout, bytes], tmp_path: Path
+) -> None:
     empty = tmp_path / "empty.journal"
     empty.write_bytes(MAGIC)
     with pytest.raises(LogError, match="ends before its first heading"):
@@ -278,7 +280,7 @@ def test_what_is_no_journal_is_said(run: tuple[Rollout, bytes], tmp_path: Path) 
 def test_rows_come_as_they_are_written(tmp_path: Path) -> None:
     path = tmp_path / "a.journal"
     reader = JournalReader(path, most=100)
-    assert reader.read() == 0  # it is not there yet
+    assert reader.read() == 0  # does not exist yet
     writer = JournalWriter(path)
     assert reader.read() == 0
     writer.write_heading(PAIR, {"status": "running", "name": "a"})
@@ -331,13 +333,13 @@ def test_a_frame_that_is_half_written_waits(
     assert reader.meta == meta
 
 
-# --- what cuts a writer short --------------------------------------------------------
+# --- a writer that is cut short ------------------------------------------------------
 
 
 def test_a_disk_that_is_full_for_a_moment_leaves_a_whole_journal(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """A part of a frame is taken back, so that the end can still be written."""
+    """A partial frame is removed, so that the end can still be written."""
     path, write = tmp_path / "a.journal", os.write
 
     def full(file: int, data: bytes) -> int:
@@ -348,19 +350,19 @@ def test_a_disk_that_is_full_for_a_moment_leaves_a_whole_journal(
 
     monkeypatch.setattr(journal.os, "write", full)
     writer = JournalWriter(path)
-    writer.write_heading({"a": ()}, {"what": 1})
+    writer.write_heading({"a": ()}, {"note": 1})
     writer.write_row(np.ones(1))
     with pytest.raises(LogError, match=r"a.journal: .*No space left"):
-        writer.write_heading({"a": ()}, {"what": "x" * 930})
+        writer.write_heading({"a": ()}, {"note": "x" * 930})
     writer.write_end("stopped", "the disk is full")
     writer.close()
     columns, meta = whole(path)
-    assert meta == {"what": 1, "status": "stopped", "message": "the disk is full"}
+    assert meta == {"note": 1, "status": "stopped", "message": "the disk is full"}
     np.testing.assert_array_equal(columns["a"], [1.0])
 
 
 class Interrupting:
-    """`os.write` that is interrupted once, before, within or after a row.
+    """`os.write` interrupted once, before, within or after a row.
 
     Attributes:
         cut: Number of bytes that are written before; None: all.
@@ -386,7 +388,7 @@ def brief_loop(log: Path) -> LoopReport:
 
 @pytest.fixture(scope="module")
 def brief(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, int]:
-    """Return the journal of a loop, and how often it was written to."""
+    """Return the journal of a loop, and the number of its writes."""
     path, counted = (
         tmp_path_factory.mktemp("brief") / "a.journal",
         Interrupting(None, 0),
@@ -428,7 +430,7 @@ def test_ctrl_c_within_a_row_loses_none(
 
 @pytest.mark.system
 @pytest.mark.slow
-def test_what_a_killed_hsp_run_leaves_is_a_log_for_all_commands(
+def test_the_journal_of_a_killed_run_is_a_log_for_all_commands(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     options = ["--out", str(tmp_path), "--set", "simulation.duration=1000"]
@@ -452,7 +454,7 @@ def test_what_a_killed_hsp_run_leaves_is_a_log_for_all_commands(
     assert path.with_name(f"{path.stem}-paper.png").is_file()
     assert main(["check", str(path)]) == 0
     capsys.readouterr()
-    # One that is not killed leaves an `.npz` alone.
+    # Without a kill only an `.npz` remains.
     short = ["--out", str(tmp_path), "--set", "simulation.duration=0.02"]
     assert main(["run", "paper/2_rest", *short]) == 0
     assert len(list(tmp_path.glob("*.journal"))) == 1
@@ -463,7 +465,7 @@ def test_what_a_killed_hsp_run_leaves_is_a_log_for_all_commands(
 
 @pytest.mark.parametrize("torn", [b"", b"N", b"N\x09\x00\x00\x00....{}"])
 def test_it_goes_on_after_a_torn_frame(torn: bytes, tmp_path: Path) -> None:
-    for begun in range(3):  # the first time there is none
+    for begun in range(3):  # there is none the first time
         reader = JournalReader(tmp_path / "a.journal")
         writer = JournalWriter(reader.path, reader)
         assert reader.notes == [{"k": k} for k in range(begun)]

@@ -1,4 +1,4 @@
-"""Check the log of a run: its columns, its file, and which files are refused."""
+"""The log of a run: its columns, its file, and refused files."""
 
 import io
 import json
@@ -33,7 +33,7 @@ from hsp_control.trajectories import Lissajous
 
 
 def test_columns(planar_run: Rollout) -> None:
-    """Every column is described, of the length of t, and agrees with the state."""
+    """Every column has a description and the length of t, and agrees with the state."""
     run, controller = planar_run, planar_controller()
     robot = controller.robot
     assert set(run.meta["columns"]) == set(run.columns)
@@ -85,7 +85,7 @@ def test_the_norm_is_that_of_the_metric() -> None:
 
 
 def test_joint_positions_of_continuous_joints_wind_up() -> None:
-    """Joints that are led to 17 and -34 rad have gone there, not to some of ±pi."""
+    """Joints guided to 17 and -34 rad are logged there, not modulo 2 pi."""
     robot = load("planar3r", gravity=False)
     away = Lissajous([20.0, -40.0, 0.1], [0.5, 0.5, 1.0], center=[0.0, 0.0, 0.0])
     task = JointPosture(
@@ -100,7 +100,7 @@ def test_joint_positions_of_continuous_joints_wind_up() -> None:
 
 
 def test_a_run_can_be_measured_afterwards(planar_run: Rollout) -> None:
-    """`measure` gives what the log has, and what it has not, at every row."""
+    """`measure` returns logged and other quantities at every row."""
     run, robot = planar_run, load("planar3r", gravity=False)
     tip = run.measure(robot, lambda state: state.position("tip"))
     np.testing.assert_array_equal(tip, run["skeleton"][:, -1])
@@ -135,14 +135,14 @@ def test_round_trip(planar_run: Rollout, tmp_path: Path) -> None:
 def test_a_column_that_is_not_there(planar_run: Rollout) -> None:
     assert "task.tip.error" in planar_run
     assert "task.tip.eror" not in planar_run
-    told = "the log ... 'task.tip.eror' ... 'task.tip.error' ... t, q, v, tau"
-    with pytest.raises(LogError, match=wording(told)):
+    reported = "the log ... 'task.tip.eror' ... 'task.tip.error' ... t, q, v, tau"
+    with pytest.raises(LogError, match=wording(reported)):
         planar_run["task.tip.eror"]
 
 
 @pytest.fixture
 def short_log(tmp_path: Path) -> tuple[Rollout, bytes, Path]:
-    """Return a log of three rows, the bytes of its file, and a place for others."""
+    """Return a log of three rows, the bytes of its file, and a path for variants."""
     run = simulate(planar_controller(), planar_start(), duration=0.02)
     data = run.save(tmp_path / "whole.npz").read_bytes()
     return run, data, tmp_path / "other.npz"
@@ -151,7 +151,7 @@ def short_log(tmp_path: Path) -> tuple[Rollout, bytes, Path]:
 def test_a_log_with_a_wrong_byte_is_refused_or_whole(
     short_log: tuple[Rollout, bytes, Path],
 ) -> None:
-    """Some bytes do not matter (dates); no other may change what is read."""
+    """Changing a byte has no effect (dates), or the file is refused."""
     run, data, path = short_log
     refused = 0
     places = range(3, len(data), 50)
@@ -223,7 +223,7 @@ FOREIGN: dict[str, tuple[Callable[[], bytes], str]] = {
 
 
 def declared(shape: tuple[int, ...]) -> bytes:
-    """Return a log whose column t declares a shape, and has no numbers."""
+    """Return a log whose column t declares a shape but has no data."""
     head = io.BytesIO()
     np.lib.format.write_array_header_1_0(
         head, {"descr": "<f8", "fortran_order": False, "shape": shape}
@@ -284,14 +284,14 @@ def test_places_where_nothing_can_be_written(
         LogError, match=r"whole.npz: cannot write the log: No space left"
     ):
         run.save(whole)
-    assert whole.read_bytes() == data  # the old one is still there, and nothing else
+    assert whole.read_bytes() == data  # only the previous file remains
     assert not list(path.parent.glob(".*.part"))
 
 
-def test_the_log_says_how_far_the_robot_is_beyond_its_limits(
+def test_the_log_has_the_excess_over_limits(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """A push that the law does not know of; without it, nothing is beyond."""
+    """With an unmodelled push; without it no limit is exceeded."""
     push = {"frame": "panda_hand", "force": [0, 0, 700], "start": 0.05, "duration": 0.1}
     config = {
         "robot": {"name": "panda"},
@@ -309,7 +309,7 @@ def test_the_log_says_how_far_the_robot_is_beyond_its_limits(
     rollout = Rollout.load(tmp_path / "pushed.npz")
     limits = load_experiment(config).controller.limits
     assert limits is not None
-    # Each row has the most since the row before, of all control periods.
+    # A row has the maximum over all control periods since the previous row.
     every = load_experiment(tmp_path / "pushed.yaml", "simulation.log_period=0.002")
     fast = np.maximum(np.abs(every.run().v) - limits.velocity, 0.0)
     rows = [fast[:1], *(fast[k - 4 : k + 1] for k in range(5, 101, 5))]
@@ -318,9 +318,11 @@ def test_the_log_says_how_far_the_robot_is_beyond_its_limits(
     assert (beyond > np.maximum(np.abs(rollout.v) - limits.velocity, 0.0) + 0.01).any()
     assert beyond.max() > 0.1
     row, dof = np.unravel_index(beyond.argmax(), beyond.shape)
-    said = " ".join(capsys.readouterr().out.split())
-    assert f"panda_joint{dof + 1} is {beyond.max():.3g} rad/s beyond its speed" in said
-    assert f"at {rollout.t[row]:g} s" in said
+    printed = " ".join(capsys.readouterr().out.split())
+    assert (
+        f"panda_joint{dof + 1} is {beyond.max():.3g} rad/s beyond its speed" in printed
+    )
+    assert f"at {rollout.t[row]:g} s" in printed
 
 
 def test_the_most_beyond_a_limit_is_kept_until_it_is_collected() -> None:

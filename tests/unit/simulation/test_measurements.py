@@ -1,4 +1,4 @@
-"""A plan's measurements, once a period: forces obey the balance of momentum."""
+"""A plan's measurements, once per period: forces obey the momentum balance."""
 
 import numpy as np
 import pytest
@@ -19,7 +19,7 @@ FEET = ("FL_FOOT", "FR_FOOT", "HL_FOOT", "HR_FOOT")
 
 
 class Listening(RunningPlan):
-    """Keeps its measurements; reports that the robot falls at a time."""
+    """Stores its measurements; reports a fall at a given time."""
 
     def __init__(self, falls_at: float = np.inf) -> None:
         super().__init__(Falls())
@@ -39,7 +39,7 @@ class Listening(RunningPlan):
 
 
 class Falls(MotionPlan):
-    """A plan that only falls."""
+    """A plan that only reports a fall."""
 
     def parts(self, robot, tasks, contacts):
         return PlanParts(tuple(tasks), tuple(contacts))
@@ -49,7 +49,7 @@ class Falls(MotionPlan):
 
 
 class Listens(Falls):
-    """A plan that only listens."""
+    """A plan that only receives measurements."""
 
     def begin(self, controller):
         return Listening()
@@ -94,11 +94,11 @@ def test_rigid_contacts_measure_them_too():
     part = RigidContacts([RigidContact(foot, kind="point") for foot in FEET])
     rk4 = Rk4(step=0.001)
     plant = part.build(robot, rk4)
-    # The force is that of the end of a period, the balance its mean.
+    # The force is that at the end of a period, the balance holds for its mean.
     momentum_balance(IntegratedPlant(plant, rk4), 2e-3)
 
 
-def test_a_fall_is_said_and_stops_the_run():
+def test_a_fall_is_reported_and_stops_the_run():
     experiment = load_experiment("paper/2_rest")
     given = (experiment.controller, experiment.q0)
     run = simulate(*given, duration=0.1, control_period=0.001, plan=Falls())

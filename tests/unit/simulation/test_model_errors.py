@@ -32,7 +32,7 @@ def borne(
 def growth(
     made: hsp.Controller, q: Array, plant: hsp.plants.Plant, until: float
 ) -> float:
-    """Return by how much a small motion has grown in the second half of a run."""
+    """Return the growth of a small motion in the second half of a run."""
     start = made.robot.integrate(q, 1e-4 * np.random.default_rng(0).normal(size=len(q)))
     log = hsp.simulate(
         made, start, duration=until, control_period=H, plant=plant, check_rate=False
@@ -43,18 +43,18 @@ def growth(
 
 
 @pytest.mark.parametrize("name", ["panda", *further("iiwa14", "xarm7")])
-def test_rotors_that_are_told_are_borne_and_larger_ones_are_not(name: str) -> None:
+def test_reported_rotors_are_tolerated_and_larger_ones_are_not(name: str) -> None:
     found, made, q = borne(name, Compensation())
     for times, grows in ((0.6, False), (1.6, True)):
         rotors = changed(made.robot, [MotorInertia(times * found.rotor)])
         assert (growth(made, q, RigidBodyPlant(rotors), 3.0) > 1.0) is grows
-    # With rotors in the model, more of them are borne.
+    # With rotors in the model, larger ones are tolerated.
     more, *_ = borne(name, Compensation(), motor_inertia=0.1)
     assert more.rotor > 5.0 * min(found.rotor, 0.1)
 
 
 @pytest.mark.parametrize("name", ["panda", *further("ur5")])
-def test_a_delay_that_is_told_is_borne_and_a_longer_one_is_not(name: str) -> None:
+def test_a_reported_delay_is_tolerated_and_a_longer_one_is_not(name: str) -> None:
     found, made, q = borne(name, Compensation())
     periods = round(found.delay / H)
     for late, grows in ((periods - 3, False), (periods + 3, True)):
@@ -65,7 +65,7 @@ def test_a_delay_that_is_told_is_borne_and_a_longer_one_is_not(name: str) -> Non
 
 @pytest.mark.parametrize("rotors", [0.05, *further(0.02)])
 def test_rotors_that_the_drives_hide_cost_delay(rotors: float) -> None:
-    """Too much of a rotor is too strong a law: it tolerates less delay."""
+    """Too large a modelled rotor raises the loop gain: less delay is tolerated."""
     made, q = holding(WrongArm("panda", 0, motor_inertia=rotors))
     found = model_errors(made, q, H, Compensation())
     assert found is not None
@@ -83,7 +83,7 @@ def test_rotors_that_the_drives_hide_cost_delay(rotors: float) -> None:
 
 
 class Pushed(RigidBodyPlant):
-    """The model under an effort that nobody commands."""
+    """The model under an effort that is not commanded."""
 
     push: Array
 
@@ -92,8 +92,8 @@ class Pushed(RigidBodyPlant):
 
 
 @pytest.mark.parametrize("joint", [3, *further(0, 5)])
-def test_an_unknown_effort_moves_the_hand_as_far_as_is_told(joint: int) -> None:
-    """A hundredth of the reported value for 1 N·m, where the arm is linear."""
+def test_an_unknown_effort_moves_the_hand_as_reported(joint: int) -> None:
+    """0.01 N·m moves it by a hundredth of the value reported for 1 N·m."""
     small = 0.01
     for compensation in (*further(ALONE), Compensation()):
         found, made, q = borne("panda", compensation)
@@ -106,7 +106,7 @@ def test_an_unknown_effort_moves_the_hand_as_far_as_is_told(joint: int) -> None:
         for each, rows in zip(found.moved, (slice(0, 3), slice(3, 6)), strict=True):
             away = np.linalg.norm(log["task.hand.error"][:, rows], axis=1)
             peak = small * each.peak[joint]
-            if compensation == ALONE:  # 1.5 s are 15 of its time constants
+            if compensation == ALONE:  # 1.5 s are 15 time constants
                 resting = small * each.resting[joint]
                 assert away[-1] == pytest.approx(resting, rel=0.03, abs=1e-7)
             else:
@@ -115,16 +115,16 @@ def test_an_unknown_effort_moves_the_hand_as_far_as_is_told(joint: int) -> None:
 
 
 @pytest.mark.parametrize("name", ARMS)
-def test_no_mode_grows_by_default_and_it_takes_no_time(name: str) -> None:
-    """A loop without an observer is reported as such, in words as well."""
+def test_by_default_no_mode_grows_and_the_check_is_fast(name: str) -> None:
+    """A loop without an observer is reported as such, also in the text."""
     found, made, q = borne(name, Compensation())
     assert (found.growing, found.growth) == (0, 0.0)
     assert lines(found)["masses ±20 %"] == "no growing mode"
     assert found.delay >= 0.005
     assert found.lag >= 0.005
     alone, *_ = borne(name, ALONE)
-    told = lines(alone)["masses ±20 %"]
-    assert told.startswith(f"{alone.growing} of 8 grow") is (alone.growing > 0)
+    reported = lines(alone)["masses ±20 %"]
+    assert reported.startswith(f"{alone.growing} of 8 grow") is (alone.growing > 0)
     if name == "iiwa14":
         assert alone.growing > 0
     light = "rotors" in lines(found)

@@ -1,4 +1,4 @@
-"""Check that many periods in one native call move the robot as one by one."""
+"""Many periods in one native call equal the same periods one by one."""
 
 from collections.abc import Callable
 from dataclasses import replace
@@ -42,10 +42,10 @@ def short(name: str, *overrides: str, duration: float = 0.3) -> Experiment:
 
 
 class Counted:
-    """Counts the periods that were made natively.
+    """Counts the periods in native calls.
 
     Attributes:
-        many: How many periods each call made.
+        many: Number of periods per call.
     """
 
     def __init__(self, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -61,7 +61,7 @@ class Counted:
         monkeypatch.setattr(Controller, "_while_free", counted)
 
     def alone(self, run: Callable[[], Rollout]) -> Rollout:
-        """Run with each period made alone."""
+        """Run with a call per period."""
         before = sum(self.many)
         with self._patch.context() as patch:
             patch.setattr(loops, "_native_loop", lambda *_: None)
@@ -76,7 +76,7 @@ def counted(monkeypatch: pytest.MonkeyPatch) -> Counted:
 
 
 def assert_same(ours: Rollout, theirs: Rollout) -> None:
-    """Compare every number of two logs, to the last bit."""
+    """Compare every number of two logs bit for bit."""
     assert ours.columns.keys() == theirs.columns.keys()
     for name, column in ours.columns.items():
         assert column.tobytes() == theirs.columns[name].tobytes(), name
@@ -132,11 +132,11 @@ def test_the_same_to_the_last_bit(case: tuple[str, ...], counted: Counted) -> No
 def test_a_step_is_free_whose_law_is_finite_within_limits(
     outcome: dict[str, int], q: float, free: bool
 ) -> None:
-    """Also with a bounded inverse; not a state that is refused."""
+    """Also with a bounded inverse; except for a refused state."""
     law, limits = LawOutcome.allocate(), LimitsOutcome.allocate()
-    told = law._asdict() | limits._asdict()
+    reported = law._asdict() | limits._asdict()
     for name, value in ({"finite": 1} | outcome).items():
-        told[name][0] = value
+        reported[name][0] = value
     move = Move(
         calls=Plan(),
         origin=np.zeros(1),
@@ -173,7 +173,7 @@ def test_a_step_is_free_whose_law_is_finite_within_limits(
 def test_calls_in_python_are_not_left_out(
     part: str, counted: Counted, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Where one is within a move, or records what was sent, periods are made alone."""
+    """A call per period if a user's call is within a step, or efforts are recorded."""
     ours = short("panda_obstacle").run()
     before, made = sum(counted.many), BoundStep.free.func
     nothing = PythonCall(float)
@@ -193,20 +193,20 @@ def test_calls_in_python_are_not_left_out(
 
 
 def test_periods_in_which_a_limit_binds_are_made_alone(counted: Counted) -> None:
-    """The rest is not: after a limit, free steps go on in the loop."""
+    """Other periods are native: after an active limit the loop continues."""
     slow = "limits.acceleration=1.0", "simulation.log_period=0.008"
     theirs = counted.alone(short("panda_obstacle", *slow, duration=2.0).run)
     ours = short("panda_obstacle", *slow, duration=2.0).run()
     assert_same(ours, theirs)
     changes = np.count_nonzero(np.diff(ours["status"] == 2))
-    assert changes >= 3  # a limit binds, and no longer does, and binds again
+    assert changes >= 3  # a limit is active, inactive, and active again
     made = np.array(counted.many)
     assert made.sum() > 500
     assert ((made > 0) & (made < 8)).sum() >= 2
 
 
-def test_what_a_held_effort_teaches_is_the_same(counted: Counted) -> None:
-    """How far speeds were off widens the margin of a speed limit that binds later."""
+def test_prediction_errors_of_held_efforts_are_the_same(counted: Counted) -> None:
+    """Past prediction errors widen the margin of a later active speed limit."""
     slow = "panda_obstacle", "limits.velocity={scale: 0.3}"
     theirs = counted.alone(short(*slow, duration=2.0).run)
     ours = short(*slow, duration=2.0).run()
@@ -218,7 +218,7 @@ def test_what_a_held_effort_teaches_is_the_same(counted: Counted) -> None:
 def test_after_it_the_controller_is_at_its_last_step(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    """Its time, too: who reads the state then reads q, v and t of one instant."""
+    """Its time, too: q, v and t of the state belong to one instant."""
     times: list[tuple[float, float, int]] = []
     while_free = Controller._while_free
 
@@ -240,7 +240,7 @@ def test_after_it_the_controller_is_at_its_last_step(
 def test_no_state_between_two_rows_is_missed(
     counted: Counted, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Excesses of limits, here beyond 0.05 rad/s, are found in every period."""
+    """Excesses over limits, here 0.05 rad/s, are detected in every period."""
 
     def strict(limits: RobotLimits | None) -> RobotLimits:
         assert limits is not None
@@ -270,11 +270,11 @@ CHANGES: dict[str, Callable[[Changes], object]] = {
 }
 
 
-@pytest.mark.parametrize("what", ["task", "limits", *further("gain", "field")])
-def test_a_change_is_made_where_it_begins(what: str, counted: Counted) -> None:
-    """Changing parts are Python's; a second after their end the native loop continues.
+@pytest.mark.parametrize("change", ["task", "limits", *further("gain", "field")])
+def test_a_change_is_made_where_it_begins(change: str, counted: Counted) -> None:
+    """Changes run in Python; a second after their end the native loop continues.
 
-    It goes on with what is in force then.
+    It continues with the parameters in force at that time.
     """
 
     def run() -> Rollout:
@@ -283,7 +283,7 @@ def test_a_change_is_made_where_it_begins(what: str, counted: Counted) -> None:
 
         def on_row(recorder: Any) -> None:
             if recorder.count == 11:  # at 0.1 s
-                CHANGES[what](controller.at(0.1234).ramp(0.05))
+                CHANGES[change](controller.at(0.1234).ramp(0.05))
 
         return simulate(
             controller,
@@ -300,23 +300,24 @@ def test_a_change_is_made_where_it_begins(what: str, counted: Counted) -> None:
     made = np.array(counted.many)
     (native,) = np.nonzero(made)
     assert len(native) > 20
-    assert (np.diff(native) > 100).any()  # calls that were refused, while it changed
-    assert made[native[-10:]].sum() > 80  # and it went on
+    assert (np.diff(native) > 100).any()  # calls that were refused during the change
+    assert made[native[-10:]].sum() > 80  # and the loop continued
 
 
 @pytest.mark.parametrize("log_period", [0.05, 1.0])
 def test_a_motion_that_diverges_stops_the_same_way(
     log_period: float, counted: Counted
 ) -> None:
-    """K_N times the period is 20: joints run away natively; their speed is reported.
+    """K_N times the period is 20: joints diverge in the native loop; their speed is
+    reported.
 
-    Within a row of 1 s the effort is no number any more.
+    Within a row of 1 s the effort becomes NaN.
     """
     task, q0 = panda_controller().tasks[0], load("panda").home()
     controller = Controller(
         load("panda"), [task], TargetPosture(q0), null_space_gain=2000.0, limits=None
     )
-    told: list[str] = []
+    reported: list[str] = []
 
     def run() -> Rollout:
         refused = pytest.raises(SimulationError, match=r"^the simulation stopped: ")
@@ -331,13 +332,13 @@ def test_a_motion_that_diverges_stops_the_same_way(
                 integrator=SemiImplicitEuler(0.01),
                 check_rate=False,
             )
-        told.append(str(caught.value))
+        reported.append(str(caught.value))
         rollout = caught.value.rollout
         assert isinstance(rollout, Rollout)
         return rollout
 
     theirs = counted.alone(run)
     assert_same(run(), theirs)
-    assert told[0] == told[1]
-    assert ("diverged" if log_period == 0.05 else "not finite") in told[0]
+    assert reported[0] == reported[1]
+    assert ("diverged" if log_period == 0.05 else "not finite") in reported[0]
     assert max(counted.many) > 1

@@ -1,4 +1,4 @@
-"""Names that no file can have are one message."""
+"""Invalid file names give one message."""
 
 from collections.abc import Callable
 from pathlib import Path

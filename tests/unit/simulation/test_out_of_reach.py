@@ -1,4 +1,4 @@
-"""Rows of a log in which a target is far away, or out of reach, are found."""
+"""Rows of a log with a distant or unreachable target are detected."""
 
 from typing import Any
 
@@ -32,7 +32,7 @@ def found(columns: dict[str, Any]) -> Unreached:
 
 
 def test_an_error_that_stays_is_out_of_reach() -> None:
-    """From when it has rested so long: a step begins at rest, too."""
+    """From the time at which it has rested long enough: a step begins at rest, too."""
     task = found(log())
     assert not task.out[:STAY].any()
     assert (task.out[STAY + 1 :] == 0.31).all()
@@ -47,7 +47,7 @@ def test_a_limit_is_a_reason_and_friction_is_none() -> None:
     assert found(limited).out.any()
 
 
-def test_what_moves_is_on_its_way() -> None:
+def test_a_moving_hand_is_on_its_way() -> None:
     rate = np.full((len(T), 6), RESTING * 0.31)
     bounded = np.where(T > 0.5, 0.4, 0.0)
     far = found(log(task__hand__error_rate=rate, task__hand__bounded=bounded))
@@ -55,13 +55,13 @@ def test_what_moves_is_on_its_way() -> None:
     assert far.words(0) == ""
     assert far.words(-1) == "target far away"
     pushed = np.zeros((len(T), 6))
-    pushed[50] = 1.0  # it has to rest again
+    pushed[50] = 1.0  # it must rest anew
     out = found(log(task__hand__error_rate=pushed)).out
     assert out[49] == out[-1] == 0.31
     assert not out[50 : 50 + STAY].any()
 
 
-def test_a_task_that_is_off_and_a_log_that_says_little_say_nothing() -> None:
+def test_an_inactive_task_and_a_sparse_log_report_nothing() -> None:
     columns = log(task__hand__error=np.full((len(T), 6), np.nan))
     for name in ("damped", "status", "task.hand.bounded"):
         del columns[name]

@@ -1,4 +1,4 @@
-"""Somebody's pull at a link does the work of its force at the point where it acts."""
+"""A pull at a link: its power equals that of the force at its point of action."""
 
 from pathlib import Path
 
@@ -15,14 +15,14 @@ kinds = pytest.mark.parametrize("kind", KINDS)
 
 
 def point_of(robot: Robot, q: Array, joint: int, point: Array) -> Array:
-    """Return where a point of a joint is in the world, shape (3,) [m]."""
+    """Return the world position of a point on a joint, shape (3,) [m]."""
     state = robot.state(0.0, q, np.zeros(robot.nv))
     return np.array(state.data.oMi[joint].act(point))
 
 
 @kinds
 def test_a_pull_has_the_power_of_its_force(kind: str, tmp_path: Path) -> None:
-    """tauᵀ v = fᵀ p', p the point that is pulled, off the joint's origin."""
+    """tauᵀ v = fᵀ p', with p the pulled point, off the joint's origin."""
     robot, rng = KINDS[kind](tmp_path), np.random.default_rng(1)
     pushes = Pushes(robot)
     last = robot.model.njoints - 1
@@ -70,7 +70,8 @@ def test_a_pull_is_no_stronger_than_its_largest_force() -> None:
 
 
 def test_a_pull_at_the_origin_of_a_joint_does_not_turn_it(tmp_path: Path) -> None:
-    """But one beside it does, by its arm, which turns with the link."""
+    """A pull at a point off the axis does, by its lever arm, which rotates with the
+    link."""
     robot = KINDS["arm"](tmp_path)
     pushes, q = Pushes(robot), np.zeros(3)
     state = robot.state(0.0, q, np.zeros(3))

@@ -1,4 +1,4 @@
-"""Check which runs are refused, and what is kept of a run that ends early."""
+"""Refused runs, and the part of an interrupted run that is kept."""
 
 from pathlib import Path
 from typing import Any
@@ -62,11 +62,11 @@ def test_starts_that_are_none(q0: Any, v0: Any, kind: Any, message: str) -> None
         )
 
 
-# --- what is kept --------------------------------------------------------------------
+# --- kept rows -----------------------------------------------------------------------
 
 
 def simulate_until_interrupted(*arguments: Any, **options: Any) -> Rollout:
-    """Simulate; a Ctrl-C that gets through fails the test, not the session."""
+    """Simulate; a Ctrl-C that propagates fails the test, not the session."""
     try:
         return simulate(*arguments, **options)
     except KeyboardInterrupt:
@@ -74,7 +74,7 @@ def simulate_until_interrupted(*arguments: Any, **options: Any) -> Rollout:
 
 
 @pytest.mark.parametrize("row", [0, 1, 17, 50])
-def test_ctrl_c_keeps_what_was_computed(row: int, planar_run: Rollout) -> None:
+def test_ctrl_c_keeps_computed_rows(row: int, planar_run: Rollout) -> None:
     """Interrupted at row k: k + 1 rows, the same as the whole run's."""
 
     def interrupt(fraction: float) -> None:

@@ -17,7 +17,7 @@ from hsp_control.simulation.measures import (
 
 @cache
 def changed_run() -> hsp.Rollout:
-    """Return a log whose columns are random numbers, so that none is like another."""
+    """Return a log of random, hence distinct, columns."""
     panda = hsp.Robot.load("panda")
     q = panda.home()
     ball = hsp.Obstacle("ball", hsp.shapes.Sphere(0.1), hsp.Hold([0.6, 0.0, 0.6]))
@@ -34,7 +34,7 @@ def changed_run() -> hsp.Rollout:
     return run
 
 
-def test_what_is_held_away_by_a_hand_is_not_out_of_reach() -> None:
+def test_a_target_that_a_pull_prevents_is_not_out_of_reach() -> None:
     t = np.arange(0.0, 1.0, 0.01)
     error = np.tile([0.3, 0.0, 0.0], (len(t), 1))
     columns = {"t": t, "task.hand.error": error, "damped": np.ones(len(t))}
@@ -45,7 +45,7 @@ def test_what_is_held_away_by_a_hand_is_not_out_of_reach() -> None:
     pulled = {**columns, PULL_COLUMN: np.where(t < 0.9, 37.0, 0.0)}
     (held,) = unreached(pulled, tasks)
     assert held.words(80) == ""
-    assert held.words(-1) == ""  # let go 0.1 s ago: it has not rested for long
+    assert held.words(-1) == ""  # released 0.1 s ago: it has not rested for long
 
 
 def rms(values: Array) -> float:
@@ -77,7 +77,7 @@ def expected(run: hsp.Rollout) -> dict[str, float]:
     }
 
 
-def test_measures_are_what_they_mean() -> None:
+def test_measures_equal_their_definitions() -> None:
     run = changed_run()
     found = measures(run)
     for name, value in expected(run).items():
@@ -92,7 +92,7 @@ def test_measures_are_what_they_mean() -> None:
 
 
 def test_a_robot_that_stands_needs_the_effort_of_gravity() -> None:
-    """The same in a run that is known: rms and largest effort are those at rest."""
+    """The same in a known run: rms and largest effort are those at rest."""
     panda = hsp.Robot.load("panda")
     controller = hsp.Controller(panda, [hsp.JointPosture("start")], limits=None)
     run = hsp.simulate(controller, panda.home(), duration=0.02, control_period=0.01)
@@ -104,7 +104,7 @@ def test_a_robot_that_stands_needs_the_effort_of_gravity() -> None:
 
 
 def test_rows_that_come_later_go_on_where_the_others_ended() -> None:
-    """As in a play: an error that rests all the time is not new in each piece."""
+    """As in a play: a persistent error is not reported anew in every piece."""
     t = np.arange(0.0, 1.0, 0.01)
     error = np.tile([0.3, 0.0, 0.0], (len(t), 1))
     columns = {"t": t, "task.hand.error": error, "damped": np.ones(len(t))}
@@ -140,4 +140,4 @@ def test_a_kept_force_is_without_its_feedback_and_lost_after_it_was_touched() ->
     np.testing.assert_allclose(kept.wanted, np.full(5, 20.0), rtol=1e-14)
     np.testing.assert_allclose(kept.planned, np.full(5, 19.5), rtol=1e-14)
     np.testing.assert_allclose(kept.actual, actual[1:], rtol=1e-14)
-    assert kept.lost == 1  # before it was touched nothing was lost
+    assert kept.lost == 1  # before contact nothing was lost

@@ -1,4 +1,4 @@
-"""Sentences of a run's table, for invented numbers."""
+"""Sentences of a run's table, for given numbers."""
 
 from typing import Any
 
@@ -22,7 +22,7 @@ class Log:
         return self.columns[name]
 
 
-def test_the_worst_joint_its_unit_and_its_time_are_said() -> None:
+def test_the_worst_joint_its_unit_and_its_time_are_reported() -> None:
     t = np.array([0.0, 0.5, 1.0, 1.5])
     position, velocity = np.zeros((2, 4, 3))
     position[1, 2], position[2, 1], velocity[2, 0] = 0.04, 0.02, 0.7
@@ -33,7 +33,7 @@ def test_the_worst_joint_its_unit_and_its_time_are_said() -> None:
     assert second.startswith("a is 0.7 rad/s beyond its speed limit at 1 s (1 rows)")
 
 
-def test_what_became_of_a_force_is_its_root_mean_square(
+def test_the_force_s_error_is_its_root_mean_square(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     wanted = np.full(4, 10.0)
@@ -61,7 +61,7 @@ def damped_run() -> hsp.Rollout:
     return hsp.simulate(controller, panda.home(), duration=0.4, control_period=0.01)
 
 
-def test_printing_a_run_shows_what_hsp_run_prints() -> None:
+def test_printing_a_run_shows_the_table_of_hsp_run() -> None:
     run = damped_run()
     text, rows = str(run), [*run_summary.summary_rows(run)]
     assert [line.split("  ")[0] for line in text.splitlines()] == [n for n, _ in rows]
@@ -81,7 +81,7 @@ def test_a_task_that_goes_is_summarised_by_the_rows_in_which_it_was_there() -> N
     assert found["tracking.elbow.rms"].value == pytest.approx(rms)
     assert found["tracking.elbow.end"].value == active[-1]
     assert f"at the end {active[-1]:.3g} m" in text
-    # Determinants of one task and of two do not compare; singular values do.
+    # Determinants of one task and of two are not comparable; singular values are.
     assert np.isnan(found["manipulability.min"].value)
     least = np.nanmin(run["singular_values"])
     assert found["singular_value.min"].value == least
@@ -110,7 +110,7 @@ def test_distances_of_barriers_are_in_log_output_and_summary() -> None:
     )
 
 
-def test_an_own_barrier_is_logged_by_its_type() -> None:
+def test_a_user_s_barrier_is_logged_by_its_type() -> None:
     class Height(hsp.limits.Barrier):
         """A frame stays above a height."""
 
@@ -126,7 +126,7 @@ def test_an_own_barrier_is_logged_by_its_type() -> None:
     assert run["barrier.Height_0"] == pytest.approx(height, abs=1e-12)
     assert run.meta["columns"]["barrier.Height_1"]["minimum"] == 0.2
     fresh = hsp.Controller(panda, [hsp.FramePosition("panda_tcp")], limits=limits)
-    for row in (0, 1):  # the second is bound: one call of the engine
+    for row in (0, 1):  # the second step is bound: one call of the engine
         output = fresh.compute(run.t[row], run.q[row], run.v[row])
         now = pytest.approx(height[row], abs=1e-12)
         assert output.distances == {"Height_0": now, "Height_1": now}

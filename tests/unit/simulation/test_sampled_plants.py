@@ -1,4 +1,4 @@
-"""Check plants that move on by themselves from one control period to the next."""
+"""Sampled plants, which advance from one control period to the next."""
 
 from typing import Any
 
@@ -16,7 +16,7 @@ from hsp_control.simulation.plants import IntegratedPlant, Plant, RigidBodyPlant
 
 
 class Sampled(IntegratedPlant):
-    """A sampled plant that writes down its calls, and shows the state one off."""
+    """A sampled plant that records its calls, and reports v + 1."""
 
     def __init__(self, robot: Robot, offset: float) -> None:
         super().__init__(RigidBodyPlant(robot), Rk4(0.001))
@@ -73,8 +73,8 @@ def test_a_sampled_plant_is_reset_once_then_measured_and_moved_every_period() ->
         np.testing.assert_array_equal(run[name], same[name], err_msg=name)
 
 
-def test_the_log_has_the_truth_and_the_effort_of_what_was_shown() -> None:
-    """Shown v + 1, the controller commands what it would at v + 1; q, v are true."""
+def test_the_log_has_the_truth_and_the_effort_at_the_measured_state() -> None:
+    """The logged effort is that at the measured v + 1; logged q, v are true."""
     controller = planar_controller()
     plant = Sampled(controller.robot, 1.0)
     run = run_sampled(plant)

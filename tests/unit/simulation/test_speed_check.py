@@ -1,4 +1,4 @@
-"""Whether joints are fast enough for references: the least share of their speeds."""
+"""Joint speeds that references require, as fractions of the joints' limits."""
 
 import numpy as np
 import pytest
@@ -12,7 +12,8 @@ from hsp_control.trajectories import Along
 
 @pytest.mark.parametrize("seed", range(5))
 def test_the_least_share_is_that_of_the_best_self_motion(seed: int) -> None:
-    """A Panda's hand leaves one free direction, along which the shares are scanned."""
+    """A Panda's hand pose leaves one self-motion, over which fractions are
+    minimised."""
     robot, rng = hsp.Robot.load("panda"), np.random.default_rng(seed)
     q = robot.home() + rng.normal(size=7) * 0.2
     limit, rate = rng.uniform(1.0, 3.0, 7), 3.0 * rng.normal(size=6)
@@ -27,32 +28,32 @@ def test_the_least_share_is_that_of_the_best_self_motion(seed: int) -> None:
     assert abs(best[joint]) == pytest.approx(share, rel=1e-3)
 
 
-def said(speed: float, rows: str) -> list[TooFast]:
+def reported(speed: float, rows: str) -> list[TooFast]:
     robot = hsp.Robot.load("panda")
     circle = Along(hsp.Circle(0.1, 1.0), speed, acceleration=200.0)
     task = hsp.FramePose("panda_tcp", circle)
     if rows != "pose":
         task = hsp.FramePosition("panda_tcp", circle)
     law = hsp.Controller(robot, [task], limits=hsp.Limits())
-    asked = robot, law.tasks, robot.home(), 2.0, (), law.limits
-    return [each for each in not_followed(*asked) if isinstance(each, TooFast)]
+    requested = robot, law.tasks, robot.home(), 2.0, (), law.limits
+    return [each for each in not_followed(*requested) if isinstance(each, TooFast)]
 
 
 @pytest.mark.parametrize("rows", ["pose", *further("position")])
-def test_what_is_too_fast_is_said_with_place_joint_and_speed(rows: str) -> None:
-    (found,) = said(4.0, rows)
+def test_a_reference_too_fast_is_reported_with_place_joint_and_speed(rows: str) -> None:
+    (found,) = reported(4.0, rows)
     assert found.share > 1.01
     assert found.unit == "m/s"
-    assert found.speed == pytest.approx(4.0)  # constant, but for its rise
+    assert found.speed == pytest.approx(4.0)  # constant, except for the ramp
     assert f"moves at 4 m/s at t = {found.t:.3g} s, for which 'panda_joint" in (
         found.message
     )
     assert f"; {4.0 / found.share:.3g} m/s would do there" in found.message
-    assert said(0.5 * 4.0 / found.share, rows) == []
-    assert said(0.2, rows) == []
+    assert reported(0.5 * 4.0 / found.share, rows) == []
+    assert reported(0.2, rows) == []
 
 
-def test_the_worst_time_is_said() -> None:
+def test_the_worst_time_is_reported() -> None:
     """A line is fastest in its middle: 1.875 times its mean speed."""
     robot = hsp.Robot.load("panda")
     line = hsp.Line([5.0, 0.0, 0.0], 1.0, start=[0.0, 0.0, 0.0])
@@ -64,9 +65,9 @@ def test_the_worst_time_is_said() -> None:
     assert found.speed == pytest.approx(1.875 * 5.0)
 
 
-def test_without_limits_nothing_is_said() -> None:
+def test_without_limits_nothing_is_reported() -> None:
     robot = hsp.Robot.load("panda")
     task = hsp.FramePose("panda_tcp", Along(hsp.Circle(0.1, 1.0), 9.0))
     law = hsp.Controller(robot, [task])
-    asked = robot, law.tasks, robot.home(), 2.0, (), None
-    assert list(not_followed(*asked)) == []
+    requested = robot, law.tasks, robot.home(), 2.0, (), None
+    assert list(not_followed(*requested)) == []

@@ -1,4 +1,4 @@
-"""Check J, J', e' and the law of the error of every task, at large errors too."""
+"""J, J', e' and the error equation of every task, at large errors too."""
 
 from typing import Any
 
@@ -57,7 +57,7 @@ def test_the_rows_move_as_the_robot_does(case: Case) -> None:
 
 
 def gains_of(kind: str, rows: int, seed: int) -> tuple[Gains, Array, Array]:
-    """Return gains and what they stand for; the matrices are not symmetric."""
+    """Return gains and their matrices, which are not symmetric."""
     rng = np.random.default_rng(seed)
     if kind == "scalar":
         return GAINS, 25.0 * np.eye(rows), 10.0 * np.eye(rows)
@@ -70,7 +70,7 @@ def gains_of(kind: str, rows: int, seed: int) -> tuple[Gains, Array, Array]:
 
 
 def shortened(task: Task, e: Array, largest: float) -> Array:
-    """Return s(e); a direction's coordinates are bounded in their own way."""
+    """Return s(e); a direction's coordinates have another bound."""
     if isinstance(task, Pointing):
         return e
     ends = np.cumsum([part.size for part in task.error_parts])[:-1]
@@ -93,9 +93,9 @@ def shortened(task: Task, e: Array, largest: float) -> Array:
 def test_the_law_of_the_error(case: Case, kind: tuple[float, str, Any]) -> None:
     """With J a + J'v = a_x the reported error obeys e'' + Kv e' + Kp s(e) = 0.
 
-    At errors up to 3 rad or m (2.5 rad for pointing), in motion, with any motion in
-    the null space. What is left, 5e-10 of e, is the rounding of second differences
-    (1e-16/h² with h = 0.5 to 10 ms) and 1e-11 of what Kp e alone amounts to.
+    At errors up to 3 rad or m (2.5 rad for pointing), in motion, with any motion in the
+    null space. The residual, 5e-10 of e, is the rounding of second differences
+    (1e-16/h² with h = 0.5 to 10 ms) and 1e-11 of Kp e.
     """
     part, gains, largest = kind
     seed = 11
@@ -117,7 +117,7 @@ def test_the_law_of_the_error(case: Case, kind: tuple[float, str, Any]) -> None:
     motion = Motion(robot, motion.q, motion.v, a, case.family.stride)
 
     def reported(s: float) -> Array:
-        # The error is a function of (t, q): any velocity will do.
+        # The error is a function of (t, q), at any velocity.
         state = moved(robot, TIME + s, motion.configuration(s), motion.v)
         return task.evaluate(state).error
 
@@ -146,8 +146,7 @@ def test_reference_rate_is_the_motion_of_who_stays_on_the_reference(case: Case) 
     sample = task.evaluate(state)
     np.testing.assert_allclose(sample.error, 0.0, rtol=0, atol=2e-15 * 10)
     np.testing.assert_allclose(sample.error_rate, 0.0, rtol=0, atol=1e-13)
-    # Only rates that depend on the robot's place may change with it, and none does
-    # with its velocity.
+    # Only rates that depend on q may change with q, and none depends on v.
     np.testing.assert_array_equal(task.reference_rate(state), rate)
     if not isinstance(case.family, Direction):
         elsewhere = robot.state(TIME, robot.neutral(), motion.v)
@@ -161,7 +160,7 @@ def test_reference_rate_is_the_motion_of_who_stays_on_the_reference(case: Case) 
 @pytest.mark.slow
 @every_task
 def test_measure(case: Case) -> None:
-    """Reference and actual, as a person would plot them; beyond half a turn too."""
+    """Reference and actual as for a plot, continuous beyond half a turn."""
     for seed, part in ((6, 0.2), (7, 1.0)):
         motion = place(case, seed)
         error = part * case.family.largest
@@ -210,7 +209,7 @@ def test_angular_momentum_obeys_its_first_order_equation(
     np.testing.assert_allclose(
         sample.jacobian @ a + sample.jacobian_dot @ v, rate, rtol=0, atol=1e-9 * scale
     )
-    # Where the law is obeyed, ℓ' = a_x, the error's rate is the sample's.
+    # Where the law holds, ℓ' = a_x, the error's rate is the sample's.
     desired = target.sample(TIME)
     np.testing.assert_allclose(sample.error, desired.position - momentum(0.0))
     np.testing.assert_allclose(

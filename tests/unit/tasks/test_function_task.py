@@ -1,4 +1,4 @@
-"""A task whose value is a Python function: beside an exact one, and its mistakes."""
+"""A task whose value is a Python function: against an exact one, and mistakes."""
 
 import re
 from collections.abc import Callable
@@ -17,7 +17,7 @@ from hsp_control.tasks import FunctionTask
 
 
 def elbow(state: RobotState) -> Array:
-    """Two numbers that move by themselves, too: not linear in q or t."""
+    """Two time-varying numbers, nonlinear in q and t."""
     x, y, z = state.position("panda_link4")
     return np.array([x * y + np.sin(2.0 * state.t) * z, z**2 - 0.3 * state.t**2 * x])
 
@@ -43,7 +43,7 @@ GIVEN: dict[str, Callable[[RobotState], Array]] = {
 
 @pytest.mark.parametrize("given", [(), ("jacobian_function",), tuple(GIVEN)], ids=str)
 def test_the_derivatives_are_those_of_the_function(given: tuple[str, ...]) -> None:
-    """J, J' and e' beside those by hand; what nobody gives is good to 1e-8."""
+    """J, J' and e' against those by hand; omitted ones are accurate to 1e-8."""
     robot, rng = load("panda"), np.random.default_rng(3)
     task = placed(
         FunctionTask(
@@ -72,7 +72,7 @@ def test_the_error_obeys_its_equation(given: tuple[str, ...]) -> None:
     """e'' + Kv e' + Kp e = 0 along a motion with J a + J'v = a_x.
 
     Second derivatives of e are differences of eighth order with a rounding of 1e-9 e''.
-    What nobody gives adds the error of J', up to 1e-8.
+    An omitted J' adds its error, up to 1e-8.
     """
     robot, rng = load("panda"), np.random.default_rng(11)
     q, v = robot.random_configuration(rng), rng.normal(size=7)
@@ -98,7 +98,7 @@ def test_the_error_obeys_its_equation(given: tuple[str, ...]) -> None:
 
 
 def test_a_task_of_a_function_is_the_ready_one() -> None:
-    """The position of a frame, written down, moves the arm as `FramePosition` does."""
+    """A frame's position as a function moves the arm like `FramePosition`."""
     robot = load("panda")
     circle = hsp.Circle(0.05, 2.0)
 
@@ -114,7 +114,7 @@ def test_a_task_of_a_function_is_the_ready_one() -> None:
     np.testing.assert_allclose(mine.q, ready.q, rtol=0, atol=1e-9)
     np.testing.assert_allclose(mine.tau, ready.tau, rtol=0, atol=1e-5)
     assert mine["task.hand.actual"].shape == (len(mine), 3)
-    # A lower level, a schedule, changes and streamed targets take it, too.
+    # It works with lower levels, schedules, changes and streamed targets, too.
     arm = hsp.Controller(
         robot, [hsp.FramePosition("panda_tcp"), FunctionTask(elbow, size=2, priority=2)]
     )

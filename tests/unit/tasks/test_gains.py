@@ -19,10 +19,10 @@ from hsp_control.common.exceptions import GainError
 
 @pytest.mark.slow
 @every_task
-def test_an_error_up_to_the_largest_counts_in_full(case: Case) -> None:
-    """To the last bit; and a little beyond it the task's acceleration has not jumped.
+def test_an_error_up_to_the_largest_is_fed_back_linearly(case: Case) -> None:
+    """Bit for bit; and just beyond the bound the task's acceleration is continuous.
 
-    A direction's coordinates are bounded by themselves.
+    A direction's coordinates are bounded by definition.
     """
     motion = place(case, 3)
     robot = motion.robot
@@ -45,7 +45,8 @@ def test_an_error_up_to_the_largest_counts_in_full(case: Case) -> None:
 
 
 def test_the_largest_errors_of_a_robot() -> None:
-    """0.35 of its size for positions, 1 rad for orientations, none for joints."""
+    """0.35 of the robot's size for positions, 1 rad for orientations, none for
+    joints."""
     robot = panda()
     pose = placed(hsp.FramePose("panda_tcp"), robot)
     assert pose.largest_error == (0.35 * robot.size, 1.25)
@@ -56,7 +57,7 @@ def test_the_largest_errors_of_a_robot() -> None:
     np.testing.assert_array_equal(part.feedback().largest, [[3.0, 6.0, 0.2]])
     none = placed(hsp.FramePose("panda_tcp", largest_error="none"), robot)
     assert len(none.feedback().largest) == 0
-    for each in (pose, one, part, none):  # what is placed can be placed again
+    for each in (pose, one, part, none):  # placed parts can be placed again
         assert placed(each, robot).largest_error == each.largest_error
 
 
@@ -114,7 +115,7 @@ def test_gains_in_three_forms() -> None:
 
 
 def test_a_change_leads_both_gains_to_the_new_ones() -> None:
-    """Unchanged before it, the mean of both half-way, exactly the new ones after it."""
+    """Unchanged before the ramp, the mean half-way, exactly the new ones after it."""
     robot = Robot.load("planar3r")
     old, new = Gains([4.0, 5.0, 6.0], 7.0), Gains(40.0, [10.0, 20.0, 30.0])
     controller = Controller(robot, [JointPosture("home", gains=old)])

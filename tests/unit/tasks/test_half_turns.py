@@ -1,4 +1,4 @@
-"""Check orientation and pointing tasks near half a turn, where the error jumps."""
+"""Orientation and pointing tasks near half a turn, where the error jumps."""
 
 from functools import cache
 from typing import Any
@@ -46,7 +46,7 @@ def panda_state() -> Any:
 @example(np.pi, np.array([1.0, 1.0, 0.0]) / np.sqrt(2.0))
 @example(0.0, np.array([0.0, 0.0, 1.0]))
 def test_orientation_through_half_a_turn(angle: float, axis: Array) -> None:
-    """The error is at most pi long, its rate and the acceleration are bounded.
+    """‖e‖ ≤ pi; its rate and the acceleration are bounded.
 
     ‖Jlog‖ ≤ pi/2 up to pi, so |e'| ≤ pi/2 |w̃|; a few hundred rad/s² at these gains.
     """
@@ -95,7 +95,7 @@ def test_pointing_through_the_antipode(angle: float, side: float, kind: str) -> 
 
 @pytest.mark.parametrize("degrees", [150.0, 170.0, 179.0])
 def test_pointing_is_led_back_from_near_the_antipode(degrees: float) -> None:
-    """From rest, along the great circle; never to the wrong pole."""
+    """From rest along the great circle, never to the opposite pole."""
     robot, q0 = panda(), panda().home()
     here = robot.state(0.0, q0, np.zeros(7)).frame("panda_tcp").rotation[:, 2].copy()
     angle = np.radians(degrees)

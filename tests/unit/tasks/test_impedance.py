@@ -71,12 +71,12 @@ def definite(rng: np.random.Generator, size: int, scale: float) -> Array:
 
 
 def impedance(kind: str, rows: int, rng: np.random.Generator) -> Impedance:
-    """Return an impedance of one kind; stiff rows beside soft ones."""
+    """Return an impedance of one kind, with stiff and soft rows."""
     each = (200.0 * rng.uniform(0.3, 3.0, rows)).tolist()
     if kind == "ratio":
         return Impedance(each, damping_ratio=0.7, largest_force="none")
     if kind in ("led", "led, damped"):
-        # without stiffness along one direction, which is no row's
+        # without stiffness along one direction, not aligned with a row
         turn = np.linalg.qr(rng.normal(size=(rows, rows)))[0]
         each[0] = 0.0
         stiffness = (turn * each) @ turn.T
@@ -130,9 +130,7 @@ def inverse_inertias(task: Any, motion: Motion) -> Callable[[float], Array]:
     covering(CASES, ["ratio", "matrices", "led", "led, damped", "bounded"]),
     ids=str,
 )
-def test_the_equation_holds_whatever_the_force_and_the_metric(
-    case: Case, kind: str
-) -> None:
+def test_the_equation_holds_for_any_force_and_metric(case: Case, kind: str) -> None:
     """Λ e'' + (½ Λ' + D) e' + s(e) = -f along the motion that follows from f."""
     rng = np.random.default_rng(3)
     metrics: list[tuple[int, Metric]]
@@ -181,7 +179,7 @@ def test_the_equation_holds_whatever_the_force_and_the_metric(
 
 @pytest.mark.parametrize("case", CASES[:3], ids=str)
 def test_gains_at_a_state_are_those_of_the_step(case: Case) -> None:
-    """A task by itself evaluates as a controller does; given gains are used."""
+    """A task alone evaluates as in a controller; given gains are used."""
     motion = place(case, 4)
     robot = motion.robot
     plain = case.family.build(robot, motion, 0.3, GAINS, 4)
@@ -270,7 +268,7 @@ def panda_hand(**fields: Any) -> Controller:
 
 
 def test_stiffness_changes_without_a_jump() -> None:
-    """Stiffness, kind of damping and bound: the effort is continuous, and arrives."""
+    """Stiffness, kind of damping and bound: the effort is continuous and converges."""
     soft = Impedance([200, 300, 400], damping_ratio=0.7)
     hard = Impedance(2000.0, damping=150.0, largest_force=20.0)
     controller = panda_hand(impedance=soft)
@@ -291,13 +289,13 @@ def test_stiffness_changes_without_a_jump() -> None:
     steps = np.abs(np.diff(tau, axis=0)).max(axis=1)
     assert steps.max() < 0.02 * np.abs(after - before).max()
     assert steps[times[1:] < 1.0].max() == 0.0
-    # A smooth step begins with its third power: no corner.
+    # A smooth step begins with t³: no corner.
     begin = np.abs(effort(1.0 + 1e-3) - before).max()
     assert begin < 1e-6 * np.abs(after - before).max()
 
 
 def later(first: Impedance) -> Any:
-    """Return the changes at 1 s of a hand that begins with an impedance."""
+    """Return the changes at 1 s of a hand that starts with an impedance."""
     return panda_hand(impedance=first).at(1.0)
 
 
@@ -331,14 +329,14 @@ REFUSED: dict[str, tuple[Callable[[], Any], type[Exception], str]] = {
         panda_hand(impedance=Impedance(1.0)).tasks),
      CompensationError,
      "... momentum_observer: ... task 'hand'"),
-    "clip of what is not cancelled": (lambda: MomentumObserver(clip=3.0, cancel=False),
+    "clip without cancellation": (lambda: MomentumObserver(clip=3.0, cancel=False),
      CompensationError,
      "... clip ... cancel is false"),
 }  # fmt: skip
 
 
 @pytest.mark.parametrize("name", REFUSED)
-def test_what_is_refused(name: str) -> None:
+def test_refusals(name: str) -> None:
     make, error, message = REFUSED[name]
     with pytest.raises(error, match=wording(message)):
         make()

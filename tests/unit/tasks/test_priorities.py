@@ -1,4 +1,4 @@
-"""Priorities that the user does not give: on a floating base, balance comes first."""
+"""Default priorities: on a floating base, balance comes first."""
 
 from typing import Any
 
@@ -61,7 +61,7 @@ def test_on_a_floating_base_balance_comes_first(which: str, quadruped: Robot) ->
     ("name", "root"), [("panda", None), ("ur5", "planar"), ("tiago_no_hand", None)]
 )
 def test_without_a_floating_base_all_tasks_have_the_first(name: str, root: Any) -> None:
-    """Motors move a base that rolls, and nothing falls."""
+    """A wheeled base is actuated and cannot fall."""
     robot = load(name, root)
     links = (robot.end_effector, robot.frame_names[-1])
     tasks: list[Task] = [
@@ -95,6 +95,6 @@ def test_a_controller_s_levels(quadruped: Robot) -> None:
     found = {task.name: priority_of(task, quadruped) for task in controller.tasks}
     for name, priority in (("FR_FOOT", 1), ("FL_FOOT", 2), ("posture", 5)):
         assert found[name] == priority
-    # The placed tasks have the user's values, and no more.
+    # The placed tasks have the user's values only.
     given = {task.name: task.priority for task in controller.tasks}
     assert given == {task.name: task.priority for task in tasks}

@@ -1,4 +1,4 @@
-"""A spring whose force is bounded: it slips, and takes no energy from anywhere."""
+"""A spring with bounded force: it slips, and generates no energy."""
 
 from typing import Any
 
@@ -25,10 +25,10 @@ ENDS = np.array([3, 6])
 
 
 def springs(kind: str, rng: np.random.Generator) -> Array:
-    """Return the numbers of a random impedance of a pose."""
+    """Return the matrices of a random impedance of a pose."""
     each = np.exp(rng.uniform(np.log(10.0), np.log(2000.0), 6))
     stiffness: Any = each.tolist()
-    if kind == "led":  # without stiffness along two directions, which are no rows
+    if kind == "led":  # without stiffness along two directions, not aligned with rows
         each[:2] = 0.0
     if kind != "diagonal":
         turn = np.linalg.qr(rng.normal(size=(6, 6)))[0]
@@ -62,7 +62,7 @@ def test_the_force_is_the_gradient_of_a_convex_energy(kind: str, seed: int) -> N
     assert (force - spring_force(numbers, ENDS, b)) @ (a - b) >= 0.0
     assert np.linalg.norm(force[:3]) <= MOST[0] * (1.0 + 1e-9)
     assert np.linalg.norm(force[3:]) <= MOST[1] * (1.0 + 1e-9)
-    # No force along a direction without stiffness, however far the hand is led.
+    # No force along a direction without stiffness, at any displacement.
     K = parts_of(numbers).K
     values, axes = np.linalg.eigh(K)
     assert np.abs(axes[:, values < 1e-9].T @ force).max(initial=0.0) < 1e-7 * scale
@@ -95,7 +95,8 @@ def test_no_part_pulls_with_more_and_slips_only_there(kind: str, seed: int) -> N
 
 
 def test_the_default_of_a_robot() -> None:
-    """The force its strongest motor holds at half its size, and half of its effort."""
+    """Force: the strongest motor's effort at a lever of half the robot's size. Moment:
+    half of that effort."""
     robot = panda()
     task = placed(hsp.FramePose("panda_tcp", impedance=hsp.Impedance(100.0)), robot)
     strongest = 87.0
@@ -123,7 +124,8 @@ def test_the_default_of_a_robot() -> None:
 
 @pytest.mark.parametrize("force", [20.0, *further(5.0)])
 def test_its_energy_falls(force: float) -> None:
-    """E = ½ e'ᵀΛe' + U(e) falls by what is damped; within it nothing is different."""
+    """E = ½ e'ᵀΛe' + U(e) decreases by the dissipation; within the bound nothing
+    changes."""
     robot = panda()
     q0 = robot.home()
     here = robot.state(0.0, q0, np.zeros(7)).position("panda_tcp").copy()

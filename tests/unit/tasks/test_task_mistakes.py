@@ -1,4 +1,4 @@
-"""Check that wrong arguments of tasks are refused by name, and how tasks are named."""
+"""Wrong arguments of tasks are refused by name; default names of tasks."""
 
 from collections.abc import Callable
 from typing import Any

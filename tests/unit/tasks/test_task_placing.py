@@ -1,4 +1,4 @@
-"""Placing: what a task leaves to the robot and its start becomes numbers and names."""
+"""Placing: omitted fields of a task are completed from the robot and its start."""
 
 from collections.abc import Callable
 from typing import Any
@@ -109,8 +109,8 @@ TASKS: dict[str, Task] = {
      "orientation, blended", "pose of a point", "pose of a screw", "position on axes",
      "pointing, turning", "relative, blended"],
 )  # fmt: skip
-def test_what_is_omitted_is_where_the_robot_starts(name: str) -> None:
-    """The error is zero there, or as large as the circle that has not yet blended."""
+def test_omitted_targets_are_at_the_robot_s_start(name: str) -> None:
+    """The error is zero there, or the circle's radius before its blend."""
     here = state()
     placed = place(TASKS[name], here)
     error = placed.evaluate(here).error
@@ -118,7 +118,7 @@ def test_what_is_omitted_is_where_the_robot_starts(name: str) -> None:
     np.testing.assert_allclose(error, 0.0, rtol=0, atol=1e-14)
 
 
-def test_relative_points_count_from_the_start() -> None:
+def test_relative_points_are_relative_to_the_start() -> None:
     here = state()
     x = here.position(TCP).copy()
     level = place(FramePosition(trajectory=Circle(0.1, 2.0)), here)
@@ -152,15 +152,15 @@ def test_a_point_trajectory_of_a_pose_holds_the_orientation() -> None:
     world = Circle(0.1, 2.0, POINT)
     placed = place(FramePose(trajectory=world), here)
     assert placed.trajectory == ComposedPose(world, HoldOrientation(R))
-    # As the same with a pose; for a relative pose, in the reference's axes.
-    said = FramePose(trajectory=ComposedPose(position=world))
-    assert place(said, here) == placed
+    # The same as with a pose; for a relative pose, in the reference's axes.
+    reported = FramePose(trajectory=ComposedPose(position=world))
+    assert place(reported, here) == placed
     relative = seen(here, TCP, "panda_link2")
     placed = place(RelativePose(reference="panda_link2", trajectory=circle), here)
     assert placed.trajectory == ComposedPose(
         Circle(0.1, 2.0, relative.translation), HoldOrientation(relative.rotation)
     )
-    # Its six rows obey what those of the composed pose do.
+    # Its six rows obey the same equation as those of the composed pose.
     for t in (0.0, 0.4):
         at = panda().state(t, here.q, here.v)
         sample = placed.evaluate(at)
@@ -258,7 +258,7 @@ def test_postures_are_given_in_four_ways(name: str, root: Any) -> None:
 
 
 def test_the_first_state_is_the_start_unless_one_is_given() -> None:
-    """Until then the robot's home stands for it; `restart` begins anew."""
+    """Before that the robot's home replaces it; `restart` begins anew."""
     robot, first, second = panda(), state(seed=1), state(seed=2)
     at_home = robot.state(0.0, robot.home(), np.zeros(7))
     free = Controller(robot, [FramePosition()])
@@ -311,7 +311,7 @@ def test_the_message_has_the_key_path(which: str) -> None:
     assert running.changes == ()
 
 
-def test_too_many_rows_are_told_with_the_robot() -> None:
+def test_too_many_rows_are_reported_with_the_robot() -> None:
     with pytest.raises(TaskError, match=r"^tasks.hand: the task has 6 rows; planar3r"):
         Controller(planar(), [FramePose(name="hand")])
 
@@ -320,7 +320,7 @@ def test_too_many_rows_are_told_with_the_robot() -> None:
 
 
 class Doubled(FramePosition):
-    """A user's task that overrides `evaluate` and calls the one that it replaces."""
+    """A user's task that overrides `evaluate` and calls the base class's."""
 
     def evaluate(
         self, state: RobotState, out: TaskSample | None = None, feedback: Any = None
@@ -332,7 +332,7 @@ class Doubled(FramePosition):
 
 
 def test_a_subclass_may_call_the_evaluate_that_it_overrides() -> None:
-    """At the same state as the task that it derives from, and in a controller."""
+    """Equal to its base class at the same state, and in a controller."""
     here = state()
     plain, doubled = (
         place(FramePosition(TCP, Hold(POINT))),

@@ -1,4 +1,4 @@
-"""Tasks and gains are values: one set of tests for all of them, by reflection."""
+"""Tasks and gains are values; the classes are found by reflection."""
 
 import inspect
 import pickle
@@ -65,7 +65,7 @@ EXAMPLES: dict[type[Part], Part] = {
     Pointing: Pointing(direction=[0, 0, 1]),
     RelativePose: RelativePose(reference="panda_link0"),
 }
-"""One of each class, with as few arguments as it needs."""
+"""One instance of each class, with required arguments only."""
 
 _TASK: dict[str, Any] = {
     "priority": 2,
@@ -110,7 +110,7 @@ OTHERS: dict[type[Part], dict[str, Any]] = {
      "axis": (0, 2, 0)},
     RelativePose: {**_TRACKING, **_FRAME, "trajectory": _POSE, "reference": "base"},
 }  # fmt: skip
-"""For each field, another value, or a list of them."""
+"""Per field another value, or a list of them."""
 ALONE: dict[type[Part], list[Part]] = {
     Gains: [
         Gains(natural_frequency=3.0),
@@ -137,7 +137,7 @@ def test_tasks_and_gains_are_values(part: Part) -> None:
     assert_is_a_value(part, NAMES)
 
 
-# --- bare values that mean a trajectory ----------------------------------------------
+# --- bare values that stand for a trajectory -----------------------------------------
 
 TURNED = Quaternion(np.array([0.6, 0.0, 0.0, 0.8]))
 THERE = SE3(TURNED, np.array([0.4, 0.1, 0.5]))
@@ -254,7 +254,7 @@ WRONG: dict[type[Part], Wrong] = {
     RelativePose: {**_WRONG_TRACKING, **_WRONG_FRAME, "trajectory": _WRONG_POSE,
      "reference": [(None, "reference: ... expected a str")]},
 }  # fmt: skip
-"""For each field, wrong values and their messages."""
+"""Wrong values per field, and their messages."""
 
 
 @pytest.mark.parametrize(
@@ -282,7 +282,7 @@ def test_wrong_values_are_refused(
 
 @pytest.mark.parametrize("cls", [cls for cls in MEMBERS if issubclass(cls, Task)])
 def test_one_task_serves_many_states_of_many_robots_in_many_threads(cls: Any) -> None:
-    """As it does one after the other, to the last bit; and nothing stays in it."""
+    """As one after the other, bit for bit; no state remains in it."""
     robots = [panda(), Robot.load("iiwa14")] if cls is not RelativePose else [panda()]
     example = EXAMPLES[cls]
     assert isinstance(example, Task)
@@ -315,7 +315,7 @@ def test_one_task_serves_many_states_of_many_robots_in_many_threads(cls: Any) ->
 
 
 def test_a_changed_copy_of_a_part_computes_for_itself() -> None:
-    """At the same state: a task whose gains are replaced."""
+    """A task with replaced gains, at the same state."""
     robot = Robot.load("planar3r")
     q = robot.integrate(robot.home(), np.array([0.3, 0.2, 0.1]))
     state = robot.state(0.0, q, np.ones(3))

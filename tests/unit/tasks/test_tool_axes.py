@@ -57,7 +57,7 @@ def test_it_is_the_error_in_the_world_turned() -> None:
 
 
 def test_a_polishing_hand_is_soft_along_its_tool_alone() -> None:
-    """A force along the tool moves the hand by f/K, whatever the tool's posture."""
+    """A force along the tool displaces the hand by f/K, at any orientation."""
     robot = hsp.Robot.load("panda")
     spring = hsp.Impedance([4000.0, 4000.0, 200.0, 200.0, 200.0, 200.0])
     hand = hsp.FramePose("panda_tcp", impedance=spring, along="tool", name="hand")

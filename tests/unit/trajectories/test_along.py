@@ -64,7 +64,8 @@ def some_curve(rng: np.random.Generator) -> Trajectory:
 
 
 def gentle(curve: Trajectory, speed: float, acceleration: float) -> Along:
-    """Return the motion along a curve, at the speed that is proposed if need be."""
+    """Return the motion along a curve, at the proposed speed if the given one is
+    refused."""
     try:
         return Along(curve, speed, acceleration)
     except TrajectoryError as refused:
@@ -83,7 +84,7 @@ def proposed(refused: Exception) -> float:
 @quick
 @given(seeds)
 def test_rates_are_the_slopes_of_the_motion(seed: int) -> None:
-    """Beside h⁶ f⁽⁷⁾/140, which grows with the bend, and 1e-15/h of rounding."""
+    """Up to h⁶ f⁽⁷⁾/140, which grows with the curvature, and rounding of 1e-15/h."""
     rng = np.random.default_rng(seed)
     motion = gentle(some_curve(rng), 1.0, 2.0)
     start, end = motion.course.knots
@@ -101,7 +102,7 @@ def test_rates_are_the_slopes_of_the_motion(seed: int) -> None:
 
 @quick
 @given(seeds)
-def test_speed_is_the_trapezoid_whatever_the_curve(seed: int) -> None:
+def test_speed_is_the_trapezoid_for_any_curve(seed: int) -> None:
     """|x'| is s', and the part of x'' along the path s'', to rounding."""
     rng = np.random.default_rng(seed)
     motion = gentle(some_curve(rng), *rng.uniform(0.3, 2.0, 2))
@@ -173,7 +174,7 @@ def test_a_circle_at_a_speed_is_the_circle_at_its_rate(rate: float) -> None:
             np.testing.assert_allclose(a, b, rtol=0, atol=1e-12)
 
 
-def test_what_goes_on_for_ever_rises_only() -> None:
+def test_an_endless_motion_only_accelerates() -> None:
     line = Along(UniformLine([3.0, 4.0], [1.0, 1.0]), 2.0, 1.5)
     for t, s in ((-1.0, 0.0), (0.0, 0.0), (2.0, 2.0), (1e3, 2.0 * (1e3 - 1.0))):
         expected = np.array([1.0, 1.0]) + s * np.array([0.6, 0.8])
@@ -267,7 +268,7 @@ def _distance(x: Array, a: Array, b: Array) -> float:
 
 @pytest.mark.parametrize("degrees", [10, 60, 90, 135, 170])
 def test_bends_are_as_wide_as_documented(degrees: float) -> None:
-    """The sharpest has two thirds of the radius of the arc that would fit, or more."""
+    """Its smallest radius is at least two thirds of that of the inscribed arc."""
     angle = np.radians(degrees)
     corner = [[-1.0, 0.0], [0.0, 0.0], [np.cos(angle), np.sin(angle)]]
     motion = Polyline(corner, 1.0, 1e6, 0.5)
@@ -282,7 +283,7 @@ def test_bends_are_as_wide_as_documented(degrees: float) -> None:
 
 
 def test_poses_pass_their_waypoints_in_their_orientations() -> None:
-    """The body does not turn there; a single line needs no blend."""
+    """The orientation is constant there; a single line needs no blend."""
     motion = PolylinePose(CORNER, 1.0, 5.0, 0.3, rotations=[R1, R2, R3])
     start, end = motion.course.knots
     for t, R in ((start, R1), ((start + end) / 2, R2), (end, R3)):
@@ -295,7 +296,7 @@ def test_poses_pass_their_waypoints_in_their_orientations() -> None:
             np.testing.assert_array_equal(a, b)
 
 
-def test_waypoints_count_from_where_the_robot_starts() -> None:
+def test_waypoints_are_relative_to_the_start() -> None:
     here = hsp.trajectories.HoldPose([1.0, 2.0, 3.0], R1)
     motion = PolylinePose(CORNER, 1.0, 5.0, 0.3, origin="start")
     with pytest.raises(TrajectoryError, match="depends on where the robot starts"):
@@ -359,7 +360,7 @@ REFUSED: dict[str, Callable[[], Any]] = {
 
 
 @pytest.mark.parametrize("message", REFUSED)
-def test_refusals_say_where_and_what_would_do(message: str) -> None:
+def test_refusals_have_the_place_and_a_remedy(message: str) -> None:
     with pytest.raises(TrajectoryError, match=wording(message)):
         REFUSED[message]()
 
@@ -367,7 +368,7 @@ def test_refusals_say_where_and_what_would_do(message: str) -> None:
 @quick
 @given(seeds)
 def test_the_speed_that_is_proposed_would_do(seed: int) -> None:
-    """And is the highest but for some percent, as 1.1 times as much is refused."""
+    """It is the highest within some percent: 1.1 times as much is refused."""
     rng = np.random.default_rng(seed)
     curve = some_curve(rng)
     if isinstance(curve, Line):
@@ -384,7 +385,7 @@ def test_the_speed_that_is_proposed_would_do(seed: int) -> None:
             v * v, 1e-300
         )
         if v > 1e-6:
-            assert np.linalg.norm(across) <= 0.5 * 1.01  # between the points looked at
+            assert np.linalg.norm(across) <= 0.5 * 1.01  # between sample points
     with pytest.raises(TrajectoryError, match="would do"):
         Along(curve, 1.1 * speed, 0.5)
 
@@ -417,7 +418,9 @@ def test_no_step_calls_python() -> None:
         "[0.1, 0.1, 0]], blend_radius: 0.03, speed: 0.1, acceleration: 0.5}",
     ],
 )
-def test_a_robot_follows_what_yaml_says(trajectory: str, tmp_path: Path) -> None:
+def test_a_robot_follows_a_trajectory_from_yaml(
+    trajectory: str, tmp_path: Path
+) -> None:
     file = tmp_path / "path.yaml"
     file.write_text(
         "robot: {name: panda}\ntasks:\n  hand: {type: frame_pose, frame: panda_tcp, "

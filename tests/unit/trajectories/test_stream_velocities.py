@@ -1,4 +1,4 @@
-"""Velocities that are streamed, as a joystick's: exact integrals, bounds, silence."""
+"""Streamed velocities, as from a joystick: exact integrals, bounds, silence."""
 
 import json
 from collections.abc import Callable
@@ -29,7 +29,7 @@ AXES = ("world", "tool")
 def run(
     stream: Any, duration: float, feed: Callable[[int], object] = lambda k: None
 ) -> list[Any]:
-    """Return samples 1 ms apart; ``feed`` sends what comes before each."""
+    """Return samples 1 ms apart; ``feed`` sends the messages before every sample."""
     samples = []
     for k in range(round(duration / H) + 1):
         feed(k)
@@ -40,7 +40,7 @@ def run(
 def held(
     stream: Any, velocity: Any, first: int, last: int, every: int = 20
 ) -> Callable[[int], None]:
-    """Return a feed of one velocity, as of a stick that is held, in samples."""
+    """Return a feed of one velocity, as of a held stick, in samples."""
 
     def feed(k: int) -> None:
         if first <= k < last and (k - first) % every == 0:
@@ -63,8 +63,9 @@ def twist(sample: PoseSample, axes: str) -> np.ndarray:
 def assert_integral(stream: Any, times: np.ndarray) -> None:
     """Check that x and R are integrals of x' and ω, and these of x'' and ω'.
 
-    Differences over ±h of what is C² with bounded jerk miss x'' by at most j h/3, and
-    x' by j h²/6; for R a term of the commutator is of the same order. h is 10 µs.
+    For a C² motion with jerk at most j, differences over ±h have an error of at most j
+    h/3 in x'' and of j h²/6 in x'; for R a term of the commutator is of the same order.
+    h is 10 µs.
     """
     h = 1e-5
     for t in times:
@@ -88,7 +89,7 @@ def test_a_stick_that_is_held_moves_the_hand_at_its_velocity(axes: Any) -> None:
     stick = held(stream, TWIST, 200, 1000)
     samples = run(stream, 1.0, lambda k: (other(k), stick(k)))
     for sample in samples[302:]:  # ``delay`` after the first message
-        # To rounding: the change ends with the velocity itself.
+        # To rounding: the transition ends at exactly the commanded velocity.
         assert np.abs(twist(sample, axes) - TWIST).max() < 1e-12
         assert np.abs(sample.orientation.angular_acceleration).max() < 1e-12
     moved = pose(samples[500]).actInv(pose(samples[1000]))
@@ -103,7 +104,7 @@ def test_a_stick_that_is_held_moves_the_hand_at_its_velocity(axes: Any) -> None:
 
 
 @pytest.mark.parametrize("axes", AXES)
-def test_the_pose_is_the_integral_of_what_is_commanded(axes: Any) -> None:
+def test_the_pose_is_the_integral_of_the_commanded_twist(axes: Any) -> None:
     rng = np.random.default_rng(5)
     stream = StreamPose(axes=axes, delay=0.05).anchored(START)
     run(
@@ -115,7 +116,7 @@ def test_the_pose_is_the_integral_of_what_is_commanded(axes: Any) -> None:
 
 
 def test_the_integral_is_exact_along_a_change_of_a_twist_in_the_tool_s_axes() -> None:
-    """Between two times x moves by ∫ x': Gauss's rule with 10 points is exact there."""
+    """Δx = ∫ x' dt: Gauss's rule with 10 points is exact there."""
     stream = StreamPose(axes="tool", delay=0.4, dead_man=1.0).anchored(START)
     run(stream, 0.6, held(stream, 4.0 * TWIST, 50, 51))
     nodes, weights = np.polynomial.legendre.leggauss(10)
@@ -137,7 +138,7 @@ def test_a_stick_that_is_let_go_of_stops_the_hand(axes: Any) -> None:
     assert np.abs(twist(samples[last + 199], axes) - TWIST).max() < 1e-12
     fading = twist(samples[last + 250], axes)
     assert 0.1 < np.linalg.norm(fading) / np.linalg.norm(TWIST) < 0.9
-    # It keeps to its line or its screw until it is at rest.
+    # It stays on its line or screw until it is at rest.
     assert np.abs(fading / TWIST - fading[0] / TWIST[0]).max() < 5e-3
     for sample in samples[last + 301 :]:
         assert not twist(sample, axes).any()
@@ -149,7 +150,7 @@ def test_a_stick_that_is_let_go_of_in_a_long_change_stops_the_hand_as_soon() -> 
     stream = StreamPose(acceleration=0.5, dead_man=0.1).anchored(START)
     samples = run(stream, 2.0, held(stream, [0.5, 0, 0, 0, 0, 0], 0, 100))
     speed = np.array([each.position.velocity[0] for each in samples])
-    assert speed.argmax() < 100 + 100 + 120  # it brakes what still accelerates
+    assert speed.argmax() < 100 + 100 + 120  # it brakes during acceleration
     assert speed.max() < 0.1
     assert not speed[-1]
     held_on = StreamPose(acceleration=0.5, dead_man=0.1).anchored(START)
@@ -157,8 +158,8 @@ def test_a_stick_that_is_let_go_of_in_a_long_change_stops_the_hand_as_soon() -> 
     assert samples[1530].position.velocity[0] == pytest.approx(0.5, abs=1e-12)
 
 
-def test_what_is_repeated_is_not_begun_again() -> None:
-    """The rate at which a stick repeats a velocity changes no bit of the motion."""
+def test_a_repeated_velocity_does_not_restart_the_motion() -> None:
+    """The rate at which a velocity is repeated does not change the motion by a bit."""
     found = []
     for every in (5, 20, 90):
         stream = StreamPose(axes="tool").anchored(START)
@@ -181,7 +182,7 @@ def test_a_velocity_beyond_the_bounds_keeps_its_direction(axes: Any) -> None:
 
 @pytest.mark.parametrize("axes", AXES)
 def test_a_stick_that_is_turned_back_amid_a_change_keeps_the_bounds(axes: Any) -> None:
-    """No cubic does: what still accelerates is brought to a steady velocity first."""
+    """No cubic does: during acceleration a constant velocity is reached first."""
     most = 0.0
     for late in range(10, 150, 10):
         stream = StreamPose(dead_man=9.0, delay=0.0, axes=axes).anchored(START)
@@ -194,7 +195,7 @@ def test_a_stick_that_is_turned_back_amid_a_change_keeps_the_bounds(axes: Any) -
 
 
 def test_a_spin_that_is_followed_by_a_target_keeps_its_bound() -> None:
-    """A component of ω may be √3 times Ruckig's bound on it, and is brought back."""
+    """A component of ω may reach √3 times Ruckig's bound, and returns into it."""
     rng = np.random.default_rng(1)
     for axis in np.eye(3):
         stream = StreamPose(dead_man=9.0, delay=0.02).anchored(START)
@@ -219,7 +220,7 @@ def test_a_spin_that_is_followed_by_a_target_keeps_its_bound() -> None:
 @settings(max_examples=25 if THOROUGH else 5)
 @given(st.integers(0, 2**32 - 1), st.floats(0.0, 0.3))
 def test_bounds_hold_in_the_axes_of_the_command(seed: int, delay: float) -> None:
-    """Random velocities in the tool's axes, at random times, and pauses."""
+    """Random velocities in tool axes at random times, with pauses."""
     rng = np.random.default_rng(seed)
     stream = StreamPose(axes="tool", delay=delay).anchored(START)
 
@@ -244,7 +245,7 @@ def test_bounds_hold_in_the_axes_of_the_command(seed: int, delay: float) -> None
 def test_targets_and_velocities_in_both_axes_follow_each_other(
     seed: int, delay: float
 ) -> None:
-    """Whatever follows whatever, the pose stays the integral of its velocity."""
+    """For any sequence of messages the pose is the integral of its velocity."""
     rng = np.random.default_rng(seed)
     stream = StreamPose(delay=delay, policy="extrapolate").anchored(START)
 
@@ -263,12 +264,12 @@ def test_targets_and_velocities_in_both_axes_follow_each_other(
     omega = [each.orientation.angular_velocity for each in samples]
     bounds = stream.run.stream
     assert np.linalg.norm(omega, axis=1).max() <= bounds.angular_speed * (1 + 1e-6)
-    # In other axes than those of the command a component is √3 larger at most.
+    # In axes other than the command's a component is at most √3 larger.
     speed = [each.position.velocity for each in samples]
     assert np.linalg.norm(speed, axis=1).max() <= np.sqrt(3) * bounds.speed + 1e-9
 
 
-def test_an_orientation_turns_about_axes_of_its_own() -> None:
+def test_an_orientation_rotates_about_its_own_axes() -> None:
     stream = StreamOrientation(START.rotation, axes="tool").anchored(START.rotation)
     last = run(stream, 0.6, held(stream, TWIST[3:], 10, 600))[-1]
     assert np.abs(last.rotation.T @ last.angular_velocity - TWIST[3:]).max() < 1e-12

@@ -37,7 +37,7 @@ POLICIES = ("latest", "interpolate", "extrapolate")
 def sampled(
     stream: Any, duration: float, feed: Callable[[float], object] = lambda t: None
 ) -> list[Any]:
-    """Return the samples of a run, in which ``feed`` sends what comes at each time."""
+    """Return the samples of a run; ``feed`` sends the messages of every time."""
     samples = []
     for k in range(round(duration / H) + 1):
         feed(k * H)
@@ -107,7 +107,7 @@ def hostile(rng: np.random.Generator, stream: Any, n: int) -> Callable[[float], 
 
 @settings(max_examples=25 if THOROUGH else 5)
 @given(st.integers(0, 2**32 - 1), st.sampled_from(POLICIES), st.floats(0.0, 0.3))
-def test_points_keep_their_bounds_whatever_is_sent(
+def test_points_keep_their_bounds_for_any_messages(
     seed: int, policy: Any, delay: float
 ) -> None:
     rng = np.random.default_rng(seed)
@@ -126,7 +126,7 @@ def test_points_keep_their_bounds_whatever_is_sent(
 
 @settings(max_examples=25 if THOROUGH else 5)
 @given(st.integers(0, 2**32 - 1), st.sampled_from(POLICIES), st.floats(0.0, 0.3))
-def test_poses_keep_their_bounds_whatever_is_sent(
+def test_poses_keep_their_bounds_for_any_messages(
     seed: int, policy: Any, delay: float
 ) -> None:
     rng = np.random.default_rng(seed)
@@ -168,7 +168,7 @@ def test_the_reference_passes_waypoints_at_their_time(policy: Any) -> None:
     x, _, acceleration = columns(sampled(stream, 2.0, feed))
     for t in times[10:-6]:  # after it has caught up
         k = round((t + 0.15) / H)
-        # A message is taken at the first sample after it came: the clocks differ by it.
+        # A message is read at the first sample after its arrival: the clocks' offset.
         assert np.abs(x[k] - circle(t)).max() < 3 * H * 0.2
     assert np.abs(acceleration[1000:3500]).max() < 0.6  # a circle's is 0.4
 
@@ -179,7 +179,7 @@ def test_lost_and_jittered_waypoints_in_any_order_change_little() -> None:
     events = []
     for t in np.arange(0.05, 2.0, 0.05):
         if rng.random() > 0.05:
-            late = t + rng.uniform(0.0, 0.07)  # later than the next one, at times
+            late = t + rng.uniform(0.0, 0.07)  # sometimes after the next one
             events.append((late, lambda t=t: stream.run.send(circle(t), t=t)))
     x, _, _ = columns(sampled(stream, 2.0, at_times(*events)))
     t = H * np.arange(len(x))
@@ -233,7 +233,7 @@ def test_a_twist_turns_the_hand_about_a_fixed_axis_until_it_is_silent() -> None:
     samples = sampled(stream, 1.5, feed)
     moving, still = samples[round(0.8 / H)], samples[-1]
     assert np.allclose(moving.position.velocity, twist[:3], atol=1e-9)
-    # Each change of velocity aims at ω to second order; the next message completes it.
+    # A change of velocity reaches ω to second order; the next message completes it.
     assert np.allclose(moving.orientation.angular_velocity, twist[3:], atol=1e-5)
     assert not still.position.velocity.any()
     assert not still.orientation.angular_velocity.any()
@@ -245,7 +245,7 @@ def test_a_chunk_replaces_the_rest_of_the_one_before() -> None:
     feed = at_times(
         (0.1, lambda: stream.run.send_chunk((0.2 * times)[:, None], times, t=0.1)),
         (0.2, lambda: stream.run.send_chunk((-0.1 * times)[:, None], times, t=0.2)),
-        # An old chunk that arrives late does not count.
+        # An old chunk that arrives late is ignored.
         (0.25, lambda: stream.run.send_chunk((9.0 + times)[:, None], times, t=0.15)),
     )
     x, _, _ = columns(sampled(stream, 1.0, feed))
@@ -271,7 +271,7 @@ def test_silence_holds_and_then_stops_with_the_time() -> None:
 
 
 def test_the_sender_s_clock_is_found_and_may_start_again() -> None:
-    """Waypoints are passed when they were meant to be, after the delay."""
+    """Waypoints are passed at their times plus the delay."""
     bounds = {"speed": 1e3, "acceleration": 1e4, "jerk": 1e6}
     stream = Stream([0.0], delay=2.0, **bounds).anchored(None)
     # The fastest message takes 0.01 s; the first arrives before that is known.
@@ -290,7 +290,8 @@ def test_the_sender_s_clock_is_found_and_may_start_again() -> None:
 
 @pytest.mark.parametrize("policy", POLICIES)
 def test_room_is_made_for_all_waypoints(policy: str) -> None:
-    """Those of large chunks and of many messages, beside a stream that has it."""
+    """Memory grows for large chunks and many messages; the reference has enough of
+    it."""
     rng = np.random.default_rng(59)
     streams = [Stream([0.0, 0.0], policy=policy, delay=1.0).anchored(None)]
     streams.append(copy.deepcopy(streams[0]))
@@ -314,7 +315,8 @@ def test_room_is_made_for_all_waypoints(policy: str) -> None:
 
 
 def test_earlier_times_are_known_while_a_step_begins_many_pieces() -> None:
-    """Of more pieces than a step can keep, the last are, and the others are named."""
+    """If a step has more pieces than it can store, the last are kept, others
+    reported."""
     stream = Stream([0.0]).anchored(None)
     stream.sample(0.0)
     times = 0.02 * (1 + np.arange(25))
@@ -336,7 +338,7 @@ def test_earlier_times_are_known_while_a_step_begins_many_pieces() -> None:
     assert 10 < known < 50
 
 
-def test_what_a_rehearsal_raises_leaves_nothing() -> None:
+def test_an_exception_in_a_rehearsal_leaves_nothing() -> None:
     stream = Stream([0.0]).anchored(None)
     stream.sample(0.0)
     stream.run.send([0.1])
@@ -348,7 +350,7 @@ def test_what_a_rehearsal_raises_leaves_nothing() -> None:
     assert pickle.dumps(stream.run) == before
 
 
-def test_a_new_run_begins_anew_and_hears_only_what_is_new() -> None:
+def test_a_new_run_begins_anew_and_reads_new_messages_only() -> None:
     stream = Stream([0.0])
     first = stream.anchored(None)
     feed = at_times((0.1, lambda: first.run.send([0.1])))
@@ -360,14 +362,14 @@ def test_a_new_run_begins_anew_and_hears_only_what_is_new() -> None:
     x, _, _ = columns(sampled(second, 1.0))
     assert not x.any()
     assert not second.run.record
-    first.run.send([0.2])  # nobody has taken it
+    first.run.send([0.2])  # not read yet
     third = stream.anchored(None)
     third.run.follow(second.run)
     x, _, _ = columns(sampled(third, 1.0))
     assert x[-1, 0] == pytest.approx(0.2)
 
 
-def test_what_was_recorded_gives_the_same_bits() -> None:
+def test_recorded_messages_give_the_same_bits() -> None:
     rng = np.random.default_rng(3)
     stream = StreamPose(policy="extrapolate").anchored(pin.SE3.Identity())
     first = sampled(stream, 1.0, hostile(rng, stream, 3))
@@ -381,7 +383,7 @@ def test_what_was_recorded_gives_the_same_bits() -> None:
     assert json.loads(json.dumps(again.run.record)) == messages
 
 
-def test_a_record_that_is_full_says_how_much_it_lost(monkeypatch: Any) -> None:
+def test_a_full_record_reports_its_losses(monkeypatch: Any) -> None:
     monkeypatch.setattr(inbox, "MOST", 7)  # a value and its time each
     stream = Stream([0.0]).anchored(None)
     feed = at_times(*((0.1, lambda: stream.run.send([0.1])) for _ in range(5)))
@@ -390,7 +392,7 @@ def test_a_record_that_is_full_says_how_much_it_lost(monkeypatch: Any) -> None:
     assert stream.run.counts()["taken"] == 5
 
 
-def test_little_is_recorded_where_nobody_writes_a_log(monkeypatch: Any) -> None:
+def test_little_is_recorded_without_a_log(monkeypatch: Any) -> None:
     monkeypatch.setattr(inbox, "BRIEF", 7)
     for logged, kept in ((False, 3), (True, 5)):
         stream = Stream([0.0]).anchored(None)
@@ -446,7 +448,7 @@ def state_of(stream: Any, t: float) -> bytes:
 
 
 def test_a_pickle_brakes_where_its_original_does() -> None:
-    """A motion to a goal that moves ends before Ruckig's does, if no message comes."""
+    """Without messages, a motion to a moving goal ends before Ruckig's does."""
     stream = Stream([0.0], policy="extrapolate", jerk=2.0, speed=5.0).anchored(None)
     feed = at_times(
         *(
@@ -460,14 +462,14 @@ def test_a_pickle_brakes_where_its_original_does() -> None:
         assert state_of(again, t) == state_of(stream, t)
 
 
-def test_a_pickle_takes_what_waits_and_not_what_was_taken() -> None:
+def test_a_pickle_has_waiting_messages_and_no_read_ones() -> None:
     stream = Stream([0.0]).anchored(None)
     sampled(stream, 0.1, at_times((0.05, lambda: stream.run.send([0.1]))))
     stream.run.send([0.2])
     again, copied = pickle.loads(pickle.dumps(stream)), copy.deepcopy(stream)
     for t in np.arange(0.11, 1.0, 0.01):
         stream.sample(t)
-    # The original has taken it meanwhile; this copy has not yet.
+    # The original has read it already; this copy has not.
     behind = pickle.loads(pickle.dumps(copied))
     for each in (again, behind):
         each.sample(0.2)
@@ -556,7 +558,7 @@ def test_bounds_that_contradict_each_other_are_refused() -> None:
 
 
 @pytest.mark.parametrize("kind", [Stream, StreamOrientation, StreamPose])
-def test_a_declaration_moves_nothing_and_says_who_does(kind: Any) -> None:
+def test_a_declaration_moves_nothing_and_names_the_run(kind: Any) -> None:
     message = f"this {kind.__name__} is declared, .* controller.stream\\('hand'\\)"
     with pytest.raises(StreamError, match=message):
         kind().sample(0.0)
@@ -566,7 +568,7 @@ def test_a_declaration_moves_nothing_and_says_who_does(kind: Any) -> None:
     assert hash(kind()) == hash(kind())
 
 
-def test_a_stream_that_hears_something_else_cannot_be_sent_to() -> None:
+def test_a_stream_with_an_address_cannot_be_sent_to() -> None:
     with pytest.raises(StreamError, match=r"receives from goals\.jsonl"):
         Stream([0.0], source="goals.jsonl").anchored(None).run.send([0.0])
 

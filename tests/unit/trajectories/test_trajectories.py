@@ -54,7 +54,7 @@ from hsp_control.trajectories import (
     UniformLine,
 )
 
-# These move already, or still accelerate, where they meet a hold: documented.
+# These do not start at rest, as documented: a jump of velocity or acceleration.
 ROUGH = {
     "spline 3",
     "polynomial",
@@ -66,12 +66,12 @@ ROUGH = {
 }
 
 every_member = pytest.mark.parametrize("name", MEMBERS)
-SPARSE = 1 if THOROUGH else 8  # of the steps without a knot, one in so many
+SPARSE = 1 if THOROUGH else 8  # every n-th of the steps without a knot
 quick = settings(max_examples=60, deadline=None, derandomize=True)
 
 
 def parts(sample: Any) -> Iterator[tuple[Array, Array, Array]]:
-    """Give place, rate and rate of the rate: once, or twice for a pose."""
+    """Yield value, rate and acceleration: once, or twice for a pose."""
     arrays = flat(sample)
     for i in range(0, len(arrays), 3):
         yield arrays[i], arrays[i + 1], arrays[i + 2]
@@ -110,7 +110,7 @@ def test_rates_are_those_of_the_motion(name: str) -> None:
 @pytest.mark.slow
 @every_member
 def test_motion_never_jumps(name: str) -> None:
-    """Each small step is the integral of the rate over it; each change of rate too."""
+    """Small steps equal the integral of the rate; changes of rate that of x''."""
     trajectory, knots = MEMBERS[name]
     rough = {knots[0], knots[-1]} if name in ROUGH else set()
     for k, (one, other) in enumerate(pairwise(np.linspace(-0.3, 2.6, 500))):
@@ -177,7 +177,7 @@ def test_orientations_have_three_notations(seed: int) -> None:
 
 
 @pytest.mark.parametrize(("rate", "tolerance"), [(1.0, 1e-10), (10.0, 5e-9)])
-def test_callable_is_as_accurate_as_it_says(rate: float, tolerance: float) -> None:
+def test_callable_is_as_accurate_as_documented(rate: float, tolerance: float) -> None:
     circle = Circle(1, rate, [1, 1])
     numerical = CallableTrajectory(lambda t: circle.sample(t).position, 2)
     for t in np.linspace(0, 3, 30):
@@ -227,7 +227,7 @@ def test_screw_is_pinocchios(seed: int) -> None:
         np.testing.assert_array_equal(orientation.rotation, held.rotation)
 
 
-def test_orientation_path_takes_the_shortest_turns() -> None:
+def test_orientation_path_uses_the_shortest_rotations() -> None:
     path = OrientationPath([R1, R2, R3], [0.0, 1.0, 3.0])
     for t, R in ((0.0, R1), (1.0, R2), (3.0, R3)):
         sample = path.sample(t)
@@ -239,7 +239,7 @@ def test_orientation_path_takes_the_shortest_turns() -> None:
     )
 
 
-def test_a_trajectory_of_ones_own() -> None:
+def test_a_user_defined_trajectory() -> None:
     class Fall(Trajectory):
         height: Number
 
@@ -266,7 +266,7 @@ def test_a_trajectory_of_ones_own() -> None:
 
 
 MIRROR = np.diag([1.0, 1.0, -1.0])
-# Single fields are in test_trajectory_values; here is how they fit together.
+# Single fields are in test_trajectory_values; these are combinations.
 ERRORS: dict[str, Callable[[], Any]] = {
     "Line: end ... (2) ... (3,)": (
      lambda: Line([1, 2, 3], 1, start=[0, 0])),

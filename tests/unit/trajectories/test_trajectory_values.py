@@ -1,4 +1,4 @@
-"""Trajectories are values: equal, immutable, checked, placed where a robot starts."""
+"""Trajectories are values: equal, immutable, checked, placed at a robot's start."""
 
 import dataclasses
 import pickle
@@ -72,12 +72,12 @@ VALUES: dict[str, Any] = {
 every_value = pytest.mark.parametrize("name", VALUES)
 
 
-# --- one value, however it came about -------------------------------------------------
+# --- one value, constructed in different ways -----------------------------------------
 
 
 @every_value
 def test_trajectories_are_values(name: str) -> None:
-    """And a pickled one moves alike: what it keeps in use is not part of it."""
+    """A pickled one moves identically: caches are not part of the value."""
     value = VALUES[name]
     if name in MEMBERS:
         before, again = value.sample(0.7), pickle.loads(pickle.dumps(value))
@@ -109,7 +109,7 @@ OPTIONAL_ROTATION = [
 ROTATION = [*OPTIONAL_ROTATION, None]
 CHILD = [None, 1.0, "circle", {}, {"type": "spyn"}, SCHEDULE, Circle]
 FUNCTION = [None, 1.0, "f"]
-# For each class: arguments that are right, and for each field all that is wrong.
+# For each class: valid arguments, and per field all invalid ones.
 WRONG: dict[type, tuple[dict[str, Any], dict[str, list[Any]]]] = {
     Hold: ({"point": [1, 2, 3]}, {"point": OPTIONAL_VECTOR}),
     Line: (
@@ -302,7 +302,9 @@ def test_a_blend_begins_and_ends_about_the_start() -> None:
     CallableTrajectory(swinging, 3, origin="start"),
     PiecewisePolynomial([0, 1], [[[1, 2, 3]]], origin="start"),
 ])  # fmt: skip
-def test_what_has_no_points_cannot_be_counted_from_the_start(trajectory: Any) -> None:
+def test_trajectories_without_points_cannot_be_relative_to_the_start(
+    trajectory: Any,
+) -> None:
     assert_relative(trajectory, TrajectorySample.allocate(3))
     with pytest.raises(TrajectoryError, match="origin: start cannot move a"):
         trajectory.anchored(START)

@@ -1,4 +1,4 @@
-"""Pictures of a MuJoCo scene's cameras, as another process receives them."""
+"""Camera pictures of a MuJoCo scene, as received by another process."""
 
 import multiprocessing
 import os
@@ -33,7 +33,7 @@ CAMERA = '<light pos="0 0 3"/><camera name="above" pos=".3 .3 .5"/></worldbody>'
 
 @pytest.fixture
 def cell(tmp_path: Path) -> hsp.Experiment:
-    """An arm beside a ball, below a camera."""
+    """An arm next to a ball, below a camera."""
     text = CELL.replace("</worldbody>", CAMERA).replace('size=".03" ', 'size=".09" ')
     mjcf = tmp_path / "cell.xml"
     mjcf.write_text(text)
@@ -52,9 +52,9 @@ def address() -> str:
         return f"127.0.0.1:{probe.getsockname()[1]}"
 
 
-def seen(address: str, what: str) -> tuple[float, np.ndarray]:
+def seen(address: str, path: str) -> tuple[float, np.ndarray]:
     """Return the time and the pixels of a picture."""
-    with urlopen(f"http://{address}/{what}", timeout=60.0) as answer:
+    with urlopen(f"http://{address}/{path}", timeout=60.0) as answer:
         picture = Image.open(BytesIO(answer.read()))
         return float(answer.headers["Time"]), np.asarray(picture).astype(int)
 
@@ -67,24 +67,24 @@ def test_a_picture_shows_the_scene_as_it_is_then(
     plant = cell.plant
     assert isinstance(plant, hsp.mujoco.MujocoScenePlant)
     plant.reset(0.0, cell.q0, cell.v0)
-    told = show(address, plant)
+    reported = show(address, plant)
     t, ball = seen(address, "above.png?width=64&height=48")
     assert (t, ball.shape) == (0.0, (48, 64, 3))
     _, again = seen(address, "above.jpg?width=64&height=48")
     assert np.abs(again - ball).mean() < 3.0
     plant.data.joint("ball").qpos[0] += 0.3
     plant.data.time = 1.5
-    told()
+    reported()
     t, floor = seen(address, "above.png?width=64&height=48")
     assert t == 1.5
     assert np.abs(floor - ball)[16:32, 24:40].mean() > 5.0
-    for wrong, said in (
+    for wrong, output in (
         ("abov.png", "no /abov.png; did you mean 'above'? (there is /above.jpg)"),
         ("above.png?width=9999", "width=9999; needs width and height, each 1 to 2048"),
     ):
         with pytest.raises(HTTPError) as caught:
             seen(address, wrong)
-        assert said in caught.value.read().decode()
+        assert output in caught.value.read().decode()
     with pytest.raises(
         HardwareError, match=r"pictures can be drawn: .*Address already"
     ):
@@ -99,7 +99,7 @@ def test_a_robot_in_its_own_process_is_seen(cell: hsp.Experiment, address: str) 
         looked: list[float] = []
 
         def look(t: float) -> None:
-            if t > 0.09 and not looked:  # the robot waits meanwhile
+            if t > 0.09 and not looked:  # the robot waits in the meantime
                 wait_until(lambda: seen(address, "above.jpg")[0] >= 0.05)
                 looked.append(t)
 
@@ -119,13 +119,13 @@ def test_where_nothing_is_drawn_any_more_the_robot_stops(
     assert isinstance(plant, hsp.mujoco.MujocoScenePlant)
     plant.reset(0.0, cell.q0, cell.v0)
     before = set(multiprocessing.active_children())
-    told = show(address, plant)
+    reported = show(address, plant)
     (drawing,) = set(multiprocessing.active_children()) - before
-    told()
+    reported()
     drawing.kill()
     drawing.join()
     with pytest.raises(HardwareError, match="that draws its pictures has ended"):
-        told()
+        reported()
 
 
 HANGING = """
@@ -154,16 +154,16 @@ if __name__ == "__main__":
 def test_who_draws_and_hangs_is_noticed_and_ended(
     cell: hsp.Experiment, address: str, tmp_path: Path
 ) -> None:
-    """Stopped, as by a debugger: Python waited for it without end when it ended."""
+    """A process stopped as by a debugger: Python waited forever for it at exit."""
     scenario, script = tmp_path / "cell.yaml", tmp_path / "hanging.py"
     scenario.write_text(yaml.safe_dump(cell.config))
     script.write_text(HANGING)
     command = [sys.executable, str(script), str(scenario), address]
-    said = subprocess.run(
+    output = subprocess.run(
         command, capture_output=True, text=True, timeout=120.0, check=True
     )
-    what, _, number = said.stdout.strip().rpartition(" ")
-    assert what.endswith("draws its pictures has not responded for 1 s")
+    text, _, number = output.stdout.strip().rpartition(" ")
+    assert text.endswith("draws its pictures has not responded for 1 s")
     with pytest.raises(ProcessLookupError):
         os.kill(int(number), 0)
 

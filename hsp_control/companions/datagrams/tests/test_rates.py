@@ -1,4 +1,4 @@
-"""States are published at the rate that is set."""
+"""States are published at the configured rate."""
 
 import numpy as np
 import pytest
@@ -14,8 +14,8 @@ def test_the_mean_rate_is_right(rate: float, period: float) -> None:
     assert count == pytest.approx(4.0 * min(rate, 1.0 / period), abs=2)
 
 
-def test_what_was_missed_is_not_made_up_for_and_a_new_run_begins() -> None:
+def test_missed_times_are_skipped_and_a_new_run_begins() -> None:
     due = Rate(100.0)
     times = [0.0, 0.005, 0.5, 0.501, 0.502, 0.51, 0.0, 0.001, 0.01]
-    told = [t for t in times if due.due(t)]
-    np.testing.assert_array_equal(told, [0.0, 0.5, 0.51, 0.0, 0.01])
+    reported = [t for t in times if due.due(t)]
+    np.testing.assert_array_equal(reported, [0.0, 0.5, 0.51, 0.0, 0.01])

@@ -1,4 +1,4 @@
-"""Targets by datagrams: a port, who sends there, and streams that share it."""
+"""Targets by datagrams: ports, senders, and streams that share a port."""
 
 import json
 import re
@@ -47,11 +47,11 @@ def wait_until(done: Callable[[], bool]) -> None:
 
 def listening(port: int, part: str = "") -> FollowedPoint:
     stream = Stream([0.0], source=f"udp://127.0.0.1:{port}{part}").anchored(None)
-    stream.sample(0.0)  # it listens from here on
+    stream.sample(0.0)  # listens from now on
     return stream
 
 
-def test_datagrams_arrive_and_bad_ones_are_counted_and_said_once(
+def test_datagrams_arrive_and_bad_ones_are_counted_and_reported_once(
     port: int, sender: socket.socket, caplog: pytest.LogCaptureFixture
 ) -> None:
     stream = listening(port)
@@ -84,7 +84,7 @@ def test_a_second_sender_is_refused_until_the_first_is_silent(
         return inbox.count > before
 
     assert taken("a:1", 0.0)
-    assert taken("b:2", 0.1)  # one goal of each: nobody streams yet
+    assert taken("b:2", 0.1)  # one message per sender is no stream yet
     for k in range(9):
         assert taken("a:1", 0.2 + 0.05 * k)
         assert not taken("b:2", 0.22 + 0.05 * k)
@@ -101,12 +101,14 @@ def test_a_wrong_address_is_named(source: str) -> None:
         Stream(source=source)
 
 
-def test_a_name_that_no_computer_can_have_is_told() -> None:
+def test_an_invalid_host_name_is_reported() -> None:
     with pytest.raises(StreamError, match="cannot listen there: not a host name"):
         opened(f"udp://{70 * 'ö'}:5005", Space(3, False))
 
 
-def test_a_port_in_use_is_told_and_streams_of_one_process_share_it(port: int) -> None:
+def test_a_port_in_use_is_reported_and_streams_of_one_process_share_it(
+    port: int,
+) -> None:
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as other:
         other.bind(("127.0.0.1", port))
         with pytest.raises(StreamError, match="cannot listen there: Address already"):
@@ -141,7 +143,7 @@ def test_a_robot_alone_leaves_the_port_to_its_loop(port: int) -> None:
     assert isinstance(experiment.controller.tasks[0].trajectory, FollowedPose)
 
 
-def test_each_stream_of_a_port_hears_its_part_or_nobody_does(
+def test_each_stream_of_a_port_receives_its_part_or_none_does(
     port: int, sender: socket.socket
 ) -> None:
     left, right = listening(port, "/left"), listening(port, "/right")
@@ -173,16 +175,16 @@ def test_one_stream_of_two_poses_or_two_senders_lead_two_hands(
     other = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
     sides = {"left": 0.33, "right": -0.33}
     parts = {
-        each: {"name": "panda", "position": [0, y, 0]} for each, y in sides.items()
+        side: {"name": "panda", "position": [0, y, 0]} for side, y in sides.items()
     }
     source = f"udp://127.0.0.1:{port}"
     tasks = {
-        each: {
+        side: {
             "type": "frame_pose",
-            "frame": f"{each}_panda_tcp",
-            "trajectory": {"type": "stream", "source": f"{source}/{each}"},
+            "frame": f"{side}_panda_tcp",
+            "trajectory": {"type": "stream", "source": f"{source}/{side}"},
         }
-        for each in sides
+        for side in sides
     }
     simulation = {"duration": 1.0, "control_period": 0.002, "log_period": 0.002}
     experiment = hsp.load_experiment(
@@ -197,14 +199,18 @@ def test_one_stream_of_two_poses_or_two_senders_lead_two_hands(
         for task in controller.tasks:
             goals[task.name] = task.measure(controller.state)[1].tolist()
             goals[task.name][2] += 0.05
-        said = {name: {"value": each} for name, each in goals.items()}
-        texts = [said] if senders == 1 else [{name: said[name]} for name in said]
+        reported = {name: {"value": each} for name, each in goals.items()}
+        texts = (
+            [reported]
+            if senders == 1
+            else [{name: reported[name]} for name in reported]
+        )
         for _ in range(2):
             for one, text in zip((sender, other), texts, strict=False):
                 data = json.dumps({"t": 7.0, **text}).encode()
                 one.sendto(data, ("127.0.0.1", port))
         wait_until(lambda: all(each.run.inbox.count == 2 for each in streams))
-        if senders == 2:  # each keeps to its own hand
+        if senders == 2:  # every stream moves its own hand
             sender.sendto(data, ("127.0.0.1", port))
             wait_until(lambda: all(each.run.inbox.rejected for each in streams))
             assert re.match(r"right: \S+ is ignored: ", streams[0].run.last_rejection)
@@ -221,7 +227,7 @@ def test_one_stream_of_two_poses_or_two_senders_lead_two_hands(
 
 
 @pytest.mark.parametrize(
-    ("clock", "said"),
+    ("clock", "warned"),
     [
         (lambda k: 0.05 * k, []),
         (lambda k: 0.05 * k - 1e-3 * (k % 2) - 0.9 * (k == 7), []),  # late ones
@@ -230,18 +236,18 @@ def test_one_stream_of_two_poses_or_two_senders_lead_two_hands(
         (lambda k: None, []),
     ],
 )
-def test_a_clock_that_jumps_is_said_once(
+def test_a_clock_that_jumps_is_reported_once(
     clock: Callable[[int], float | None],
-    said: list[str],
+    warned: list[str],
     caplog: pytest.LogCaptureFixture,
 ) -> None:
     inbox = Inbox(Space(1, False), "ros2://goal")
     for k in range(12):
         inbox.receive("one", 100.0 + 0.05 * k, {"value": [0.0], "t": clock(k)})
-    for k in range(2):  # a policy that starts again has another clock
+    for k in range(2):  # a restarted policy has another clock
         inbox.receive("two", 110.0 + 0.05 * k, {"value": [0.0], "t": 0.05 * k})
     assert [each.removeprefix("ros2://goal: the sender's clock ")
-            for each in caplog.messages] == said  # fmt: skip
+            for each in caplog.messages] == warned  # fmt: skip
 
 
 def test_a_joystick_s_velocities_name_their_axes(
@@ -259,7 +265,7 @@ def test_a_joystick_s_velocities_name_their_axes(
     wait_until(lambda: inbox.count + inbox.rejected == 2)
     assert inbox.reason == "axes is 'hand'; needs 'world' or 'tool'"
     stream.sample(0.01)
-    found = stream.sample(0.11)  # it was taken 0.1 s ago
+    found = stream.sample(0.11)  # it was read 0.1 s ago
     assert found.orientation.rotation.T @ found.position.velocity == pytest.approx(
         twist[:3], abs=1e-9
     )

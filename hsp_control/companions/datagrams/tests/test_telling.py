@@ -1,4 +1,4 @@
-"""States that a live loop publishes, received by plain sockets, in Python and C."""
+"""States published by a live loop, received by plain sockets in Python and C."""
 
 import json
 import math
@@ -46,19 +46,19 @@ def command() -> CompensatedController:
     return CompensatedController(controller, observer)
 
 
-def test_it_tells_what_a_policy_needs(states: socket.socket) -> None:
+def test_it_publishes_the_input_of_a_policy(states: socket.socket) -> None:
     source = command()
-    told = publish(f"127.0.0.1:{states.getsockname()[1]}?rate=100", source)
+    reported = publish(f"127.0.0.1:{states.getsockname()[1]}?rate=100", source)
     truth = []
 
     def on_period(t: float) -> None:
-        told(t)
+        reported(t)
         truth.append((t, source.state.q.copy(), source.output.tau.copy()))
         if len(truth) == 50:
             source.controller.stream("hand").send(FAR)
 
     report = run_loop(source, Rig(), duration=0.2, on_period=on_period)
-    told.ended(report.ended, report.reason)
+    reported.ended(report.ended, report.reason)
     heard = [json.loads(states.recv(65536)) for _ in range(23)]
     running, ends = heard[:20], heard[20:]
     assert [each["number"] for each in heard] == list(range(1, 24))
@@ -88,7 +88,7 @@ def test_it_tells_what_a_policy_needs(states: socket.socket) -> None:
     )  # fmt: skip
 
 
-def test_the_page_s_client_hears_and_answers(capsys: pytest.CaptureFixture) -> None:
+def test_the_page_s_client_receives_and_answers(capsys: pytest.CaptureFixture) -> None:
     page = (Path(__file__).parents[1] / "policies.md").read_text(encoding="utf-8")
     (client,) = re.findall(r"^```python\n(.*?)^```", page, re.MULTILINE | re.DOTALL)
     assert len(client.splitlines()) <= 12
@@ -102,15 +102,15 @@ def test_the_page_s_client_hears_and_answers(capsys: pytest.CaptureFixture) -> N
         thread = Thread(target=exec, args=(code, space), daemon=True)
         thread.start()
         source = command()
-        told = publish(f"127.0.0.1:{port}?rate=10", source)
+        reported = publish(f"127.0.0.1:{port}?rate=10", source)
         source.effort(0.0, start(), np.zeros(7), 0.001)
         goals.settimeout(0.05)
-        for k in range(1000):  # it may not listen yet
-            told(0.1 * k)
+        for k in range(1000):  # it may not be listening yet
+            reported(0.1 * k)
             with suppress(TimeoutError):
                 goal = json.loads(goals.recv(65536))
                 break
-        told.ended("operator", "stopped by the operator (Ctrl-C)")
+        reported.ended("operator", "stopped by the operator (Ctrl-C)")
         thread.join(60.0)
     assert capsys.readouterr().out == "stopped by the operator (Ctrl-C)\n"
     _, actual = source.controller.tasks[0].measure(source.state)
@@ -136,28 +136,28 @@ states.bind(0, "127.0.0.1", () => console.log(states.address().port))
 
 @pytest.mark.process
 @pytest.mark.skipif(shutil.which("node") is None, reason="needs Node.js")
-def test_a_client_in_another_language_hears_the_same_numbers() -> None:
+def test_a_client_in_another_language_receives_the_same_numbers() -> None:
     source = command()
     node = ["node", "-e", OTHER_LANGUAGE]
     with subprocess.Popen(node, stdout=subprocess.PIPE, text=True) as client:
         assert client.stdout is not None
-        told = publish(f"127.0.0.1:{int(client.stdout.readline())}", source)
+        reported = publish(f"127.0.0.1:{int(client.stdout.readline())}", source)
         q, v = start(), 0.1 * np.ones(7)
         source.effort(0.0, q, v, 0.001)
-        told(0.0)
-        told.ended("fault", "a door was opened")
+        reported(0.0)
+        reported.ended("fault", "a door was opened")
         heard = json.loads(client.stdout.readline())
     _, actual = source.controller.tasks[0].measure(source.state)
     assert heard == [q.tolist(), actual.tolist(), "fault"]
 
 
-def test_what_is_no_number_is_null(states: socket.socket) -> None:
+def test_nan_is_null(states: socket.socket) -> None:
     source = command()
-    told = publish(f"127.0.0.1:{states.getsockname()[1]}", source)
+    reported = publish(f"127.0.0.1:{states.getsockname()[1]}", source)
     source.effort(0.0, start(), np.zeros(7), 0.001)
     source.output.tau[2] = np.nan
-    told(0.0)
-    told.ended("completed", "")
+    reported(0.0)
+    reported.ended("completed", "")
     text = states.recv(65536).decode()
     assert "NaN" not in text
     assert json.loads(text)["tau"][2] is None
@@ -180,15 +180,15 @@ def test_mistakes_are_named(address: str, message: str) -> None:
         publish(address, command())
 
 
-def test_what_cannot_be_sent_is_said_once_and_hinders_nothing(
+def test_a_send_error_is_reported_once_and_has_no_other_effect(
     caplog: pytest.LogCaptureFixture,
 ) -> None:
     source = command()
-    told = publish("255.255.255.255:5006", source)  # which a plain socket may not
+    reported = publish("255.255.255.255:5006", source)  # forbidden for a plain socket
     source.effort(0.0, start(), np.zeros(7), 0.001)
-    told(0.0)
-    told(1.0)
-    told.ended("completed", "")
+    reported(0.0)
+    reported(1.0)
+    reported.ended("completed", "")
     (line,) = caplog.messages
     assert line.startswith(
         "udp://255.255.255.255:5006: the state cannot be sent there: "

@@ -1,4 +1,4 @@
-"""Films: their moments, refusals, and messages where something is missing."""
+"""Films: their frames, refusals, and messages about missing packages."""
 
 import re
 import sys
@@ -50,7 +50,7 @@ def test_a_film_that_cannot_be_is_refused(
 
 
 @pytest.mark.slow
-def test_what_is_missing_for_a_film_is_said_and_the_rest_goes_on(
+def test_missing_programs_for_films_are_reported_and_the_rest_continues(
     planar: Rollout,
     tmp_path: Path,
     monkeypatch: pytest.MonkeyPatch,
@@ -63,12 +63,12 @@ def test_what_is_missing_for_a_film_is_said_and_the_rest_goes_on(
 
     monkeypatch.setenv("HSP_BROWSER", "no-such-browser")
     assert main(command) == 2
-    said = capsys.readouterr()
-    assert "page.html" in said.out
+    reported = capsys.readouterr()
+    assert "page.html" in reported.out
     assert page.is_file()
-    assert said.err.count("hsp: ") == 1  # once, not once a film
+    assert reported.err.count("hsp: ") == 1  # once, not once per film
     assert re.search(
-        r"no-such-browser is not an executable; .*apt-get install chr", said.err
+        r"no-such-browser is not an executable; .*apt-get install chr", reported.err
     )
 
     monkeypatch.setitem(sys.modules, "playwright.sync_api", None)
@@ -82,7 +82,7 @@ def test_what_is_missing_for_a_film_is_said_and_the_rest_goes_on(
     assert sorted(file.name for file in tmp_path.iterdir()) == ["page.html", "run.npz"]
 
 
-def test_ffmpegs_own_words_are_passed_on(
+def test_ffmpeg_s_message_is_passed_on(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     film = tmp_path / "film.mp4"
@@ -96,7 +96,7 @@ def test_ffmpegs_own_words_are_passed_on(
     assert not list(tmp_path.iterdir())
 
 
-def test_the_command_says_what_it_wants(
+def test_the_command_names_missing_arguments(
     planar: Rollout, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     log = str(planar.save(tmp_path / "run.npz"))
@@ -106,6 +106,6 @@ def test_the_command_says_what_it_wants(
         main(["export", log, "--gif=a.gif", "--size=800"])
     assert "'800' is not WIDTHxHEIGHT" in capsys.readouterr().err
     assert main(["export", log, log, "--gif", str(tmp_path / "a.gif")]) == 2
-    said = capsys.readouterr().err
-    assert re.search(wording("hsp: ... one run ... 2 logs ... --html"), said)
+    reported = capsys.readouterr().err
+    assert re.search(wording("hsp: ... one run ... 2 logs ... --html"), reported)
     assert not (tmp_path / "a.gif").exists()

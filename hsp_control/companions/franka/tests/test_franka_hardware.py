@@ -1,4 +1,4 @@
-"""A Franka arm as the loop sees it, with a client that answers to order."""
+"""A Franka arm as seen by the loop, with a client of given answers."""
 
 import signal
 import socket
@@ -35,13 +35,13 @@ class Answers:
     """A `ClientProcess` with the given answers.
 
     Attributes:
-        asked: The letters of the requests.
-        efforts: Those that were sent.
-        patience: How long the last answer was waited for [s].
+        requested: The letters of the requests.
+        efforts: The sent efforts.
+        patience: Timeout of the last answer [s].
     """
 
     def __init__(self) -> None:
-        self.asked = b""
+        self.requested = b""
         self.efforts: list[Array] = []
         self.waiting = self.late = self.closed = False
         self.patience = 0.0
@@ -52,7 +52,7 @@ class Answers:
     def ask(self, message: bytes) -> None:
         assert not self.waiting
         self.waiting = True
-        self.asked += message[:1]
+        self.requested += message[:1]
         if message[:1] in {client.EFFORT, client.FINISH}:
             self.efforts.append(np.array(client.REQUEST.unpack(message)[1:]))
 
@@ -64,7 +64,7 @@ class Answers:
         if self.late:
             return None
         self.waiting = False
-        self.t = round(self.t + 0.001, 3)  # as the arm counts milliseconds
+        self.t = round(self.t + 0.001, 3)  # as in the arm's clock of milliseconds
         numbers = np.concatenate([np.arange(7.0), np.zeros(7), APPLIED])
         return client.STATE.pack(b"S", self.t, *numbers.tolist())
 
@@ -93,19 +93,19 @@ def test_control_starts_at_the_second_read_and_time_with_it() -> None:
     first, second = state(hardware), state(hardware)
     hardware.write(np.zeros(7))
     third = state(hardware)
-    assert answers.asked == b"RSE"
+    assert answers.requested == b"RSE"
     assert [m.sequence for m in (first, second, third)] == [0, 0, 1]
     np.testing.assert_allclose([first.t, second.t, third.t], [0.0, 0.0, 0.001])
     np.testing.assert_array_equal(third.q, np.arange(7.0))
     np.testing.assert_array_equal(third.applied, APPLIED)
     hardware.close()
     hardware.close()
-    assert answers.asked == b"RSEF"
+    assert answers.requested == b"RSEF"
     assert answers.closed
 
 
 def test_an_effort_answers_a_state() -> None:
-    """Without a new state the last effort stays, and no effort is sent for it."""
+    """Without a new state the last effort stays in force, and none is sent."""
     hardware, answers = arm()
     state(hardware)
     state(hardware)
@@ -115,13 +115,13 @@ def test_an_effort_answers_a_state() -> None:
     hardware.write(2.0 * APPLIED)
     answers.late = False
     state(hardware)
-    assert answers.asked == b"RSE"
+    assert answers.requested == b"RSE"
     answers.fault = "a reflex"
     with pytest.raises(HardwareError, match="a reflex"):
         hardware.read(0.001)
     assert hardware.fault == "a reflex"
     hardware.close()
-    assert b"F" not in answers.asked
+    assert b"F" not in answers.requested
 
 
 def test_a_box_in_lockstep_is_waited_for() -> None:
@@ -136,7 +136,7 @@ def test_a_box_in_lockstep_is_waited_for() -> None:
 
 
 def test_states_are_numbered_by_the_arm_s_time() -> None:
-    """Its clock counts milliseconds, in steps that no binary number is."""
+    """Its clock is in milliseconds, which are not exact binary numbers."""
     hardware, _ = arm()
     state(hardware)
     state(hardware)
@@ -145,7 +145,7 @@ def test_states_are_numbered_by_the_arm_s_time() -> None:
         assert state(hardware).sequence == k
 
 
-def test_at_the_end_the_arm_says_why_it_did_not_answer() -> None:
+def test_at_the_end_the_arm_s_reason_is_reported() -> None:
     hardware, answers = arm()
     state(hardware)
     state(hardware)
@@ -157,7 +157,7 @@ def test_at_the_end_the_arm_says_why_it_did_not_answer() -> None:
     hardware.close()
     assert hardware.fault == "a reflex"
     assert answers.closed
-    assert b"F" not in answers.asked
+    assert b"F" not in answers.requested
 
 
 def test_without_the_gripper_s_process_the_arm_stops() -> None:
@@ -167,7 +167,7 @@ def test_without_the_gripper_s_process_the_arm_stops() -> None:
     gripper._silence = Silence(0.0)
     state(hardware)
     assert not state(hardware).fault
-    theirs.close()  # as the system does for a process that dies
+    theirs.close()  # as the system does for a dead process
     assert state(hardware).fault == "the process that drives the gripper has ended"
     gripper._link.close()
 
@@ -175,7 +175,7 @@ def test_without_the_gripper_s_process_the_arm_stops() -> None:
 def test_a_gripper_s_process_that_hangs_is_noticed(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    """Not one that drives the fingers, nor while this process was stopped itself."""
+    """Not the gripper's client, nor while this process itself was stopped."""
     now = 10.0
     monkeypatch.setattr(client_process, "monotonic", lambda: now)
     process = ClientProcess.__new__(ClientProcess)
@@ -195,7 +195,7 @@ def test_a_gripper_s_process_that_hangs_is_noticed(
         assert not process.trouble()
 
 
-def test_both_processes_end_whatever_is_raised() -> None:
+def test_both_processes_end_after_any_exception() -> None:
     class Fails(Answers):
         def close(self) -> None:
             super().close()
@@ -209,7 +209,7 @@ def test_both_processes_end_whatever_is_raised() -> None:
 
 
 def test_ctrl_c_leaves_no_process(monkeypatch: pytest.MonkeyPatch) -> None:
-    """One that hangs in libfranka sees no end of its connection."""
+    """A client that hangs in libfranka does not see its connection close."""
     process = ClientProcess.__new__(ClientProcess)
     process._link, theirs = socket.socketpair()
     process._errors, process.waiting = BytesIO(), False  # type: ignore[assignment]
@@ -262,7 +262,7 @@ def test_a_first_effort_with_gravity_is_refused() -> None:
     gravity = robot.inverse_dynamics(robot.home(), np.zeros(7), np.zeros(7))
     with pytest.raises(HardwareError, match=r"jumps by 2\d.* N·m; a Franka adds g"):
         hardware.write(gravity)
-    assert answers.asked == b"RS"
+    assert answers.requested == b"RS"
 
 
 def test_a_load_that_the_robot_did_not_take_is_refused() -> None:

@@ -1,4 +1,4 @@
-"""The arm's own model as a URDF, and how it is compared with the controller's."""
+"""The arm's own model as a URDF, and its comparison with the controller's."""
 
 from pathlib import Path
 from typing import Any
@@ -18,14 +18,14 @@ TOOL = pin.SE3(pin.rpy.rpyToMatrix(0.1, -0.2, 0.8), np.array([0.0, 0.01, 0.1]))
 CARRIED = pin.Inertia(0.9, np.array([0.01, -0.02, 0.06]), np.diag([3e-3, 2e-3, 2e-3]))
 
 
-def said(body: pin.Inertia = CARRIED) -> dict[str, Any]:
+def reported(body: pin.Inertia = CARRIED) -> dict[str, Any]:
     """Return a load as a Franka reports it."""
     inertia = body.inertia.ravel().tolist()
     return {"mass": body.mass, "center": body.lever.tolist(), "inertia": inertia}
 
 
 def arm_alone() -> str:
-    """Return a description as the control box has it: the arm to its flange.
+    """Return a URDF as from the control box: the arm up to its flange.
 
     Its masses are a third larger than the bundled ones.
     """
@@ -69,9 +69,9 @@ def masses_and_gravities(model: pin.Model, q: Array) -> tuple[Array, Array]:
 @pytest.mark.parametrize("like", [False, True])
 def test_a_saved_model_is_the_robot_s(like: bool, tmp_path: Path) -> None:
     text = (
-        calibrated(arm_alone(), said(), Robot.load("panda"))
+        calibrated(arm_alone(), reported(), Robot.load("panda"))
         if like
-        else own_model(arm_alone(), said(), TOOL.homogeneous.T.ravel().tolist())
+        else own_model(arm_alone(), reported(), TOOL.homogeneous.T.ravel().tolist())
     )
     robot = loaded(text, tmp_path)
     q = postures(robot)
@@ -125,13 +125,13 @@ def test_a_wrong_inertia_is_refused(factor: float) -> None:
 
 def test_another_robot_is_no_franka() -> None:
     with pytest.raises(ModelError, match="no link link8"):
-        own_model("<robot name='a'><link name='b'/></robot>", said(), [0.0] * 16)
+        own_model("<robot name='a'><link name='b'/></robot>", reported(), [0.0] * 16)
     with pytest.raises(ModelError, match="3 moving joints; needs seven"):
-        calibrated(arm_alone(), said(), Robot.load("planar3r"))
+        calibrated(arm_alone(), reported(), Robot.load("planar3r"))
     for text, reason in (
         ("<robot", r"the robot's description:1:\d: malformed XML"),
         ("<!DOCTYPE robot><robot/>", "the robot's description:1: a document type"),
         ("<?xml version='1.0' encoding='ebcdic-9'?><robot/>", "unknown encoding"),
     ):
         with pytest.raises(ModelError, match=reason):
-            own_model(text, said(), [0.0] * 16)
+            own_model(text, reported(), [0.0] * 16)

@@ -13,7 +13,7 @@ from hsp_control.companions.franka.reflexes import MODES, REFLEXES, explained
 pylibfranka = pytest.importorskip("pylibfranka")
 
 
-def test_text_and_file_say_what_python_says(tmp_path: Path) -> None:
+def test_text_and_file_equal_the_settings_in_python(tmp_path: Path) -> None:
     wanted = FrankaSettings(
         "172.16.0.2",
         realtime="ignore",
@@ -68,22 +68,22 @@ def test_every_error_and_mode_of_libfranka_is_explained() -> None:
     assert set(MODES) == modes - {"Idle"}
 
 
-def test_an_exception_is_told_with_its_names() -> None:
+def test_an_exception_is_reported_with_its_names() -> None:
     text = (
         "libfranka: Move command aborted: motion aborted by reflex! "
         '["joint_reflex", "power_limit_violation"]\n'
         "control_command_success_rate: 0.97 packets lost in a row in the last sample: 2"
     )
-    told = explained("ControlException", text)
+    reported = explained("ControlException", text)
     parts = "joint_reflex: ", "collision_torque", "power_limit_violation: ", "0.97"
-    assert all(part in told for part in parts)
+    assert all(part in reported for part in parts)
     stopped = "libfranka: Move command aborted: User Stop pressed!"
     assert "stop button was pressed" in explained("ControlException", stopped)
     other = explained("ValueError", "something new\nand more")
     assert other == "ValueError: something new; and more"
 
 
-def test_a_robot_without_an_address_says_what_is_missing(
+def test_a_missing_address_is_reported(
     capsys: pytest.CaptureFixture[str],
 ) -> None:
     assert main(["live", "panda_obstacle", "--robot", "franka"]) == 2

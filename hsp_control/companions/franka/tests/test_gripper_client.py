@@ -1,4 +1,4 @@
-"""The gripper's process reads commands from datagrams, without a gripper."""
+"""The gripper's process reads datagrams of commands; no gripper is connected."""
 
 import json
 import socket
@@ -39,13 +39,13 @@ def test_an_opening_is_read(message: Any, opening: float) -> None:
     ids=repr,
 )  # fmt: skip
 def test_nothing_else_moves_the_fingers(message: Any) -> None:
-    """A text was a number by its first letter: "0.02" closed the gripper."""
+    """Text was parsed by its first letter: "0.02" closed the gripper."""
     with pytest.raises(ValueError, match="need"):
         gripper().read(message, SENDER, 0.01)
 
 
-def test_its_own_answers_that_come_back_are_no_orders() -> None:
-    """A policy that echoes messages: they answered each other without end."""
+def test_its_returned_answers_are_no_commands() -> None:
+    """A policy that echoes messages: they answered each other forever."""
     made, openings = gripper(), []
     state = SimpleNamespace(width=0.03, is_grasped=True)
     made.gripper = SimpleNamespace(
@@ -65,26 +65,26 @@ def test_its_own_answers_that_come_back_are_no_orders() -> None:
         serving = threading.Thread(target=made.serve, args=(link,))
         serving.start()
 
-        def told(message: Any) -> bytes:
+        def reported(message: Any) -> bytes:
             policy.sendto(json.dumps(message).encode(), made.inbox.getsockname())
             return policy.recv(999)
 
-        answer = told({"value": [0.04]})
+        answer = reported({"value": [0.04]})
         for _ in range(3):
             policy.sendto(answer, made.inbox.getsockname())
-        assert told({}) == answer
+        assert reported({}) == answer
         policy.settimeout(0.0)
-        with pytest.raises(BlockingIOError):  # not one of the three was answered
+        with pytest.raises(BlockingIOError):  # none of the three was answered
             policy.recv(999)
         loop.close()
         serving.join(20.0)
     assert openings == [0.08]
 
 
-def test_whoever_drives_the_fingers_says_that_it_lives(
+def test_the_gripper_s_process_sends_heartbeats(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    """Also while datagrams come without end; and it waits for nobody who listens."""
+    """Also under a flood of datagrams, and without waiting for a listener."""
     now = 0.0
     monkeypatch.setattr(client, "monotonic", lambda: now)
     made = gripper()
@@ -93,8 +93,8 @@ def test_whoever_drives_the_fingers_says_that_it_lives(
     with closing(loop), closing(link):
         for now in (0.0, 0.1, 0.4, 0.5, 0.9, 1.1):  # noqa: B007 (its clock)
             made.beat(link)
-        said = [loop.recv(9, socket.MSG_DONTWAIT) for _ in range(3)]
-        assert said == 3 * [client.ALIVE]
+        output = [loop.recv(9, socket.MSG_DONTWAIT) for _ in range(3)]
+        assert output == 3 * [client.ALIVE]
         with pytest.raises(BlockingIOError):
             loop.recv(9, socket.MSG_DONTWAIT)
         for k in range(2000):  # more than fits

@@ -28,12 +28,12 @@ TORQUE = ControllerMode.EXTERNAL, MotionGenerator.NONE
 
 
 class Talking(ControlBox):
-    """A box whose lines are kept."""
+    """A box that keeps its messages."""
 
     def __init__(self, simulated: Any = None, q: Any = None) -> None:
-        self.said: list[str] = []
+        self.messages: list[str] = []
         start = home() if q is None else q
-        super().__init__(panda(), simulated or plant(), start, self.said.append)
+        super().__init__(panda(), simulated or plant(), start, self.messages.append)
 
 
 def state(box: ControlBox) -> Any:
@@ -56,7 +56,7 @@ def ask(box: Talking, kind: FrankaCommand, number: int = 5, **fields: Any) -> li
     for name, value in fields.items():
         payload[name] = value  # type: ignore[index]
     data = payload if isinstance(payload, bytes) else payload.tobytes()
-    Requests(box, box.said.append).answer(kind, number, data)
+    Requests(box, box.messages.append).answer(kind, number, data)
     return answers(box)
 
 
@@ -88,9 +88,9 @@ def test_an_effort_acts_for_one_period() -> None:
     gravity = box.arm.robot.inverse_dynamics(home(), REST, REST)
     expected = robot.forward_dynamics(home(), REST, effort + gravity)
     np.testing.assert_allclose(box.v, PERIOD * expected, rtol=1e-3)
-    told = state(box)
-    np.testing.assert_allclose(told["tau_J_d"], effort, rtol=1e-6)
-    np.testing.assert_allclose(told["dtau_J"] * PERIOD, effort, atol=1e-3)
+    reported = state(box)
+    np.testing.assert_allclose(reported["tau_J_d"], effort, rtol=1e-6)
+    np.testing.assert_allclose(reported["dtau_J"] * PERIOD, effort, atol=1e-3)
 
 
 def test_lost_commands_hold_the_effort_and_the_twentieth_ends_the_motion() -> None:
@@ -107,12 +107,12 @@ def test_lost_commands_hold_the_effort_and_the_twentieth_ends_the_motion() -> No
     answers(box)
     box.step(None)
     assert answers(box) == [(FrankaCommand.MOVE, 1, MoveStatus.REFLEX_ABORTED)]
-    told = state(box)
-    flags = np.flatnonzero(told["errors"]).tolist()
-    assert flags == np.flatnonzero(told["reflex_reason"]).tolist()
+    reported = state(box)
+    flags = np.flatnonzero(reported["errors"]).tolist()
+    assert flags == np.flatnonzero(reported["reflex_reason"]).tolist()
     assert flags == [Error.COMMUNICATION_CONSTRAINTS_VIOLATION]
-    assert told["robot_mode"] == RobotMode.REFLEX
-    assert told["control_command_success_rate"] == 0.0
+    assert reported["robot_mode"] == RobotMode.REFLEX
+    assert reported["control_command_success_rate"] == 0.0
 
 
 def test_a_reflex_brakes_within_the_published_acceleration() -> None:
@@ -148,10 +148,10 @@ def test_recovery_answers_when_the_arm_is_back() -> None:
         (FrankaCommand.AUTOMATIC_ERROR_RECOVERY, 9, FrankaStatus.SUCCESS)
     ]
     assert box.q[3] < upper - 0.005
-    told = state(box)
-    assert told["robot_mode"] == RobotMode.IDLE
-    assert not told["errors"].any()
-    assert told["reflex_reason"].any()  # of the last motion, until the next reflex
+    reported = state(box)
+    assert reported["robot_mode"] == RobotMode.IDLE
+    assert not reported["errors"].any()
+    assert reported["reflex_reason"].any()  # of the last motion, until the next reflex
 
 
 def test_an_arm_that_folds_into_itself_stops() -> None:
@@ -162,12 +162,12 @@ def test_an_arm_that_folds_into_itself_stops() -> None:
     while box.motion is not None and box.periods < 6000:
         ramp = min(ramp + 0.004, 0.5)
         box.step(command(dq_c=[0, -ramp, 0, -ramp * 0.6, 0, -ramp, 0]))
-    told = state(box)
-    names = {Error(int(k)) for k in np.flatnonzero(told["errors"])}
-    assert names == {Error.SELF_COLLISION_AVOIDANCE_VIOLATION}, box.said
+    reported = state(box)
+    names = {Error(int(k)) for k in np.flatnonzero(reported["errors"])}
+    assert names == {Error.SELF_COLLISION_AVOIDANCE_VIOLATION}, box.messages
 
 
-def test_what_a_client_may_not_do_while_the_arm_moves() -> None:
+def test_calls_that_are_refused_while_the_arm_moves() -> None:
     box = Talking()
     box.begin(1, *TORQUE)
     answers(box)
@@ -251,7 +251,7 @@ def test_invalid_arguments_are_refused(
     assert ask(box, kind, **fields) == [
         (kind, 5, FrankaStatus.INVALID_ARGUMENT_REJECTED)
     ]
-    (line,) = box.said
+    (line,) = box.messages
     assert line.startswith("refused: set ")
 
 
@@ -267,12 +267,12 @@ def test_contacts_and_collisions_follow_the_thresholds() -> None:
     box.begin(1, ControllerMode.JOINT_IMPEDANCE, MotionGenerator.JOINT_POSITION)
     while box.motion is not None and box.periods < 1000:
         box.step(command(q_c=box.motion.reference.q))  # type: ignore[union-attr]
-    told = state(box)
-    names = {Error(int(k)) for k in np.flatnonzero(told["errors"])}
+    reported = state(box)
+    names = {Error(int(k)) for k in np.flatnonzero(reported["errors"])}
     assert names == {Error.JOINT_REFLEX}
-    over = np.abs(told["tau_ext_hat_filtered"])
-    np.testing.assert_array_equal(told["joint_contact"], over > 3.0)
-    assert told["joint_collision"].any()
+    over = np.abs(reported["tau_ext_hat_filtered"])
+    np.testing.assert_array_equal(reported["joint_contact"], over > 3.0)
+    assert reported["joint_collision"].any()
 
 
 @pytest.mark.parametrize(("controller", "kind", "stiffness"), [
@@ -284,7 +284,7 @@ def test_contacts_and_collisions_follow_the_thresholds() -> None:
 def test_an_unknown_payload_stretches_the_springs_that_are_set(
     controller: ControllerMode, kind: FrankaCommand, stiffness: list[float]
 ) -> None:
-    """At rest the joints yield by tau / K, or the hand by its weight over K."""
+    """At rest the joints deflect by tau / K, or the hand by its weight over K."""
     box = Talking(plant(payload=Payload("panda_tcp", 1.0)))
     field = "K_theta" if kind is FrankaCommand.SET_JOINT_IMPEDANCE else "K_x"
     assert ask(box, kind, **{field: stiffness})[0][2] == FrankaStatus.SUCCESS

@@ -1,4 +1,4 @@
-"""The box's log has what has happened."""
+"""The box logs all events."""
 
 from pathlib import Path
 
@@ -46,7 +46,7 @@ def test_the_log_has_the_true_motion(tmp_path: Path) -> None:
     assert (torn.status, torn.meta["message"]) == ("stopped", "no line")
 
 
-@pytest.mark.parametrize(("arguments", "said"), [
+@pytest.mark.parametrize(("arguments", "logged"), [
     (["planar3r"], "planar3r has the joints"),
     (["panda", "--host", "10.1.1.1"], "listens on loopback only"),
     (["panda", "--deadline", "0"], "deadline 0 µs; must be above 0"),
@@ -54,12 +54,12 @@ def test_the_log_has_the_true_motion(tmp_path: Path) -> None:
     (["panda", "--set", "start.velocity=[1, 0, 0, 0, 0, 0, 0]"], "at rest"),
 ])  # fmt: skip
 def test_a_mistake_is_one_line(
-    arguments: list[str], said: str, capsys: pytest.CaptureFixture[str]
+    arguments: list[str], logged: str, capsys: pytest.CaptureFixture[str]
 ) -> None:
     assert main(["franka-box", *arguments]) == 2
     (line,) = capsys.readouterr().err.splitlines()
     assert line.startswith("hsp: ")
-    assert said in line
+    assert logged in line
 
 
 def test_a_log_has_the_name_of_one(tmp_path: Path) -> None:

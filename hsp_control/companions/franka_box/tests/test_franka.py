@@ -1,7 +1,7 @@
 """A Franka arm behind pylibfranka, unmodified, and the control box on loopback.
 
-All in lockstep: the box waits for each command. The client has its own process,
-and what hangs there is killed.
+All in lockstep: the box waits for every command. The client runs in another process,
+which is killed if it hangs.
 """
 
 import json
@@ -50,7 +50,7 @@ from hsp_control.live.simulated_robot import sampled
 pytest.importorskip("pylibfranka")
 PERIOD = 0.001
 PUSH = {"frame": "panda_link6", "force": [0, 150, 0], "start": 0.2, "duration": 0.1}
-"""Both an external torque and an external force: which is felt first is the box's."""
+"""External torque and external force: the box determines which reflex is first."""
 
 
 def moved(arm: FrankaHardware, experiment: Any = None, **options: Any) -> LoopReport:
@@ -63,14 +63,14 @@ def moved(arm: FrankaHardware, experiment: Any = None, **options: Any) -> LoopRe
 
 @pytest.mark.process
 def test_the_arm_moves_as_the_simulated_robot(tmp_path: Path) -> None:
-    """The states come in single precision; else the two runs are the same."""
+    """States are in single precision; otherwise the two runs are identical."""
     experiment, logs = circle(), (tmp_path / "arm.journal", tmp_path / "sim.journal")
     with serving(experiment) as box:
         arm = connect(box.address, experiment.robot, PERIOD)
         report = moved(arm, log=logs[0], duration=0.8)
         assert report.ended == "completed", report.reason
         assert arm.fault is None
-        assert box.said("motion ended: the client has finished it", "0 lost")
+        assert box.reported("motion ended: the client has finished it", "0 lost")
     plant = sampled(experiment.plant, experiment.integrator, PERIOD)
     settings = arm.adapted(LiveSettings())
     assert settings.compensates_gravity
@@ -93,17 +93,17 @@ def test_the_arm_moves_as_the_simulated_robot(tmp_path: Path) -> None:
 
 
 @pytest.mark.process
-def test_a_reflex_is_told_and_reset_only_when_asked(tmp_path: Path) -> None:
+def test_a_reflex_is_reported_and_reset_only_on_request(tmp_path: Path) -> None:
     experiment = circle(plant={"type": "rigid_body", "pushes": [PUSH]})
     with serving(experiment) as box:
         arm = connect(box.address, experiment.robot, PERIOD)
         report = moved(arm, log=tmp_path / "pushed.journal")
         assert report.ended == "fault"
         (name,) = re.findall(r"(\w+_reflex): the external", report.reason)
-        assert report.silent  # the arm holds itself
+        assert report.silent  # the arm holds its position
         assert arm.fault is not None
         assert arm.fault in report.reason
-        assert box.said("motion ended: reflex", name)
+        assert box.reported("motion ended: reflex", name)
         assert Rollout.load(tmp_path / "pushed.journal").t[-1] < 0.4
         box.wait_alone()
         with pytest.raises(HardwareError, match=f"mode Reflex .{name}.*recover="):
@@ -128,7 +128,7 @@ def test_the_operator_s_stop_finishes_the_motion() -> None:
         assert (report.ended, report.reason) == ("operator", "enough")
         assert not report.silent
         assert report.speed < 0.01
-        assert box.said("motion ended: the client has finished it")
+        assert box.reported("motion ended: the client has finished it")
 
 
 @pytest.mark.process
@@ -161,7 +161,7 @@ def test_a_killed_box_ends_the_loop() -> None:
 
 @pytest.mark.process
 @pytest.mark.smoke
-def test_a_client_that_dies_is_told() -> None:
+def test_a_dead_client_is_reported() -> None:
     experiment = circle()
     with serving(experiment) as box:
         arm = connect(box.address, experiment.robot, PERIOD)
@@ -174,12 +174,12 @@ def test_a_client_that_dies_is_told() -> None:
         assert report.ended == "fault"
         assert "the process that talks to the robot ended (SIGKILL)" in report.reason
         box.wait_alone()
-        assert box.said("motion ended")
+        assert box.reported("motion ended")
 
 
 @pytest.mark.process
 def test_a_client_that_hangs_is_killed(monkeypatch: pytest.MonkeyPatch) -> None:
-    """libfranka waits without end where a box closes the line without an answer."""
+    """libfranka waits forever if a box closes the connection without an answer."""
     monkeypatch.setattr(connection, "_TIMEOUT", 1.0)
     address = host(2)
     with socket.create_server((address, 1337)) as server:
@@ -235,10 +235,10 @@ def test_the_load_is_in_both_models(tmp_path: Path) -> None:
 
 
 @pytest.mark.process
-def test_the_gripper_goes_where_openings_say_and_tells_where_it_is() -> None:
-    said: list[str] = []
+def test_the_gripper_follows_openings_and_reports_its_own() -> None:
+    messages: list[str] = []
     with serving(circle()) as box, closing(udp()) as policy, closing(udp()) as other:
-        gripper = Gripper(said.append, box.host)
+        gripper = Gripper(messages.append, box.host)
         gripper.thing = 0.03
         other.bind((box.host, 0))
         port = other.getsockname()[1]
@@ -248,34 +248,37 @@ def test_the_gripper_goes_where_openings_say_and_tells_where_it_is() -> None:
         other.close()
         with closing(connect(settings, circle().robot, PERIOD)):
 
-            def told(message: Any, sender: socket.socket) -> Any:
+            def printed(message: Any, sender: socket.socket) -> Any:
                 sender.sendto(json.dumps(message).encode(), (box.host, port))
                 return json.loads(sender.recv(999))
 
-            assert told({}, policy) == {"value": [0.04], "grasped": False}
+            assert printed({}, policy) == {"value": [0.04], "grasped": False}
             for odd in ([], "x", 3, None, {"value": 3}, {"value": []}, {"values": []},
                         {"value": [{}]}, {"value": "x"}, [[[]]]):  # fmt: skip
-                assert told(odd, policy) == {"value": [0.04], "grasped": False}
-            assert told({"value": [0.0]}, policy) == {"value": [0.015], "grasped": True}
-            assert told({"value": [np.nan]}, policy)["grasped"]
+                assert printed(odd, policy) == {"value": [0.04], "grasped": False}
+            assert printed({"value": [0.0]}, policy) == {
+                "value": [0.015],
+                "grasped": True,
+            }
+            assert printed({"value": [np.nan]}, policy)["grasped"]
             with closing(udp()) as second:
-                assert told({"value": [0.04]}, second)["grasped"]
-            opened = told({"values": [[0.0], [0.03]]}, policy)
+                assert printed({"value": [0.04]}, second)["grasped"]
+            opened = printed({"values": [[0.0], [0.03]]}, policy)
             assert opened == {"value": [0.03], "grasped": False}
-    assert said == [
+    assert messages == [
         "the gripper grasps with 30 N to 0 mm", "the gripper goes to 60 mm"
     ]  # fmt: skip
 
 
 @pytest.mark.parametrize(
-    ("sent", "said"),
+    ("sent", "fault"),
     [(signal.SIGKILL, "has ended"), (signal.SIGSTOP, "has sent nothing for 2 s")],
 )
 def test_without_a_gripper_that_obeys_the_arm_stops(
-    sent: signal.Signals, said: str, monkeypatch: pytest.MonkeyPatch
+    sent: signal.Signals, fault: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Its process dies or hangs amid a run; the loop holds the arm itself."""
-    monkeypatch.setattr(client_process, "_HANGS", 2.0)  # four signs of life
+    """The gripper's process dies or hangs during a run; the loop holds the arm."""
+    monkeypatch.setattr(client_process, "_HANGS", 2.0)  # four heartbeats
     experiment, times = circle(), list[float]()
     with serving(experiment, 3 + (sent == signal.SIGSTOP)) as box:
         gripper = Gripper(lambda line: None, box.host)
@@ -294,7 +297,7 @@ def test_without_a_gripper_that_obeys_the_arm_stops(
         report = moved(arm, experiment, duration=600.0, on_period=strike)
     assert gripper.width == 0.08
     assert report.ended == "fault"
-    assert report.reason == f"the process that drives the gripper {said}"
+    assert report.reason == f"the process that drives the gripper {fault}"
     assert report.at_rest
     assert not report.silent
     assert arm._gripper is not None
@@ -326,12 +329,12 @@ def test_the_command_line_drives_the_arm(
     options = ["live", str(file), "--out", str(tmp_path), "--robot"]
     with serving(experiment) as box:
         assert main([*options, f"franka://{box.address}", "--duration", "0.15"]) == 0
-        told = capsys.readouterr().out
+        printed = capsys.readouterr().out
         run = Rollout.load(tmp_path / "circle-live.npz")
         assert np.abs(run["task.hand.error"][run.t < 0.1]).max() < 1e-3
-        assert "end effector 0.76 kg (Desk)" in told
-        assert "differs from the robot's by" in told
-        assert "The loop: the duration is over" in told
+        assert "end effector 0.76 kg (Desk)" in printed
+        assert "differs from the robot's by" in printed
+        assert "The loop: the duration is over" in printed
         box.wait_alone()
         assert main([*options, f"franka://{box.address}", "--duration", "1"]) == 2
         assert "_reflex: " in capsys.readouterr().err
@@ -339,9 +342,9 @@ def test_the_command_line_drives_the_arm(
         away = ["--set", "start={joints: {panda_joint2: -0.3}}"]
         recover = f"franka://{box.address}&recover=true"
         assert main([*options, recover, *away]) == 2
-        told = capsys.readouterr().err
-        assert "from the configuration's start; 0.2 is allowed" in told
-        assert "begin where it is" in told
+        printed = capsys.readouterr().err
+        assert "from the configuration's start; 0.2 is allowed" in printed
+        assert "begin where it is" in printed
     assert main([*options, "franka://a?realtme=ignore"]) == 2
     assert "did you mean 'realtime'" in capsys.readouterr().err
 
@@ -349,12 +352,12 @@ def test_the_command_line_drives_the_arm(
 @pytest.mark.process
 def test_the_page_is_true(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     text = (ROOT / "hsp_control/companions/franka/page.md").read_text(encoding="utf-8")
-    told = dict(re.findall(r"^\| `(\w+)` \|.*\| ([^|]*)\|$", text, re.MULTILINE))
+    printed = dict(re.findall(r"^\| `(\w+)` \|.*\| ([^|]*)\|$", text, re.MULTILINE))
     fields = FrankaSettings("a").all_fields()
-    assert set(told) == set(fields)
+    assert set(printed) == set(fields)
     for name in ("collision_torque", "collision_force"):
         wanted = ", ".join(f"{each:g}" for each in fields[name])
-        assert told[name].strip() == wanted
+        assert printed[name].strip() == wanted
     (document,) = re.findall(r"```yaml\n(.*?)```", text, re.DOTALL)
     (tmp_path / "lab.yaml").write_text(document)
     load = Load(0.4, center=[0.0, 0.0, 0.1])

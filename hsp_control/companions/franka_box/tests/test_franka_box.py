@@ -1,6 +1,6 @@
 """The box and the real client: pylibfranka in another process, in lockstep.
 
-A client can hang where libfranka waits for ever, so each has a time limit.
+A client can hang where libfranka waits forever, so all have a time limit.
 """
 
 import signal
@@ -27,7 +27,7 @@ pytest.importorskip("pylibfranka", reason="needs the extra franka")
 @pytest.mark.process
 def test_the_client_computes_with_the_arms_own_model() -> None:
     with served() as rig:
-        told = rig.run("""
+        report = rig.run("""
 model = robot.load_model()
 robot.set_EE([1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0.05, 1])
 robot.set_load(1.5, [0, 0.02, 0.1], [0.02, 0, 0, 0, 0.03, 0, 0, 0, 0.01])
@@ -41,18 +41,18 @@ print(json.dumps({
 }))
 """)
         robot = rig.box.model.state.robot
-        state = robot.state(0.0, np.array(told["q"]), np.zeros(7))
+        state = robot.state(0.0, np.array(report["q"]), np.zeros(7))
         hand = rig.box.model.O_T_EE
         rest = np.zeros(7)
         gravity = robot.inverse_dynamics(state.q, rest, rest)
-        jacobian = np.array(told["jacobian"]).reshape(7, 6).T
-        assert told["m_total"] == pytest.approx(0.76 + 1.5)
-        assert told["gravity"] == pytest.approx(gravity, abs=1e-5)
-        assert np.reshape(told["mass"], (7, 7)) == pytest.approx(
+        jacobian = np.array(report["jacobian"]).reshape(7, 6).T
+        assert report["m_total"] == pytest.approx(0.76 + 1.5)
+        assert report["gravity"] == pytest.approx(gravity, abs=1e-5)
+        assert np.reshape(report["mass"], (7, 7)) == pytest.approx(
             np.array(state.mass_matrix), abs=1e-6
         )
-        assert told["coriolis"] == pytest.approx(rest, abs=1e-9)
-        pose = np.reshape(told["O_T_EE"], (4, 4)).T
+        assert report["coriolis"] == pytest.approx(rest, abs=1e-9)
+        pose = np.reshape(report["O_T_EE"], (4, 4)).T
         np.testing.assert_allclose(pose, hand.homogeneous, atol=1e-6)
         flange = state.frame("panda_link8")
         lever = hand.translation - flange.position
@@ -65,37 +65,37 @@ print(json.dumps({
 @pytest.mark.process
 def test_a_reflex_is_named_and_recovered_from() -> None:
     with served() as rig:
-        told = rig.run("""
-told = []
+        report = rig.run("""
+report = []
 for jump in (1.5, 0.5):
     control = robot.start_torque_control()
     try:
         for _ in range(5):
             state, _ = control.readOnce()
             control.writeOnce(damped(state, np.array([0, 0, 0, 0, 0, jump, 0])))
-        told.append("no reflex")
+        report.append("no reflex")
         control = None
     except franka.ControlException as error:
-        told.append(str(error))
+        report.append(str(error))
         control = None
         state = robot.read_once()
-        told += [str(state.robot_mode), str(state.last_motion_errors)]
+        report += [str(state.robot_mode), str(state.last_motion_errors)]
         try:
             robot.start_torque_control()
         except franka.CommandException as error:
-            told.append(str(error))
+            report.append(str(error))
         robot.automatic_error_recovery()
         state = robot.read_once()
-        told += [str(state.robot_mode), str(state.current_errors)]
-print(json.dumps(told))
+        report += [str(state.robot_mode), str(state.current_errors)]
+print(json.dumps(report))
 """)
-    first, mode, errors, refused, mode_after, errors_after, second = told
+    first, mode, errors, refused, mode_after, errors_after, second = report
     assert "aborted by reflex" in first
     assert "controller_torque_discontinuity" in first
     assert (mode, errors) == ("RobotMode.Reflex", '["controller_torque_discontinuity"]')
     assert 'not possible in the current mode ("Reflex")' in refused
     assert (mode_after, errors_after, second) == ("RobotMode.Idle", "[]", "no reflex")
-    line = rig.tells("ended: reflex")
+    line = rig.message_with("ended: reflex")
     assert "joint 6 at 1500 N·m/s; limit 1000" in line
 
 
@@ -135,16 +135,16 @@ print(json.dumps([worst, moved, str(robot.read_once().robot_mode)]))
     assert error < 0.02
     assert moved == pytest.approx(np.array([0, 0, 0, 1, 1, 0, 1]) * np.pi / 8, abs=0.02)
     assert mode == "RobotMode.Idle"
-    assert "finished" in rig.tells("motion ended")
+    assert "finished" in rig.message_with("motion ended")
 
 
 @pytest.mark.process
-def test_what_is_not_served_is_refused_by_the_protocol() -> None:
+def test_unsupported_requests_are_refused_by_the_protocol() -> None:
     with served() as rig:
-        told = rig.run("""
+        report = rig.run("""
 handler = franka.AsyncPositionControlHandler
 settings = handler.Configuration([1.0] * 7, 1e-3)
-told = [handler.configure(robot, settings).error_message]
+report = [handler.configure(robot, settings).error_message]
 for attempt in (
     lambda: robot.set_load(-1.0, [0, 0, 0], [0] * 9),
     lambda: robot.set_K([2] * 16),
@@ -152,22 +152,22 @@ for attempt in (
     try:
         attempt()
     except franka.CommandException as error:
-        told.append(str(error))
-print(json.dumps([told, str(robot.read_once().robot_mode)]))
+        report.append(str(error))
+print(json.dumps([report, str(robot.read_once().robot_mode)]))
 """)
-    (motion, load, frame), mode = told
+    (motion, load, frame), mode = report
     assert mode == "RobotMode.Idle"
     assert "Move command rejected: command not possible" in motion
     assert "Set Load command rejected: invalid argument" in load
     assert "Set EE to K command rejected: invalid argument" in frame
-    line = rig.tells("refused: move")
+    line = rig.message_with("refused: move")
     assert "asynchronous joint position with joint impedance is not served" in line
 
 
 @pytest.mark.process
 def test_a_cut_link_ends_motion_and_client() -> None:
     with served(cut=0.1) as rig:
-        told = rig.run("""
+        report = rig.run("""
 control = robot.start_torque_control()
 try:
     while True:
@@ -177,10 +177,10 @@ except franka.NetworkException as error:
     print(json.dumps([str(error), str(state.robot_mode)]), flush=True)
 control = robot = None
 """)
-        assert told == ["libfranka: UDP receive: Timeout", "RobotMode.Move"]
-        line = rig.tells("communication_constraints_violation")
+        assert report == ["libfranka: UDP receive: Timeout", "RobotMode.Move"]
+        line = rig.message_with("communication_constraints_violation")
         assert "20 commands in a row were lost; limit 20" in line
-        # Once more: a new client is served as the first one was.
+        # A new client is served like the first one.
         assert rig.run("print(json.dumps(str(robot.read_once().robot_mode)))") == (
             "RobotMode.Reflex"
         )
@@ -221,30 +221,30 @@ except franka.NetworkException as error:
         assert client.stdout is not None
         assert client.stdout.readline()
         box.send_signal(signal.SIGKILL)
-        said, _ = client.communicate(timeout=LONGEST)
+        output, _ = client.communicate(timeout=LONGEST)
         assert client.returncode == 7
-        assert "libfranka: " in said
+        assert "libfranka: " in output
 
 
 @pytest.mark.process
 @pytest.mark.smoke
 def test_a_second_client_is_refused_and_the_first_goes_on() -> None:
     with served() as rig:
-        told = rig.run("""
+        report = rig.run("""
 try:
     franka.Robot(sys.argv[1], franka.RealtimeConfig.kIgnore)
 except franka.NetworkException as error:
     print(json.dumps([str(error), str(robot.read_once().robot_mode)]))
 """)
-    assert told[0].startswith("libfranka: ")
-    assert told[1] == "RobotMode.Idle"
-    assert "is connected" in rig.tells("refused: ")
+    assert report[0].startswith("libfranka: ")
+    assert report[1] == "RobotMode.Idle"
+    assert "is connected" in rig.message_with("refused: ")
 
 
 @pytest.mark.process
 @pytest.mark.slow
 def test_the_example_in_the_documentation_runs(tmp_path: Path) -> None:
-    """As a user does it: the command, the example, Ctrl-C, and the log."""
+    """As a user would: the command, the example, Ctrl-C, and the log."""
     page = Path(__file__).parents[1] / "page.md"
     example = page.read_text(encoding="utf-8").split("```python\n")[1].split("```")[0]
     assert len(example.strip().splitlines()) <= 14
@@ -257,10 +257,10 @@ def test_the_example_in_the_documentation_runs(tmp_path: Path) -> None:
         )  # fmt: skip
         assert client.returncode == 0, client.stderr
         box.send_signal(signal.SIGINT)
-        said, _ = box.communicate(timeout=LONGEST)
+        output, _ = box.communicate(timeout=LONGEST)
     assert box.returncode == 0
-    assert "motion ended: the client has finished it (2999 commands, 0 lost)" in said
-    assert f"Log: {log}" in said
+    assert "motion ended: the client has finished it (2999 commands, 0 lost)" in output
+    assert f"Log: {log}" in output
     run = Rollout.load(log)
     moved = np.asarray(run["q"])[-1] - home()
     assert moved == pytest.approx([0, 0, 0, 0.3, 0, 0, 0], abs=0.01)

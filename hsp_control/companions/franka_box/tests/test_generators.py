@@ -1,4 +1,4 @@
-"""Motion generators of the hand: the joints follow it, and its limits are watched."""
+"""Motion generators of the hand: the joints follow, and limits are monitored."""
 
 from typing import Any
 
@@ -29,12 +29,12 @@ def columns(pose: pin.SE3) -> Any:
     return pose.homogeneous.T.ravel()
 
 
-def follow(generator: Generator, told: Any, *, first: bool = False) -> list[Error]:
-    return [v.error for v in generator.follow(told, first=first)]
+def follow(generator: Generator, reported: Any, *, first: bool = False) -> list[Error]:
+    return [v.error for v in generator.follow(reported, first=first)]
 
 
 def way(step: int) -> tuple[Any, Any]:
-    """Return displacement and twist of a smooth way out and back, in base's axes."""
+    """Return displacement and twist of a smooth motion out and back, in base axes."""
     t = 2.0 * np.pi * step / STEPS
     most = np.array([0.05, -0.04, 0.06, 0.1, -0.1, 0.2]) / 2.0
     speed = 2.0 * np.pi / (STEPS * PERIOD)
@@ -49,8 +49,8 @@ def test_joints_follow_the_hand_to_its_pose() -> None:
         pose = pin.SE3(
             pin.exp3(moved[3:]) @ start.rotation, start.translation + moved[:3]
         )
-        told = command(O_T_EE_c=columns(pose))
-        assert follow(generator, told, first=step == 0) == []
+        reported = command(O_T_EE_c=columns(pose))
+        assert follow(generator, reported, first=step == 0) == []
         at, J = model.hand_at(generator.reference.q)
         assert np.abs(hand.displacement(pose, at)).max() < 1e-5
         np.testing.assert_allclose(
@@ -67,10 +67,10 @@ def test_a_client_that_is_late_for_its_first_commands_has_begun(
     start = model.hand_at(home())[0]
     for step in (late, late + 1):
         way = jerk * (step * PERIOD) ** 3 / 6.0 * np.array([1.0, 0.0, 0.0])
-        told = command(
+        reported = command(
             O_T_EE_c=columns(pin.SE3(start.rotation, start.translation + way))
         )
-        assert follow(generator, told, first=step == late) == []
+        assert follow(generator, reported, first=step == late) == []
 
 
 def test_an_elbow_that_is_commanded_is_reached_by_a_hand_that_stays() -> None:
@@ -78,8 +78,10 @@ def test_an_elbow_that_is_commanded_is_reached_by_a_hand_that_stays() -> None:
     start = model.hand_at(home())[0]
     for step in range(STEPS + 1):
         elbow = 0.2 * (1.0 - np.cos(np.pi * step / STEPS)) / 2.0
-        told = command(O_T_EE_c=columns(start), valid_elbow=1, elbow_c=[elbow, -1.0])
-        assert follow(generator, told, first=step == 0) == []
+        reported = command(
+            O_T_EE_c=columns(start), valid_elbow=1, elbow_c=[elbow, -1.0]
+        )
+        assert follow(generator, reported, first=step == 0) == []
         assert generator.reference.q[2] == pytest.approx(elbow, abs=1e-5)
     at, _ = model.hand_at(generator.reference.q)
     assert np.abs(hand.displacement(start, at)).max() < 1e-5
@@ -93,8 +95,8 @@ def test_an_elbow_that_is_commanded_is_reached_by_a_hand_that_stays() -> None:
 def test_an_elbow_elsewhere_is_refused(first: bool, elbow: Any, error: Error) -> None:
     generator, model = made(HandPoses)
     pose = columns(model.hand_at(home())[0])
-    told = command(O_T_EE_c=pose, valid_elbow=1, elbow_c=elbow)
-    assert follow(generator, told, first=first)[0] is error
+    reported = command(O_T_EE_c=pose, valid_elbow=1, elbow_c=elbow)
+    assert follow(generator, reported, first=first)[0] is error
 
 
 def test_each_limit_of_a_commanded_hand_is_watched() -> None:
@@ -139,7 +141,7 @@ def test_a_hand_starts_where_it_is_and_its_pose_is_one() -> None:
 
 
 def test_a_twist_is_that_of_the_poses_it_makes() -> None:
-    """In the base's axes, however the hand is turned."""
+    """In base axes, for any orientation of the hand."""
     pose = pin.SE3(pin.rpy.rpyToMatrix(0.3, -0.8, 1.2), np.array([0.3, 0.1, 0.5]))
     before, twist = hand.at_rest(pose), np.array([0.1, -0.2, 0.3, 0.5, -0.4, 0.3])
     made = hand.to_twist(twist, before)
@@ -147,7 +149,7 @@ def test_a_twist_is_that_of_the_poses_it_makes() -> None:
 
 
 def test_a_lost_command_keeps_the_acceleration_of_the_hand() -> None:
-    """Of a constant angular acceleration about one axis, and a straight line."""
+    """A constant angular acceleration about one axis, and a straight line."""
     a = np.array([0.4, 0.0, 0.2, 0.0, 0.0, 0.8])
     motion = hand.at_rest(pin.SE3.Identity())
     for k in range(1, 6):

@@ -1,4 +1,4 @@
-"""The box's gripper answers whatever comes, and nobody keeps it from the next one."""
+"""The box's gripper answers any request, and no client blocks the next one."""
 
 import socket
 import struct
@@ -57,7 +57,7 @@ def test_no_speed_is_a_failure_and_no_endless_motion(
     [b"", b"\0", HEADER.pack(MOVE, 1, HEADER.size + 16) + b"\0", HEADER.pack(9, 1, 10),
      HEADER.pack(MOVE, 1, 4_000_000_000), HEADER.pack(MOVE, 1, 0), bytes(500)],
 )  # fmt: skip
-def test_who_says_nothing_or_nonsense_makes_room(served: Gripper, sent: bytes) -> None:
+def test_silent_or_invalid_clients_make_room(served: Gripper, sent: bytes) -> None:
     with closing(client()) as odd:
         odd.sendall(sent)
         with closing(client()) as made:
@@ -67,7 +67,7 @@ def test_who_says_nothing_or_nonsense_makes_room(served: Gripper, sent: bytes) -
 
 
 def test_who_leaves_during_a_motion_makes_room(served: Gripper) -> None:
-    """It would last two minutes."""
+    """The full motion would last two minutes."""
     with closing(client()) as first:
         assert asked(first, CONNECT, struct.pack("<HH", 3, 0)) == 0
         assert asked(first, MOVE, struct.pack("<2d", 0.08, 10.0)) == 0

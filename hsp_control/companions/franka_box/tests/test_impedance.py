@@ -1,4 +1,4 @@
-"""The controllers inside the box: stable for every stiffness, and springs at last."""
+"""The box's internal controllers: stable at any stiffness, springs in steady state."""
 
 from typing import Any
 
@@ -32,7 +32,7 @@ def springs(kind: str, scale: float, model: Model) -> ArmImpedance:
 @pytest.mark.parametrize("scale", [0.0, 1e-3, 1.0, 1e3])
 @pytest.mark.parametrize("kind", ["joints", "hand"])
 def test_the_impedances_are_stable_for_every_stiffness(kind: str, scale: float) -> None:
-    """Of the exact model the linearised error does not grow: eigenvalues within 1."""
+    """With the exact model the linearised error does not grow: |eigenvalues| ≤ 1."""
     robot, q, h = panda().robot, home(), PERIOD
     fixed = springs(kind, scale, at(q))
 
@@ -50,7 +50,7 @@ def test_the_impedances_are_stable_for_every_stiffness(kind: str, scale: float) 
 
 
 def test_the_hand_is_a_spring_along_its_own_axes() -> None:
-    """Pushed by a small wrench in its axes, it yields by K_x⁻¹ of it."""
+    """Under a small wrench in its axes it deflects by K_x⁻¹ times the wrench."""
     q, K_x = home(), np.array([400.0, 800.0, 1600.0, 20.0, 40.0, 80.0])
     model = at(q)
     model.EE_T_K = pin.SE3(pin.utils.rotate("z", 0.7), np.array([0.0, 0.02, 0.05]))
@@ -66,11 +66,11 @@ def test_the_hand_is_a_spring_along_its_own_axes() -> None:
     )
 
 
-def test_an_external_wrench_is_told_in_axes_of_the_base_and_of_the_frame() -> None:
+def test_an_external_wrench_is_reported_in_base_and_frame_axes() -> None:
     model, in_K = at(home() + 0.2), np.array([3.0, -2.0, 1.0, 0.2, 0.1, -0.3])
     model.EE_T_K = pin.SE3(pin.utils.rotate("y", 0.7), np.array([0.0, 0.02, 0.05]))
     effort = model.gravity + model.stiffness_jacobian().T @ in_K
-    for k in range(600):  # the arm stands still, and pushes
+    for k in range(600):  # the arm is at rest and pushes
         model.measure(k * PERIOD, home() + 0.2, REST, effort)
     R = (model.O_T_EE * model.EE_T_K).rotation
     in_base, turned = model.external_wrench()

@@ -55,7 +55,7 @@ def test_each_limit_of_the_measured_state_is_watched(joint: int, sign: int) -> N
             assert all(f"joint {joint + 1} at" in v.reason for v in violations)
 
 
-def test_effort_rates_are_taken_from_what_the_client_was_told() -> None:
+def test_effort_rates_are_relative_to_reported_efforts() -> None:
     before = np.full(7, 40.0 / 3.0).astype(np.float32).astype(float)
     step = np.full(7, 1.0 - 1e-6)
     assert not list(reflexes.effort_rate(before + step, before))
@@ -92,7 +92,7 @@ def test_a_constant_acceleration_is_no_jerk() -> None:
 
 
 def test_a_lost_command_keeps_the_acceleration() -> None:
-    """q(t) = a t²/2 sampled backwards: velocity and acceleration are as they were."""
+    """q(t) = a t²/2 by backward differences: velocity and acceleration are exact."""
     a, motion = unit(3, 2.0), Reference(home(), REST, REST)
     for k in range(1, 6):
         motion = reference.to_velocity(k * PERIOD * a, motion)

@@ -1,4 +1,4 @@
-"""The server and faulty clients: one line each, and the box goes on."""
+"""The server and faulty clients: one message per fault, and the box continues."""
 
 import socket
 import struct
@@ -77,22 +77,22 @@ def client(rig: Rig) -> Iterator[RawClient]:
 
 
 def serves(rig: Rig) -> bool:
-    """Return whether the next client is served: it gets a state."""
+    """Return whether the next client is served, i.e. receives a state."""
     with client(rig) as good:
         return good.connect() == b"\0\x0a\0" and int(good.state()["message_id"]) > 0
 
 
-def test_another_version_is_told_ours() -> None:
+def test_a_client_of_another_version_receives_ours() -> None:
     with served() as rig:
         with client(rig) as old:
             assert old.connect(version=9) == b"\1\x0a\0"
             assert old.answer() == b""
         assert serves(rig)
-        line = rig.tells("version 9")
+        line = rig.message_with("version 9")
         assert line.endswith("this box speaks 10, as libfranka 0.18 to 0.21 do")
 
 
-@pytest.mark.parametrize(("data", "said"), [
+@pytest.mark.parametrize(("data", "message"), [
     (struct.pack("<III", 99, 1, 12), "command 99 does not exist"),
     (struct.pack("<III", 1, 1, 12), "move of 12 bytes; it has 125"),
     (struct.pack("<III", 2, 1, 5), "stop_move of 5 bytes; it has 12"),
@@ -100,14 +100,14 @@ def test_another_version_is_told_ours() -> None:
     (b"GET / HTTP/1.1\r\nHost: box\r\n\r\n", "does not exist"),
     (struct.pack("<IIIHH", 0, 1, 16, 10, 1), "where the first request is over"),
 ])  # fmt: skip
-def test_a_malformed_request_ends_the_connection(data: bytes, said: str) -> None:
+def test_a_malformed_request_ends_the_connection(data: bytes, message: str) -> None:
     with served() as rig:
         with client(rig) as bad:
             assert bad.connect()
             bad.tcp.sendall(data)
             assert bad.answer() == b""
         assert serves(rig)
-        assert "is disconnected: " in rig.tells(said)
+        assert "is disconnected: " in rig.message_with(message)
 
 
 def test_a_command_is_late_by_when_it_arrived_not_by_when_it_is_read() -> None:
@@ -125,7 +125,7 @@ def test_a_command_is_late_by_when_it_arrived_not_by_when_it_is_read() -> None:
                 connection.send(bytes(STATE.itemsize))
                 udp.sendto(bytes(COMMAND.itemsize), box)
                 sent = monotonic()
-                while monotonic() < sent + 1e-3:  # it is read later than it arrives
+                while monotonic() < sent + 1e-3:  # read later than it arrives
                     pass
                 command = connection.command(0, deadline)
                 assert (command is None) == (deadline == 0.0)
@@ -134,7 +134,7 @@ def test_a_command_is_late_by_when_it_arrived_not_by_when_it_is_read() -> None:
 
 
 def test_datagrams_that_are_no_commands_are_ignored() -> None:
-    """Torn, foreign and outdated ones; the right one moves the arm."""
+    """Truncated, foreign and outdated ones are ignored; the valid one moves the arm."""
     with served(patience=LONGEST) as rig, client(rig) as noisy:
         assert noisy.connect()
         noisy.state()
@@ -151,13 +151,13 @@ def test_datagrams_that_are_no_commands_are_ignored() -> None:
         noisy.udp.sendto(good.tobytes(), noisy.box)
         motion = rig.box.motion
         assert motion is not None
-        while not motion.commands:  # it reads what came before, too
+        while not motion.commands:  # it also reads earlier ones
             good["message_id"] = noisy.state()["message_id"]
             noisy.udp.sendto(good.tobytes(), noisy.box)
         assert rig.server.client is not None
         assert rig.server.client.malformed == 3
         assert rig.server.client.outdated >= 1
-        assert rig.tells("that is not a command")
+        assert rig.message_with("that is not a command")
 
 
 def test_random_bytes_never_stop_the_box() -> None:
@@ -167,7 +167,8 @@ def test_random_bytes_never_stop_the_box() -> None:
             with client(rig) as mad:
                 if length % 2:
                     mad.connect()
-                with suppress(OSError):  # the box may have had enough by then
+                # the box may have closed the connection by then
+                with suppress(OSError):
                     mad.tcp.sendall(random.bytes(int(length)))
                     mad.tcp.shutdown(socket.SHUT_WR)
                 while mad.answer():
@@ -176,7 +177,7 @@ def test_random_bytes_never_stop_the_box() -> None:
 
 
 def test_in_real_time_a_command_after_the_deadline_is_lost() -> None:
-    """No answer arrives within a nanosecond; within a millisecond one does at last."""
+    """No answer arrives within a nanosecond; within a millisecond one does."""
     for deadline, in_time in ((1e-9, False), (1e-3, True)):
         with served(lockstep=False, deadline=deadline) as rig, client(rig) as quick:
             assert quick.connect()
@@ -197,15 +198,15 @@ def test_in_real_time_a_command_after_the_deadline_is_lost() -> None:
                 assert served_client.late + served_client.outdated > 0
 
 
-@pytest.mark.parametrize(("option", "said"), [
+@pytest.mark.parametrize(("option", "message"), [
     ({"deadline": 0.0}, "deadline 0 µs; must be above 0"),
     ({"deadline": 2e-3}, "deadline 2000 µs"),
     ({"patience": float("nan")}, "patience nan s; must be positive"),
     ({"cut": -1.0}, "cut -1 s"),
 ])  # fmt: skip
-def test_times_out_of_range_are_refused(option: dict[str, float], said: str) -> None:
+def test_times_out_of_range_are_refused(option: dict[str, float], message: str) -> None:
     box = ControlBox(panda(), plant(), home(), print)
-    with pytest.raises(LiveError, match=said):
+    with pytest.raises(LiveError, match=message):
         Server(box, print, **option)
 
 
@@ -218,10 +219,10 @@ def test_addresses_beyond_loopback_and_taken_ones_are_refused() -> None:
         Server(box, print, host=rig.host)
 
 
-def test_a_client_that_says_nothing_makes_room_for_the_next_one(
+def test_a_silent_client_makes_room_for_the_next_one(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     monkeypatch.setattr(connection, "_PATIENCE", 0.0)
     with served() as rig, client(rig):  # it is silent
         assert serves(rig)
-        assert rig.tells("another client is waiting")
+        assert rig.message_with("another client is waiting")

@@ -28,7 +28,7 @@ FR3_URDF_LIMITS = {
 
 
 def test_the_layouts_have_the_sizes_of_the_packed_structures() -> None:
-    """As a C++ compiler gives them for libfranka-common's headers."""
+    """Sizes and offsets by a C++ compiler for libfranka-common's headers."""
     sizes = {command: layout.itemsize for command, layout in REQUESTS.items()}
     assert (HEADER.itemsize, STATE.itemsize, COMMAND.itemsize) == (12, 1377, 371)
     assert sizes == {
@@ -48,24 +48,24 @@ def test_the_layouts_have_the_sizes_of_the_packed_structures() -> None:
 
 
 @pytest.mark.parametrize("name", ["panda", "iiwa14"])
-def test_what_clients_are_told_has_the_same_dynamics(name: str) -> None:
+def test_the_model_sent_to_clients_has_the_same_dynamics(name: str) -> None:
     robot = Robot.load(name)
     arm = Arm(robot)
-    told = pin.buildModelFromXML(arm.urdf)
-    told.inertias[7] += arm.flange.act(arm.end_effector)
+    reported = pin.buildModelFromXML(arm.urdf)
+    reported.inertias[7] += arm.flange.act(arm.end_effector)
     random = np.random.default_rng(1)
     for _ in range(20):
         q, v, a = random.normal(size=(3, 7))
         np.testing.assert_allclose(
-            pin.rnea(told, told.createData(), q, v, a),
+            pin.rnea(reported, reported.createData(), q, v, a),
             robot.inverse_dynamics(q, v, a),
             atol=1e-12,
         )
     for mine, theirs in (
-        (told.lowerPositionLimit, robot.model.lowerPositionLimit),
-        (told.upperPositionLimit, robot.model.upperPositionLimit),
-        (told.upperVelocityLimit, robot.model.upperVelocityLimit),
-        (told.upperEffortLimit, robot.model.upperEffortLimit),
+        (reported.lowerPositionLimit, robot.model.lowerPositionLimit),
+        (reported.upperPositionLimit, robot.model.upperPositionLimit),
+        (reported.upperVelocityLimit, robot.model.upperVelocityLimit),
+        (reported.upperEffortLimit, robot.model.upperEffortLimit),
     ):
         assert mine.tolist() == theirs.tolist()
 
@@ -74,7 +74,7 @@ def test_a_load_is_one_more_body() -> None:
     arm = panda()
     load = pin.Inertia(2.0, np.array([0.0, 0.1, 0.2]), np.eye(3))
     carrying, rest = arm.carrying(load), np.zeros(7)
-    q = arm.robot.home() + 0.3  # the hand does not hang straight down
+    q = arm.robot.home() + 0.3  # the hand is not vertical
     state = arm.robot.state(0.0, q, rest)
     flange = state.frame("panda_link8")
     lever = flange.rotation @ load.lever
@@ -101,7 +101,7 @@ def test_velocity_limits_are_those_that_libfranka_computes() -> None:
 
 
 def test_velocity_limits_are_read_beside_transmissions(tmp_path: Path) -> None:
-    """A URDF names its joints again in its transmissions."""
+    """A URDF repeats joint names in its transmissions."""
     urdf, arm = panda().robot.source.urdf.read_text(), tmp_path / "arm.urdf"
     slower = '<position_based_velocity_limits velocity_offset="0.3"/>'
     driven = '<transmission name="t"><joint name="panda_joint3"/></transmission>'

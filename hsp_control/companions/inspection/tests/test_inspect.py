@@ -1,4 +1,4 @@
-"""Each finding names what is odd, with its value and a cure that helps."""
+"""A finding names the implausible value, and a remedy that works."""
 
 import json
 from collections.abc import Callable
@@ -21,7 +21,7 @@ LIMIT = '<limit lower="-3" upper="3" effort="9" velocity="9"/>'
 
 @pytest.fixture
 def look(tmp_path: Path) -> Callable[..., dict[str, list[Finding]]]:
-    """Return what is found in a text, by check."""
+    """Return the findings in a text, by check."""
 
     def look_at(text: str, **options: bool) -> dict[str, list[Finding]]:
         path = tmp_path / "arm.urdf"
@@ -140,9 +140,10 @@ def test_motors_that_cannot_hold_the_robot_at_home(look: Look, tmp_path: Path) -
     weak = ARM.replace('effort="9"', f'effort="{limit}"')
     (found,) = look(weak)["effort"]
     assert found.element == f"joint {robot.dof_names[int(np.argmax(slope))]!r}"
-    asked = f"gravity requires {max(slope):.3g} N·m of it, its limit is {limit:.3g}"
-    assert found.message == f"at home {asked}"
-    assert "effort" not in look(ARM.replace('effort="9"', 'effort="0"'))  # none is kept
+    required = f"gravity requires {max(slope):.3g} N·m of it, its limit is {limit:.3g}"
+    assert found.message == f"at home {required}"
+    # none is satisfied
+    assert "effort" not in look(ARM.replace('effort="9"', 'effort="0"'))
 
 
 def test_a_robot_that_does_not_load_is_an_error(look: Look) -> None:
@@ -203,12 +204,12 @@ def test_fix_writes_a_robot_without_findings(
     write_stl(tmp_path / "a.stl", OCTAHEDRON, FACES)
     wrong = INERTIA.replace('izz="0.1"', 'izz="-0.5"')
     path.write_text(ARM.replace(INERTIA, wrong + mesh, 1))
-    assert main(["inspect", str(path), "--fix", str(fixed)]) == 2  # it does not load
+    assert main(["inspect", str(path), "--fix", str(fixed)]) == 2  # does not load
     assert f"Written with projected inertias: {fixed}" in capsys.readouterr().out
     assert 'filename="../a.stl"' in fixed.read_text()
     repaired = Robot.load(fixed).model.inertias[1]
-    asked = Robot.load(path, project_inertias=True).model.inertias[1]
-    assert repaired.isApprox(asked, 1e-14)
+    projected = Robot.load(path, project_inertias=True).model.inertias[1]
+    assert repaired.isApprox(projected, 1e-14)
     assert main(["inspect", str(fixed)]) == 0
     assert main(["inspect", str(path), "--fix", str(path)]) == 2
     assert "is the robot's own file; give another" in capsys.readouterr().err

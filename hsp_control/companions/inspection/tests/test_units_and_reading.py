@@ -1,4 +1,4 @@
-"""Implausible values are reported, and so is how files are read, and ignored parts."""
+"""Implausible values, the interpretation of files, and ignored parts are reported."""
 
 import re
 from collections.abc import Callable
@@ -18,7 +18,7 @@ Look = Callable[[str], dict[str, list[Finding]]]
 
 @pytest.fixture
 def look(tmp_path: Path) -> Look:
-    """Return what is found in a text, by check."""
+    """Return the findings in a text, by check."""
 
     def look_at(text: str) -> dict[str, list[Finding]]:
         path = tmp_path / "arm.urdf"
@@ -32,7 +32,7 @@ def look(tmp_path: Path) -> Look:
 
 
 def arm(mass: float = 2.0, moment: float = 0.02, away: float = 0.1) -> str:
-    """Return an arm of links of half a metre."""
+    """Return an arm with links of half a metre."""
     inertia = (
         f'<inertial><origin xyz="{away} 0 0"/><mass value="{mass}"/><inertia '
         f'ixx="{moment}" iyy="{moment}" izz="{moment}" ixy="0" ixz="0" iyz="0"/>'
@@ -48,9 +48,9 @@ def arm(mass: float = 2.0, moment: float = 0.02, away: float = 0.1) -> str:
     (arm(moment=2e4), "with a radius of gyration of 122 m, but it ends"),  # kg mm²
     (arm(mass=2000.0), "denser than any metal"),  # g
     (arm(moment=2e-8), "denser than any metal"),
-    (arm(moment=0.0), ""),  # points
+    (arm(moment=0.0), ""),  # point masses
 ])  # fmt: skip
-def test_what_a_body_cannot_be_is_named(text: str, message: str, look: Look) -> None:
+def test_impossible_bodies_are_named(text: str, message: str, look: Look) -> None:
     found = [f for f in look(text).get("units", []) if f.element.startswith("link")]
     assert bool(found) == bool(message)
     for each in found:
@@ -59,12 +59,12 @@ def test_what_a_body_cannot_be_is_named(text: str, message: str, look: Look) -> 
         assert "kg·m²" in each.cure
 
 
-def test_inertias_of_what_does_not_move_do_not_matter(look: Look) -> None:
+def test_inertias_of_fixed_links_are_ignored(look: Look) -> None:
     identity = INERTIA.replace('"0.1"', '"9"')
     assert "units" not in look(arm().replace(link("base", ""), link("base", identity)))
 
 
-def test_shapes_tell_how_large_a_link_is(look: Look) -> None:
+def test_shapes_determine_the_size_of_a_link(look: Look) -> None:
     """A long tool may have a wide inertia."""
     wide = arm(mass=1.0, moment=6.0)
     tool = (
@@ -93,7 +93,7 @@ def test_lengths_in_another_unit(
 
 
 def test_masses_in_grams(look: Look) -> None:
-    """With inertias in g·m²: each link is a body, but what an arm?"""
+    """Inertias in g·m²: every link is possible, but the arm is implausible."""
     (found,) = look(arm(mass=2000.0, moment=20.0))["units"]
     assert found.element == "all links"
     assert "4000 kg move, on a chain of 0.548 m" in found.message
@@ -110,7 +110,7 @@ def test_limits_in_degrees(look: Look) -> None:
     assert "units" not in look(ARM.replace('"-3" upper="3"', '"-1e5" upper="1e5"', 1))
 
 
-def test_what_nobody_reads_is_named(look: Look) -> None:
+def test_ignored_elements_are_named(look: Look) -> None:
     extra = (
         '<transmission name="gear"/><gazebo reference="upper"/>'
         '<gazebo reference="lower"/><sensor name="eye"/></robot>'
@@ -213,7 +213,7 @@ def test_an_srdf_is_looked_at(look: Look, tmp_path: Path) -> None:
     assert (found.severity, "malformed XML" in found.message) == ("error", True)
 
 
-def test_it_is_said_why_a_link_is_the_hand(tmp_path: Path) -> None:
+def test_the_reason_for_the_choice_of_hand_is_reported(tmp_path: Path) -> None:
     path = tmp_path / "arm.urdf"
     path.write_text(ARM)
     facts = inspect(RobotDescription(path)).facts

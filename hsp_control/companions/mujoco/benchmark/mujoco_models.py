@@ -131,7 +131,7 @@ def checked(package: str, folder: Path, file: Path) -> Iterator[Row]:
 
 
 def write_csv(rows: list[Row]) -> None:
-    """Write a line for each file."""
+    """Write a line per file."""
     with CSV.open("w", encoding="utf-8", newline="") as file:
         writer = csv.writer(file, lineterminator="\n")
         writer.writerow(

@@ -61,7 +61,7 @@ def test_a_configuration_runs_in_its_scene(
     rollout = experiment.run()
     assert rollout.meta["plant"]["motors"] == ["j1", "j2", "j3", "j4"]
     assert "plant.contact.ball.force" in rollout.columns
-    # The log has enough to repeat the run.
+    # The log suffices to repeat the run.
     path = folder / "run.npz"
     rollout.save(path)
     again = load_experiment(path).run()
@@ -73,7 +73,7 @@ def test_a_configuration_runs_in_its_scene(
 
 
 def test_the_plant_may_be_another_mjcf_or_no_mjcf(folder: Path) -> None:
-    """It has the controller's root, joints and keyframe; a URDF has neither."""
+    """It takes the controller's root, joints and keyframe; a URDF has none of them."""
     (folder / "heavy.xml").write_text(CELL.replace('mass="1"', 'mass="1.5"'))
     scene = "{type: mujoco_scene, contacts: [ball]}"
     other = f"{{type: rigid_body, robot: {{mjcf: {folder}/heavy.xml}}}}"
@@ -165,7 +165,7 @@ def test_a_scene_needs_an_mjcf(folder: Path) -> None:
         ("<!DOCTYPE x><mujoco/>", r"cell\.xml:1: a document type"),
     ],
 )
-def test_what_is_no_mjcf(text: str, message: str, folder: Path) -> None:
+def test_invalid_mjcf(text: str, message: str, folder: Path) -> None:
     path = folder / "cell.xml"
     path.write_text(text)
     with pytest.raises(ModelError, match=message):
@@ -180,7 +180,7 @@ def test_a_scene_may_be_too_large(folder: Path) -> None:
         Robot.load(RobotDescription(mjcf=path))
 
 
-# --- files of strangers --------------------------------------------------------------
+# --- untrusted files -----------------------------------------------------------------
 
 MESH = (
     "<mujoco>{}<asset><mesh name='m' {}/></asset><worldbody><body><joint/>"
@@ -231,7 +231,7 @@ def test_strict_reading_loads_no_plugins_and_ends(folder: Path) -> None:
         Robot.load(RobotDescription(mjcf=path), access=elsewhere)
 
 
-def test_check_takes_a_robot_of_a_mujoco_model(
+def test_check_accepts_a_robot_of_a_mujoco_model(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     (tmp_path / "cell.xml").write_text(CELL)

@@ -1,4 +1,4 @@
-"""Robots from MuJoCo's models: the same mechanics as MuJoCo computes with."""
+"""Robots from MuJoCo models: the same mechanics as in MuJoCo."""
 
 from pathlib import Path
 from typing import Any
@@ -52,7 +52,8 @@ def test_a_random_scene_is_the_one_of_mujoco(text: str) -> None:
 
 @given(trees(), st.randoms(use_true_random=False))
 def test_a_part_of_a_random_scene_is_that_part(text: str, random: Any) -> None:
-    """The joints that are not named, above the root and below, stand still anywhere."""
+    """Joints that are not named, above and below the root, are fixed at any
+    position."""
     model = compiled(text)
     names = Names(model)
     rng = np.random.default_rng(random.randrange(2**32))
@@ -150,9 +151,7 @@ MOTORS = [
 
 
 @pytest.mark.parametrize(("actuators", "limit"), MOTORS)
-def test_effort_limits_are_what_the_actuators_give(
-    actuators: str, limit: float
-) -> None:
+def test_effort_limits_are_those_of_the_actuators(actuators: str, limit: float) -> None:
     model = compiled(body(rest=f"<actuator>{actuators}</actuator>"))
     robot = Robot.from_mujoco(model)
     assert robot.model.upperEffortLimit[0] == limit
@@ -177,7 +176,7 @@ def test_a_joint_may_limit_the_sum_of_its_actuators() -> None:
 
 
 def test_actuators_may_have_an_armature_and_a_damping() -> None:
-    """Of MuJoCo 4, behind the gear; M and the damping force are MuJoCo's."""
+    """In MuJoCo 4, after the gear; M and the damping force are MuJoCo's."""
     motor = "<motor joint='a' gear='3' armature='2' damping='4'/>"
     try:
         model = compiled(body(rest=f"<actuator>{motor}</actuator>"))
@@ -193,7 +192,7 @@ def test_actuators_may_have_an_armature_and_a_damping() -> None:
     assert data.qfrc_passive[0] == pytest.approx(-0.5 * viscous[0], rel=1e-12)
 
 
-# --- what is left out ----------------------------------------------------------------
+# --- omitted parts -------------------------------------------------------------------
 
 SERVO = "<actuator><position joint='a'/></actuator>"
 TENDON = "<tendon><fixed name='t' {}><joint joint='a' coef='2'/></fixed></tendon>"
@@ -232,7 +231,7 @@ def _nothing_said() -> None:
 
 @pytest.mark.usefixtures("_nothing_said")
 @pytest.mark.parametrize(("text", "sentence"), OMISSIONS)
-def test_what_the_robot_lacks_is_named(
+def test_missing_features_of_the_robot_are_named(
     text: str, sentence: str, caplog: pytest.LogCaptureFixture
 ) -> None:
     robot = Robot.from_mujoco(compiled(text))
@@ -241,11 +240,11 @@ def test_what_the_robot_lacks_is_named(
     assert sentence in caplog.text
     caplog.clear()
     assert Robot.from_mujoco(compiled(text)).source.omitted == robot.source.omitted
-    assert not caplog.records  # once is enough
+    assert not caplog.records  # once suffices
 
 
 def test_a_servo_of_an_orientation_acts_on_its_ball_joint() -> None:
-    """Of MuJoCo 4: three controls on the joint, or a torque between two sites."""
+    """In MuJoCo 4: three controls on the joint, or a torque between two sites."""
     ball = "<joint name='n' type='ball'/><site name='base'/>"
     for target, kind in (
         ("joint='n'", "torque motors"),
@@ -261,7 +260,7 @@ def test_a_servo_of_an_orientation_acts_on_its_ball_joint() -> None:
         assert kind in sentence
 
 
-def test_what_does_not_touch_the_robot_is_not_named() -> None:
+def test_parts_without_an_effect_on_the_robot_are_not_named() -> None:
     text = CELL.replace(
         "</mujoco>", "<equality><weld body1='ball' active='false'/></equality></mujoco>"
     )

@@ -1,4 +1,4 @@
-"""MuJoCo as a plant: the same mechanics as Pinocchio's, and a ground to stand on."""
+"""MuJoCo as a plant: the same mechanics as Pinocchio's, and contact with the ground."""
 
 import re
 from functools import cache
@@ -45,7 +45,7 @@ def load(name: str) -> Robot:
     if name == "zoo":
         return zoo()
     pytest.importorskip("example_robot_data")
-    if name == "placed":  # a floating robot whose root does not stand at the origin
+    if name == "placed":  # a floating robot whose root is not at the origin
         whole = pin.Model()
         place = pin.SE3(pin.rpy.rpyToMatrix(0.3, -0.5, 1.0), np.array([1.0, 2.0, 3.0]))
         source = find_robot("solo12")
@@ -55,7 +55,7 @@ def load(name: str) -> Robot:
 
 
 def zoo() -> Robot:
-    """Return a robot with a joint of every kind that MuJoCo has too."""
+    """Return a robot with every joint type that MuJoCo has, too."""
     model, parent = pin.Model(), 0
     axis = np.array([0.6, 0.0, 0.8])
     for joint in (
@@ -90,7 +90,7 @@ def random_state(robot: Robot, rng: np.random.Generator) -> tuple[Array, Array]:
 
 @pytest.mark.parametrize("name", [*bundled_robots(), *OTHERS, "placed", "zoo"])
 def test_mass_matrix_and_bias_agree_with_pinocchio(name: str) -> None:
-    """M = TᵀM'T and N = Tᵀ(N' + M'T'v), T' by differences; power is kept."""
+    """M = TᵀM'T and N = Tᵀ(N' + M'T'v), T' by differences; power is invariant."""
     robot = load(name)
     plant = MujocoPlant(robot, Mujoco())
     rng = np.random.default_rng(1)
@@ -158,7 +158,7 @@ def standing(name: str) -> tuple[Robot, Array, list[str], Array]:
 def stand(
     plant: MujocoPlant, q: Array, springs: Array, duration: float
 ) -> tuple[Array, Array, dict[str, Array]]:
-    """Hold the joints with springs, from where the feet touch; return the end."""
+    """Hold the joints with springs, starting at touchdown; return the final state."""
     robot = plant.robot
     reference = q.copy()
     reference[2] -= plant.clearance(q)
@@ -174,16 +174,16 @@ def stand(
 
 
 def dampers(springs: Array) -> Friction:
-    """Return what damps the springs: implicit, as such stiff ones must be."""
+    """Return the springs' damping: implicit, since they are stiff."""
     return Friction(viscous=0.03 * springs)
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("name", ["talos", "solo12", *further("g1", "go2")])
 def test_a_legged_robot_stands_on_its_own_feet(name: str) -> None:
-    """On the collision geometry of its feet: less than 2 cm and 2°, and it rests.
+    """It stands at rest on its feet's collision geometry, within 2 cm and 2°.
 
-    What it sinks is what its springs give. The ground carries its weight, and the
+    It sinks by the deflection of its springs. The ground carries its weight, and the
     moments of the forces about the centre of mass cancel.
     """
     robot, q, feet, springs = standing(name)
@@ -241,7 +241,8 @@ def test_a_contact_force_is_the_grounds_on_the_robot_about_the_frame() -> None:
 
 @pytest.mark.parametrize(("mu", "slides"), [(0.3, True), (0.7, False)])
 def test_friction_of_the_ground_is_coulombs(mu: float, slides: bool) -> None:
-    """A block under gravity tilted by 27° (tan = 0.5): a = g (sin - µ cos) or rest."""
+    """A block under gravity tilted by 27° (tan = 0.5): a = g (sin - µ cos), or at
+    rest."""
     robot = ball()
     tilt = np.arctan(0.5)
     robot.model.gravity.linear = 9.81 * np.array([np.sin(tilt), 0.0, -np.cos(tilt)])
@@ -296,7 +297,7 @@ def test_a_joint_without_counterpart_is_refused() -> None:
 
 
 def test_impossible_inertias_are_refused() -> None:
-    """MuJoCo wants A + B >= C of principal inertias; Pinocchio computes with any."""
+    """MuJoCo requires A + B >= C of principal inertias; Pinocchio accepts any."""
     model = pin.Model()
     joint = model.addJoint(0, pin.JointModelRX(), pin.SE3.Identity(), "hip")
     inertia = pin.Inertia(1.0, np.zeros(3), np.diag([1.0, 1.0, 3.0]))
@@ -342,7 +343,7 @@ def test_a_foot_that_cannot_touch_is_refused(tmp_path: Path) -> None:
 def test_a_motion_that_diverges_is_an_error(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """And it leaves no file behind, as MuJoCo does by default."""
+    """It leaves no file, as MuJoCo does by default."""
     monkeypatch.chdir(tmp_path)
     robot = load("panda")
     plant = MujocoPlant(robot, Mujoco())
@@ -354,8 +355,8 @@ def test_a_motion_that_diverges_is_an_error(
     assert not list(tmp_path.iterdir())
 
 
-def test_mujoco_carries_what_a_time_line_puts_into_the_hand() -> None:
-    """Mass matrix and gravity of the present share, and a hand that does not sag."""
+def test_mujoco_carries_the_payload_of_a_time_line() -> None:
+    """Mass matrix and gravity for the present fraction; the hand does not sag."""
     robot = load("panda")
     q, rest = robot.home(), np.zeros(7)
     made = hsp.Controller(robot, [hsp.FramePose("panda_tcp")], start=q)
@@ -378,5 +379,5 @@ def test_mujoco_carries_what_a_time_line_puts_into_the_hand() -> None:
     given: dict[str, Any] = {"duration": 0.6, "control_period": 1e-3}
     run = hsp.simulate(made, q, plant=Mujoco(), compensation=none, **given)
     there = [robot.state(0.0, each, rest).position("panda_tcp") for each in run.q]
-    # With the bodies of before the hand is 20 mm below.
+    # With the previous bodies the hand sags by 20 mm.
     np.testing.assert_allclose(there, [there[0]] * len(there), rtol=0.0, atol=1e-9)

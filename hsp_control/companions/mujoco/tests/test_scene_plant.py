@@ -1,4 +1,4 @@
-"""A MuJoCo scene of one's own as a plant: the robot, its motors, and objects."""
+"""A user's MuJoCo scene as a plant: the robot, its motors, and objects."""
 
 import re
 from typing import Any
@@ -25,7 +25,7 @@ EFFORT = np.array([3.0, 40.0, -2.0, 5.0])
 
 
 def cell(text: str = CELL) -> tuple[Robot, Any, Any]:
-    """Return the arm of the cell, the scene, and its state at its keyframe."""
+    """Return the cell's arm, the scene, and the state at its keyframe."""
     model = mujoco.MjModel.from_xml_string(text)
     data = mujoco.MjData(model)
     if model.nkey:
@@ -40,7 +40,7 @@ def at_home(robot: Robot, plant: MujocoScenePlant) -> None:
 
 
 def without_gripper() -> str:
-    """Return the cell whose robot has no joint but those that move."""
+    """Return the cell with only moving joints in its robot."""
     text = re.sub(r'<joint name="f".*?/>', "", CELL)
     text = re.sub(r"<position.*?/>", "", text)
     return re.sub(r"<keyframe>.*</keyframe>", "", text, flags=re.DOTALL)
@@ -94,7 +94,7 @@ def test_the_rest_of_the_scene_lives_on() -> None:
 
 
 def test_two_bodies_of_the_scene_push_each_other_equally() -> None:
-    """The hand, pushed down on the ball: what one gets, the other gives."""
+    """The hand is pushed down on the ball: action equals reaction."""
     robot, model, data = cell()
     state = robot.state(0.0, robot.home(), np.zeros(4))
     finger = state.position("finger")
@@ -124,7 +124,7 @@ def test_pushes_are_applied_besides_the_motors() -> None:
 
 
 def test_a_controller_tracks_in_the_scene() -> None:
-    """The model is the scene's: half a millimetre, most of it the effort's being held.
+    """With the scene's model: half a millimetre, mostly due to held efforts.
 
     Without compensation of the joint's damping, which the controller's model lacks.
     """
@@ -173,7 +173,7 @@ def test_servos_on_the_robots_joints_are_refused_or_switched_off() -> None:
     assert data.qfrc_actuator[3] == 0.0
     assert data.qfrc_applied[3] == EFFORT[3]
     assert data.actuator_force[4] != 0.0  # the gripper's is the user's
-    MujocoScenePlant(robot, model, data)  # it is off now
+    MujocoScenePlant(robot, model, data)  # now inactive
 
 
 @pytest.mark.parametrize("servo", [
@@ -198,17 +198,17 @@ def test_every_kind_of_servo_can_be_switched_off(servo: str) -> None:
     assert data.qfrc_actuator[3] == 0.0
 
 
-def test_a_robot_that_overlaps_itself_is_told_once(
+def test_a_robot_in_self_collision_is_reported_once(
     caplog: pytest.LogCaptureFixture,
 ) -> None:
-    """Where the parent stands still, MuJoCo lets parent and child collide."""
+    """MuJoCo enables collisions of parent and child if the parent is static."""
     scene = """<mujoco><worldbody>
       <body name="stand"><geom size="0.1"/>
         <body name="arm" pos="0 0 {height}">
           <joint name="turn"/><geom size="0.1"/>
         </body>
       </body></worldbody></mujoco>"""
-    for height, told in ((0.15, ["stand and arm (50 mm)"]), (0.2001, [])):
+    for height, reported in ((0.15, ["stand and arm (50 mm)"]), (0.2001, [])):
         model = mujoco.MjModel.from_xml_string(scene.format(height=height))
         robot = Robot.from_mujoco(model, "stand", ["turn"])
         plant = MujocoScenePlant(robot, model, mujoco.MjData(model))
@@ -216,8 +216,8 @@ def test_a_robot_that_overlaps_itself_is_told_once(
         for _ in range(2):
             plant.reset(0.0, np.zeros(1), np.zeros(1))
         found = [each.getMessage() for each in caplog.records]
-        assert len(found) == len(told)
-        assert all(pair in line for pair, line in zip(told, found, strict=True))
+        assert len(found) == len(reported)
+        assert all(pair in line for pair, line in zip(reported, found, strict=True))
 
 
 def test_mistakes() -> None:

@@ -1,4 +1,4 @@
-"""Shapes of robots from MuJoCo's models: MuJoCo's own distances, and what is seen."""
+"""Shapes of robots from MuJoCo models: distances as in MuJoCo, and visuals."""
 
 from typing import Any
 
@@ -28,7 +28,7 @@ GEOMS = {
 
 
 def pair(first: str, second: str) -> Any:
-    """Return a scene of two bodies that turn, far from each other, with a geom each."""
+    """Return a scene of two distant hinged bodies with one geom each."""
     return mujoco.MjModel.from_xml_string(f"""<mujoco>
       <asset><mesh name="wedge" vertex="{WEDGE}"/></asset>
       <worldbody>
@@ -41,7 +41,7 @@ def pair(first: str, second: str) -> Any:
 
 @pytest.mark.parametrize("kind", GEOMS)
 def test_distances_are_those_of_mujoco(kind: str) -> None:
-    """Between a shape of each kind and a sphere, as they turn."""
+    """Between every type of shape and a sphere, while they rotate."""
     model = pair(kind, "sphere")
     robot = Robot.from_mujoco(model)
     first, second = link_shapes(robot, "meshes")
@@ -95,7 +95,7 @@ def scene(geoms: str, rest: str = "") -> Robot:
     return Robot.from_mujoco(mujoco.MjModel.from_xml_string(text))
 
 
-def test_contype_and_group_decide_what_collides_and_what_is_seen() -> None:
+def test_contype_and_group_determine_collisions_and_visuals() -> None:
     shown = "<geom size='.1' contype='0' conaffinity='0' group='{}' rgba='1 0 0 {}'/>"
     hull = "<geom size='.2' group='3'/>"
     both = scene(shown.format(2, 1) + hull)
@@ -142,7 +142,7 @@ def test_it_is_drawn_with_its_meshes_in_place() -> None:
     mujoco.mju_quat2Mat(turned, quat)
     theirs = (wedge @ turned.reshape(3, 3).T + [0.1, 0.0, 0.0]) @ frame.T + data.xpos[1]
     gaps = np.linalg.norm(ours[:, None] - theirs[None], axis=2).min(axis=0)
-    assert gaps.max() < 1e-6  # MuJoCo keeps vertices as floats
+    assert gaps.max() < 1e-6  # MuJoCo stores vertices in single precision
     assert triangles.max() < len(vertices)
     drawn = [command.path for command in RobotDrawing(robot).draw()]
     assert len(drawn) == 2

@@ -1,4 +1,4 @@
-"""The solid things of a plant: drawn where they are, moved as in the log."""
+"""The solids of a plant: drawn at their poses, moved as in the log."""
 
 import numpy as np
 import pytest
@@ -42,7 +42,7 @@ def test_solids_are_drawn_where_they_are_and_loose_ones_move(carried):
     np.testing.assert_array_equal(tracks[0].values, run["plant.solid.box.position"])
     (entry,) = layer.legend()
     assert entry.name == "solids box, stand"
-    # The whole box is in sight.
+    # The whole box is in view.
     upper = points_around(run).max(axis=0)
     assert upper[2] > run["plant.solid.box.position"][:, 2].max() + 0.1
     assert "solids" in all_layers(experiment.robot, motion, experiment.controller)

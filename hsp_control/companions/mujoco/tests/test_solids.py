@@ -1,4 +1,4 @@
-"""Solids in MuJoCo: where they stand, whose friction is used, and refusals."""
+"""Solids in MuJoCo: placement, friction, and refusals."""
 
 from typing import Any
 
@@ -39,14 +39,14 @@ def test_stairs_are_copies() -> None:
         np.testing.assert_allclose(geom.quat, [np.cos(0.05), 0, 0, np.sin(0.05)])
 
 
-def test_what_is_loose_falls_onto_what_is_fixed() -> None:
-    """Beside a robot, whose coordinates do not change; with the mass that is given."""
+def test_free_solids_fall_onto_fixed_ones() -> None:
+    """In addition to a robot, whose coordinates are unchanged; with the given mass."""
     table = Solid("table", Box([0.4, 0.4, 0.1]), [2.0, 0.0, 0.5])
     ball = Solid("ball", Sphere(0.05), [2.0, 0.0, 0.7], mass=3.0)
     made = plant(table, ball)
     q0, rest = panda().home(), np.zeros(7)
     tau = panda().state(0.0, q0, rest).nonlinear_effects.copy()
-    for _ in range(2):  # a second run begins where the first did
+    for _ in range(2):  # a second run begins at the same state
         made.reset(0.0, q0, rest)
         q, v = made.advance(0.0, 0.1, tau)
         np.testing.assert_allclose(q, q0, atol=1e-9)
@@ -59,7 +59,7 @@ def test_what_is_loose_falls_onto_what_is_fixed() -> None:
 
 
 def test_a_plant_pushes_off_as_its_slowest_solid_does() -> None:
-    """μ b d/(1 - d): on which of them a contact slides is not known."""
+    """μ b d/(1 - d); the sliding contact is not known in advance."""
     box = Box([1.0, 1.0, 1.0])
     felt = Solid("felt", box, friction=0.8, slip_damping=10.0, impedance=0.5)
     steel = Solid("steel", box, friction=0.2)
@@ -77,7 +77,7 @@ def test_a_plant_pushes_off_as_its_slowest_solid_does() -> None:
      "3 copies have the spacing"),
     (lambda: Solid("floor", HalfSpace()), "shape: plane is not possible here"),
 ])  # fmt: skip
-def test_what_no_solid_can_be(make: Any, message: str) -> None:
+def test_impossible_solids(make: Any, message: str) -> None:
     with pytest.raises(SimulationError) as raised:
         make()
     assert message in str(raised.value)

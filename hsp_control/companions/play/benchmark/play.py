@@ -30,11 +30,11 @@ from pages import Steering
 from shared.marked_sections import replace_section
 
 CONFIGURATIONS = ("panda_obstacle", "dual_panda", "whole_body/talos_circle")
-WINDOW, ROUNDS = 5.0, 3  # each condition is measured so long, so often [s]
+WINDOW, ROUNDS = 5.0, 3  # duration [s] and number of the measurements per condition
 
 
 class Timed(Session):
-    """A session that notes when it computes each row, and for how long."""
+    """A session that records begin and duration of the computation of rows."""
 
     def advance(self) -> None:
         """Go on to the next row."""
@@ -64,7 +64,8 @@ def measured(session: Timed, picture: Picture, server: PageServer) -> tuple[Any,
     play(session, picture, server.messages, lambda: "", end=lambda: monotonic() > end)
     picture.draw = draw  # type: ignore[method-assign]
     starts, lengths = np.array(session.rows).T
-    # Late against the best schedule of a row every 10 ms that none begins before.
+    # Lateness relative to the earliest schedule of a row every 10 ms that no row
+    # precedes.
     due = session.row * np.arange(len(starts))
     late = starts - due - (starts - due).min()
     return late, float((lengths.sum() + drawn[0]) / WINDOW)

@@ -1,4 +1,4 @@
-"""This play as one page: a process writes it, and reports the outcome."""
+"""A play as one page: a process writes it and reports the outcome."""
 
 from pathlib import Path
 
@@ -16,10 +16,10 @@ def written(tmp_path: Path, page: Path) -> str:
     one = OnePage(lambda: run.save(tmp_path / "mine.npz"), page)
     assert one.done() == ""
     assert one.begin() == one.begin() == f"writing {page} …"  # one at a time
-    told: list[str] = []
-    wait_until(lambda: bool(told.append(one.done()) or told[-1]))
+    reported: list[str] = []
+    wait_until(lambda: bool(reported.append(one.done()) or reported[-1]))
     one.close()
-    return told[-1]
+    return reported[-1]
 
 
 @pytest.mark.process
@@ -30,6 +30,6 @@ def test_a_play_is_written_as_one_page(tmp_path: Path) -> None:
 
 
 @pytest.mark.system
-def test_what_cannot_be_written_says_why(tmp_path: Path) -> None:
+def test_an_unwritable_file_gives_the_reason(tmp_path: Path) -> None:
     (tmp_path / "file").write_text("")
     assert "hsp: " in written(tmp_path, tmp_path / "file" / "mine.html")

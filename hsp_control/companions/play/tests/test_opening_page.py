@@ -1,4 +1,4 @@
-"""When a page opens, and what it shows before all is ready."""
+"""Opening a page, and its content before the scene is ready."""
 
 import sys
 from argparse import Namespace
@@ -28,7 +28,7 @@ PLAYED = "hsp_control.companions.play.real_time.play"
 
 
 class Said:
-    """A page that keeps what happened."""
+    """A page that records its messages."""
 
     def __init__(self) -> None:
         self.events: list[str] = []
@@ -84,7 +84,7 @@ def experiment() -> hsp.Experiment:
     return playable("planar3r")
 
 
-def test_a_page_that_says_nothing_ends_the_wait(
+def test_a_silent_page_ends_the_wait(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     silent = tmp_path / "python"
@@ -101,7 +101,7 @@ def test_a_page_that_says_nothing_ends_the_wait(
 def test_a_page_that_dies_before_its_key_was_held(
     experiment: hsp.Experiment, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Nothing has moved, and nobody has stopped it: that is an error."""
+    """Neither moved nor stopped by the user: an error."""
     channel, there = channel_pair()
     process = SimpleNamespace(
         channel=channel, held=True, begin=lambda *_: there.close()

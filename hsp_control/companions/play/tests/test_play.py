@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from clips import Recorder, told
+from clips import Recorder, reported
 from places import further
 from wording import wording
 
@@ -38,7 +38,7 @@ def session(experiment: hsp.Experiment) -> Session:
 
 @pytest.fixture
 def still() -> Session:
-    """A hand that holds its pose, beside a ball that rests."""
+    """A hand that holds its pose, next to a ball at rest."""
     return Session(playable("panda", COARSE))
 
 
@@ -52,12 +52,12 @@ def pose_of(session: Session, name: str = "hand") -> Array:
     return np.array(session.handles.targets[name].where(session.controller.state))
 
 
-def test_what_is_dragged_is_reached_and_the_log_repeats_it(
+def test_a_dragged_target_is_reached_and_the_log_repeats_it(
     session: Session, tmp_path: Path
 ) -> None:
     go(session, 0.5)
     wanted = pose_of(session)
-    for k in range(20):  # a drag, picture by picture
+    for k in range(20):  # a drag, frame by frame
         wanted[:3] += [0.002, -0.004, 0.005]
         session.receive({"do": "move", "target": "hand", "pose": wanted.tolist()})
         session.receive(
@@ -76,7 +76,7 @@ def test_what_is_dragged_is_reached_and_the_log_repeats_it(
     np.testing.assert_allclose(ball, [0.1, 0.3, 0.605], atol=1e-9)
     assert session.handles.values["frequency.hand"] == 15.0
     log = session.rollout()
-    # The error of the law is that of a held effort, however the hand was dragged.
+    # The law's error is that of held efforts, for any drag.
     assert np.abs(log["task.hand.error"][log.t > 0.5]).max() < 1e-3
     log.save(tmp_path / "played.npz")
     again = hsp.load_experiment(tmp_path / "played.npz").run()
@@ -108,7 +108,7 @@ def test_its_own_path_comes_back(session: Session) -> None:
 
 
 def test_the_elbow_of_the_posture_leads_the_null_space(tmp_path: Path) -> None:
-    """The elbow follows as in the theorem, the hand is undisturbed; and back."""
+    """The elbow follows as in the theorem, the hand is undisturbed; and it returns."""
     session = Session(playable("panda", COARSE))
     go(session, 0.3)
     start = pose_of(session, "posture")
@@ -118,7 +118,8 @@ def test_the_elbow_of_the_posture_leads_the_null_space(tmp_path: Path) -> None:
         session.receive({"do": "move", "target": "posture", "pose": wanted.tolist()})
         go(session, 0.03)
     go(session, 2.0)
-    # The elbow stays at its distance from the shoulder: not quite there.
+    # The elbow stays at its distance from the shoulder: it cannot reach the target
+    # exactly.
     np.testing.assert_allclose(pose_of(session, "posture")[1], wanted[1], atol=0.01)
     moved = session.controller.state.data.oMi[3].translation - elbow.translation
     assert moved[1] > 0.05
@@ -135,7 +136,7 @@ def test_the_elbow_of_the_posture_leads_the_null_space(tmp_path: Path) -> None:
 
 
 def test_a_return_is_no_jolt(still: Session) -> None:
-    """A target and an obstacle that were led far away return at a bearable speed."""
+    """A target and an obstacle dragged far away return at a limited speed."""
     go(still, 0.1)
     targets, obstacles = still.handles.places()
     far = np.add(targets["hand"], [0.0, 0.3, 0.0, 0.0, 0.0, 0.0, 0.0])
@@ -192,7 +193,7 @@ def test_nonsense_is_answered_and_moves_nothing(
 
 
 class Told:
-    """Keeps the gains that a knob sets."""
+    """Records the gains set by a knob."""
 
     def gains(self, name: str, gains: hsp.Gains) -> None:
         self.made = gains.matrices(6)
@@ -200,14 +201,14 @@ class Told:
 
 def test_knobs_keep_damping_ratios() -> None:
     own = "tasks.hand.gains={natural_frequency: 5, damping_ratio: 0.7}"
-    controller, told = hsp.load_experiment(PANDA, own).controller, Told()
+    controller, reported = hsp.load_experiment(PANDA, own).controller, Told()
     knob = knobs_of(controller, 0.001)["frequency.hand"]
-    knob.turn(told, 20.0)  # type: ignore[arg-type]
-    np.testing.assert_allclose(told.made[0], 20.0**2 * np.eye(6))
-    np.testing.assert_allclose(told.made[1], 2.0 * 0.7 * 20.0 * np.eye(6))
+    knob.turn(reported, 20.0)  # type: ignore[arg-type]
+    np.testing.assert_allclose(reported.made[0], 20.0**2 * np.eye(6))
+    np.testing.assert_allclose(reported.made[1], 2.0 * 0.7 * 20.0 * np.eye(6))
     softer = _scaled(hsp.Impedance(100.0, damping=30.0), 0.25)
     assert (softer.stiffness, softer.damping) == (25.0, 15.0)
-    # Up to ten times the rate, or to a fifth per period; never below what it is.
+    # Up to ten times the gain, or a fifth per period; at least its present value.
     for period, high in ((0.001, 50.0), (0.02, 10.0), (1.0, 5.0)):
         knob = knobs_of(controller, period)["frequency.hand"]
         assert (knob.low, knob.high) == pytest.approx((0.5, high))
@@ -222,7 +223,7 @@ def test_a_slider_that_is_dragged_makes_few_changes(session: Session) -> None:
     assert len(session.controller.changes) <= 12
 
 
-def test_somebody_pulls_at_the_elbow_and_the_hand_goes_on(
+def test_the_hand_continues_during_a_pull_at_the_elbow(
     session: Session, tmp_path: Path
 ) -> None:
     go(session, 0.2)
@@ -270,7 +271,7 @@ def test_a_pull_follows_the_hand_up_to_its_largest_force(session: Session) -> No
 def test_who_lets_go_leaves_or_begins_anew_pulls_no_more(
     message: str, session: Session
 ) -> None:
-    """A page that is closed is ``left``: else its last pull would never end."""
+    """A closed page is ``left``: otherwise its last pull would never end."""
     go(session, 0.1)
     point = list(map(float, session.controller.state.data.oMi[4].translation))
     session.receive(
@@ -300,7 +301,7 @@ def test_it_begins_anew(session: Session) -> None:
     np.testing.assert_array_equal(session.rollout().q, first)
 
 
-def test_what_goes_wrong_ends_the_run_and_not_the_session(
+def test_an_error_ends_the_run_and_not_the_session(
     experiment: hsp.Experiment,
 ) -> None:
     push = "{type: rigid_body, pushes: [{frame: panda_tcp, force: [1.0e9, 0, 0]}]}"
@@ -318,7 +319,7 @@ def test_what_goes_wrong_ends_the_run_and_not_the_session(
 
 @pytest.mark.parametrize("law", ["operational-space law", *further("no field")])
 def test_another_law_goes_beside_it(law: str) -> None:
-    """From the same state, with the same hand; the play itself does not notice."""
+    """From the same state, with the same hand; without an effect on the play."""
     both = [Session(playable(PANDA, COARSE)) for _ in range(2)]
     for session in both:
         go(session, 0.5)
@@ -356,7 +357,7 @@ def test_another_law_goes_beside_it(law: str) -> None:
 
 
 def test_a_plain_impedance_goes_beside_it() -> None:
-    """Equal where it begins; then its stiffness is constant, and its hand lags."""
+    """Equal at the start; then its stiffness is constant, and its hand lags."""
     session = Session(playable(PANDA, COARSE, "null_space.fields.0.weight=0"))
     go(session, 2.0)  # on the circle
     state, active = session.controller.state, session.controller.active_stack
@@ -370,14 +371,14 @@ def test_a_plain_impedance_goes_beside_it() -> None:
     go(session, 1.0)
     feed_forward = active.rows.acceleration[:3] - feedback_of(state, active)[:3]
     left = other.controller.active_stack.rows.error[:3]
-    # Kp⁻¹ x_d'', but for the inertia, which is not that of the start any more
+    # Kp⁻¹ x_d'', up to the change of inertia since the start
     np.testing.assert_allclose(left, feed_forward / 10.0**2, atol=6e-4)
     assert np.linalg.norm(left) > 1e-3
     with_spring = Session(playable("panda", "tasks.hand.impedance={stiffness: 300}"))
     assert with_spring.laws == ["no field", "operational-space law"]
 
 
-def test_what_fails_beside_a_play_ends_alone(
+def test_a_failure_beside_a_play_ends_alone(
     session: Session, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     go(session, 0.1)
@@ -404,12 +405,12 @@ def test_the_log_has_an_end(session: Session, monkeypatch: pytest.MonkeyPatch) -
 # --- the picture and the loop --------------------------------------------------------
 
 
-def test_the_picture_follows_what_is_dragged(session: Session) -> None:
+def test_the_picture_follows_the_dragged_object(session: Session) -> None:
     viewer = Viewer(session.experiment.robot, transport=Recorder())
     picture = Picture(session, viewer)
     recorder = viewer.transport
     assert isinstance(recorder, Recorder)
-    setup = told(recorder, "/play", "setup")
+    setup = reported(recorder, "/play", "setup")
     assert [each["name"] for each in setup["targets"]] == ["hand", "posture"]
     assert [each["name"] for each in setup["obstacles"]] == ["ball"]
     assert [each["title"] for each in setup["plots"]] == [
@@ -431,7 +432,7 @@ def test_the_picture_follows_what_is_dragged(session: Session) -> None:
     session.receive({"do": "obstacle", "name": "ball", "position": [0.2, 0.4, 0.5]})
     go(session, 1.5)
     picture.draw(running=True, rate=1.0)
-    pose = told(recorder, "/play", "pose")
+    pose = reported(recorder, "/play", "pose")
     shown = {(t["path"], t["property"]): t["values"] for t in pose["tracks"]}
     for path in ("/obstacles/ball", "/influence/ball"):
         np.testing.assert_allclose(shown[path, "position"], [0.2, 0.4, 0.5], atol=1e-6)
@@ -439,14 +440,15 @@ def test_the_picture_follows_what_is_dragged(session: Session) -> None:
     np.testing.assert_allclose(
         shown["/robot/panda_joint4", "position"], elbow, atol=1e-6
     )
-    targets = told(recorder, "/play", "targets")
+    targets = reported(recorder, "/play", "targets")
     np.testing.assert_allclose(targets["poses"]["hand"], pose_of(session))
-    # In a pause it is where it is wanted, and goes there afterwards.
+    # In a pause the target is drawn where it is commanded; the hand moves there
+    # afterwards.
     session.receive({"do": "obstacle", "name": "ball", "position": [0.2, 0.5, 0.5]})
     assert session.handles.places()[1]["ball"] == [0.2, 0.5, 0.5]
     session.advance()
     assert session.handles.places()[1]["ball"][1] < 0.41
-    samples = told(recorder, "/play", "samples 2")
+    samples = reported(recorder, "/play", "samples 2")
     assert len(samples["times"]) == 150
     session.receive({"do": "set", "id": "field", "value": False})
     go(session, 0.25)  # past the ramp: its zone is no longer one
@@ -458,34 +460,34 @@ def test_the_picture_follows_what_is_dragged(session: Session) -> None:
     assert recorder.paths("/influence")
 
 
-def test_a_target_out_of_reach_is_said_and_by_how_much(still: Session) -> None:
-    """Half a metre too high; within reach again there is no message."""
+def test_a_target_out_of_reach_is_reported_with_its_distance(still: Session) -> None:
+    """Half a metre too high; within reach again the message is gone."""
     recorder = Recorder()
     picture = Picture(still, Viewer(still.experiment.robot, transport=recorder))
 
     def said() -> str:
         picture.draw(running=True, rate=1.0)
-        return str(told(recorder, "/play", "targets")["away"].get("hand", ""))
+        return str(reported(recorder, "/play", "targets")["away"].get("hand", ""))
 
     wanted = pose_of(still)
     assert said() == ""
     wanted[2] += 1.0
     still.receive({"do": "move", "target": "hand", "pose": wanted.tolist()})
-    heard = []
+    received = []
     for _ in range(130):
         go(still, 0.03)
-        heard.append(said())
+        received.append(said())
     away = np.linalg.norm(still.rollout()["task.hand.error"][-1, :3])
-    first, then, *last = dict.fromkeys(heard)
+    first, then, *last = dict.fromkeys(received)
     assert (first, then) == ("", "target far away")
     assert all(each.startswith("target out of reach") for each in last)
-    assert heard[-1] == f"target out of reach, {away:.2f} m"
+    assert received[-1] == f"target out of reach, {away:.2f} m"
     still.receive({"do": "resume", "target": "hand"})
     go(still, 3.0)
     assert said() == ""
 
 
-def test_the_loop_does_what_the_page_says_about_time(session: Session) -> None:
+def test_the_loop_follows_the_page_s_time_controls(session: Session) -> None:
     viewer = Viewer(session.experiment.robot, transport=Recorder())
     said: list[list[dict[str, Any]]] = [
         [{"do": "pause"}],
@@ -513,7 +515,7 @@ def test_the_loop_does_what_the_page_says_about_time(session: Session) -> None:
     assert session.t > 0.05
 
 
-# --- what can be played with ---------------------------------------------------------
+# --- sources of a play ---------------------------------------------------------------
 
 
 def test_any_fixed_robot_is_a_playground() -> None:
@@ -532,7 +534,7 @@ def test_any_fixed_robot_is_a_playground() -> None:
         ("pandaa", "no configuration 'pandaa'"),
     ],
 )  # fmt: skip
-def test_what_cannot_be_played_with_is_said(source: str, message: str) -> None:
+def test_unplayable_sources_are_reported(source: str, message: str) -> None:
     with pytest.raises(ConfigError, match=wording(message)):
         playable(source)
 
@@ -540,7 +542,7 @@ def test_what_cannot_be_played_with_is_said(source: str, message: str) -> None:
 def test_the_operational_space_law_keeps_the_tasks_and_not_the_field(
     experiment: hsp.Experiment,
 ) -> None:
-    """Both laws meet the tasks; the moving field is followed by the exact one alone."""
+    """Both laws fulfil the tasks; only the exact one follows the moving field."""
     logs = []
     for operational in (False, True):
         session = Session(experiment)
@@ -551,7 +553,7 @@ def test_the_operational_space_law_keeps_the_tasks_and_not_the_field(
     for log in logs:
         assert np.abs(log["task.hand.error"]).max() < 2e-3
     late = exact.t > 1.5
-    # The exact one deviates because the effort is held for a millisecond.
+    # The exact one deviates since efforts are held for a millisecond.
     assert exact["null_space_norm"][late].max() < 0.02
     assert compared["null_space_norm"][late].max() > 0.3
     assert "operational" in compared.meta["changes_lost"]
@@ -559,7 +561,7 @@ def test_the_operational_space_law_keeps_the_tasks_and_not_the_field(
 
 
 def test_a_robot_that_walks_can_be_pulled_but_not_led(tmp_path: Path) -> None:
-    """The feet and the trunk are the plan's; its run is that of `simulate`."""
+    """Feet and trunk are controlled by the plan; the run equals that of `simulate`."""
     session = Session(playable("walking/talos_walk"))
     assert [*session.handles.targets] == ["posture"]
     plan = session.recorder.plan  # whose streams are recorded
@@ -576,7 +578,7 @@ def test_a_robot_that_walks_can_be_pulled_but_not_led(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     "error", [ValueError("mine"), CancelledError(), GeneratorExit(), MemoryError()]
 )
-def test_whatever_a_field_raises_ends_the_run_and_not_the_session(
+def test_any_exception_of_a_field_ends_the_run_and_not_the_session(
     error: BaseException, session: Session, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     go(session, 0.05)
@@ -597,7 +599,7 @@ def test_whatever_a_field_raises_ends_the_run_and_not_the_session(
 @pytest.mark.parametrize(
     "error", [RuntimeError("mine"), CancelledError(), GeneratorExit(), MemoryError()]
 )
-def test_whatever_a_change_of_a_page_raises_ends_the_run_and_not_the_session(
+def test_any_exception_of_a_page_s_change_ends_the_run_and_not_the_session(
     error: BaseException, session: Session, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     def fail(*_: object, **__: object) -> None:

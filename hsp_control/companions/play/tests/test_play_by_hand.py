@@ -1,4 +1,4 @@
-"""`hsp play` as somebody plays with it: the program, a real browser, and a mouse."""
+"""`hsp play` as used by hand: the program, a real browser, and a mouse."""
 
 import socket
 from collections.abc import Iterator
@@ -15,7 +15,7 @@ from played import Played
 
 import hsp_control as hsp
 
-SMALL = {"viewport": {"width": 800, "height": 500}}  # a picture takes less time
+SMALL = {"viewport": {"width": 800, "height": 500}}  # a frame takes less time
 READY = "typeof play !== 'undefined' && play.ready && play.state.t > 0"
 SHADOW = """[...document.querySelectorAll("#layers button")]
   .find((row) => row.textContent === "shadow").click()"""
@@ -29,7 +29,7 @@ BALL = """() => {
   const {x, y} = play.sight.update().project(position);
   return [x, y];
 }"""
-# Its highest pixel, of every fifth: first of every 15th, a look at each takes a while.
+# Its highest pixel, in steps of 5: first in steps of 15, since a test is slow.
 ELBOW = """() => {
   const {left, top, width, height} = play.sight.update().box;
   const first = (from, to, step) => {
@@ -48,7 +48,7 @@ ELBOW = """() => {
 
 @pytest.fixture
 def played(robot: str, tmp_path: Path) -> Iterator[Played]:
-    with socket.socket() as probe:  # a port that no other test finds free meanwhile
+    with socket.socket() as probe:  # reserved, so that no other test uses the port
         probe.bind(("127.0.0.1", 0))
         port = str(probe.getsockname()[1])
     process = Played(robot, "--out", str(tmp_path), "--port", port)
@@ -72,7 +72,7 @@ def test_hand_ball_and_elbow(browser: Any, played: Played, tmp_path: Path) -> No
     """The hand comes within a millimetre of its target; the elbow ducks the ball."""
     page, wrong = browsers.opened(browser, played.url, **SMALL)
     until(page, READY)
-    page.evaluate(SHADOW)  # without it a picture takes half the time
+    page.evaluate(SHADOW)  # without it a frame takes half the time
     before = page.evaluate("play.gizmos.get('target hand').position.toArray()")
     start = page.evaluate(HAND)
     dragged(page, start, [60.0, -45.0])
@@ -101,10 +101,10 @@ def test_hand_ball_and_elbow(browser: Any, played: Played, tmp_path: Path) -> No
     np.testing.assert_allclose(hand, target, atol=1e-3)
     np.testing.assert_allclose(log["obstacle.ball"][-1], ball, atol=1e-6)
     moved = np.abs(np.diff(log["obstacle.ball"], axis=0)).max()
-    assert moved < 0.0055  # half a metre a second: it went there
-    # The ball came at up to half a metre a second to where the elbow was, which a field
-    # answers as softly as it is weighted: it may touch, by more where a loaded machine
-    # delivers the drag at once, and it ends clear.
+    assert moved < 0.0055  # half a metre per second: it followed
+    # The ball moved at up to half a metre per second to the elbow's position; the
+    # field's reaction depends on its weight: they may touch, more so if a loaded
+    # machine delivers the drag at once, but the elbow ends clear of the ball.
     clearance = log["distance.obstacle_clearance"]
     assert clearance.min() > -0.05
     assert clearance[-1] > 0.02
@@ -112,7 +112,7 @@ def test_hand_ball_and_elbow(browser: Any, played: Played, tmp_path: Path) -> No
     assert np.linalg.norm(elbow[-1] - elbow[0]) > 0.1
     played.end()
     assert played.process.returncode == 0
-    # The page reports it, and finds the next start.
+    # The page reports it, and detects the next start.
     until(page, "document.getElementById('lost').textContent.includes('has ended')")
     assert page.evaluate("play.panel.fields.every((field) => field.disabled)")
     assert page.evaluate("play.bar.acting.every((button) => button.disabled)")

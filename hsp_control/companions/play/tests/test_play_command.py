@@ -67,7 +67,7 @@ def test_a_page_steers_and_the_log_repeats_it(played: Played, tmp_path: Path) ->
 def test_a_page_that_stalls_or_leaves_holds_nothing_up(
     played: Played, tmp_path: Path
 ) -> None:
-    stalled = Steering(played.url, pause=1e9)  # takes one message, and no more
+    stalled = Steering(played.url, pause=1e9)  # reads one message only
     wait_until(lambda: stalled.commands)
     other = Steering(played.url)
     wait_until(lambda: last(other, "play_state"))
@@ -80,7 +80,7 @@ def test_a_page_that_stalls_or_leaves_holds_nothing_up(
     wait_until(lambda: last(other, "play_force")["visible"])
     watching = Steering(played.url)
     wait_until(lambda: last(watching, "play_force"))
-    other.leave()  # in the middle of a pull
+    other.leave()  # during a pull
     wait_until(lambda: not last(watching, "play_force")["visible"])
     text = played.end(signal.SIGTERM)
     assert played.process.returncode == 0, text
@@ -96,14 +96,14 @@ def test_a_page_that_stalls_or_leaves_holds_nothing_up(
     (["panda", "--host", "192.0.2.1"], "cannot listen on 192.0.2.1"),
     (["panda", "--set", "null_space.gain=-1"], "null_space.gain"),
 ])  # fmt: skip
-def test_mistakes_are_said_in_a_line(
+def test_mistakes_are_one_line(
     arguments: list[str],
     message: str,
     tmp_path: Path,
     capfd: pytest.CaptureFixture[str],
 ) -> None:
-    """Also where the page's own process is the first to notice."""
+    """Also if the page's process notices it first."""
     assert main(["play", "--no-browser", *arguments, "--out", str(tmp_path)]) == 2
-    said = capfd.readouterr()
-    assert message in said.err
-    assert "Traceback" not in said.out + said.err
+    reported = capfd.readouterr()
+    assert message in reported.err
+    assert "Traceback" not in reported.out + reported.err

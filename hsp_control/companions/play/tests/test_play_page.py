@@ -1,8 +1,8 @@
 """The page of `hsp play` in a real browser: motions of the hand, and messages.
 
 Chromium without a window; where there is none these tests are skipped, but not in CI.
-The page is that of a real server. Its commands come from the tests, which also keep
-what it answers.
+The page is that of a real server. Its commands come from the tests, which also record
+its messages.
 """
 
 import json
@@ -51,7 +51,7 @@ SETUP: dict[str, Any] = {
     "pull": True, "loop": "simulated", "period_ms": 1.0,
 }  # fmt: skip
 
-# Keep the page's messages; the server gets only those that it knows.
+# Record the page's messages; the server gets only those that it knows.
 LISTEN = """() => {
   window.sent = [];
   const {connection} = viewer, send = connection.send.bind(connection);
@@ -63,7 +63,7 @@ PIXEL = """(point) => {
   const {x, y} = play.sight.update().project(new MeshCat.THREE.Vector3(...point));
   return [x, y];
 }"""
-# A pixel at which a press takes a handle and no other; handles reach 100 pixels out.
+# A pixel at which a press grabs only this handle; handles extend over 100 pixels.
 HANDLE = """([name, kind, axis]) => {
   const gizmo = [...play.gizmos.values()].find(({target}) => target.name === name);
   const middle = play.sight.update().project(gizmo.position);
@@ -76,7 +76,7 @@ HANDLE = """([name, kind, axis]) => {
   }
   return null;
 }"""
-# What can be seen of a kind, in one word: to ask for each takes a second each time.
+# The visible elements of a kind in one query, since a query takes a second.
 BOXES = """(selector) => [...document.querySelectorAll(selector)]
   .filter((one) => one.checkVisibility()).map((one) => {
     one.scrollIntoView({block: "nearest"});
@@ -175,7 +175,7 @@ def test_the_ball_stays_under_the_pointer(page: Any) -> None:
     end = start + np.array([70.0, -45.0])
     drag(page, start, end)
     until_sent(page, "move")
-    # While it is held, the program's word on it is not shown; on the others it is.
+    # While a slider is held, the program's value of it is not shown; others' are.
     elsewhere = {"hand": [0, 0, 0, 0, 0, 0, 1], "elbow": [0.3, *ELBOW[1:]]}
     tell(page, "play_targets", poses=elsewhere)
     held, free, _ = page.evaluate("[...play.gizmos.values()].map((one) => one.pose())")
@@ -218,10 +218,10 @@ def test_a_ring_turns_about_its_axis(page: Any, axis: int) -> None:
     pose = np.array(until_sent(page, "move")[-1]["pose"])
     assert pose[:3] == pytest.approx(HAND[:3], abs=1e-12)
     x, y, z, w = pose[3:]
-    # In the target's own axes: the conjugate of its turn, times the new one.
+    # In the target's axes: the conjugate of its orientation times the new one.
     _, b, _, a = TURN
     local = np.array([a * x - b * z, a * y - b * w, a * z + b * x])
-    assert a * w + b * y < 1.0 - 1e-5  # it has turned
+    assert a * w + b * y < 1.0 - 1e-5  # it has rotated
     assert np.delete(local, axis) == pytest.approx([0.0, 0.0], abs=1e-9)
 
 
@@ -233,7 +233,7 @@ def test_the_keyboard_moves_by_a_centimetre(page: Any) -> None:
     label = page.locator(".play-label.name:not([hidden])")
     assert label.inner_text() == "hand"
     before = np.array(HAND[:3])
-    # The camera stands at negative y: x to the right, y away from it, z up.
+    # The camera is at negative y: x to the right, y away from it, z up.
     for key, axis, step in (
         ("ArrowRight", 0, 0.01),
         ("ArrowRight", 0, 0.01),
@@ -266,7 +266,7 @@ def test_the_keyboard_moves_by_a_centimetre(page: Any) -> None:
 
 @pytest.mark.browser
 def test_a_plot_draws_the_limits_of_its_curves(page: Any) -> None:
-    """Of a curve shown alone, only its own, and the axis reaches them."""
+    """For a single shown curve only its own limits, within the axis."""
     # Two joints, at 0.9 and at 1.1, which is beyond the second one's limit of 1.
     page.evaluate(
         """() => {
@@ -369,7 +369,7 @@ def test_keys_steer_the_run(page: Any) -> None:
 
 @pytest.mark.browser
 def test_the_key_of_a_live_loop_is_held(page: Any) -> None:
-    """By the space bar or the button; whoever looks away has let go."""
+    """By the space bar or the button; losing focus releases it."""
     live = SETUP | {"loop": "held"}
     page.evaluate("(command) => viewer.handle_command(command)", live)
     page.evaluate("sent.length = 0")
@@ -422,7 +422,7 @@ def test_an_obstacle_comes_to_the_robot_that_it_is_dragged_over(page: Any) -> No
     page.mouse.up()
     place = np.array(until_sent(page, "obstacle")[-1]["position"])
     assert abs(place[2]) < 0.15  # the arm's plane; it has begun at 0.3
-    # Its arrow moves it along an axis, and a line leads to the floor.
+    # Its arrow moves it along an axis, and a line connects it to the floor.
     start = np.array(page.evaluate(HANDLE, ["ball", "arrow", 2]))
     drag(page, start, start + np.array([0.0, -40.0]))
     page.mouse.up()
@@ -462,7 +462,7 @@ def test_a_link_is_pulled(page: Any) -> None:
 
 
 def told_until(page: Any, values: dict[str, Any], expression: str) -> None:
-    """Send the settings, as with each picture, until an expression is true."""
+    """Send the settings, as with every frame, until an expression is true."""
     text = json.dumps(values)
     until(page, f"viewer.handle_command({{type: 'play_values', values: {text}}}), "
           + expression)  # fmt: skip
@@ -470,7 +470,7 @@ def told_until(page: Any, values: dict[str, Any], expression: str) -> None:
 
 @pytest.mark.browser
 def test_a_refused_value_goes_back(page: Any) -> None:
-    """Whether a word of the program is older is a matter of time: here it stands."""
+    """Which of two values is older depends on timing: here time is frozen."""
     page.evaluate("window.usual = [Play.ECHO, PlayPanel.PATIENCE]")
     page.evaluate("Play.ECHO = PlayPanel.PATIENCE = 1e9")
     slider, shown = page.locator("#play-stiffness"), page.locator(".slider output")
@@ -508,7 +508,7 @@ def test_a_target_and_an_obstacle_return_to_their_paths(page: Any) -> None:
 
 
 @pytest.mark.browser
-def test_a_target_out_of_reach_is_told_at_its_handle(page: Any) -> None:
+def test_a_target_out_of_reach_is_reported_at_its_handle(page: Any) -> None:
     state = {"t": 2.0, "running": True, "rate": 1.0, "level": "info"}
     words = {"hand": "target out of reach, 0.31 m", "elbow": "target far away"}
     tell(page, "play_state", message="saved", **state)
@@ -519,7 +519,7 @@ def test_a_target_out_of_reach_is_told_at_its_handle(page: Any) -> None:
     box, (x, y) = away.first.bounding_box(), pixel(page, HAND)
     assert abs(box["x"] + 0.5 * box["width"] - x) < 3.0
     assert -40.0 < box["y"] + box["height"] - y < -12.0  # at the handle
-    page.keyboard.press("p")  # also while presenting, when the bar has gone
+    page.keyboard.press("p")  # also when presenting, without the bar
     page.wait_for_selector("body.presenting.resting", state="attached")
     status = "document.querySelector('.play-status')"
     until(page, f"getComputedStyle({status}).opacity === '0'")
@@ -532,7 +532,7 @@ def test_a_target_out_of_reach_is_told_at_its_handle(page: Any) -> None:
 
 @pytest.mark.browser
 def test_labels_are_right_at_every_ratio_and_range(page: Any) -> None:
-    """uPlot scales whole numbers before px, and has no steps of 3 or 4 decades."""
+    """uPlot uses whole numbers before pixels, and has no steps of 3 or 4 decades."""
     assert page.evaluate("/^\\d+px/.test(Plot.FONT)")
     steps = page.evaluate(
         "[1, 4, 6, 9, 12, 17].map((n) => Plot.DECADES.incrs(0, 1, -n, 0)[0])"
@@ -543,7 +543,7 @@ def test_labels_are_right_at_every_ratio_and_range(page: Any) -> None:
 
 @pytest.mark.browser
 def test_a_slow_program_does_not_turn_a_knob_back(page: Any) -> None:
-    """Its messages from before it received the change are not shown."""
+    """Messages from before the program received the change are not shown."""
     page.evaluate("play.panel.set('stiffness', 900)")
     page.evaluate("play.touched.set('set stiffness', performance.now() - 1000)")
     tell(page, "play_values", values={"stiffness": 400.0, "friction": False})
@@ -576,7 +576,7 @@ def test_bars_show_joints_against_their_limits(page: Any) -> None:
 @pytest.mark.browser
 def test_the_slider_looks_back(page: Any) -> None:
     node = "viewer.scene_tree.find(['seen']).object"
-    page.evaluate(f"{node}.name = 'seen'")  # what is not in the scene is ignored
+    page.evaluate(f"{node}.name = 'seen'")  # nodes missing in the scene are ignored
     for k in range(5):
         track = {"path": "/seen", "property": "position", "values": [0.1 * k, 0, 0]}
         track |= {"times": [0.0]}
@@ -600,7 +600,7 @@ def test_the_slider_looks_back(page: Any) -> None:
     assert x == pytest.approx(0.4)
     assert page.evaluate(handle) == pytest.approx(0.1)
     tell(page, "play_targets", poses={"hand": [0.7, 0.2, 0.5, 0.0, 0.0, 0.0, 1.0]})
-    assert page.evaluate(handle) == pytest.approx(0.1)  # of the row that is seen
+    assert page.evaluate(handle) == pytest.approx(0.1)  # of the displayed row
     assert page.evaluate(f"{held} === null")
     page.evaluate(
         "(() => { const back = document.querySelector('.back'); back.value = 0; "
@@ -611,7 +611,7 @@ def test_the_slider_looks_back(page: Any) -> None:
     for running in (False, True):  # it pauses, and later goes on
         tell(page, "play_state", t=6.0, running=running, rate=1.0, message="")
     assert not page.evaluate("play.bar.past.looking")
-    # It pauses also where a start is under way, and the space bar goes on from there.
+    # It pauses also during a start, and the space bar continues from there.
     states = [  # at once: a later one would not be older
         {"type": "play_state", "path": "/play", "t": 6.5, "running": running,
          "rate": 1.0, "message": ""}
@@ -633,7 +633,7 @@ def test_the_slider_looks_back(page: Any) -> None:
 
 @pytest.mark.browser
 def test_the_name_of_a_line_covers_no_curve(page: Any) -> None:
-    """It stays where it is, until a curve or another name is there."""
+    """A name keeps its side until a curve or another name is in the way."""
     place = """([curve, named, last]) => {
       const over = {clientWidth: 200, clientHeight: 88};
       const chart = {over, data: [curve, curve], series: [{}, {show: true}],
@@ -656,7 +656,7 @@ def test_the_name_of_a_line_covers_no_curve(page: Any) -> None:
 
 
 @pytest.mark.browser
-def test_a_picture_is_a_file_of_what_is_seen(page: Any) -> None:
+def test_a_picture_is_saved_as_displayed(page: Any) -> None:
     page.evaluate(
         "(() => { window.saved = null; PlayCamera.prototype.save = (blob, ending) => "
         "{ window.saved = [blob.size, ending]; }; })()"
@@ -691,7 +691,7 @@ def test_a_target_that_moves_out_of_the_picture_stays_in_sight(page: Any) -> Non
 
 
 @pytest.mark.browser
-def test_without_a_graphics_card_it_draws_lightly_and_says_so(page: Any) -> None:
+def test_without_a_gpu_it_draws_lightly_and_reports_it(page: Any) -> None:
     if not page.evaluate("isSoftware()"):
         pytest.skip("this browser has a graphics card")
     assert not page.evaluate("viewer.renderer.shadowMap.enabled")
@@ -730,8 +730,8 @@ def test_it_fits_a_phone(browser: Any, viewer: Viewer) -> None:
     for left, right, height, role, html in things:
         assert left >= 0
         assert right <= 390
-        assert role == "switch" or height >= 40, html  # of a switch its whole row is
-    # The legend takes the sheet's place, and ends with the picture.
+        assert role == "switch" or height >= 40, html  # of a switch, the whole row
+    # The legend replaces the sheet, and ends at the picture's edge.
     page.locator(".layers-toggle").tap()
     until(
         page, "getComputedStyle(document.querySelector('.play-panel')).opacity === '0'"
@@ -748,7 +748,7 @@ def test_it_fits_a_phone(browser: Any, viewer: Viewer) -> None:
     until(
         page, "getComputedStyle(document.querySelector('.play-panel')).opacity === '0'"
     )
-    # A finger that drags the ball; it may miss it by 20 pixels.
+    # A finger drags the ball; it may miss by 20 pixels.
     start = pixel(page, HAND)
     touch = page.context.new_cdp_session(page)
 
@@ -769,7 +769,7 @@ def test_it_fits_a_phone(browser: Any, viewer: Viewer) -> None:
 
 
 @pytest.mark.browser
-def test_a_browser_that_cannot_draw_is_told_so(browser: Any, viewer: Viewer) -> None:
+def test_a_browser_without_webgl_shows_a_message(browser: Any, viewer: Viewer) -> None:
     page = browser.new_page()
     page.add_init_script("HTMLCanvasElement.prototype.getContext = () => null")
     page.goto(str(viewer.url))

@@ -17,7 +17,7 @@ from played import wait_until
 import hsp_control as hsp
 from hsp_control.cli import main
 
-# On a machine with much else to do, processes wait for one another.
+# On a busy machine, processes wait for one another.
 PATIENT = ["--lockstep", "--set=simulation.control_period=0.002"]
 
 
@@ -31,7 +31,7 @@ class SteeredLive:
             text=True,
         )
         assert self.process.stdout is not None
-        self.before = ""  # its messages before it had an address
+        self.before = ""  # its output before it had an address
         for line in self.process.stdout:
             self.before += line
             if found := re.match(r"Steer: (http\S+)", line):
@@ -70,7 +70,7 @@ def test_a_page_moves_the_hand_and_stops_the_robot(
     page.say(do="move", target="hand", pose=pose)
 
     def reached() -> bool:
-        # In the period in which it is sent, the page shows where it is to go.
+        # In the period in which it is sent, the page shows the commanded target.
         hand = last(page, "play_targets")["poses"]["hand"]
         moved = last(page, "play_state")["t"] > begun + 0.5
         return moved and abs(hand[2] - pose[2]) < 1e-6
@@ -94,7 +94,7 @@ def test_a_robot_moves_while_the_key_is_held(
     page = Steering(live.url)
     wait_until(lambda: any(c["type"] == "play_setup" for c in page.commands), 120.0)
     assert last(page, "play_setup")["loop"] == "held"
-    assert not moving(page)  # until somebody holds the key
+    assert not moving(page)  # until the key is held
     let_go = threading.Event()
 
     def hold() -> None:
@@ -130,7 +130,7 @@ def test_it_fails_if_its_page_dies(arguments: list[str]) -> None:
     (["--steer", "--robot=arm://x"], "use --steer hardware"),
     (["--port=7100"], "need --steer"),
 ])  # fmt: skip
-def test_what_makes_no_sense_is_refused(
+def test_nonsensical_input_is_refused(
     arguments: list[str], message: str, capsys: pytest.CaptureFixture[str]
 ) -> None:
     assert main(["live", "panda_obstacle", *arguments]) == 2

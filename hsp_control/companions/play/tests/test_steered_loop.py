@@ -1,4 +1,4 @@
-"""A live loop that is steered, without a page: words become motion of the robot."""
+"""A steered live loop without a page: messages become motion of the robot."""
 
 import json
 from collections.abc import Iterator
@@ -27,7 +27,7 @@ from hsp_control.null_space.fields.weight import sample_weight
 
 
 class Steered:
-    """A steered loop in no real time; messages come at times of the loop."""
+    """A steered loop in simulated time; messages arrive at times of the loop."""
 
     def __init__(self, journal: Path, **more: Any) -> None:
         self.experiment = hsp.load_experiment("panda_obstacle")
@@ -82,7 +82,7 @@ def steered(tmp_path: Path) -> Iterator[Steered]:
 
 @pytest.fixture
 def keyed(tmp_path: Path) -> Iterator[Steered]:
-    """Its key is held at the beginning."""
+    """Its dead-man key is held at the beginning."""
     key = DeadMansKey(lambda: steered.now)
     steered = Steered(tmp_path / "live.journal", key=key)
     key.update(held=True)
@@ -90,7 +90,7 @@ def keyed(tmp_path: Path) -> Iterator[Steered]:
     steered.close()
 
 
-def test_what_is_dragged_is_reached(steered: Steered) -> None:
+def test_a_dragged_target_is_reached(steered: Steered) -> None:
     targets, obstacles = steered.loop.handles.places()
     pose = np.array(targets["hand"])
     pose[:3] += [0.02, -0.05, 0.06]
@@ -111,7 +111,7 @@ def test_what_is_dragged_is_reached(steered: Steered) -> None:
 
 
 def test_who_lets_go_of_the_key_stops_the_robot(keyed: Steered) -> None:
-    """After the last word, the time limit later; the end is that of any safe stop."""
+    """A timeout after the last message; the end is that of any safe stop."""
     for k in range(11):
         keyed.at(0.05 * k, do="hold", held=True)
     report = keyed.run(5.0)
@@ -136,7 +136,7 @@ def test_it_stops_at_once(keyed: Steered, message: dict[str, Any], reason: str) 
     assert stopped == pytest.approx(0.1, abs=0.003)
 
 
-def test_what_a_page_says_after_the_stop_changes_nothing(steered: Steered) -> None:
+def test_messages_after_the_stop_have_no_effect(steered: Steered) -> None:
     for x, said in ((0.5, {"do": "nothing"}), (0.6, {"do": "stop"})):
         steered.page.send(said)
         steered.page.send({"do": "obstacle", "name": "ball", "position": [x, 0.0, 1.0]})
@@ -145,7 +145,7 @@ def test_what_a_page_says_after_the_stop_changes_nothing(steered: Steered) -> No
     assert steered.requests.reason == "stopped from the page"
 
 
-def test_a_word_that_is_too_much_is_dropped_and_nobody_waits() -> None:
+def test_an_excess_message_is_dropped_without_waiting() -> None:
     here, there = channel_pair()
     other = Channel(there)
     for _ in range(10_000):
@@ -208,7 +208,7 @@ def test_the_picture_follows_the_journal(steered: Steered) -> None:
 
 
 def test_a_page_whose_process_ends_is_a_fault(steered: Steered) -> None:
-    """Nobody could stop the robot any more: it is no operator's stop."""
+    """Without a page no operator can stop the robot: this is a fault."""
     steered.each.append(lambda t: steered.page.close() if t > 0.05 else None)
     report = steered.run(1.0)
     assert "the process of the page has ended" in report.reason

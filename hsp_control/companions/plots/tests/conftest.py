@@ -8,5 +8,5 @@ from hsp_control import Rollout
 
 @pytest.fixture(scope="module")
 def logs() -> dict[str, Rollout]:
-    """Return runs by what they show: those of the paper, and spatial ones."""
+    """Return runs by their contents: those of the paper, and spatial ones."""
     return {name: planar(number) for name, number in PAPER.items()} | spatial()

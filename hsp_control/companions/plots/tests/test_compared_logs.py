@@ -1,4 +1,4 @@
-"""Several logs in the same panels, chosen panels, limits, and steps that are marked."""
+"""Several logs in the same panels, chosen panels, limits, and marked steps."""
 
 from pathlib import Path
 
@@ -31,7 +31,7 @@ def test_logs_share_panels_and_a_legend_names_them(log: Rollout) -> None:
     actual = [each for each in errors.lines if len(each.get_xdata()) in (50, 101)]
     colors = {len(each.get_xdata()): each.get_color() for each in actual}
     assert colors == {101: palette.run(0), 50: palette.run(1)}
-    first, second = (line for line in efforts.lines[::3])  # three joints of each
+    first, second = (line for line in efforts.lines[::3])  # three joints per log
     assert first.get_color() == second.get_color()
     assert first.get_linestyle() != second.get_linestyle()
     assert efforts.get_xlim() == (0.0, log.t[-1])
@@ -45,7 +45,7 @@ def test_logs_share_panels_and_a_legend_names_them(log: Rollout) -> None:
 
 @pytest.mark.slow
 def test_a_narrow_figure_names_all_its_logs(log: Rollout) -> None:
-    """Within its width; of the predictions the legend has what is true of all."""
+    """Within its width; predictions have one common entry in the legend."""
     logs = [log, *(changed(log, slice(None), {}) for _ in range(3))]
     logs[2].meta["null_space_gain"] = (3.0 * np.eye(3)).tolist()
     names = [f"$K_N = {k}$" for k in (4, 8, 16, 32)]

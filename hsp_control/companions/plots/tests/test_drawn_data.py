@@ -1,4 +1,4 @@
-"""Check that figures show the log's numbers, predictions of e_N among them."""
+"""Figures show the log's numbers, and predictions of e_N."""
 
 import matplotlib as mpl
 import numpy as np
@@ -47,7 +47,7 @@ def log(logs: dict[str, Rollout], request: pytest.FixtureRequest) -> Rollout:
 
 
 def named(axes: Axes, label: str) -> np.ndarray:
-    """Return x and y of the one line whose label begins so, shape (N, 2)."""
+    """Return x and y of the only line whose label begins so, shape (N, 2)."""
     found = [line for line in axes.lines if str(line.get_label()).startswith(label)]
     assert len(found) == 1, (label, [line.get_label() for line in axes.lines])
     return np.column_stack(found[0].get_data())
@@ -124,7 +124,7 @@ def test_metres_and_radians_of_a_pose_are_apart(logs: dict[str, Rollout]) -> Non
 
 
 @pytest.mark.slow
-def test_a_task_of_a_user_s_own_says_itself_what_is_drawn() -> None:
+def test_a_user_s_task_determines_its_figure() -> None:
     class Tool(FramePosition):
         @property
         def error_parts(self) -> tuple[ErrorPart, ...]:
@@ -152,7 +152,7 @@ def test_a_task_of_a_user_s_own_says_itself_what_is_drawn() -> None:
 
 
 @pytest.mark.slow
-def test_frames_are_even_in_time_or_where_they_are_asked_for(
+def test_frames_are_equidistant_in_time_or_at_given_times(
     logs: dict[str, Rollout],
 ) -> None:
     log = logs["rest"]
@@ -223,7 +223,8 @@ def test_obstacles_are_their_outlines(logs: dict[str, Rollout]) -> None:
             left = edges[:, 0] * off[..., 1] - edges[:, 1] * off[..., 0]
             assert np.all(left >= -1e-3 * np.linalg.norm(edges, axis=1))
     everything = world.enclosing_points(log)
-    assert np.ptp(everything, axis=0).max() < 2.0  # the table does not shrink the arm
+    # the table does not change the arm's scale
+    assert np.ptp(everything, axis=0).max() < 2.0
     for view in ("xz", "xy"):
         axes = drawn(plots.draw_end_effector, log, names=view)
         floors = [p for p in axes.patches if p.get_facecolor() == SHADOW]

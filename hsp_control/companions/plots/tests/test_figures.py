@@ -1,4 +1,4 @@
-"""Figures: short logs, files, and that they can be read."""
+"""Figures: short logs, files, and legibility."""
 
 import itertools
 import subprocess
@@ -15,7 +15,7 @@ from hsp_control import Rollout
 from hsp_control.cli import main
 from hsp_control.common.exceptions import PlotError
 
-# --- logs at the edge ----------------------------------------------------------------
+# --- short logs ----------------------------------------------------------------------
 
 
 @pytest.mark.slow
@@ -28,7 +28,7 @@ def test_one_row_is_drawn(logs: dict[str, Rollout], name: str) -> None:
 
 
 @pytest.mark.slow
-def test_a_log_without_rows_says_so() -> None:
+def test_a_log_without_rows_is_refused() -> None:
     whole = planar(PAPER["rest"])
     empty = changed(whole, slice(0), status="diverged")
     for draw in (plots.paper_figure, plots.diagnostics_figure):
@@ -38,14 +38,14 @@ def test_a_log_without_rows_says_so() -> None:
         plots.paper_figure(whole, times=[])
 
 
-# --- files, and what drawing leaves behind -------------------------------------------
+# --- files, and side effects of drawing ----------------------------------------------
 
 
 @pytest.mark.slow
 @pytest.mark.system
 def test_figures_are_written_in_every_format(tmp_path: Path) -> None:
     log, folder = changed(planar(PAPER["rest"]), slice(20)), tmp_path / "new" / "folder"
-    formats = "svg", *further("pdf")  # which an example writes
+    formats = "svg", *further("pdf")  # written by an example
     files = plots.save_figures(log, folder, "run", formats)
     kinds = itertools.product(("paper", "diagnostics"), formats)
     assert files == [folder / f"run-{name}.{suffix}" for name, suffix in kinds]
@@ -53,7 +53,7 @@ def test_figures_are_written_in_every_format(tmp_path: Path) -> None:
 
 
 @pytest.mark.slow
-def test_what_cannot_be_written_says_why(tmp_path: Path) -> None:
+def test_an_unwritable_file_gives_the_reason(tmp_path: Path) -> None:
     log = planar(PAPER["rest"])
     with pytest.raises(PlotError, match="no picture format 'pgn'; did you mean 'png'"):
         plots.save_figures(log, tmp_path, "run", ("pgn",))
@@ -63,7 +63,7 @@ def test_what_cannot_be_written_says_why(tmp_path: Path) -> None:
 
 
 @pytest.mark.slow
-def test_plot_draws_beside_a_log_and_says_what_is_none(
+def test_plot_draws_beside_a_log_and_names_files_that_are_none(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     log = planar(4).save(tmp_path / "run.npz")
@@ -168,6 +168,6 @@ def test_nothing_is_clipped_and_nothing_overlaps(shown: list[Figure]) -> None:
             assert inside == (True, True), what
         for (one, here), (other, there) in itertools.combinations(panels + headings, 2):
             if one in getattr(other, "child_axes", []):
-                continue  # the scale of time stands in its panel
+                continue  # the time axis is in its panel
             overlap = here.intersection(here, there)
             assert overlap is None or min(overlap.size) < 3.0, (one, other)

@@ -1,4 +1,4 @@
-"""docs/paper.md and its pictures: every number, and every frame, comes from a run."""
+"""docs/paper.md and its pictures: every number and every frame is from a run."""
 
 import importlib.util
 import re
@@ -42,14 +42,14 @@ def runs() -> dict[int, Rollout]:
 
 
 def angles(rollout: Rollout) -> Array:
-    """Return absolute angles, as the paper's panels (b) show them, shape (N, 3)."""
+    """Return absolute angles, as in the paper's panels (b), shape (N, 3)."""
     theta, what = joint_positions(rollout)
     assert what == "absolute joint angle"
     return theta
 
 
 def drift(rollout: Rollout) -> float:
-    """Return the most that an angle changes in a turn, the first turn left out."""
+    """Return the largest change of an angle per revolution, without the first one."""
     theta = angles(rollout)
     turns = drawing.TURN * np.arange(1, 5)
     at = [[np.interp(t, rollout.t, theta[:, k]) for k in range(3)] for t in turns]
@@ -57,13 +57,13 @@ def drift(rollout: Rollout) -> float:
 
 
 def joint_distance(rollout: Rollout) -> float:
-    """Return how near joints two and three come to the disk's centre [m]."""
+    """Return the smallest distance of joints two and three to the disk's centre [m]."""
     away = rollout["skeleton"][:, 1:3] - rollout["obstacle.disk"][:, None]
     return float(np.linalg.norm(away, axis=2).min())
 
 
 def link_distance(rollout: Rollout) -> float:
-    """Return how near the links come to the disk's centre [m]."""
+    """Return the smallest distance of the links to the disk's centre [m]."""
     points, center = rollout["skeleton"], rollout["obstacle.disk"][:, None]
     link = np.diff(points, axis=1)
     from_root = center - points[:, :-1]
@@ -78,14 +78,14 @@ def without_the_disk() -> Experiment:
 
 
 def farthest_apart(here: Rollout) -> float:
-    """Return how far (1) takes two starts 1e-9 rad apart [rad]."""
+    """Return the final distance of two runs of (1) that start 1e-9 rad apart [rad]."""
     there = load_experiment(PAPER[2].configuration)
     there.q0[:] = there.robot.integrate(there.q0, np.array([1e-9, 0.0, 0.0]))
     return float(np.abs(angles(there.run()) - angles(here)).max())
 
 
 def log_channels(number: int, run: Rollout) -> dict[str, float]:
-    """Return the numbers that the page may have of a run, in SI units."""
+    """Return the numbers that the page may quote of a run, in SI units."""
     det, late = run["manipulability"], run.t >= 5.0
     found = {
         "largest tracking error from 5 s on": np.abs(run["task.tip.error"][late]).max(),

@@ -1,4 +1,4 @@
-"""`hsp plot`: names, order, one file, the floor and the decay, and what is narrow."""
+"""`hsp plot`: names, order, one file, the floor, the decay, and narrow figures."""
 
 import itertools
 from pathlib import Path

@@ -1,4 +1,4 @@
-"""Rerun draws every kind of shape where it is."""
+"""Rerun draws every type of shape at its pose."""
 
 from dataclasses import dataclass
 from pathlib import Path
@@ -17,24 +17,24 @@ from hsp_control.companions.viewer.robot_drawing import Visual, read_visuals
 
 @dataclass
 class Drawn:
-    """An archetype of Rerun's, as it was made."""
+    """A Rerun archetype with its arguments."""
 
     kind: str
     given: dict[str, Any]
 
 
 class Rerun:
-    """Keeps what is drawn, without Rerun."""
+    """Records drawn objects, without Rerun."""
 
     def __getattr__(self, kind: str) -> Any:
         return lambda **given: Drawn(kind, given)
 
 
 def extent(drawn: Drawn) -> Array:
-    """Return the least and the greatest point of an archetype, (2, 3) [m].
+    """Return the bounding box of an archetype, (2, 3) [m].
 
-    As Rerun's pages have it: a capsule begins at its origin and goes along z, without
-    its ends; all others are about their centres.
+    By Rerun's documentation a capsule's axis begins at its origin along z, without its
+    caps; all others are centred.
     """
     given = drawn.given
     low, high = np.zeros((2, 3))
@@ -67,7 +67,7 @@ BOUNDS = {
     "capsule": ((0.1, 0.8), (0.1, 0.1, 0.5)),
     "ellipsoid": ((0.1, 0.2, 0.3), (0.1, 0.2, 0.3)),
 }
-"""Sizes by kind, and half of what they take along each axis [m]."""
+"""Sizes by type, and half extents along the axes [m]."""
 
 
 @pytest.mark.parametrize("kind", BOUNDS)
@@ -92,7 +92,7 @@ def test_an_obstacle_is_about_its_centre(shape: Any, half: tuple[float, ...]) ->
 
 
 def test_the_normals_of_a_solid_point_outwards() -> None:
-    """Else its inner side is lit."""
+    """Otherwise its inner side is lit."""
     corners = np.array(
         [[1.0, 0, 0], [-1, 0, 0], [0, 1, 0], [0, -1, 0], [0, 0, 1], [0, 0, -1]]
     )

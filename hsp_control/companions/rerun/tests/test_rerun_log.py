@@ -1,4 +1,4 @@
-"""A run in Rerun's file, read back: the same names and numbers as in our view."""
+"""A run in a Rerun file, read back: the same names and numbers as in our view."""
 
 import builtins
 from collections.abc import Mapping
@@ -42,7 +42,7 @@ def log(experiment: hsp.Experiment) -> hsp.Rollout:
 def written(
     log: hsp.Rollout, tmp_path_factory: pytest.TempPathFactory
 ) -> Mapping[str, Any]:
-    """The file's chunks by their paths: those with rows, else those that stay."""
+    """The file's chunks by path: those with rows, otherwise static ones."""
     path = tmp_path_factory.mktemp("rerun") / "run.rrd"
     log_to_rerun(log, path=path)
     chunks = sorted(RrdReader(path).stream(), key=lambda chunk: not chunk.is_static)
@@ -137,7 +137,7 @@ def test_the_command_writes_it(
     assert "a file of Rerun shows one run" in capsys.readouterr().err
 
 
-def test_what_is_missing_is_said(
+def test_missing_parts_are_reported(
     log: hsp.Rollout, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     with pytest.raises(ExportError, match="either a recording or a path"):
@@ -156,7 +156,7 @@ def test_what_is_missing_is_said(
         log_to_rerun(log)
 
 
-def test_every_kind_of_geom_is_drawn_as_what_it_is() -> None:
+def test_every_kind_of_geom_is_drawn() -> None:
     sizes = {
         "sphere": ".1",
         "capsule": ".05 .1",
@@ -184,7 +184,7 @@ def test_every_kind_of_geom_is_drawn_as_what_it_is() -> None:
     ]
 
 
-def test_what_is_turned_is_turned_the_same_way(log: hsp.Rollout) -> None:
+def test_rotations_are_the_same(log: hsp.Rollout) -> None:
     """A link's shape in its joint, and the target of an orientation."""
     robot = hsp.Robot.load("panda")
     sent: dict[str, Any] = {}
@@ -197,7 +197,7 @@ def test_what_is_turned_is_turned_the_same_way(log: hsp.Rollout) -> None:
             sent[path] = columns
 
     class Rerun:
-        """Keeps what it is given."""
+        """Records its arguments."""
 
         class Transform3D(dict[str, Any]):
             @staticmethod

@@ -23,6 +23,6 @@ def test_an_address_has_a_name_a_domain_and_options() -> None:
     ("a?state=/b", r"unknown option 'state'; did you mean 'states'\? \(known"),
     ("a?states=/b&states=/c", r"the option 'states' is given twice"),
 ])  # fmt: skip
-def test_what_is_wrong_is_named(address: str, message: str) -> None:
+def test_errors_are_named(address: str, message: str) -> None:
     with pytest.raises(HardwareError, match=message):
         parse(address, ("states",))

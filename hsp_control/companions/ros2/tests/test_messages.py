@@ -1,4 +1,4 @@
-"""The bytes are ROS 2's, as an independent decoder reads them; names of a node."""
+"""The bytes are ROS 2's, by an independent decoder; names of a node."""
 
 from typing import Any
 
@@ -91,7 +91,7 @@ def test_ends_of_a_topic_see_each_other() -> None:
     )
     del publisher
     assert subscription.matched == 0
-    assert subscription.take() == []  # that one left is no message
+    assert subscription.take() == []  # a departure is no message
 
 
 def test_bytes_that_are_no_message_are_dropped() -> None:
@@ -115,6 +115,6 @@ def test_a_configuration_of_cyclone_that_is_none_is_told(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     monkeypatch.setenv("CYCLONEDDS_URI", "<CycloneDDS><Nonsense/></CycloneDDS>")
-    unused = (DOMAIN + 17) % 233  # a domain is configured once in a process
+    unused = (DOMAIN + 17) % 233  # a domain is configured once per process
     with pytest.raises(HardwareError, match=f"cannot join the DDS domain {unused}: "):
         Node(unused)

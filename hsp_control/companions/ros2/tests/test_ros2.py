@@ -1,4 +1,4 @@
-"""A plain client of DDS in another process drives, watches and is driven.
+"""A plain DDS client in another process commands, observes and is commanded.
 
 The client (`dds_client`) imports Cyclone DDS only. Both sides run in lockstep.
 """
@@ -43,15 +43,15 @@ def test_a_client_drives_the_simulated_robot(
 ) -> None:
     controller, states, address = fresh()
     backwards = ",".join(panda().dof_names[::-1])
-    said = tmp_path / "said.json"
-    with client(said, "drive", DOMAIN, controller, states, COUNT):
+    output = tmp_path / "output.json"
+    with client(output, "drive", DOMAIN, controller, states, COUNT):
         arguments = ["panda_obstacle", f"ros2://{address}&joints={backwards}"]
         arguments += [word for each in SETTINGS for word in ("--set", each)]
         assert ros2_robot.main([*arguments, "--lockstep"]) == 0
     printed = capsys.readouterr().out
     assert f"{states}, {controller}/commands: ready" in printed
     assert "The robot: the loop closed the connection" in printed
-    log = json.loads(said.read_text())
+    log = json.loads(output.read_text())
     twin = simulated_robot(load_experiment("panda_obstacle", *SETTINGS))
     reached = [np.concatenate([*twin.measure(), twin.tau])]
     for _, _, _, _, tau in log:
@@ -70,18 +70,18 @@ def test_a_client_drives_the_simulated_robot(
 
 
 @pytest.mark.process
-def test_the_status_of_a_robot_that_a_fault_stopped_says_so(
+def test_the_status_of_a_robot_after_a_fault_reports_it(
     capsys: pytest.CaptureFixture[str], tmp_path: Path
 ) -> None:
     controller, states, address = fresh()
-    with client(tmp_path / "said.json", "drive", DOMAIN, controller, states, COUNT):
+    with client(tmp_path / "output.json", "drive", DOMAIN, controller, states, COUNT):
         arguments = ["panda_obstacle", f"ros2://{address}", "--set", "live.watchdog=1"]
         assert ros2_robot.main(arguments) == 2
     assert "The robot: the loop closed the connection" not in capsys.readouterr().out
 
 
 class Recording:
-    """Hardware that waits for as long as the robot lives, and remembers."""
+    """Hardware that waits as long as the robot is alive, and records."""
 
     period = PERIOD
 
@@ -112,17 +112,17 @@ def test_the_loop_drives_a_client_that_is_a_robot(tmp_path: Path) -> None:
     joints = [
         f"{n}={q!r}" for n, q in zip(panda().dof_names, start().tolist(), strict=True)
     ]
-    said = tmp_path / "said.json"
-    with client(said, "robot", DOMAIN, controller, states, COUNT, *joints) as robot:
+    output = tmp_path / "output.json"
+    with client(output, "robot", DOMAIN, controller, states, COUNT, *joints) as robot:
         with pytest.warns(RuntimeWarning, match="are ignored: gripper"):
             connected = Ros2Hardware(address, panda(), PERIOD, timeout=LONG)
         hardware = Recording(connected, robot)
         own = {"missing": 200, "prediction_time": 0.003}
-        settings = LiveSettings(age=1e9, contact=1e3, **own)  # it moves as it likes
+        settings = LiveSettings(age=1e9, contact=1e3, **own)  # it moves arbitrarily
         report = run_loop(law(), hardware, settings=settings)  # type: ignore[arg-type]
-    log: list[Any] = json.loads(said.read_text())
+    log: list[Any] = json.loads(output.read_text())
     assert len(log) == COUNT
-    # It had no more states at the end: the loop noticed, and stopped.
+    # At the end there were no more states: the loop detected it and stopped.
     assert report.ended == "fault"
     assert report.reason in {
         "no new state for 201 periods",
@@ -130,9 +130,9 @@ def test_the_loop_drives_a_client_that_is_a_robot(tmp_path: Path) -> None:
     }
     efforts = [tau for _, _, _, tau in log]
     assert efforts == hardware.sent[:COUNT]
-    told = {tuple(q + v) for _, q, v, _ in log}
+    reported = {tuple(q + v) for _, q, v, _ in log}
     heard = [(*m.q.tolist(), *m.v.tolist()) for m in hardware.heard]
-    assert len(set(heard) - told) == 0
+    assert len(set(heard) - reported) == 0
     assert len(set(heard)) > COUNT // 4  # a busy machine loses some
     periods = np.array([m.t for m in hardware.heard]) / PERIOD
     assert np.allclose(periods, periods.round(), atol=1e-9, rtol=0.0)
@@ -144,5 +144,7 @@ def test_mistakes_at_the_command_line_are_one_line(
 ) -> None:
     assert ros2_robot.main(["panda_obstacle", "ros2://eff?domains=1"]) == 2
     (line,) = capsys.readouterr().err.splitlines()
-    told = "hsp: ros2://eff?domains=1: ... 'domains' ... 'domain' ... states, joints"
-    assert re.search(wording(told), line)
+    reported = (
+        "hsp: ros2://eff?domains=1: ... 'domains' ... 'domain' ... states, joints"
+    )
+    assert re.search(wording(reported), line)

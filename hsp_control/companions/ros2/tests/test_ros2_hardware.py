@@ -1,4 +1,4 @@
-"""A robot on topics: joints by name, states by stamp, and everything wrong is named."""
+"""A robot on topics: joints by name, states by stamp, and errors are named."""
 
 import re
 from collections.abc import Iterator
@@ -40,7 +40,7 @@ class Rig:
         self.robot = Broadcaster(states, **message)  # type: ignore[arg-type]
 
     def connected(self) -> Ros2Hardware:
-        """Return the hardware; from then on states come one by one."""
+        """Return the hardware; afterwards states arrive one by one."""
         with self.robot.sending():
             found = Ros2Hardware(self.address, panda(), PERIOD, timeout=LONG)
         while found.read(0.0) is not None:
@@ -71,7 +71,7 @@ def test_joints_are_found_by_name_in_any_order() -> None:
         assert np.array_equal(state, (q, v))
 
 
-def test_a_message_is_what_the_joints_read() -> None:
+def test_a_message_becomes_the_joints_measurement() -> None:
     for robot in (panda(), load("planar3r")):
         rng, joints = np.random.default_rng(1), Joints(robot)
         q, v = robot.random_configuration(rng), rng.standard_normal(robot.nv)
@@ -106,7 +106,7 @@ def test_a_message_has_every_joint_once(names: tuple[str, ...], message: str) ->
 # --- reading and writing -------------------------------------------------------------
 
 
-def test_the_newest_of_many_counts_and_old_ones_do_not(
+def test_the_newest_of_many_is_used_and_old_ones_are_not(
     rig: tuple[Rig, Ros2Hardware],
 ) -> None:
     made, hardware = rig
@@ -135,7 +135,7 @@ def test_efforts_arrive_in_the_order_of_the_controller() -> None:
     assert hardware.read(0.0) is None
 
 
-# --- what is wrong -------------------------------------------------------------------
+# --- errors --------------------------------------------------------------------------
 
 
 def test_a_faulty_message_is_a_reason_to_stop_once(
@@ -190,7 +190,7 @@ def test_two_publishers_of_these_joints_are_a_reason_to_stop(
 
 
 class Faulty:
-    """Hardware in lockstep with a broadcaster, whose states go wrong at the 20th."""
+    """Hardware in lockstep with a broadcaster whose 20th state is wrong."""
 
     period = PERIOD
 
@@ -224,16 +224,16 @@ def test_the_loop_stops_safely(
 ) -> None:
     hardware = Faulty(*rig, **wrong)
     settings = LiveSettings(age=1e9)
-    # No observer: this robot stands whatever it is sent.
+    # No observer: this robot is at rest under any effort.
     plain = CompensatedController(law(), Compensation(momentum_observer=None))
     report = run_loop(plain, hardware, settings=settings)  # type: ignore[arg-type]
     assert report.ended == "fault"
     assert reason.replace("\\", "") in report.reason
     assert not report.silent
-    assert hardware.writes > 150  # the good states that follow serve the safe stop
+    assert hardware.writes > 150  # later valid states are used by the safe stop
 
 
-def test_nobody_listens_any_more(rig: tuple[Rig, Ros2Hardware]) -> None:
+def test_a_topic_without_subscribers(rig: tuple[Rig, Ros2Hardware]) -> None:
     made, hardware = rig
     del made.efforts
     with pytest.raises(HardwareError, match=r"no subscriber of /.*/commands is left"):
@@ -247,7 +247,7 @@ def refused(message: str) -> Iterator[None]:
 
 
 def refuses(address: str, message: str) -> None:
-    """Check why; on a busy computer what it waits for comes late."""
+    """Check the reason; on a busy computer messages are late."""
     for patience in (1.0, 10.0, 60.0):
         with pytest.raises(HardwareError) as caught:
             Ros2Hardware(address, panda(), PERIOD, timeout=patience)
@@ -295,7 +295,7 @@ def test_without_cyclone_the_extra_is_named(monkeypatch: pytest.MonkeyPatch) -> 
 def test_a_state_is_as_old_as_it_waited_longer_than_the_quickest(
     rig: tuple[Rig, Ros2Hardware], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """By its stamp, whatever the robot's clock shows; its number plays no part."""
+    """By its stamp, for any offset of the robot's clock; its number has no effect."""
     _, hardware = rig
     now = [0.0]
     monkeypatch.setattr(ros2_hardware, "monotonic", lambda: now[0])
@@ -312,7 +312,7 @@ def test_a_state_is_as_old_as_it_waited_longer_than_the_quickest(
         found = hardware._measurement(ReceivedMessage(message, sender_of(hardware)))
         assert found is not None
         assert found.t == pytest.approx(begun + sent - last)
-        begun, last = 5.0 + 3.0 * k, sent  # time may begin anew at any state
+        begun, last = 5.0 + 3.0 * k, sent  # time may restart at any state
         hardware._stamps.begin(begun)
         assert found.sequence == k
         ages.append(found.age)
@@ -327,7 +327,7 @@ def sender_of(hardware: Ros2Hardware) -> int:
 
 
 def test_the_first_two_reads_are_a_period_apart(rig: tuple[Rig, Ros2Hardware]) -> None:
-    """Whatever the robot's clock did while the loop prepared between them."""
+    """For any jump of the robot's clock during the preparation in between."""
     made, hardware = rig
     hardware._reads, times = 0, []
     for _ in range(4):

@@ -1,4 +1,4 @@
-"""A simulated robot on topics: lockstep, and what makes it stop."""
+"""A simulated robot on topics: lockstep, and causes of its stop."""
 
 from collections.abc import Callable, Iterator
 from threading import Event, Thread
@@ -24,7 +24,7 @@ PATIENT = LiveSettings(age=1e9, missing=10_000, watchdog=10_000)
 
 
 class Served:
-    """A robot that is served in a thread, in lockstep."""
+    """A robot served in a thread, in lockstep."""
 
     def __init__(self) -> None:
         self.controller, _, self.address = fresh()
@@ -100,7 +100,7 @@ def test_a_wrong_effort_stops_the_robot(
 
 
 class Listened:
-    """Topics without a wire: what is sent, by the clock of the test."""
+    """Topics without a network: sent messages, with the test's clock."""
 
     commands, left = "/commands", False
 
@@ -124,7 +124,8 @@ class Listened:
 def test_stamps_go_on_where_the_process_did_not(
     late: float, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """A few periods are made up for; in many the robot stands, its clock does not."""
+    """A few late periods are caught up; during many the robot rests while time
+    advances."""
     topics, robot = Listened(10, late), watched(PATIENT)
     monkeypatch.setattr(simulated, "monotonic", lambda: topics.now)
     monkeypatch.setattr(simulated, "sleep", topics.sleep)
@@ -136,7 +137,7 @@ def test_stamps_go_on_where_the_process_did_not(
     )
     stamps, times = np.array(topics.sent[:40]).T
     ahead = (stamps - stamps[0]) * 1e-9 - (times - times[0])
-    # At the end it is back in step, whether periods were made up for or left out.
+    # At the end it is in step again, whether periods were caught up or skipped.
     assert abs(ahead[-1]) < 1.5 * PERIOD
     steps = np.diff(stamps) * 1e-9
     assert (steps.max() > 0.1) == (late > 0.1)
@@ -146,7 +147,7 @@ def test_stamps_go_on_where_the_process_did_not(
     ("function", "raised"),
     covering(["efforts", "send"], [OddError, MemoryError, GeneratorExit]),
 )
-def test_whatever_a_topic_raises_stops_the_robot(
+def test_any_exception_of_a_topic_stops_the_robot(
     served: Served,
     function: str,
     raised: type[BaseException],
@@ -165,7 +166,7 @@ def test_whatever_a_topic_raises_stops_the_robot(
     assert served.robot.phase == Phase.HOLDING
 
 
-def test_a_robot_that_nobody_commands_ends_when_it_is_told(served: Served) -> None:
+def test_an_uncommanded_robot_ends_on_request(served: Served) -> None:
     served.stop.set()
     assert served.ended() == ""
     assert served.robot.phase == Phase.WAITING

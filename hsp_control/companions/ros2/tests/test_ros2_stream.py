@@ -1,4 +1,4 @@
-"""Poses of ROS 2 as targets: what of a pose a stream takes, and what it refuses."""
+"""ROS 2 poses as targets: the part of a pose that a stream uses, and refusals."""
 
 import re
 from collections.abc import Callable
@@ -61,7 +61,7 @@ def until(true: Callable[[], Any]) -> None:
     (POSITION, [0.4, 0.1, 0.5]),
     (ORIENTATION, [HALF, HALF, HALF, HALF]),
 ])  # fmt: skip
-def test_a_stream_takes_what_it_needs_of_a_pose(space: Space, value: Any) -> None:
+def test_a_stream_uses_its_part_of_a_pose(space: Space, value: Any) -> None:
     inbox, publisher = opened(space)
     publisher.send(pose())
     until(lambda: inbox.count == 1)
@@ -98,7 +98,7 @@ def test_wrong_poses_are_counted_and_dropped(
     (POSITION, [0.1, 0.2, 0.3]),
     (ORIENTATION, [-1.0, 0.0, 2.0]),
 ])  # fmt: skip
-def test_a_stream_takes_what_it_needs_of_a_twist(space: Space, velocity: Any) -> None:
+def test_a_stream_uses_its_part_of_a_twist(space: Space, velocity: Any) -> None:
     inbox, publisher = opened(space, "&type=twist&tool=hand", TwistStamped)
     twist = Twist(Vector3(0.1, 0.2, 0.3), Vector3(-1.0, 0.0, 2.0))
     named = [("", None), ("world", "world"), *[("hand", "tool")] * space.rotational]

@@ -16,7 +16,7 @@ from hsp_control.control.compensation import CompensatedController
 REST = np.zeros(7)
 
 
-def heard(topic: str) -> Subscription[PoseStamped]:
+def received(topic: str) -> Subscription[PoseStamped]:
     return Node(DOMAIN).subscription(topic, PoseStamped)
 
 
@@ -26,15 +26,15 @@ def test_watchers_hear_state_effort_and_poses() -> None:
     watched = publish(f"ros2:/{prefix}?domain={DOMAIN}&rate=100", command)
     joints = Node(DOMAIN).subscription(states, JointState)
     actual, reference = (
-        heard(f"{prefix}/tip/{what}") for what in ("actual", "reference")
+        received(f"{prefix}/tip/{kind}") for kind in ("actual", "reference")
     )
     q, v = start(), 0.1 * np.ones(7)
     for t in (0.0, 0.004, 0.010):  # the second is too early for 100 Hz
         tau = command.effort(t, q, v, 0.001)
         watched(t)
-    told = joints.take()
-    assert len(told) == len(actual.take()) == 2
-    state = told[-1].message
+    reported = joints.take()
+    assert len(reported) == len(actual.take()) == 2
+    state = reported[-1].message
     assert (state.name, state.position) == (list(panda().dof_names), q.tolist())
     assert (state.velocity, state.effort) == (v.tolist(), tau.tolist())
     pose = reference.take()[-1].message
@@ -53,13 +53,16 @@ def test_a_pose_has_its_orientation_and_a_plane_is_no_pose() -> None:
     plane = FramePosition("panda_link5", Stream(), axes="x", gains=gains, name="plane")
     command = CompensatedController(Controller(panda(), [pose, plane]))
     watched = publish(f"ros2:/{prefix}?domain={DOMAIN}", command)
-    hand, flat = heard(f"{prefix}/whole_hand/actual"), heard(f"{prefix}/plane/actual")
+    hand, flat = (
+        received(f"{prefix}/whole_hand/actual"),
+        received(f"{prefix}/plane/actual"),
+    )
     command.effort(0.0, start(), REST, 0.001)
     watched(0.0)
     found = hand.take()[0].message.pose
     _, actual = command.controller.tasks[0].measure(command.state)
-    told = [*vars(found.position).values(), *vars(found.orientation).values()]
-    assert told == actual.tolist()
+    reported = [*vars(found.position).values(), *vars(found.orientation).values()]
+    assert reported == actual.tolist()
     assert flat.take() == []
 
 

@@ -1,4 +1,4 @@
-"""States are numbered by stamps that jitter, and dated by them."""
+"""States are numbered and dated by stamps with jitter."""
 
 import numpy as np
 import pytest
@@ -13,7 +13,7 @@ BEGIN = 1_700_000_000_000_000_000
 
 @pytest.mark.parametrize("jitter", [0.0, 0.1, 0.24])
 def test_states_are_numbered_by_how_many_were_sent(jitter: float) -> None:
-    """Also where some are lost: the stamps jitter by less than half a period."""
+    """Also with losses: jitter is below half a period."""
     rng = np.random.default_rng(1)
     stamps = Stamps(PERIOD)
     kept = [0, *(1 + np.flatnonzero(rng.uniform(size=400) < 0.7))]
@@ -37,11 +37,11 @@ def test_a_step_is_the_nearest_number_of_periods_and_at_least_one(
     assert stamps.sequence == states
 
 
-def test_what_is_not_later_is_no_state_and_changes_nothing() -> None:
+def test_states_with_old_stamps_are_ignored() -> None:
     stamps = Stamps(PERIOD)
     assert stamps.last is None
     assert stamps.t == 0.0
-    stamps.begin(3.0)  # before the first there is nothing to begin with
+    stamps.begin(3.0)  # before the first state there is no reference
     assert stamps.take(BEGIN)
     assert (stamps.sequence, stamps.t) == (0, 0.0)
     stamps.take(BEGIN + 5 * STEP)
@@ -53,7 +53,7 @@ def test_what_is_not_later_is_no_state_and_changes_nothing() -> None:
 
 
 def test_times_are_those_of_the_stamps_from_the_origin_on() -> None:
-    """Jitter is in them: it is when the state was, not how many there were."""
+    """Times include jitter: they date the state, not its number."""
     stamps = Stamps(PERIOD)
     for offset in (0, 900_000, 2_100_000, 4_000_000):
         stamps.take(BEGIN + offset)

@@ -64,7 +64,7 @@ class Way(NamedTuple):
 
 
 class Run(NamedTuple):
-    """The hand's start, and the motion at each step of the simulation."""
+    """The hand's start, and the motion at every step of the simulation."""
 
     start: pin.SE3
     t: Array
@@ -189,7 +189,7 @@ def _action(pose: pin.SE3) -> Array:
 
 
 def errors(one: Run, goal: Any, lag: float = 0.0) -> tuple[Array, Array]:
-    """Return the errors of position and orientation at each step [m, rad]."""
+    """Return the errors of position and orientation at every step [m, rad]."""
     poses = [goal(t - lag, one.start) for t in one.t]
     position = one.hand - np.array([each.translation for each in poses])
     turned = [
@@ -205,7 +205,7 @@ def rms(values: Array) -> float:
 
 
 def effort_rates(one: Run) -> Array:
-    """Return the rate of the efforts in each step, shape (steps, 7) [N·m/s]."""
+    """Return the rate of the efforts in every step, shape (steps, 7) [N·m/s]."""
     return np.asarray(np.diff(one.effort, axis=0) / STEP)
 
 

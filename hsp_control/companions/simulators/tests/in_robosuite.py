@@ -1,8 +1,8 @@
 """Make an environment for robosuite, and run its tests there: `make sims`.
 
 robosuite 1.5.2 does not work with MuJoCo 4. It requires mink 0.0.5, which requires
-NumPy 1; both are needed by none of its arm controllers. So it is installed without its
-requirements, and those that it imports beside it.
+NumPy 1; no arm controller needs either. So it is installed without its requirements,
+and those that it imports are installed separately.
 
 Run it with the Python of .venv-sims; arguments are pytest's.
 """
@@ -20,7 +20,7 @@ TESTS = ["hypothesis", "pytest>=8", "pytest-timeout"]
 
 
 def pip(*arguments: str) -> None:
-    """Install into this environment; our own constraints have another MuJoCo."""
+    """Install into this environment; our constraints have another MuJoCo."""
     own = {key: value for key, value in os.environ.items() if key != "PIP_CONSTRAINT"}
     command = [sys.executable, "-m", "pip", "install", "--quiet", *arguments]
     subprocess.run(command, check=True, env=own)

@@ -34,7 +34,7 @@ def arm(tmp_path: Path) -> ArmEnv:
 
 
 def pose_of(env: HandTargets) -> pin.SE3:
-    """Return the pose of the site, as MuJoCo has it."""
+    """Return MuJoCo's pose of the site."""
     data = env.unwrapped.data
     mujoco.mj_forward(env.unwrapped.model, data)
     site = data.site("hand")
@@ -45,12 +45,12 @@ def action_of(pose: pin.SE3, finger: float = 0.0) -> Any:
     return np.concatenate([pose.translation, pin.log3(pose.rotation), [finger]])
 
 
-def test_the_engine_does_what_the_law_wants(arm: ArmEnv) -> None:
+def test_the_engine_accelerates_as_the_law_commands(arm: ArmEnv) -> None:
     """With the finger held, MuJoCo's acceleration is that of e'' + Kv e' + Kp e = 0."""
     env = HandTargets(arm, "hand", FREE, absolute=True)
     env.reset(seed=0)
     start = pose_of(env)
-    # So near that the threshold of damping stays below the least singular value.
+    # So near that the damping threshold stays below the smallest singular value.
     turned = start.rotation @ pin.exp3(np.array([0.003, 0.0, 0.006]))
     goal = pin.SE3(turned, start.translation + np.array([0.001, 0.002, -0.001]))
     for _ in range(5):
@@ -59,7 +59,8 @@ def test_the_engine_does_what_the_law_wants(arm: ArmEnv) -> None:
     tau = env.hand.effort(data.time, data.qpos[:7], data.qvel[:7], 0.001)
     assert np.abs(tau).max() < STRONGEST
     wanted = env.hand.compensated.output.acceleration
-    # With the finger where the arm's model has it; the arm's joints alone accelerate.
+    # With the finger at its position in the arm's model; only the arm's joints
+    # accelerate.
     data.ctrl[:7], data.qpos[7], data.qvel[7] = tau, 0.0, 0.0
     mujoco.mj_forward(model, data)
     M = np.zeros((8, 8))
@@ -89,7 +90,7 @@ def test_the_hand_arrives_and_the_finger_obeys(arm: ArmEnv) -> None:
     for _ in range(100):
         _, reward, *_ = env.step(action_of(goal, 0.03))
     reached = pose_of(env)
-    # The finger's weight is not where the model has it: 0.05 kg of 10.5.
+    # The finger's weight is not at its position in the model: 0.05 kg of 10.5.
     assert np.linalg.norm(reached.translation - goal.translation) < 2e-3
     assert np.linalg.norm(pin.log3(goal.rotation.T @ reached.rotation)) < 4e-3
     assert arm.data.qpos[7] == pytest.approx(0.03, abs=5e-3)
@@ -106,12 +107,12 @@ def test_a_loaded_state_begins_a_new_run(arm: ArmEnv) -> None:
     begun = pose_of(env).translation
     env.step(np.zeros(7))
     moved = pose_of(env).translation - begun
-    assert np.linalg.norm(moved) < 1e-4  # it aims at where it is now
+    assert np.linalg.norm(moved) < 1e-4  # its target is the current pose
 
 
-@pytest.mark.filterwarnings("ignore:.*WARN")  # about Pusher itself
+@pytest.mark.filterwarnings("ignore:.*WARN")  # warnings of Pusher itself
 def test_it_is_an_environment_like_others() -> None:
-    """Gymnasium's own check, and seven joints that can give 2 N·m each."""
+    """Gymnasium's checker, and seven joints with 2 N·m each."""
     env = HandTargets(gymnasium.make("Pusher-v5"), "tips_arm", axes="xyz")
     check_env(env, skip_render_check=True)
     env.reset(seed=0)
@@ -123,7 +124,7 @@ def test_it_is_an_environment_like_others() -> None:
     assert data.body("tips_arm").xpos[1] - before[1] > 0.2
 
 
-def test_what_does_not_fit_is_refused(tmp_path: Path, arm: ArmEnv) -> None:
+def test_unsuitable_input_is_refused(tmp_path: Path, arm: ArmEnv) -> None:
     with pytest.raises(
         ControllerError, match=r"CartPoleEnv is none of .* has no model"
     ):
@@ -143,7 +144,7 @@ def test_what_does_not_fit_is_refused(tmp_path: Path, arm: ArmEnv) -> None:
         env.step(np.full(7, np.nan))
 
 
-def test_what_the_page_shows_runs() -> None:
+def test_the_page_s_code_runs() -> None:
     text = (Path(__file__).parents[1] / "page.md").read_text(encoding="utf-8")
     _, snippet = re.findall(r"^```python\n(.*?)^```", text, re.MULTILINE | re.DOTALL)
     space: dict[str, Any] = {}

@@ -1,4 +1,4 @@
-"""A hand whose targets come step by step, without any simulator."""
+"""A hand with one target per step, without a simulator."""
 
 from pathlib import Path
 from typing import Any
@@ -44,7 +44,7 @@ def test_between_jumps_the_error_equation_holds(
 ) -> None:
     hand = HandControl(robot, "panda_tcp", LAW, gains=GAINS, axes=axes)
     q, v = moving(robot)
-    v *= 0.01  # and near: then the threshold is the least, and the law exact
+    v *= 0.01  # and near: then the threshold is smallest, and the law exact
     hand.begin(0.0, q, v)
     goal = hand.pose(q)
     goal.translation = goal.translation + np.array([2e-3, -1e-3, 4e-4])
@@ -82,7 +82,9 @@ def test_axes_that_are_none(robot: hsp.Robot, axes: str) -> None:
         HandControl(robot, "panda_tcp", gains=GAINS, axes=axes)
 
 
-def test_efforts_are_clipped_and_the_observer_knows(robot: hsp.Robot) -> None:
+def test_efforts_are_clipped_and_the_observer_uses_the_clipped_ones(
+    robot: hsp.Robot,
+) -> None:
     observer = {"momentum_observer": {"bandwidth": 50, "cancel": True}}
     settings = {"stream": None, "limits": "none", "compensation": observer}
     hard = hsp.Gains(natural_frequency=150.0)
@@ -104,9 +106,7 @@ def test_efforts_are_clipped_and_the_observer_knows(robot: hsp.Robot) -> None:
     assert np.abs(channels["observer.disturbance"].value).max() < 0.5
 
 
-def test_what_is_wrong_is_named_with_its_place(
-    robot: hsp.Robot, tmp_path: Path
-) -> None:
+def test_errors_are_named_with_their_place(robot: hsp.Robot, tmp_path: Path) -> None:
     file = tmp_path / "hand.yaml"
     file.write_text("limits: none\nnull_space:\n  gian: 3\n", encoding="utf-8")
     with pytest.raises(ConfigError, match=r"hand\.yaml:3: null_space\.gian"):
@@ -149,7 +149,7 @@ SCENE = """
 </worldbody></mujoco>"""
 
 
-def test_the_arm_is_what_carries_the_hand() -> None:
+def test_the_arm_is_the_chain_that_carries_the_hand() -> None:
     model = mujoco.MjModel.from_xml_string(SCENE)
     for frame in ("tip", "hand"):
         arm = arm_of(model, np.zeros(4), frame)

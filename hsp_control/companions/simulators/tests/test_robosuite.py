@@ -31,7 +31,7 @@ ARMS = ["Panda", "Sawyer", "IIWA", "Jaco", "Kinova3", "UR5e", "XArm7"]
 def made(
     robot: str = "Panda", kind: str = "HSP_POSE", frequency: int = 20, **arm: Any
 ) -> Iterator[Any]:
-    """Make Lift with one arm, changed settings of which are given."""
+    """Make Lift with one arm, with the given settings changed."""
     config = robosuite.load_composite_controller_config(robot=robot)
     config["type"] = "HSP"
     config["body_parts"]["right"] |= {"type": kind, **arm}
@@ -80,7 +80,7 @@ def error_of(env: Any, pose: pin.SE3) -> tuple[float, float]:
 
 
 @pytest.mark.parametrize("name", ARMS)
-def test_every_arm_goes_where_it_is_told(name: str) -> None:
+def test_every_arm_reaches_its_goal(name: str) -> None:
     absolute = {"input_type": "absolute", "input_ref_frame": "world"}
     settings = {"stream": {"delay": 0.3}}
     with made(name, hsp=settings, **absolute) as env:
@@ -93,7 +93,8 @@ def test_every_arm_goes_where_it_is_told(name: str) -> None:
 
 
 def test_the_model_is_the_simulation_s() -> None:
-    """Without what it leaves out, MuJoCo's acceleration is the law's: 7 of 9 joints."""
+    """Without the effects that it omits, MuJoCo's acceleration is the law's: 7 of 9
+    joints."""
     with made(hsp=LAW) as env:
         arm, model, data = arm_of(env), env.sim.model._model, env.sim.data._data
         for _ in range(5):
@@ -113,11 +114,11 @@ def test_the_model_is_the_simulation_s() -> None:
 
 
 @pytest.mark.parametrize("frame", ["base", "world"])
-def test_an_action_means_what_it_means_to_osc_pose(frame: str) -> None:
-    """The goals of both are the same; if goals jump, so is the motion, roughly.
+def test_an_action_has_the_meaning_of_osc_pose(frame: str) -> None:
+    """Both have the same goals and, with steps of the goal, similar motions.
 
-    Where the wrist's motors do not reach their limits: OSC_POSE leaves out how rotation
-    and translation are coupled, and so demands less.
+    As long as the wrist's motors are within their limits: OSC_POSE neglects the
+    coupling of rotation and translation, and so demands less.
     """
     actions = np.random.default_rng(0).uniform(-0.5, 0.5, (10, 7))
     actions[:, 3:6] *= 0.1
@@ -147,12 +148,14 @@ def test_an_action_means_what_it_means_to_osc_pose(frame: str) -> None:
     ({"hsp": {"limit": "none"}}, ConfigError, "limit"),
     ({"hsp": "nowhere.yaml"}, ConfigError, "nowhere.yaml"),
 ])  # fmt: skip
-def test_what_it_cannot_do_is_refused(settings: Any, error: Any, message: str) -> None:
+def test_unsupported_settings_are_refused(
+    settings: Any, error: Any, message: str
+) -> None:
     with pytest.raises(error, match=message), made(**settings):
         pass
 
 
-def test_what_the_page_shows_runs() -> None:
+def test_the_page_s_code_runs() -> None:
     page = Path(__file__).parents[1] / "page.md"
     text = page.read_text(encoding="utf-8")
     snippet, _ = re.findall(r"^```python\n(.*?)^```", text, re.MULTILINE | re.DOTALL)

@@ -1,4 +1,4 @@
-"""A scheduler with two workers, which all sweeps share that need none of their own."""
+"""A scheduler with two workers, shared by the sweeps of these tests."""
 
 import os
 import subprocess

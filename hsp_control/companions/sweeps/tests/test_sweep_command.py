@@ -1,4 +1,4 @@
-"""Check the sweep command: its mistakes, its output, and its figures."""
+"""The sweep command: mistakes, output, and figures."""
 
 import sys
 from pathlib import Path
@@ -55,7 +55,7 @@ def test_an_unknown_configuration_or_place_is_refused(
 
 
 @pytest.mark.process
-def test_the_command_tells_and_draws_what_it_found(
+def test_the_command_prints_and_draws_its_findings(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     out = tmp_path / "found.parquet"
@@ -73,10 +73,10 @@ def test_the_command_tells_and_draws_what_it_found(
 
 
 @pytest.mark.process
-def test_reasons_that_differ_in_numbers_alone_are_told_once(
+def test_reasons_that_differ_in_numbers_alone_are_reported_once(
     tmp_path: Path, scheduler: str, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    # Not refused for their rate: the motion decides.
+    # Not refused for their rate: the motion diverges.
     settings = [*QUICK, "simulation.control_period=0.01", "simulation.check_rate=false"]
     options = [word for setting in settings for word in ("--set", setting)]
     over = ["--over", "null_space.gain=10,900,1100,-1,-2.5"]
@@ -92,7 +92,7 @@ def test_reasons_that_differ_in_numbers_alone_are_told_once(
 
 
 @pytest.mark.parametrize("package", ["pyarrow.parquet", "distributed"])
-def test_what_is_not_installed_is_said_first(
+def test_missing_packages_are_reported_first(
     package: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setitem(sys.modules, package, None)
@@ -101,7 +101,7 @@ def test_what_is_not_installed_is_said_first(
         hsp.sweeps.sweep(MOVING, OVER, overrides=QUICK)
 
 
-def test_a_mistake_in_the_file_is_told_with_its_line(
+def test_a_mistake_in_the_file_is_reported_with_its_line(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     file = tmp_path / "mine.yaml"
@@ -113,6 +113,6 @@ def test_a_mistake_in_the_file_is_told_with_its_line(
 
 
 def test_a_stream_from_another_process_cannot_be_swept() -> None:
-    heard = "tasks.tip.trajectory={type: stream, source: 'udp://127.0.0.1:5005'}"
+    received = "tasks.tip.trajectory={type: stream, source: 'udp://127.0.0.1:5005'}"
     with pytest.raises(SweepError, match=r"listens to udp:.*, which only one"):
-        hsp.sweeps.sweep(MOVING, OVER, overrides=[*QUICK, heard])
+        hsp.sweeps.sweep(MOVING, OVER, overrides=[*QUICK, received])

@@ -1,4 +1,4 @@
-"""Check values, designs and sensitivities of sweeps."""
+"""Values, designs and sensitivities of sweeps."""
 
 import json
 import math
@@ -37,7 +37,7 @@ def test_lists_and_ranges_as_they_are_spelled(text: str, levels: tuple) -> None:
     found = parsed(text)
     assert isinstance(found, tuple)
     assert [type(value) for value in found] == [type(value) for value in levels]
-    # To rounding: the ends of a range are exact, what is between need not be.
+    # To rounding: the ends of a range are exact, values in between need not be.
     if isinstance(levels[0], float):
         np.testing.assert_allclose(found, levels, rtol=1e-15)
         assert (found[0], found[-1]) == (levels[0], levels[-1])
@@ -69,7 +69,7 @@ def test_distributions_as_they_are_spelled(text: str, name: str) -> None:
     ("integers:3:1", "no integers from 3 to 1"),
     ("integers:0:1.5", "'1.5' is not an integer"), ("[1, 2", "not a list"),
 ])  # fmt: skip
-def test_what_is_no_range_is_refused(text: str, message: str) -> None:
+def test_invalid_ranges_are_refused(text: str, message: str) -> None:
     with pytest.raises(SweepError, match=message.replace("?", r"\?")):
         parsed(text)
 
@@ -153,7 +153,7 @@ def plan_of(over: dict[str, Any]) -> SweepPlan:
 
 
 def test_rows_are_in_the_order_of_the_plan() -> None:
-    """In whichever order they finish, and also if some are missing."""
+    """In any order of completion, and also if some are missing."""
     files = RowFiles(plan_of({"a": "10:30:3"}), {}, None, fresh=False)
     for k in (2, 0):
         files.add(Row(k, "completed", "", {"e": Measure(0.5 * k, "m", "error")}))
@@ -167,7 +167,7 @@ def test_rows_are_in_the_order_of_the_plan() -> None:
 
 
 def test_a_file_is_in_the_order_of_the_plan(tmp_path: Path) -> None:
-    """The files for other tools have the same bytes, in whichever order runs end."""
+    """The files for other tools have the same bytes, for any order of runs."""
     for name, order in (("one", (0, 1, 2)), ("other", (2, 0, 1))):
         files = RowFiles(plan_of({"a": "10:30:3"}), {}, tmp_path / name, fresh=False)
         for k in order:
@@ -180,7 +180,7 @@ def test_a_file_is_in_the_order_of_the_plan(tmp_path: Path) -> None:
     assert one == other
 
 
-def test_what_was_lost_is_computed_again_and_nothing_else(tmp_path: Path) -> None:
+def test_only_lost_rows_are_computed_again(tmp_path: Path) -> None:
     ended = "completed", "diverged", "refused", "failed"
     plan, folder = plan_of({"a": "10:60:6"}), tmp_path / "a.parquet"
     files = RowFiles(plan, {}, folder, fresh=False)
@@ -199,7 +199,7 @@ def test_what_was_lost_is_computed_again_and_nothing_else(tmp_path: Path) -> Non
 def test_ctrl_c_while_a_file_is_written_leaves_no_part_of_it(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Nor does one that was killed then; its rows are written when it closes."""
+    """Nor does a sweep that was killed then; its rows are written when it closes."""
     folder = tmp_path / "a.parquet"
     folder.mkdir()
     (folder / ".rows-000099.parquet.part").write_bytes(b"PAR1")
@@ -240,7 +240,7 @@ def invented(runs: int = 200) -> Sweep:
         "distance.y.min": bowl**2,
         "effort.max": np.where(kind == "a", 5.0, 1.0) + 0.1 * none,
     }  # fmt: skip
-    columns["tracking.x.rms"][0] = 1e9  # it diverged: it must not count
+    columns["tracking.x.rms"][0] = 1e9  # it diverged: it must be excluded
     metrics = ["tracking.x.rms", "manipulability.min", "distance.y.min", "effort.max"]
     meta = {
         "format": "hsp_control sweep 2",
@@ -275,9 +275,9 @@ def test_sensitivities_are_those_that_were_put_in() -> None:
     assert share[0, 0] > 0.97
     assert share[1, 2] > 0.9  # ... but explains nearly all
     assert share[3, 3] == pytest.approx(0.75, abs=0.05)  # two halves of the ranks
-    assert max(share[2, :3]) < 0.1  # one in twenty is called an influence
+    assert max(share[2, :3]) < 0.1  # one in twenty is reported as an influence
     assert share[2, 3] > 0.2  # within each half, it orders the ranks
-    # Ranks: what the oracle of correlations gives.
+    # Ranks by the oracle of correlations.
     oracle = stats.spearmanr(invented()["bowl"][5:], invented()["distance.y.min"][5:])
     assert bowl[2] == pytest.approx(oracle.statistic, abs=1e-12)
     # Twelve classes of equal size: from the F of an analysis of variance.
@@ -288,8 +288,8 @@ def test_sensitivities_are_those_that_were_put_in() -> None:
 
 
 def test_chance_is_that_of_the_completed_runs() -> None:
-    """One correlation of twenty is beyond, of runs that have nothing to do with each
-    other: 4000 of 30 estimate that share to 0.0035."""
+    """One correlation in twenty of independent runs is beyond the threshold: 4000
+    samples of 30 runs estimate that fraction to 0.0035."""
     half = invented(60)
     half["status"][:30] = "diverged"
     noise = sweeps.sensitivity(half).noise
@@ -302,7 +302,7 @@ def test_chance_is_that_of_the_completed_runs() -> None:
 
 
 def test_a_configuration_is_that_of_the_run_wherever_its_row_is() -> None:
-    """Rows of a sweep that is not complete begin with another run."""
+    """Rows of an incomplete sweep begin with another run."""
     whole = invented(20)
     part = Sweep({name: each[7:] for name, each in whole.columns.items()}, whole.meta)
     for run in (7, 12):
@@ -312,7 +312,7 @@ def test_a_configuration_is_that_of_the_run_wherever_its_row_is() -> None:
         part.configuration(3)
 
 
-def test_what_cannot_be_told_is_not_told() -> None:
+def test_undecidable_influences_are_not_reported() -> None:
     with pytest.raises(SweepError, match="5 runs were completed"):
         sweeps.sensitivity(invented(10))
     with pytest.raises(SweepError, match=r"did you mean 'effort.max'\?"):
@@ -376,7 +376,7 @@ def test_two_or_three_values_give_a_figure_too(runs: int) -> None:
     points, line = first.lines
     assert len(points.get_xdata()) == len(line.get_xdata()) == runs
     assert np.all(np.diff(line.get_ydata()) > 0.0)
-    # Of so few nothing is reported as an influence, nor as none.
+    # With so few runs neither an influence nor its absence is reported.
     assert not any(each.get_title(loc="left") for each in figure.axes)
     with pytest.raises(SweepError, match=f"{runs} runs were completed"):
         sweeps.sensitivity(Sweep(few, whole.meta))

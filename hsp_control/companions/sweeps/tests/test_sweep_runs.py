@@ -1,4 +1,4 @@
-"""Check that sweeps give the same bits however computed, lost or done twice."""
+"""Sweeps give the same bits in any order, and after lost or repeated runs."""
 
 import json
 import os
@@ -35,7 +35,7 @@ RUNS = 8
 
 
 def same(one: Sweep, other: Sweep) -> None:
-    """Assert that two sweeps have the same bits, but for how long runs took."""
+    """Assert that two sweeps have the same bits, except for the runs' durations."""
     assert list(one.columns) == list(other.columns)
     assert one.meta == other.meta
     for name, column in one.columns.items():
@@ -63,13 +63,13 @@ def whole(scheduler: str) -> Sweep:
     return hsp.sweeps.sweep(MOVING, GAINS, overrides=SLOWER, scheduler=scheduler)
 
 
-# --- what is in it -------------------------------------------------------------------
+# --- contents ------------------------------------------------------------------------
 
 
 @pytest.mark.process
 @pytest.mark.slow
 @pytest.mark.smoke
-def test_a_row_is_what_a_single_run_gives(swept: Sweep) -> None:
+def test_a_row_equals_a_single_run(swept: Sweep) -> None:
     row = 7
     keys = {name: swept[name][row] for name in swept.parameters}
     settings = [f"{key}={float(value)!r}" for key, value in keys.items()]
@@ -150,7 +150,7 @@ def test_neither_workers_nor_a_cluster_change_a_bit(
     same(hsp.sweeps.sweep(MOVING, OVER, overrides=QUICK, scheduler=scheduler), swept)
     with Client(scheduler, set_as_default=False) as client:
         same(hsp.sweeps.sweep(MOVING, OVER, overrides=QUICK, scheduler=client), swept)
-        assert client.status == "running"  # whose it is closes it
+        assert client.status == "running"  # its owner closes it
 
 
 def sweep_command(out: Path) -> list[str]:
@@ -169,7 +169,7 @@ raise SystemExit(main())
 
 
 def started(out: Path, rows: int) -> "subprocess.Popen[bytes]":
-    """Start a sweep and return when it has written some rows, and some are left."""
+    """Start a sweep and return when it has written some, but not all rows."""
     process = subprocess.Popen(
         sweep_command(out), stdout=subprocess.PIPE, stderr=subprocess.PIPE
     )
@@ -186,7 +186,7 @@ def until(condition: Callable[[], bool], patience: float = 120.0) -> None:
 
 
 def finish(out: Path, kept: Sweep, whole: Sweep, scheduler: str) -> None:
-    """The same command computes what is left, and only that."""
+    """The same command computes only the missing runs."""
     assert 2 <= len(kept) < RUNS
     assert not kept.complete
     ended = hsp.sweeps.sweep(
@@ -209,11 +209,11 @@ def test_a_killed_sweep_goes_on_where_it_was(
     assert len(workers) >= 2  # the nanny and its worker
     process.kill()
     process.communicate()
-    # They do not outlive it, though one was in the middle of a run.
+    # They do not outlive it, though one was busy with a run.
     _, alive = psutil.wait_procs(workers, timeout=100)
     assert not alive
     kept = Sweep.load(out)
-    (out / ".rows-000099.parquet.part").write_bytes(b"PAR1")  # killed while it wrote
+    (out / ".rows-000099.parquet.part").write_bytes(b"PAR1")  # killed while writing
     finish(out, kept, whole, scheduler)
 
 
@@ -229,7 +229,7 @@ def test_ctrl_c_keeps_the_rows_and_the_same_command_ends_it(
     assert process.returncode == 130, errors.decode()
     assert b"stopped by the user" in errors
     assert b"Traceback" not in errors
-    assert len(list(out.iterdir())) == 1  # few files replace the many
+    assert len(list(out.iterdir())) == 1  # few files replace many
     finish(out, Sweep.load(out), whole, scheduler)
 
 
@@ -264,10 +264,10 @@ def test_a_dead_scheduler_keeps_the_rows_and_the_same_command_ends_it(
 
 
 def running(word: str, parent: psutil.Process) -> list[psutil.Process]:
-    """Return the children that were called with a word; not those that have ended."""
+    """Return the running child processes with a word in their command."""
     found = []
     for child in parent.children():
-        with suppress(psutil.NoSuchProcess):  # also nobody has read how it ended
+        with suppress(psutil.NoSuchProcess):  # zombies are excluded
             if word in " ".join(child.cmdline()):
                 found.append(child)
     return found
@@ -280,7 +280,7 @@ def test_a_killed_worker_is_replaced(after: tuple[int, int], whole: Sweep) -> No
     killed: list[int] = []
 
     def kill(done: int, total: int, failures: int) -> None:
-        """After the first rows, the process that computes."""
+        """Kill the worker after the first rows."""
         if done in after:
             (nanny,) = running("--nworkers", psutil.Process())
             each = running("spawn_main", nanny)
@@ -332,7 +332,7 @@ def test_a_run_that_kills_three_workers_is_a_row_and_tried_again_another_time(
     assert found["status"].tolist() == 3 * ["completed"]
 
 
-# --- what travels --------------------------------------------------------------------
+# --- transfer to workers -------------------------------------------------------------
 
 SCRIPT = """
 import hsp_control as hsp
@@ -359,16 +359,16 @@ def test_a_script_needs_no_guard_and_its_types_travel(tmp_path: Path) -> None:
     script = tmp_path / "mine.py"
     script.write_text(SCRIPT.format(configuration=MOVING, more=QUICK))
     (tmp_path / "beside.py").write_text("TWICE = 2.0\n")
-    told = subprocess.run(
+    reported = subprocess.run(
         [sys.executable, str(script)], capture_output=True, text=True, check=False
     )
-    assert told.stdout == "['completed', 'completed'] ['', '']\n", told.stderr
+    assert reported.stdout == "['completed', 'completed'] ['', '']\n", reported.stderr
 
 
 @pytest.mark.process
 @pytest.mark.slow
 def test_files_travel_where_no_worker_has_them(tmp_path: Path, scheduler: str) -> None:
-    """Those of the configuration are in a folder that is gone when runs begin."""
+    """The configuration's files are in a folder that is removed before the runs."""
     folder = tmp_path / "mine"
     folder.mkdir()
     urdf = hsp.Robot.load("planar3r").source.urdf.read_text()
@@ -425,12 +425,12 @@ def test_a_computer_that_is_not_fit_ends_the_sweep() -> None:
         computed(unfit, 0, (), None)
 
 
-# --- what ends no sweep --------------------------------------------------------------
+# --- faults that end no sweep --------------------------------------------------------
 
 
 @pytest.mark.process
 @pytest.mark.slow
-def test_a_run_that_takes_too_long_is_a_row_and_tried_again_another_time(
+def test_a_run_with_a_timeout_is_a_row_and_tried_again_later(
     tmp_path: Path, scheduler: str
 ) -> None:
     endless = [  # a quarter of an hour
@@ -460,15 +460,15 @@ def test_a_time_limit_is_positive(limit: float) -> None:
         hsp.sweeps.sweep(MOVING, {"null_space.gain": [1, 2]}, time_limit=limit)
 
 
-def test_a_row_that_has_arrived_stays_whatever_becomes_of_its_worker() -> None:
-    """Which the next run may kill before anybody looks at the future."""
+def test_a_received_row_is_kept_after_its_worker_dies() -> None:
+    """The next run may kill its worker before the result is read."""
     row = Row(2, "completed", "")
     assert sweep_runs._row(SimpleNamespace(status="cancelled"), row) is row
     with pytest.raises(SweepError, match="the scheduler does not answer"):
         sweep_runs._row(SimpleNamespace(status="cancelled"), None)
 
 
-def test_what_is_no_exception_is_a_row() -> None:
+def test_a_base_exception_is_a_row() -> None:
     for error in (GeneratorExit("x"), SystemExit(3)):
 
         def fail(_: object, error: BaseException = error) -> None:
@@ -503,7 +503,7 @@ def test_a_scheduler_that_does_not_answer_is_an_error(
         )
 
 
-# --- files of others -----------------------------------------------------------------
+# --- untrusted files -----------------------------------------------------------------
 
 
 @pytest.mark.process
@@ -584,7 +584,7 @@ def test_another_program_s_parquet_is_refused(tmp_path: Path) -> None:
         Sweep.load(tmp_path / "b.parquet")
 
 
-def test_a_bad_key_is_found_before_any_worker_is_asked() -> None:
+def test_a_bad_key_is_found_before_any_worker_starts() -> None:
     with pytest.raises(ConfigError, match=r"null_space.gian"):
         hsp.sweeps.sweep(MOVING, {"null_space.gian": [1]})
     with pytest.raises(HspControlError, match="'x': needs the form key=value"):
@@ -593,7 +593,7 @@ def test_a_bad_key_is_found_before_any_worker_is_asked() -> None:
 
 @pytest.mark.process
 @pytest.mark.slow
-def test_whatever_raises_in_the_parent_leaves_the_folder_free(
+def test_any_exception_in_the_parent_leaves_the_folder_free(
     tmp_path: Path, scheduler: str
 ) -> None:
     out = tmp_path / "x.parquet"
@@ -610,7 +610,7 @@ def test_whatever_raises_in_the_parent_leaves_the_folder_free(
 
 
 @pytest.mark.parametrize("kind", ["fifo", "device"])
-def test_what_never_ends_is_no_table(kind: str, tmp_path: Path) -> None:
+def test_endless_input_is_no_table(kind: str, tmp_path: Path) -> None:
     path = tmp_path / "a.parquet"
     if kind == "fifo":
         os.mkfifo(path)

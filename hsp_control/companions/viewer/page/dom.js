@@ -28,7 +28,7 @@ function onPress(button, act) {
   return button;
 }
 
-// Call `actionOf` for each key, outside of fields and without ctrl: it returns what to do, or
+// Call `actionOf` for each key, outside of fields and without ctrl: it returns an action, or
 // nothing. The browser then does no more with that key.
 function onKey(actionOf) {
   on(window, "keydown", (event) => {

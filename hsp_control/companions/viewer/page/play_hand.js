@@ -152,7 +152,7 @@ class PlayKeys {
 
   constructor(play) {
     this.play = play;
-    this.moving = new Map();  // keys that are down -> what they move
+    this.moving = new Map();  // pressed keys -> their motion
     onKey((event) => this.actionOf(event));
     on(window, "keyup", ({key}) => this.up(key));
     whenAway(() => this.releaseAll());

@@ -63,9 +63,8 @@ class PlayBar {
   }
 }
 
-// The dead-man's key of a live loop: the robot moves only while somebody holds the space bar, or
-// this button. The page repeats a message while it is held; the loop stops the robot when none
-// arrives.
+// The dead-man's key of a live loop: the robot moves only while the space bar, or this button, is
+// held. The page repeats a message while it is held; the loop stops the robot when none arrives.
 class PlayHold {
   constructor(play) {
     Object.assign(this, {play, held: false, button: part(".play-bar .hold")});

@@ -167,8 +167,8 @@ async function inflated(bytes) {
   return new Uint8Array(await new Response(stream).arrayBuffer());
 }
 
-// Whoever listens at this address may be another program, even another user's. The key is not
-// sent to find out: only a server that has it can answer the question.
+// Another program, even another user's, may listen at this address. The key is not sent to it: only
+// a server that has the key can answer the question.
 async function lookForNext() {
   const own = await answersRightly().catch(() => null);
   if (own) return location.reload();

@@ -18,5 +18,5 @@ def arm() -> Robot:
 
 @pytest.fixture
 def recorder() -> Recorder:
-    """Take what a view would send to its page."""
+    """Receive the messages of a view to its page."""
     return Recorder()

@@ -1,4 +1,4 @@
-"""Bands on the time line: from the log's columns, and in whatever shows the run."""
+"""Bands on the time line: from the log's columns, and in every view of the run."""
 
 import numpy as np
 import pytest
@@ -59,26 +59,26 @@ def test_bands_are_the_logs_columns(obstacle: tuple[Experiment, Rollout]) -> Non
         "inside an influence zone": [pytest.approx((run.t[30], run.t[40]))],
         "collision": [pytest.approx((run.t[35], run.t[38]))],
     }
-    told = [band.caption for band in bands_of(run, experiment.controller)]
-    assert "collision, up to 4.2 cm deep" in told
+    reported = [band.caption for band in bands_of(run, experiment.controller)]
+    assert "collision, up to 4.2 cm deep" in reported
     without = "null_space.fields.0.weight=0", *FAST
     weightless = load_experiment("panda_obstacle", *without).controller
     bands = [band.name for band in bands_of(run, weightless)]
-    assert bands == ["limit active", "collision"]  # nothing reacts there
+    assert bands == ["limit active", "collision"]  # no reaction there
     excess = np.zeros((n, 7))
     excess[42:46, 3] = 1e-3
     beyond = altered(run, status=np.zeros(n), position_excess=excess)
     assert {band.name: band.spans for band in bands_of(beyond, None)} == {
         "beyond a limit": [pytest.approx((run.t[42], run.t[46]))]
     }
-    # Without the controller nobody knows where a zone begins.
+    # Without the controller the start of a zone is unknown.
     assert [band.name for band in bands_of(run, None)] == ["limit active"]
 
 
-def test_a_target_out_of_reach_is_told_with_its_distance(
+def test_a_target_out_of_reach_is_reported_with_its_distance(
     obstacle: tuple[Experiment, Rollout],
 ) -> None:
-    """Once it has rested for 0.3 s; before, it is far away."""
+    """After 0.3 s at rest; before, it is far away."""
     _, run = obstacle
     error, n = np.zeros_like(run["task.hand.error"]), len(run)
     error[:, 0] = 0.31

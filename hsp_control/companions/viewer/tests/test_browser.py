@@ -1,4 +1,4 @@
-"""In a real browser: what the live view and an exported page draw, and how they act.
+"""The live view and an exported page in a real browser: drawing and interaction.
 
 Chromium without a window. Where there is none these tests are skipped, but not in CI.
 """
@@ -55,7 +55,7 @@ def planar_page(planar: Rollout, tmp_path_factory: pytest.TempPathFactory) -> Pa
 
 
 class Watched:
-    """A page, and all that went wrong on it."""
+    """A page, and its errors."""
 
     def __init__(
         self, browser: Any, address: str, size: tuple[int, int], *, lightly: bool
@@ -76,13 +76,13 @@ class Watched:
         browsers.until(self.page, expression)
 
     def picture(self, selector: str = "#meshcat-pane") -> np.ndarray:
-        """The present picture of an element, shape (height, width, 3)."""
+        """The current picture of an element, shape (height, width, 3)."""
         self.page.evaluate(SETTLE)
         data = self.page.locator(selector).screenshot()
         return np.asarray(Image.open(io.BytesIO(data)).convert("RGB")).astype(int)
 
     def matrix(self, path: str) -> np.ndarray:
-        """Where a node of the scene is in Pinocchio's world."""
+        """Pose of a scene's node in Pinocchio's world."""
         elements = self.page.evaluate(
             """(path) => {
               const root = node("").matrixWorld.clone().invert();
@@ -131,7 +131,7 @@ def seek(watched: Watched, moment: float) -> None:
 
 
 def cursors(watched: Watched) -> list[float]:
-    """Where the cursors stand in the plots, from the left of their curves."""
+    """Positions of the cursors in the plots, from the left of their curves."""
     return watched.page.evaluate(
         """() => [...document.querySelectorAll("#side .cursor")].map((cursor) =>
           new DOMMatrix(getComputedStyle(cursor).transform).e)"""
@@ -235,7 +235,7 @@ def test_views_by_key_button_and_configuration(
     }"""
 
     def looked(name: str) -> tuple[np.ndarray, np.ndarray]:
-        """The direction to the camera, of length 1, and the point that it looks at."""
+        """The unit direction to the camera, and the point that it looks at."""
         browser.evaluate("viewer.render()")
         found, eye, target = browser.evaluate(seen)
         assert found == name
@@ -294,7 +294,7 @@ def test_timeline_plots_and_robot_move_together(
     numbers = [float(text.replace("−", "-")) for text in shown]
     np.testing.assert_allclose(numbers, angles, atol=0.02)
 
-    # A click in a plot goes there; the cursor can be taken, and follows.
+    # A click in a plot seeks there; the cursor can be dragged.
     box = page.locator("#side .u-over").nth(1).bounding_box()
     page.mouse.click(box["x"] + 0.25 * width, box["y"] + 40)
     assert page.evaluate("player.time") == pytest.approx(1.0, abs=0.02)
@@ -306,7 +306,7 @@ def test_timeline_plots_and_robot_move_together(
     page.mouse.move(box["x"] + 1, box["y"] + 40)
     assert page.evaluate("player.time") == released
 
-    # Playing moves all of it.
+    # Playing moves all cursors.
     page.keyboard.press("Space")
     watched.until("player.time > 2.2")
     page.keyboard.press("Space")
@@ -321,7 +321,7 @@ def test_timeline_plots_and_robot_move_together(
 def test_a_page_has_its_bands_and_presents(
     planar: Rollout, tmp_path: Path, watch: Callable[..., Watched]
 ) -> None:
-    """On a dark background, on which nothing of it stays light."""
+    """On a dark background, without light remains."""
     damped = np.where((planar.t > 1.0) & (planar.t < 2.0), 1.0, 0.0)
     bounded = Rollout({**planar.columns, "damped": damped}, planar.meta)
     page_file = export_html(bounded, tmp_path / "dark.html", background="#14202B")
@@ -353,7 +353,7 @@ def row(watched: Watched, name: str) -> Any:
 
 
 def states(watched: Watched) -> dict[str, bool]:
-    """Which rows of the legend are switched on."""
+    """The active rows of the legend."""
     return watched.page.evaluate(
         """() => {
           const all = document.querySelectorAll("#layers button");
@@ -365,7 +365,7 @@ def states(watched: Watched) -> dict[str, bool]:
 
 
 def orange(watched: Watched) -> int:
-    """How many pixels have the colour of obstacles."""
+    """Number of pixels in the colour of obstacles."""
     image = watched.picture()
     red, green, blue = np.moveaxis(image, 2, 0)
     return int(((red > 190) & (green < 150) & (green > 70) & (blue < 90)).sum())
@@ -373,7 +373,7 @@ def orange(watched: Watched) -> int:
 
 @pytest.mark.slow
 @pytest.mark.browser
-def test_a_row_of_the_legend_switches_what_it_names(
+def test_a_row_of_the_legend_switches_its_objects(
     planar_page: Path, watch: Callable[..., Watched]
 ) -> None:
     watched = exported(watch, planar_page, at="#t=1")
@@ -397,7 +397,7 @@ def test_a_row_of_the_legend_switches_what_it_names(
     row(watched, "obstacle disk").click()
     assert not states(watched)["obstacle disk"]
     assert orange(watched) < 0.1 * before
-    # The keyboard returns to the player after a click, and stays with a focused row.
+    # Keys reach the player again after a click, and stay with a focused row.
     page.keyboard.press("Space")
     assert page.evaluate("player.playing")
     page.keyboard.press("Space")
@@ -422,7 +422,7 @@ def test_a_row_of_the_legend_switches_what_it_names(
 def test_the_live_view_has_the_run_s_plots(
     planar: Rollout, watch: Callable[..., Watched]
 ) -> None:
-    """While it is computed and after; they keep what the user has made of them."""
+    """During a run and after it; they keep the user's settings."""
     experiment = load_experiment(PLANAR, "simulation.duration=2")
     partial: list[Any] = []
 
@@ -439,14 +439,14 @@ def test_the_live_view_has_the_run_s_plots(
         live = LiveView(viewer, experiment)
         assert not page.locator("#side").is_visible()  # there is no run yet
         log = experiment.run(on_row=on_row)
-        assert partial == [2]  # the axis is that of the whole run
+        assert partial == [2]  # the axis spans the whole run
         live.finish(log)
         assert viewer.wait_for_browser(200.0)
         assert page.locator("#side .plot").count() == 7
         alone = page.locator("#side .plot button").first.get_attribute("aria-pressed")
         assert alone == "true"
 
-        # One command for each picture of the plots: the newest replaces the last.
+        # One command per frame of the plots: the newest replaces the previous one.
         kept = [
             name for path, name, _ in viewer.transport.scene.items() if path == PLOTS
         ]
@@ -466,7 +466,7 @@ def test_the_live_view_has_the_run_s_plots(
         assert page.locator("#side").is_visible()
         local = ("http://127.0.0.1", "ws://127.0.0.1", "data:")
         assert all(request.startswith(local) for request in watched.requests)
-        page.close()  # one that outlives its server asks for it, which is an error
+        page.close()  # a page that outlives its server would log a request as an error
 
 
 # -- films ----------------------------------------------------------------------------
@@ -512,15 +512,15 @@ def test_films_from_the_command_line(
     assert [line.partition(": ")[2] for line in capsys.readouterr().out.split("\n")][
         :-1
     ] == [str(film) for film in films]
-    told = subprocess.run(
+    reported = subprocess.run(
         [find_ffmpeg(), "-hide_banner", "-i", str(films[0]), "-f", "null", "-"],
         capture_output=True,
         text=True,
         check=True,
     ).stderr
-    assert "Video: h264" in told
-    assert "302x200" in told  # H.264 has even sizes only
-    assert "Duration: 00:00:01.25" in told
+    assert "Video: h264" in reported
+    assert "302x200" in reported  # H.264 requires even sizes
+    assert "Duration: 00:00:01.25" in reported
     with Image.open(films[1]) as film:
         assert (film.format, film.size) == ("WEBP", (301, 200))
         assert film.n_frames == 5

@@ -1,4 +1,4 @@
-"""Arrows of contact forces: where, along what, how long, how thick."""
+"""Arrows of contact forces: origin, direction, length, thickness."""
 
 import numpy as np
 import pytest
@@ -23,12 +23,12 @@ HELD = {
     "left": np.array([*PLACES["left"][:2], PLACES["left"][1], PLACES["left"][3]]),
     "right": np.array([PLACES["right"][1], *PLACES["right"][1:]]),
 }
-"""Where the place of a contact is unknown, it stays where it was, or will be."""
+"""An unknown position of a contact is the previous or the next one."""
 
 
 @pytest.fixture(scope="module")
 def drawn() -> tuple[float, Clip]:
-    """Return the size of what is seen [m], and what is drawn."""
+    """Return the size of the scene [m], and the drawn objects."""
     robot = Robot.load("panda")
     columns = {
         "t": TIMES,
@@ -47,7 +47,7 @@ WEIGHT = 9.81 * sum(inertia.mass for inertia in Robot.load("panda").model.inerti
 
 
 def vector(clip: Clip, path: str, t: float) -> Array:
-    """Return the arrow from its beginning to its tip, shape (3,) [m]."""
+    """Return the arrow's vector from its origin to its tip, shape (3,) [m]."""
     length = clip.value(path, "scale", t)[2]
     return np.asarray(clip.pose(path, t)[:3, 2] * length)
 
@@ -62,7 +62,7 @@ def test_they_begin_at_their_contacts(name: str, drawn: tuple[float, Clip]) -> N
 
 @pytest.mark.parametrize("name", FORCES)
 def test_they_are_the_forces(name: str, drawn: tuple[float, Clip]) -> None:
-    """One of the robot's weight is half as long as the robot."""
+    """An arrow of the robot's weight is half as long as the robot."""
     size, clip = drawn
     path, whole = f"/contacts/{name}/force", 0.5 * size / WEIGHT
     for t, force in zip(TIMES, FORCES[name], strict=True):
@@ -71,7 +71,7 @@ def test_they_are_the_forces(name: str, drawn: tuple[float, Clip]) -> None:
 
 @pytest.mark.parametrize("name", FORCES)
 def test_short_ones_are_thinner(name: str, drawn: tuple[float, Clip]) -> None:
-    """Those longer than 12 radii have their whole width, and none is wider."""
+    """Arrows longer than 12 radii have their full width; none is wider."""
     size, clip = drawn
     path = f"/contacts/{name}/force"
     for t in TIMES:

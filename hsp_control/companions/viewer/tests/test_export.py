@@ -1,4 +1,4 @@
-"""An exported page holds what the log has, within its bounds, in few bytes."""
+"""An exported page contains the log within tolerances, in few bytes."""
 
 import base64
 import gzip
@@ -78,7 +78,7 @@ def panda() -> Rollout:
 
 
 def unpacked(entry: dict[str, Any]) -> np.ndarray:
-    """The other half of packing.py, as unpack.js has it."""
+    """The inverse of packing.py, as in unpack.js."""
     data = entry["bytes"]
     data = np.frombuffer(getattr(data, "data", data), np.uint8)
     rows, columns, width = entry["rows"], entry["columns"], entry["width"]
@@ -251,7 +251,7 @@ def test_a_mesh_that_cannot_be_read_is_named(monkeypatch: pytest.MonkeyPatch) ->
 
 
 def content_of(page: Path) -> dict[str, Any]:
-    """The content of a page, with its arrays in their places."""
+    """The content of a page, with its arrays inserted."""
     text = page.read_text(encoding="utf-8")
     block = re.search(r'id="content">([^<]*)<', text)
     assert block is not None
@@ -308,7 +308,7 @@ def test_every_joint_is_where_the_log_has_it(panda: Rollout, tmp_path: Path) -> 
 
 
 def rows_at(times: np.ndarray, values: np.ndarray, t: np.ndarray) -> Any:
-    """The rows of a track at the times of a log; one that stays has one row."""
+    """The rows of a track at the times of a log; a constant one has one row."""
     rows = np.abs(times[:, None] - t).argmin(axis=0)
     assert len(times) == 1 or np.abs(times[rows] - t).max() <= 1e-6
     return values[rows]
@@ -413,7 +413,7 @@ def test_the_plots_are_the_logs(panda: Rollout) -> None:
     assert points < 0.3 * 2 * len(panda) * 21
 
 
-def test_where_the_law_is_bounded_the_plots_say_so(planar: Rollout) -> None:
+def test_where_the_law_is_bounded_the_plots_are_marked(planar: Rollout) -> None:
     damped = np.zeros(len(planar))
     damped[[10, 11, 12, 50]] = 1.0
     damped[-3:] = 1.0
@@ -425,7 +425,7 @@ def test_where_the_law_is_bounded_the_plots_say_so(planar: Rollout) -> None:
 
 
 @pytest.mark.parametrize("values", [[np.nan] * 4, [0.0] * 4, [1.0, np.inf, 0.5, -1.0]])
-def test_what_cannot_be_drawn_does_not_break_the_page(
+def test_undrawable_parts_do_not_break_the_page(
     values: list[float], planar: Rollout
 ) -> None:
     columns = {name: column[:4].copy() for name, column in planar.columns.items()}
@@ -442,7 +442,7 @@ def test_what_cannot_be_drawn_does_not_break_the_page(
     assert all(np.isfinite(unpacked(entry)).all() for entry in table.entries)
 
 
-def test_what_cannot_be_exported_is_said(
+def test_unexportable_logs_are_reported(
     planar: Rollout, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     robot = {k: v for k, v in planar.meta["robot"].items() if k != "record"}
@@ -461,7 +461,7 @@ def test_what_cannot_be_exported_is_said(
         write_page(Path(), "")
 
 
-def test_a_command_without_a_file_says_what_it_wants(
+def test_a_command_without_a_file_names_the_missing_argument(
     planar: Rollout, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     assert main(["export", str(planar.save(tmp_path / "run.npz"))]) == 2

@@ -1,4 +1,4 @@
-"""In a real browser: the plots of an exported page, and its switch between two runs."""
+"""The plots of an exported page and its switch between runs, in a real browser."""
 
 from collections.abc import Iterator
 from pathlib import Path
@@ -19,7 +19,7 @@ JOINTS = 3  # the place of the plot of joint positions
 
 @pytest.fixture(scope="module")
 def page_file(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A page of two runs of 4 s, with efforts that are held."""
+    """A page of two runs of 4 s, with held efforts."""
     runs = []
     for name, weight in (("with", 1.0), ("without", 0.0)):
         experiment = load_experiment(
@@ -54,7 +54,7 @@ def page(opened: tuple[Any, list[str]]) -> Iterator[Any]:
 
 
 def place(page: Any, plot: int, moment: float) -> tuple[float, float]:
-    """Where a time is on the screen, in a plot that shows the whole run."""
+    """The screen position of a time, in a plot of the whole run."""
     over = page.locator("#side .u-over").nth(plot)
     over.scroll_into_view_if_needed()
     box = over.bounding_box()
@@ -70,7 +70,7 @@ def drag(page: Any, plot: int, start: float, end: float) -> None:
 
 
 def span(page: Any, plot: int) -> list[float]:
-    """The first and the last time that a plot shows."""
+    """The first and the last time in a plot."""
     scale = "(k) => uPlot.sync('run').plots[k].scales.x"
     shown = page.evaluate(scale, plot)
     return [round(shown[end], 2) for end in ("min", "max")]
@@ -133,7 +133,7 @@ def test_a_finger_taps_a_time_and_leaves_no_pointer(
 def test_all_plots_zoom_together_and_back(page: Any) -> None:
     first = span(page, 0)
     drag(page, JOINTS, 2.0, 3.0)
-    assert page.evaluate("player.time") == 1  # a span is no click
+    assert page.evaluate("player.time") == 1  # a drag is no click
     assert zoom_label(page) == "2.00 – 3.00 s"
     assert span(page, 0) == span(page, JOINTS)
     assert span(page, 0) == pytest.approx([2.0, 3.0], abs=0.02)
@@ -179,7 +179,7 @@ def test_a_plot_is_used_with_the_keyboard(page: Any) -> None:
     assert page.evaluate("player.speed") == speed
     page.keyboard.press("Shift+ArrowRight")
     assert page.evaluate("player.time") == 2
-    assert zoom_label(page) == "1.50 – 2.50 s"  # the cursor stays in sight
+    assert zoom_label(page) == "1.50 – 2.50 s"  # the cursor stays in view
     assert picture.get_attribute("aria-valuenow") == "2"
     assert "t = 2.00 s: " in picture.get_attribute("aria-valuetext")
     page.keyboard.press("-")
@@ -192,7 +192,7 @@ def test_a_plot_is_used_with_the_keyboard(page: Any) -> None:
 
 
 def seen(page: Any, path: str) -> bool:
-    """Whether a camera sees what is below a node."""
+    """Whether a camera sees objects below a node."""
     return page.evaluate(
         """(path) => {
           const meshes = [];
@@ -224,7 +224,7 @@ def test_the_switch_shows_one_run_or_both(page: Any) -> None:
         return set(found)
 
     def pale() -> list[float]:
-        """How strong the curves of the joints are, those of one run first."""
+        """Opacities of the joints' curves, those of one run first."""
         found = page.evaluate(f"side.plots[{JOINTS}].chart.series.slice(1)"
                               ".map(({alpha}) => alpha)")  # fmt: skip
         return sorted(found)

@@ -38,7 +38,7 @@ def held() -> ComparedRun:
 
 
 @pytest.mark.parametrize("name", ["panda_obstacle", *further(PLANAR)])
-def test_the_floor_is_what_is_measured_and_falls_with_the_period(name: str) -> None:
+def test_the_floor_is_the_measured_one_and_falls_with_the_period(name: str) -> None:
     periods, sizes = (*further(0.001), 0.002, 0.005), []
     for period in periods:
         settings = [f"simulation.control_period={period}", "simulation.duration=6"]
@@ -47,7 +47,7 @@ def test_the_floor_is_what_is_measured_and_falls_with_the_period(name: str) -> N
         assert floor is not None
         late = run.rollout.t > 2.0  # the start has decayed to 1e-9
         measured = run.rollout["null_space_norm"][late]
-        # The norms pass through zero: there their ratio is of no use.
+        # The norms pass through zero, where their ratio is meaningless.
         far = floor[late] > 0.1 * floor[late].max()
         ratio = (measured / floor[late])[far]
         assert (ratio.min(), ratio.max()) == pytest.approx((1.0, 1.0), abs=0.25)
@@ -64,7 +64,7 @@ def test_where_no_floor_is_known_none_is_drawn(
     assert held_period(held.rollout) == 0.002
     assert expected_floor(planar.rollout, planar.controller) is None
     assert expected_floor(held.rollout, None) is None
-    rows = slice(None, None, 40)  # 0.4 s: what decays with 10 1/s is not seen
+    rows = slice(None, None, 40)  # 0.4 s: a decay at 10 1/s is not resolved
     columns = {name: column[rows] for name, column in held.rollout.columns.items()}
     assert expected_floor(Rollout(columns, held.rollout.meta), held.controller) is None
     no_gain = {k: v for k, v in held.rollout.meta.items() if k != "null_space_gain"}
@@ -101,7 +101,7 @@ def test_a_distance_to_a_centre_says_so_and_has_the_radius_as_its_line(
     drawn = {line.get_label(): line.get_ydata() for line in axes.lines}
     assert set(drawn) == {"joint to centre of disk", "radius 0.2 m"}
     assert set(np.asarray(drawn["radius 0.2 m"])) == {0.2}
-    # Between surfaces, contact is at zero; a log that does not know is taken so.
+    # Between surfaces contact is at zero; the default for logs without the information.
     columns = {"distance.point_distance": {"unit": "m", "meaning": ""}}
     old = Rollout(log.columns, log.meta | {"columns": log.meta["columns"] | columns})
     assert distance(old).edges == [Edge(0.0, "contact")]
@@ -115,7 +115,7 @@ def test_a_distance_to_a_centre_says_so_and_has_the_radius_as_its_line(
 # -- several runs ---------------------------------------------------------------------
 
 
-def test_what_cannot_be_compared_is_said(planar: ComparedRun, tmp_path: Path) -> None:
+def test_incomparable_logs_are_reported(planar: ComparedRun, tmp_path: Path) -> None:
     path = tmp_path / "page.html"
     with pytest.raises(ExportError, match="there is no run"):
         export_html([], path)

@@ -1,4 +1,4 @@
-"""The view draws a mesh in metres and upright, of any format that distances read."""
+"""The view draws meshes of all formats of distances in metres and upright."""
 
 import logging
 from pathlib import Path
@@ -26,7 +26,7 @@ def visual(name: str) -> str:
 
 
 def drawn(piece: Visual) -> Array:
-    """Return the points that are drawn in the joint's frame, shape (k, 3) [m]."""
+    """Return the drawn points in the joint's frame, shape (k, 3) [m]."""
     if piece.mesh is not None:
         points = piece.mesh[0]
     else:
@@ -54,12 +54,12 @@ def test_a_mesh_is_drawn_where_it_is(
     (piece,) = read_visuals(odd_robot(tmp_path, visual(file.name)))
     found = drawn(piece)
     x, y, z = (CORNERS * (0.1, 0.2, 0.5)).T
-    expected = np.array([0.1 - y, 0.2 + x, 0.3 + z]).T  # turned by 90°
+    expected = np.array([0.1 - y, 0.2 + x, 0.3 + z]).T  # rotated by 90°
     away = np.linalg.norm(found[:, None] - expected[None], axis=2)
     assert max(away.min(axis=0).max(), away.min(axis=1).max()) < 1e-6
 
 
-def test_what_is_there_but_no_mesh_is_said(
+def test_files_that_are_no_meshes_are_reported(
     tmp_path: Path, caplog: pytest.LogCaptureFixture
 ) -> None:
     (tmp_path / "mesh.ply").write_text("no mesh")

@@ -29,7 +29,7 @@ def rollout(experiment: Experiment) -> Rollout:
 
 
 class Notebook:
-    """A page that holds the outputs of cells, as a notebook's does."""
+    """A page with the outputs of cells, like a notebook's."""
 
     def __init__(self, browser: Any, folder: Path, *outputs: str) -> None:
         file = folder / "notebook.html"
@@ -57,14 +57,14 @@ class Notebook:
     def close(self) -> None:
         self.page.close()
         assert self.wrong == []
-        # The frames have their content in themselves.
+        # The frames contain their content.
         assert all(
             url.startswith(("file:", "about:", "data:")) for url in self.requests
         )
 
 
 def turn(view: Any) -> float:
-    """Return how far the first joint is turned about its axis [rad]."""
+    """Return the first joint's rotation about its axis [rad]."""
     _, _, z, w = view.evaluate(f"node('{JOINT}').quaternion.toArray()")
     return float(2.0 * np.arctan2(z, w))
 
@@ -93,12 +93,12 @@ def test_a_viewer_is_shown_after_its_server_has_ended(
         moment = view.evaluate("player.time")
         assert moment == pytest.approx(2.0 * share, abs=0.05)
         assert turn(view) == pytest.approx(logged(rollout, moment), abs=2e-3)
-    # Its keys are its own, as soon as it was clicked.
+    # After a click it receives keys.
     notebook.page.keyboard.press("Home")
     assert view.evaluate("[player.time, player.playing]") == [0, False]
     notebook.page.keyboard.press(" ")
     until(view, "player.time > 0.02")
-    # Its content cannot reach the notebook.
+    # Its content cannot access the notebook.
     assert view.evaluate("window.origin") == "null"
     notebook.close()
 

@@ -1,4 +1,4 @@
-"""The page's player in a real browser: what it shows at a time, and who steers it.
+"""The page's player in a real browser: its picture at a time, and its controls.
 
 Chromium without a window; where there is none these tests are skipped, but not in CI.
 """
@@ -65,7 +65,7 @@ def clip(stop: int = 21, horizon: float | None = None) -> Clip:
         Track(JOINT, "scale", times[::4], scale[::4]),
         Track(f"{JOINT}/link1", "visible", times, (times < 2.0).astype(float)[:, None]),
         Track(TRAIL, "length", times, rings),
-        Track("/nobody/knows", "position", times, np.zeros((stop, 3))),
+        Track("/missing/node", "position", times, np.zeros((stop, 3))),
     ]
     return Clip(1.0, float(times[-1]), tracks, horizon)
 
@@ -108,7 +108,7 @@ def test_a_time_is_shown_exactly(page: Any) -> None:
     assert player(page, "time") == 1.0
     page.evaluate("player.seek(50)")
     assert player(page, "time") == 3.0
-    assert page.evaluate("viewer.scene_tree.children.nobody === undefined")
+    assert page.evaluate("viewer.scene_tree.children.missing === undefined")
 
 
 @pytest.mark.browser
@@ -135,7 +135,7 @@ def test_it_is_steered_from_the_keyboard(page: Any) -> None:
     assert player(page, "playing") is False
 
 
-# By the player's own events: a slow machine may draw no picture of any one moment.
+# By the player's events: a slow machine may not draw a frame of a given moment.
 COUNT_ROUNDS = """window.rounds = 0;
 let last = player.time;
 player.addEventListener("time", ({detail}) => {
@@ -163,7 +163,7 @@ def test_it_is_steered_from_the_page(page: Any) -> None:
     page.locator(".toggle").click()  # from the start again, and again
     until(page, "rounds >= 2")
     page.locator(".toggle").click()
-    # The bar's keys are still the page's, wherever the focus is.
+    # The bar's keys still work, wherever the focus is.
     page.locator(".timeline").focus()
     page.keyboard.press("Home")
     assert player(page, "time") == 1.0
@@ -172,7 +172,7 @@ def test_it_is_steered_from_the_page(page: Any) -> None:
     assert player(page, "time") == pytest.approx(1.0 + 1 / 30)
     page.locator(".toggle").click()
     assert player(page, "playing") is True
-    page.keyboard.press(" ")  # once, not by the button in focus as well
+    page.keyboard.press(" ")  # once, not also by the focused button
     assert player(page, "playing") is False
 
 
@@ -187,9 +187,7 @@ def moments(page: Any) -> list[str]:
 
 
 @pytest.mark.browser
-def test_the_time_line_has_bands_and_they_say_what_they_are(
-    page: Any, viewer: Viewer
-) -> None:
+def test_the_time_line_has_labelled_bands(page: Any, viewer: Viewer) -> None:
     tell(viewer, set_clip(clip()._replace(bands=BANDS)))
     bands, name = page.locator(".bands button"), page.locator(".band-name")
     assert bands.count() == 3
@@ -213,7 +211,7 @@ def test_the_time_line_has_bands_and_they_say_what_they_are(
     bands.nth(0).blur()
     assert name.is_hidden()
 
-    for moment, said in (
+    for moment, reported in (
         (1.05, []),
         (1.4, ["a limit is active"]),
         (2.15, ["a limit is active", "the law is damped"]),
@@ -221,11 +219,11 @@ def test_the_time_line_has_bands_and_they_say_what_they_are(
         (3.0, []),
     ):
         page.evaluate("(t) => player.seek(t)", moment)
-        assert moments(page) == said
+        assert moments(page) == reported
 
 
 @pytest.mark.browser
-def test_presenting_leaves_the_scene_its_title_and_what_happens(
+def test_presenting_leaves_the_scene_its_title_and_events(
     page: Any, viewer: Viewer
 ) -> None:
     tell(viewer, set_clip(clip()._replace(bands=BANDS)))
@@ -259,7 +257,7 @@ def test_presenting_leaves_the_scene_its_title_and_what_happens(
     until(page, "!presentation.on && !document.fullscreenElement")
     assert page.evaluate(height) == before
     page.evaluate("(rest) => { Presentation.REST = rest; }", rest)
-    # Nothing is put away later.
+    # Nothing is removed later.
     assert not page.evaluate("document.body.classList.contains('resting')")
 
 

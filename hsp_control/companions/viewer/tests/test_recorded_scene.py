@@ -1,4 +1,4 @@
-"""A run beside a mesh is repeated and drawn where the mesh's file is not."""
+"""A run with a mesh obstacle is repeated and drawn without the mesh's file."""
 
 import logging
 import shutil
@@ -32,7 +32,7 @@ simulation: {duration: 0.05}
 
 @pytest.fixture
 def log(tmp_path: Path) -> Path:
-    """Return the log of a run beside a mesh, whose files are in `project`."""
+    """Return the log of a run with a mesh obstacle, whose files are in `project`."""
     project = tmp_path / "project"
     project.mkdir()
     (project / "rock.obj").write_text(ROCK)

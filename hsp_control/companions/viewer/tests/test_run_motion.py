@@ -1,4 +1,4 @@
-"""Between two rows of a coarse log everything moves on its own geodesic."""
+"""Between two rows of a coarse log everything moves along geodesics."""
 
 import numpy as np
 import pinocchio as pin
@@ -13,10 +13,10 @@ def turn(quaternion: Array) -> Array:
     return np.asarray(pin.Quaternion(w, x, y, z).normalized().matrix())
 
 
-def test_what_is_drawn_between_two_rows_is_on_the_way_from_one_to_the_other(
+def test_frames_between_rows_are_on_the_geodesic(
     arm: Robot,
 ) -> None:
-    """Joints turn, positions go straight, orientations turn about one axis."""
+    """Joints rotate, positions move straight, orientations rotate about one axis."""
     rng = np.random.default_rng(4)
     q = np.array([arm.integrate(arm.neutral(), v) for v in rng.normal(size=(3, 3))])
     quaternions = rng.normal(size=(3, 4))
@@ -51,7 +51,7 @@ def test_what_is_drawn_between_two_rows_is_on_the_way_from_one_to_the_other(
         wanted = begin @ pin.exp3(share * pin.log3(begin.T @ end))
         found = turn(rows["object.box.quaternion"][k])
         np.testing.assert_allclose(found, wanted, atol=1e-9)
-    # A value that is known on a row stays known there, beside a row where it is not.
+    # A value known on a row stays known there, next to a row without one.
     on_rows = np.isin(rows.t, t)
     np.testing.assert_array_equal(rows["half"][on_rows], half)
     assert np.isnan(rows["half"][~on_rows]).all()

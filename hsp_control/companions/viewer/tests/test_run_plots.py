@@ -1,4 +1,4 @@
-"""Check the plots of the live page: what is sent, how much of it, and to whom."""
+"""The plots of the live page: messages, their amount, and their receivers."""
 
 import pytest
 
@@ -18,7 +18,7 @@ MOVING = "paper/4_moving_obstacle"
 
 @pytest.fixture(scope="module")
 def computed() -> tuple[Experiment, Rollout, list[tuple[int, dict]]]:
-    """A run of 1.5 s, and what was to be sent at some of its rows."""
+    """A run of 1.5 s, and the messages due at some of its rows."""
     experiment = load_experiment(
         MOVING, "simulation.duration=1.5", "simulation.log_period=0.001"
     )

@@ -1,4 +1,4 @@
-"""A preview of self-motion: the tasks stay as they are, and the elbow moves."""
+"""A preview of self-motion: task errors are constant, and the elbow moves."""
 
 import numpy as np
 import pytest
@@ -26,7 +26,7 @@ def test_the_hand_rests_while_the_elbow_moves(name: str) -> None:
         errors.append(np.concatenate([output.error(t.name) for t in probe.tasks]))
         low, high = robot.model.lowerPositionLimit, robot.model.upperPositionLimit
         assert ((q >= low) & (q <= high)).all()
-    # Two steps of Newton's method after each step of 0.1 rad.
+    # Two Newton steps after every step of 0.1 rad.
     np.testing.assert_allclose(errors, np.tile(errors[0], (len(errors), 1)), atol=1e-5)
     steps = [
         robot.difference(one, other)
@@ -59,7 +59,7 @@ def test_a_preview_is_drawn_when_it_is_there_and_then_removed() -> None:
     controller.compute(0.0, experiment.q0, experiment.v0)
     drawing = PreviewDrawing(experiment.robot)
     commands = list(drawing.draw(controller, on=True))
-    assert commands == []  # a thread has begun to compute it
+    assert commands == []  # a thread has started to compute it
     assert drawing._coming is not None
     drawing._coming.result()
     drawn = [unpack(each.packed) for each in drawing.draw(controller, on=True)]

@@ -1,4 +1,5 @@
-"""``hsp view`` and ``hsp run --view`` as a person uses them, with a browser or none."""
+"""``hsp view`` and ``hsp run --view`` as a user runs them, with or without a
+browser."""
 
 import socket
 import threading
@@ -48,10 +49,10 @@ def address(printed: str) -> str:
 
 
 def ended(url: str) -> bool:
-    """Return whether nothing serves a page; its port may be another one's by now."""
+    """Return whether no page is served; another server may use the port by now."""
     try:
         urlopen(url).close()
-    except URLError:  # there is nobody, or somebody who does not know the key
+    except URLError:  # no server, or one without this key
         return True
     return False
 
@@ -63,10 +64,10 @@ def test_view_prints_its_address_and_keeps_no_script_waiting(
     caplog: pytest.LogCaptureFixture,
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    monkeypatch.setattr(pages_of_commands, "PAGE_TIMEOUT", 1e5)  # never over
+    monkeypatch.setattr(pages_of_commands, "PAGE_TIMEOUT", 1e5)  # endless
     assert main(["view", str(log)]) == 0
     url = address(capsys.readouterr().out)
-    assert ended(url)  # it left nothing behind
+    assert ended(url)  # no files remain
     assert f"the view is at {url}" in caplog.text
     caplog.clear()
     assert main(["view", "--no-browser", str(log), str(log), "--beside"]) == 0
@@ -75,7 +76,7 @@ def test_view_prints_its_address_and_keeps_no_script_waiting(
 
 @pytest.mark.process
 @pytest.mark.smoke
-def test_run_shows_what_it_computes_and_keeps_its_log(
+def test_run_shows_its_progress_and_keeps_its_log(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     assert main(["run", MOVING, "--view", "--out", str(tmp_path), *SHORT]) == 0
@@ -112,7 +113,7 @@ def test_the_page_of_a_run_opens_once_and_shows_its_robot(
 
 
 @pytest.mark.process
-def test_a_port_in_use_is_said_and_the_run_goes_on(
+def test_a_port_in_use_is_reported_and_the_run_continues(
     tmp_path: Path, log: Path, taken: int, capsys: pytest.CaptureFixture[str]
 ) -> None:
     port = ["--port", str(taken)]
@@ -127,7 +128,7 @@ def test_a_port_in_use_is_said_and_the_run_goes_on(
     assert len(Rollout.load(next(tmp_path.glob("*.npz")))) == 21
 
 
-def test_what_makes_no_sense_is_refused(
+def test_nonsensical_input_is_refused(
     log: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     assert main(["view", str(log), "--speed", "0"]) == 2
@@ -159,6 +160,6 @@ def test_with_a_browser_it_stays_until_the_page_is_closed(
 
     monkeypatch.setattr(transport.webbrowser, "open", look)
     assert main(["view", str(log)]) == 0
-    assert time.monotonic() > left[0]  # not before the page was closed
+    assert time.monotonic() > left[0]  # not before the page is closed
     (page,) = pages
     assert ("clip", "/clip") in [(c["type"], c.get("path")) for c in page.commands]

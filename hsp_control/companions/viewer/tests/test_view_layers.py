@@ -1,4 +1,4 @@
-"""The view's layers agree with the run, recomputed another way."""
+"""The view's layers agree with the run, recomputed independently."""
 
 from typing import Any
 
@@ -6,7 +6,7 @@ import coal
 import numpy as np
 import pinocchio as pin
 import pytest
-from clips import Clip, Recorder, told
+from clips import Clip, Recorder, reported
 
 from hsp_control import Experiment, Robot, Rollout, load_experiment
 from hsp_control.companions.plots.analysis import (
@@ -79,7 +79,7 @@ def bar_of(clip: Clip) -> str:
 
 
 def tip(clip: Clip, path: str, time: float) -> np.ndarray:
-    """Return where an arrow or a bar ends."""
+    """Return the end of an arrow or a bar."""
     length = clip.value(path, "scale", time)[2]
     return (clip.pose(path, time) @ [0.0, 0.0, length, 1.0])[:3]
 
@@ -187,7 +187,7 @@ def test_bars_are_as_long_as_the_distances_in_the_log(
         assert np.linalg.norm(end) == pytest.approx(0.1, abs=1e-5)
 
 
-# -- the links that are measured ------------------------------------------------------
+# -- the links in distances -----------------------------------------------------------
 
 
 def test_distances_end_on_the_capsules_that_are_measured(
@@ -201,14 +201,14 @@ def test_distances_end_on_the_capsules_that_are_measured(
     joints = {proximity.links[i].joint for i in measured}
     model_names = experiment.robot.model.names
     assert clip.paths("/capsules") == {f"/capsules/{model_names[j]}" for j in joints}
-    # Off at first, with a row that switches them.
+    # Initially off, with a row to switch them.
     (entry,) = [e for e in legend(recorder) if "(measured)" in e["name"]]
     assert entry["name"] == "capsules of the links (measured)"
     assert (entry["shown"], entry["paths"]) == (False, ["/capsules"])
     hidden = recorder.command("/capsules", "visible")
     assert hidden is not None
     assert hidden["value"] is False
-    # The nearest of the drawn capsules is as far from the ball as the log has it.
+    # The distance of the nearest drawn capsule to the ball is that in the log.
     for row in (0, 20, 50):
         t = float(rollout.t[row])
         ball = rollout["obstacle.ball"][row]
@@ -267,7 +267,7 @@ def test_minimum_distances_of_limits_are_drawn_and_unmeasured_links_are_not(
     assert set(recorder.paths("/capsules")) == nodes
     motion = motion_of(kept.robot, spatial[1])
     moved = {track.path for track in layer.tracks(motion)}
-    assert moved == nodes - {"/capsules/universe"}  # the base: measured, but fixed
+    assert moved == nodes - {"/capsules/universe"}  # the base: in distances, but fixed
     assert moved < nodes
 
 
@@ -380,10 +380,10 @@ def test_contact_forces_are_arrows_at_their_points(recorder: Recorder) -> None:
         "t": np.array([0.0, 0.02]),
         "q": np.tile(robot.home(), (2, 1)),
         "v": np.zeros((2, robot.nv)),
-        # The place of a contact that is off is not in the log.
+        # The position of an inactive contact is not in the log.
         "contact.left/foot.position": np.array([[0.1, 0.2, 0.3], [np.nan] * 3]),
         "contact.left/foot.force": np.array([weight, np.zeros(3)]),
-        "contact.halved.force": np.zeros((2, 3)),  # without its place: left out
+        "contact.halved.force": np.zeros((2, 3)),  # without its position: omitted
     }
     viewer = Viewer(robot, transport=recorder)
     viewer.play(Rollout(columns, {"status": "completed"}))
@@ -421,7 +421,7 @@ def test_each_layer_can_be_switched(
             command = recorder.command(path, "visible")
             assert row["shown"] == (command is None)
             assert command is None or command["value"] is False
-    assert Clip(recorder).paths("/self_motion")  # there, to be switched on
+    assert Clip(recorder).paths("/self_motion")  # present, to be switched on
 
 
 # -- several runs ---------------------------------------------------------------------
@@ -468,7 +468,7 @@ def test_runs_of_one_robot_lie_over_each_other_as_ghosts(
 
 
 class Watched(Recorder):
-    """Keeps what was sent, too."""
+    """Records sent messages, too."""
 
     def __init__(self) -> None:
         super().__init__()
@@ -488,7 +488,7 @@ def test_a_run_is_shown_while_it_is_computed(monkeypatch: pytest.MonkeyPatch) ->
     transport = Watched()
     viewer = Viewer(experiment.robot, transport=transport)
     view = LiveView(viewer, experiment)
-    # The whole desired path is there before the first step.
+    # The whole desired path is present before the first step.
     desired = transport.command("/paths/tip/desired", "object")
     assert desired is not None
     del transport.sent[:]
@@ -497,10 +497,11 @@ def test_a_run_is_shown_while_it_is_computed(monkeypatch: pytest.MonkeyPatch) ->
     clips = [command for command in transport.sent if command["type"] == "clip"]
     assert [clip["begins"] for clip in clips] == [True] + [False] * (len(clips) - 1)
     assert all(clip["open"] and clip["horizon"] == 0.5 for clip in clips[:-1])
-    said = [c["text"] for c in transport.sent if c["type"] == "status"]
-    assert any("× real time" in text for text in said)
+    printed = [c["text"] for c in transport.sent if c["type"] == "status"]
+    assert any("× real time" in text for text in printed)
     times = np.concatenate([clip["clocks"][0] for clip in clips])
-    assert (np.diff(times) >= 0.0).all()  # each begins where the one before ends
+    # every piece begins at the end of the previous one
+    assert (np.diff(times) >= 0.0).all()
     assert (times[0], times[-1]) == (0.0, 0.5)
     joint = np.concatenate(
         [
@@ -515,7 +516,7 @@ def test_a_run_is_shown_while_it_is_computed(monkeypatch: pytest.MonkeyPatch) ->
         state = experiment.robot.state(0.0, rollout.q[row], rollout.v[row])
         expected = pin.SE3ToXYZQUAT(state.data.oMi[1])[3:]
         assert abs(quaternion @ expected) == pytest.approx(1.0, abs=1e-6)
-    trail = told(transport, "/paths/tip/actual", "object")["points"]
+    trail = reported(transport, "/paths/tip/actual", "object")["points"]
     assert len(trail) == 3 * len(np.unique(times))
 
     view.finish(rollout)
@@ -523,7 +524,8 @@ def test_a_run_is_shown_while_it_is_computed(monkeypatch: pytest.MonkeyPatch) ->
     assert begin is not None
     assert begin["keep"]
     assert not begin["open"]
-    assert transport.command(CLIP, "more 1") is None  # one clip is kept, the whole
+    # one clip of the whole run is kept
+    assert transport.command(CLIP, "more 1") is None
     assert Clip(transport).value("/paths/tip/actual", "length", 0.5) == 50
 
 
@@ -540,7 +542,7 @@ def test_a_view_that_ends_does_not_end_the_run(
 
 
 def test_the_axes_of_an_ellipsoid_are_a_rotation_that_does_not_jump() -> None:
-    """Mirrored axes are no quaternion; and the nearest order of the axes is kept."""
+    """Mirrored axes are no rotation; and the nearest order of the axes is kept."""
     rng, last = np.random.default_rng(0), np.eye(3)
     J = rng.standard_normal((3, 7))
     for size in [0.02] * 100 + [1.0] * 100:

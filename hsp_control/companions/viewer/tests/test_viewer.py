@@ -1,4 +1,4 @@
-"""Check that the view shows what there is where it is, and plays logs."""
+"""The view shows all objects at their poses, and plays logs."""
 
 import re
 from pathlib import Path
@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import pinocchio as pin
 import pytest
-from clips import Clip, Recorder, told
+from clips import Clip, Recorder, reported
 
 from hsp_control import Obstacle, Robot, Rollout, load_experiment
 from hsp_control.common.exceptions import ViewerError
@@ -23,7 +23,7 @@ from hsp_control.trajectories import Hold
 
 
 def children(recorder: Recorder, path: str) -> list[dict[str, Any]]:
-    command = told(recorder, path, "object")
+    command = reported(recorder, path, "object")
     return list(command["object"]["object"]["children"])
 
 
@@ -65,7 +65,7 @@ def test_every_visual_stands_where_pinocchio_puts_it(name: str) -> None:
 
 
 def geometries(recorder: Recorder, path: str) -> list[dict[str, Any]]:
-    command = told(recorder, path, "object")
+    command = reported(recorder, path, "object")
     return list(command["object"]["geometries"])
 
 
@@ -93,7 +93,7 @@ def test_paths_target_and_obstacle_follow_the_log(
     assert recorder.paths("/obstacles/") == ["/obstacles/disk"]
     (disk,) = geometries(recorder, "/obstacles/disk")
     assert (disk["type"], disk["radius"]) == ("SphereGeometry", 0.2)
-    desired = told(recorder, "/paths/tip/desired", "object")
+    desired = reported(recorder, "/paths/tip/desired", "object")
     points = np.reshape(desired["points"], (-1, 3))[:, :2]
     np.testing.assert_allclose(points, run["task.tip.reference"], atol=1e-6)
 
@@ -112,7 +112,7 @@ def test_paths_target_and_obstacle_follow_the_log(
             shown = clip.pose(f"/robot/joint{joint}", t)
             expected = data.oMi[joint].homogeneous
             np.testing.assert_allclose(shown, expected, atol=1e-6)
-    caption = told(recorder, CAPTION, "caption")
+    caption = reported(recorder, CAPTION, "caption")
     assert caption["title"] == run.meta["title"]
     assert [entry["name"] for entry in caption["legend"]] == [
         "desired path", "actual path", "target", "obstacle disk", "manipulability",
@@ -126,21 +126,21 @@ def test_paths_target_and_obstacle_follow_the_log(
     ]  # fmt: skip
 
 
-def test_a_state_is_shown_with_what_the_run_did_then(
+def test_a_state_is_shown_with_its_row_of_the_run(
     arm: Robot, run: Rollout, recorder: Recorder
 ) -> None:
     viewer = Viewer(arm, transport=recorder)
     viewer.draw_scene(run)
     q = arm.integrate(run.q[37], np.full(3, 0.1))
     viewer.show(arm.state(run.t[37], q, run.v[37]))
-    sought = told(recorder, CLIP, "seek")
+    sought = reported(recorder, CLIP, "seek")
     assert sought["time"] == run.t[37]
     expected = arm.state(0.0, q, np.zeros(3)).data.oMi[3].homogeneous
     np.testing.assert_array_equal(recorder.transform("/robot/joint3"), expected)
     viewer.draw_scene(Scene())
     assert recorder.command(CLIP, "begin") == {"type": "still", "path": CLIP}
     viewer.show(arm.state(0.25, q, run.v[37]))
-    clock = told(recorder, CAPTION, "time")
+    clock = reported(recorder, CAPTION, "time")
     assert clock["text"] == "t = 0.25 s"
 
 
@@ -201,7 +201,7 @@ def test_coarse_logs_play_smoothly_and_fine_ones_are_thinned(
     assert (times[0], times[-1]) == (coarse.t[0], coarse.t[-1])
     assert np.diff(times).max() < 0.034
     assert np.isin(coarse.t, times).all()
-    # Between two rows the links keep their lengths: joints turn, nothing is cut short.
+    # Between two rows the links keep their lengths: joints rotate along arcs.
     for t in times:
         places = [clip.value(f"/robot/joint{k}", "position", t) for k in (1, 2, 3)]
         lengths = np.linalg.norm(np.diff(places, axis=0), axis=1)
@@ -218,7 +218,7 @@ def resampled(run: Rollout, rows: int) -> Rollout:
     return Rollout({k: v[near] for k, v in run.columns.items()} | {"t": t}, run.meta)
 
 
-def test_what_cannot_be_played_is_refused(arm: Robot, run: Rollout) -> None:
+def test_unplayable_sources_are_refused(arm: Robot, run: Rollout) -> None:
     viewer = Viewer(arm, transport=Recorder())
     with pytest.raises(ViewerError, match="speed -1 must be positive"):
         viewer.play(run, speed=-1)
@@ -234,7 +234,7 @@ def test_what_cannot_be_played_is_refused(arm: Robot, run: Rollout) -> None:
         other.draw_scene(run)
 
 
-def test_a_log_is_viewed_as_its_configuration_says(
+def test_a_log_is_viewed_as_configured(
     tmp_path: Path, run: Rollout, recorder: Recorder
 ) -> None:
     look = {"camera": [0, 0, 9], "speed": 20.0, "show": {"paths": False}}
@@ -245,11 +245,11 @@ def test_a_log_is_viewed_as_its_configuration_says(
     assert (robot.name, robot.nq) == ("planar3r", 6)
     assert not robot.model.gravity.linear.any()  # as configured
     viewer = view_logs([path], transport=recorder)
-    camera = told(recorder, CAMERA, "camera")
+    camera = reported(recorder, CAMERA, "camera")
     assert camera["eye"] == [0.0, 0.0, 9.0]
-    begin = told(recorder, CLIP, "begin")
+    begin = reported(recorder, CLIP, "begin")
     assert begin["speed"] == 20.0
-    hidden = told(recorder, "/paths/tip/actual", "visible")
+    hidden = reported(recorder, "/paths/tip/actual", "visible")
     assert hidden["value"] is False
     assert recorder.command("/targets", "visible") is None
     tip = Clip(recorder).pose("/robot/joint3", run.t[-1]) @ [1.0, 0.0, 0.0, 1.0]
@@ -257,7 +257,7 @@ def test_a_log_is_viewed_as_its_configuration_says(
     viewer.close()
 
 
-def test_a_log_whose_controller_is_gone_shows_what_its_columns_tell(
+def test_a_log_without_its_controller_is_drawn_from_columns(
     tmp_path: Path, run: Rollout, recorder: Recorder, caplog: pytest.LogCaptureFixture
 ) -> None:
     config = {**(run.config or {})}
@@ -272,7 +272,7 @@ def test_a_log_whose_controller_is_gone_shows_what_its_columns_tell(
     assert not recorder.paths("/distances")
 
 
-def test_a_log_whose_robot_is_gone_says_so(run: Rollout) -> None:
+def test_a_log_without_its_robot_is_refused(run: Rollout) -> None:
     robot = {k: v for k, v in run.meta["robot"].items() if k != "record"}
     meta = {**run.meta, "robot": robot}
     anonymous = Rollout(run.columns, {k: v for k, v in meta.items() if k != "config"})
@@ -285,7 +285,7 @@ def test_a_log_whose_robot_is_gone_says_so(run: Rollout) -> None:
 
 
 def from_files(command: dict[str, Any]) -> list[dict[str, Any]]:
-    """Return what of an object is drawn from mesh files."""
+    """Return the parts of an object that are drawn from mesh files."""
     if command["type"] != "set_object":
         return []
     thing = command["object"]
@@ -294,7 +294,7 @@ def from_files(command: dict[str, Any]) -> list[dict[str, Any]]:
     return [each for each in things if "file" in each]
 
 
-def test_a_mesh_file_comes_once_and_before_what_is_drawn_from_it() -> None:
+def test_a_mesh_file_is_sent_once_and_before_its_objects() -> None:
     robot, recorder = load_experiment("dual_panda").robot, SceneRecorder()
     Viewer(robot, transport=recorder)
     one = SceneRecorder()
@@ -310,7 +310,7 @@ def test_a_mesh_file_comes_once_and_before_what_is_drawn_from_it() -> None:
     other = [unpack(packed) for *_, packed in one.scene.items()]
     files = {each["file"] for each in other if each["type"] == "mesh_file"}
     assert known == files
-    # An export has them where their names were.
+    # An export has them in place of their names.
     shown = [*with_files(commands)]
     assert not any(command["type"] == "mesh_file" for command in shown)
     drawn = [each for command in shown for each in from_files(command)]

@@ -1,4 +1,4 @@
-"""Check the view's server: to this machine alone, and it leaves nothing behind."""
+"""The view's server: reachable on this machine only, without residues at its end."""
 
 import asyncio
 import gzip
@@ -86,7 +86,7 @@ def test_closing_leaves_nothing(arm: Robot) -> None:
         viewer.show(arm.home())
     assert not answers(port)
     assert not any(each.name == "page server" for each in threading.enumerate())
-    viewer.close()  # again is no error
+    viewer.close()  # twice is no error
     with pytest.raises(ViewerError, match="the viewer is closed"):
         viewer.show(arm.home())
 
@@ -117,12 +117,12 @@ def test_without_a_browser_nothing_waits(
         monkeypatch.delenv(name, raising=False)
     with Viewer(arm, open_browser=True) as viewer:
         viewer.play(run)
-        for _ in range(5000):  # more than any pipe holds
+        for _ in range(5000):  # more than the buffer of a pipe
             viewer.show(arm.home())
         assert not viewer.wait_for_browser(0.0)
 
 
-def test_a_notebook_holds_what_is_shown(arm: Robot, recorder: SceneRecorder) -> None:
+def test_a_notebook_contains_its_output(arm: Robot, recorder: SceneRecorder) -> None:
     with Viewer(arm) as viewer:
         shown = viewer._repr_html_()
     assert shown.startswith("<iframe srcdoc=")
@@ -130,7 +130,7 @@ def test_a_notebook_holds_what_is_shown(arm: Robot, recorder: SceneRecorder) -> 
     assert "127.0.0.1" not in Viewer(arm, transport=recorder)._repr_html_()
 
 
-def test_without_what_reads_meshes_a_notebook_shows_the_live_page(
+def test_without_a_mesh_reader_a_notebook_shows_the_live_page(
     arm: Robot, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     def fail(*_: object) -> None:
@@ -187,7 +187,8 @@ def test_a_page_that_opens_late_sees_everything(arm: Robot, run: Rollout) -> Non
 
 
 def test_a_connection_names_host_and_origin(started: PageServer) -> None:
-    """No page of another site, no name that resolves here, no program without both."""
+    """No page of another site, no name that resolves to here, no program without
+    both."""
     assert started.url is not None
     with pytest.raises(HTTPClientError) as refused:
         asyncio.run(connect(started.url, Host="evil.example"))
@@ -211,7 +212,7 @@ async def opened(request: HTTPRequest) -> None:
     protocol = page.protocol
     page.close()
     if protocol is not None and protocol.stream is not None:
-        protocol.stream.close()  # the loop ends before the other side could confirm
+        protocol.stream.close()  # the loop ends before the other side can confirm
 
 
 # --- pages that steer ----------------------------------------------------------------
@@ -254,7 +255,7 @@ def test_a_page_needs_the_key(steered: PageServer) -> None:
         assert refused.value.code == 403
         with pytest.raises(HTTPClientError):
             asyncio.run(connect(address + query))
-    # Another site's page, that knows the key.
+    # Another site's page that knows the key.
     port = int(address.rpartition(":")[2].strip("/"))
     with closing(HTTPConnection("127.0.0.1", port)) as connection:
         evil = HANDSHAKE | {"Origin": "http://evil.example"}
@@ -284,8 +285,8 @@ def test_a_page_that_lost_its_program_keeps_its_key(
     address, _, query = steered.url.partition("?")
     key, question = query.removeprefix("key="), "a1b2"
     with urllib.request.urlopen(f"{address}alive?question={question}") as answer:
-        told = answer.read().decode()
-    assert told == hmac.new(key.encode(), question.encode(), "sha256").hexdigest()
+        reported = answer.read().decode()
+    assert reported == hmac.new(key.encode(), question.encode(), "sha256").hexdigest()
     script = (Path(transport.__file__).parent / "page" / "scene.js").read_text()
     asks = script[
         script.index("async function lookForNext") : script.index("// From Pin")
@@ -294,7 +295,7 @@ def test_a_page_that_lost_its_program_keeps_its_key(
     assert "fetch(location" not in asks
 
 
-def test_meshes_come_compressed_to_pages_that_say_so(steered: PageServer) -> None:
+def test_meshes_are_compressed_for_pages_that_accept_it(steered: PageServer) -> None:
     text = " ".join(map(str, range(100_000)))
     steered.send([page_command("nothing", "/mesh", "object", text=text)])
     assert steered.url is not None
@@ -318,7 +319,7 @@ async def largest_message(url: str) -> bytes:
     protocol = connection.protocol
     connection.close()
     if protocol is not None and protocol.stream is not None:
-        protocol.stream.close()  # the event loop ends before the server could confirm
+        protocol.stream.close()  # the event loop ends before the server can confirm
     return largest
 
 
@@ -330,7 +331,7 @@ def test_hardware_gets_a_key_that_no_earlier_page_has() -> None:
 def test_a_browser_is_started_without_the_key_in_its_arguments(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """All users see the arguments of a process; the file is this user's alone."""
+    """All users see a process's arguments; the file is readable by this user only."""
     monkeypatch.setenv("XDG_DATA_HOME", str(tmp_path))
     seen: list[tuple[str, int, str]] = []
 
@@ -354,7 +355,7 @@ def test_one_page_steers_at_a_time(steered: PageServer) -> None:
     wait_until(lambda: first.drives() == (True, True))
     second = Steering(steered.url)
     wait_until(lambda: second.drives() == (False, True))
-    second.say(do="pause")  # it may not
+    second.say(do="pause")  # not permitted
     first.say(do="go")
     assert heard(steered, "go") == [{"do": "go"}]
     second.say(do="take_over")
@@ -372,7 +373,7 @@ def test_one_page_steers_at_a_time(steered: PageServer) -> None:
 
 @pytest.mark.slow
 def test_a_flood_is_no_more_than_its_newest_words(steered: PageServer) -> None:
-    """2000 messages while nobody listens: the last of each kind is used."""
+    """2000 unread messages: the last of every kind is used."""
     assert steered.url is not None
     page = Steering(steered.url)
     wait_until(lambda: page.drives() == (True, True))
@@ -389,13 +390,13 @@ def test_a_flood_is_no_more_than_its_newest_words(steered: PageServer) -> None:
 
 
 @pytest.mark.parametrize("raised", [SystemExit, KeyboardInterrupt])
-def test_a_server_that_ends_by_itself_says_so_and_leaves_nothing(
+def test_a_server_that_ends_by_itself_is_reported_and_leaves_nothing(
     raised: type[BaseException], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Its thread ends at these two; all others asyncio and Tornado catch.
+    """Its thread ends at these two; asyncio and Tornado catch all others.
 
-    Its port is none of those that servers look through: another process would take
-    one of them as soon as it is free.
+    Its port is outside the range that servers try: another process would use one of
+    those as soon as it is free.
     """
     with socket.create_server(("127.0.0.1", 0)) as probe:
         port = probe.getsockname()[1]
@@ -430,7 +431,7 @@ def test_a_page_that_cannot_be_served_is_not_open(
     raised: type[BaseException],
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    """It is hung up on, also amid what it gets; others go on."""
+    """Its connection is closed, also during a message to it; others continue."""
     assert steered.url is not None
 
     def fails(*_: object) -> None:
@@ -460,7 +461,8 @@ def test_where_a_page_cannot_be_removed_the_server_ends(
     steered: PageServer,
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    """Else the program would go on with what the page held, and nobody could steer."""
+    """Otherwise the page's last command would stay in force, and no page could
+    steer."""
     assert steered.url is not None
     page = Steering(steered.url)
     wait_until(lambda: page.drives() == (True, True))
@@ -475,13 +477,13 @@ def test_where_a_page_cannot_be_removed_the_server_ends(
         steered.messages()
 
 
-def test_it_is_said_what_to_install(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_missing_package_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(transport.importlib.util, "find_spec", lambda name: None)
     with pytest.raises(ViewerError, match="pip install meshcat"):
         PageServer()
 
 
-def test_a_server_that_cannot_start_says_why(
+def test_a_server_that_cannot_start_gives_the_reason(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(transport, "meshcat_page", lambda: tmp_path)
@@ -489,7 +491,7 @@ def test_a_server_that_cannot_start_says_why(
         PageServer()
 
 
-def test_a_port_that_is_taken_is_said(started: PageServer) -> None:
+def test_a_port_in_use_is_reported(started: PageServer) -> None:
     with pytest.raises(ViewerError, match=r"cannot start: cannot listen on 127\.0"):
         PageServer(port_of(started.url))
 
@@ -519,16 +521,16 @@ def test_a_browser_is_opened_only_where_there_is_one(
 # --- its parts -----------------------------------------------------------------------
 
 
-def test_the_newest_word_counts_and_order_is_kept() -> None:
+def test_the_newest_message_is_used_and_order_is_kept() -> None:
     kept = LatestCommands()
     for path, word in (("/a", b"1"), ("/a/b", b"2"), ("/ab", b"3"), ("/a", b"4")):
         kept.keep([PageCommand(path, key_of(path, "object"), word)])
-    told, gone = kept.copy(), PageCommand("/a", key_of("/a", "delete"), b"5", True)
+    reported, gone = kept.copy(), PageCommand("/a", key_of("/a", "delete"), b"5", True)
     assert kept.copy().pop_all() == [b"2", b"3", b"4"]
     kept.keep([gone])
     assert [item[0] for item in kept.items()] == ["/ab"]
-    told.keep([gone], deletions=True)
-    assert told.pop_all() == [b"3", b"5"]
+    reported.keep([gone], deletions=True)
+    assert reported.pop_all() == [b"3", b"5"]
 
 
 @pytest.mark.process
@@ -546,7 +548,7 @@ def test_importing_the_package_pulls_in_no_viewer_and_that_no_meshcat() -> None:
     assert not {"meshcat", "tornado", "zmq", "IPython", "matplotlib"} & viewer
 
 
-def test_a_host_that_nobody_knows_is_named() -> None:
+def test_an_unknown_host_is_named() -> None:
     with pytest.raises(ViewerError, match=r"on no\.such\.host\.invalid: no computer"):
         PageServer(host="no.such.host.invalid")
     with pytest.raises(

@@ -1,4 +1,4 @@
-"""A user's own loop that is watched: what is taken of it, and what its page shows."""
+"""Watching a user's loop: data read from it, and the page's content."""
 
 import subprocess
 from asyncio import CancelledError
@@ -27,7 +27,7 @@ def controller_of(field: Any = None) -> hsp.Controller:
     panda = hsp.Robot.load("panda")
     ball = hsp.Obstacle("ball", hsp.shapes.Sphere(0.1), hsp.Hold([0.6, 0.1, 0.6]))
     limits = hsp.Limits(barriers=[hsp.limits.ObstacleDistance(minimum=0.02)])
-    circle = hsp.Circle(radius=0.1, angular_rate=2.0)  # about where the hand starts
+    circle = hsp.Circle(radius=0.1, angular_rate=2.0)  # around the hand's start
     hand = hsp.FramePose("panda_tcp", circle, name="hand", blend=1.0)
     return hsp.Controller(
         panda, [hand], field or hsp.JointCentering(), scene=[ball], limits=limits
@@ -35,7 +35,7 @@ def controller_of(field: Any = None) -> hsp.Controller:
 
 
 class Loop:
-    """A loop whose clock begins anywhere, as those of robots do."""
+    """A loop whose clock has any offset, like a robot's."""
 
     def __init__(self, controller: hsp.Controller) -> None:
         self.controller, self.k = controller, 0
@@ -62,8 +62,8 @@ def followed(follower: Follower) -> dict[str, Array]:
     return reader.rows(reader.count - 1)
 
 
-def test_a_row_is_what_the_loop_computed() -> None:
-    """The copy begins where the loop began, though it sees it later."""
+def test_a_row_equals_the_loop_s_results() -> None:
+    """The copy begins at the loop's start, though it is made later."""
     loop = Loop(controller_of())
     follower = Follower(loop.controller)
     assert follower.newest() is None  # nothing was computed yet
@@ -71,7 +71,7 @@ def test_a_row_is_what_the_loop_computed() -> None:
     output = loop.step()
     row = followed(follower)
     assert row["t"][0] == pytest.approx(20 * PERIOD, abs=1e-9)
-    # The loop's effort is within its rate limit; the copy saw no effort before.
+    # The loop's effort is rate-limited; the copy has no previous effort.
     assert row["acceleration"][0] == pytest.approx(output.acceleration, abs=1e-6)
     assert row["task.hand.error"][0] == pytest.approx(output.error("hand"), abs=1e-9)
     assert row["null_space_error"][0] == pytest.approx(
@@ -92,7 +92,7 @@ def test_changes_targets_and_a_new_beginning_are_followed() -> None:
     row = followed(follower)
     assert row["acceleration"][0] == pytest.approx(output.acceleration, abs=1e-6)
     goal = loop.controller.robot.state(0.0, loop.q, loop.v).position("panda_tcp")
-    for away in (0.0, 0.05):  # to a stream that is new, and to one that is followed
+    for away in (0.0, 0.05):  # to a new stream, and to an existing one
         target = [goal[0] - away, *goal[1:], 1.0, 0.0, 0.0, 0.0]
         loop.controller.set_target("hand", target)
         for _ in range(60):  # the copy receives the same message, at its own steps
@@ -121,7 +121,7 @@ def recorded(tmp_path: Path, controller: hsp.Controller) -> JournalReader:
 
 
 def drawn(watched: Watched) -> tuple[dict[str, Any], set[str]]:
-    """The setup of the page, and the nodes that are drawn."""
+    """The page's setup, and its drawn nodes."""
     recorder = SceneRecorder()
     picture = Picture(watched, Viewer(watched.robot, transport=recorder))
     picture.draw(running=True, rate=1.0)
@@ -164,7 +164,7 @@ def test_a_recorder_is_shown_with_its_distances_and_plots(tmp_path: Path) -> Non
 def test_a_loop_with_a_function_of_its_own_is_shown_by_its_columns(
     tmp_path: Path,
 ) -> None:
-    """Another process cannot build it: the log knows all but lines and zones."""
+    """Another process cannot rebuild it: the log has all but lines and zones."""
     own = hsp.FunctionCost(lambda state: float(state.q @ state.q))
     watched = Watched(recorded(tmp_path, controller_of(own)))
     assert watched.controller is None
@@ -175,7 +175,7 @@ def test_a_loop_with_a_function_of_its_own_is_shown_by_its_columns(
     assert not any(path.startswith("/distances") for path in paths)
 
 
-def test_what_fails_is_said_and_does_not_reach_the_loop() -> None:
+def test_failures_are_reported_and_do_not_reach_the_loop() -> None:
     fails: BaseException | None = None
 
     def cost(state: hsp.RobotState) -> float:
@@ -196,14 +196,15 @@ def test_what_fails_is_said_and_does_not_reach_the_loop() -> None:
         fails = None
         loop.step(3)
         _until(lambda: not page.failure)
-        fails = CancelledError()  # no `Exception`: the thread ends, and reports why
+        # a BaseException: the thread ends, and reports the reason
+        fails = CancelledError()
         with pytest.raises(CancelledError):
             loop.step()
         _until(lambda: page.failure == "CancelledError")
     assert not follower.journal.exists()
 
 
-def test_watch_refuses_what_is_no_loop() -> None:
+def test_watch_accepts_loops_only() -> None:
     with pytest.raises(ViewerError, match="a Controller or a Recorder; got Robot"):
         hsp.viewer.watch(hsp.Robot.load("panda"))
     with pytest.raises(ViewerError, match="backgroun"):
@@ -213,7 +214,7 @@ def test_watch_refuses_what_is_no_loop() -> None:
 def _until(true: Any) -> None:
     from time import monotonic, sleep
 
-    deadline = monotonic() + 60.0  # only ends a test that hangs
+    deadline = monotonic() + 60.0  # ends a test that hangs
     while not true():
         assert monotonic() < deadline
         sleep(0.01)

@@ -3,7 +3,7 @@ r"""Eight quadrupeds trot and crawl on MuJoCo, with one set of parameters.
     python hsp_control/companions/walking/benchmark/trotting.py \
         [--estimated] [--case WORD] [robot ...]
 
-Prints one line for each robot and case: whether it stood at the end, how far it came,
+Prints one line per robot and case: whether it stood at the end, how far it came,
 its mean speed while it trotted at full speed, the share of steps that a limit changed,
 and the CPU time of a period as a share of real time, median: of the whole loop, with
 plan, estimator, controller, MuJoCo and log. ``--estimated``: with an estimated base,
@@ -118,7 +118,7 @@ def said(robot: str, case: dict[str, Any], *, estimated: bool) -> str:
     if run.status != "completed":
         return str(run.meta["message"])
     fast = (run.t > 2.0) & (run.t < UNTIL)
-    points = run.q[fast][::30, :2]  # of whole cycles, so that swaying does not count
+    points = run.q[fast][::30, :2]  # of whole cycles, so that swaying averages out
     ways = np.diff(points if case["plan"].get("turn") else points[[0, -1]], axis=0)
     mean = np.hypot(*ways.T).sum() / (0.3 * (len(points) - 1))
     stands = run["plan.phase"][-1] == 0 and np.abs(run.v[-1]).max() < 0.3

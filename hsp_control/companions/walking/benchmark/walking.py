@@ -3,7 +3,7 @@ r"""Talos walks on MuJoCo: far, fast, turning, pushed, with other masses and fri
     python hsp_control/companions/walking/benchmark/walking.py \
         [--estimated] [--robot g1] [WORD ...]
 
-Prints one line for each case: whether it stood at the end, how far it came, and how
+Prints one line per case: whether it stood at the end, how far it came, and how
 well the plan was followed; with words only those whose names contain one. Each case is
 ``walking/talos_walk`` (or ``g1_walk``) with other values; ``--estimated`` with an
 estimated base, from a noisy inertial measurement unit and noisy encoders.

@@ -3,10 +3,10 @@ r"""Other bipeds walk by the same plan, with its defaults: how fast, and how wel
     python hsp_control/companions/walking/benchmark/walking_bipeds.py \
         [--unitree FOLDER] [part of a name]
 
-Prints one line for each robot and speed: six steps on MuJoCo at 1 kHz, and a second of
-standing. Nothing is tuned: a robot has its joints bent a little, soles as large as its
-meshes or an estimate of them, and ``plan: {type: walk, speed: ...}``. ``--unitree`` is
-the folder ``robots`` of github.com/unitreerobotics/unitree_ros, whose robots
+Prints one line per robot and speed: six steps on MuJoCo at 1 kHz, and a second of
+standing. Nothing is tuned: a robot has its joints slightly flexed, soles as large as
+its meshes or an estimate of them, and ``plan: {type: walk, speed: ...}``. ``--unitree``
+is the folder ``robots`` of github.com/unitreerobotics/unitree_ros, whose robots
 example-robot-data has not.
 """
 
@@ -35,7 +35,7 @@ ROMEO_HANDS = [
 
 @dataclass(frozen=True)
 class Biped:
-    """A biped: its feet, and how its knees are bent.
+    """A biped: its feet, and its knees' flexion.
 
     Attributes:
         robot: The robot, as in a configuration.
@@ -167,7 +167,7 @@ def unitree(folder: Path) -> dict[str, Biped]:
 
 
 def lines(words: list[str], bipeds: dict[str, Biped]) -> Iterator[str]:
-    """Yield a line for each robot and speed, until one falls."""
+    """Yield a line per robot and speed, until one falls."""
     for name, biped in bipeds.items():
         if words and not any(word in name for word in words):
             continue

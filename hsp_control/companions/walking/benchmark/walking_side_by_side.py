@@ -307,14 +307,14 @@ def timing_table(taken: dict[str, Array]) -> str:
 
 
 INTRODUCTION = """Talos stands and walks under the same plan, on MuJoCo at 1 kHz. The
-plan gets the measurements of each closed loop and feeds references back (so the error
-of the divergent component ξ has in it what a controller does not follow). Both have the
+plan receives the measurements of its closed loop and returns references (so the error
+of the divergent component ξ includes the controller's tracking error). Both have the
 same gains, soles, friction pyramids, effort limits and contact damping, and the forces
 of a foot that comes or goes fade alike; neither has joint limits. TSID 1.10 has soles
 as constraints that are added and removed, centre of mass, trunk and swing foot with
 weight 1, and a posture (Kp = 6, Kd = 7: K_N = 6 and g = -(q - q_start)). Status of this
 law: 0 exact, 1 forces redistributed, 2 limited, 3 limits relaxed; of TSID: 0 solved,
-otherwise its last effort is held. *Slipped*: how far a sole moved while it bore fully.
+otherwise its last effort is held. *Slipped*: the motion of a sole under full load.
 
 """
 

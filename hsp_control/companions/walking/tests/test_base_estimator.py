@@ -1,4 +1,4 @@
-"""The base of a whole robot: against the truth, and what is refused."""
+"""The base of a whole robot: against the truth, and refusals."""
 
 from functools import cache
 
@@ -32,7 +32,7 @@ EXACT = Imu(
 
 
 class Listening(RunningPlan):
-    """Keeps its measurements."""
+    """Records its measurements."""
 
     def __init__(self):
         super().__init__(Listens())
@@ -50,7 +50,7 @@ class Listening(RunningPlan):
 
 
 class Listens(MotionPlan):
-    """A plan that only listens."""
+    """A plan that only receives measurements."""
 
     def parts(self, robot, tasks, contacts):
         raise NotImplementedError
@@ -64,7 +64,7 @@ LISTENING = Listening()
 
 @cache
 def swaying():
-    """Return a robot that sways on two rigid feet, and what is measured of it."""
+    """Return a robot that sways on two rigid feet, and its measurements."""
     experiment = load_experiment(
         "whole_body/talos_circle", "tasks.center_of_mass.blend=0.3"
     )
@@ -116,7 +116,7 @@ def test_without_noise_it_converges_to_the_truth():
     assert velocity < 1e-3
     assert estimate.v[3:6] == pytest.approx(true.v[3:6], abs=0.05)  # half a period late
     assert estimate.q[7:] == pytest.approx(true.q[7:])
-    # The soles stand still.
+    # The soles are at rest.
     P = running.filter.covariance
     assert np.sqrt(np.diag(P)[ROTATION][:2]).max() < 2e-4
 
@@ -139,7 +139,7 @@ def test_from_the_truth_it_stays_there():
 
 
 @pytest.mark.parametrize("share", [0.0, 0.09])
-def test_a_foot_counts_while_it_is_pressed(share):
+def test_a_foot_is_in_contact_while_it_is_pressed(share):
     """With a tenth of the robot's weight."""
     experiment, heard = swaying()
     mass = sum(inertia.mass for inertia in experiment.robot.model.inertias)
@@ -155,7 +155,7 @@ def test_a_foot_counts_while_it_is_pressed(share):
     assert len(running.filter.names) == 8
 
 
-def test_only_the_named_contacts_count():
+def test_only_the_named_contacts_are_used():
     experiment, heard = swaying()
     own = BaseEstimator(contacts=["left_foot"])
     running = own.begin(experiment.controller, heard[0].inertial)
@@ -167,14 +167,14 @@ def test_only_the_named_contacts_count():
         wrong.begin(experiment.controller, heard[0].inertial)
 
 
-def test_without_a_force_the_controller_says_which_foot_bears():
+def test_without_a_force_the_controller_determines_the_stance_foot():
     experiment, heard = swaying()
     running = BaseEstimator().begin(experiment.controller, heard[0].inertial)
     running.update(heard[0]._replace(wrenches={}))
     assert len(running.filter.names) == 8
 
 
-def test_what_does_not_fit_is_said():
+def test_unsuitable_input_is_reported():
     arm = load_experiment("paper/2_rest").controller
     reading = Inertial("base_link", np.zeros(3), np.zeros(3))
     with pytest.raises(EstimationError, match=r"has no free-flyer root at its beg"):

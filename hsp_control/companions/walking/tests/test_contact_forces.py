@@ -39,24 +39,24 @@ def standing(name):
 
 
 @pytest.mark.parametrize("name", CASES)
-def test_estimates_are_what_rigid_contacts_exert(name):
+def test_estimates_equal_forces_of_rigid_contacts(name):
     run = standing(name)
     weight = 9.81 * sum(
         inertia.mass for inertia in load_experiment(name).robot.model.inertias
     )
     later = run.t > 0.1  # the observer has converged
     for frame in CASES[name]:
-        for what, share in (("force", 0.02), ("moment", 0.005)):
-            if what == "moment" and "talos" not in name:
-                continue  # a rigid point holds the centre, a ball rolls below it
-            true = run[f"plant.contact.{frame}.{what}"][later]
-            found = run[f"estimate.contact.{frame}.{what}"][later]
+        for part, share in (("force", 0.02), ("moment", 0.005)):
+            if part == "moment" and "talos" not in name:
+                continue  # a rigid point fixes the centre, a ball rolls below it
+            true = run[f"plant.contact.{frame}.{part}"][later]
+            found = run[f"estimate.contact.{frame}.{part}"][later]
             assert np.abs(true - found).max() < share * weight
 
 
 @pytest.mark.parametrize("name", CASES)
 def test_wrenches_that_push_on_a_robot_at_rest_are_found(name):
-    """Any wrenches; a ball is pushed where it touches, below its centre."""
+    """Any wrenches; the force on a ball acts at its contact, below the centre."""
     experiment, random = load_experiment(name), np.random.default_rng(1)
     robot, q, rest = experiment.robot, experiment.q0, np.zeros(experiment.robot.nv)
     state, tau = robot.state(0.0, q, rest), robot.inverse_dynamics(q, rest, rest)
@@ -75,7 +75,7 @@ def test_wrenches_that_push_on_a_robot_at_rest_are_found(name):
 
 
 def test_a_wrench_that_moves_nothing_is_zero():
-    """Of two contacts at one place the difference has no effect; each has half."""
+    """For two contacts at one place only the sum is observable; both get half."""
     experiment = load_experiment("whole_body/solo12_trunk")
     robot, q, rest = experiment.robot, experiment.q0, np.zeros(experiment.robot.nv)
     first = experiment.controller.contacts[0]
@@ -95,7 +95,7 @@ def test_a_wrench_that_moves_nothing_is_zero():
 
 
 @pytest.mark.parametrize("instead", [True, False])
-def test_measured_wrenches_are_replaced_if_asked_for(instead):
+def test_measured_wrenches_are_replaced_on_request(instead):
     experiment = load_experiment("whole_body/solo12_trunk")
     q, rest = experiment.q0, np.zeros(experiment.robot.nv)
     frames = [each.frame for each in experiment.controller.contacts]

@@ -21,7 +21,7 @@ COARSE = "simulation.control_period=0.002"  # at its own period it trots in othe
 
 @cache
 def crawl() -> Rollout:
-    """Return a crawl of some steps, until it stands again."""
+    """Return a crawl of some steps until it stands again."""
     plan = "plan={type: crawl, speed: 0.06, until: 0.7}"
     settings = plan, "simulation.duration=5.4", "simulation.log_period=0.006"
     return load_experiment("walking/solo12_trot", *settings, COARSE).run()
@@ -33,7 +33,7 @@ def test_it_crawls_and_stands_again():
     assert run.status == "completed"
     assert run["plan.phase"][-1] == 0
     assert np.abs(run.v[-1]).max() < 0.05
-    # It has gone on by its velocity, and the feet are below it again.
+    # It has advanced by its velocity, and the feet are below it again.
     assert run.q[-1, 0] - run.q[0, 0] == pytest.approx(0.06 * 0.7, abs=0.015)
     places = [run[f"task.{name}.actual"][-1][:2] for name in FEET]
     mass = run["task.center_of_mass.actual"][-1]

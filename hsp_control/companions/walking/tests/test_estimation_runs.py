@@ -1,4 +1,4 @@
-"""Robots walk and trot on an estimated base, with a noisy unit, on MuJoCo."""
+"""Robots walk and trot on an estimated base, with a noisy IMU, on MuJoCo."""
 
 import re
 from pathlib import Path
@@ -24,7 +24,7 @@ def largest(run, name):
 @pytest.mark.system
 @pytest.mark.slow
 def test_talos_takes_a_step_on_an_estimated_base():
-    """One key turns it on; nothing else of the configuration changes."""
+    """One key enables it; the rest of the configuration is unchanged."""
     given = ("plan.steps=1", "simulation.duration=2.2", COARSE)
     run = load_experiment("walking/talos_walk", "estimators.base=true", *given).run()
     assert run.status == "completed"
@@ -33,7 +33,7 @@ def test_talos_takes_a_step_on_an_estimated_base():
     assert largest(run, "position_error") < 0.02
     assert largest(run, "rotation_error") < 0.02
     assert largest(run, "velocity_error") < 0.03
-    # The law has computed with the estimate, and the log has both.
+    # The law used the estimate, and the log has both.
     assert not np.array_equal(run["estimate.base"], run.q[:, :7])
     error = run["estimate.base"][:, :3] - run.q[:, :3]
     assert error == pytest.approx(run["estimate.position_error"])

@@ -1,4 +1,4 @@
-"""References and schedules that are fed while a robot moves."""
+"""References and schedules that are set while a robot moves."""
 
 import pickle
 from copy import deepcopy
@@ -42,7 +42,7 @@ def test_in_between_an_orientation_turns_about_its_mean_rate():
     assert reference.sample(1.0).rotation == pytest.approx(R, abs=1e-15)
 
 
-def test_its_calls_read_what_is_written_later():
+def test_its_calls_read_later_values():
     reference, sample = Fed(2), TrajectorySample.allocate(2)
     reference.anchored([0.0, 0.0])
     calls = planned(reference.calls(sample))

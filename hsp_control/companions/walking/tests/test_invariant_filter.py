@@ -23,7 +23,7 @@ from hsp_control.companions.walking.estimation.invariant_filter import (
 
 
 def random_filter(random, points=2):
-    """Return a filter somewhere, with points."""
+    """Return a filter at a random state, with points."""
     made = InvariantFilter(
         expm(skew(random.normal(size=3))),
         random.normal(size=3),
@@ -62,7 +62,7 @@ def error_of(estimate, true):
 
 
 def displaced(true, error):
-    """Return the filter whose error is this."""
+    """Return the filter with a given error."""
     estimate = deepcopy(true)
     estimate.retract(error)
     return estimate
@@ -74,7 +74,7 @@ def test_the_transition_is_the_derivative_of_the_motion():
     omega, force, h = random.normal(size=3), 10.0 * random.normal(size=3), 0.05
 
     def after(error):
-        """Return the error after a period in which the readings are the same."""
+        """Return the error after a period with the same readings."""
         true = displaced(estimate, -error)  # to first order
         before = error_of(estimate, true)
         hat = deepcopy(estimate)
@@ -99,7 +99,7 @@ def test_the_transition_is_the_derivative_of_the_motion():
 
 
 def test_a_period_adds_the_variance_of_its_noise():
-    """From certainty at the origin, at rest: density² h, whatever the period."""
+    """From zero covariance at the origin, at rest: density² h, for any period."""
     made, n, h = random_filter(np.random.default_rng(7)), DENSITIES, 0.02
     made.velocity, made.position = np.zeros(3), np.zeros(3)
     made.points, made.covariance = np.zeros((2, 3)), np.zeros((FIXED + 6, FIXED + 6))
@@ -148,7 +148,7 @@ def test_a_new_point_has_the_error_of_where_it_is_seen_from():
     place, noise = random.normal(size=(1, 3)), np.diag([1.0, 4.0, 9.0])
     grown, step = deepcopy(true), 1e-6
     grown.add(["point"], place, noise)
-    # As a function of the error and of the noise of what is seen.
+    # As a function of the error and of the measurement noise.
     columns = []
     for k in range(FIXED + 3):
         hat = displaced(true, step * np.eye(FIXED + 3)[k][:FIXED])
@@ -165,7 +165,7 @@ def test_a_new_point_has_the_error_of_where_it_is_seen_from():
 @settings(max_examples=25, deadline=None)
 @given(seed=st.integers(0, 10_000), yaw=st.floats(-3.0, 3.0))
 def test_it_does_not_matter_where_the_world_begins(seed, yaw):
-    """Another heading and place of the world turn the estimate, and nothing else."""
+    """Another heading and origin of the world transform the estimate only."""
     random = np.random.default_rng(seed)
     here, turn = random_filter(random), expm(skew(np.array([0.0, 0.0, yaw])))
     offset = random.normal(size=3)
@@ -216,7 +216,7 @@ def test_the_covariance_stays_one(seed):
 START = np.repeat([0.05, 0.1, 0.02, 0.01, 0.1], 3)
 
 
-def test_without_noise_what_can_be_observed_converges():
+def test_without_noise_observable_states_converge():
     """Tilt, velocity and biases, from a wrong start; the heading keeps its error."""
     start = START.copy()
     start[9:] = [*3 * [0.02], *3 * [0.05]]

@@ -1,4 +1,4 @@
-"""Contacts by the legs' joints equal those of the whole configuration."""
+"""Contacts from the legs' joints equal those of the whole configuration."""
 
 import numpy as np
 import pytest

@@ -16,7 +16,7 @@ FRAMES = {1.0: "left_sole_link", -1.0: "right_sole_link"}
 
 @pytest.fixture(scope="module")
 def talos():
-    """Talos, one foot ahead and turned, and what its legs do."""
+    """Talos with one foot ahead and rotated, and its legs' reaction."""
     experiment = load_experiment("walking/talos_walk")
     robot, step = experiment.robot, np.zeros(experiment.robot.nv)
     for joint, angle in (("left_1", 0.3), ("left_3", -0.4), ("right_3", 0.3)):
@@ -28,7 +28,7 @@ def talos():
 
 
 def pressed(state, rows, wanted):
-    """Return where the ground pushes for the smallest motion with accelerations, (2,).
+    """Return the centre of pressure of the smallest motion with accelerations, (2,).
 
     From the wrench at the root, by inverse dynamics; relative to the centre of
     mass, on the ground 1 m below it.
@@ -64,9 +64,9 @@ def test_a_leg_that_swings_moves_the_centre_of_pressure(talos, side, axis):
     wanted = np.zeros(18)
     wanted[axis] = 2.0
     moved = pressed(state, rows, wanted)
-    # K is in axes of the standing foot, whose yaw is zero here.
+    # K is in axes of the stance foot, whose yaw is zero here.
     assert legs._first[side][:, axis] * -2.0 == pytest.approx(moved, abs=1e-9)
-    if axis == 0:  # forward: the feet push ahead, by centimetres
+    if axis == 0:  # forward: the centre of pressure moves ahead by centimetres
         assert moved[0] > 0.01
     turned, yaw = LegReaction(experiment.controller, "base_link", FRAMES), 0.7
     turned.lifts(state, side, yaw)
@@ -77,7 +77,7 @@ def test_a_leg_that_swings_moves_the_centre_of_pressure(talos, side, axis):
 
 
 def test_the_reaction_to_a_swing_obeys_the_pendulum(talos):
-    """η' = ω (η - δ), and zero at touchdown, with δ = K a; K changes on the way."""
+    """η' = ω (η - δ), zero at touchdown, with δ = K a and varying K."""
     _, state, legs = talos
     yaw = 0.4
     legs.begin(state, yaw, 0.6, W)

@@ -1,4 +1,4 @@
-"""Robots on feet in a live loop: what is measured, how they stand, stop and fall."""
+"""Legged robots in a live loop: measurements, standing, stops and falls."""
 
 from dataclasses import replace
 from functools import cache
@@ -49,7 +49,7 @@ def trotting(*overrides: str) -> Experiment:
 
 
 class Watched(InProcessRobot):
-    """A robot that keeps the efforts and the velocities of all periods."""
+    """A robot that records efforts and velocities of all periods."""
 
     def __init__(self, experiment: Experiment) -> None:
         super().__init__(simulated_robot(experiment))
@@ -87,7 +87,7 @@ def live(
 
 @pytest.mark.system
 @pytest.mark.slow
-def test_a_live_plan_does_what_the_simulation_does(tmp_path: Path) -> None:
+def test_a_live_plan_equals_the_simulated_one(tmp_path: Path) -> None:
     """The estimator's errors, the plan's phases and the efforts are those of a run."""
     brief = ("estimators.base=true", "simulation.duration=0.35", *BRIEF)
     experiment = trotting(*brief)
@@ -111,7 +111,7 @@ def test_a_live_plan_does_what_the_simulation_does(tmp_path: Path) -> None:
 
 @pytest.mark.system
 @pytest.mark.slow
-@pytest.mark.parametrize("by", ["operator", *further("duration")])  # as a walk below
+@pytest.mark.parametrize("by", ["operator", *further("duration")])  # like a walk below
 def test_a_regular_end_lets_the_plan_come_to_rest(by: str) -> None:
     experiment, requests = trotting(COARSE), OperatorRequests()
 
@@ -126,7 +126,7 @@ def test_a_regular_end_lets_the_plan_come_to_rest(by: str) -> None:
     assert report.ended == {"duration": "completed", "operator": "operator"}[by]
     assert report.at_rest
     assert 0.7 < report.t < 0.7 + 4.0  # `StopSettings.coming_to_rest`
-    # It stands: the contacts carry its weight, and its trunk is level and high.
+    # It stands: the contacts carry its weight; its trunk is level and at full height.
     wrenches = robot.robot.measured().wrenches
     assert set(wrenches) == set(FEET)
     weight = 9.81 * sum(each.mass for each in experiment.robot.model.inertias)
@@ -156,7 +156,7 @@ def test_a_walk_that_is_stopped_brings_its_feet_together(plan: str) -> None:
 
 @pytest.mark.system
 @pytest.mark.slow
-def test_a_fall_is_found_said_and_ends_with_damped_joints() -> None:
+def test_a_fall_is_detected_reported_and_ends_with_damped_joints() -> None:
     push = "{frame: base_link, moment: [6, 0, 0], start: 0.1, duration: 0.3}"
     shove = f"plant.pushes=[{push}]"
     for plan in ("plan.speed=0.3", "plan=null"):
@@ -175,13 +175,13 @@ def test_a_fall_is_found_said_and_ends_with_damped_joints() -> None:
         assert len(stopped) > 100
         for _, _, tau, v in robot.rows[-200:]:
             assert not tau[:6].any()
-            # Damping takes energy out of the joints, within the limits.
+            # Damping dissipates energy in the joints, within the limits.
             assert tau @ v <= 1e-12
         assert report.t < 4.0, "a fall must end the run"
 
 
 @pytest.mark.system
-def test_what_a_plan_or_an_estimator_misses_is_said_before_the_run() -> None:
+def test_missing_input_of_a_plan_or_estimator_is_reported_before_the_run() -> None:
     felt = "plan={type: sensed, contacts: {front_left: {force: 1}}}"
     tasks = "tasks={trunk: {type: frame_orientation, frame: base_link}}"
 
@@ -215,7 +215,7 @@ def test_what_a_plan_or_an_estimator_misses_is_said_before_the_run() -> None:
 
 @pytest.mark.system
 def test_joints_and_feet_exert_the_force_of_a_safe_stop() -> None:
-    """x = Sᵀ tau + Jᵀ f, and tau does the work of x while the feet stand still."""
+    """x = Sᵀ tau + Jᵀ f; tau and x have equal power while the feet are at rest."""
     experiment = trotting()
     robot, contacts = experiment.robot, experiment.controller.contacts
     state = robot.state(0.0, experiment.q0, experiment.v0)
@@ -253,7 +253,7 @@ def test_feet_that_are_not_pressed_do_not_bear() -> None:
     feet.update(Measurement(1, 0.0, q, v, wrenches=pressed))
     assert [each.frame for each in feet.contacts] == ["HL_FOOT"]
     assert feet.hold
-    feet.update(Measurement(1, 0.0, q, v))  # no sensors: their schedules count
+    feet.update(Measurement(1, 0.0, q, v))  # no sensors: their schedules apply
     assert len(feet.contacts) == 4
     feet.lift()
     assert not feet.hold
@@ -272,7 +272,7 @@ def test_no_motor_of_a_floating_base_is_ever_sent_an_effort() -> None:
         check_live(trotting("live.compensates_gravity=true"))
 
 
-# --- what is measured ----------------------------------------------------------------
+# --- measurements --------------------------------------------------------------------
 
 
 @pytest.mark.system

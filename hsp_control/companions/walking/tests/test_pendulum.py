@@ -1,4 +1,4 @@
-"""The pendulum's divergent component, and the polygons that it must stay in."""
+"""The pendulum's divergent component of motion, and its support polygons."""
 
 import numpy as np
 import pytest
@@ -64,7 +64,7 @@ def test_integration_of_the_pendulum_stays_with_the_closed_form():
             k4 = rate(t + h, x + h * k3)
             x = x + h / 6 * (k1 + 2 * k2 + 2 * k3 + k4)
         end = phase.dcm(start, phase.duration, W)
-        # An error of the start grows by exp(ω t): 800 over these 2 s.
+        # An initial error grows by exp(ω t): 800 over these 2 s.
         assert dcm_of(x[:2], x[2:], W) == pytest.approx(end, abs=1e-8)
 
 
@@ -82,8 +82,9 @@ def test_the_error_that_bounded_feedback_leaves(error, t):
         assert abs(error_after(error, t, W, gain, reach)) <= abs(error)
 
 
-def test_a_phase_takes_as_long_as_the_component_needs():
-    """A foot that lands 30 ms early or late changes how long the weight shifts."""
+def test_a_phase_lasts_as_long_as_the_component_needs():
+    """A foot that lands 30 ms early or late changes the duration of the weight
+    shift."""
     phase = DcmPhase(0.15, np.array([0.48, -0.08]), np.array([0.74, 0.08]))
     last = phase.end + np.array([0.03, -0.02])
     for duration in (0.12, 0.15, 0.18):
@@ -91,7 +92,7 @@ def test_a_phase_takes_as_long_as_the_component_needs():
         found = in_step(phase, last, there, W, (0.075, 0.3))
         assert found.duration == pytest.approx(duration, abs=0.6 * 0.225 / 200)
         assert np.array_equal(found.end, phase.end)
-        # A point beside the path changes little: the nearest point is used.
+        # A point off the path changes little: the nearest point is used.
         along = there - phase._replace(duration=duration - 1e-3).first_dcm(last, W)
         beside = 0.02 * np.array([-along[1], along[0]]) / np.linalg.norm(along)
         found = in_step(phase, last, there + beside, W, (0.075, 0.3))
@@ -128,10 +129,10 @@ def test_a_way_ends_where_it_leaves_the_polygon():
 
 
 def test_soles_hold_every_divergent_component_that_is_within_them():
-    """ξ' = ω (ξ - p) with p along the error: to the middle, straight.
+    """ξ' = ω (ξ - p) with p along the error: straight to the middle.
 
-    The feet of a stride, and a component at the edge of the front one: the nearest
-    point instead brings ξ behind this foot's heel first, where the soles are narrower.
+    Feet in a stride with ξ at the edge of the front one: the nearest point would first
+    move ξ behind this foot's heel, where the soles are narrower.
     """
     sole = np.array([[1, 1], [1, -1], [-1, 1], [-1, -1]]) * [0.072, 0.045]
     front, back = np.array([0.74, 0.085]), np.array([0.48, -0.085])

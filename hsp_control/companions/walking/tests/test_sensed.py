@@ -1,4 +1,4 @@
-"""Contacts begin and end when that is felt."""
+"""Contacts begin and end by measured forces."""
 
 import numpy as np
 import pytest
@@ -17,15 +17,15 @@ SWING, FOOT = "whole_body/solo12_swing", "FL_FOOT"
 UNSCHEDULED = ("contacts.front_left.schedule=null", "tasks.foot.schedule=null")
 
 
-def told(rule, *overrides):
-    """Return the experiment of a foot that is sensed, and what runs."""
+def reported(rule, *overrides):
+    """Return the experiment of a foot with a sensed contact, and its run."""
     plan = f"plan={{type: sensed, contacts: {{front_left: {rule}}}}}"
     experiment = load_experiment(SWING, *UNSCHEDULED, plan, *overrides)
     return experiment, experiment.scenario.plan.begin(experiment.controller)
 
 
 def feel(experiment, running, t, force):
-    """Set a measured force, and return the contact's and the task's switches."""
+    """Set a measured force; return the contact's and the task's switches."""
     q, v = experiment.q0, np.zeros(experiment.robot.nv)
     wrenches = {} if force is None else {FOOT: np.array([0, 0, force, 0, 0, 0.0])}
     running.update(Measurement(0, t, q, v, wrenches=wrenches))
@@ -34,8 +34,8 @@ def feel(experiment, running, t, force):
     return contacts["front_left"].schedule, tasks["foot"].schedule
 
 
-def test_it_bears_when_it_is_pressed_and_its_force_rises():
-    experiment, running = told("{force: 3, task: foot, ramp: 0.2}")
+def test_it_carries_when_pressed_and_its_force_rises():
+    experiment, running = reported("{force: 3, task: foot, ramp: 0.2}")
     contact, task = feel(experiment, running, 0.0, 0.0)
     assert isinstance(contact, Switch)
     assert not contact.is_on
@@ -54,7 +54,9 @@ def test_it_bears_when_it_is_pressed_and_its_force_rises():
 
 
 def test_it_ends_when_the_ground_is_gone_but_not_at_once():
-    experiment, running = told("{force: 4, patience: 0.02, task: foot, starts: true}")
+    experiment, running = reported(
+        "{force: 4, patience: 0.02, task: foot, starts: true}"
+    )
     contact, task = feel(experiment, running, 0.0, 0.0)  # nothing is measured yet
     assert contact.is_on
     assert not task.is_on
@@ -66,20 +68,20 @@ def test_it_ends_when_the_ground_is_gone_but_not_at_once():
         assert contact.is_on, k
     contact, task = feel(experiment, running, 0.051, 0.9)
     assert not contact.is_on
-    assert contact.weight(0.061) == pytest.approx(0.5)  # it fades as long again
+    assert contact.weight(0.061) == pytest.approx(0.5)  # it fades for as long again
     assert task.weight(0.061) == 0.0
     assert not contact.active(0.0711)
     assert task.weight(0.0711) == 1.0
 
 
 @pytest.mark.parametrize(
-    ("height", "force", "bears"),
+    ("height", "force", "carries"),
     [(0.02, 2.9, False), (0.01, 3.0, False), (0.02, 3.0, True)],
 )
-def test_with_height_and_force_both_must_be_felt(height, force, bears):
-    experiment, running = told(f"{{force: 3, height: {height}}}")
-    contact, _ = feel(experiment, running, 0.0, force)  # it stands at 0.0165 m
-    assert contact.is_on == bears
+def test_with_height_and_force_both_must_be_felt(height, force, carries):
+    experiment, running = reported(f"{{force: 3, height: {height}}}")
+    contact, _ = feel(experiment, running, 0.0, force)  # standing height: 0.0165 m
+    assert contact.is_on == carries
 
 
 @pytest.mark.parametrize(("rule", "message"), [
@@ -89,9 +91,9 @@ def test_with_height_and_force_both_must_be_felt(height, force, bears):
     ("{force: 2, wanted: [[2, 1]]}", "the interval from 2 to 1 s is empty"),
     ("{force: 2, task: fot}", "no task 'fot'; did you mean 'foot'"),
 ])  # fmt: skip
-def test_what_does_not_fit_is_said(rule, message):
+def test_unsuitable_input_is_reported(rule, message):
     with pytest.raises(HspControlError, match=message):
-        told(rule)
+        reported(rule)
 
 
 def test_schedules_and_unknown_contacts_are_refused():
@@ -106,8 +108,8 @@ def test_schedules_and_unknown_contacts_are_refused():
 
 
 def stood(plant, *overrides, duration):
-    """Return a run of Solo, whose front left foot is sensed, on rigid contacts."""
-    experiment, _ = told("{force: 2, starts: true, ramp: 0.05}", *overrides)
+    """Return a run of Solo on rigid contacts; that of the front left foot is sensed."""
+    experiment, _ = reported("{force: 2, starts: true, ramp: 0.05}", *overrides)
     return simulate(
         experiment.controller, experiment.q0, duration=duration,
         control_period=0.002, log_period=0.002, integrator=Rk4(step=0.002),
@@ -115,8 +117,8 @@ def stood(plant, *overrides, duration):
     )  # fmt: skip
 
 
-def test_on_rigid_contacts_it_follows_what_the_plant_does():
-    """The plant's contact goes and comes back; the controller feels both."""
+def test_on_rigid_contacts_it_tracks_the_plant():
+    """The plant's contact is lost and regained; the controller detects both."""
     feet = ("FL_FOOT", "FR_FOOT", "HL_FOOT", "HR_FOOT")
     plant = RigidContacts(
         [
@@ -127,12 +129,12 @@ def test_on_rigid_contacts_it_follows_what_the_plant_does():
         ]
     )
     run = stood(plant, duration=0.3)
-    bears, t = run["plan.front_left.active"], run.t
-    assert bears[t < 0.1].all()
-    gone = t[np.flatnonzero(np.diff(bears) < 0)[0] + 1]
+    carries, t = run["plan.front_left.active"], run.t
+    assert carries[t < 0.1].all()
+    gone = t[np.flatnonzero(np.diff(carries) < 0)[0] + 1]
     assert 0.1 + 0.015 < gone < 0.1 + 0.03  # its patience
-    back = t[np.flatnonzero(np.diff(bears) > 0)[0] + 1]
-    assert 0.2 <= back < 0.29  # when it has turned from a pull to a push
+    back = t[np.flatnonzero(np.diff(carries) > 0)[0] + 1]
+    assert 0.2 <= back < 0.29  # when it changes from a pull to a push
     weight = run["contact.front_left.weight"]
     assert weight[np.flatnonzero(t >= back + 0.05)] == pytest.approx(1.0)
     faded = gone + 0.02  # its patience again

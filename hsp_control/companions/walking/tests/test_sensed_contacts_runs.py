@@ -1,4 +1,4 @@
-"""A foot is put down where the ground is felt: on MuJoCo, measured and estimated."""
+"""A foot lands where the ground is detected: on MuJoCo, measured and estimated."""
 
 import numpy as np
 import pytest
@@ -11,7 +11,7 @@ FOOT = "FL_FOOT"
 PUT_DOWN = (
     "contacts.front_left.schedule=null",
     "tasks.foot.schedule=null",
-    # The reference goes on to a centimetre below the ground.
+    # The reference continues to a centimetre below the ground.
     "tasks.foot.trajectory.waypoints=[[0, 0, 0], [0, 0, 0.03], [0, 0, -0.01]]",
     "tasks.foot.trajectory.times=[0.75, 1.0, 1.4]",
     "tasks.trunk.trajectory.position.times=[0, 0.5, 1.7, 2.2]",
@@ -37,7 +37,7 @@ def test_a_foot_is_put_down_where_the_ground_is_felt(estimated):
     measured = run[f"plant.contact.{FOOT}.force"][:, 2]
     lands = np.flatnonzero(np.diff(bears) > 0)[0] + 1
     touches = np.flatnonzero((measured > 0.0) & (t > 1.0))[0]
-    # Before the reference would have ended, and soon after the ground is touched.
+    # Before the reference's end, and soon after the ground is touched.
     assert 1.1 < t[lands] < 1.4
     assert 0.0 <= t[lands] - t[touches] < 0.05
     assert not measured[(t > 0.8) & (t < 1.1)].any()

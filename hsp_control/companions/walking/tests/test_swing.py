@@ -1,4 +1,4 @@
-"""Swing feet, footsteps and soles: continuity, and what may not be left."""
+"""Swing feet, footsteps and soles: continuity and constraints."""
 
 import numpy as np
 import pytest
@@ -88,7 +88,7 @@ def test_a_swing_is_smooth_before_and_after_it_should_have_landed():
         [0.3, 0.1]
     )
     assert swing.orientation(1.6).position == pytest.approx(np.eye(3), abs=1e-12)
-    # No ground: it goes on down, as fast as it was lifted.
+    # Without ground it continues down, at its lift speed.
     assert swing.position(1.9).velocity == pytest.approx([0.0, 0.0, -DESCENT / 12])
 
 
@@ -109,7 +109,7 @@ def test_a_redirected_swing_stays_smooth(t, end):
 
 @pytest.mark.parametrize(("width", "arm"), [(0.17, 0.1), (0.3, 0.15)])
 def test_feet_that_turn_accelerate_as_those_that_walk(width, arm):
-    """They are half a width beside the middle; less than 0.1 m is regarded as that."""
+    """They are half a width off the middle, at least 0.1 m."""
     walk = Walk(speed=0.5, turn=9.0, acceleration=0.4, swing=0.6, double_support=0.15)
     planner = StepPlanner(walk, STANCE._replace(width=width), "a biped")
     first = planner._next_velocity(Velocity(0.0, 0.0, 0.0), 0.0, 0)
@@ -127,7 +127,7 @@ def test_steps_on_a_circle_stay_on_it():
     assert turns == pytest.approx(0.25 * np.ones(15))
     points = np.array([[each.x, each.y] for each in middles])
     chords = np.linalg.norm(points[8:] - points[:8], axis=1)
-    for foot_of in (chords[::2], chords[1::2]):  # eight steps turn by two radians
+    for foot_of in (chords[::2], chords[1::2]):  # eight steps rotate by two radians
         assert np.ptp(foot_of) < 1e-9
     radius = chords.mean() / (2.0 * np.sin(1.0))
     assert radius == pytest.approx(v.forward / v.turn, rel=0.02)
@@ -141,7 +141,7 @@ def test_a_step_keeps_away_from_the_other_foot_and_within_reach():
     assert place.local(far.point) == pytest.approx([0.6, -0.4])
 
 
-def test_full_turns_do_not_count_between_feet():
+def test_full_turns_between_feet_are_ignored():
     a, b = Footstep(0.0, 0.0, 3.1), Footstep(0.0, 0.2, -3.1)
     assert between(a, b).yaw == pytest.approx(np.pi)
     assert near(0.1, 4 * np.pi) == pytest.approx(0.1 + 4 * np.pi)
@@ -161,7 +161,7 @@ def test_the_nearest_point_of_a_hull():
     hull = convex_hull(rng.normal(size=(30, 2)))
     for point in rng.normal(scale=3.0, size=(20, 2)):
         found = nearest_inside(hull, point)
-        # The projection onto a convex set: no corner is on the other side of it.
+        # Projection onto a convex set: all corners are on one side.
         assert ((hull - found) @ (point - found)).max() < 1e-9
 
 
@@ -203,4 +203,4 @@ def test_a_push_is_answered_by_place_and_where_that_ends_by_time():
     assert free.target.y > 0.13
     held = adjust(planned, 0.3, (0.1, 0.5), dcm_at, wanted, shift, least)
     assert held.target.y <= 0.12
-    assert held.remaining < free.remaining < 0.3  # before it gets farther
+    assert held.remaining < free.remaining < 0.3  # before it moves farther

@@ -1,4 +1,4 @@
-"""A trot is a value, as is a crawl; mistakes are refused before a foot swings."""
+"""Trots and crawls are values; mistakes are refused before a foot swings."""
 
 from dataclasses import replace
 
@@ -59,7 +59,7 @@ TURNED = BallContact("HR_FOOT", radius=0.0165, normal=[1, 0, 0])
     (Trot(), [], [*FEET[:3], TURNED],
      "plan: contact 'HR_FOOT' ... normal [1.0, 0.0, 0.0]"),
 ])  # fmt: skip
-def test_what_does_not_fit_is_said(solo, trot, tasks, contacts, message):
+def test_unsuitable_input_is_reported(solo, trot, tasks, contacts, message):
     with pytest.raises(HspControlError, match=wording(message)):
         trot.parts(solo, tasks, contacts)
 
@@ -75,7 +75,7 @@ def test_a_leg_needs_three_joints(solo):
 
 
 def test_barriers_let_legs_swing():
-    """A given value stays, also through later changes."""
+    """A given value is kept, also through later changes."""
     controller = load_experiment(TROT).controller
     assert controller.limits.bandwidth == BANDWIDTH
     controller.at(0.1).ramp(0.0).limits(Limits(velocity=0.5))
@@ -87,7 +87,7 @@ def test_barriers_let_legs_swing():
     assert load_experiment(TROT, "limits=none").controller.limits is None
 
 
-def test_what_the_robot_cannot_do_is_said_before_it_runs():
+def test_infeasible_parts_are_reported_before_the_run():
     with pytest.raises(PlanError, match=r"plan: at 3 m/s a foot is 0.525 m before and"):
         load_experiment(TROT, "plan.speed=3")
     with pytest.raises(PlanError, match=r"at 0.3 m/s and 9 rad/s a foot is 0.374 m"):

@@ -1,4 +1,4 @@
-"""Solo takes some diagonal steps and stands: on MuJoCo, by its configuration."""
+"""Solo makes some diagonal steps and stands: on MuJoCo, by its configuration."""
 
 from dataclasses import replace
 from functools import cache
@@ -38,13 +38,13 @@ def test_it_trots_and_stands_again():
 @pytest.mark.slow
 @pytest.mark.system
 def test_it_returns_to_its_line_after_a_push():
-    """Across it; what it loses along it, it does not make up for."""
+    """Laterally; the error along the walk is not corrected."""
     push = "{frame: base_link, force: [-4, 8, 0], start: 1, duration: 0.1}"
     settings = f"plant.pushes=[{push}]", "plan.until=4.4", "simulation.duration=4.8"
     run = load_experiment("walking/solo12_trot", *settings, COARSE).run()
     assert run.status == "completed"
     beside = run.q[:, 1]
-    assert beside.max() > 0.12  # farther than the reference lets it go
+    assert beside.max() > 0.12  # farther than the reference permits
     assert np.abs(beside[run.t > 4.2]).max() < 0.03
     fast = (run.t > 2.5) & (run.t < 3.5)
     assert np.ptp(run.q[fast, 0]) == pytest.approx(0.3, abs=0.05)
@@ -52,8 +52,8 @@ def test_it_returns_to_its_line_after_a_push():
 
 @pytest.mark.slow
 @pytest.mark.parametrize("degrees", further(10.0))
-def test_down_a_ramp_a_foot_bears_while_the_other_one_looks_for_ground(degrees):
-    """A hind foot on the platform, the diagonal one above ground that is not there."""
+def test_down_a_ramp_a_foot_carries_while_the_other_seeks_ground(degrees):
+    """A hind foot is on the platform, the diagonal one above missing ground."""
     until = "plan.until=2", "simulation.duration=4"
     run = load_experiment("walking/solo12_trot", *ramp(degrees, 0.4), *until).run()
     assert run.status == "completed"
@@ -65,7 +65,7 @@ def test_down_a_ramp_a_foot_bears_while_the_other_one_looks_for_ground(degrees):
 
 @pytest.mark.slow
 def test_a_robot_that_is_nowhere_named_trots_within_its_limits():
-    """Go1 with nothing but defaults: barriers of 10 1/s would make it fall at 0.9 s."""
+    """Go1 with all defaults: with barriers of 10 1/s it would fall at 0.9 s."""
     feet = ["FL_foot", "FR_foot", "RL_foot", "RR_foot"]
     ball = {"shape": {"type": "sphere", "radius": 0.02}}
     given = {
@@ -117,7 +117,7 @@ def test_a_streamed_velocity_is_followed_and_repeated_from_the_log(tmp_path):
             recorder.plan.streams[0].send([0.0, 0.0, 0.0])
 
     run = experiment.run(on_row=drive)
-    assert (run["plan.phase"][:20] == 0).all()  # it stands until it is commanded
+    assert (run["plan.phase"][:20] == 0).all()  # it stands until commanded
     assert run["plan.velocity"].max() > 0.1
     again = load_experiment(run.save(tmp_path / "trot.npz")).run()
     for name in run.columns:

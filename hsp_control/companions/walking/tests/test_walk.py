@@ -1,4 +1,4 @@
-"""A walk is a value; what does not fit it is refused before the first step."""
+"""A walk is a value; an unsuitable robot is refused before the first step."""
 
 import re
 from dataclasses import replace
@@ -91,13 +91,13 @@ def test_it_adds_what_it_needs_and_keeps_what_is_given(talos):
         (Walk(trunk="base_lnk"), [], FEET, "plan.trunk: no ... 'base_lnk'"),
     ],
 )  # fmt: skip
-def test_what_does_not_fit_is_said(talos, walk, tasks, contacts, message):
+def test_unsuitable_input_is_reported(talos, walk, tasks, contacts, message):
     with pytest.raises(HspControlError, match=wording(message)):
         walk.parts(talos, tasks, contacts)
 
 
 def test_a_leg_of_five_joints_cannot_walk(talos):
-    """As that of Unitree's H1, or of Talos without the joint that rolls its ankle."""
+    """Like that of Unitree's H1, or of Talos without its ankle-roll joint."""
     locked = {"leg_left_6_joint": 0.0}
     robot = Robot.load("talos", locked=locked)
     with pytest.raises(
@@ -132,7 +132,7 @@ def test_a_velocity_is_given_once_and_has_three_numbers():
     (["contacts.left_foot.width=0.2", "contacts.right_foot.width=0.2"],
      "... plan: ... 'left_foot' and 'right_foot' ... 0.17 m ... 0.2 m"),
 ])  # fmt: skip
-def test_what_the_robot_cannot_do_is_said_before_it_runs(overrides, message):
+def test_infeasible_parts_are_reported_before_the_run(overrides, message):
     with pytest.raises(HspControlError) as caught:
         load_experiment(WALK, *overrides)
     assert re.search(wording(message), str(caught.value))
@@ -159,7 +159,7 @@ def test_falls_are_found(talos):
     FallDetector("base_link", feet, leaning).check(leaning)
     knees = np.zeros(talos.nv)
     for side in ("left", "right"):
-        detector.check(moved(knees))  # on one leg it stands, above the lower foot
+        detector.check(moved(knees))  # it stands on one leg, above the lower foot
         for joint, angle in ((3, -1.2), (4, 2.2), (5, -1.0)):
             knees[talos.velocity_index(f"leg_{side}_{joint}_joint")] = angle
     with pytest.raises(FallError, match=r"its centre of mass is at \d+ % of its first"):
@@ -167,7 +167,7 @@ def test_falls_are_found(talos):
 
 
 def test_a_footstep_is_the_middle_of_a_sole(talos):
-    """Wherever the frame's origin is: also beside it, as on a narrow ankle."""
+    """For any origin of the frame, also off the sole, as on a narrow ankle."""
     frame = SurfaceContact("left_sole_link", **SOLE, center=[0.02, 0.01, 0.0])
     given = {"left_foot": replace(frame, name="left_foot"), "right_foot": FEET[1]}
     made = Walk().parts(talos, [], list(given.values()))
@@ -202,7 +202,7 @@ def test_footsteps_are_taken_from_the_middle_between_the_feet():
     assert preview.swings.count(True) == 3
     for before, after in pairwise(preview.phases):
         assert np.array_equal(after.start, before.end)
-    # The weight ends between the last two steps.
+    # Finally the weight is between the last two footsteps.
     assert preview.phases[-1].end - middle == pytest.approx([0.4, 0.0], abs=1e-6)
 
 
@@ -212,6 +212,6 @@ def test_footsteps_are_taken_from_the_middle_between_the_feet():
     ("[[0.2, 0.085]]", "... footsteps"),
     ("[[0.2, 0.085, 0]], speed: 0.2", "... either footsteps or speed"),
 ])  # fmt: skip
-def test_footsteps_that_legs_do_not_reach_are_said(rows, message):
+def test_footsteps_out_of_reach_are_reported(rows, message):
     with pytest.raises(HspControlError, match=wording(message)):
         load_experiment(WALK, GIVEN % rows)

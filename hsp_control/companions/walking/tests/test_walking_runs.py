@@ -1,4 +1,4 @@
-"""Talos takes two steps and stands: on MuJoCo, by its configuration."""
+"""Talos makes two steps and stands: on MuJoCo, by its configuration."""
 
 import re
 from functools import cache
@@ -26,7 +26,7 @@ COARSE = "simulation.control_period=0.002"  # at its own period it walks in `wal
 def walk() -> Rollout:
     """Return a walk of one step, the step that closes, and a second of standing.
 
-    The arms swing by a field, so that the law's theorem has something to do.
+    The arms swing by a field, as a test of the law's theorem.
     """
     amplitudes, weights = np.zeros(36), np.ones(36)
     amplitudes[[*SWINGING]], weights[[*SWINGING]] = [*SWINGING.values()], FOLLOWS
@@ -50,7 +50,7 @@ def test_it_walks_and_stands_again():
     assert run.status == "completed"
     assert run["plan.steps"][-1] == 2
     assert run["plan.phase"][-1] == 0
-    # One step of 0.75 s, at what 0.4 m/s² give in this time.
+    # One step of 0.75 s, at the speed after 0.4 m/s² in this time.
     assert run.q[-1, 0] == pytest.approx(0.4 * 0.75**2, abs=0.02)
     assert np.abs(np.delete(run.v[-1], [*SWINGING])).max() < 0.05
     error = run["plan.dcm"] - run["plan.dcm_reference"]
@@ -60,7 +60,7 @@ def test_it_walks_and_stands_again():
 @pytest.mark.slow
 @pytest.mark.parametrize("degrees", further(5.0))
 def test_it_walks_down_a_ramp_of_which_it_does_not_know(degrees):
-    """From a platform: the soles lie on it, the mass stays above it."""
+    """From a platform: soles are flat on it, the centre of mass stays above it."""
     run = load_experiment("walking/talos_walk", *ramp(degrees, 0.3)).run()
     assert run.status == "completed"
     assert run["plan.phase"][-1] == 0
@@ -106,7 +106,7 @@ def test_the_null_space_error_decays_within_each_phase():
 
 @pytest.mark.slow
 @pytest.mark.system
-def test_a_push_that_fells_is_said():
+def test_a_push_that_causes_a_fall_is_reported():
     push = "{frame: torso_2_link, force: [0, 900, 0], start: 0.1, duration: 0.3}"
     settings = (f"plant.pushes=[{push}]", "simulation.duration=3", COARSE)
     run = load_experiment("walking/talos_walk", *settings).run()
@@ -118,7 +118,7 @@ def test_a_push_that_fells_is_said():
 @pytest.mark.slow
 @pytest.mark.system
 def test_a_push_that_one_sole_does_not_hold_is_held_by_both():
-    """To the left, just before the right foot swings, which cannot step across."""
+    """To the left, just before the right foot swings, which cannot cross over."""
     push = "{frame: torso_2_link, force: [0, 200, 0], start: 1.62, duration: 0.1}"
     settings = (f"plant.pushes=[{push}]", "simulation.duration=4.1", COARSE)
     run = load_experiment("walking/talos_walk", *settings).run()
@@ -132,10 +132,10 @@ def test_a_push_that_one_sole_does_not_hold_is_held_by_both():
     left = run["task.left_foot.actual"][held]
     outer_edge = left[0, 1] + 0.05
     dcm = run["plan.dcm"][held]
-    assert dcm[0, 1] == pytest.approx(outer_edge, abs=0.01)  # one sole just holds it
-    # It is calm below 20 mm, a row later.
+    assert dcm[0, 1] == pytest.approx(outer_edge, abs=0.01)  # one sole barely holds it
+    # It has settled below 20 mm a row later.
     assert np.abs(dcm[-1] - run["plan.dcm_reference"][held][-1]).max() < 0.022
-    # It goes on with the foot that was to swing.
+    # It continues with the foot that was to swing.
     assert phase[-1] == 3.0
     assert begins[-1] > t[held][-1] + 0.5
 
@@ -159,7 +159,7 @@ def test_the_page_s_yaml_and_python_run():
 @pytest.mark.slow
 @pytest.mark.system
 def test_it_walks_on_footsteps_that_are_given():
-    """A step to the left ahead, and the other foot beside it."""
+    """A step ahead to the left, and the other foot next to it."""
     rows = "[[0.15, 0.1, 0.1], [0.15, -0.08, 0.1]]"
     plan = f"plan={{type: walk, footsteps: {rows}}}"
     settings = (plan, "simulation.duration=4.2", COARSE)

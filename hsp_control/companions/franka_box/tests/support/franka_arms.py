@@ -14,11 +14,11 @@ from hsp_control.config import Experiment
 from hsp_control.live.simulated_robot import sampled
 
 LOOPBACK = "realtime=ignore&lockstep=true"
-"""What stands behind the address of a box in lockstep."""
+"""The query part of the address of a box in lockstep."""
 
 
 def host(number: int = 0) -> str:
-    """Return an address of loopback that no other test process uses."""
+    """Return a loopback address that no other test process uses."""
     high, low = divmod(os.getpid() % 16384, 128)
     return f"127.{10 + number}.{high}.{low + 1}"
 
@@ -73,11 +73,11 @@ class RunningBox:
 
     @property
     def address(self) -> str:
-        """The address behind ``franka://``."""
+        """The address after ``franka://``."""
         return f"{self.host}?{LOOPBACK}"
 
     def wait_alone(self) -> None:
-        """Wait until it has noticed that its clients have gone."""
+        """Wait until it has detected that its clients have left."""
         for _ in range(6000):
             ended = sum(" is disconnected: " in line for line in self.lines)
             if self._begun() == ended:
@@ -89,7 +89,7 @@ class RunningBox:
         connected = [line for line in self.lines if line.endswith("is connected")]
         return sum(not line.startswith("refused") for line in connected)
 
-    def said(self, *words: str) -> bool:
+    def reported(self, *words: str) -> bool:
         """Return whether a line contains all words."""
         return any(all(word in line for word in words) for line in self.lines)
 
@@ -100,7 +100,7 @@ def serving(
 ) -> Iterator[RunningBox]:
     """Serve an experiment's plant in lockstep; options are the `Server`'s.
 
-    A gripper keeps its address, so a box beside another gripper has another number.
+    A gripper keeps its address, so a box next to another gripper has another number.
     """
     running, ended = RunningBox(host(number)), threading.Event()
     plant = sampled(experiment.plant, experiment.integrator, PERIOD)

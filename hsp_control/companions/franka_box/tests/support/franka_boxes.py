@@ -22,9 +22,9 @@ from hsp_control.robot.integrators import Rk4
 from hsp_control.simulation.plants import IntegratedPlant, RigidBody, SampledPlant
 
 LONGEST = 120.0
-"""Time after which a client is killed: libfranka can wait for ever [s]."""
+"""Time after which a client is killed: libfranka can wait forever [s]."""
 PATIENCE = 30.0
-"""How long a box waits for a command [s]: machines that run tests may stall."""
+"""Time a box waits for a command [s]: test machines may stall."""
 PRELUDE = """
 import json, sys
 import numpy as np, pylibfranka as franka
@@ -33,7 +33,7 @@ robot = franka.Robot(sys.argv[1], franka.RealtimeConfig.kIgnore)
 def damped(state, effort):
     return franka.Torques((effort - 5.0 * np.array(state.dq)).tolist())
 """
-"""The beginning of the clients of these tests."""
+"""The common beginning of the tests' clients."""
 
 
 def command(**fields: Any) -> Any:
@@ -68,21 +68,21 @@ class Rig:
         server: Its server.
         box: The box.
         host: Its address.
-        said: Its messages.
+        messages: Its messages.
     """
 
-    def __init__(self, host: str, server: Server, said: list[str]) -> None:
-        self.host, self.server, self.said = host, server, said
+    def __init__(self, host: str, server: Server, messages: list[str]) -> None:
+        self.host, self.server, self.messages = host, server, messages
         self.box = server.box
 
-    def tells(self, text: str) -> str:
+    def message_with(self, text: str) -> str:
         """Return the only line that contains a text."""
-        lines = [line for line in self.said if text in line]
-        assert len(lines) == 1, (text, self.said)
+        lines = [line for line in self.messages if text in line]
+        assert len(lines) == 1, (text, self.messages)
         return lines[0]
 
     def run(self, source: str, *, status: int = 0) -> Any:
-        """Run a client to its end; return what it prints last, as JSON."""
+        """Run a client to its end; return its last line of output, parsed as JSON."""
         client = subprocess.run(
             [sys.executable, "-c", PRELUDE + source, self.host],
             capture_output=True,
@@ -97,18 +97,18 @@ class Rig:
 def served(
     simulated: SampledPlant | None = None, q: Array | None = None, **options: Any
 ) -> Iterator[Rig]:
-    """Serve a box in lockstep, in a thread, at an address that is free."""
-    said: list[str] = []
+    """Serve a box in lockstep in a thread, at a free address."""
+    messages: list[str] = []
     start = home() if q is None else q
-    box = ControlBox(panda(), simulated or plant(), start, said.append)
+    box = ControlBox(panda(), simulated or plant(), start, messages.append)
     patient = {"lockstep": True, "patience": PATIENCE, **options}
-    with _anywhere(box, said, patient) as (server, host):
+    with _anywhere(box, messages, patient) as (server, host):
         running = threading.Event()
         running.set()
         thread = threading.Thread(target=server.serve, args=(running.is_set,))
         thread.start()
         try:
-            yield Rig(host, server, said)
+            yield Rig(host, server, messages)
         finally:
             running.clear()
             thread.join(LONGEST)
@@ -116,7 +116,7 @@ def served(
 
 
 def addresses() -> Iterator[str]:
-    """Yield loopback addresses that other tests hardly use at the same time."""
+    """Yield loopback addresses that are unlikely to be used by other tests."""
     random = np.random.default_rng(os.getpid())
     for _ in itertools.count():
         yield f"127.{random.integers(1, 255)}.{random.integers(256)}.1"
@@ -124,11 +124,11 @@ def addresses() -> Iterator[str]:
 
 @contextmanager
 def _anywhere(
-    box: ControlBox, said: list[str], options: dict[str, Any]
+    box: ControlBox, messages: list[str], options: dict[str, Any]
 ) -> Iterator[tuple[Server, str]]:
     for host in itertools.islice(addresses(), 20):
         try:
-            server = Server(box, said.append, host=host, **options)
+            server = Server(box, messages.append, host=host, **options)
         except HardwareError:
             continue
         with server:

@@ -77,7 +77,7 @@ def trees(draw: st.DrawFn) -> str:
             SubElement(body, "freejoint", name=f"free{k}")
         else:
             kinds = draw(st.lists(st.sampled_from(KINDS), max_size=2))
-            if "ball" in kinds:  # MuJoCo wants it alone
+            if "ball" in kinds:  # MuJoCo permits it alone only
                 kinds = ["ball"]
             if k == 0:
                 kinds = kinds or ["hinge"]  # one joint at least

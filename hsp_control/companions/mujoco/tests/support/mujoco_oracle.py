@@ -1,4 +1,4 @@
-"""MuJoCo as an oracle of robots that were made from its own models."""
+"""MuJoCo as an oracle for robots made from its models."""
 
 from dataclasses import dataclass
 from typing import Any
@@ -15,7 +15,7 @@ from hsp_control.companions.mujoco.scene import Names
 class Differences:
     """The largest differences to MuJoCo, relative to the largest number or to 1.
 
-    That of the bias also relative to the mass matrix, whose rounding it has.
+    That of the bias is also relative to the mass matrix, whose rounding it contains.
     """
 
     mass_matrix: float = 0.0
@@ -25,7 +25,7 @@ class Differences:
 
     @property
     def largest(self) -> float:
-        """The largest of all."""
+        """The largest difference."""
         return max(self.mass_matrix, self.bias, self.poses, self.jacobians)
 
 
@@ -38,7 +38,7 @@ def differences(robot: Robot, model: Any, qpos: Any, count: int = 3) -> Differen
     Args:
         robot: The robot, from `Robot.from_mujoco`.
         model: The scene.
-        qpos: Where the joints are that the robot does not have.
+        qpos: Positions of the joints that are not in the robot.
         count: The number of states.
     """
     rng = np.random.default_rng(0)
@@ -92,7 +92,7 @@ def _compare_dynamics(
 
 
 def _frame_acceleration(state: RobotState, model: Any) -> Any:
-    """Return T' v: MuJoCo's free joints move in the world's axes, ours in the body's.
+    """Return T' v: MuJoCo's free joints use world axes, ours body axes.
 
     d/dt (R v_lin) = R (v_lin' + ω × v_lin).
     """

@@ -1,4 +1,4 @@
-"""Logs of planar and spatial arms to be drawn, and what is found on drawn axes."""
+"""Logs of planar and spatial arms for drawing, and artists of drawn axes."""
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
@@ -92,13 +92,13 @@ def spatial() -> dict[str, hsp.Rollout]:
 def changed(
     log: hsp.Rollout, rows: slice = slice(None), columns: Any = None, **meta: Any
 ) -> hsp.Rollout:
-    """Return a copy of a log of some rows, with some columns and meta replaced."""
+    """Return a copy of some rows of a log, with some columns and meta replaced."""
     kept = {name: column[rows].copy() for name, column in log.columns.items()}
     return hsp.Rollout(kept | (columns or {}), log.meta | meta)
 
 
 def drawn(draw: Callable[..., None], *arguments: Any, **options: Any) -> Axes:
-    """Return axes that something has been drawn on."""
+    """Return the axes with content."""
     with plots.styled():
         axes = plots.new_figure(4.0, 3.0).add_subplot()
         draw(axes, *arguments, **options)

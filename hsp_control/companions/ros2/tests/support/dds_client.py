@@ -1,7 +1,7 @@
-"""A plain client of DDS, as a program: it knows Cyclone DDS and no code of ours.
+"""A plain DDS client as a program: it imports Cyclone DDS and no code of ours.
 
-Its types are written down once more, from ROS 2's definitions. It runs in lockstep with
-what it talks to, and prints what it did as JSON.
+Its types are defined again, from ROS 2's definitions. It runs in lockstep with its
+peer, and prints its results as JSON.
 
     python dds_client.py drive DOMAIN CONTROLLER STATES COUNT
     python dds_client.py robot DOMAIN CONTROLLER STATES COUNT JOINT...
@@ -26,7 +26,7 @@ from cyclonedds.util import duration
 
 GIVE_UP = 120.0
 BACKWARDS = slice(None, None, -1)
-"""The client names joints in the opposite order, because it may."""
+"""The client lists joints in reverse order, which is permitted."""
 
 
 @dataclass
@@ -118,7 +118,7 @@ class Client:
         return DataWriter(self._participant, there, self._qos)
 
     def next(self, reader: DataReader, patience: float = GIVE_UP) -> object | None:
-        """Return the next message; None if none comes in time."""
+        """Return the next message; None after a timeout."""
         end = monotonic() + patience
         while monotonic() < end:
             for each in reader.take(1):
@@ -129,14 +129,14 @@ class Client:
 
 
 def drive(client: Client, controller: str, states: str, count: int) -> list[object]:
-    """Pull every joint to where it was first, with efforts in the robot's order."""
+    """Pull every joint to its first position, with efforts in the robot's order."""
     reader = client.reader(states, JointState)
     writer = client.writer(f"{controller}/commands", Numbers)
     first, log = None, []
     while len(log) < count:
         state = client.next(reader)
         assert state is not None
-        if first is None:  # a robot that has a listener, and a listener that has it
+        if first is None:  # both ends have discovered each other
             if not writer.get_matched_subscriptions():
                 continue
             first = state.position
@@ -151,7 +151,7 @@ def drive(client: Client, controller: str, states: str, count: int) -> list[obje
 def robot(
     client: Client, controller: str, states: str, count: int, joints: list[str]
 ) -> list[object]:
-    """Move arbitrarily: one step with each effort that it receives."""
+    """Move arbitrarily, one step per received effort."""
     writer = client.writer(states, JointState)
     reader = client.reader(f"{controller}/commands", Numbers)
     start = [float(each.partition("=")[2]) for each in joints]
@@ -174,10 +174,10 @@ def robot(
                 [],
             )
         )
-        heard = client.next(reader, GIVE_UP if step else 1e-3)
-        if heard is not None:
+        received = client.next(reader, GIVE_UP if step else 1e-3)
+        if received is not None:
             step += 1
-            log.append([stamp, q, v, list(heard.data)])
+            log.append([stamp, q, v, list(received.data)])
     return log
 
 

@@ -1,4 +1,4 @@
-"""DDS on the loopback interface, where tests of several processes do not meet."""
+"""DDS on the loopback interface, isolated between test processes."""
 
 import os
 import subprocess
@@ -23,7 +23,7 @@ LOOPBACK = (
     "<MaxAutoParticipantIndex>40</MaxAutoParticipantIndex>"
     "<Peers><Peer address='127.0.0.1'/></Peers></Discovery></Domain></CycloneDDS>"
 )
-"""No multicast, which containers seldom have: participants look for each other here."""
+"""Discovery without multicast, which containers seldom have."""
 os.environ["CYCLONEDDS_URI"] = LOOPBACK
 DOMAIN = 1 + os.getpid() % 200
 MILLISECOND = BILLION // 1000
@@ -31,7 +31,7 @@ _numbers = count()
 
 
 def fresh() -> tuple[str, str, str]:
-    """Return names that nobody else uses: controller, states, and their address."""
+    """Return unique topic names: controller, states, and their address."""
     name = f"t{os.getpid()}_{next(_numbers)}"
     states = f"/{name}/joint_states"
     return f"/{name}", states, f"{name}?states={states}&domain={DOMAIN}"
@@ -39,11 +39,11 @@ def fresh() -> tuple[str, str, str]:
 
 @contextmanager
 def client(out: Path, *words: object) -> Iterator[subprocess.Popen[bytes]]:
-    """Run the plain client, see `dds_client`; at the end it has ended by itself."""
+    """Run the plain client, see `dds_client`; it must end by itself."""
     script = Path(__file__).with_name("dds_client.py")
     command = [sys.executable, str(script), *map(str, words)]
     environment = {**os.environ, "PYTHONPATH": ""}
-    with out.open("wb") as file:  # not a pipe: a full one would hold it up
+    with out.open("wb") as file:  # not a pipe: a full one would block it
         process = subprocess.Popen(command, stdout=file, env=environment)
     try:
         yield process
@@ -95,7 +95,7 @@ class Broadcaster:
 
     @contextmanager
     def sending(self) -> Iterator[None]:
-        """Publish a state a millisecond."""
+        """Publish a state per millisecond."""
         self._thread.start()
         try:
             yield

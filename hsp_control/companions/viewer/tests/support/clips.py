@@ -1,4 +1,4 @@
-"""A clip as a page would play it, read from what a recorder keeps; for tests."""
+"""A recorder's clip as a page would play it, for tests."""
 
 from typing import Any
 
@@ -37,7 +37,7 @@ class Recorder(SceneRecorder):
         return total
 
 
-def told(recorder: Recorder, path: str, kind: str) -> dict[str, Any]:
+def reported(recorder: Recorder, path: str, kind: str) -> dict[str, Any]:
     """Return the last command of a kind at a path; there is one."""
     command = recorder.command(path, kind)
     assert command is not None
@@ -45,7 +45,7 @@ def told(recorder: Recorder, path: str, kind: str) -> dict[str, Any]:
 
 
 class Clip:
-    """The clip of a recorder: what each node does, at any time."""
+    """The clip of a recorder: the motion of its nodes."""
 
     def __init__(self, recorder: Recorder) -> None:
         begin = recorder.command(CLIP, "begin")
@@ -58,7 +58,7 @@ class Clip:
             self._tracks[track["path"], track["property"]] = times, values
 
     def paths(self, below: str) -> set[str]:
-        """Return the nodes below a path that move."""
+        """Return the moving nodes below a path."""
         return {path for path, _ in self._tracks if path.startswith(below)}
 
     def times(self, path: str, name: str) -> np.ndarray:

@@ -1,4 +1,4 @@
-"""A unit that sways above points that come and go, and the filter that follows it."""
+"""A swaying IMU above points that appear and vanish, and the filter that tracks it."""
 
 from copy import deepcopy
 
@@ -13,11 +13,11 @@ from hsp_control.companions.walking.estimation.invariant_filter import (
 
 GRAVITY = np.array([0.0, 0.0, -9.81])
 DENSITIES = Densities(2e-3, 2e-2, 1e-3, 1e-2, 5e-3)
-SEEN = 2e-3  # standard deviation of what the legs see [m]
+SEEN = 2e-3  # standard deviation of the leg kinematics [m]
 
 
 class Walker:
-    """A unit that sways above points, which come and go; all is known of it."""
+    """A swaying IMU above points that appear and vanish, with known truth."""
 
     def __init__(self, random, h, densities, seen, noise=1.0):
         self.random, self.h, self.noise = random, h, noise
@@ -34,7 +34,7 @@ class Walker:
         return self.noise * self.random.normal(size=shape)
 
     def step(self, t):
-        """Go on; return the readings of the unit."""
+        """Advance; return the IMU's readings."""
         h = self.h
         omega = np.array([0.5 * np.sin(3 * t), 0.4 * np.cos(4 * t), 0.3 * np.sin(t)])
         force = self.rotation.T @ (
@@ -68,14 +68,14 @@ class Walker:
 
 
 def walked(random, start, duration, densities=DENSITIES, seen=SEEN, noise=1.0):
-    """Return a walker and the filter that followed it; each step has new points.
+    """Return a walker and the filter that tracked it; every step has new points.
 
     Args:
         random: The random numbers.
         start: Standard deviations of the error at the start, shape (15,).
-        duration: How long [s].
-        densities: What the filter expects.
-        seen: The deviation of what the legs see, as it expects [m].
+        duration: Duration [s].
+        densities: Noise densities assumed by the filter.
+        seen: Standard deviation of leg kinematics assumed by the filter [m].
         noise: Factor of all noise of the readings.
     """
     h = 0.01
@@ -96,7 +96,7 @@ def walked(random, start, duration, densities=DENSITIES, seen=SEEN, noise=1.0):
     estimate.add(names, walker.seen(names), seen**2 * np.eye(6))
     for k in range(round(duration / h)):
         estimate.predict(*walker.step(k * h), h)
-        if k % 40 == 20:  # a foot leaves, and comes elsewhere
+        if k % 40 == 20:  # a foot lifts off, and lands elsewhere
             name = estimate.names[0]
             estimate.drop([name])
             walker.places[name] = walker.position * [1, 1, 0] + [0.2, 0.1, 0]

@@ -36,7 +36,7 @@ SPRING = {"type": "frame_position", "impedance": {"stiffness": 600, "damping": 3
          "off: a hand with an impedance yields, task 'hand'"),
     ],
 )  # fmt: skip
-def test_check_says_it(
+def test_check_reports_it(
     changes: dict[str, Any],
     words: str,
     tmp_path: Path,
@@ -52,7 +52,7 @@ def test_check_says_it(
     assert len(borne["moved"][0]["resting"]) == 7
 
 
-def test_a_run_says_how_much_nobody_explained() -> None:
+def test_a_run_reports_unexplained_efforts() -> None:
     """3 kg at the Panda's hand: 15 N·m on joint 4, a sixth of its limit."""
     heavy = load_experiment(CONFIG | {"plant": LOAD}).run()
     (row,) = unexplained_rows(heavy)
@@ -60,9 +60,9 @@ def test_a_run_says_how_much_nobody_explained() -> None:
     assert row.endswith(" N·m that the model does not explain, on panda_joint4")
     beside = {**LOAD, "payload": {**LOAD["payload"], "center": [0.15, 0.0, 0.0]}}
     log = load_experiment(CONFIG | {"plant": beside}).run()
-    _, told, remedy = unexplained_rows(log)
-    assert told.startswith("the model does not describe the robot: that is ")
-    assert "of the effort limit of panda_joint" in told
+    _, reported, remedy = unexplained_rows(log)
+    assert reported.startswith("the model does not describe the robot: that is ")
+    assert "of the effort limit of panda_joint" in reported
     assert remedy == "the model has no rotors: robot: motor_inertia adds them"
     size = np.abs(log["observer.disturbance"]) / log.meta["limits"]["effort"]
     np.testing.assert_allclose(log["observer.share"], size.max(axis=1), rtol=1e-12)
@@ -71,8 +71,8 @@ def test_a_run_says_how_much_nobody_explained() -> None:
     assert not [*unexplained_rows(load_experiment(CONFIG).run())]
 
 
-def test_a_safe_stop_hides_nothing_of_what_an_observer_found() -> None:
-    """Each live run once printed: up to nan N·m, and never that it is a lot."""
+def test_a_safe_stop_keeps_an_observer_s_findings() -> None:
+    """Every live run once printed "up to nan N·m", and never warned of a large load."""
     beside = {**LOAD, "payload": {**LOAD["payload"], "center": [0.15, 0.0, 0.0]}}
     log = load_experiment(CONFIG | {"plant": beside}).run()
     known = [*unexplained_rows(log)]

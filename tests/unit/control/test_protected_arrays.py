@@ -1,4 +1,5 @@
-"""Users reach copies, not a step's arrays: mistakes are exact errors, or harmless."""
+"""Users get copies, not a step's arrays: mistakes raise exact errors or are
+harmless."""
 
 import copy
 import os
@@ -59,7 +60,7 @@ ATTACKS: dict[str, Callable[[RobotState], object]] = {
     "centre": lambda s: s.centroidal.jacobian.fill(0.0),
     "companion": lambda s: s.ahead(0.01).q.fill(0.0),
 }
-"""Mistakes of a part's own Python with the state that it is given."""
+"""Attempts of user code to write the state that it receives."""
 
 
 class Attacked:
@@ -77,7 +78,7 @@ class Attacked:
             except (ValueError, ImmutableError):
                 continue
             self.done.append(f"{place}: {name}")
-        # what is its own: Pinocchio's data, and an effort
+        # its own copies: Pinocchio's data, and an effort
         state.data.M[:] = state.data.J[:] = state.data.tau[:] = 0.0
         state.inverse_dynamics(np.ones(NV)).fill(0.0)
 
@@ -86,7 +87,7 @@ attacked = Attacked()
 
 
 class OwnCost(hsp.Cost):
-    """A cost by each of its methods."""
+    """A cost that defines all of its methods."""
 
     def value(self, state: RobotState) -> float:
         attacked.by("Cost.value", state)
@@ -248,7 +249,7 @@ def test_a_modifier_that_returns_something_else(returned: Any, message: str) -> 
 
 
 def test_no_hook_can_change_the_controllers_robot() -> None:
-    """Whatever it writes is refused, or its own; and the efforts are the same."""
+    """Writes are refused or go to a copy; the efforts are the same."""
 
     def modifier(state: RobotState, active: Any, a: Array) -> tuple[Array, None]:
         attacked.by("modifier", state)
@@ -285,7 +286,7 @@ def overwrite(shown: Any, seen: dict[int, Any], name: str = "active") -> set[str
         or id(shown) in seen
     ):
         return set()
-    seen[id(shown)] = shown  # kept: an id is used again
+    seen[id(shown)] = shown  # kept, since ids of freed objects are reused
     if isinstance(shown, np.ndarray):
         with suppress(ValueError):  # read-only
             shown[...] = 7
@@ -307,7 +308,7 @@ def overwrite(shown: Any, seen: dict[int, Any], name: str = "active") -> set[str
 
 
 def test_a_modifier_cannot_write_the_stack() -> None:
-    """Nor what is bound to it: gains, their changes, contacts, tasks, the field."""
+    """Nor are bound objects: gains, their changes, contacts, tasks, the field."""
     panda = hsp.Robot.load("panda")
     press = hsp.contacts.CommandedForce([0.0, 0.0, 10.0])
     wipe = hsp.contacts.SlidingContact(FRAME, friction=0.3, force=press)
@@ -342,7 +343,7 @@ def test_a_modifier_cannot_write_the_stack() -> None:
 
 
 @pytest.mark.parametrize("by", ["a modifier", "the controller"])
-def test_nobody_steps_the_active_stack(by: str) -> None:
+def test_the_active_stack_cannot_be_stepped(by: str) -> None:
     panda = hsp.Robot.load("panda")
     own = hsp.Controller(panda, [hsp.FramePosition(FRAME)])
     q, v = panda.home(), np.zeros(NV)
@@ -379,7 +380,7 @@ def controller() -> hsp.Controller:
 
 
 def test_a_robots_model_gets_no_more_joints() -> None:
-    """Pinocchio would write beyond the data that were made before."""
+    """Otherwise Pinocchio would write beyond data made for the previous model."""
     own = controller()
     robot = own.robot
     before = own.compute(0.0, robot.home(), np.zeros(NV)).tau.copy()
@@ -421,7 +422,7 @@ def test_data_that_are_written_or_replaced_change_nothing() -> None:
 
 @pytest.mark.parametrize("name", ["q", "v", "t", "time", "robot", "effort"])
 def test_arrays_of_a_state_cannot_be_replaced(name: str) -> None:
-    """Terms would go on as they were; values are copied by `update`."""
+    """A replaced term would have no effect; values are copied by `update`."""
     robot = hsp.Robot.load("panda")
     state = robot.state(0.0, robot.home(), np.zeros(NV))
     for each in (state, state.seen, state.read_only):
@@ -460,7 +461,8 @@ def test_a_sample_of_another_size_is_one_error() -> None:
 @pytest.mark.skipif(not hasattr(os, "fork"), reason="no processes that fork")
 @pytest.mark.filterwarnings("ignore:.*multi-threaded.*:DeprecationWarning")
 def test_a_fork_while_a_thread_computes_is_one_error() -> None:
-    """The child's copy is half a step: it reports that, and waits for nobody."""
+    """The child inherits an unfinished step: it raises instead of waiting for the
+    lock."""
     inside, leave = threading.Event(), threading.Event()
 
     def slow(state: RobotState) -> float:
@@ -483,10 +485,10 @@ def test_a_fork_while_a_thread_computes_is_one_error() -> None:
     assert inside.wait(60.0)
     child = os.fork()
     if child == 0:  # without pytest's own handlers
-        signal.alarm(60)  # ends it if it waits for ever
+        signal.alarm(60)  # ends the child if it deadlocks
         code = 1
         try:
-            other.compute(0.0, q, v)  # nobody computed with it
+            other.compute(0.0, q, v)  # no step was under way
             try:
                 own.compute(0.0, q, v)
             except ControllerError as error:
@@ -496,12 +498,12 @@ def test_a_fork_while_a_thread_computes_is_one_error() -> None:
     leave.set()
     thread.join()
     assert os.waitstatus_to_exitcode(os.waitpid(child, 0)[1]) == 0
-    own.compute(0.0, q, v)  # here all is as it was
+    own.compute(0.0, q, v)  # the parent is unaffected
 
 
 @pytest.mark.parametrize("copied", [copy.copy, copy.deepcopy, pickle.dumps])
-def test_what_a_step_writes_is_not_copied(copied: Callable[[object], object]) -> None:
-    """A copy would need its controller; `stack_at` returns one that has it."""
+def test_results_of_a_step_are_not_copied(copied: Callable[[object], object]) -> None:
+    """A stack belongs to its controller; `stack_at` returns an independent one."""
     made = hsp.Controller(hsp.Robot.load("panda"), [hsp.FramePosition(name="hand")])
     made.compute(0.0, made.robot.home(), np.zeros(NV))
     with pytest.raises(ImmutableError, match=r"active cannot be copied.*stack_at"):

@@ -1,4 +1,4 @@
-"""Soft limits and the axes of planar joints count, which Pinocchio's parser skips."""
+"""Soft limits and axes of planar joints are applied; Pinocchio's parser skips both."""
 
 from collections.abc import Callable
 from pathlib import Path
@@ -36,7 +36,7 @@ def test_soft_limits_are_limits(
     assert (lower[1], upper[1]) == (-3.0, 3.0)
 
 
-def test_soft_limits_of_followers_and_of_unlimited_joints_count(write: Write) -> None:
+def test_soft_limits_of_followers_and_of_unlimited_joints_apply(write: Write) -> None:
     text = ARM.replace('lower="-3" upper="3"', "", 1)
     text = text.replace("</joint>", soft(-0.1, 0.2), 1)
     lower, upper = Robot.load(write(text)).position_limits()
@@ -54,7 +54,7 @@ def test_soft_limits_of_followers_and_of_unlimited_joints_count(write: Write) ->
 def test_a_planar_joint_moves_in_the_plane_of_its_axis(
     axis: tuple[float, float, float] | None, write: Write
 ) -> None:
-    """And turns about it; the cart and all beyond it lie as the URDF has them."""
+    """It rotates about its axis; the cart and later links are as in the URDF."""
     cart = joint("cart", "base", "cart", "planar")
     text = "" if axis is None else f'<axis xyz="{" ".join(map(str, axis))}"/>'
     cart = cart.replace('<axis xyz="0 0 1"/>', text)
