@@ -3,8 +3,9 @@
 from collections.abc import Callable
 from functools import cache
 from importlib import import_module, metadata
-from importlib.metadata import EntryPoint, EntryPoints
+from importlib.metadata import EntryPoint
 from pathlib import Path
+from typing import Any
 
 _PACKAGE = Path(__file__).parents[1]
 
@@ -15,14 +16,17 @@ def entry_points(group: str) -> dict[str, EntryPoint]:
     Companions whose folder was deleted add nothing, although the package's metadata
     still name them.
     """
-    found = _installed(f"{_PACKAGE.name}.{group}")
+    found = _installed().select(group=f"{_PACKAGE.name}.{group}")
     return {entry.name: entry for entry in found if _is_there(entry)}
 
 
 @cache
-def _installed(group: str) -> EntryPoints:
-    """Return the entry points of all packages; reading their files takes 20 ms."""
-    return metadata.entry_points(group=group)
+def _installed() -> Any:
+    """Return the entry points of all packages; reading their files takes 20 ms.
+
+    Before Python 3.12 these are no `EntryPoints`, but have `select`, too.
+    """
+    return metadata.entry_points()
 
 
 def is_ours(entry: EntryPoint) -> bool:

@@ -218,7 +218,7 @@ class LogWriter:
         row = columns.row
         for name, source in self._sources:
             row[name][:] = source
-        self._tasks.write_law(active, output)
+        self._tasks.write_law(output)
         row["field.value"][...] = diagnostics.field_value
         row["null_space_norm"][...] = diagnostics.null_space_norm
         row["manipulability"][...] = diagnostics.manipulability

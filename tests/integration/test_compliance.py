@@ -223,6 +223,7 @@ def test_at_its_target_a_hand_becomes_stiffer_at_once_and_copies_wait_alike() ->
 
 
 CARTESIAN = "compliance/panda_cartesian_impedance"
+COARSE = "simulation.control_period=0.002"
 
 
 @cache
@@ -239,7 +240,10 @@ def test_limits_with_an_observer_stay_inactive_under_a_push() -> None:
     away = np.abs(log["task.hand.error"][early, 1])
     assert away.max() == pytest.approx(0.05, rel=0.02)
     untold = hsp.load_experiment(
-        CARTESIAN, "simulation.duration=1.5", "compensation.momentum_observer=null"
+        CARTESIAN,
+        COARSE,
+        "simulation.duration=1.5",
+        "compensation.momentum_observer=null",
     ).run()
     assert (untold["status"] >= 2).any()
 
@@ -372,7 +376,7 @@ def test_the_cartesian_configuration_makes_its_point() -> None:
 
 def test_the_joint_configuration_makes_its_point() -> None:
     """Efforts at the sprung joints do not move the free one; a push at it does."""
-    experiment = hsp.load_experiment("compliance/panda_joint_impedance")
+    experiment = hsp.load_experiment("compliance/panda_joint_impedance", COARSE)
     log = experiment.run()
     assert log.status == "completed"
     assert not log["status"].any()

@@ -13,6 +13,7 @@ from hsp_control.common.resources import bundled_configs
 
 mujoco = pytest.importorskip("mujoco")
 WIPER = "panda_tcp"
+COARSE = "simulation.control_period=0.002"  # at its own period a panda wipes below
 
 
 def felt(log: Rollout, frame: str, normal: list[float]) -> np.ndarray:
@@ -69,7 +70,7 @@ def test_the_bound_on_the_damping_of_a_slip(
 def test_talos_presses_against_a_wall() -> None:
     """40 N balanced by the soles, on compliant contacts; no step is limited."""
     pytest.importorskip("example_robot_data")
-    log = load_experiment("forces/talos_wall", "simulation.duration=1.8").run()
+    log = load_experiment("forces/talos_wall", "simulation.duration=1.8", COARSE).run()
     assert log.meta["status"] == "completed"
     force = felt(log, "gripper_right_base_link", [-1.0, 0.0, 0.0])
     np.testing.assert_allclose(force[log.t > 1.5], 40.0, atol=0.5)
@@ -85,7 +86,7 @@ def test_talos_presses_against_a_wall() -> None:
 def test_talos_leans_while_it_is_heavier_than_its_model() -> None:
     """On the ramp to 120 N, 10 % too heavy: it stands, and presses as commanded."""
     pytest.importorskip("example_robot_data")
-    log = load_experiment("forces/talos_lean", "simulation.duration=2.2").run()
+    log = load_experiment("forces/talos_lean", "simulation.duration=2.2", COARSE).run()
     assert log.meta["status"] == "completed"
     force = felt(log, "gripper_right_base_link", [-1.0, 0.0, 0.0])
     commanded = -log["contact.hand.commanded"][:, 0] - log["contact.hand.integral"]
@@ -98,7 +99,7 @@ def test_talos_leans_while_it_is_heavier_than_its_model() -> None:
 def test_two_pandas_lift_a_box() -> None:
     """60 N between the palms, half of the weight on each: friction alone holds the
     box."""
-    log = load_experiment("forces/pandas_box", "simulation.duration=1.7").run()
+    log = load_experiment("forces/pandas_box", "simulation.duration=1.7", COARSE).run()
     late = log.t > 1.3
     for side, sign in (("left", 1.0), ("right", -1.0)):
         force = log[f"plant.contact.{side}_panda_tcp.force"][late]

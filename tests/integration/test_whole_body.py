@@ -11,6 +11,7 @@ from hsp_control.control.actuation import Status
 
 pytest.importorskip("example_robot_data")
 pytest.importorskip("mujoco")
+COARSE = "simulation.control_period=0.002"  # at its own period a robot stands below
 
 
 @cache
@@ -52,7 +53,7 @@ def test_talos_on_two_feet() -> None:
 def test_talos_with_a_weak_arm() -> None:
     """At its torque limit the hand deviates and returns; other tasks continue."""
     name, shorter = "talos_weak_arm", "simulation.duration=3.4"
-    rollout = run(name, shorter, "simulation.log_period=0.005")
+    rollout = run(name, shorter, "simulation.log_period=0.01", COARSE)
     assert rollout.meta["status"] == "completed"
     limits = load_experiment(f"whole_body/{name}").controller.limits
     assert limits is not None
@@ -74,7 +75,7 @@ def test_talos_with_a_weak_arm() -> None:
 
 
 def test_solo_lifts_a_foot_and_puts_it_down() -> None:
-    rollout = run("solo12_swing")
+    rollout = run("solo12_swing", COARSE)
     assert rollout.meta["status"] == "completed"
     assert rms(rollout, "trunk") < 3e-4
     t = rollout.t
@@ -105,7 +106,7 @@ FAR = (
 def test_talos_stands_while_a_hand_target_is_out_of_reach() -> None:
     """0.9 m ahead: with all tasks at one priority it falls within two seconds."""
     experiment = hsp.load_experiment(
-        "whole_body/talos_circle", FAR, "simulation.duration=2"
+        "whole_body/talos_circle", FAR, "simulation.duration=2", COARSE
     )
     order = [[task.name for task in level] for level in experiment.controller.levels]
     assert order == [["center_of_mass", "trunk"], ["hand"]]

@@ -63,7 +63,7 @@ OTHERS = {  # by the output of `hsp run`
 
 TAKERS = {
     "export {log} --html out/{name}.html": "{name}.html",
-    "plot {log}": "{name}-diagnostics.png",
+    "plot {log} --panels null_space": "{name}-null_space.png",
 }
 """Commands and their outputs; unless thorough the logs are assigned in turn."""
 LOGS = [*REPEATED, *OTHERS]
@@ -105,7 +105,7 @@ def test_a_log_is_taken(name: str, folder: Path) -> None:
 def test_a_walk_s_log_is_taken(folder: Path) -> None:
     in_this_process("run walking/solo12_trot --set simulation.duration=0.3", folder)
     (log,) = (path.relative_to(folder) for path in folder.glob("out/solo12_trot*.npz"))
-    for command in (*TAKERS, VIEW, "run {log}"):
+    for command in (*TAKERS, "plot {log}", VIEW, "run {log}"):
         in_this_process(command.format(log=log, name="walk"), folder)
 
 

@@ -8,8 +8,6 @@ from typing import Any, NamedTuple
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.patches import Circle, Polygon
-from scipy.spatial import ConvexHull
-from scipy.spatial.transform import Rotation
 
 from hsp_control.common.arrays import Array
 from hsp_control.companions.plots import palette
@@ -120,6 +118,8 @@ class LoggedObstacle(NamedTuple):
 
     def outline(self, view: View, row: int) -> Array:
         """Return its outline in the view's plane at a row [m], shape (P, 2)."""
+        from scipy.spatial import ConvexHull  # here: SciPy takes long to import
+
         page = np.column_stack(view.project(self.world_points(row)))
         # A flat shape, seen edge-on.
         thinnest = 1e-4 * float(np.ptp(page, axis=0).max())
@@ -142,6 +142,8 @@ def _logged_obstacle(
     center = rollout[f"obstacle.{name}"]
     rotation = np.broadcast_to(np.eye(3), (len(center), 3, 3))
     if f"obstacle.{name}.quaternion" in rollout and len(center):
+        from scipy.spatial.transform import Rotation  # here, as above
+
         orientation = Rotation.from_quat(rollout[f"obstacle.{name}.quaternion"])
         rotation = orientation.as_matrix()
     points_of = _POINTS_OF_SHAPE.get(about.get("shape", ""))

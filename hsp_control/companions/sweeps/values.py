@@ -10,7 +10,6 @@ from collections.abc import Callable, Sequence
 from typing import Any, TypeAlias
 
 import numpy as np
-from scipy import stats
 
 from hsp_control.common.arrays import Array
 from hsp_control.common.exceptions import SweepError
@@ -130,11 +129,15 @@ def _logarithmic(low: float, high: float, count: int) -> Sequence[float]:
 
 
 def _uniform(low: float, high: float) -> Distribution:
+    from scipy import stats  # here, because this import is slow
+
     _check(low, high)
     return stats.uniform(low, high - low)
 
 
 def _log_uniform(low: float, high: float) -> Distribution:
+    from scipy import stats  # here, because this import is slow
+
     _check(low, high, positive=True)
     return stats.loguniform(low, high)
 
@@ -142,6 +145,8 @@ def _log_uniform(low: float, high: float) -> Distribution:
 def _normal(
     mean: float, deviation: float, low: float = -math.inf, high: float = math.inf
 ) -> Distribution:
+    from scipy import stats  # here, because this import is slow
+
     if not (math.isfinite(mean) and 0.0 < deviation < math.inf):
         raise SweepError(
             f"a normal distribution of mean {mean:g} and standard deviation "

@@ -195,10 +195,7 @@ def read_mesh(thing: Json, owner: str) -> list[Piece]:
             f"{owner} is drawn from a mesh file, and reading it needs {error.name}: "
             f"{INSTALL}"
         ) from None
-    data = thing["data"]
-    if isinstance(data, umsgpack.Ext):  # in the form in which pages receive it
-        data = data.data
-    content = data.encode() if isinstance(data, str) else bytes(data)
+    content = _content(thing)
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")  # about defects of the file
@@ -217,6 +214,32 @@ def read_mesh(thing: Json, owner: str) -> list[Piece]:
     except Exception as error:  # any error is possible with untrusted files
         raise ExportError(f"{owner}: its mesh cannot be read: {error}") from error
     return merged([piece for piece in pieces if len(piece.triangles)])
+
+
+def _content(thing: Json) -> bytes:
+    data = thing["data"]
+    if isinstance(data, umsgpack.Ext):  # in the form in which pages receive it
+        data = data.data
+    return data.encode() if isinstance(data, str) else bytes(data)
+
+
+_KEPT = 256  # mesh files: those of some robots
+_smooth: dict[bytes, list[Piece]] = {}
+
+
+def smooth_mesh(thing: Json, owner: str) -> list[Piece]:
+    """Return `read_mesh`, with vertices merged, doubled at creases and sorted; cached.
+
+    Runs that are compared show the same robot, and so do most pages of a process.
+    """
+    about = [thing["format"], thing["type"], thing.get("resources", {})]
+    key = hashlib.sha256(repr(about).encode() + _content(thing)).digest()
+    if key not in _smooth:
+        pieces = [_smoothed(piece) for piece in read_mesh(thing, owner)]
+        while len(_smooth) >= _KEPT:
+            del _smooth[next(iter(_smooth))]  # the oldest
+        _smooth[key] = pieces
+    return _smooth[key]
 
 
 def merged(pieces: list[Piece]) -> list[Piece]:
@@ -321,13 +344,13 @@ def _without_files(thing: Json, owner: str, arrays: ArrayTable) -> Json:
         shadows = {k: v for k, v in node.items() if k.endswith("Shadow")}
         if node["type"] == "_meshfile_object":
             children = []
-            for piece in read_mesh(node, owner):
+            for piece in smooth_mesh(node, owner):
                 color = piece.color or (0.72, 0.74, 0.76, 1.0)
                 surface = material(color, opacity=color[3])
                 materials.append(surface)
                 children.append(mesh(piece, scale, surface["uuid"], shadows))
         elif file := files.get(node.get("geometry")):
-            pieces = read_mesh(file, owner)
+            pieces = smooth_mesh(file, owner)
             children = [mesh(p, scale, node["material"], shadows) for p in pieces]
         elif "children" in node:
             children = [replaced(child, scale) for child in node["children"]]
@@ -343,8 +366,8 @@ def _without_files(thing: Json, owner: str, arrays: ArrayTable) -> Json:
     return {**thing, **about, "object": drawn}
 
 
-def _geometry(piece: Piece, scale: float, arrays: ArrayTable) -> Json:
-    """Return a piece as a packed geometry; the page computes its normals."""
+def _smoothed(piece: Piece) -> Piece:
+    """Return a piece whose normals the page can compute."""
     import trimesh
     from trimesh.graph import smooth_shade
 
@@ -352,7 +375,12 @@ def _geometry(piece: Piece, scale: float, arrays: ArrayTable) -> Json:
     solid.update_faces(solid.nondegenerate_faces())
     # The vertices of creases are doubled: normals are smooth across other edges.
     solid = smooth_shade(solid, angle=CREASE, facet_minarea=None)
-    vertices, triangles = sort_along_curve(solid.vertices, solid.faces)
+    return Piece(*sort_along_curve(solid.vertices, solid.faces), piece.color)
+
+
+def _geometry(piece: Piece, scale: float, arrays: ArrayTable) -> Json:
+    """Return a smooth piece as a packed geometry; the page computes its normals."""
+    vertices, triangles, _ = piece
     size = float(np.ptp(vertices, axis=0).max(initial=0.0)) or 1.0
     step = max(VERTEX_STEP / float(f"{scale:.6g}"), size * 2.0**-16)
     places = arrays.numbers(vertices, step)

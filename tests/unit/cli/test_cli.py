@@ -400,6 +400,7 @@ def test_a_diverging_run_keeps_its_log(
     assert "unstable at this rate: K_N times the period is 9" in capsys.readouterr().err
     assert not list(tmp_path.iterdir())
     wild += ["--set", "simulation.check_rate=false"]
+    wild += ["--set", "simulation.integrator={type: rk4, step: 0.01}"]
     assert main(["run", MOVING, "--out", str(tmp_path), *wild]) == 2
     assert "diverged" in capsys.readouterr().err
     (log,) = tmp_path.iterdir()

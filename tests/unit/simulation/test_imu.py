@@ -103,7 +103,7 @@ def test_in_mujoco_a_body_that_falls_freely_feels_nothing():
 
 def test_noise_and_biases_have_the_sizes_that_were_declared():
     robot = Robot.load("solo12")
-    q, n = robot.home(), 2000
+    q, n = robot.home(), 1000
     states = [(k * H, q, np.zeros(18)) for k in range(n + 1)]
     white = SILENT | {"gyroscope_noise": 1e-3, "accelerometer_noise": 1e-2}
     found = readings(Imu("base_link", **white), states)[1:]

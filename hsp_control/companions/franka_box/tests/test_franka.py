@@ -67,7 +67,7 @@ def test_the_arm_moves_as_the_simulated_robot(tmp_path: Path) -> None:
     experiment, logs = circle(), (tmp_path / "arm.journal", tmp_path / "sim.journal")
     with serving(experiment) as box:
         arm = connect(box.address, experiment.robot, PERIOD)
-        report = moved(arm, log=logs[0])
+        report = moved(arm, log=logs[0], duration=0.8)
         assert report.ended == "completed", report.reason
         assert arm.fault is None
         assert box.reported("motion ended: the client has finished it", "0 lost")
@@ -80,7 +80,7 @@ def test_the_arm_moves_as_the_simulated_robot(tmp_path: Path) -> None:
     run_loop(
         circle().controller,
         InProcessRobot(robot),
-        duration=1.0,
+        duration=0.8,
         settings=settings,
         log=logs[1],
         log_period=PERIOD,
@@ -88,7 +88,7 @@ def test_the_arm_moves_as_the_simulated_robot(tmp_path: Path) -> None:
     real, simulated = map(Rollout.load, logs)
     np.testing.assert_array_equal(real.t, simulated.t)
     np.testing.assert_allclose(real.q, simulated.q, atol=2e-6)
-    circling = (real.t > 0.6) & (real.t < 1.0)
+    circling = (real.t > 0.6) & (real.t < 0.8)
     assert np.abs(real["task.hand.error"][circling]).max() < 1e-3
 
 
@@ -227,10 +227,10 @@ def test_the_load_is_in_both_models(tmp_path: Path) -> None:
         known = circle(robot={"name": urdf}, start=start)
         arm = connect(settings, known.robot, PERIOD)
         log = tmp_path / "loaded.journal"
-        report = moved(arm, known, log=log)
+        report = moved(arm, known, log=log, duration=0.8)
         assert report.ended == "completed", report.reason
     run = Rollout.load(log)
-    circling = (run.t > 0.6) & (run.t < 1.0)
+    circling = (run.t > 0.6) & (run.t < 0.8)
     assert np.abs(run["task.hand.error"][circling]).max() < 1e-3
 
 
@@ -322,7 +322,7 @@ def test_the_arm_has_seven_joints_and_a_millisecond() -> None:
 def test_the_command_line_drives_the_arm(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    later = PUSH | {"start": 0.9}
+    later = PUSH | {"start": 0.6}
     experiment = circle(plant={"type": "rigid_body", "pushes": [later]})
     file = tmp_path / "circle.yaml"
     file.write_text(yaml.safe_dump(circle().config))

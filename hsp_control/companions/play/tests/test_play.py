@@ -23,6 +23,7 @@ from hsp_control.companions.viewer import Viewer
 from hsp_control.companions.viewer.live_picture import Picture
 
 PANDA = "panda_obstacle"
+COARSE = "simulation.control_period=0.002"  # at one of 1 ms the log repeats a drag
 
 
 @pytest.fixture(scope="module")
@@ -38,7 +39,7 @@ def session(experiment: hsp.Experiment) -> Session:
 @pytest.fixture
 def still() -> Session:
     """A hand that holds its pose, next to a ball at rest."""
-    return Session(playable("panda"))
+    return Session(playable("panda", COARSE))
 
 
 def go(session: Session, seconds: float) -> None:
@@ -108,7 +109,7 @@ def test_its_own_path_comes_back(session: Session) -> None:
 
 def test_the_elbow_of_the_posture_leads_the_null_space(tmp_path: Path) -> None:
     """The elbow follows as in the theorem, the hand is undisturbed; and it returns."""
-    session = Session(playable("panda"))
+    session = Session(playable("panda", COARSE))
     go(session, 0.3)
     start = pose_of(session, "posture")
     wanted, elbow = start.copy(), session.controller.state.data.oMi[3].copy()
@@ -319,7 +320,7 @@ def test_an_error_ends_the_run_and_not_the_session(
 @pytest.mark.parametrize("law", ["operational-space law", *further("no field")])
 def test_another_law_goes_beside_it(law: str) -> None:
     """From the same state, with the same hand; without an effect on the play."""
-    both = [Session(playable("panda_obstacle")) for _ in range(2)]
+    both = [Session(playable(PANDA, COARSE)) for _ in range(2)]
     for session in both:
         go(session, 0.5)
         wanted = pose_of(session)
@@ -357,7 +358,7 @@ def test_another_law_goes_beside_it(law: str) -> None:
 
 def test_a_plain_impedance_goes_beside_it() -> None:
     """Equal at the start; then its stiffness is constant, and its hand lags."""
-    session = Session(playable("panda_obstacle", "null_space.fields.0.weight=0"))
+    session = Session(playable(PANDA, COARSE, "null_space.fields.0.weight=0"))
     go(session, 2.0)  # on the circle
     state, active = session.controller.state, session.controller.active_stack
     feedback = feedback_of(state, active)

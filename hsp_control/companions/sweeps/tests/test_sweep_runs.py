@@ -27,8 +27,8 @@ from hsp_control.companions.sweeps import Sweep, cluster, sweep_runs
 from hsp_control.companions.sweeps.one_run import Row, computed
 from hsp_control.companions.sweeps.row_files import RowFiles, read_rows
 
-# Some tenths of a second each.
-SECONDS = 3
+# A tenth of a second each, or more.
+SECONDS = 1.5
 SLOWER = [QUICK[1], f"simulation.duration={SECONDS}"]
 GAINS = {"null_space.gain": "1:20:8"}
 RUNS = 8

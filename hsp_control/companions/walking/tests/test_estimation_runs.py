@@ -13,6 +13,7 @@ from hsp_control.control.compensation import CompensatedController
 
 pytest.importorskip("example_robot_data")
 pytest.importorskip("mujoco")
+COARSE = "simulation.control_period=0.002"  # their own is that of test_live_on_feet.py
 
 
 def largest(run, name):
@@ -24,7 +25,7 @@ def largest(run, name):
 @pytest.mark.slow
 def test_talos_takes_a_step_on_an_estimated_base():
     """One key enables it; the rest of the configuration is unchanged."""
-    given = ("plan.steps=1", "simulation.duration=2.2")
+    given = ("plan.steps=1", "simulation.duration=2.2", COARSE)
     run = load_experiment("walking/talos_walk", "estimators.base=true", *given).run()
     assert run.status == "completed"
     assert run["plan.steps"][-1] == 1
@@ -43,7 +44,12 @@ def test_talos_takes_a_step_on_an_estimated_base():
 @pytest.mark.system
 @pytest.mark.slow
 def test_solo_trots_on_an_estimated_base_and_again_the_same(tmp_path):
-    given = ("estimators.base=true", "plan.until=0.6", "simulation.duration=1.2")
+    given = (
+        "estimators.base=true",
+        "plan.until=0.6",
+        "simulation.duration=1.2",
+        COARSE,
+    )
     effort, sent = CompensatedController.effort, []
 
     def spy(command, t, *rest):

@@ -40,6 +40,7 @@ pytest.importorskip("example_robot_data")
 pytest.importorskip("mujoco")
 FEET = ("FL_FOOT", "FR_FOOT", "HL_FOOT", "HR_FOOT")
 BRIEF = ("live.stop.coming_to_rest=0", "simulation.log_period=0.001")
+COARSE = "simulation.control_period=0.002"
 
 
 @cache
@@ -88,13 +89,13 @@ def live(
 @pytest.mark.slow
 def test_a_live_plan_equals_the_simulated_one(tmp_path: Path) -> None:
     """The estimator's errors, the plan's phases and the efforts are those of a run."""
-    brief = ("estimators.base=true", "simulation.duration=0.6", *BRIEF)
+    brief = ("estimators.base=true", "simulation.duration=0.35", *BRIEF)
     experiment = trotting(*brief)
-    report, _ = live(experiment, tmp_path / "trot.journal", duration=0.6)
+    report, _ = live(experiment, tmp_path / "trot.journal", duration=0.35)
     log = hsp.Rollout.load(tmp_path / "trot.journal")
     run = hsp.load_experiment("walking/solo12_trot", *brief).run()
     count = int((log["live.phase"] == Phase.RUNNING).sum())
-    assert 598 <= count <= 600
+    assert 348 <= count <= 350
     for name in ("q", "v", "tau", "plan.phase", "plan.velocity", "estimate.base"):
         np.testing.assert_allclose(
             log[name][:count], run[name][:count], rtol=1e-7, atol=1e-9, err_msg=name
@@ -112,7 +113,7 @@ def test_a_live_plan_equals_the_simulated_one(tmp_path: Path) -> None:
 @pytest.mark.slow
 @pytest.mark.parametrize("by", ["operator", *further("duration")])  # like a walk below
 def test_a_regular_end_lets_the_plan_come_to_rest(by: str) -> None:
-    experiment, requests = trotting(), OperatorRequests()
+    experiment, requests = trotting(COARSE), OperatorRequests()
 
     def stop(t: float) -> None:
         if t > 0.7 and by == "operator":
@@ -142,7 +143,7 @@ def test_a_regular_end_lets_the_plan_come_to_rest(by: str) -> None:
     "[0.8, -0.1, 0]], first: left}",
 ])  # fmt: skip
 def test_a_walk_that_is_stopped_brings_its_feet_together(plan: str) -> None:
-    experiment = hsp.load_experiment("walking/talos_walk", plan)
+    experiment = hsp.load_experiment("walking/talos_walk", plan, COARSE)
     report, robot = live(experiment, duration=2.0)
     assert report.ended == "completed", report.reason
     assert report.at_rest
@@ -156,7 +157,7 @@ def test_a_walk_that_is_stopped_brings_its_feet_together(plan: str) -> None:
 @pytest.mark.system
 @pytest.mark.slow
 def test_a_fall_is_detected_reported_and_ends_with_damped_joints() -> None:
-    push = "{frame: base_link, moment: [6, 0, 0], start: 0.3, duration: 0.3}"
+    push = "{frame: base_link, moment: [6, 0, 0], start: 0.1, duration: 0.3}"
     shove = f"plant.pushes=[{push}]"
     for plan in ("plan.speed=0.3", "plan=null"):
         tasks = (

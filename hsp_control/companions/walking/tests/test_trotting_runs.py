@@ -15,11 +15,12 @@ from hsp_control.companions.walking import Trot
 
 pytest.importorskip("example_robot_data")
 pytest.importorskip("mujoco")
+COARSE = "simulation.control_period=0.002"  # at its own period it trots in `trot`
 
 
 @cache
 def trot() -> Rollout:
-    settings = ("plan.until=1", "simulation.duration=3", "simulation.log_period=0.005")
+    settings = "plan.until=0.8", "simulation.duration=2", "simulation.log_period=0.005"
     return load_experiment("walking/solo12_trot", *settings).run()
 
 
@@ -40,7 +41,7 @@ def test_it_returns_to_its_line_after_a_push():
     """Laterally; the error along the walk is not corrected."""
     push = "{frame: base_link, force: [-4, 8, 0], start: 1, duration: 0.1}"
     settings = f"plant.pushes=[{push}]", "plan.until=4.4", "simulation.duration=4.8"
-    run = load_experiment("walking/solo12_trot", *settings).run()
+    run = load_experiment("walking/solo12_trot", *settings, COARSE).run()
     assert run.status == "completed"
     beside = run.q[:, 1]
     assert beside.max() > 0.12  # farther than the reference permits
@@ -73,7 +74,7 @@ def test_a_robot_that_is_nowhere_named_trots_within_its_limits():
         "contacts": {f: {"type": "ball", "frame": f, "radius": 0.02} for f in feet},
         "plan": {"type": "trot", "speed": 0.4},
         "null_space": {"fields": [{"type": "target_posture", "target": "start"}]},
-        "simulation": {"duration": 1.6, "control_period": 0.001},
+        "simulation": {"duration": 1.3, "control_period": 0.001},
         "plant": {"type": "mujoco", "contacts": dict.fromkeys(feet, ball)},
     }
     run = load_experiment(given).run()
@@ -106,7 +107,7 @@ def test_a_streamed_velocity_is_followed_and_repeated_from_the_log(tmp_path):
         limits=given.limits,
         plan=Trot(velocity=velocity),
         plant=given.plant,
-        simulation=replace(given.simulation, duration=1.5),
+        simulation=replace(given.simulation, duration=1.5, control_period=0.002),
     )
 
     def drive(recorder):

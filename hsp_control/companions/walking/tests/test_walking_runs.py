@@ -19,6 +19,7 @@ pytest.importorskip("mujoco")
 SWINGING = {23: 0.25, 30: -0.25}  # the elbows, in v [rad]
 RATE, FOLLOWS = 2.0 * np.pi / 1.5, 6.0  # once in two steps [rad/s]; how fast [1/s]
 FEET = {"left_foot": "left_sole_link", "right_foot": "right_sole_link"}
+COARSE = "simulation.control_period=0.002"  # at its own period it walks in `walk`
 
 
 @cache
@@ -107,7 +108,7 @@ def test_the_null_space_error_decays_within_each_phase():
 @pytest.mark.system
 def test_a_push_that_causes_a_fall_is_reported():
     push = "{frame: torso_2_link, force: [0, 900, 0], start: 0.1, duration: 0.3}"
-    settings = (f"plant.pushes=[{push}]", "simulation.duration=3")
+    settings = (f"plant.pushes=[{push}]", "simulation.duration=3", COARSE)
     run = load_experiment("walking/talos_walk", *settings).run()
     assert run.status == "stopped"
     assert run.meta["message"].startswith("the robot falls: at t = ")
@@ -119,7 +120,7 @@ def test_a_push_that_causes_a_fall_is_reported():
 def test_a_push_that_one_sole_does_not_hold_is_held_by_both():
     """To the left, just before the right foot swings, which cannot cross over."""
     push = "{frame: torso_2_link, force: [0, 200, 0], start: 1.62, duration: 0.1}"
-    settings = (f"plant.pushes=[{push}]", "simulation.duration=4.1")
+    settings = (f"plant.pushes=[{push}]", "simulation.duration=4.1", COARSE)
     run = load_experiment("walking/talos_walk", *settings).run()
     assert run.status == "completed"
     phase, t = run["plan.phase"], run.t
@@ -161,7 +162,8 @@ def test_it_walks_on_footsteps_that_are_given():
     """A step ahead to the left, and the other foot next to it."""
     rows = "[[0.15, 0.1, 0.1], [0.15, -0.08, 0.1]]"
     plan = f"plan={{type: walk, footsteps: {rows}}}"
-    run = load_experiment("walking/talos_walk", plan, "simulation.duration=4.2").run()
+    settings = (plan, "simulation.duration=4.2", COARSE)
+    run = load_experiment("walking/talos_walk", *settings).run()
     assert run.status == "completed"
     assert run["plan.steps"][-1] == 2
     assert run["plan.phase"][-1] == 0
