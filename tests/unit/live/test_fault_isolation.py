@@ -76,3 +76,17 @@ def test_an_undecided_joint_is_decided_by_others_only() -> None:
     isolation.undecided = np.array([True, False])
     assert isolated(isolation, (1.0, CLEAR), (0, 0), wrong="00")[0] == NEITHER
     assert isolated(isolation, (1.0, CLEAR), (CLEAR, 1.0), wrong="01")[0] == V
+
+
+@pytest.mark.parametrize(
+    ("constant", "right"), [("q", V), ("v", Q), ("v q", NEITHER), ("", NEITHER)]
+)
+def test_a_constant_source_is_wrong_if_the_difference_is_slight(
+    constant: str, right: tuple[bool, bool]
+) -> None:
+    """The other one changes; but a clear case is decided by the surprises."""
+    doubtful, clear = (0.02, 0.03), (CLEAR, 1.0)
+    assert isolated(FaultIsolation(1), doubtful, constant=constant) == [right]
+    far = isolated(FaultIsolation(1), doubtful, constant=constant, slight=False)
+    assert far == [NEITHER]
+    assert isolated(FaultIsolation(1), clear, constant=constant) == [V]
