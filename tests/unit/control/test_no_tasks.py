@@ -40,6 +40,7 @@ def test_tasks_come_and_go() -> None:
     there = np.isfinite(run["task.hand.error"]).all(axis=1)
     assert there[(run.t > 0.2005) & (run.t < 0.7995)].all()
     assert not there[(run.t < 0.1995) | (run.t > 0.8005)].any()
+    np.testing.assert_array_equal(np.isfinite(run["task.hand.bounded"]), there)
     # The ramp is C²: a jump would be as large as the efforts, not as their change.
     change = np.abs(np.diff(run.tau, axis=0)).max()
     assert change < 0.2 < 0.01 * np.abs(run.tau).max()

@@ -23,7 +23,12 @@ from hsp_control.cli import main
 from hsp_control.common.exceptions import ExportError, ViewerError
 from hsp_control.companions.viewer import ComparedRun, export_html, robot_of
 from hsp_control.companions.viewer.export_page import write_page
-from hsp_control.companions.viewer.packing import VERTEX_STEP, ArrayTable, read_mesh
+from hsp_control.companions.viewer.packing import (
+    VERTEX_STEP,
+    ArrayTable,
+    read_mesh,
+    smooth_mesh,
+)
 from hsp_control.companions.viewer.page_plots import (
     CURVE_BOUND,
     pack_panels,
@@ -204,6 +209,17 @@ def test_a_collada_file_keeps_its_place_colour_and_outside() -> None:
     }  # fmt: skip
     # Mirrored, but still seen from above.
     assert np.cross(corners[1] - corners[0], corners[2] - corners[0])[2] > 0.0
+
+
+def test_a_mesh_is_smoothed_once_for_each_use() -> None:
+    """Its own colours are those of an object, not of a geometry."""
+    thing = {"format": "dae", "data": collada("1 0 0 0 0 1 0 0 0 0 1 0 0 0 0 1", PLAIN)}
+    kinds = "_meshfile_object", "_meshfile_geometry"
+    first, again = (
+        [smooth_mesh({**thing, "type": kind}, "it") for kind in kinds] for _ in range(2)
+    )
+    assert [pieces[0].color is None for pieces in first] == [False, True]
+    assert all(one is other for one, other in zip(first, again, strict=True))
 
 
 def test_a_texture_becomes_its_mean_colour() -> None:
