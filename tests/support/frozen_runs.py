@@ -37,8 +37,10 @@ def replayed(program: Path, frozen: Path, states: Rows) -> Rows:
     """Return status and tau of a frozen controller at rows of t, q and v."""
     lines = "\n".join(" ".join(f"{x:.17g}" for x in row) for row in states)
     environment = {"PATH": "/usr/bin:/bin"}  # without Python's environment
-    if sanitizer := os.environ.get("ASAN_OPTIONS"):
-        environment["ASAN_OPTIONS"] = sanitizer
+    # The sanitizer's options, and the C library's: which processor's sines it computes.
+    for name in ("ASAN_OPTIONS", "GLIBC_TUNABLES"):
+        if name in os.environ:
+            environment[name] = os.environ[name]
     done = subprocess.run(
         [program, frozen],
         input=lines,

@@ -250,7 +250,10 @@ def bent(robot: hsp.Robot, bend: float) -> Array:
 def sqrtm_psd(A: Array) -> Array:
     """Return the square root of a symmetric positive semidefinite matrix."""
     values, vectors = np.linalg.eigh(A)
-    return (vectors * np.sqrt(np.maximum(values, 0.0))) @ vectors.T
+    # Zero eigenvalues are rounded, by the processor, to some 1e-15 of the greatest, of
+    # which the roots would be 3e-8.
+    values[values < 1e-13 * values.max()] = 0.0
+    return (vectors * np.sqrt(values)) @ vectors.T
 
 
 # --- changes -------------------------------------------------------------------------
