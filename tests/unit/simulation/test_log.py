@@ -104,8 +104,8 @@ def test_a_run_can_be_measured_afterwards(planar_run: Rollout) -> None:
     run, robot = planar_run, load("planar3r", gravity=False)
     tip = run.measure(robot, lambda state: state.position("tip"))
     np.testing.assert_array_equal(tip, run["skeleton"][:, -1])
-    speed = run.measure(robot, lambda state: state.v @ state.v)
-    np.testing.assert_array_equal(speed, [v @ v for v in run.v])
+    square = run.measure(robot, lambda state: state.v[0] ** 2)
+    np.testing.assert_array_equal(square, [v[0] ** 2 for v in run.v])
     np.testing.assert_array_equal(run.measure(robot, lambda state: state.t), run.t)
     with pytest.raises(ShapeError, match=r"panda needs \(7,\)"):
         run.measure(load("panda"), lambda state: state.t)
