@@ -139,9 +139,12 @@ class FunctionTask(TrackingTask, type="function_task"):
             array = array.reshape(1)
         if array.shape != shape or not np.isfinite(array).all():
             many = " x ".join(map(str, shape))
+            other = what == "function" and array.ndim == 1 and array.size > 0
+            other = other and np.isfinite(array).all()
             raise TaskError(
                 f"task {self.name!r}: {what} returned {value!r}; needs {many} finite "
                 f"number{'' if shape == (1,) else 's'}"
+                + (f", or size={array.size}" if other else "")
             )
         return array
 

@@ -131,6 +131,7 @@ def test_a_task_of_a_function_is_the_ready_one() -> None:
 MISTAKES: list[tuple[dict[str, Any], str]] = [
     ({"function": lambda state: state.q[:3]}, "function returned array("),
     ({"function": lambda state: np.array([np.nan, 0.0])}, "needs 2 finite numbers"),
+    ({"function": lambda state: np.zeros(3)}, "needs 2 finite numbers, or size=3"),
     ({"function": lambda state: "far"}, "function returned 'far'; needs 2 finite"),
     ({"function": elbow, "jacobian_function": lambda state: np.zeros((2, 6))},
      "jacobian_function returned array("),
