@@ -27,17 +27,17 @@ class ExpectedMotion:
 
     The sources are the rows of all arrays: the measured velocity, the slope of the
     positions, and the mean of the trusted ones of these. An expectation is integrated
-    with the model under the efforts applied, and follows its source by a limited step,
-    so that a jump of a sensor is not followed at once. A second state of the first two
-    estimates the acceleration that the model lacks.
+    with the model under the efforts applied and the load, and follows its source by a
+    limited step, so that a jump of a sensor is not followed at once. A second state of
+    the first two estimates the acceleration that the model lacks yet.
 
     Attributes:
         v: The expected velocities, shape (3, nv) [rad/s or m/s].
         before: Those before the last sources were followed, shape (3, nv).
         surprise: The largest recent differences, shape (3, nv).
         usual: Those before the last one, shape (3, nv).
-        acceleration: The acceleration by the applied efforts and the model, shape
-        (nv,).
+        acceleration: The acceleration by the applied efforts and the model, without
+        the load, shape (nv,).
     """
 
     def __init__(
@@ -58,21 +58,24 @@ class ExpectedMotion:
         self.usual = self.surprise
         self._missed = np.zeros((3, v.size))  # none of the mean
         self.acceleration: Array = np.zeros(v.size)
+        self._loaded = self.acceleration
 
-    def apply(self, q: Array, v: Array, tau: Array) -> None:
-        """Record the effort that acts from now on, shape (nv,), at a state."""
+    def apply(self, q: Array, v: Array, tau: Array, load: Array) -> None:
+        """Record the effort and the load that act from now on, (nv,), at a state."""
         if self._robot.unactuated:  # the forces at the feet are unknown
             return
+        moved, dynamics = self._robot.forward_dynamics, self._dynamics
         try:
-            acceleration = self._robot.forward_dynamics(q, v, tau, self._dynamics)
+            acceleration = moved(q, v, tau, dynamics)
+            loaded = moved(q, v, tau + load, dynamics) if load.any() else acceleration
         except HspControlError:
             return
-        if np.isfinite(acceleration).all():
-            self.acceleration = acceleration
+        if np.isfinite([acceleration, loaded]).all():
+            self.acceleration, self._loaded = acceleration, loaded
 
     def advance(self, passed: float) -> None:
         """Advance by a time [s]."""
-        self.v = self.v + passed * (self.acceleration + self._missed)
+        self.v = self.v + passed * (self._loaded + self._missed)
 
     def follow(
         self, measured: Array, trusted: Flags, passed: float, *, braked: bool

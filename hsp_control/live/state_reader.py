@@ -200,7 +200,7 @@ class FrozenState:
         if self._same == 0:
             self._reckoning.correct(last.t, last.q, last.v)
         self._same += 1
-        self._reckoning.predict(applied)
+        self._reckoning.predict(applied + self.load)
         if self._same <= self._tolerated:
             return None
         reached = self._reckoning.state.q
@@ -449,6 +449,8 @@ class StateReader:
             real_time=bool(getattr(hardware, "real_time", False)),
         )
         self._missing = 0
+        # what acts on the joints besides their efforts; see `LoadEstimate`
+        self.load: Array = np.zeros(robot.nv)
         # the new, valid measurement of this period, or None
         self.measurement: Measurement | None = None
         self.fault: str | None = None  # why the robot must be stopped, or None
@@ -520,9 +522,9 @@ class StateReader:
         self._last_arrival = self._clock()
         self._due = self._last_arrival + (1.0 + _READ_MARGIN) * self._period
 
-    def stop(self, load: Array) -> None:
+    def stop(self) -> None:
         """Begin braking the joints; see `TrustedMotion.stop`."""
-        self._motion.stop(load)
+        self._motion.stop()
 
     def read(self, applied: Array, limits: RobotLimits | None) -> None:
         """Read the period's measurement; predict the state if there is none."""
@@ -540,7 +542,8 @@ class StateReader:
         """Record the effort that acts now, (nv,); return the response time [s]."""
         response = self._clock() - self.arrival
         state = self.state
-        self._motion.applied(state.q, state.v, applied, state.mass_matrix)
+        inertia = state.mass_matrix
+        self._motion.applied(state.q, state.v, applied, self.load, inertia)
         if self.measurement is not None:
             self.deadlines.add(self.arrival - self._last_arrival, response)
             self._last_arrival = self.arrival
@@ -593,7 +596,7 @@ class StateReader:
         self._reckoning.correct(t, measurement.q, measurement.v)
 
     def _predict(self, applied: Array) -> None:
-        self._reckoning.predict(applied)
+        self._reckoning.predict(applied + self.load)
         self._missing += 1
         self.deadlines.without_state += 1
         self._due = max(self._due + self._period, self._clock())

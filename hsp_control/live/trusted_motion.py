@@ -96,7 +96,6 @@ class TrustedMotion:
         self.complete = True
         self._useless = False  # whether joints do not follow their efforts
         self.stopping = False  # whether the joints are braked
-        self._load: Array = np.zeros(self._robot.nv)  # since then
         self._driving: Driving | None = None
         self._moving = False  # whether the robot's clock has begun
         self._positions = np.ones(self._robot.nv, dtype=bool)
@@ -132,23 +131,23 @@ class TrustedMotion:
         """Joints whose positions are trusted, shape (nv,)."""
         return self._positions
 
-    def stop(self, load: Array) -> None:
-        """Begin braking: a joint that accelerates now has a wrong sensor or motor.
-
-        ``load`` is the external effort on the joints, shape (nv,).
-        """
+    def stop(self) -> None:
+        """Begin braking: a joint that accelerates now has a wrong sensor or motor."""
         self.stopping = True
-        self._load = load.copy()
 
     def applied(
-        self, q: Array, v: Array, tau: Array, inertia: Array | None = None
+        self, q: Array, v: Array, tau: Array, load: Array, inertia: Array | None = None
     ) -> None:
         """Record the effort that acts from now on, shape (nv,), at a state.
 
-        ``inertia`` is its mass matrix, shape (nv, nv); None: it is computed.
+        ``load`` is the external effort on the joints, shape (nv,); ``inertia`` the mass
+        matrix, shape (nv, nv); None: it is computed.
         """
-        tau = tau + self._load
-        self._expected.apply(q, v, tau)
+        if self.stopping:
+            # Before, what holds a joint is no load for the checks: its sensor may be
+            # dead.
+            tau, load = tau + load, np.zeros_like(load)
+        self._expected.apply(q, v, tau, load)
         robot, dynamics = self._robot, self._dynamics
         if self.complete and self._moving:
             self._sensors.judge(q, v, tau, dynamics)

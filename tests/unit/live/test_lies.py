@@ -493,7 +493,8 @@ def test_noise_of_hours_is_no_lie(period: float) -> None:
         shown = v if k % 2 and period > 0.005 else filtered
         if rng.random() < 0.1:
             continue
-        motion.applied(q, shown, robot.inverse_dynamics(q, shown, np.zeros(7)))
+        held = robot.inverse_dynamics(q, shown, np.zeros(7))
+        motion.applied(q, shown, held, np.zeros(7))
         motion.update(Measurement(k, t, q, shown), t - last, none)
         last = t
         assert motion.fault is None
@@ -561,7 +562,8 @@ def test_friction_that_the_model_misses_is_no_dead_sensor() -> None:
         v = at * (0.0 if sticks else speed)
         q = q + PERIOD * v
         held = panda().inverse_dynamics(q, v, -4.0 * np.sin(10.0 * t) * at)
-        motion.applied(q, v, held + 10.0 * np.sign(-np.sin(10.0 * t)) * at)
+        pushed = held + 10.0 * np.sign(-np.sin(10.0 * t)) * at
+        motion.applied(q, v, pushed, np.zeros(7))
         motion.update(Measurement(k, t, q, v), PERIOD * (k > 0), none)
         assert motion.fault is None, k
     assert motion.complete

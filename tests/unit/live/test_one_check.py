@@ -108,7 +108,7 @@ class Motion:
         self.trusted.update(reported, passed, np.zeros(7, dtype=bool))
         tau = gravity(self.q)
         tau[6] += effort
-        self.trusted.applied(self.q, np.zeros(7), tau)
+        self.trusted.applied(self.q, np.zeros(7), tau, load=np.zeros(7))
         return self.trusted.fault
 
 
@@ -145,7 +145,7 @@ def test_one_noisy_velocity_of_a_braked_joint_is_no_acceleration() -> None:
     motion = Motion(0.002)
     for _ in range(50):
         assert motion.update(0.2, 0.2) is None
-    motion.trusted.stop(np.zeros(7))
+    motion.trusted.stop()
     assert motion.update(0.2, 0.7) is None  # beyond the residual of braking, once
     faults = [motion.update(0.6, 0.6) for _ in range(10)]  # the others are at rest
     (found,) = filter(None, faults)

@@ -1,0 +1,86 @@
+"""Where nothing is measured, joints are expected under their load, too.
+
+Masses are wrong by 20 %: without the load of before, the model expects an arm at rest
+to fall or to rise, and the safe stop brakes a motion that there is not.
+"""
+
+from functools import partial
+
+import numpy as np
+import pytest
+from lies import LIES, Sensors
+from live_rigs import Rig
+from loaded_robots import load
+from places import further
+
+import hsp_control as hsp
+from hsp_control.live import (
+    LiveSettings,
+    Measurement,
+    SimulatedRobot,
+    StopSettings,
+    run_loop,
+)
+from hsp_control.robot.integrators import SemiImplicitEuler
+from hsp_control.simulation.plants import IntegratedPlant, RigidBodyPlant
+
+PERIOD = 0.002
+KNOWN = 500
+"""Number of the read after which the fault begins: 3 % of the load were not known yet
+0.2 s before."""
+SETTINGS = LiveSettings(
+    effort_rate=1000.0, stop=StopSettings(hold=0.02, longest_damping=0.3)
+)
+# The robot's own stop is late: the loop's must suffice.
+PATIENT = LiveSettings(velocity_margin=99.0)
+
+
+class Blind(Rig):
+    """A robot at rest whose masses differ, and which is not measured any more."""
+
+    def __init__(self, arm: str, share: float, *, silent: bool) -> None:
+        known = load(arm)
+        model = known.model.copy()
+        for inertia in list(model.inertias)[1:]:  # not on a slice, which is a copy
+            inertia.mass *= share
+            inertia.inertia = inertia.inertia * share
+        true = RigidBodyPlant(hsp.Robot.from_pinocchio(model))
+        plant = IntegratedPlant(true, SemiImplicitEuler(PERIOD))
+        q, v = known.home(), np.zeros(known.nv)
+        super().__init__(SimulatedRobot(plant, q, v, PERIOD, settings=PATIENT))
+        self.silent, self.fastest = silent, 0.0
+        both = np.ones(known.nv, dtype=bool), KNOWN, np.random.default_rng(0), PERIOD
+        self.jump = partial(Sensors(*both).__call__, lie=LIES["both: +1 and +0.1"])
+
+    def read(self, timeout: float) -> Measurement | None:
+        found = super().read(timeout)
+        assert found is not None
+        if self.reads < KNOWN:
+            return self.jump(found)
+        self.fastest = max(self.fastest, float(np.abs(found.v).max()))
+        return None if self.silent else self.jump(found)
+
+
+@pytest.mark.parametrize(
+    ("arm", "share", "silent"),
+    [
+        *(("xarm7", 0.8, False), ("panda", 1.2, True)),
+        *further(
+            *(("xarm7", 1.2, False), ("xarm7", 0.8, True), ("panda", 0.8, False)),
+            *(("iiwa14", 0.8, False), ("iiwa14", 1.2, True), ("ur5", 1.2, False)),
+            *(("panda", 1.2, False), ("xarm7", 1.2, True), ("ur5", 0.8, True)),
+        ),
+    ],
+)
+def test_an_arm_of_other_masses_that_is_not_measured_stays_at_rest(
+    arm: str, share: float, silent: bool
+) -> None:
+    """All joints are lost at once: they jump, or there is no state any more."""
+    robot, own = Blind(arm, share, silent=silent), load(arm)
+    tip = own.state(0.0, own.home(), np.zeros(own.nv)).position(own.hand.frame)
+    task = hsp.FramePosition(own.hand.frame, tip)
+    law = hsp.Controller(own, [task], hsp.TargetPosture(own.home()))
+    report = run_loop(law, robot, duration=2.0, settings=SETTINGS)
+    assert report.ended == "fault"
+    assert ("no new state" if silent else "jumps by") in report.reason
+    assert robot.fastest < 0.3
