@@ -22,8 +22,9 @@ class FaultIsolation:
     sensors of several joints: once one kind of source was wrong beyond doubt, and not
     the other kind, it is wrong in joints in doubt, too, also in those of which neither
     was trusted. Unless a kind is known, the joints in doubt are decided together: none,
-    if one of them is undecided. Where the case is not clear, and the difference is
-    slight, a source that is constant to the last bit is the wrong one.
+    if one of them is undecided; but like earlier ones, if these were decided alike: of
+    a wrong model all joints may be in doubt. Where the case is not clear, and the
+    difference is slight, a source that is constant to the last bit is the wrong one.
 
     Attributes:
         undecided: Joints of which neither source is trusted, since the wrong one is
@@ -33,6 +34,7 @@ class FaultIsolation:
     def __init__(self, joints: int) -> None:
         """``joints``: nv."""
         self._wrong_kind = np.zeros(2, dtype=bool)  # velocities, positions
+        self._decided = np.zeros(2, dtype=bool)  # the same, if not beyond doubt
         self.undecided: Flags = np.zeros(joints, dtype=bool)
 
     def isolate(
@@ -64,5 +66,9 @@ class FaultIsolation:
         else:
             right = right & ~self.undecided
             if (wrong & ~right.any(axis=0)).any():
-                right = right & (clear | alive)
+                if self._decided[0] != self._decided[1]:
+                    right = np.where(doubtful, ~self._decided[:, None], right)
+                else:
+                    right = right & (clear | alive)
+        self._decided |= (wrong & right[::-1] & ~right).any(axis=1)
         return right[0], right[1]

@@ -59,6 +59,17 @@ def test_the_kind_that_is_wrong_elsewhere_is_wrong_in_joints_in_doubt(
     assert found[2] == wrong  # that source of this joint is right
 
 
+def test_an_undecided_joint_follows_those_that_were_decided_before() -> None:
+    """None of them beyond doubt, as with a wrong model; and only if they agree."""
+    isolation = FaultIsolation(2)
+    nothing, unclear = (0.0, 0.0), (1.0, UNDECIDED)
+    assert isolated(isolation, (1.0, DOUBTFUL), nothing, wrong="10")[0] == Q
+    assert isolated(isolation, nothing, unclear, wrong="01")[1] == Q
+    isolation = FaultIsolation(3)
+    isolated(isolation, (1.0, DOUBTFUL), (DOUBTFUL, 1.0), nothing, wrong="110")
+    assert isolated(isolation, nothing, nothing, unclear, wrong="001")[2] == NEITHER
+
+
 def test_joints_that_are_not_wrong_say_nothing_of_a_kind() -> None:
     isolation = FaultIsolation(2)
     assert isolated(isolation, (1.0, CLEAR), (1.0, 0.9), wrong="01")[1] == NEITHER
