@@ -75,6 +75,7 @@ class LoopLog:
         self.path = None if path is None else Path(path)
         # whether the controller has raised; it is not called again
         self.controller_failed = False
+        self.interrupted = False  # whether it was an operator's exception
         self._log: LogWriter | None = None
         if self.path is not None:
             self._log = LogWriter(controller, scene, 0, path=self.path, meta=meta)
@@ -100,7 +101,8 @@ class LoopLog:
         if not self._due.is_due(state.t, phase, last=last):
             return
         try:
-            self._log.record(*self._row(phase, reader, limiter, response))
+            row = self._row(phase, reader, limiter, response)
+            self._log.record(*row, tasks=not self.interrupted)
         except KeyboardInterrupt:  # the row is written again
             raise
         except BaseException:

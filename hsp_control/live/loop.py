@@ -275,8 +275,10 @@ class LiveRun:
                     self.abandon(request)
                     continue
                 reason = f"stopped by the operator ({_called(request)})"
-                # An exception of the law would be raised again in the stop.
+                # One of the law or a task, such as sys.exit(), would be raised again in
+                # the stop, and would then be taken for the operator's second request.
                 self.log.controller_failed |= self.chain.plan is None
+                self.log.interrupted = True
                 if self.ending is None:
                     self.end_regularly("operator", reason)
                 else:
@@ -327,7 +329,7 @@ class LiveRun:
             self.safe_stop.observe(reader.state, limiter.applied, reader.silent)
         if stops:
             self.safe_stop.trust(measurements=self.consistent, dead=reader.dead)
-            reader.stop(self.safe_stop.load)
+        reader.load = self.safe_stop.load
         response = reader.effort_sent(limiter.applied)
         self.report_applied_effort()
         self.log_row(response)
@@ -416,7 +418,7 @@ class LiveRun:
         self.safe_stop.begin()
         dead = self.reader.dead
         self.safe_stop.trust(measurements=self.consistent, dead=dead)
-        self.reader.stop(self.safe_stop.load)
+        self.reader.stop()
 
     def fail(self, error: BaseException) -> None:
         """Stop after an error of a user's code or of the law."""

@@ -145,6 +145,7 @@ class LogWriter:
         log_channels: Mapping[str, LogChannel],
         *,
         keep: bool = True,
+        tasks: bool = True,
     ) -> None:
         """Write a row.
 
@@ -154,6 +155,7 @@ class LogWriter:
             tau: The effort of the motors, shape (nv,).
             log_channels: Further values to log, by name.
             keep: Whether the row is written; False: see `warm_up`.
+            tasks: Whether tasks are measured: a user's may raise, again and again.
 
         Raises:
             LogError: If the journal cannot be written.
@@ -174,7 +176,8 @@ class LogWriter:
         row["t"][...] = state.t
         row["q"][:], row["v"][:], row["tau"][:] = state.q, state.v, tau
         row["joint_positions"][:] = controller.robot.joint_positions(state.q)
-        self._tasks.write(state)
+        if tasks:
+            self._tasks.write(state)
         skeleton = row["skeleton"]
         joints = len(skeleton) - len(self._frames)
         skeleton[:joints] = state.world.placements[1:, 9:]

@@ -465,6 +465,27 @@ def test_an_exception_of_a_field_ends_in_the_safe_stop(
 
 
 @pytest.mark.parametrize(
+    "error", [SystemExit(3), *further(KeyboardInterrupt(), *NO_EXCEPTIONS)], ids=repr
+)
+def test_an_exception_that_a_task_keeps_raising_ends_in_the_safe_stop(
+    error: BaseException, tmp_path: Path
+) -> None:
+    """Rows of the log measure tasks in the stop, too: that is no second Ctrl-C."""
+
+    def height(state: RobotState) -> float:
+        if state.t > 0.05:
+            raise error
+        return float(state.position("panda_tcp")[2])
+
+    log, robot = tmp_path / "run.journal", rig()
+    made = hsp.Controller(panda(), [hsp.FunctionTask(height)], hsp.JointCentering())
+    report = run_loop(made, robot, duration=0.3, settings=SETTINGS, log=log)
+    assert_safe(robot, report)
+    assert not report.silent
+    assert Rollout.load(log).meta["message"] == report.reason
+
+
+@pytest.mark.parametrize(
     "error",
     [
         OddError("panicked"),
