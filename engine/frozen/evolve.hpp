@@ -38,15 +38,15 @@ struct Evolve {
       const double start = times(k, 0);
       if (start > t) break;
       ramp[0] = times(k, 1);
-      const auto [s, s_dot, s_ddot] =
+      const SmoothStep step =
           ramp[0] == 0.0 ? SmoothStep{1.0, 0.0, 0.0} : smooth_step(t, start, ramp[0]);
       const auto target = targets.row(k).transpose();
-      if (s == 1.0) {
+      if (step.over()) {
         x = target;
         rate.setZero();
-      } else if (s > 0.0) {
-        rate = (1.0 - s) * rate + s_dot * (target - x);
-        x += s * (target - x);
+      } else if (step.s > 0.0) {
+        rate = (1.0 - step.s) * rate + step.s_dot * (target - x);
+        x += step.s * (target - x);
       }
     }
   }

@@ -122,7 +122,7 @@ struct Payloads {
       const double start = starts(k, i), ramp = ramps(k, i), target = i == 0 ? 1.0 : 0.0;
       if (start > t) break;
       const auto step = ramp == 0.0 ? SmoothStep{1.0, 0.0, 0.0} : smooth_step(t, start, ramp);
-      if (step.s == 1.0) {
+      if (step.over()) {
         x = target;
         x_dot = x_ddot = 0.0;
       } else if (step.s > 0.0) {

@@ -52,7 +52,7 @@ inline void crossfade(double elapsed, double duration, const TrajectorySample<In
   }
   const SmoothStep step =
       elapsed < duration ? smooth_step(elapsed, 0.0, duration) : SmoothStep{1.0, 0.0, 0.0};
-  if (step.s == 1.0) assign(after, out);  // exactly
+  if (step.over()) assign(after, out);  // exactly
   else mix(step, before, after, out);
 }
 

@@ -6,6 +6,9 @@ namespace hsp {
 
 struct SmoothStep {
   double s, s_dot, s_ddot;
+
+  // s alone rounds to 1 at u = 1 - 2e-6, where s'' is not yet zero.
+  bool over() const { return s == 1.0 && s_ddot == 0.0; }
 };
 
 // s(t) = 10 u³ - 15 u⁴ + 6 u⁵ with u = (t - t0)/T.

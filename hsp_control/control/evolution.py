@@ -100,7 +100,7 @@ class Evolution(Generic[Value]):
             if each.start > t:
                 break
             s, s_dot, s_ddot = each.share(t)
-            if s == 1.0:
+            if s == 1.0 and s_ddot == 0.0:  # s alone rounds to 1 a little before
                 x, x_dot = each.target, 0.0 * each.target
                 x_ddot = x_dot
             elif s > 0.0:

@@ -166,3 +166,28 @@ def test_impossible_changes(
         make(panda.controller)
     assert panda.controller.changes == ()
     panda.largest_step(lambda k: None, 0.01)
+
+
+@pytest.mark.parametrize("ramp", [0.3, 0.01])
+def test_efforts_have_no_jump_where_a_ramp_ends(ramp: float) -> None:
+    """s rounds to 1 at 2e-6 of the ramp before its end, where s'' is not zero yet."""
+    robot = hsp.Robot.load("panda")
+    q, v, end = robot.home(), np.zeros(7), 0.1 + ramp
+    here = robot.state(0.0, q, v).position("panda_tcp")
+    made = hsp.Controller(
+        robot,
+        [hsp.FramePosition("panda_tcp", hsp.Hold(here), name="hand")],
+        hsp.JointCentering(),
+        limits=None,
+    )
+    changes = made.at(0.1).ramp(ramp).reference("hand", hsp.Hold(here + 0.05))
+    changes.tool("panda_tcp", [0.0, 0.0, 0.1]).payload("panda_hand", 2.0)
+    made.compute(0.0, q, v)
+    before = [end - ramp * 10.0**-k for k in np.linspace(5.0, 8.0, 60)]
+    tau = np.array([copy.copy(made).compute(t, q, v).tau for t in [*before, end]])
+    # Between these times s'' changes by 60 / T² times the time between.
+    smooth = 60.0 / ramp**3 * np.diff([*before, end]) * 10.0
+    assert (np.abs(np.diff(tau, axis=0)).max(axis=1) < smooth + 1e-6).all()
+    last = copy.copy(made).compute(end - ramp * 1e-7, q, v).tau
+    assert_smooth = 60.0 / ramp**2 * 1e-7 * 10.0
+    np.testing.assert_allclose(last, tau[-1], rtol=0, atol=assert_smooth + 1e-6)
