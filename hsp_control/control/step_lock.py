@@ -2,7 +2,6 @@
 
 import os
 from threading import RLock
-from typing import Any
 from weakref import WeakSet
 
 from hsp_control.common.exceptions import ControllerError
@@ -30,9 +29,11 @@ class StepLock:
 
     def forked(self) -> None:
         """Replace the lock in a forked process, which lacks its holder's thread."""
-        own: Any = self._lock
-        if self._taken and not own._is_owned():
-            self._lock, self._taken = RLock(), _FORKED
+        if self._lock.acquire(blocking=False):  # free, or held by this thread
+            self._lock.release()
+            return
+        # Its holder was in a step, or just before one or after it.
+        self._lock, self._taken = RLock(), _FORKED if self._taken else ""
 
 
 _BY_ITSELF = (

@@ -23,6 +23,7 @@ from hsp_control.common.exceptions import (
     TaskError,
 )
 from hsp_control.constraints.limits.barriers import Barrier
+from hsp_control.control.step_lock import StepLock
 from hsp_control.law import FieldSample, MetricSample, TaskSample
 from hsp_control.null_space.fields import (
     FunctionCost,
@@ -508,3 +509,32 @@ def test_results_of_a_step_are_not_copied(copied: Callable[[object], object]) ->
     made.compute(0.0, made.robot.home(), np.zeros(NV))
     with pytest.raises(ImmutableError, match=r"active cannot be copied.*stack_at"):
         copied(made.active_stack)
+
+
+def test_a_lock_that_is_held_around_a_step_is_free_in_a_forked_process() -> None:
+    """Its holder's thread is gone; it was in no step, so that nothing is half done."""
+    lock, held, leave = StepLock(), threading.Event(), threading.Event()
+
+    def hold() -> None:
+        with lock._lock:  # as between its acquisition and the beginning of a step
+            held.set()
+            leave.wait(60.0)
+
+    thread = threading.Thread(target=hold)
+    thread.start()
+    assert held.wait(60.0)
+    lock.forked()
+    with lock:
+        pass
+    leave.set()
+    thread.join()
+
+
+def test_a_lock_that_this_thread_holds_is_kept_in_a_forked_process() -> None:
+    lock = StepLock()
+    with lock:
+        lock.forked()
+        with pytest.raises(ControllerError, match="calls the same controller"), lock:
+            pass
+    with lock:
+        pass
