@@ -11,8 +11,6 @@ from numpy.typing import ArrayLike
 
 from hsp_control.common.exceptions import LogError
 from hsp_control.common.keywords import suggesting
-from hsp_control.common.warned import warn
-from hsp_control.control.clock_check import ClockWarning
 from hsp_control.control.controller import Controller
 from hsp_control.control.output import ControlOutput
 from hsp_control.declaration.language import check_kind
@@ -21,9 +19,6 @@ from hsp_control.simulation import Rollout
 from hsp_control.simulation.declared_run import declared_controller
 from hsp_control.simulation.log_writer import LogWriter
 from hsp_control.simulation.simulate import SimulationSettings
-
-_SLOWEST = 0.2
-"""Longest time between outputs [s]: with K_N = 10 1/s no loop is stable beyond it."""
 
 
 class Recorder:
@@ -112,12 +107,7 @@ class Recorder:
                 self._config["simulation"]["start_time"] = state.t
         elif self._last == self._begun:
             self._held = state.t - self._begun
-            if self._held > _SLOWEST:
-                warn(
-                    f"the first two outputs are {self._held:g} s apart: "
-                    "milliseconds? Times are in s",
-                    ClockWarning,
-                )
+        self._controller._memory.clock.recorded(state.t)
         self._last = state.t
         if state.t < self._due:
             return

@@ -13,15 +13,21 @@ _STILL = 100
 """The same for steps at equal times: a loop may rehearse its first step."""
 _UNITS = 100.0
 """Times of a step over its period from which on they have different units."""
-_MILLI = 1.0 / 3000.0, 1.0 / 300.0
-"""Displacement over velocity times time [1], where times are in milliseconds."""
-_SAME = 0.1, 10.0
-"""The same, where the units are right."""
+_SECONDS = "seconds"
+_RATIOS = {
+    _SECONDS: (0.1, 10.0),
+    "milliseconds": (1.0 / 3e3, 1.0 / 3e2),
+    "microseconds": (1.0 / 3e6, 1.0 / 3e5),
+    "nanoseconds": (1.0 / 3e9, 1.0 / 3e8),
+}
+"""Displacement over velocity times time [1], by the unit of times."""
 _MOVES = 1e-3
 """Norm of the velocity from which on they are compared [rad/s or m/s]."""
 _SURE = 20
 """Moving steps in a row after which the unit is known: noise has any sign."""
 
+_SLOWEST = 0.2
+"""Longest time between outputs [s]: with K_N = 10 1/s no loop is stable beyond it."""
 _LOOKS = 300
 """Steps that are checked for it, after the first one and after a change or a message of
 a stream: later ones cost nothing."""
@@ -41,7 +47,10 @@ class ClockCheck:
         self._told = False
         self.undecided = True  # whether `moved` has to check another step
         self._before: tuple[float, Array, Array] | None = None
-        self._milli = self._same = self._looks = 0
+        self._unit, self._alike = "", 0  # of times, and steps in a row that show it
+        self._looks = self._backwards = 0
+        self._outputs, self._latest = 0, 0.0  # that are recorded, and their latest time
+        self._stuck = 0  # outputs in a row whose times do not advance
 
     def begin(self, t: float) -> None:
         """Check the time of the first step [s]."""
@@ -96,7 +105,7 @@ class ClockCheck:
     def look_again(self) -> None:
         """Check the next steps, if the unit of times is not known yet."""
         self._looks = 0
-        self.undecided = max(self._same, self._milli) < _SURE
+        self.undecided = self._alike < _SURE
 
     def moved(self, state: RobotState) -> None:
         """Compare the displacement since the last step with velocity times time.
@@ -111,18 +120,48 @@ class ClockCheck:
             self._before = None
             return
         before, self._before = self._before, (state.t, state.q.copy(), v.copy())
-        if before is None or not state.t > before[0]:
+        if before is None:
             return
-        way = 0.5 * (state.t - before[0]) * (before[2] + v)
+        passed = state.t - before[0]
+        self._backwards = self._backwards + 1 if passed < 0.0 else 0
+        if self._backwards >= _SURE and not self._told:
+            self._tell(_MESSAGES["back"].format(t=state.t, passed=passed))
+        if not passed > 0.0:
+            return
+        way = 0.5 * passed * (before[2] + v)
         difference = state.robot.difference(before[1], state.q)
         ratio = way.dot(difference) / max(way.dot(way), 1e-300)
-        self._same = self._same + 1 if _SAME[0] < ratio < _SAME[1] else 0
-        self._milli = self._milli + 1 if _MILLI[0] < ratio < _MILLI[1] else 0
-        self.undecided &= max(self._same, self._milli) < _SURE
-        if self._milli >= _SURE and not self._told:
+        shown = [unit for unit, (a, b) in _RATIOS.items() if a < ratio < b]
+        unit = shown[0] if shown else ""
+        self._alike = self._alike + 1 if unit == self._unit else 1
+        self._unit = unit
+        if unit == "" or self._alike < _SURE:
+            return
+        self.undecided = False
+        if unit != _SECONDS and not self._told:
             self._tell(
                 f"positions change by {ratio:.2g} times velocity times time, the last "
-                f"step {state.t - before[0]:.3g} s: milliseconds? Times are in s"
+                f"step {passed:.3g} s: {unit}? Times are in s"
+            )
+
+    def recorded(self, t: float) -> None:
+        """Check the time of an output that is recorded [s]: its period is not known."""
+        self._outputs += 1
+        passed = t - self._latest
+        if self._outputs == 1 or passed > 0.0:
+            self._latest = t
+        if self._outputs == 1 or self._told:
+            return
+        if self._outputs == 2 and passed > _SLOWEST:
+            self._tell(
+                f"the first two outputs are {passed:g} s apart: milliseconds? Times "
+                "are in s"
+            )
+        self._stuck = 0 if passed > 0.0 else self._stuck + 1
+        if self._stuck >= _FEW and not self._told:
+            self._tell(
+                f"the clock runs back, or stands still, at t = {t:.10g} s: outputs are "
+                "recorded at later times only"
             )
 
     def _tell(self, message: str) -> None:

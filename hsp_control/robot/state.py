@@ -175,8 +175,9 @@ class RobotState:
         value = move(t, q, v)
         if value is None:  # rejected: lists, for example, or invalid values
             if not isinstance(t, float | int | np.number) or not np.isfinite(t):
+                given = t.item() if isinstance(t, np.number) else t
                 raise NonFiniteError(
-                    f"time t is {t!r}; needs a finite number of seconds"
+                    f"time t is {given!r}; needs a finite number of seconds"
                 )
             q_in = self.robot.check_configuration(q)
             v_in = self.robot.check_tangent(v, "velocity v")

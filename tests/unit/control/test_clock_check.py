@@ -158,3 +158,50 @@ def test_the_unit_is_seen_when_the_robot_moves_after_a_long_rest(by: str) -> Non
 
     with pytest.warns(ClockWarning, match="milliseconds"):
         move()
+
+
+@pytest.mark.parametrize(
+    ("unit", "name"),
+    [(1e3, "milliseconds"), (1e6, "microseconds"), (1e9, "nanoseconds")],
+)
+def test_times_in_another_unit_are_reported_without_a_period(
+    unit: float, name: str
+) -> None:
+    """Nothing is applied: positions and velocities show the unit."""
+    robot = hsp.Robot.load("panda")
+    controller, v = hsp.Controller(robot, [hsp.FramePosition()]), 0.1 * np.ones(7)
+
+    def run() -> None:
+        for k in range(60):
+            controller.compute(unit * H * k, robot.home() + H * k * v, v)
+
+    with pytest.warns(ClockWarning, match=f"{name}[?] Times are in s") as caught:
+        run()
+    assert len(caught) == 1
+
+
+def test_a_clock_that_runs_back_is_reported_without_a_period() -> None:
+    robot = hsp.Robot.load("panda")
+    controller, v = hsp.Controller(robot, [hsp.FramePosition()]), 0.1 * np.ones(7)
+
+    def run() -> None:
+        for k in range(60):
+            controller.compute(-H * k, robot.home() + H * k * v, v)
+
+    with pytest.warns(ClockWarning, match="the clock runs back"):
+        run()
+
+
+@pytest.mark.parametrize("times", [-STEPS, 0.0 * STEPS, np.append(STEPS, STEPS[:10])])
+def test_a_recorder_says_why_it_records_nothing(times: Sequence[float]) -> None:
+    robot = hsp.Robot.load("panda")
+    controller = hsp.Controller(robot, [hsp.FramePosition()])
+
+    def run() -> None:
+        with hsp.Recorder(controller) as recorder:
+            for t in times:
+                recorder.record(controller.compute(t, robot.home(), np.zeros(7)))
+
+    with pytest.warns(ClockWarning, match="recorded at later times only") as caught:
+        run()
+    assert len(caught) == 1
